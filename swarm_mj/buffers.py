@@ -1,0 +1,146 @@
+"""The buffers (II-B, Eqs. 5, 7, 8): what every robot knows about every other.
+
+Index order: `[b, i, j]` is what robot `i` of mission `b` knows about robot `j`. The functions here
+are the only ones that write a buffer, and they write it in place.
+"""
+
+from dataclasses import dataclass
+from typing import no_type_check
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numba import njit
+
+NO_PARENT = -1  # of oneself, and of a teammate never heard of
+NEVER = 0.0  # T_0 and L_0: the clock's first tick is half a window, so 0 is before everything
+
+
+@dataclass(frozen=True, kw_only=True)
+class Buffers:
+    """What every robot i knows about every robot j, in all B missions at once."""
+
+    timestamp: Float[np.ndarray, "B N N"]  # T^{i,j}: when j observed it [windows], or NEVER
+    position_m: Float[np.ndarray, "B N N 2"]  # M^{i,j}: where j was, as i knows it [m]
+    velocity_mps: Float[np.ndarray, "B N N 2"]  # M^{i,j}: how fast j was, as i knows it [m/s]
+    parent: Int[np.ndarray, "B N N"]  # P^{i,j}: whom j first passed it to, or NO_PARENT
+    last_attempt: Float[np.ndarray, "B N N"]  # L^{i,j}: when i last addressed j [windows], or NEVER
+
+    @property
+    def is_known(self) -> Bool[np.ndarray, "B N N"]:
+        """Whether i has observed j, or heard of it, since the start (T > T_0)."""
+        return self.timestamp > NEVER
+
+
+def empty_buffers(num_missions: int, num_robots: int) -> Buffers:
+    """Buffers before the first observation: everything unknown."""
+    shape = (num_missions, num_robots, num_robots)
+    return Buffers(
+        timestamp=np.full(shape, NEVER),
+        position_m=np.zeros((*shape, 2)),
+        velocity_mps=np.zeros((*shape, 2)),
+        parent=np.full(shape, NO_PARENT, dtype=np.int32),
+        last_attempt=np.full(shape, NEVER),
+    )
+
+
+def observe_self(
+    buffers: Buffers,
+    position_m: Float[np.ndarray, "B N 2"],
+    velocity_mps: Float[np.ndarray, "B N 2"],
+    now: Float[np.ndarray, "B"],
+) -> None:
+    """Writes every robot's own state and the time into its own buffer (Eq. 5).
+
+    Args:
+        buffers: Written in place.
+        position_m: True positions [m].
+        velocity_mps: True velocities [m/s].
+        now: t [windows].
+    """
+    _write_own(
+        buffers.timestamp, buffers.position_m, buffers.velocity_mps, position_m, velocity_mps, now
+    )
+
+
+def record_attempt(
+    buffers: Buffers,
+    recipient: Int[np.ndarray, "B N"],
+    now: Float[np.ndarray, "B"],
+    *,
+    silence_is_attempt: bool = False,
+) -> None:
+    """Notes when each robot last addressed its recipient (Eq. 7).
+
+    Args:
+        buffers: Written in place.
+        recipient: Whom each robot addresses; itself is silence.
+        now: t [windows].
+        silence_is_attempt: Whether a silent robot notes having addressed itself.
+    """
+    _write_attempt(buffers.last_attempt, recipient, now, silence_is_attempt)
+
+
+def merge(buffers: Buffers, heard: Int[np.ndarray, "B N"]) -> None:
+    """Takes over whatever is strictly newer in the packet each robot decoded (Eq. 8).
+
+    A packet holds its sender's buffer as it was before the phase. Information that comes straight
+    from its subject gets the receiver as parent (II-B: P^{i,k} = i).
+
+    Args:
+        buffers: Written in place.
+        heard: The sender that each robot decoded; itself is nobody.
+    """
+    _merge_newer(
+        buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent, heard
+    )
+
+
+@njit(cache=True)
+@no_type_check
+def _write_own(timestamp, believed_m, believed_mps, position_m, velocity_mps, now):
+    num_missions, num_robots = timestamp.shape[:2]
+    for b in range(num_missions):
+        for i in range(num_robots):
+            timestamp[b, i, i] = now[b]
+            for axis in range(2):
+                believed_m[b, i, i, axis] = position_m[b, i, axis]
+                believed_mps[b, i, i, axis] = velocity_mps[b, i, axis]
+
+
+@njit(cache=True)
+@no_type_check
+def _write_attempt(last_attempt, recipient, now, silence_is_attempt):
+    num_missions, num_robots = recipient.shape
+    for b in range(num_missions):
+        for i in range(num_robots):
+            if silence_is_attempt or recipient[b, i] != i:
+                last_attempt[b, i, recipient[b, i]] = now[b]
+
+
+@njit(cache=True)
+@no_type_check
+def _merge_newer(timestamp, position_m, velocity_mps, parent, heard):
+    num_missions, num_robots = heard.shape
+    for b in range(num_missions):
+        senders_listen = False
+        for i in range(num_robots):
+            j = heard[b, i]
+            senders_listen |= j != i and heard[b, j] != j
+        # Packets are read from the buffers before the phase: a copy where a sender also decodes,
+        # which only the reference preset lets happen; else no row is both read and written.
+        sent_timestamp, sent_position_m = timestamp[b], position_m[b]
+        sent_velocity_mps, sent_parent = velocity_mps[b], parent[b]
+        if senders_listen:
+            sent_timestamp, sent_position_m = timestamp[b].copy(), position_m[b].copy()
+            sent_velocity_mps, sent_parent = velocity_mps[b].copy(), parent[b].copy()
+        for i in range(num_robots):
+            j = heard[b, i]
+            if j != i:
+                for k in range(num_robots):
+                    if timestamp[b, i, k] < sent_timestamp[j, k]:
+                        timestamp[b, i, k] = sent_timestamp[j, k]
+                        position_m[b, i, k, 0] = sent_position_m[j, k, 0]
+                        position_m[b, i, k, 1] = sent_position_m[j, k, 1]
+                        velocity_mps[b, i, k, 0] = sent_velocity_mps[j, k, 0]
+                        velocity_mps[b, i, k, 1] = sent_velocity_mps[j, k, 1]
+                        parent[b, i, k] = i if k == j else sent_parent[j, k]

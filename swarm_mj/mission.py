@@ -1,0 +1,161 @@
+"""The mission (IV-B): every number of the paper with its unit and source, and the two presets.
+
+Where the paper's text and its authors' code differ, each difference is a field of `Mission`:
+`paper()` follows the text, `reference()` the code.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal, get_args
+
+Task = Literal["stationary", "random-walk", "flocking"]
+PhysicsMode = Literal["exact", "contact"]
+Boundary = Literal["reflect", "none"]
+WallHit = Literal["mirror", "clip"]
+HalfDuplex = Literal["strict", "eavesdroppers"]
+FlockingSet = Literal["heard", "moving"]
+
+MISSION_DISTANCE_M = 1000.0  # ratios are fractions of this distance, whatever the team's size (IV-B)
+MISSION_DURATION_S = 50.0  # 500 windows of 100 ms: the duration that velocity ratios mean (IV-B)
+SQUARE_METRES_PER_KM2 = 1e6
+
+
+def _quantity(default: float, label: str, unit: str, source: str, low: float, high: float) -> Any:  # noqa: ANN401 - a dataclass field takes the type of its attribute
+    """A field that carries its name in words, its unit, its source and its allowed range."""
+    return field(
+        default=default,
+        metadata={"label": label, "unit": unit, "source": source, "low": low, "high": high},
+    )
+
+
+def _choice(default: str, label: str, source: str, choices: object) -> Any:  # noqa: ANN401 - as above
+    """A field that carries its name in words, its source and its allowed values."""
+    return field(
+        default=default, metadata={"label": label, "source": source, "choices": get_args(choices)}
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mission:
+    """A mission's numbers; the defaults are the paper's text.
+
+    Raises:
+        ValueError: A field is outside its range; the message names the value and the range.
+    """
+
+    preset: str = _choice("paper", "preset", "text or code", Literal["paper", "reference"])
+    task: Task = _choice("flocking", "task", "IV", Task)
+    num_robots: int = _quantity(40, "number of robots", "robots", "IV-B", 2, 1000)
+    density_per_km2: float = _quantity(40.0, "density", "robots/km²", "IV-B", 0.1, 10_000.0)
+    range_ratio: float = _quantity(0.25, "range ratio", "of 1 km", "IV-B", 0.01, 10.0)
+    velocity_ratio: float = _quantity(0.15, "velocity ratio", "of 1 km in 50 s", "IV-B", 0.001, 5.0)
+    max_acceleration_mps2: float = _quantity(20.0, "A_max", "m/s²", "IV-B", 0.01, 1000.0)
+    window_s: float = _quantity(0.1, "window", "s", "IV-B", 0.01, 10.0)
+    num_windows: int = _quantity(500, "number of windows", "windows", "IV-B", 1, 100_000)
+    # The paper writes "1 dBm", but a threshold on a ratio is a ratio: 1 dB.
+    sinr_threshold_db: float = _quantity(1.0, "SINR threshold", "dB", "IV-B", -30.0, 60.0)
+    noise_dbm: float = _quantity(-50.0, "noise power", "dBm", "IV-B", -200.0, 50.0)
+    frequency_hz: float = _quantity(2.4e9, "centre frequency", "Hz", "IV-B", 1e6, 1e12)
+
+    physics: PhysicsMode = _choice("exact", "physics", "Eq. 15 or forces", PhysicsMode)
+    boundary: Boundary = _choice("reflect", "boundary", "IV-A", Boundary)
+    wall_hit: WallHit = _choice("mirror", "wall hit", "IV-A; the code clips", WallHit)
+    half_duplex: HalfDuplex = _choice("strict", "half duplex", "Eq. 3", HalfDuplex)
+    flocking_set: FlockingSet = _choice("heard", "flocking set F", "Eq. 16", FlockingSet)
+    silence_is_attempt: bool = False  # Eq. 7; the code also sets L of a silent robot to itself
+    moves_each_transmission: bool = False  # IV-B; the code moves twice per window of flooding
+    tree_recomputed: bool = False  # IV-C; the code rebuilds the tree of a mobile team each window
+    tree_root_transmits: bool = False  # IV-C; the code's root addresses the last robot
+
+    def __post_init__(self) -> None:
+        for spec in fields(self):
+            _check(spec.metadata, getattr(self, spec.name))
+
+    @property
+    def side_m(self) -> float:
+        """Side of the square area, at constant density [m] (IV-B)."""
+        return math.sqrt(self.num_robots / self.density_per_km2 * SQUARE_METRES_PER_KM2)
+
+    @property
+    def half_side_m(self) -> float:
+        """P_max: positions lie in (-P_max, P_max) per axis [m] (IV-A)."""
+        return self.side_m / 2.0
+
+    @property
+    def range_m(self) -> float:
+        """Distance at which a lone transmission just decodes [m] (IV-B)."""
+        return self.range_ratio * MISSION_DISTANCE_M
+
+    @property
+    def max_velocity_mps(self) -> float:
+        """V_max: bound of the velocity per axis [m/s] (IV-B)."""
+        return self.velocity_ratio * MISSION_DISTANCE_M / MISSION_DURATION_S
+
+    @property
+    def has_walls(self) -> bool:
+        """Whether robots are reflected at the boundary of the area."""
+        return self.boundary == "reflect"
+
+
+def _check(allowed: Any, value: Any) -> None:  # noqa: ANN401 - any field's metadata and value
+    """Raises ValueError when a field's value is not among its choices or in its range."""
+    if "choices" in allowed and value not in allowed["choices"]:
+        raise ValueError(
+            f"{allowed['label']} must be one of {', '.join(allowed['choices'])}, not {value!r}"
+        )
+    if "low" in allowed and not allowed["low"] <= value <= allowed["high"]:
+        raise ValueError(
+            f"{allowed['label']} must be from {allowed['low']:g} to {allowed['high']:g} "
+            f"{allowed['unit']}, not {value:g}"
+        )
+
+
+def paper(task: Task = "flocking", **overrides: Any) -> Mission:  # noqa: ANN401 - Mission's own fields
+    """The paper's text, taken literally.
+
+    Args:
+        task: What the robots do; a flock has no boundary unless `overrides` give it one.
+        **overrides: Any field of `Mission`.
+
+    Returns:
+        The mission.
+
+    Raises:
+        ValueError: A value is outside its range.
+        TypeError: An override is no field of `Mission`.
+    """
+    boundary: Boundary = "none" if task == "flocking" else "reflect"
+    return replace(Mission(task=task, boundary=boundary), **overrides)
+
+
+def reference(task: Task = "flocking", **overrides: Any) -> Mission:  # noqa: ANN401 - as above
+    """What the authors' published code does; the setting of the published numbers.
+
+    Args:
+        task: What the robots do; a flock has no boundary unless `overrides` give it one.
+        **overrides: Any field of `Mission`.
+
+    Returns:
+        The mission.
+
+    Raises:
+        ValueError: A value is outside its range.
+        TypeError: An override is no field of `Mission`.
+    """
+    return replace(
+        paper(task),
+        preset="reference",
+        max_acceleration_mps2=10.0,
+        wall_hit="clip",
+        half_duplex="eavesdroppers",
+        flocking_set="moving",
+        silence_is_attempt=True,
+        moves_each_transmission=True,
+        tree_recomputed=task != "stationary",
+        tree_root_transmits=True,
+        **overrides,
+    )
+
+
+PRESETS: dict[str, Callable[..., Mission]] = {"paper": paper, "reference": reference}

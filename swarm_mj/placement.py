@@ -1,0 +1,77 @@
+"""Initial positions (IV-B): uniform in the area, redrawn until the disk graph is connected."""
+
+from typing import no_type_check
+
+import numpy as np
+from jaxtyping import Float
+from numba import njit
+
+MAX_DRAWS = 20_000  # the sparsest of the paper's teams (range ratio 0.2) connects in a few hundred
+
+
+def is_connected(position_m: Float[np.ndarray, "N 2"], range_m: float) -> bool:
+    """Whether the disk graph is connected.
+
+    Equivalent to a positive algebraic connectivity (Fiedler 1973), which the paper tests (IV-B).
+
+    Args:
+        position_m: Positions [m].
+        range_m: Two robots at most this far apart are neighbours [m].
+
+    Returns:
+        Whether every robot reaches every other over neighbours.
+    """
+    return bool(_reaches_all(position_m, range_m))
+
+
+def connected_positions(
+    num_robots: int, half_side_m: float, range_m: float, rng: np.random.Generator
+) -> Float[np.ndarray, "N 2"]:
+    """Positions uniform in the area whose disk graph is connected (IV-B).
+
+    Args:
+        num_robots: N.
+        half_side_m: Positions lie within plus or minus this [m].
+        range_m: Range of the disk graph [m].
+        rng: Where the positions are drawn from.
+
+    Returns:
+        Positions [m].
+
+    Raises:
+        ValueError: `MAX_DRAWS` draws were all disconnected.
+    """
+    for _ in range(MAX_DRAWS):
+        position_m = rng.uniform(-half_side_m, half_side_m, size=(num_robots, 2))
+        if is_connected(position_m, range_m):
+            return position_m
+    raise ValueError(
+        f"no connected team in {MAX_DRAWS} draws: {num_robots} robots with a range of "
+        f"{range_m:g} m are too sparse for an area of {2 * half_side_m:.0f} m by "
+        f"{2 * half_side_m:.0f} m; raise the range ratio or the density"
+    )
+
+
+@njit(cache=True)
+@no_type_check
+def _reaches_all(position_m, range_m):
+    """Floods the disk graph from robot 0."""
+    num_robots = position_m.shape[0]
+    reached = np.zeros(num_robots, dtype=np.bool_)
+    frontier = np.empty(num_robots, dtype=np.int64)
+    reached[0] = True
+    frontier[0] = 0
+    num_reached = 1
+    num_spread = 0
+    while num_spread < num_reached:
+        i = frontier[num_spread]
+        num_spread += 1
+        for j in range(num_robots):
+            if not reached[j]:
+                dx = position_m[i, 0] - position_m[j, 0]
+                dy = position_m[i, 1] - position_m[j, 1]
+                if dx * dx + dy * dy <= range_m * range_m:
+                    reached[j] = True
+                    frontier[num_reached] = j
+                    num_reached += 1
+    return num_reached == num_robots

@@ -1,0 +1,24 @@
+"""Round robin (IV-C; time-division multiple access around a base station, Miao et al. 2016)."""
+
+import numpy as np
+from jaxtyping import Int
+
+from swarm_mj.policies.policy import CentralisedPolicy, LocalViews
+from swarm_mj.protocol import Bodies
+
+
+class RoundRobin(CentralisedPolicy):
+    """One robot after the other exchanges buffers with the robot nearest the area's centre.
+
+    Centralised: the base station is chosen anew in each window from all true positions.
+    """
+
+    def recipients(self, views: LocalViews, bodies: Bodies) -> Int[np.ndarray, "B N"]:
+        """The base, for the one robot whose turn it is."""
+        missions = np.arange(len(views.now))
+        base = np.argmin(np.sum(bodies.position_m**2, axis=2), axis=1)
+        turn = views.now.astype(np.int64) % (views.num_robots - 1)
+        turn += turn >= base
+        recipient = views.silence.copy()
+        recipient[missions, turn] = base
+        return recipient

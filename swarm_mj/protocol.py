@@ -1,0 +1,121 @@
+"""The protocol (III-B, Alg. 1): one communication window over any channel (Eq. 6).
+
+Two phases of half a window each: a transmission and its responses, or, for flooding, two
+transmissions that nobody answers (IV-C). Index order: `[b, i]` is robot `i` of mission `b`.
+"""
+
+from dataclasses import dataclass
+from typing import no_type_check
+
+import numpy as np
+from jaxtyping import Float, Int
+from numba import njit
+
+from swarm_mj.buffers import Buffers, merge, observe_self, record_attempt
+from swarm_mj.radio import Channel
+
+PHASE = 0.5  # Delta t: each of a window's two phases takes half of it [windows]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Phase:
+    """Who addressed whom in half a window, and whose packet everyone decoded."""
+
+    recipient: Int[np.ndarray, "B N"]  # S^i: whom each robot addressed; itself: it was silent
+    heard: Int[np.ndarray, "B N"]  # i with j in R^i: whom robot j decoded; itself: nobody
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bodies:
+    """Where the robots truly are, in all B missions at once."""
+
+    position_m: Float[np.ndarray, "B N 2"]  # p [m]
+    velocity_mps: Float[np.ndarray, "B N 2"]  # v [m/s]
+
+
+def window(
+    buffers: Buffers,
+    bodies: Bodies,
+    recipient: Int[np.ndarray, "B N"],
+    channel: Channel,
+    now: Float[np.ndarray, "B"],
+    *,
+    silence_is_attempt: bool = False,
+) -> tuple[Phase, Phase]:
+    """One communication window: a transmission phase, then a response phase (Alg. 1).
+
+    There is one difference: Alg. 1 evaluates the policy after the robots' self-observation; here
+    `recipient` was decided at the end of the previous window, before the robots moved, as in the
+    authors' code.
+
+    Args:
+        buffers: Written in place.
+        bodies: True states, fixed during the window.
+        recipient: Whom each robot addresses; itself is silence.
+        channel: Who decodes whom (Eq. 6).
+        now: t at the start of the window [windows].
+        silence_is_attempt: Whether silence counts as addressing oneself (Eq. 7).
+
+    Returns:
+        The transmission and the response phase.
+    """
+    transmission = transmit(
+        buffers, bodies, recipient, channel, now + PHASE, silence_is_attempt=silence_is_attempt
+    )
+
+    observe_self(buffers, bodies.position_m, bodies.velocity_mps, now + 2 * PHASE)
+    response = _send(buffers, bodies, respondents(transmission), channel)
+    return transmission, response
+
+
+def transmit(
+    buffers: Buffers,
+    bodies: Bodies,
+    recipient: Int[np.ndarray, "B N"],
+    channel: Channel,
+    now: Float[np.ndarray, "B"],
+    *,
+    silence_is_attempt: bool = False,
+) -> Phase:
+    """One transmission phase: the first half of Alg. 1, and each half of flooding's window.
+
+    Args:
+        buffers: Written in place.
+        bodies: True states.
+        recipient: Whom each robot addresses; itself is silence.
+        channel: Who decodes whom (Eq. 6).
+        now: t of this phase [windows].
+        silence_is_attempt: Whether silence counts as addressing oneself (Eq. 7).
+
+    Returns:
+        The phase.
+    """
+    observe_self(buffers, bodies.position_m, bodies.velocity_mps, now)
+    record_attempt(buffers, recipient, now, silence_is_attempt=silence_is_attempt)
+    return _send(buffers, bodies, recipient, channel)
+
+
+def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
+    """Whom each robot answers: the sender it decoded, if that packet was meant for it (Alg. 1)."""
+    answered = np.empty_like(transmission.recipient)
+    _answer_senders(transmission.recipient, transmission.heard, answered)
+    return answered
+
+
+def _send(
+    buffers: Buffers, bodies: Bodies, recipient: Int[np.ndarray, "B N"], channel: Channel
+) -> Phase:
+    """Everyone's packet through the channel and, decoded, into the buffers."""
+    heard = channel(bodies.position_m, recipient)
+    merge(buffers, heard)
+    return Phase(recipient=recipient, heard=heard)
+
+
+@njit(cache=True)
+@no_type_check
+def _answer_senders(recipient, heard, answered):
+    num_missions, num_robots = recipient.shape
+    for b in range(num_missions):
+        for j in range(num_robots):
+            i = heard[b, j]
+            answered[b, j] = i if recipient[b, i] == j else j

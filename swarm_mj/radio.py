@@ -1,0 +1,144 @@
+"""The radio (II-A, Eqs. 1-4): who decodes whom, from positions and concurrent transmissions.
+
+Index order everywhere: `i` sends, `j` receives. Powers and ratios are linear unless their name
+ends in `_db` or `_dbm`. As a robot that addresses itself is silent (Alg. 1), so a robot that hears
+itself heard nobody: no sentinel is needed.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol, no_type_check
+
+import numpy as np
+from jaxtyping import Float, Int
+from numba import njit
+
+MIN_DISTANCE_M = 1e-3  # robots closer than this count as this far apart, which keeps gains finite
+
+
+class Channel(Protocol):
+    """Who decodes whom (f of Eq. 6): the protocol takes any of these.
+
+    Called with positions [m] and recipients (itself is silence); returns whose packet each robot
+    decodes (itself: nobody's).
+    """
+
+    def __call__(
+        self, position_m: Float[np.ndarray, "B N 2"], recipient: Int[np.ndarray, "B N"]
+    ) -> Int[np.ndarray, "B N"]: ...
+
+
+def path_loss_db(distance_m: float, frequency_hz: float) -> float:
+    """Free-space path loss over a distance [dB] (Eq. 1)."""
+    return 20.0 * math.log10(distance_m) + 20.0 * math.log10(frequency_hz) - 147.55
+
+
+def channel_gain(loss_db: float) -> float:
+    """Received over transmitted power, linear [1] (Eq. 2)."""
+    return from_db(-loss_db)
+
+
+def from_db(ratio_db: float) -> float:
+    """A ratio in dB as a linear one; a power in dBm as mW."""
+    return 10.0 ** (ratio_db / 10.0)
+
+
+def transmit_power_dbm(
+    range_m: float, frequency_hz: float, noise_dbm: float, threshold_db: float
+) -> float:
+    """Power whose packets decode exactly up to a range when all others are silent [dBm] (IV-B)."""
+    return noise_dbm + threshold_db + path_loss_db(range_m, frequency_hz)
+
+
+@njit(cache=True)
+@no_type_check
+def sinr(signal_mw: float, interference_mw: float, noise_mw: float) -> float:
+    """Signal over interference plus noise, linear [1] (Eq. 3)."""
+    return signal_mw / (noise_mw + interference_mw)
+
+
+@njit(cache=True)
+@no_type_check
+def is_received(signal_to_noise: float, threshold: float) -> bool:
+    """Whether a packet decodes; both ratios linear [1] (Eq. 4)."""
+    return signal_to_noise >= threshold
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeSpaceRadio:
+    """The paper's channel: free-space path loss, interference of all concurrent transmitters.
+
+    Eq. 3 counts a robot's own signal as interference, so a transmitter hears nothing. The authors'
+    code exempts the addressed recipient: `recipient_hears_while_sending`. Of several packets above
+    the threshold, possible only below 0 dB, a robot decodes the strongest (III-B).
+    """
+
+    power_mw: float  # rho: transmit power of every robot [mW]
+    noise_mw: float  # sigma [mW]
+    threshold: float  # least SINR that decodes, linear [1]
+    frequency_hz: float  # nu [Hz]
+    recipient_hears_while_sending: bool = False
+
+    @property
+    def received_at_1_m_mw(self) -> float:
+        """Power received over one metre [mW]; free space scales it by 1/d² (Eqs. 1-2)."""
+        return self.power_mw * channel_gain(path_loss_db(1.0, self.frequency_hz))
+
+    def __call__(
+        self, position_m: Float[np.ndarray, "B N 2"], recipient: Int[np.ndarray, "B N"]
+    ) -> Int[np.ndarray, "B N"]:
+        """Whose packet each robot decodes when all of these are sent at once (Eqs. 1-4).
+
+        Args:
+            position_m: Positions [m].
+            recipient: Whom each robot addresses; itself is silence.
+
+        Returns:
+            The sender that each robot decodes; itself is nobody.
+        """
+        heard = np.empty_like(recipient)
+        _decode_strongest(
+            position_m,
+            recipient,
+            self.received_at_1_m_mw,
+            self.noise_mw,
+            self.threshold,
+            self.recipient_hears_while_sending,
+            heard,
+        )
+        return heard
+
+
+@njit(cache=True)
+@no_type_check
+def _decode_strongest(
+    position_m, recipient, received_at_1_m_mw, noise_mw, threshold, hears_while_sending, heard
+):
+    """Fills `heard`: the strongest packet at each receiver, if it clears the threshold."""
+    num_missions, num_robots = recipient.shape
+    sender = np.empty(num_robots, dtype=np.int64)
+    for b in range(num_missions):
+        num_senders = 0
+        for i in range(num_robots):
+            if recipient[b, i] != i:
+                sender[num_senders] = i
+                num_senders += 1
+        for j in range(num_robots):
+            total_mw = 0.0
+            strongest_mw = 0.0
+            strongest = j
+            for s in range(num_senders):
+                i = sender[s]
+                if i != j:
+                    dx = position_m[b, i, 0] - position_m[b, j, 0]
+                    dy = position_m[b, i, 1] - position_m[b, j, 1]
+                    squared_m2 = max(dx * dx + dy * dy, MIN_DISTANCE_M * MIN_DISTANCE_M)
+                    received_mw = received_at_1_m_mw / squared_m2
+                    total_mw += received_mw
+                    if received_mw > strongest_mw:
+                        strongest_mw = received_mw
+                        strongest = i
+            is_silent = recipient[b, j] == j
+            may_hear = is_silent or (hears_while_sending and recipient[b, strongest] == j)
+            ratio = sinr(strongest_mw, total_mw - strongest_mw, noise_mw)
+            heard[b, j] = strongest if may_hear and is_received(ratio, threshold) else j

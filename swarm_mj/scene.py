@@ -1,0 +1,116 @@
+"""The scene: the arena and N robots, composed from the MJCF files in `assets/`."""
+
+from importlib import resources
+from pathlib import Path
+
+import mujoco  # noqa: TID251 - the scene is MuJoCo's
+
+from swarm_mj.mission import Mission
+
+CONTACT_STEP_S = 0.01  # step of the `contact` physics: ten per window of 100 ms
+ROBOT_MASS_KG = 1.0  # assets/robot.xml
+WALL_THICKNESS_M = 2.0  # half of it, assets/arena.xml
+WALL_HEIGHT_M = 5.0  # half of it, assets/arena.xml
+SQUARES_PER_M = 5.0 / 1000.0  # repeats of the floor's texture, assets/arena.xml
+CAMERA_HEIGHT_PER_SIDE = 1.3  # sees the whole area at a field of view of 45 degrees
+
+# An overdamped limit that turns v into -v within one Euler step: a = -2 v / h (MuJoCo, solreflimit
+# in the direct form). Tight impedance, or part of the speed is lost.
+ELASTIC_SOLIMP = [0.9999, 0.9999, 0.001, 0.5, 2.0]
+
+
+def asset(name: str) -> Path:
+    """The path of a file in `assets/`, in a checkout or in an installed wheel.
+
+    Args:
+        name: The file's name.
+
+    Returns:
+        Its path.
+
+    Raises:
+        FileNotFoundError: It is in neither place.
+    """
+    package = Path(str(resources.files("swarm_mj")))
+    for folder in (package / "assets", package.parent / "assets"):
+        if (folder / name).is_file():
+            return folder / name
+    raise FileNotFoundError(f"asset {name} is neither in the package nor beside it; reinstall")
+
+
+def timestep_s(mission: Mission) -> float:
+    """MuJoCo's step [s]: the whole window in `exact` physics, 10 ms or a tenth in `contact`."""
+    if mission.physics == "exact":
+        return mission.window_s
+    return mission.window_s / num_substeps(mission)
+
+
+def num_substeps(mission: Mission) -> int:
+    """MuJoCo steps per window."""
+    if mission.physics == "exact":
+        return 1
+    return max(1, round(mission.window_s / CONTACT_STEP_S))
+
+
+def compose(mission: Mission) -> mujoco.MjSpec:
+    """The arena at the mission's size with its N robots, ready to compile.
+
+    Args:
+        mission: Number of robots, area, bounds and physics.
+
+    Returns:
+        The editable model.
+    """
+    spec = mujoco.MjSpec.from_file(str(asset("arena.xml")))
+    spec.option.timestep = timestep_s(mission)
+    spec.modelname = f"swarm of {mission.num_robots}"
+    _scale_arena(spec, mission)
+    robot = mujoco.MjSpec.from_file(str(asset("robot.xml")))
+    _bound_robot(robot, mission)
+    for i in range(mission.num_robots):
+        frame = spec.worldbody.add_frame(pos=[0.0, 0.0, 1.0])
+        spec.attach(robot.copy(), frame=frame, prefix=f"r{i}/")
+    return spec
+
+
+def _scale_arena(spec: mujoco.MjSpec, mission: Mission) -> None:
+    """Sizes floor, walls, camera and statistics to the area; an open area has no walls."""
+    half = mission.half_side_m
+    spec.stat.extent = mission.side_m
+    spec.geom("floor").size = [half, half, mission.side_m / 20.0]
+    repeats = mission.side_m * SQUARES_PER_M
+    spec.material("floor").texrepeat = [repeats, repeats]
+    spec.camera("top").pos = [0.0, 0.0, CAMERA_HEIGHT_PER_SIDE * mission.side_m]
+    across = half + 2 * WALL_THICKNESS_M
+    for name, x, y in (("east", 1, 0), ("west", -1, 0), ("north", 0, 1), ("south", 0, -1)):
+        wall = spec.geom(f"wall_{name}")
+        if not mission.has_walls:
+            spec.delete(wall)
+            continue
+        centre = half + WALL_THICKNESS_M
+        wall.pos = [x * centre, y * centre, WALL_HEIGHT_M]
+        wall.size = [
+            WALL_THICKNESS_M if x else across,
+            WALL_THICKNESS_M if y else across,
+            WALL_HEIGHT_M,
+        ]
+
+
+def _bound_robot(robot: mujoco.MjSpec, mission: Mission) -> None:
+    """Sets the mission's bounds on the robot's actuators, and in `contact` its elastic walls."""
+    step_s = timestep_s(mission)
+    force_n = ROBOT_MASS_KG * mission.max_acceleration_mps2
+    for actuator in robot.actuators:
+        actuator.forcerange = [-force_n, force_n]
+        if mission.physics == "exact":
+            actuator.set_to_velocity(kv=ROBOT_MASS_KG / step_s)
+            actuator.ctrlrange = [-mission.max_velocity_mps, mission.max_velocity_mps]
+        else:
+            actuator.set_to_motor()
+            actuator.ctrlrange = [-force_n, force_n]
+    if mission.physics == "contact" and mission.has_walls:
+        for joint in robot.joints:
+            joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+            joint.range = [-mission.half_side_m, mission.half_side_m]
+            joint.solref_limit = [0.0, -2.0 / step_s]
+            joint.solimp_limit = ELASTIC_SOLIMP

@@ -1,0 +1,193 @@
+"""The swarm: B missions side by side, window by window: motion, physics, radio, buffers, costs."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from swarm_mj.buffers import Buffers, empty_buffers, observe_self
+from swarm_mj.costs import WindowCosts, window_costs
+from swarm_mj.mission import Mission
+from swarm_mj.motion import initial_velocity, motion_of
+from swarm_mj.physics import Physics
+from swarm_mj.placement import connected_positions
+from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, LocalViews, Policy
+from swarm_mj.protocol import PHASE, Bodies, Phase, transmit, window
+from swarm_mj.radio import Channel, FreeSpaceRadio, from_db, transmit_power_dbm
+
+
+def radio_of(mission: Mission) -> FreeSpaceRadio:
+    """The mission's radio, its power such that the range is exact in silence (IV-B)."""
+    power_dbm = transmit_power_dbm(
+        mission.range_m, mission.frequency_hz, mission.noise_dbm, mission.sinr_threshold_db
+    )
+    return FreeSpaceRadio(
+        power_mw=from_db(power_dbm),
+        noise_mw=from_db(mission.noise_dbm),
+        threshold=from_db(mission.sinr_threshold_db),
+        frequency_hz=mission.frequency_hz,
+        recipient_hears_while_sending=mission.half_duplex == "eavesdroppers",
+    )
+
+
+class Swarm:
+    """B missions that differ in their seed only.
+
+    A mission's course depends on its own seed, not on the missions beside it.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        seeds: Sequence[int],
+        *,
+        channel: Channel | None = None,
+        num_threads: int = 1,
+    ) -> None:
+        """Places the robots and starts all missions.
+
+        Args:
+            mission: The numbers of every mission.
+            seeds: One per mission; its length is B.
+            channel: Who decodes whom; the mission's `FreeSpaceRadio` unless given.
+            num_threads: MuJoCo's own.
+
+        Raises:
+            ValueError: No seed, a negative one, or no connected team could be drawn.
+        """
+        if not seeds or min(seeds) < 0:
+            raise ValueError(f"seeds must be one or more integers from 0, not {list(seeds)}")
+        self.mission = mission
+        self.channel = radio_of(mission) if channel is None else channel
+        self._physics = Physics(mission, len(seeds), num_threads=num_threads)
+        self.restart(seeds)
+
+    def restart(self, seeds: Sequence[int]) -> None:
+        """Starts all missions anew.
+
+        Args:
+            seeds: One per mission, as many as before.
+
+        Raises:
+            ValueError: No connected team could be drawn.
+        """
+        placement, motion, policy = zip(*(_streams(seed) for seed in seeds), strict=True)
+        mission = self.mission
+        position_m = [
+            connected_positions(mission.num_robots, mission.half_side_m, mission.range_m, rng)
+            for rng in placement
+        ]
+        velocity_mps = [initial_velocity(mission, rng) for rng in placement]
+        self._physics.place(np.stack(position_m), np.stack(velocity_mps))
+        self._motion = motion_of(mission, motion)
+        self._policy_rngs = policy
+        self.now = np.zeros(len(seeds))  # t [windows]
+        self.buffers: Buffers = empty_buffers(len(seeds), mission.num_robots)
+        observe_self(self.buffers, self.bodies.position_m, self.bodies.velocity_mps, self.now)
+        self.phases: tuple[Phase, ...] = ()
+
+    @property
+    def bodies(self) -> Bodies:
+        """Where the robots truly are."""
+        return self._physics.bodies
+
+    @property
+    def views(self) -> LocalViews:
+        """What every robot knows."""
+        return LocalViews(buffers=self.buffers, now=self.now, phases=self.phases)
+
+    def start(self, policy: Policy) -> None:
+        """Gives a policy the missions' random streams; once, before its first window."""
+        policy.start(self.mission.num_robots, self._policy_rngs)
+
+    def decide(self, policy: Policy) -> Int[np.ndarray, "B N"]:
+        """Whom each robot addresses next, from no more than the policy's type allows it to know."""
+        if isinstance(policy, CentralisedPolicy):
+            return policy.recipients(self.views, self.bodies)
+        assert isinstance(policy, DecentralisedPolicy)
+        return policy.recipients(self.views)
+
+    def move(self) -> None:
+        """Moves the robots through one window (Eq. 15)."""
+        self._physics.step(self._motion(self.buffers, self.bodies))
+
+    def step(self, policy: Policy) -> WindowCosts:
+        """One window: the policy decides, the robots move, then they talk."""
+        if policy.transmits_twice:
+            return self._flood(policy)
+        return self.exchange(self.decide(policy))
+
+    def exchange(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
+        """One window of Alg. 1 with these recipients, after the robots have moved.
+
+        Args:
+            recipient: Whom each robot addresses; itself is silence.
+
+        Returns:
+            What the window cost.
+        """
+        self.move()
+        phases = window(
+            self.buffers,
+            self.bodies,
+            recipient,
+            self.channel,
+            self.now,
+            silence_is_attempt=self.mission.silence_is_attempt,
+        )
+        return self._finish(phases, has_response=True)
+
+    def _flood(self, policy: Policy) -> WindowCosts:
+        """One window of two transmissions, each decided on what was known before it (IV-C)."""
+        phases = []
+        for half in (1, 2):
+            recipient = self.decide(policy)
+            if half == 1 or self.mission.moves_each_transmission:
+                self.move()
+            phase = transmit(
+                self.buffers,
+                self.bodies,
+                recipient,
+                self.channel,
+                self.now + half * PHASE,
+                silence_is_attempt=self.mission.silence_is_attempt,
+            )
+            phases.append(phase)
+        return self._finish((phases[0], phases[1]), has_response=False)
+
+    def _finish(self, phases: tuple[Phase, Phase], *, has_response: bool) -> WindowCosts:
+        self.phases = phases
+        self.now = self.now + 2 * PHASE
+        return window_costs(
+            self.buffers, self.bodies, phases, self.now, has_response=has_response
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flight:
+    """What B missions cost, window by window."""
+
+    costs: WindowCosts  # leading axis: windows flown
+    hops: Float[np.ndarray, "B"]
+
+    @property
+    def x(self) -> int:
+        return 0
+
+
+def fly(
+    swarm: Swarm, policy: Policy, *, watch: Callable[[], None] = lambda: None
+) -> list[WindowCosts]:
+    """Flies all windows of a mission."""
+    swarm.start(policy)
+    costs = []
+    for _ in range(swarm.mission.num_windows):
+        costs.append(swarm.step(policy))
+        watch()
+    return costs
+
+
+def _streams(seed: int) -> list[np.random.Generator]:
+    """Placement, motion and policy of one mission draw apart, so policies meet equal missions."""
+    return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3)]
