@@ -90,14 +90,19 @@ def merge(buffers: Buffers, heard: Int[np.ndarray, "B N"]) -> None:
         buffers: Written in place.
         heard: The sender that each robot decoded; itself is nobody.
     """
-    _merge_newer(
-        buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent, heard
-    )
+    _merge_newer(buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent, heard)
 
 
 @njit(cache=True)
 @no_type_check
-def _write_own(timestamp, believed_m, believed_mps, position_m, velocity_mps, now):
+def _write_own(
+    timestamp: Float[np.ndarray, "B N N"],
+    believed_m: Float[np.ndarray, "B N N 2"],
+    believed_mps: Float[np.ndarray, "B N N 2"],
+    position_m: Float[np.ndarray, "B N 2"],
+    velocity_mps: Float[np.ndarray, "B N 2"],
+    now: Float[np.ndarray, "B"],
+) -> None:
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
@@ -109,7 +114,12 @@ def _write_own(timestamp, believed_m, believed_mps, position_m, velocity_mps, no
 
 @njit(cache=True)
 @no_type_check
-def _write_attempt(last_attempt, recipient, now, silence_is_attempt):
+def _write_attempt(
+    last_attempt: Float[np.ndarray, "B N N"],
+    recipient: Int[np.ndarray, "B N"],
+    now: Float[np.ndarray, "B"],
+    silence_is_attempt: bool,
+) -> None:
     num_missions, num_robots = recipient.shape
     for b in range(num_missions):
         for i in range(num_robots):
@@ -119,7 +129,13 @@ def _write_attempt(last_attempt, recipient, now, silence_is_attempt):
 
 @njit(cache=True)
 @no_type_check
-def _merge_newer(timestamp, position_m, velocity_mps, parent, heard):
+def _merge_newer(
+    timestamp: Float[np.ndarray, "B N N"],
+    position_m: Float[np.ndarray, "B N N 2"],
+    velocity_mps: Float[np.ndarray, "B N N 2"],
+    parent: Int[np.ndarray, "B N N"],
+    heard: Int[np.ndarray, "B N"],
+) -> None:
     num_missions, num_robots = heard.shape
     for b in range(num_missions):
         senders_listen = False

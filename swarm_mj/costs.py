@@ -15,13 +15,13 @@ from swarm_mj.protocol import Bodies, Phase
 class Packets:
     """What became of the packets of one window, or of many, in every mission [packets]."""
 
-    attempted: Int[np.ndarray, "*T B"]  # sent to a recipient in a transmission phase
-    delivered: Int[np.ndarray, "*T B"]  # of these, decoded by the recipient
-    overheard: Int[np.ndarray, "*T B"]  # decoded by a robot it was not meant for, in any phase
-    answered: Int[np.ndarray, "*T B"]  # responses that the first sender decoded
+    attempted: Int[np.ndarray, "B"]  # sent to a recipient in a transmission phase
+    delivered: Int[np.ndarray, "B"]  # of these, decoded by the recipient
+    overheard: Int[np.ndarray, "B"]  # decoded by a robot it was not meant for, in any phase
+    answered: Int[np.ndarray, "B"]  # responses that the first sender decoded
 
     @property
-    def lost(self) -> Int[np.ndarray, "*T B"]:
+    def lost(self) -> Int[np.ndarray, "B"]:
         """Attempted, and not decoded by the recipient."""
         return self.attempted - self.delivered
 
@@ -84,9 +84,9 @@ def mean_hops(buffers: Buffers) -> Float[np.ndarray, "B"]:
 class WindowCosts:
     """What one window cost, in every mission."""
 
-    age_windows: Float[np.ndarray, "*T B"]  # age of information after the window (Eq. 10)
-    is_complete: Bool[np.ndarray, "*T B"]  # whether everyone has heard of everyone
-    velocity_variance_m2ps2: Float[np.ndarray, "*T B"]  # Eq. 17
+    age_windows: Float[np.ndarray, "B"]  # age of information after the window (Eq. 10)
+    is_complete: Bool[np.ndarray, "B"]  # whether everyone has heard of everyone
+    velocity_variance_m2ps2: Float[np.ndarray, "B"]  # Eq. 17
     packets: Packets
 
 
@@ -111,7 +111,12 @@ def window_costs(
 # Times are halves of a window, so their sum is exact and adding in any order changes nothing.
 @njit(cache=True, fastmath={"reassoc"})
 @no_type_check
-def _mean_age(timestamp, now, age, is_complete):
+def _mean_age(
+    timestamp: Float[np.ndarray, "B N N"],
+    now: Float[np.ndarray, "B"],
+    age: Float[np.ndarray, "B"],
+    is_complete: Bool[np.ndarray, "B"],
+) -> None:
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         total = 0.0
@@ -126,7 +131,10 @@ def _mean_age(timestamp, now, age, is_complete):
 
 @njit(cache=True)
 @no_type_check
-def _variance(velocity_mps, variance):
+def _variance(
+    velocity_mps: Float[np.ndarray, "B N 2"],
+    variance: Float[np.ndarray, "B"],
+) -> None:
     num_missions, num_robots = velocity_mps.shape[:2]
     for b in range(num_missions):
         total = 0.0
@@ -141,7 +149,13 @@ def _variance(velocity_mps, variance):
 
 @njit(cache=True)
 @no_type_check
-def _count(recipient, heard, attempted, received, overheard):
+def _count(
+    recipient: Int[np.ndarray, "B N"],
+    heard: Int[np.ndarray, "B N"],
+    attempted: Int[np.ndarray, "B"],
+    received: Int[np.ndarray, "B"],
+    overheard: Int[np.ndarray, "B"],
+) -> None:
     num_missions, num_robots = recipient.shape
     for b in range(num_missions):
         for i in range(num_robots):
@@ -155,7 +169,11 @@ def _count(recipient, heard, attempted, received, overheard):
 
 @njit(cache=True)
 @no_type_check
-def _mean_depth(timestamp, parent, hops):
+def _mean_depth(
+    timestamp: Float[np.ndarray, "B N N"],
+    parent: Int[np.ndarray, "B N N"],
+    hops: Float[np.ndarray, "B"],
+) -> None:
     num_missions, num_robots = parent.shape[:2]
     depth = np.empty(num_robots, dtype=np.int64)
     path = np.empty(num_robots, dtype=np.int64)

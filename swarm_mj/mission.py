@@ -16,12 +16,16 @@ WallHit = Literal["mirror", "clip"]
 HalfDuplex = Literal["strict", "eavesdroppers"]
 FlockingSet = Literal["heard", "moving"]
 
-MISSION_DISTANCE_M = 1000.0  # ratios are fractions of this distance, whatever the team's size (IV-B)
+MISSION_DISTANCE_M = (
+    1000.0  # ratios are fractions of this distance, whatever the team's size (IV-B)
+)
 MISSION_DURATION_S = 50.0  # 500 windows of 100 ms: the duration that velocity ratios mean (IV-B)
 SQUARE_METRES_PER_KM2 = 1e6
 
 
-def _quantity(default: float, label: str, unit: str, source: str, low: float, high: float) -> Any:  # noqa: ANN401 - a dataclass field takes the type of its attribute
+def _quantity(
+    default: float | int, label: str, unit: str, source: str, low: float, high: float
+) -> Any:  # noqa: ANN401 - a dataclass field takes the type of its attribute
     """A field that carries its name in words, its unit, its source and its allowed range."""
     return field(
         default=default,
@@ -46,13 +50,13 @@ class Mission:
 
     preset: str = _choice("paper", "preset", "text or code", Literal["paper", "reference"])
     task: Task = _choice("flocking", "task", "IV", Task)
-    num_robots: int = _quantity(40, "number of robots", "robots", "IV-B", 2, 1000)
+    num_robots: int = _quantity(40, "number of robots", "robots", "IV-B", 2.0, 1000.0)
     density_per_km2: float = _quantity(40.0, "density", "robots/km²", "IV-B", 0.1, 10_000.0)
     range_ratio: float = _quantity(0.25, "range ratio", "of 1 km", "IV-B", 0.01, 10.0)
     velocity_ratio: float = _quantity(0.15, "velocity ratio", "of 1 km in 50 s", "IV-B", 0.001, 5.0)
     max_acceleration_mps2: float = _quantity(20.0, "A_max", "m/s²", "IV-B", 0.01, 1000.0)
     window_s: float = _quantity(0.1, "window", "s", "IV-B", 0.01, 10.0)
-    num_windows: int = _quantity(500, "number of windows", "windows", "IV-B", 1, 100_000)
+    num_windows: int = _quantity(500, "number of windows", "windows", "IV-B", 1.0, 100_000.0)
     # The paper writes "1 dBm", but a threshold on a ratio is a ratio: 1 dB.
     sinr_threshold_db: float = _quantity(1.0, "SINR threshold", "dB", "IV-B", -30.0, 60.0)
     noise_dbm: float = _quantity(-50.0, "noise power", "dBm", "IV-B", -200.0, 50.0)

@@ -1,7 +1,7 @@
 """What the robots do (IV-A): stand still, walk at random, or flock on what they have heard."""
 
 from collections.abc import Sequence
-from typing import Protocol, no_type_check
+from typing import Protocol, no_type_check, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -13,10 +13,13 @@ from swarm_mj.protocol import Bodies
 from swarm_mj.streams import Stream, normal
 
 
+@runtime_checkable
 class Motion(Protocol):
-    """The accelerations u for the next window [m/s²]."""
+    """What the robots' controllers want in the next window."""
 
-    def __call__(self, buffers: Buffers, bodies: Bodies) -> Float[np.ndarray, "B N 2"]: ...
+    def __call__(self, buffers: Buffers, bodies: Bodies) -> Float[np.ndarray, "B N 2"]:
+        """The accelerations u [m/s²]; row [b, i] may use buffer and body [b, i] only."""
+        ...
 
 
 def motion_of(mission: Mission, rngs: Sequence[np.random.Generator]) -> Motion:
@@ -36,9 +39,7 @@ def motion_of(mission: Mission, rngs: Sequence[np.random.Generator]) -> Motion:
     return Flocking(mission)
 
 
-def initial_velocity(
-    mission: Mission, rng: np.random.Generator
-) -> Float[np.ndarray, "N 2"]:
+def initial_velocity(mission: Mission, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
     """Velocities at the start [m/s]: uniform in plus or minus V_max per axis, 0 when stationary."""
     if mission.task == "stationary":
         return np.zeros((mission.num_robots, 2))
@@ -73,7 +74,7 @@ class Flocking:
 
     def __init__(self, mission: Mission) -> None:
         self._limit_mps2 = mission.max_acceleration_mps2
-        self._flocking_set = mission.flocking_set
+        self._flocking_set: FlockingSet = mission.flocking_set
 
     def __call__(self, buffers: Buffers, bodies: Bodies) -> Float[np.ndarray, "B N 2"]:
         """The next accelerations [m/s²]."""
@@ -109,7 +110,13 @@ def flocking(
 
 @njit(cache=True)
 @no_type_check
-def _mean_difference(timestamp, believed_mps, velocity_mps, counts_heard, acceleration):
+def _mean_difference(
+    timestamp: Float[np.ndarray, "B N N"],
+    believed_mps: Float[np.ndarray, "B N N 2"],
+    velocity_mps: Float[np.ndarray, "B N 2"],
+    counts_heard: bool,
+    acceleration: Float[np.ndarray, "B N 2"],
+) -> None:
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):

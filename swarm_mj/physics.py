@@ -140,7 +140,9 @@ def _check_finite(acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
 
 @njit(cache=True)
 @no_type_check
-def _first_not_finite(acceleration_mps2):
+def _first_not_finite(
+    acceleration_mps2: Float[np.ndarray, "B N 2"],
+) -> int:
     flat = acceleration_mps2.ravel()
     for n in range(flat.size):
         if not np.isfinite(flat[n]):
@@ -151,8 +153,18 @@ def _first_not_finite(acceleration_mps2):
 @njit(cache=True)
 @no_type_check
 def _kick(
-    qpos, qvel, ctrl, acceleration, dt_s, limit_mps2, limit_mps, wall_m, wall, position, velocity
-):
+    qpos: Float[np.ndarray, "B N 2"],
+    qvel: Float[np.ndarray, "B N 2"],
+    ctrl: Float[np.ndarray, "B N 2"],
+    acceleration: Float[np.ndarray, "B N 2"],
+    dt_s: float,
+    limit_mps2: float,
+    limit_mps: float,
+    wall_m: float,
+    wall: int,
+    position: Float[np.ndarray, "B N 2"],
+    velocity: Float[np.ndarray, "B N 2"],
+) -> None:
     """Accelerates, clips, reflects, and copies the states out; qpos has already moved by v dt."""
     num_missions, num_robots = acceleration.shape[:2]
     for b in range(num_missions):

@@ -54,7 +54,10 @@ def connected_positions(
 
 @njit(cache=True)
 @no_type_check
-def _reaches_all(position_m, range_m):
+def _reaches_all(
+    position_m: Float[np.ndarray, "N 2"],
+    range_m: float,
+) -> bool:
     """Floods the disk graph from robot 0."""
     num_robots = position_m.shape[0]
     reached = np.zeros(num_robots, dtype=np.bool_)

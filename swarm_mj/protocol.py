@@ -113,7 +113,11 @@ def _send(
 
 @njit(cache=True)
 @no_type_check
-def _answer_senders(recipient, heard, answered):
+def _answer_senders(
+    recipient: Int[np.ndarray, "B N"],
+    heard: Int[np.ndarray, "B N"],
+    answered: Int[np.ndarray, "B N"],
+) -> None:
     num_missions, num_robots = recipient.shape
     for b in range(num_missions):
         for j in range(num_robots):

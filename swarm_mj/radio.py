@@ -7,7 +7,7 @@ itself heard nobody: no sentinel is needed.
 
 import math
 from dataclasses import dataclass
-from typing import Protocol, no_type_check
+from typing import Protocol, no_type_check, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -16,16 +16,23 @@ from numba import njit
 MIN_DISTANCE_M = 1e-3  # robots closer than this count as this far apart, which keeps gains finite
 
 
+@runtime_checkable
 class Channel(Protocol):
-    """Who decodes whom (f of Eq. 6): the protocol takes any of these.
-
-    Called with positions [m] and recipients (itself is silence); returns whose packet each robot
-    decodes (itself: nobody's).
-    """
+    """Who decodes whom (f of Eq. 6): the protocol takes any of these."""
 
     def __call__(
         self, position_m: Float[np.ndarray, "B N 2"], recipient: Int[np.ndarray, "B N"]
-    ) -> Int[np.ndarray, "B N"]: ...
+    ) -> Int[np.ndarray, "B N"]:
+        """Whose packet each robot decodes.
+
+        Args:
+            position_m: Positions [m].
+            recipient: Whom each robot addresses; itself is silence.
+
+        Returns:
+            The sender that each robot decodes; itself is nobody.
+        """
+        ...
 
 
 def path_loss_db(distance_m: float, frequency_hz: float) -> float:
@@ -112,8 +119,14 @@ class FreeSpaceRadio:
 @njit(cache=True)
 @no_type_check
 def _decode_strongest(
-    position_m, recipient, received_at_1_m_mw, noise_mw, threshold, hears_while_sending, heard
-):
+    position_m: Float[np.ndarray, "B N 2"],
+    recipient: Int[np.ndarray, "B N"],
+    received_at_1_m_mw: float,
+    noise_mw: float,
+    threshold: float,
+    hears_while_sending: bool,
+    heard: Int[np.ndarray, "B N"],
+) -> None:
     """Fills `heard`: the strongest packet at each receiver, if it clears the threshold."""
     num_missions, num_robots = recipient.shape
     sender = np.empty(num_robots, dtype=np.int64)

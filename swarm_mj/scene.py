@@ -3,7 +3,7 @@
 from importlib import resources
 from pathlib import Path
 
-import mujoco  # noqa: TID251 - the scene is MuJoCo's
+from mujoco._specs import MjSpec  # noqa: TID251 - the scene is MuJoCo's; typed nowhere else
 
 from swarm_mj.mission import Mission
 
@@ -52,7 +52,7 @@ def num_substeps(mission: Mission) -> int:
     return max(1, round(mission.window_s / CONTACT_STEP_S))
 
 
-def compose(mission: Mission) -> mujoco.MjSpec:
+def compose(mission: Mission) -> MjSpec:
     """The arena at the mission's size with its N robots, ready to compile.
 
     Args:
@@ -61,11 +61,11 @@ def compose(mission: Mission) -> mujoco.MjSpec:
     Returns:
         The editable model.
     """
-    spec = mujoco.MjSpec.from_file(str(asset("arena.xml")))
+    spec = MjSpec.from_file(str(asset("arena.xml")))
     spec.option.timestep = timestep_s(mission)
     spec.modelname = f"swarm of {mission.num_robots}"
     _scale_arena(spec, mission)
-    robot = mujoco.MjSpec.from_file(str(asset("robot.xml")))
+    robot = MjSpec.from_file(str(asset("robot.xml")))
     _bound_robot(robot, mission)
     for i in range(mission.num_robots):
         frame = spec.worldbody.add_frame(pos=[0.0, 0.0, 1.0])
@@ -73,7 +73,7 @@ def compose(mission: Mission) -> mujoco.MjSpec:
     return spec
 
 
-def _scale_arena(spec: mujoco.MjSpec, mission: Mission) -> None:
+def _scale_arena(spec: MjSpec, mission: Mission) -> None:
     """Sizes floor, walls, camera and statistics to the area; an open area has no walls."""
     half = mission.half_side_m
     spec.stat.extent = mission.side_m
@@ -96,9 +96,10 @@ def _scale_arena(spec: mujoco.MjSpec, mission: Mission) -> None:
         ]
 
 
-def _bound_robot(robot: mujoco.MjSpec, mission: Mission) -> None:
+def _bound_robot(robot: MjSpec, mission: Mission) -> None:
     """Sets the mission's bounds on the robot's actuators, and in `contact` its elastic walls."""
     step_s = timestep_s(mission)
+    robot.option.timestep = step_s
     force_n = ROBOT_MASS_KG * mission.max_acceleration_mps2
     for actuator in robot.actuators:
         actuator.forcerange = [-force_n, force_n]
@@ -110,7 +111,7 @@ def _bound_robot(robot: mujoco.MjSpec, mission: Mission) -> None:
             actuator.ctrlrange = [-force_n, force_n]
     if mission.physics == "contact" and mission.has_walls:
         for joint in robot.joints:
-            joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+            joint.limited = True
             joint.range = [-mission.half_side_m, mission.half_side_m]
             joint.solref_limit = [0.0, -2.0 / step_s]
             joint.solimp_limit = ELASTIC_SOLIMP

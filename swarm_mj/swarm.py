@@ -1,10 +1,9 @@
 """The swarm: B missions side by side, window by window: motion, physics, radio, buffers, costs."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from swarm_mj.buffers import Buffers, empty_buffers, observe_self
 from swarm_mj.costs import WindowCosts, window_costs
@@ -159,33 +158,7 @@ class Swarm:
     def _finish(self, phases: tuple[Phase, Phase], *, has_response: bool) -> WindowCosts:
         self.phases = phases
         self.now = self.now + 2 * PHASE
-        return window_costs(
-            self.buffers, self.bodies, phases, self.now, has_response=has_response
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Flight:
-    """What B missions cost, window by window."""
-
-    costs: WindowCosts  # leading axis: windows flown
-    hops: Float[np.ndarray, "B"]
-
-    @property
-    def x(self) -> int:
-        return 0
-
-
-def fly(
-    swarm: Swarm, policy: Policy, *, watch: Callable[[], None] = lambda: None
-) -> list[WindowCosts]:
-    """Flies all windows of a mission."""
-    swarm.start(policy)
-    costs = []
-    for _ in range(swarm.mission.num_windows):
-        costs.append(swarm.step(policy))
-        watch()
-    return costs
+        return window_costs(self.buffers, self.bodies, phases, self.now, has_response=has_response)
 
 
 def _streams(seed: int) -> list[np.random.Generator]:

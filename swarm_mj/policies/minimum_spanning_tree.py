@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import no_type_check
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numba import njit
 
 from swarm_mj.policies.policy import CentralisedPolicy, LocalViews, check_probability
@@ -72,7 +72,10 @@ def spanning_tree(position_m: Float[np.ndarray, "B N 2"]) -> Int[np.ndarray, "B 
 
 @njit(cache=True)
 @no_type_check
-def _grow_and_peel(position_m, parent):
+def _grow_and_peel(
+    position_m: Float[np.ndarray, "... N 2"],
+    parent: Int[np.ndarray, "... N"],
+) -> None:
     num_missions, num_robots = parent.shape
     is_edge = np.empty((num_robots, num_robots), dtype=np.bool_)
     for b in range(num_missions):
@@ -83,7 +86,10 @@ def _grow_and_peel(position_m, parent):
 
 @njit(cache=True)
 @no_type_check
-def _grow(position_m, is_edge):
+def _grow(
+    position_m: Float[np.ndarray, "... N 2"],
+    is_edge: Bool[np.ndarray, "N N"],
+) -> None:
     """Prim's algorithm from robot 0."""
     num_robots = position_m.shape[0]
     nearest = np.zeros(num_robots, dtype=np.int64)
@@ -108,7 +114,10 @@ def _grow(position_m, is_edge):
 
 @njit(cache=True)
 @no_type_check
-def _peel(is_edge, parent):
+def _peel(
+    is_edge: Bool[np.ndarray, "N N"],
+    parent: Int[np.ndarray, "... N"],
+) -> None:
     """Leaves point at their neighbour and go, round by round, until the root is left."""
     num_robots = parent.shape[0]
     degree = np.empty(num_robots, dtype=np.int64)

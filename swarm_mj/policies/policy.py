@@ -35,7 +35,7 @@ class LocalViews:
         return np.broadcast_to(np.arange(num_robots), (num_missions, num_robots))
 
 
-class Policy(ABC):
+class Policy:
     """Chooses whom every robot addresses in the next window; itself is silence."""
 
     transmits_twice: ClassVar[bool] = False  # flooding's window: two transmissions, no responses
@@ -49,7 +49,7 @@ class Policy(ABC):
         """
 
 
-class DecentralisedPolicy(Policy):
+class DecentralisedPolicy(Policy, ABC):
     """A policy that every robot evaluates on its own view (Eq. 9)."""
 
     @abstractmethod
@@ -64,7 +64,7 @@ class DecentralisedPolicy(Policy):
         """
 
 
-class CentralisedPolicy(Policy):
+class CentralisedPolicy(Policy, ABC):
     """A policy that is told the truth: everyone's buffer and everyone's true state."""
 
     @abstractmethod
