@@ -1,1 +1,30 @@
-"""Robot swarms on MuJoCo that share their state over a radio they compete for."""
+"""Robot swarms on MuJoCo that share their state over a radio they compete for.
+
+Source: Tolstaya, Butler, Mox, Paulos, Kumar, Ribeiro: Learning Connectivity for Data Distribution
+in Robot Teams. Where its text and its authors' code differ, see `mission.paper` and
+`mission.reference`. The map from the paper to the code:
+
+    II-A    Eq. 1   path loss                radio.path_loss_db
+    II-A    Eq. 2   channel gain             radio.channel_gain
+    II-A    Eq. 3   SINR                     radio.sinr
+    II-A    Eq. 4   reception                radio.is_received
+    II-B    Eq. 5   self-observation         buffers.observe_self
+    II-B    Eq. 6   channel f                radio.Channel
+    II-B    Eq. 7   last attempt             buffers.record_attempt
+    II-B    Eq. 8   merge                    buffers.merge
+    II-C    Eq. 9   local policy             policies.policy.DecentralisedPolicy
+    II-C    Eq. 10  age of information       costs.age_of_information
+    III-B   Alg. 1  the protocol's window    protocol.window
+    IV-A    Eq. 15  dynamics                 physics.Physics.step
+    IV-A    Eq. 16  flocking control         motion.flocking
+    IV-A    Eq. 17  velocity variance        costs.velocity_variance
+    IV-B            mission specification    mission.Mission
+    IV-B            initial positions        placement.connected_positions
+    IV-C            random flooding          policies.random_flooding.RandomFlooding
+    IV-C            round robin              policies.round_robin.RoundRobin
+    IV-C            minimum spanning tree    policies.minimum_spanning_tree.MinimumSpanningTree
+
+Around the paper: `scene` (MJCF), `swarm` (B missions side by side), `flight` (a policy from the
+first window to the last), `recorder` and `replay` (what is seen), `envs` (other libraries' faces),
+`bench` (speed), `cli` (the command line).
+"""

@@ -1,0 +1,55 @@
+"""The command line: `swarm-mj fly | replay | scene | bench`, one file per command.
+
+Exit codes: 0 done, 2 bad input, 130 interrupted.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from swarm_mj.cli import bench, fly, replay, scene
+from swarm_mj.provenance import version
+
+BAD_INPUT, INTERRUPTED = 2, 130
+
+
+class _Parser(argparse.ArgumentParser):
+    """Complains in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Prints the complaint and where to read on; exits with 2."""
+        self.exit(BAD_INPUT, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The parser of all commands."""
+    parser = _Parser(
+        prog="swarm-mj",
+        description="Robot swarms on MuJoCo that share their state over a radio they compete for.",
+    )
+    parser.add_argument("--version", action="version", version=f"swarm-mj {version()}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    for command in (fly, replay, scene, bench):
+        command.add_parser(commands)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs a command.
+
+    Args:
+        arguments: The command line after the program's name; None is this process's.
+
+    Returns:
+        The exit code.
+    """
+    options = make_parser().parse_args(arguments)
+    try:
+        return options.run(options)
+    except (ValueError, OSError) as error:
+        print(f"swarm-mj: error: {error}", file=sys.stderr)  # noqa: T201 - the command's voice
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("swarm-mj: interrupted", file=sys.stderr)  # noqa: T201 - the command's voice
+        return INTERRUPTED

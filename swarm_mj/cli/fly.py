@@ -1,0 +1,223 @@
+"""`swarm-mj fly`: flies one mission, records its replay and says what it cost."""
+
+import argparse
+import json
+import math
+import time
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from swarm_mj.cli.options import add_mission_options, mission_of, new_parser
+from swarm_mj.cli.outputs import check_writable, write_text
+from swarm_mj.flight import Flown, Summary, fly, summarise
+from swarm_mj.mission import Mission
+from swarm_mj.policies import POLICIES, Policy, make_policy
+from swarm_mj.provenance import commit, version
+from swarm_mj.recorder import Recorder
+from swarm_mj.swarm import Swarm
+
+DONE, INTERRUPTED = 0, 130
+REPLAYS = Path("replays")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Flight:
+    """A flight as the command line saw it."""
+
+    flown: list[Flown]
+    recorder: Recorder | None
+    was_interrupted: bool
+    wall_s: float
+
+
+def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no public type
+    """Adds the command."""
+    parser = new_parser(
+        commands,
+        "fly",
+        "Fly one mission and record its replay.",
+        epilog="Exit codes: 0 done, 2 bad input, 130 interrupted (what was flown is recorded).",
+    )
+    parser.add_argument("--policy", default="mst", help=f"who talks to whom: {', '.join(POLICIES)}")
+    parser.add_argument(
+        "--probability",
+        type=float,
+        default=None,
+        help="of a transmission, for random-flooding and mst (default: 0.06)",
+    )
+    parser.add_argument("--seed", type=int, default=1, help="the same seed is the same mission")
+    add_mission_options(parser)
+    group = parser.add_argument_group("output")
+    recording = group.add_mutually_exclusive_group()
+    recording.add_argument(
+        "--record",
+        type=Path,
+        metavar="FILE.rrd",
+        help="the replay (default: a fresh name under replays/)",
+    )
+    recording.add_argument("--no-record", action="store_true", help="record no replay")
+    group.add_argument("--force", action="store_true", help="replace an existing replay")
+    group.add_argument(
+        "--observer", type=int, default=0, help="the robot whose knowledge the replay shows"
+    )
+    group.add_argument("--view", action="store_true", help="open the replay afterwards")
+    group.add_argument("--json", type=Path, metavar="FILE", help="write a summary")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Runs the command; returns its exit code."""
+    mission = mission_of(options)
+    policy = make_policy(options.policy, mission, options.probability)
+    path = _check_outputs(options)
+    console = Console(stderr=True, highlight=False)
+    with console.status("Preparing the swarm (compiles once, then it is cached) ..."):
+        swarm = Swarm(mission, [options.seed])
+        recorder = _recorder(options, swarm, policy) if path else None
+    flight = _fly(swarm, policy, recorder, console)
+    if flight.flown:
+        _report(options, mission, flight, path)
+    if flight.was_interrupted:
+        console.print(f"Interrupted after {len(flight.flown)} of {mission.num_windows} windows.")
+        return INTERRUPTED
+    return _view(path) if options.view and path else DONE
+
+
+def _check_outputs(options: argparse.Namespace) -> Path | None:
+    """The replay's path, or None; raises ValueError for what could not be written later."""
+    if options.json:
+        check_writable(options.json, "summary")
+    if options.no_record:
+        if options.view:
+            raise ValueError("--view needs a replay; leave out --no-record")
+        return None
+    path = options.record or _fresh_name(options)
+    if path.suffix != ".rrd":
+        raise ValueError(f"replay must be named *.rrd, not {path}")
+    check_writable(path, "replay", must_be_new=not options.force)
+    return path
+
+
+def _fresh_name(options: argparse.Namespace) -> Path:
+    stem = f"{options.task}-{options.policy}-seed{options.seed}-{datetime.now():%Y%m%d-%H%M%S}"
+    candidates = [f"{stem}.rrd", *(f"{stem}-{count}.rrd" for count in range(2, 100))]
+    return next(REPLAYS / name for name in candidates if not (REPLAYS / name).exists())
+
+
+def _recorder(options: argparse.Namespace, swarm: Swarm, policy: Policy) -> Recorder:
+    return Recorder(swarm, observer=options.observer, has_response=not policy.transmits_twice)
+
+
+def _fly(swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Console) -> _Flight:
+    """Flies with a progress bar; Ctrl-C ends the flight, and what was flown is kept."""
+    flown: list[Flown] = []
+    was_interrupted = False
+    bar = Progress(
+        TextColumn("Flying"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("windows, age {task.fields[age]:.1f}"),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+    )
+    start_s = time.perf_counter()
+    try:
+        with bar:
+            task = bar.add_task("fly", total=swarm.mission.num_windows, age=0.0)
+            for window in fly(swarm, policy):
+                flown.append(window)
+                if recorder:
+                    recorder.add(window)
+                bar.update(task, advance=1, age=float(window.costs.age_windows[0]))
+    except KeyboardInterrupt:
+        was_interrupted = True
+    wall_s = time.perf_counter() - start_s
+    return _Flight(flown=flown, recorder=recorder, was_interrupted=was_interrupted, wall_s=wall_s)
+
+
+def _report(
+    options: argparse.Namespace, mission: Mission, flight: _Flight, path: Path | None
+) -> None:
+    """Writes the replay and the summary, and prints the table."""
+    config = {
+        **asdict(mission),
+        "policy": options.policy,
+        "probability": options.probability,
+        "seed": options.seed,
+        "version": version(),
+        "commit": commit(),
+    }
+    summary = summarise(flight.flown)
+    if path and flight.recorder and flight.recorder.num_windows:
+        from swarm_mj.replay.write import write_replay  # rerun takes its time to import
+
+        path.parent.mkdir(parents=True, exist_ok=True)
+        kept = {key: value for key, value in config.items() if value is not None}
+        write_replay(flight.recorder.log(), mission, kept, path)
+    if options.json:
+        document = {
+            "config": config,
+            **_numbers(summary),
+            "wall_seconds": flight.wall_s,
+            "interrupted": flight.was_interrupted,
+            "replay": str(path) if path else None,
+        }
+        write_text(options.json, json.dumps(document, indent=2) + "\n")
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(_table(options, summary, flight.wall_s))
+    if path:
+        console.print(f"Open the replay:  swarm-mj replay {path}")
+
+
+def _numbers(summary: Summary) -> dict[str, Any]:
+    """The summary of the one mission flown; what never happened is None."""
+    numbers: dict[str, Any] = {}
+    for name, value in asdict(summary).items():
+        number = value if isinstance(value, int) else float(value[0])
+        is_count = name.startswith("packets_") or name == "complete_window"
+        if math.isnan(number):
+            number = None
+        numbers[name] = int(number) if is_count and number is not None else number
+    return numbers
+
+
+def _table(options: argparse.Namespace, summary: Summary, wall_s: float) -> Table:
+    numbers = _numbers(summary)
+    table = Table(
+        title=f"{options.task}, {options.policy}, {options.robots} robots, seed {options.seed}",
+        title_justify="left",
+        show_header=False,
+    )
+    complete = numbers["complete_window"]
+    rows = {
+        "age of information, mean": f"{numbers['aoi_mean']:.2f} windows",
+        "velocity variance, mean": f"{numbers['velocity_variance_mean']:.4f} m²/s²",
+        "velocity variance, first to last": (
+            f"{numbers['velocity_variance_first']:.4f} to "
+            f"{numbers['velocity_variance_last']:.4f} m²/s²"
+        ),
+        "packets attempted": f"{numbers['packets_attempted']}",
+        "  delivered, lost": f"{numbers['packets_delivered']}, {numbers['packets_lost']}",
+        "  answered": f"{numbers['packets_answered']}",
+        "  overheard by others": f"{numbers['packets_overheard']}",
+        "hops in the parent trees, mean": f"{numbers['hops_mean']:.2f}",
+        "everyone had heard of everyone": f"window {complete}" if complete else "never",
+        "windows flown": f"{summary.num_windows} in {wall_s:.2f} s",
+    }
+    for name, value in rows.items():
+        table.add_row(name, value)
+    return table
+
+
+def _view(path: Path) -> int:
+    from swarm_mj.replay.view import run as run_viewer
+    from swarm_mj.replay.view import view_command
+
+    return run_viewer(view_command(path))

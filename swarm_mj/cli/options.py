@@ -1,0 +1,83 @@
+"""Options that several commands share, and the mission they name."""
+
+import argparse
+from typing import Any, get_args
+
+from swarm_mj.mission import PRESETS, Boundary, Mission, PhysicsMode, Task
+
+DEFAULTS = Mission()
+
+
+def new_parser(commands: Any, name: str, summary: str, epilog: str = "") -> argparse.ArgumentParser:  # noqa: ANN401 - argparse names no public type
+    """A command's parser: its summary as its help, defaults shown with every option."""
+    return commands.add_parser(
+        name,
+        help=summary,
+        description=summary,
+        epilog=epilog,
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+
+
+def add_mission_options(parser: argparse.ArgumentParser) -> None:
+    """The options that make a mission."""
+    group = parser.add_argument_group("mission")
+    group.add_argument(
+        "--task", default="flocking", help=f"what the robots do: {_listed(get_args(Task))}"
+    )
+    group.add_argument(
+        "--robots", type=int, default=DEFAULTS.num_robots, help="size of the team, 2 to 1000"
+    )
+    group.add_argument(
+        "--velocity-ratio",
+        type=float,
+        default=DEFAULTS.velocity_ratio,
+        help="largest velocity per axis, as the share of 1 km covered in 50 s (0.15 is 3 m/s)",
+    )
+    group.add_argument(
+        "--range-ratio",
+        type=float,
+        default=DEFAULTS.range_ratio,
+        help="range of a packet in silence, as a share of 1 km",
+    )
+    group.add_argument(
+        "--windows", type=int, default=DEFAULTS.num_windows, help="length, in windows of 100 ms"
+    )
+    group.add_argument(
+        "--preset",
+        default="paper",
+        help=f"{_listed(PRESETS)}: the paper's text, or what its authors' code does",
+    )
+    group.add_argument(
+        "--physics",
+        default=DEFAULTS.physics,
+        help=f"{_listed(get_args(PhysicsMode))}: Eq. 15 to rounding error, or forces and bounces",
+    )
+    group.add_argument(
+        "--boundary",
+        default=DEFAULTS.boundary,
+        help=f"{_listed(get_args(Boundary))}; the paper's flocks fly out of the area: none",
+    )
+
+
+def mission_of(options: argparse.Namespace) -> Mission:
+    """The mission that the options name.
+
+    Raises:
+        ValueError: A value is unknown or outside its range.
+    """
+    if options.preset not in PRESETS:
+        raise ValueError(f"preset must be one of {_listed(PRESETS)}, not {options.preset!r}")
+    return PRESETS[options.preset](
+        options.task,
+        num_robots=options.robots,
+        velocity_ratio=options.velocity_ratio,
+        range_ratio=options.range_ratio,
+        num_windows=options.windows,
+        physics=options.physics,
+        boundary=options.boundary,
+    )
+
+
+def _listed(names: Any) -> str:  # noqa: ANN401 - any names
+    return ", ".join(names)

@@ -1,0 +1,35 @@
+"""`swarm-mj scene`: writes the composed MJCF model."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from swarm_mj.cli.options import add_mission_options, mission_of, new_parser
+from swarm_mj.cli.outputs import check_writable, write_text
+from swarm_mj.scene import compose
+
+
+def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no public type
+    """Adds the command."""
+    parser = new_parser(commands, "scene", "Write the scene of a mission as one MJCF file.")
+    add_mission_options(parser)
+    parser.add_argument("--out", type=Path, default=Path("scene.xml"), help="the file to write")
+    parser.add_argument("--force", action="store_true", help="replace an existing file")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Runs the command; returns its exit code."""
+    mission = mission_of(options)
+    check_writable(options.out, "scene", must_be_new=not options.force)
+    spec = compose(mission)
+    spec.compile()
+    write_text(options.out, spec.to_xml())
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(
+        f"Wrote {options.out}: {mission.num_robots} robots, {mission.side_m:.0f} m square"
+    )
+    console.print(f"Open it:  python -m mujoco.viewer --mjcf={options.out}")
+    return 0

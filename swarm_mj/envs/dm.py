@@ -1,0 +1,161 @@
+"""The dm_control face: one mission as a `control.Environment`, with its cameras and its viewer.
+
+The swarm flies the mission; dm_control is shown where the robots are. What is written into its
+physics is seen in a picture, and is overwritten at the next window.
+"""
+
+from collections import OrderedDict
+from collections.abc import Sequence
+
+import numpy as np
+from dm_control import mujoco  # noqa: TID251 - the dm_control face
+from dm_control.mujoco import wrapper  # noqa: TID251 - as above
+from dm_control.rl import control  # noqa: TID251 - as above
+from dm_env import specs
+from jaxtyping import Int
+
+from swarm_mj.costs import age_of_information
+from swarm_mj.mission import Mission
+from swarm_mj.scene import compose
+from swarm_mj.swarm import Swarm
+
+
+def make_environment(mission: Mission, seed: int = 0) -> control.Environment:
+    """One mission as an environment of dm_control, and so of dm_env.
+
+    Args:
+        mission: Its numbers.
+        seed: Of the first episode; the next one has `seed + 1`, and so on.
+
+    Returns:
+        The environment; a step is a window, an episode is a mission.
+
+    Raises:
+        ValueError: The seed is negative, or no connected team could be drawn.
+    """
+    return control.Environment(SwarmPhysics(mission, seed), SwarmTask(seed))
+
+
+class SwarmPhysics(mujoco.Physics):
+    """A swarm of one mission, as dm_control's `named`, cameras and viewer know a physics.
+
+    Its qpos and qvel are p and v of Eq. 15. A copy of it is a still, to be looked at only.
+    """
+
+    def __init__(self, mission: Mission, seed: int) -> None:
+        """Compiles the scene and starts the mission.
+
+        Args:
+            mission: Its numbers.
+            seed: Of the mission.
+        """
+        super().__init__(wrapper.MjData(wrapper.MjModel(compose(mission).compile())))
+        self.swarm = Swarm(mission, [seed])
+        self.restart(seed)
+
+    def restart(self, seed: int) -> None:
+        """Starts the mission anew, with everyone silent.
+
+        Args:
+            seed: Of the mission.
+        """
+        self.swarm.restart([seed])
+        self.recipient: Int[np.ndarray, "B N"] = self.swarm.views.silence
+        self._show()
+
+    def step(self, nstep: int = 1) -> None:
+        """Flies windows of Alg. 1 with the recipients that stand in `recipient`.
+
+        Args:
+            nstep: How many [windows].
+        """
+        for _ in range(nstep):
+            self.swarm.exchange(self.recipient)
+        self._show()
+
+    def timestep(self) -> float:
+        """One window, however many steps MuJoCo takes for it [s]."""
+        return self.swarm.mission.window_s
+
+    def _show(self) -> None:
+        """Copies the robots' states and the time to where dm_control looks for them."""
+        mission, bodies = self.swarm.mission, self.swarm.bodies
+        self.data.time = self.swarm.now[0] * mission.window_s
+        self.data.qpos[:] = bodies.position_m.ravel()
+        self.data.qvel[:] = bodies.velocity_mps.ravel()
+        self.data.ctrl[:] = bodies.velocity_mps.ravel() if mission.physics == "exact" else 0.0
+        self.forward()
+
+
+class SwarmTask(control.Task):
+    """Choose whom every robot addresses, so that what they know of each other is young (Eq. 10)."""
+
+    def __init__(self, seed: int) -> None:
+        """Prepares the first episode.
+
+        Args:
+            seed: Of the first episode's mission.
+        """
+        self._next_seed = seed
+        self._num_flown = 0
+
+    def initialize_episode(self, physics: SwarmPhysics) -> None:
+        """Starts a fresh mission with the next seed."""
+        physics.restart(self._next_seed)
+        self._next_seed += 1
+        self._num_flown = 0
+
+    def before_step(self, action: np.ndarray | Sequence[int], physics: SwarmPhysics) -> None:
+        """Sets whom each robot addresses; itself is silence.
+
+        Raises:
+            ValueError: The action is not one integer from 0 to N - 1 per robot.
+        """
+        physics.recipient = _checked(action, physics.swarm.mission.num_robots)[np.newaxis]
+
+    def after_step(self, physics: SwarmPhysics) -> None:  # noqa: ARG002 - a control.Task
+        """Counts the window."""
+        self._num_flown += 1
+
+    def action_spec(self, physics: SwarmPhysics) -> specs.BoundedArray:
+        """Whom each robot addresses, shape (N,), from 0 to N - 1."""
+        num_robots = physics.swarm.mission.num_robots
+        return specs.BoundedArray((num_robots,), np.int64, 0, num_robots - 1, name="recipient")
+
+    def get_observation(self, physics: SwarmPhysics) -> OrderedDict[str, np.ndarray | np.float64]:
+        """What the buffers hold (II-B), [i, j]: what i knows about j; and the time [windows]."""
+        buffers = physics.swarm.buffers
+        return OrderedDict(
+            timestamp=buffers.timestamp[0].copy(),
+            position_m=buffers.position_m[0].copy(),
+            velocity_mps=buffers.velocity_mps[0].copy(),
+            parent=buffers.parent[0].copy(),
+            last_attempt=buffers.last_attempt[0].copy(),
+            now=physics.swarm.now[0],
+        )
+
+    def get_reward(self, physics: SwarmPhysics) -> float:
+        """Minus the age of information after the window [windows] (Eq. 10)."""
+        age, _ = age_of_information(physics.swarm.buffers, physics.swarm.now)
+        return -float(age[0])
+
+    def get_termination(self, physics: SwarmPhysics) -> float | None:
+        """A discount of 1 after the last window: the mission is cut off, it has no goal to reach."""
+        return 1.0 if self._num_flown >= physics.swarm.mission.num_windows else None
+
+
+def _checked(action: np.ndarray | Sequence[int], num_robots: int) -> Int[np.ndarray, "N"]:
+    """A copy of the action, or a ValueError that says what is wrong with it."""
+    recipient = np.array(action)
+    if recipient.shape != (num_robots,) or not np.issubdtype(recipient.dtype, np.integer):
+        raise ValueError(
+            f"recipients must be {num_robots} integers, one per robot, "
+            f"not {recipient.dtype} of shape {recipient.shape}"
+        )
+    is_nobody = (recipient < 0) | (recipient >= num_robots)
+    if np.any(is_nobody):
+        i = int(np.argmax(is_nobody))
+        raise ValueError(
+            f"recipient of robot {i} must be from 0 to {num_robots - 1}, not {action[i]}"
+        )
+    return recipient.astype(np.int64)

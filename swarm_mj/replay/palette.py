@@ -1,0 +1,83 @@
+"""The replay's colours: one ramp for every age, one colour and one shape for every packet's fate.
+
+The ramp is viridis reversed (bright is fresh); the packets' colours are Okabe and Ito's, which stay
+apart for colour-blind eyes. The radio plot and the map share them.
+"""
+
+from typing import TypeAlias
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+Colour: TypeAlias = tuple[int, int, int]
+
+BACKGROUND: Colour = (13, 16, 22)
+GRID: Colour = (30, 36, 46)
+WALL: Colour = (112, 122, 138)
+TEXT: Colour = (196, 203, 214)
+TRAIL: Colour = (50, 60, 76)
+BELIEF: Colour = (104, 118, 144)
+TREE: Colour = (92, 104, 126)
+OBSERVER: Colour = (255, 255, 255)
+UNKNOWN: Colour = (84, 86, 94)
+HEADING: Colour = (205, 210, 220)
+
+DELIVERED: Colour = (0, 205, 145)
+LOST: Colour = (240, 98, 42)
+OVERHEARD: Colour = (204, 121, 167)
+ANSWERED: Colour = (86, 180, 233)
+
+MEAN_AGE: Colour = (53, 183, 121)
+WORST_AGE: Colour = (125, 135, 152)
+OBSERVER_AGE: Colour = (253, 231, 37)
+VARIANCE: Colour = (240, 200, 80)
+
+# Nine equal steps of viridis (van der Walt and Smith, 2015, CC0), stale to fresh.
+_VIRIDIS = np.array(
+    [
+        (68, 1, 84),
+        (71, 44, 122),
+        (59, 81, 139),
+        (44, 113, 142),
+        (33, 144, 141),
+        (39, 173, 129),
+        (92, 200, 99),
+        (170, 220, 50),
+        (253, 231, 37),
+    ],
+    dtype=float,
+)
+_STALEST = 0.10  # the darkest end of viridis would vanish on the background
+
+
+def dim(colour: Colour, share: float) -> Colour:
+    """A darker shade: alpha on 2D lines only darkens, so darken plainly."""
+    return (int(colour[0] * share), int(colour[1] * share), int(colour[2] * share))
+
+
+def age_colours(
+    age_windows: Float[np.ndarray, "*S"], full_scale: float, is_known: Bool[np.ndarray, "*S"]
+) -> UInt8[np.ndarray, "*S 3"]:
+    """Colours of ages: bright yellow is fresh, dark violet is `full_scale` or older, grey unknown.
+
+    Args:
+        age_windows: Ages [windows].
+        full_scale: The age at which the ramp ends [windows].
+        is_known: Whether there is an age at all.
+
+    Returns:
+        RGB.
+    """
+    freshness = 1.0 - (1.0 - _STALEST) * np.clip(age_windows / full_scale, 0.0, 1.0)
+    place = freshness * (len(_VIRIDIS) - 1)
+    steps = np.arange(len(_VIRIDIS))
+    rgb = np.stack([np.interp(place, steps, _VIRIDIS[:, c]) for c in range(3)], axis=-1)
+    rgb[~is_known] = UNKNOWN
+    return rgb.astype(np.uint8)
+
+
+def nice_scale(age_windows: Float[np.ndarray, "..."]) -> float:
+    """A round number of windows that three ages in four lie below."""
+    target = max(1.0, float(np.percentile(age_windows, 75)))
+    decade = 10.0 ** np.floor(np.log10(target))
+    return float(next(step * decade for step in (1.0, 2.0, 5.0, 10.0) if step * decade >= target))

@@ -1,0 +1,77 @@
+"""Writes a log as a rerun recording, its layout inside."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import rerun as rr  # noqa: TID251 - part of the replay
+
+from swarm_mj.mission import Mission
+from swarm_mj.recorder import Log
+from swarm_mj.replay import arena, charts, palette
+from swarm_mj.replay.layout import layout
+from swarm_mj.replay.legend import draw_legend
+from swarm_mj.replay.links import fates
+from swarm_mj.replay.sheet import Sheet
+
+APPLICATION = "swarm_mj"
+
+
+def write_replay(log: Log, mission: Mission, config: dict[str, object], path: Path) -> None:
+    """Writes a replay; the file appears under its name only when it is whole.
+
+    Args:
+        log: What was flown.
+        mission: Its numbers.
+        config: Kept in the file as recording properties; values are numbers, texts or booleans.
+        path: The file, replaced if it exists; its folder must exist.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        _write(log, mission, config, unfinished, name=path.stem)
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def _write(log: Log, mission: Mission, config: dict[str, object], path: Path, *, name: str) -> None:
+    path.touch()  # rerun reports a folder that cannot be written in its own log only
+    rr.set_strict_mode(True)  # bad data raises; otherwise a column is silently missing
+    reach_m = max(mission.half_side_m, float(np.max(np.abs(log.position_m))))
+    top_age = 1.05 * float(np.max(log.age_mean + log.age_std))
+    blueprint = layout(log.observer, reach_m, top_age, has_flock=bool(np.any(log.velocity_mps)))
+    with rr.RecordingStream(APPLICATION, send_properties=False) as recording:
+        recording.save(path, default_blueprint=blueprint)
+        recording.set_log_tick_enabled(False)
+        recording.set_log_time_enabled(False)
+        recording.send_recording_name(name)
+        recording.send_property("mission", rr.AnyValues(drop_untyped_nones=True, **config))
+        draw(Sheet(recording, log, mission.window_s), mission, reach_m)
+        lines = [f"- **{key}**: {value}" for key, value in config.items()]
+        about = "\n".join([f"# {name}", *lines])
+        recording.log("about", rr.TextDocument(about, media_type="text/markdown"), static=True)
+
+
+def draw(sheet: Sheet, mission: Mission, reach_m: float) -> None:
+    """Draws every layer of a replay.
+
+    Args:
+        sheet: Where to draw, and what.
+        mission: Its numbers.
+        reach_m: Half the width of the map, which is centred on the origin [m].
+    """
+    full_scale = palette.nice_scale(sheet.log.age)
+    packets = fates(sheet.log)
+    arena.draw_area(sheet, mission)
+    arena.draw_robots(sheet, full_scale)
+    arena.draw_beliefs(sheet)
+    arena.draw_tree_on_map(sheet)
+    arena.draw_radio(sheet, packets, mission.range_m)
+    draw_legend(sheet, full_scale, reach_m)
+    charts.draw_tree(sheet, full_scale)
+    charts.draw_age_matrix(sheet, full_scale)
+    charts.draw_plots(sheet, packets)
+    charts.draw_states(sheet)

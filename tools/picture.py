@@ -1,0 +1,156 @@
+"""Takes a picture of a replay at one window, without a screen.
+
+    python tools/picture.py replays/mission.rrd --window 250 --out mission.png
+
+Runs rerun's own viewer headless, so what it shows is what people see. Needs a Vulkan driver; a
+software one will do (Debian and Ubuntu: `apt-get install mesa-vulkan-drivers`).
+"""
+
+import argparse
+import io
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+from PIL import Image
+from rerun.experimental import ViewerClient
+
+from swarm_mj.replay.read import check_replay, windows
+
+START_TIMEOUT_S = 60.0
+LOAD_TIMEOUT_S = 120.0
+NOTICES_S = 6.0  # the viewer's notices fade after this time
+TITLE_BAR_POINTS = 36.0
+ZOOM_STEP = 0.1  # of the viewer's own zoom
+SETTLE_S = 1.0  # after a jump in time, until everything is drawn
+
+
+def main() -> int:
+    """Runs the command; returns its exit code."""
+    parser = argparse.ArgumentParser(description="Takes a picture of a replay without a screen.")
+    parser.add_argument("replay", type=Path, help="an .rrd file that `swarm-mj fly` recorded")
+    parser.add_argument("--window", type=int, help="the window to show (default: the middle one)")
+    parser.add_argument("--out", type=Path, default=Path("replay.png"), help="default: replay.png")
+    parser.add_argument("--size", default="2560x1400", help="WIDTHxHEIGHT in pixels")
+    parser.add_argument("--zoom", type=int, default=6, help="steps by which texts are enlarged")
+    arguments = parser.parse_args()
+    try:
+        take_picture(
+            arguments.replay, arguments.window, arguments.out, arguments.size, arguments.zoom
+        )
+    except (ValueError, OSError, TimeoutError) as error:
+        print(f"picture: error: {error}", file=sys.stderr)
+        return 2
+    print(arguments.out)
+    return 0
+
+
+def take_picture(replay: Path, window: int | None, out: Path, size: str, zoom: int) -> None:
+    """Writes a PNG of the replay's first tab at one window.
+
+    Args:
+        replay: The recording.
+        window: The window to show; None is the middle one.
+        out: The PNG.
+        size: WIDTHxHEIGHT [pixels].
+        zoom: Steps of the viewer's own zoom.
+
+    Raises:
+        ValueError: The file is no whole replay, or has no such window, or the size is malformed.
+        OSError: A file cannot be read or written.
+        TimeoutError: The viewer did not come up or did not load the file.
+    """
+    if not re.fullmatch(r"[1-9]\d{2,3}x[1-9]\d{2,3}", size):
+        raise ValueError(f"size must be WIDTHxHEIGHT from 100x100 to 9999x9999, not {size!r}")
+    check_replay(replay)
+    flown = windows(replay)
+    shown = int(flown[len(flown) // 2]) if window is None else window
+    if not flown[0] <= shown <= flown[-1]:
+        raise ValueError(f"window must be from {flown[0]} to {flown[-1]}, not {shown}")
+    if not out.parent.is_dir():
+        raise ValueError(f"folder of the picture does not exist: {out.parent}")
+    with _viewer(size) as client:
+        client.open(str(replay.resolve()))
+        _wait(lambda: not client.get_state().loading, LOAD_TIMEOUT_S, "the viewer did not load it")
+        client.run_command("ui.toggle_top_panel")
+        for _ in range(zoom):
+            client.run_command("ui.zoom_in_ui")
+        time.sleep(NOTICES_S)
+        client.set_time("window", sequence=shown, play_state="paused")
+        time.sleep(SETTLE_S)
+        _save_without_title_bar(client.take_screenshot(), out, zoom)
+
+
+def _save_without_title_bar(png: bytes, out: Path, zoom: int) -> None:
+    """Crops the window's empty title bar off."""
+    with Image.open(io.BytesIO(png)) as picture:
+        top = round(TITLE_BAR_POINTS * (1.0 + ZOOM_STEP * zoom))
+        picture.crop((0, top, picture.width, picture.height)).save(out, optimize=True)
+
+
+@contextmanager
+def _viewer(size: str) -> Iterator[ViewerClient]:
+    """A headless viewer on a free port of this machine, gone afterwards."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = [
+        str(Path(sys.executable).with_name("rerun")),
+        *("--headless", "--hide-welcome-screen", "--bind", "127.0.0.1"),
+        *("--port", str(port), "--window-size", size),
+    ]
+    with tempfile.TemporaryFile("w+") as said:
+        # A group of its own: `rerun` is a script that starts the viewer as its child.
+        viewer = subprocess.Popen(
+            command, stdout=said, stderr=subprocess.STDOUT, start_new_session=True
+        )
+        try:
+            yield _connect(viewer, port, said)
+        finally:
+            os.killpg(viewer.pid, signal.SIGTERM)
+            viewer.wait()
+
+
+def _connect(viewer: subprocess.Popen, port: int, said: IO[str]) -> ViewerClient:
+    address = f"rerun+http://127.0.0.1:{port}/proxy"
+    clients: list[ViewerClient] = []
+
+    def is_up() -> bool:
+        if viewer.poll() is not None:
+            said.seek(0)
+            raise OSError(
+                "rerun's viewer stopped at once; without a graphics card it needs a software "
+                "Vulkan driver (Debian and Ubuntu: apt-get install mesa-vulkan-drivers). It said: "
+                + " ".join(said.read().split())[-400:]
+            )
+        try:
+            client = ViewerClient.connect(address)
+            client.get_state()
+        except Exception:
+            return False
+        clients.append(client)
+        return True
+
+    _wait(is_up, START_TIMEOUT_S, "rerun's viewer did not start")
+    return clients[0]
+
+
+def _wait(is_done: Callable[[], bool], timeout_s: float, complaint: str) -> None:
+    deadline = time.monotonic() + timeout_s
+    while not is_done():
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"{complaint} within {timeout_s:g} s")
+        time.sleep(0.1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
