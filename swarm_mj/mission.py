@@ -42,7 +42,7 @@ def _choice(default: str, label: str, source: str, choices: object) -> Any:  # n
 
 @dataclass(frozen=True, kw_only=True)
 class Mission:
-    """A mission's numbers; the defaults are the paper's text.
+    """A mission's numbers; the defaults are the paper's text (IV-B).
 
     Raises:
         ValueError: A field is outside its range; the message names the value and the range.
@@ -111,7 +111,7 @@ def _check(allowed: Any, value: Any) -> None:  # noqa: ANN401 - any field's meta
     if "low" in allowed and not allowed["low"] <= value <= allowed["high"]:
         raise ValueError(
             f"{allowed['label']} must be from {allowed['low']:g} to {allowed['high']:g} "
-            f"{allowed['unit']}, not {value:g}"
+            f"[{allowed['unit']}], not {value:g}"
         )
 
 

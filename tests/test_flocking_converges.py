@@ -80,5 +80,3 @@ def test_fig6_every_baseline_makes_the_flock_converge(name, preset):
     kept = summary.velocity_variance_last / start
     assert kept.max() < 1 / 3
     assert np.median(kept) < 1e-3
-    # Consensus is on a velocity that the robots had: none is faster than the fastest at the start.
-    assert np.abs(swarm.bodies.velocity_mps).max() <= mission.max_velocity_mps

@@ -13,13 +13,15 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from swarm_mj.cli.options import add_mission_options, mission_of, new_parser
+from swarm_mj.cli.options import add_mission_options, mission_of, new_parser, this_command
 from swarm_mj.cli.outputs import check_writable, write_text
 from swarm_mj.flight import Flown, Summary, fly, summarise
 from swarm_mj.mission import Mission
 from swarm_mj.policies import POLICIES, Policy, make_policy
 from swarm_mj.provenance import commit, version
 from swarm_mj.recorder import Recorder
+from swarm_mj.replay.view import run as run_viewer
+from swarm_mj.replay.view import view_command
 from swarm_mj.swarm import Swarm
 
 DONE, INTERRUPTED = 0, 130
@@ -82,11 +84,13 @@ def run(options: argparse.Namespace) -> int:
         recorder = _recorder(options, swarm, policy) if path else None
     flight = _fly(swarm, policy, recorder, console)
     if flight.flown:
-        _report(options, mission, flight, path)
+        with console.status("Writing ..."):
+            _write(options, mission, flight, path)
+        _print(options, flight, path)
     if flight.was_interrupted:
         console.print(f"Interrupted after {len(flight.flown)} of {mission.num_windows} windows.")
         return INTERRUPTED
-    return _view(path) if options.view and path else DONE
+    return run_viewer(view_command(path)) if options.view and path else DONE
 
 
 def _check_outputs(options: argparse.Namespace) -> Path | None:
@@ -101,6 +105,8 @@ def _check_outputs(options: argparse.Namespace) -> Path | None:
     if path.suffix != ".rrd":
         raise ValueError(f"replay must be named *.rrd, not {path}")
     check_writable(path, "replay", must_be_new=not options.force)
+    if options.view:
+        view_command(path)  # complains now if there is no display
     return path
 
 
@@ -142,10 +148,10 @@ def _fly(swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Conso
     return _Flight(flown=flown, recorder=recorder, was_interrupted=was_interrupted, wall_s=wall_s)
 
 
-def _report(
+def _write(
     options: argparse.Namespace, mission: Mission, flight: _Flight, path: Path | None
 ) -> None:
-    """Writes the replay and the summary, and prints the table."""
+    """Writes the replay and the summary."""
     config = {
         **asdict(mission),
         "policy": options.policy,
@@ -154,7 +160,6 @@ def _report(
         "version": version(),
         "commit": commit(),
     }
-    summary = summarise(flight.flown)
     if path and flight.recorder and flight.recorder.num_windows:
         from swarm_mj.replay.write import write_replay  # rerun takes its time to import
 
@@ -164,16 +169,20 @@ def _report(
     if options.json:
         document = {
             "config": config,
-            **_numbers(summary),
+            **_numbers(summarise(flight.flown)),
             "wall_seconds": flight.wall_s,
             "interrupted": flight.was_interrupted,
             "replay": str(path) if path else None,
         }
         write_text(options.json, json.dumps(document, indent=2) + "\n")
+
+
+def _print(options: argparse.Namespace, flight: _Flight, path: Path | None) -> None:
+    """Prints the table and how to open the replay."""
     console = Console(highlight=False, soft_wrap=True)
-    console.print(_table(options, summary, flight.wall_s))
+    console.print(_table(options, summarise(flight.flown), flight.wall_s))
     if path:
-        console.print(f"Open the replay:  swarm-mj replay {path}")
+        console.print(f"Open the replay:  {this_command()} replay {path}")
 
 
 def _numbers(summary: Summary) -> dict[str, Any]:
@@ -214,10 +223,3 @@ def _table(options: argparse.Namespace, summary: Summary, wall_s: float) -> Tabl
     for name, value in rows.items():
         table.add_row(name, value)
     return table
-
-
-def _view(path: Path) -> int:
-    from swarm_mj.replay.view import run as run_viewer
-    from swarm_mj.replay.view import view_command
-
-    return run_viewer(view_command(path))

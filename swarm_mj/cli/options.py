@@ -1,11 +1,24 @@
 """Options that several commands share, and the mission they name."""
 
 import argparse
+import os
+import shutil
+import sys
+from pathlib import Path
 from typing import Any, get_args
 
 from swarm_mj.mission import PRESETS, Boundary, Mission, PhysicsMode, Task
 
 DEFAULTS = Mission()
+
+
+class _Formatter(argparse.ArgumentDefaultsHelpFormatter):
+    """Shows a default where there is one to show."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        if action.default in (None, False):
+            return action.help
+        return super()._get_help_string(action)
 
 
 def new_parser(commands: Any, name: str, summary: str, epilog: str = "") -> argparse.ArgumentParser:  # noqa: ANN401 - argparse names no public type
@@ -15,8 +28,17 @@ def new_parser(commands: Any, name: str, summary: str, epilog: str = "") -> argp
         help=summary,
         description=summary,
         epilog=epilog,
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        formatter_class=_Formatter,
     )
+
+
+def this_command() -> str:
+    """How the reader can call this program: by name, or by its path if it is not on the PATH."""
+    program = Path(sys.executable).with_name("swarm-mj")
+    found = shutil.which("swarm-mj")
+    if (found and Path(found) == program) or not program.exists():
+        return "swarm-mj"
+    return os.path.relpath(program)
 
 
 def add_mission_options(parser: argparse.ArgumentParser) -> None:
@@ -32,16 +54,20 @@ def add_mission_options(parser: argparse.ArgumentParser) -> None:
         "--velocity-ratio",
         type=float,
         default=DEFAULTS.velocity_ratio,
-        help="largest velocity per axis, as the share of 1 km covered in 50 s (0.15 is 3 m/s)",
+        help="largest velocity per axis, as the share of 1 km covered in 50 s (0.15 is 3 m/s), "
+        "0.001 to 5",
     )
     group.add_argument(
         "--range-ratio",
         type=float,
         default=DEFAULTS.range_ratio,
-        help="range of a packet in silence, as a share of 1 km",
+        help="range of a packet in silence, as a share of 1 km, 0.01 to 10",
     )
     group.add_argument(
-        "--windows", type=int, default=DEFAULTS.num_windows, help="length, in windows of 100 ms"
+        "--windows",
+        type=int,
+        default=DEFAULTS.num_windows,
+        help="length, in windows of 100 ms, 1 to 100000",
     )
     group.add_argument(
         "--preset",

@@ -7,7 +7,6 @@ from typing import Any
 from rich.console import Console
 
 from swarm_mj.cli.options import new_parser
-from swarm_mj.replay.read import check_replay
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
 
@@ -26,6 +25,8 @@ def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no publi
 
 def run(options: argparse.Namespace) -> int:
     """Runs the command; returns its exit code."""
+    from swarm_mj.replay.read import check_replay  # rerun takes its time to import
+
     check_replay(options.file)
     if not options.web:
         return run_viewer(view_command(options.file))

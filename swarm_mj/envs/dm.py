@@ -6,6 +6,7 @@ physics is seen in a picture, and is overwritten at the next window.
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from dm_control import mujoco  # noqa: TID251 - the dm_control face
@@ -18,6 +19,8 @@ from swarm_mj.costs import age_of_information
 from swarm_mj.mission import Mission
 from swarm_mj.scene import compose
 from swarm_mj.swarm import Swarm
+
+_Task: Any = control.Task  # untyped: pyright reads its abstract methods as returning None
 
 
 def make_environment(mission: Mission, seed: int = 0) -> control.Environment:
@@ -43,25 +46,22 @@ class SwarmPhysics(mujoco.Physics):
     """
 
     def __init__(self, mission: Mission, seed: int) -> None:
-        """Compiles the scene and starts the mission.
-
-        Args:
-            mission: Its numbers.
-            seed: Of the mission.
-        """
+        """Compiles the scene and starts a mission with these numbers and this seed."""
         super().__init__(wrapper.MjData(wrapper.MjModel(compose(mission).compile())))
         self.swarm = Swarm(mission, [seed])
         self.restart(seed)
 
     def restart(self, seed: int) -> None:
-        """Starts the mission anew, with everyone silent.
-
-        Args:
-            seed: Of the mission.
-        """
+        """Starts a mission with this seed; until told otherwise, everyone is silent."""
+        self._seed = seed
         self.swarm.restart([seed])
-        self.recipient: Int[np.ndarray, "B N"] = self.swarm.views.silence
+        self.recipient: Int[np.ndarray, "B N"] = self.swarm.views.silence.copy()
         self._show()
+
+    def reset(self, keyframe_id: int | None = None) -> None:
+        """Starts the same mission anew, as dm_control asks before every episode."""
+        super().reset(keyframe_id)
+        self.restart(self._seed)
 
     def step(self, nstep: int = 1) -> None:
         """Flies windows of Alg. 1 with the recipients that stand in `recipient`.
@@ -87,15 +87,11 @@ class SwarmPhysics(mujoco.Physics):
         self.forward()
 
 
-class SwarmTask(control.Task):
+class SwarmTask(_Task):
     """Choose whom every robot addresses, so that what they know of each other is young (Eq. 10)."""
 
     def __init__(self, seed: int) -> None:
-        """Prepares the first episode.
-
-        Args:
-            seed: Of the first episode's mission.
-        """
+        """Takes the seed of the first episode's mission."""
         self._next_seed = seed
         self._num_flown = 0
 
@@ -140,13 +136,13 @@ class SwarmTask(control.Task):
         return -float(age[0])
 
     def get_termination(self, physics: SwarmPhysics) -> float | None:
-        """A discount of 1 after the last window: the mission is cut off, it has no goal to reach."""
+        """A discount of 1 after the last window: a mission is cut off, it reaches no end."""
         return 1.0 if self._num_flown >= physics.swarm.mission.num_windows else None
 
 
 def _checked(action: np.ndarray | Sequence[int], num_robots: int) -> Int[np.ndarray, "N"]:
     """A copy of the action, or a ValueError that says what is wrong with it."""
-    recipient = np.array(action)
+    recipient = np.asarray(action)
     if recipient.shape != (num_robots,) or not np.issubdtype(recipient.dtype, np.integer):
         raise ValueError(
             f"recipients must be {num_robots} integers, one per robot, "

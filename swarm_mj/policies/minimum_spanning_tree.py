@@ -15,7 +15,7 @@ ROOT = -1  # the parent of the root
 
 
 class MinimumSpanningTree(CentralisedPolicy):
-    """Every robot exchanges buffers with its parent in the spanning tree with probability p.
+    """Every robot exchanges buffers with its parent in the tree with probability p (IV-C).
 
     Centralised: the tree is built from all true positions at the start of the mission.
     """

@@ -11,7 +11,7 @@ from swarm_mj.streams import Stream, uniform
 
 
 class RandomFlooding(DecentralisedPolicy):
-    """Every robot rebroadcasts with probability p, twice per window; nobody answers.
+    """Every robot rebroadcasts with probability p, twice per window, unanswered (IV-C).
 
     The packet is addressed to a robot drawn from the whole team, as in the authors' code. Uses no
     information but the team's size.

@@ -8,7 +8,7 @@ from swarm_mj.protocol import Bodies
 
 
 class RoundRobin(CentralisedPolicy):
-    """One robot after the other exchanges buffers with the robot nearest the area's centre.
+    """One robot after the other exchanges buffers with the one nearest the centre (IV-C).
 
     Centralised: the base station is chosen anew in each window from all true positions.
     """

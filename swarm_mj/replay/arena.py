@@ -90,11 +90,15 @@ def draw_tree_on_map(sheet: Sheet) -> None:
 def draw_radio(sheet: Sheet, packets: dict[str, Links], range_m: float) -> None:
     """Packets by fate: colour and shape say which; a transmitter's range is a faint circle."""
     sheet.arrows(
-        "arena/radio/delivered", packets["delivered"], colour=palette.DELIVERED, width=2.0, order=20
+        "arena/radio/delivered",
+        packets["delivered"],
+        colour=palette.DELIVERED,
+        width=2.0,
+        order=20.0,
     )
     lost, unanswered = packets["lost"], packets["unanswered"]
     sheet.arrows(
-        "arena/radio/lost", lost, colour=palette.LOST, width=1.8, order=19, share=LOST_SHARE
+        "arena/radio/lost", lost, colour=palette.LOST, width=1.8, order=19.0, share=LOST_SHARE
     )
     sheet.line_style("arena/radio/lost/rest", palette.dim(palette.LOST, 0.5), 0.7, 18.0)
     sheet.lines("arena/radio/lost/rest", *ends(sheet.log, lost), lost.per_window)
@@ -104,7 +108,7 @@ def draw_radio(sheet: Sheet, packets: dict[str, Links], range_m: float) -> None:
         packets["answered"],
         colour=palette.ANSWERED,
         width=1.5,
-        order=21,
+        order=21.0,
         aside_m=aside_m,
     )
     sheet.arrows(
@@ -112,7 +116,7 @@ def draw_radio(sheet: Sheet, packets: dict[str, Links], range_m: float) -> None:
         unanswered,
         colour=palette.dim(palette.ANSWERED, 0.6),
         width=1.2,
-        order=18,
+        order=18.0,
         share=LOST_SHARE,
         aside_m=aside_m,
     )

@@ -25,7 +25,7 @@ def view_command(path: Path) -> list[str]:
     if sys.platform.startswith("linux") and not has_display:
         raise ValueError(
             "there is no display (DISPLAY and WAYLAND_DISPLAY are unset); use "
-            f"`swarm-mj replay --web {path}`, or tools/picture.py for a picture"
+            "`swarm-mj replay --web FILE`, or tools/picture.py for a picture"
         )
     return [sys.executable, "-m", "rerun", str(path)]
 

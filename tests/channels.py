@@ -1,0 +1,36 @@
+"""Channels without physics, for tests of everything above the radio."""
+
+import numpy as np
+
+
+def to_nobody(_position_m, recipient):
+    """Every packet is lost."""
+    return np.tile(np.arange(recipient.shape[1]), (len(recipient), 1))
+
+
+def to_the_addressee(position_m, recipient):
+    """Every packet reaches its recipient, and nobody else."""
+    heard = to_nobody(position_m, recipient)
+    for b, row in enumerate(recipient):
+        for i, j in enumerate(row):
+            if j != i:
+                heard[b, j] = i
+    return heard
+
+
+def unreliable(seed, *, senders_listen):
+    """Everyone decodes some sender or nobody, never the same way twice."""
+    rng = np.random.default_rng(seed)
+
+    def channel(position_m, recipient):
+        heard = to_nobody(position_m, recipient)
+        for b, row in enumerate(recipient):
+            for j in range(len(row)):
+                senders = [i for i in range(len(row)) if row[i] != i and i != j]
+                to_me = [i for i in senders if row[i] == j]
+                chance = rng.random()
+                if senders and chance < 0.7 and (senders_listen or row[j] == j):
+                    heard[b, j] = rng.choice(to_me if to_me and chance < 0.5 else senders)
+        return heard
+
+    return channel

@@ -1,0 +1,72 @@
+"""The other commands as processes: scene, replay, bench, help."""
+
+import mujoco
+import pytest
+
+
+def test_scene_writes_a_model_that_mujoco_opens(swarm_mj, tmp_path):
+    done = swarm_mj("scene", "--robots", 40, "--out", "scene.xml")
+    assert done.returncode == 0, done.stderr
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))
+    assert model.nq == model.nv == model.nu == 80
+    assert "40 robots" in done.stdout
+
+
+def test_scene_does_not_replace_a_file_unasked(swarm_mj, tmp_path):
+    (tmp_path / "scene.xml").write_text("mine")
+    assert swarm_mj("scene").returncode == 2
+    assert (tmp_path / "scene.xml").read_text() == "mine"
+    assert swarm_mj("scene", "--force", "--robots", 3).returncode == 0
+
+
+@pytest.mark.parametrize("arguments", [["scene", "--robots", "1"], ["scene", "--out", "."]])
+def test_scene_refuses_bad_input(swarm_mj, arguments):
+    done = swarm_mj(*arguments)
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_replay_refuses_what_is_no_whole_replay(swarm_mj, tmp_path):
+    swarm_mj("fly", "--windows", 5, "--record", "whole.rrd")
+    whole = (tmp_path / "whole.rrd").read_bytes()
+    (tmp_path / "cut.rrd").write_bytes(whole[: len(whole) // 2])
+    for name in ("cut.rrd", "missing.rrd"):
+        for web in ([], ["--web"]):
+            done = swarm_mj("replay", name, *web)
+            assert done.returncode == 2
+            assert name in done.stderr
+            assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_bench_prints_the_whole_and_its_parts(swarm_mj):
+    done = swarm_mj("bench", "--missions", 1, 3, "--seconds", 0.1)
+    assert done.returncode == 0, done.stderr
+    for row in ("windows per second", "plain mj_step", "radio and buffers", "move", "decide"):
+        assert row in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        (["--missions", "0"], "missions must be from 1 to 10000, not 0"),
+        (["--threads", "0"], "threads must be from 1 to 256, not 0"),
+        (["--seconds", "nan"], "seconds must be from 0.1 to 600, not nan"),
+    ],
+)
+def test_bench_refuses_bad_input(swarm_mj, options, complaint):
+    done = swarm_mj("bench", *options)
+    assert done.returncode == 2
+    assert complaint in done.stderr
+
+
+@pytest.mark.parametrize("command", ["fly", "replay", "scene", "bench"])
+def test_help_suffices(swarm_mj, command):
+    overview, detail = swarm_mj("--help"), swarm_mj(command, "--help")
+    assert overview.returncode == detail.returncode == 0
+    assert command in overview.stdout
+    assert "None" not in detail.stdout
+
+
+def test_no_command_and_version(swarm_mj):
+    assert swarm_mj().returncode == 2
+    assert swarm_mj("--version").stdout.startswith("swarm-mj ")

@@ -1,0 +1,190 @@
+"""`swarm-mj fly` as a process: what it prints, writes, refuses, and leaves when interrupted."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from swarm_mj.flight import fly, summarise
+from swarm_mj.mission import paper
+from swarm_mj.policies import make_policy
+from swarm_mj.replay.read import check_replay, windows
+from swarm_mj.swarm import Swarm
+
+SHORT = ("--windows", "20", "--robots", "6", "--range-ratio", "0.5")
+
+
+def files(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+def test_the_default_flight_leaves_a_replay_of_the_default_mission(swarm_mj, tmp_path):
+    done = swarm_mj("fly")
+    assert done.returncode == 0, done.stderr
+    (replay,) = (tmp_path / "replays").iterdir()
+    assert f"replay replays/{replay.name}" in done.stdout
+    assert "flocking, mst, 40 robots" in done.stdout
+    assert len(windows(replay)) == 500
+    assert replay.stat().st_size < 5e6
+
+
+def test_a_summary_is_what_the_library_computes(swarm_mj, tmp_path):
+    done = swarm_mj(
+        "fly", *SHORT, "--task", "random-walk", "--policy", "random-flooding", "--seed", 7,
+        "--probability", 0.2, "--no-record", "--json", "out/summary.json",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert files(tmp_path) == ["out/summary.json"]
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    mission = paper("random-walk", num_robots=6, num_windows=20, range_ratio=0.5)
+    expected = summarise(
+        list(fly(Swarm(mission, [7]), make_policy("random-flooding", mission, 0.2)))
+    )
+    assert summary["aoi_mean"] == expected.aoi_mean[0]
+    assert summary["velocity_variance_mean"] == expected.velocity_variance_mean[0]
+    for fate in ("attempted", "delivered", "lost", "overheard", "answered"):
+        assert summary[f"packets_{fate}"] == getattr(expected, f"packets_{fate}")[0]
+    assert summary["config"]["num_robots"] == 6
+    assert summary["config"]["seed"] == 7
+    assert summary["config"]["probability"] == 0.2
+    assert summary["config"]["version"]
+    assert summary["wall_seconds"] > 0
+    assert summary["interrupted"] is False
+    assert summary["replay"] is None
+
+
+def test_what_never_happened_is_null(swarm_mj, tmp_path):
+    done = swarm_mj("fly", *SHORT, "--probability", 0, "--no-record", "--json", "s.json")
+    assert done.returncode == 0
+    assert json.loads((tmp_path / "s.json").read_text())["complete_window"] is None
+    assert "never" in done.stdout
+
+
+@pytest.mark.parametrize("task", ["stationary", "random-walk", "flocking"])
+@pytest.mark.parametrize("preset", ["paper", "reference"])
+def test_every_task_and_preset_flies(swarm_mj, tmp_path, task, preset):
+    done = swarm_mj("fly", *SHORT, "--task", task, "--preset", preset, "--record", "a.rrd")
+    assert done.returncode == 0, done.stderr
+    assert len(windows(tmp_path / "a.rrd")) == 20
+
+
+@pytest.mark.parametrize("boundary", ["reflect", "none"])
+def test_contact_physics_flies(swarm_mj, tmp_path, boundary):
+    options = ("--physics", "contact", "--policy", "round-robin", "--boundary", boundary)
+    done = swarm_mj("fly", *SHORT, *options, "--record", "a.rrd")
+    assert done.returncode == 0, done.stderr
+    assert len(windows(tmp_path / "a.rrd")) == 20
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        (["--robots", "0"], "number of robots must be from 2 to 1000 [robots], not 0"),
+        (["--robots", "1"], "number of robots must be from 2 to 1000 [robots], not 1"),
+        (["--robots", "-4"], "not -4"),
+        (["--robots", "123456789"], "from 2 to 1000"),
+        (["--robots", "many"], "argument --robots: invalid int value: 'many'"),
+        (["--windows", "0"], "number of windows must be from 1 to 100000 [windows], not 0"),
+        (["--windows", "-1"], "not -1"),
+        (["--range-ratio", "0"], "range ratio must be from 0.01 to 10 [of 1 km], not 0"),
+        (["--range-ratio", "nan"], "not nan"),
+        (["--range-ratio", "1e9"], "not 1e+09"),
+        (["--velocity-ratio", "0"], "velocity ratio must be from 0.001 to 5"),
+        (["--velocity-ratio", "inf"], "not inf"),
+        (["--velocity-ratio", "-0.15"], "not -0.15"),
+        (["--task", "swim"], "task must be one of stationary, random-walk, flocking, not 'swim'"),
+        (["--policy", "magic"], "policy must be one of random-flooding, round-robin, mst"),
+        (["--preset", "mine"], "preset must be one of paper, reference, not 'mine'"),
+        (["--physics", "quantum"], "physics must be one of exact, contact, not 'quantum'"),
+        (["--boundary", "torus"], "boundary must be one of reflect, none, not 'torus'"),
+        (["--probability", "1.5"], "probability must be from 0 to 1, not 1.5"),
+        (["--policy", "round-robin", "--probability", "0.1"], "takes no transmission probability"),
+        (["--seed", "-1"], "not [-1]"),
+        (["--observer", "40"], "observer must be from 0 to 39, not 40"),
+        (["--range-ratio", "0.02"], "too sparse"),
+        (["--record", "replay.txt"], "must be named *.rrd"),
+        (["--json", "."], "is a folder"),
+        (["--no-record", "--view"], "--view needs a replay"),
+        (["--no-record", "--record", "a.rrd"], "not allowed with"),
+        (["--wings", "2"], "unrecognized arguments: --wings 2"),
+    ],
+)
+def test_bad_input_is_one_clear_line_and_leaves_nothing(swarm_mj, tmp_path, options, complaint):
+    done = swarm_mj("fly", *options)
+    assert done.returncode == 2
+    assert complaint in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert done.stdout == ""
+    assert files(tmp_path) == []
+
+
+def test_an_output_below_a_file_is_refused_before_the_flight(swarm_mj, tmp_path):
+    (tmp_path / "file").write_text("kept")
+    done = swarm_mj("fly", *SHORT, "--record", "file/a.rrd")
+    assert done.returncode == 2
+    assert "cannot be written" in done.stderr
+    assert (tmp_path / "file").read_text() == "kept"
+
+
+def test_an_existing_replay_needs_force(swarm_mj, tmp_path):
+    path = tmp_path / "a.rrd"
+    path.write_text("precious")
+    refused = swarm_mj("fly", *SHORT, "--record", path)
+    assert refused.returncode == 2
+    assert "--force" in refused.stderr
+    assert path.read_text() == "precious"
+    assert swarm_mj("fly", *SHORT, "--record", path, "--force").returncode == 0
+    check_replay(path)
+
+
+def test_viewing_needs_a_display_and_says_so_first(tmp_path):
+    bare = {key: value for key, value in os.environ.items() if "DISPLAY" not in key}
+    done = subprocess.run(
+        [sys.executable, "-m", "swarm_mj", "fly", *SHORT, "--view"],
+        cwd=tmp_path, env=bare, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "no display" in done.stderr
+    assert files(tmp_path) == []
+
+
+def test_ctrl_c_leaves_a_readable_replay_of_what_was_flown(tmp_path):
+    command = [
+        *(sys.executable, "-m", "swarm_mj", "fly", "--windows", "100000", "--seed", "3"),
+        *("--record", "cut.rrd", "--json", "cut.json"),
+    ]
+    # A terminal's Ctrl-C reaches the process even if this test run ignores it.
+    flight = subprocess.Popen(
+        command,
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    time.sleep(6.0)
+    flight.send_signal(signal.SIGINT)
+    output, errors = flight.communicate(timeout=120)
+    assert flight.returncode == 130, errors
+    flown = windows(tmp_path / "cut.rrd")
+    np.testing.assert_array_equal(flown, np.arange(1, len(flown) + 1))
+    assert 0 < len(flown) < 100_000
+    assert f"Interrupted after {len(flown)} of 100000 windows" in errors
+    summary = json.loads((tmp_path / "cut.json").read_text())
+    assert summary["interrupted"] is True
+    assert summary["num_windows"] == len(flown)
+    assert files(tmp_path) == ["cut.json", "cut.rrd"]
+    assert f"{len(flown)} in" in output
+
+
+def test_the_same_seed_is_the_same_mission(swarm_mj, tmp_path):
+    for name in ("a", "b"):
+        swarm_mj("fly", *SHORT, "--seed", 11, "--no-record", "--json", f"{name}.json")
+    first, second = (json.loads((tmp_path / f"{name}.json").read_text()) for name in "ab")
+    del first["wall_seconds"], second["wall_seconds"]
+    assert first == second

@@ -1,0 +1,214 @@
+import copy
+import inspect
+import math
+
+import numpy as np
+import pytest
+
+from swarm_mj.mission import paper, reference
+from swarm_mj.policies import (
+    POLICIES,
+    CentralisedPolicy,
+    DecentralisedPolicy,
+    LocalViews,
+    MinimumSpanningTree,
+    Policy,
+    RandomFlooding,
+    RoundRobin,
+    make_policy,
+)
+from swarm_mj.swarm import Swarm
+
+MISSION = paper("flocking", num_robots=8)
+DECENTRALISED = [
+    name for name in POLICIES if isinstance(make_policy(name, MISSION), DecentralisedPolicy)
+]
+ROW = 3  # the robot whose knowledge the law keeps
+
+
+def generators(num_missions=2):
+    return [np.random.default_rng((9, b)) for b in range(num_missions)]
+
+
+def real_views(seeds):
+    """What two teams know after 5, 10, ..., 30 windows of random flooding."""
+    swarm = Swarm(MISSION, seeds)
+    talk = RandomFlooding(0.2)
+    swarm.start(talk)
+    views = []
+    for window in range(1, 31):
+        swarm.step(talk)
+        if window % 5 == 0:
+            views.append(copy.deepcopy(swarm.views))
+    return views
+
+
+def with_row_of(mine, theirs):
+    """A copy of `theirs` in which `ROW` of every array, in every dataclass within, is `mine`'s."""
+    mixed = copy.deepcopy(theirs)
+    for own, other in [
+        (mine.buffers, mixed.buffers),
+        *zip(mine.phases, mixed.phases, strict=True),
+    ]:
+        for name, array in vars(own).items():
+            vars(other)[name][:, ROW] = array[:, ROW]
+    return mixed
+
+
+def decisions_of_row(policy, views):
+    policy.start(MISSION.num_robots, generators())
+    return [policy.recipients(view)[:, ROW].tolist() for view in views]
+
+
+def knows_its_own_view_only(make):
+    """Whether `ROW` decides as before when all that it cannot know is another team's (Eq. 9)."""
+    mine, theirs = real_views([1, 2]), real_views([3, 4])
+    mixed = [with_row_of(*pair) for pair in zip(mine, theirs, strict=True)]
+    return decisions_of_row(make(), mine) == decisions_of_row(make(), mixed)
+
+
+@pytest.mark.parametrize("name", DECENTRALISED)
+@pytest.mark.parametrize("preset", [paper, reference])
+def test_eq9_a_decentralised_robot_decides_on_its_own_view(name, preset):
+    assert knows_its_own_view_only(lambda: make_policy(name, preset(num_robots=8)))
+
+
+@pytest.mark.parametrize("name", DECENTRALISED)
+def test_eq9_a_decentralised_policy_is_not_told_the_truth(name):
+    """Its type has no bodies, and where the robots truly are does not change what it decides."""
+    policy = make_policy(name, MISSION)
+    assert list(inspect.signature(policy.recipients).parameters) == ["views"]
+    decisions = []
+    for scale in (1.0, 0.5):
+        swarm = Swarm(MISSION, [1, 2])
+        swarm._physics.place(scale * swarm.bodies.position_m, scale * swarm.bodies.velocity_mps)
+        swarm.start(policy)
+        decisions.append(swarm.decide(policy))
+    np.testing.assert_array_equal(*decisions)
+
+
+class MostIsolated(DecentralisedPolicy):
+    """Decentralised by its type only: everyone addresses the robot that knows the fewest."""
+
+    def recipients(self, views):
+        num_known = np.sum(views.buffers.is_known, axis=2)
+        return views.silence * 0 + np.argmin(num_known, axis=1)[:, None]
+
+
+class StalestKnown(DecentralisedPolicy):
+    """Decentralised indeed: everyone addresses whom it has heard of longest ago."""
+
+    def recipients(self, views):
+        return np.argmin(views.buffers.timestamp, axis=2)
+
+
+class LoudestLastWindow(DecentralisedPolicy):
+    """Decentralised by its type only: everyone addresses whom robot 0 decoded."""
+
+    def recipients(self, views):
+        return views.silence * 0 + views.phases[0].heard[:, :1]
+
+
+class LastHeard(DecentralisedPolicy):
+    """Decentralised indeed: everyone addresses whom it decoded last."""
+
+    def recipients(self, views):
+        return views.phases[1].heard
+
+
+@pytest.mark.parametrize(
+    ("cheat", "honest"), [(MostIsolated, StalestKnown), (LoudestLastWindow, LastHeard)]
+)
+def test_eq9_the_law_above_tells_cheats_from_honest_policies(cheat, honest):
+    assert not knows_its_own_view_only(cheat)
+    assert knows_its_own_view_only(honest)
+
+
+@pytest.mark.parametrize("name", POLICIES)
+def test_every_named_policy_is_of_one_kind(name):
+    policy = make_policy(name, MISSION)
+    assert isinstance(policy, DecentralisedPolicy) != isinstance(policy, CentralisedPolicy)
+
+
+@pytest.mark.parametrize("kind", [DecentralisedPolicy, CentralisedPolicy])
+def test_policy_must_say_whom_it_addresses(kind):
+    class Undecided(kind):
+        """Says nothing."""
+
+    with pytest.raises(TypeError, match="recipients"):
+        Undecided()
+
+
+def test_policy_starts_without_ado():
+    """A policy that neither draws nor remembers needs no start of its own."""
+    assert Policy().start(4, generators()) is None
+
+
+def test_alg1_silence_is_addressing_oneself():
+    views = LocalViews(buffers=real_views([1, 2])[0].buffers, now=np.zeros(2), phases=())
+    assert views.num_robots == 8
+    np.testing.assert_array_equal(views.silence, [range(8)] * 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "probability"),
+    [
+        ("random-flooding", RandomFlooding, 0.2),
+        ("mst", MinimumSpanningTree, 0.2),
+        ("round-robin", RoundRobin, None),
+    ],
+)
+def test_iv_c_baselines_by_name(name, kind, probability):
+    assert type(make_policy(name, MISSION)) is kind
+    assert type(make_policy(name, MISSION, probability)) is kind
+
+
+@pytest.mark.parametrize("name", ["random-flooding", "mst"])
+def test_probability_reaches_the_policy(name):
+    """At 0 nobody transmits, at 1 nearly everybody does."""
+    num_sending = []
+    for probability in (0.0, 1.0):
+        swarm = Swarm(MISSION, [1])
+        policy = make_policy(name, MISSION, probability)
+        swarm.start(policy)
+        num_sending.append(np.sum(swarm.decide(policy) != swarm.views.silence))
+    assert num_sending[0] == 0
+    assert num_sending[1] >= 5
+
+
+@pytest.mark.parametrize(
+    ("mission", "is_recomputed", "root_transmits"),
+    [
+        (paper("random-walk", num_robots=8), False, False),
+        (reference("random-walk", num_robots=8), True, True),
+        (reference("stationary", num_robots=8), False, True),
+    ],
+)
+def test_iv_c_tree_is_the_presets(mission, is_recomputed, root_transmits):
+    """The named policy decides as the one built by hand with the preset's two differences."""
+    named = make_policy("mst", mission, 1.0)
+    by_hand = MinimumSpanningTree(1.0, is_recomputed=is_recomputed, root_transmits=root_transmits)
+    for seed in range(5):
+        swarm = Swarm(mission, [seed])
+        named.start(8, generators(1))
+        by_hand.start(8, generators(1))
+        for _ in range(2):
+            np.testing.assert_array_equal(swarm.decide(named), swarm.decide(by_hand))
+            swarm._physics.place(swarm.bodies.position_m[:, ::-1], swarm.bodies.velocity_mps)
+
+
+def test_unknown_policy_is_a_clear_error():
+    with pytest.raises(ValueError, match=r"one of random-flooding, round-robin, mst.*not 'rumour'"):
+        make_policy("rumour", MISSION)
+
+
+@pytest.mark.parametrize("name", ["random-flooding", "mst"])
+@pytest.mark.parametrize("probability", [-0.1, 1.5, math.inf])
+def test_bad_probability_is_a_clear_error(name, probability):
+    with pytest.raises(ValueError, match="probability must be from 0 to 1"):
+        make_policy(name, MISSION, probability)
+
+
+def test_round_robin_has_no_probability():
+    with pytest.raises(ValueError, match="round-robin takes no transmission probability"):
+        make_policy("round-robin", MISSION, 0.5)

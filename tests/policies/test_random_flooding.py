@@ -1,0 +1,77 @@
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from swarm_mj.buffers import empty_buffers
+from swarm_mj.policies import DecentralisedPolicy, LocalViews, RandomFlooding
+
+NUM_ROBOTS = 6
+
+
+def decided(probability, num_windows, num_missions=2, num_robots=NUM_ROBOTS):
+    """Whom everyone addresses [half window, mission, robot]."""
+    policy = RandomFlooding(probability)
+    policy.start(num_robots, [np.random.default_rng((7, b)) for b in range(num_missions)])
+    views = LocalViews(
+        buffers=empty_buffers(num_missions, num_robots), now=np.zeros(num_missions), phases=()
+    )
+    return np.stack([policy.recipients(views) for _ in range(num_windows)])
+
+
+def is_sending(recipient):
+    return recipient != np.arange(recipient.shape[-1])
+
+
+def test_iv_c_two_transmissions_a_window_on_local_knowledge():
+    assert RandomFlooding.transmits_twice
+    assert issubclass(RandomFlooding, DecentralisedPolicy)
+
+
+def test_iv_c_probability_0_is_silence():
+    assert not np.any(is_sending(decided(0.0, 200)))
+
+
+def test_iv_c_probability_1_addresses_the_whole_team_alike():
+    """As in the authors' code the recipient is uniform over all N, so 1 in N is silence."""
+    recipient = decided(1.0, 2000)
+    for i in range(NUM_ROBOTS):
+        counts = np.bincount(recipient[..., i].ravel(), minlength=NUM_ROBOTS)
+        assert len(counts) == NUM_ROBOTS
+        assert stats.chisquare(counts).pvalue > 1e-4
+
+
+@pytest.mark.parametrize("probability", [0.06, 0.5])
+def test_iv_c_frequency_is_the_probability(probability):
+    """A robot addresses another with probability p (N - 1) / N: within 5 standard deviations."""
+    sending = is_sending(decided(probability, 2000))
+    expected = probability * (NUM_ROBOTS - 1) / NUM_ROBOTS
+    num_draws = sending.shape[0] * sending.shape[1]
+    for i in range(NUM_ROBOTS):
+        off = abs(np.mean(sending[..., i]) - expected)
+        assert off < 5 * math.sqrt(expected * (1 - expected) / num_draws)
+
+
+def test_iv_c_recipient_does_not_depend_on_whether_a_robot_sends():
+    """Among packets at p = 0.3 the recipients are as uniform as at p = 1."""
+    recipient = decided(0.3, 4000)
+    for i in range(NUM_ROBOTS):
+        counts = np.bincount(recipient[..., i].ravel(), minlength=NUM_ROBOTS)
+        assert stats.chisquare(np.delete(counts, i)).pvalue > 1e-4
+
+
+def test_iv_c_robots_missions_and_half_windows_draw_apart():
+    sending = is_sending(decided(0.5, 3000)).reshape(3000, -1)
+    correlation = np.corrcoef(np.vstack([sending[1:].T, sending[:-1].T]))
+    np.testing.assert_allclose(correlation, np.eye(len(correlation)), atol=5 / math.sqrt(3000))
+
+
+def test_mission_does_not_depend_on_its_neighbours():
+    np.testing.assert_array_equal(decided(0.3, 100, 3)[:, :1], decided(0.3, 100, 1))
+
+
+@pytest.mark.parametrize("probability", [-0.01, 1.01, math.nan])
+def test_bad_probability_is_a_clear_error(probability):
+    with pytest.raises(ValueError, match=f"probability must be from 0 to 1, not {probability:g}"):
+        RandomFlooding(probability)

@@ -1,0 +1,51 @@
+"""A short flight with every kind of packet, for the replay's tests."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from swarm_mj.costs import Packets
+from swarm_mj.flight import fly
+from swarm_mj.mission import Mission, paper
+from swarm_mj.policies import make_policy
+from swarm_mj.recorder import Log, Recorder
+from swarm_mj.swarm import Swarm
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A log, its mission, and the packets as the costs count them, per window."""
+
+    log: Log
+    mission: Mission
+    packets: list[Packets]
+
+    def counted(self, fate: str) -> np.ndarray:
+        """How many packets of a fate each window had, by the costs."""
+        return np.array([int(getattr(packets, fate)[0]) for packets in self.packets])
+
+
+def record(policy_name, probability, **overrides):
+    settings = {"num_robots": 12, "num_windows": 30, "boundary": "reflect"} | overrides
+    mission = paper("flocking", **settings)
+    swarm = Swarm(mission, [5])
+    policy = make_policy(policy_name, mission, probability)
+    recorder = Recorder(swarm, observer=4, has_response=not policy.transmits_twice)
+    packets = []
+    for window in fly(swarm, policy):
+        recorder.add(window)
+        packets.append(window.costs.packets)
+    return Recorded(recorder.log(), mission, packets)
+
+
+@pytest.fixture(scope="session")
+def two_way():
+    """Windows of Alg. 1, busy enough that packets of all fates occur."""
+    return record("mst", 0.3)
+
+
+@pytest.fixture(scope="session")
+def flooded():
+    """Windows of two transmissions."""
+    return record("random-flooding", 0.2)

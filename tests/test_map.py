@@ -1,0 +1,78 @@
+"""The package's map of the paper against the code, and who may import what."""
+
+import ast
+import importlib
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import swarm_mj
+
+PACKAGE = Path(swarm_mj.__file__).parent
+LINE = re.compile(r"^    (I\S+)\s+(Eq\. \d+|Alg\. \d+)?\s+\S.*?\s{2,}(\S+)$", re.MULTILINE)
+MAP = [(section, item, target) for section, item, target in LINE.findall(swarm_mj.__doc__)]
+
+
+def resolve(target):
+    """The object named by a dotted path inside the package."""
+    parts = target.split(".")
+    for length in range(len(parts) - 1, 0, -1):
+        try:
+            found = importlib.import_module(".".join(["swarm_mj", *parts[:length]]))
+        except ModuleNotFoundError:
+            continue
+        for name in parts[length:]:
+            found = getattr(found, name)
+        return found
+    raise AssertionError(f"{target} is not in the package")
+
+
+def documented(target):
+    """An object's own docstring, also if numba compiled it."""
+    found = resolve(target)
+    return getattr(found, "py_func", found).__doc__
+
+
+def test_the_map_is_complete():
+    equations = {item for _, item, _ in MAP if item}
+    assert equations == {f"Eq. {n}" for n in [*range(1, 11), 15, 16, 17]} | {"Alg. 1"}
+
+
+@pytest.mark.parametrize(("section", "item", "target"), MAP)
+def test_every_entry_leads_to_code_that_names_it(section, item, target):
+    assert (item or section) in documented(target)
+
+
+def test_every_equation_ends_one_function_s_first_line():
+    sources = {path: path.read_text() for path in PACKAGE.rglob("*.py")}
+    for _, item, target in MAP:
+        if item and item not in ("Eq. 6", "Eq. 9"):  # a protocol and a type, not functions
+            tag = re.compile(rf'"""[^"\n]*\({re.escape(item)}\)\.?(?:"""|\n)')
+            found = [path.stem for path, text in sources.items() if tag.search(text)]
+            assert target.split(".")[0] in found, item
+
+
+def imports(path):
+    """The modules of this package that a file imports."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("swarm_mj"):
+            yield node.module.removeprefix("swarm_mj.")
+
+
+@pytest.mark.parametrize("name", ["mission", "placement", "radio", "buffers", "streams"])
+def test_the_innermost_rooms_know_no_other(name):
+    assert list(imports(PACKAGE / f"{name}.py")) == []
+
+
+def test_the_library_knows_neither_training_nor_tools():
+    for path in PACKAGE.rglob("*.py"):
+        assert not re.search(r"^(from|import) (training|tools)\b", path.read_text(), re.MULTILINE)
+
+
+@pytest.mark.parametrize("heavy", ["torch", "stable_baselines3", "rerun", "dm_control"])
+def test_the_core_does_not_load_heavy_libraries(heavy):
+    code = f"import sys, swarm_mj.flight, swarm_mj.recorder; sys.exit({heavy!r} in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

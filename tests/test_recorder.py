@@ -1,0 +1,87 @@
+"""The record of a flight against the swarm it was taken from."""
+
+import numpy as np
+import pytest
+
+from swarm_mj import recorder
+from swarm_mj.flight import fly
+from swarm_mj.mission import paper
+from swarm_mj.policies import make_policy
+from swarm_mj.recorder import Recorder
+from swarm_mj.swarm import Swarm
+
+
+def flown_log(num_windows=12, observer=2, num_robots=8):
+    """A short flight's log, and what the test itself saw of every window."""
+    mission = paper("random-walk", num_robots=num_robots, num_windows=num_windows)
+    swarm = Swarm(mission, [3])
+    policy = make_policy("mst", mission, 0.4)
+    record = Recorder(swarm, observer=observer)
+    seen = []
+    for window in fly(swarm, policy):
+        record.add(window)
+        seen.append((swarm.bodies.position_m[0].copy(), swarm.now[0] - swarm.buffers.timestamp[0]))
+    return record.log(), seen
+
+
+def test_a_log_holds_the_true_positions_of_every_window():
+    log, seen = flown_log()
+    np.testing.assert_array_equal(log.position_m, [position for position, _ in seen])
+    np.testing.assert_array_equal(log.window, np.arange(1, 13))
+
+
+def test_ages_are_those_of_the_buffers():
+    log, seen = flown_log()
+    ages = np.array([age for _, age in seen])
+    np.testing.assert_array_equal(log.age, ages)
+    np.testing.assert_array_equal(log.observer_age, ages[:, 2])
+    np.testing.assert_allclose(log.age_mean, ages.mean(axis=(1, 2)), rtol=1e-12)
+    others = ages[:, ~np.eye(8, dtype=bool)]
+    np.testing.assert_allclose(log.age_std, others.std(axis=1), rtol=1e-12)
+    np.testing.assert_array_equal(log.age_max, others.max(axis=1))
+
+
+def test_an_unknown_robot_is_as_old_as_the_mission():
+    log, _ = flown_log()
+    first = log.observer_age[0]
+    assert set(first[~log.is_known[0]]) == {1.0}
+    assert first[2] == 0.0
+
+
+def test_large_flights_keep_every_kth_age_matrix(monkeypatch):
+    # Twelve matrices of 8 x 8 float32 in room for five: every third one is kept.
+    monkeypatch.setattr(recorder, "MAX_AGE_MATRIX_BYTES", 5 * 8 * 8 * 4.0)
+    log, seen = flown_log()
+    np.testing.assert_array_equal(log.age_window, [1, 4, 7, 10])
+    np.testing.assert_array_equal(log.age, [seen[w - 1][1] for w in (1, 4, 7, 10)])
+
+
+def test_an_interrupt_inside_add_leaves_a_whole_log(monkeypatch):
+    mission = paper("stationary", num_robots=5, num_windows=4)
+    swarm = Swarm(mission, [0])
+    record = Recorder(swarm)
+    windows = fly(swarm, make_policy("round-robin", mission))
+    record.add(next(windows))
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    second = next(windows)
+    monkeypatch.setattr(recorder.np, "std", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        record.add(second)
+    monkeypatch.undo()
+    log = record.log()
+    assert len(log.window) == len(log.age_window) == len(log.age) == len(log.position_m) == 1
+
+
+@pytest.mark.parametrize("observer", [-1, 8])
+def test_an_observer_must_exist(observer):
+    swarm = Swarm(paper("stationary", num_robots=8), [0])
+    with pytest.raises(ValueError, match=f"observer must be from 0 to 7, not {observer}"):
+        Recorder(swarm, observer=observer)
+
+
+def test_nothing_flown_is_no_log():
+    with pytest.raises(ValueError, match="at least 1 window"):
+        Recorder(Swarm(paper("stationary", num_robots=4), [0])).log()

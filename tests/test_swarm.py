@@ -1,0 +1,406 @@
+import itertools
+
+import numpy as np
+import pytest
+
+from swarm_mj.mission import paper, reference
+from swarm_mj.motion import initial_velocity
+from swarm_mj.placement import is_connected
+from swarm_mj.policies import (
+    POLICIES,
+    CentralisedPolicy,
+    DecentralisedPolicy,
+    RandomFlooding,
+    RoundRobin,
+    make_policy,
+)
+from swarm_mj.swarm import Swarm, radio_of
+
+TASKS = ["stationary", "random-walk", "flocking"]
+PRESETS = [paper, reference]
+MODES = ["exact", "contact"]
+NUM_WINDOWS = 8
+
+everything = pytest.mark.parametrize(
+    ("name", "task", "preset", "physics"),
+    list(itertools.product(POLICIES, TASKS, PRESETS, MODES)),
+)
+
+
+def small(task="flocking", preset=paper, **numbers):
+    return preset(task, num_robots=8, velocity_ratio=1.0, **numbers)
+
+
+def course(swarm, policy, num_windows=NUM_WINDOWS):
+    """Everything that can be seen of a mission: arrays with the missions as leading axis."""
+    swarm.start(policy)
+    seen = []
+    for _ in range(num_windows):
+        costs = swarm.step(policy)
+        seen += [swarm.bodies.position_m, swarm.bodies.velocity_mps, swarm.now]
+        seen += [array.copy() for array in vars(swarm.buffers).values()]
+        seen += [array for phase in swarm.phases for array in vars(phase).values()]
+        seen += [costs.age_windows, costs.is_complete, costs.velocity_variance_m2ps2]
+        seen += list(vars(costs.packets).values())
+    return seen
+
+
+def assert_same(one, other):
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@everything
+def test_a_seed_is_a_mission(name, task, preset, physics):
+    """The same seeds give the same missions bit by bit, other seeds others, and so do restarts."""
+    mission = small(task, preset, physics=physics)
+    swarm = Swarm(mission, [1, 2])
+    first = course(swarm, make_policy(name, mission))
+    assert_same(first, course(Swarm(mission, [1, 2]), make_policy(name, mission)))
+    others = course(Swarm(mission, [3, 4]), make_policy(name, mission))
+    assert not np.array_equal(first[0], others[0])
+    swarm.restart([3, 4])
+    assert_same(others, course(swarm, make_policy(name, mission)))
+
+
+@everything
+def test_missions_side_by_side_are_the_missions_one_by_one(name, task, preset, physics):
+    mission = small(task, preset, physics=physics)
+    together = course(Swarm(mission, [5, 6, 7]), make_policy(name, mission))
+    for b, seed in enumerate([5, 6, 7]):
+        alone = course(Swarm(mission, [seed]), make_policy(name, mission))
+        assert_same([array[b : b + 1] for array in together], alone)
+
+
+def test_missions_side_by_side_differ():
+    swarm = Swarm(small(), [1, 2, 1])
+    np.testing.assert_array_equal(swarm.bodies.position_m[0], swarm.bodies.position_m[2])
+    assert not np.any(swarm.bodies.position_m[0] == swarm.bodies.position_m[1])
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("physics", MODES)
+def test_every_policy_meets_the_same_missions(preset, physics):
+    """Common random numbers: equal seeds are equal placements, and equal walks.
+
+    Under flooding the reference preset's robots move twice per window, so every second of its
+    states stands beside the others'.
+    """
+    mission = small("random-walk", preset, physics=physics)
+    paths = []
+    for name in POLICIES:
+        swarm, policy = Swarm(mission, [1, 2]), make_policy(name, mission)
+        moves = 2 if mission.moves_each_transmission and policy.transmits_twice else 1
+        swarm.start(policy)
+        path = [swarm.bodies.position_m]
+        for _ in range(12 // moves):
+            swarm.step(policy)
+            path.append(swarm.bodies.position_m)
+        paths.append({k * moves: position_m for k, position_m in enumerate(path)})
+    for path in paths[1:]:
+        for window in path.keys() & paths[0].keys():
+            np.testing.assert_array_equal(path[window], paths[0][window])
+
+
+def test_iv_b_start_is_connected_inside_and_known_to_nobody_else():
+    mission = small("random-walk")
+    swarm = Swarm(mission, list(range(10)))
+    for position_m in swarm.bodies.position_m:
+        assert is_connected(position_m, 250.0)
+        assert np.abs(position_m).max() <= 500.0 * (8 / 40) ** 0.5
+    buffers, own = swarm.buffers, np.arange(8)
+    np.testing.assert_array_equal(buffers.position_m[:, own, own], swarm.bodies.position_m)
+    np.testing.assert_array_equal(buffers.velocity_mps[:, own, own], swarm.bodies.velocity_mps)
+    is_other = ~np.eye(8, dtype=bool)
+    assert not np.any(buffers.position_m[:, is_other])
+    assert not np.any(buffers.is_known[:, is_other])
+    np.testing.assert_array_equal(swarm.now, 0.0)
+    assert swarm.phases == ()
+
+
+class Witness(CentralisedPolicy):
+    """Notes what it is shown, and what the robots know of themselves by then; stays silent."""
+
+    def __init__(self):
+        self.shown = []
+
+    def recipients(self, views, bodies):
+        own = np.arange(views.num_robots)
+        self.shown.append((bodies.position_m, views.buffers.position_m[:, own, own], views.now))
+        return views.silence.copy()
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_policy_decides_before_the_robots_move(preset):
+    """In window w it sees the states at the end of window w - 1, and so do the robots."""
+    swarm, witness = Swarm(small("random-walk", preset), [1, 2]), Witness()
+    swarm.start(witness)
+    ends_m = [swarm.bodies.position_m]
+    for window in range(5):
+        swarm.step(witness)
+        shown_m, believed_m, now = witness.shown[window]
+        np.testing.assert_array_equal(shown_m, ends_m[window])
+        np.testing.assert_array_equal(believed_m, ends_m[window])
+        np.testing.assert_array_equal(now, window)
+        ends_m.append(swarm.bodies.position_m)
+        assert np.all(ends_m[window] != ends_m[window + 1])
+    own = np.arange(8)
+    np.testing.assert_array_equal(swarm.buffers.position_m[:, own, own], ends_m[-1])
+
+
+class Silent(DecentralisedPolicy):
+    """Nobody ever transmits."""
+
+    def recipients(self, views):
+        return views.silence.copy()
+
+
+class SilentTwice(Silent):
+    """Nobody ever transmits, twice per window."""
+
+    transmits_twice = True
+
+
+@pytest.mark.parametrize("physics", MODES)
+@pytest.mark.parametrize(
+    ("preset", "policy", "moves"),
+    [
+        (paper, Silent, 1),
+        (paper, SilentTwice, 1),
+        (reference, Silent, 1),
+        (reference, SilentTwice, 2),
+    ],
+)
+def test_iv_b_flooding_moves_twice_in_the_reference_preset_only(physics, preset, policy, moves):
+    """A flock that hears nothing coasts: 10 windows of 0.1 s at v, or 20 of them."""
+    swarm = Swarm(small(preset=preset, physics=physics), [1, 2])
+    start = swarm.bodies
+    for _ in range(10):
+        swarm.step(policy())
+    travelled_m = swarm.bodies.position_m - start.position_m
+    np.testing.assert_allclose(travelled_m, moves * 1.0 * start.velocity_mps, rtol=1e-9)
+    np.testing.assert_array_equal(swarm.now, 10.0)
+
+
+class Script(DecentralisedPolicy):
+    """Reads its decisions off a list."""
+
+    def __init__(self, recipients):
+        self._recipients = iter(recipients)
+
+    def recipients(self, views):  # noqa: ARG002 - a DecentralisedPolicy
+        return next(self._recipients)
+
+
+class ScriptTwice(Script):
+    """Reads two decisions per window."""
+
+    transmits_twice = True
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_exchange_is_a_window_of_a_policy_that_chose_these_recipients(preset):
+    mission = small("random-walk", preset)
+    rng = np.random.default_rng(0)
+    recipients = [rng.integers(0, 8, size=(2, 8)) for _ in range(6)]
+    given, chosen = Swarm(mission, [1, 2]), Swarm(mission, [1, 2])
+    script = Script(recipients)
+    for recipient in recipients:
+        by_hand, by_policy = given.exchange(recipient), chosen.step(script)
+        np.testing.assert_array_equal(by_hand.age_windows, by_policy.age_windows)
+        np.testing.assert_array_equal(given.phases[0].recipient, recipient)
+        assert_same(vars(given.buffers).values(), vars(chosen.buffers).values())
+        np.testing.assert_array_equal(given.bodies.position_m, chosen.bodies.position_m)
+
+
+@pytest.mark.parametrize("physics", MODES)
+def test_iv_a_a_flock_can_be_walled_in(physics):
+    """At 20 m/s for 30 s a flock of 450 m by 450 m leaves its area, unless given a boundary."""
+    farthest_m = {}
+    for boundary in ("reflect", "none"):
+        mission = small(physics=physics, boundary=boundary)
+        swarm, policy = Swarm(mission, [1, 2]), make_policy("round-robin", mission)
+        reached_m = [0.0]
+        for _ in range(300):
+            swarm.step(policy)
+            reached_m.append(np.abs(swarm.bodies.position_m).max())
+        farthest_m[boundary] = max(reached_m)
+    half_side_m = 500.0 * (8 / 40) ** 0.5
+    assert farthest_m["reflect"] <= half_side_m + 0.5  # the radius of a body
+    assert farthest_m["none"] > half_side_m + 50.0
+
+
+def silence_of(num_missions, num_robots):
+    return np.tile(np.arange(num_robots), (num_missions, 1))
+
+
+def test_alg1_exchange_by_hand():
+    """Robot 0 addresses robot 1, alone on the air and within range: both learn of each other.
+
+    The packet leaves at half a window, the answer at a whole one, after the robots moved.
+    """
+    mission = small("random-walk", range_ratio=10.0)
+    swarm = Swarm(mission, [1])
+    recipient = silence_of(1, 8)
+    recipient[0, 0] = 1
+    costs = swarm.exchange(recipient)
+    timestamp = np.diag(np.full(8, 1.0))
+    timestamp[1:, 0] = 0.5  # everyone decoded robot 0's packet,
+    timestamp[[0, *range(2, 8)], 1] = 1.0  # and robot 1's answer
+    np.testing.assert_array_equal(swarm.buffers.timestamp[0], timestamp)
+    np.testing.assert_array_equal(swarm.buffers.position_m[0, 0, 1], swarm.bodies.position_m[0, 1])
+    assert swarm.buffers.last_attempt[0, 0, 1] == 0.5
+    assert np.count_nonzero(swarm.buffers.last_attempt) == 1
+    assert costs.packets.attempted == costs.packets.delivered == costs.packets.answered == 1
+    assert costs.packets.overheard == 6 + 6
+    assert costs.age_windows[0] == pytest.approx(1.0 - timestamp.mean())
+
+
+def test_iv_c_flooding_by_hand():
+    """Robot 0 sends, then robot 1: the second packet passes the first one's news on, unanswered."""
+    mission = small("random-walk", range_ratio=10.0)
+    swarm = Swarm(mission, [1])
+    first, second = silence_of(1, 8), silence_of(1, 8)
+    first[0, 0], second[0, 1] = 1, 2
+    costs = swarm.step(ScriptTwice([first, second]))
+    timestamp = np.diag(np.full(8, 1.0))
+    timestamp[1:, 0] = 0.5
+    timestamp[[0, *range(2, 8)], 1] = 1.0
+    np.testing.assert_array_equal(swarm.buffers.timestamp[0], timestamp)
+    assert swarm.buffers.last_attempt[0, 0, 1] == 0.5
+    assert swarm.buffers.last_attempt[0, 1, 2] == 1.0
+    assert costs.packets.attempted == costs.packets.delivered == 2
+    assert costs.packets.answered == 0
+
+
+@pytest.mark.parametrize(("preset", "own_attempt"), [(paper, 0.0), (reference, 0.5)])
+def test_eq7_silence_is_an_attempt_in_the_reference_preset_only(preset, own_attempt):
+    swarm = Swarm(small(preset=preset), [1])
+    swarm.exchange(silence_of(1, 8))
+    np.testing.assert_array_equal(swarm.buffers.last_attempt[0], np.eye(8) * own_attempt)
+    swarm.step(SilentTwice())
+    expected = np.eye(8) * (2.0 if own_attempt else 0.0)
+    np.testing.assert_array_equal(swarm.buffers.last_attempt[0], expected)
+
+
+def test_radio_is_the_missions():
+    """IV-B: at 250 m, 2.4 GHz, -50 dBm and 1 dB the authors' code sends 39.013025 dBm."""
+    radio = radio_of(paper())
+    assert 10 * np.log10(radio.power_mw) == pytest.approx(39.013025, abs=1e-6)
+    assert radio.noise_mw == pytest.approx(1e-5)
+    assert radio.threshold == pytest.approx(10**0.1)
+    assert not radio.recipient_hears_while_sending
+    assert radio_of(reference()).recipient_hears_while_sending
+
+
+def test_eq6_channel_is_exchangeable():
+    """Everyone decodes robot 5, whatever was sent: the swarm believes its channel."""
+
+    def only_robot_5(position_m, recipient):
+        assert position_m.shape == (*recipient.shape, 2)
+        return np.full_like(recipient, 5)
+
+    swarm = Swarm(small(), [1, 2], channel=only_robot_5)
+    swarm.exchange(silence_of(2, 8))
+    assert np.all(swarm.buffers.timestamp[..., 5] == 1.0)
+    is_own_or_5 = np.eye(8, dtype=bool) | (np.arange(8) == 5)
+    np.testing.assert_array_equal(swarm.buffers.is_known, np.stack([is_own_or_5] * 2))
+
+
+@pytest.mark.parametrize("seeds", [[], [-1], [3, -1]])
+def test_bad_seeds_are_a_clear_error(seeds):
+    with pytest.raises(ValueError, match="seeds must be one or more integers from 0"):
+        Swarm(small(), seeds)
+
+
+def test_more_seeds_than_missions_are_an_error():
+    swarm = Swarm(small(), [1, 2])
+    with pytest.raises(ValueError, match="3"):
+        swarm.restart([1, 2, 3])
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_eq16_a_robot_does_not_react_to_one_it_has_not_heard(preset, monkeypatch, deaf_channel):
+    """Two flocks that differ in robot 7's velocity alone, and nobody hears robot 7."""
+
+    def all_but_7_hear_0(position_m, recipient):
+        heard = deaf_channel(position_m, recipient)
+        heard[:, 1:7] = 0
+        return heard
+
+    def with_a_slower_robot_7(mission, rng):
+        velocity_mps = initial_velocity(mission, rng)
+        velocity_mps[7] /= 2.0
+        return velocity_mps
+
+    ends = []
+    for start_of in (initial_velocity, with_a_slower_robot_7):
+        monkeypatch.setattr("swarm_mj.swarm.initial_velocity", start_of)
+        swarm = Swarm(small(preset=preset), [1, 2], channel=all_but_7_hear_0)
+        start_mps = swarm.bodies.velocity_mps
+        for _ in range(NUM_WINDOWS):
+            swarm.exchange(silence_of(2, 8))
+        ends.append(swarm.bodies.velocity_mps)
+    assert np.all(start_mps[:, 1:7] != ends[0][:, 1:7])  # they did react to robot 0
+    np.testing.assert_array_equal(ends[0][:, :7], ends[1][:, :7])
+    assert np.all(ends[0][:, 7] != ends[1][:, 7])
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("name", POLICIES)
+def test_ages_never_shrink_without_a_packet(name, preset):
+    """Laws along a mission: no age is negative, and old news stays old until a packet decodes."""
+    mission = small("random-walk", preset)
+    swarm, policy = Swarm(mission, [1, 2]), make_policy(name, mission)
+    swarm.start(policy)
+    is_other = ~np.eye(8, dtype=bool)
+    num_learnt = 0
+    for _ in range(60):
+        before = swarm.buffers.timestamp.copy()
+        swarm.step(policy)
+        timestamp = swarm.buffers.timestamp
+        assert np.all(timestamp <= swarm.now[:, None, None])
+        assert np.all(timestamp >= before)
+        np.testing.assert_array_equal(timestamp[:, ~is_other], swarm.now[:, None].repeat(8, axis=1))
+        has_decoded = np.any([p.heard != silence_of(2, 8) for p in swarm.phases], axis=0)
+        has_news = np.any((timestamp > before) & is_other, axis=2)
+        assert not np.any(has_news & ~has_decoded)
+        num_learnt += np.sum(has_news)
+    assert num_learnt > 10
+
+
+@pytest.mark.parametrize("name", POLICIES)
+@pytest.mark.parametrize("task", ["random-walk", "flocking"])
+def test_eq5_eq8_what_a_robot_knows_was_true_when_observed(name, task):
+    """However many hops it took: M^{i,j} is j's true state in the window of its timestamp."""
+    mission = small(task)
+    swarm, policy = Swarm(mission, [1, 2]), make_policy(name, mission)
+    swarm.start(policy)
+    path_m, path_mps = [swarm.bodies.position_m], [swarm.bodies.velocity_mps]
+    for _ in range(60):
+        swarm.step(policy)
+        path_m.append(swarm.bodies.position_m)
+        path_mps.append(swarm.bodies.velocity_mps)
+    observed_in = np.ceil(swarm.buffers.timestamp).astype(int)  # both phases of window w end it
+    checked = 0
+    for b, i, j in zip(*np.nonzero(swarm.buffers.is_known), strict=True):
+        w = observed_in[b, i, j]
+        np.testing.assert_array_equal(swarm.buffers.position_m[b, i, j], path_m[w][b, j])
+        np.testing.assert_array_equal(swarm.buffers.velocity_mps[b, i, j], path_mps[w][b, j])
+        checked += i != j
+    assert checked > 20
+
+
+@pytest.mark.parametrize("policy", [RandomFlooding(0.2), RoundRobin()])
+def test_costs_are_of_the_end_of_the_window(policy):
+    """Eq. 10 and Eq. 17 from the swarm's own arrays, in plain loops."""
+    swarm = Swarm(small("random-walk"), [1, 2])
+    swarm.start(policy)
+    for _ in range(10):
+        costs = swarm.step(policy)
+    for b in range(2):
+        ages = [swarm.now[b] - t for row in swarm.buffers.timestamp[b] for t in row]
+        assert costs.age_windows[b] == pytest.approx(sum(ages) / 64)
+        velocity_mps = swarm.bodies.velocity_mps[b]
+        spread = [np.sum((v - velocity_mps.mean(axis=0)) ** 2) for v in velocity_mps]
+        assert costs.velocity_variance_m2ps2[b] == pytest.approx(sum(spread) / 8)
