@@ -46,7 +46,7 @@ format: setup
 
 picture: setup
 	$(BIN)/swarm-mj fly --record replays/readme.rrd --force
-	$(BIN)/python tools/picture.py replays/readme.rrd --window 250 --out assets/pictures/replay.png
+	$(BIN)/python tools/picture.py replays/readme.rrd --window 335 --out assets/pictures/replay.png
 
 clean:
 	rm -rf .venv replays build dist .pytest_cache .ruff_cache .hypothesis

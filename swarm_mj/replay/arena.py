@@ -12,7 +12,7 @@ from swarm_mj.replay.sheet import Sheet, screen
 GRID_M = 100.0
 TRAIL_WINDOWS = 40
 TRAIL_STRIDE = 5
-HEADING_S = 6.0  # a velocity is drawn as the way it covers in this time
+HEADING_S = 10.0  # a velocity is drawn as the way it covers in this time
 LOST_SHARE = 0.6  # a lost packet's arrow stops short of its receiver
 
 
@@ -83,7 +83,7 @@ def draw_tree_on_map(sheet: Sheet) -> None:
     links = Links(
         num_windows=len(log.window), row=row, sender=log.parent[row, child], receiver=child
     )
-    sheet.line_style("arena/tree", palette.TREE, 0.9, 6.0)
+    sheet.line_style("arena/tree", palette.dim(palette.TREE, 0.75), 0.8, 6.0)
     sheet.lines("arena/tree", *ends(log, links), links.per_window)
 
 

@@ -1,0 +1,64 @@
+"""How far a flock agrees on a velocity over each of the paper's baselines (Fig. 2, Eqs. 16-17).
+
+    python training/flocking_converges.py
+
+Flies the same missions with every policy and prints how much of the velocity variance is left at
+the end. Flocks have no boundary here, as in the paper.
+"""
+
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from swarm_mj.flight import fly, summarise
+from swarm_mj.mission import Mission, paper
+from swarm_mj.policies import POLICIES, make_policy
+from swarm_mj.provenance import commit, version
+from swarm_mj.swarm import Swarm
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What is flown."""
+
+    mission: Mission = paper("flocking")
+    first_seed: int = 0
+    num_missions: int = 100
+    agreed_share: float = 0.01  # a flock has agreed when less of its first variance is left
+
+
+def left_over(settings: Settings, policy_name: str) -> np.ndarray:
+    """The share of the first window's velocity variance left after the last, per mission."""
+    seeds = range(settings.first_seed, settings.first_seed + settings.num_missions)
+    swarm = Swarm(settings.mission, seeds)
+    policy = make_policy(policy_name, settings.mission)
+    windows = fly(swarm, policy)
+    total = settings.mission.num_windows
+    summary = summarise(list(track(windows, policy_name, total, transient=True)))
+    return summary.velocity_variance_last / summary.velocity_variance_first
+
+
+def main() -> int:
+    """Runs the experiment; returns its exit code."""
+    settings = Settings()
+    table = Table(title=f"Velocity variance left, {settings.num_missions} missions")
+    for heading in ("policy", "median", "mean", "worst", f"below {settings.agreed_share:.0%}"):
+        table.add_column(heading, justify="left" if heading == "policy" else "right")
+    for name in POLICIES:
+        share = left_over(settings, name)
+        agreed = np.mean(share < settings.agreed_share)
+        numbers = (np.median(share), np.mean(share), np.max(share), agreed)
+        table.add_row(name, *(f"{number:.2%}" for number in numbers))
+    console = Console(highlight=False)
+    console.print(table)
+    last = settings.first_seed + settings.num_missions - 1
+    console.print(f"Seeds {settings.first_seed} to {last}, swarm_mj {version()}, {commit()}.")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
