@@ -5,13 +5,14 @@ from pathlib import Path
 
 from mujoco._specs import MjSpec  # noqa: TID251 - the scene is MuJoCo's; typed nowhere else
 
-from swarm_mj.mission import Mission
+from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 
 CONTACT_STEP_S = 0.01  # step of the `contact` physics: ten per window of 100 ms
 ROBOT_MASS_KG = 1.0  # assets/robot.xml
 WALL_THICKNESS_M = 2.0  # half of it, assets/arena.xml
 WALL_HEIGHT_M = 5.0  # half of it, assets/arena.xml
 SQUARES_PER_M = 5.0 / 1000.0  # repeats of the floor's texture, assets/arena.xml
+BEACON_RADIUS_M = 8.0  # assets/robot.xml, for an area of 1 km; larger areas have larger beacons
 CAMERA_HEIGHT_PER_SIDE = 1.3  # sees the whole area at a field of view of 45 degrees
 
 # An overdamped limit that turns v into -v within one Euler step: a = -2 v / h (MuJoCo, solreflimit
@@ -66,7 +67,7 @@ def compose(mission: Mission) -> MjSpec:
     spec.modelname = f"swarm of {mission.num_robots}"
     _scale_arena(spec, mission)
     robot = MjSpec.from_file(str(asset("robot.xml")))
-    _bound_robot(robot, mission)
+    _fit_robot(robot, mission)
     for i in range(mission.num_robots):
         frame = spec.worldbody.add_frame(pos=[0.0, 0.0, 1.0])
         spec.attach(robot.copy(), frame=frame, prefix=f"r{i}/")
@@ -96,10 +97,12 @@ def _scale_arena(spec: MjSpec, mission: Mission) -> None:
         ]
 
 
-def _bound_robot(robot: MjSpec, mission: Mission) -> None:
-    """Sets the mission's bounds on the robot's actuators, and in `contact` its elastic walls."""
+def _fit_robot(robot: MjSpec, mission: Mission) -> None:
+    """Sets the robot's beacon, the mission's bounds on it, and in `contact` its elastic walls."""
     step_s = timestep_s(mission)
     robot.option.timestep = step_s
+    beacon_m = BEACON_RADIUS_M * max(1.0, mission.side_m / MISSION_DISTANCE_M)
+    robot.geom("beacon").size = [beacon_m, *robot.geom("beacon").size[1:]]
     force_n = ROBOT_MASS_KG * mission.max_acceleration_mps2
     for actuator in robot.actuators:
         actuator.forcerange = [-force_n, force_n]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from channels import to_nobody
 
 from swarm_mj.flight import fly, summarise
 from swarm_mj.mission import paper, reference
@@ -30,15 +31,13 @@ def tell_everyone_the_truth(swarm):
 
 @pytest.mark.parametrize("preset", [paper, reference])
 @pytest.mark.parametrize("physics", ["exact", "contact"])
-def test_eq16_perfect_knowledge_shrinks_the_spread_by_a_tenth_a_window(
-    preset, physics, deaf_channel
-):
+def test_eq16_perfect_knowledge_shrinks_the_spread_by_a_tenth_a_window(preset, physics):
     """v' = v + 0.1 s (mean - v) per second: the mean stays and the spread is (1 - 0.1)^k.
 
     Velocities move towards each other, so V_max never clips them; no difference exceeds
     2 V_max = 6 m/s, so A_max never does either.
     """
-    swarm = Swarm(preset("flocking", physics=physics, num_robots=20), [1, 2], channel=deaf_channel)
+    swarm = Swarm(preset("flocking", physics=physics, num_robots=20), [1, 2], channel=to_nobody)
     start_mps, mean_mps = spread_mps(swarm), np.mean(swarm.bodies.velocity_mps, axis=1)
     for k in range(1, NUM_WINDOWS + 1):
         tell_everyone_the_truth(swarm)
@@ -52,10 +51,10 @@ def test_eq16_perfect_knowledge_shrinks_the_spread_by_a_tenth_a_window(
 @pytest.mark.parametrize("preset", [paper, reference])
 @pytest.mark.parametrize("physics", ["exact", "contact"])
 @pytest.mark.parametrize("name", BASELINES)
-def test_flock_that_hears_nothing_never_converges(name, preset, physics, deaf_channel):
+def test_flock_that_hears_nothing_never_converges(name, preset, physics):
     """Every robot keeps the velocity that it started with, however much it transmits."""
     mission = preset("flocking", physics=physics, num_robots=10, num_windows=50)
-    swarm = Swarm(mission, [1, 2], channel=deaf_channel)
+    swarm = Swarm(mission, [1, 2], channel=to_nobody)
     start_mps = swarm.bodies.velocity_mps
     summary = summarise(list(fly(swarm, make_policy(name, mission))))
     np.testing.assert_allclose(swarm.bodies.velocity_mps, start_mps, rtol=1e-12)

@@ -2,6 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
+from channels import to_nobody
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.motion import initial_velocity
@@ -102,6 +103,39 @@ def test_every_policy_meets_the_same_missions(preset, physics):
             np.testing.assert_array_equal(path[window], paths[0][window])
 
 
+class Silent(DecentralisedPolicy):
+    """Nobody ever transmits."""
+
+    def start(self, num_robots, rngs):  # noqa: ARG002 - a Policy
+        self.rngs = rngs
+
+    def recipients(self, views):
+        return views.silence.copy()
+
+
+def test_policy_draws_apart_from_placement_and_motion():
+    """Over 400 seeds, their first numbers have nothing to do with each other.
+
+    From one state they would be equal: so the policy's generator is asked for what placement draws
+    first, a uniform number, and for what the walk draws first, a normal one.
+    """
+    num_missions = 400
+    mission = paper(
+        "random-walk", num_robots=2, range_ratio=10.0, velocity_ratio=5.0, boundary="none"
+    )
+    swarm, policy = Swarm(mission, list(range(num_missions))), Silent()
+    placed, start_mps = swarm.bodies.position_m[:, 0, 0], swarm.bodies.velocity_mps
+    swarm.start(policy)
+    by_policy = [rng.random() for rng in policy.rngs]
+    swarm.move()
+    walked = (swarm.bodies.velocity_mps - start_mps)[:, 0, 0]
+    swarm.restart(list(range(num_missions)))
+    swarm.start(policy)
+    by_policy_normal = [rng.standard_normal() for rng in policy.rngs]
+    correlation = np.corrcoef([placed, walked, by_policy, by_policy_normal])
+    assert np.abs(correlation[:2, 2:]).max() < 4 / num_missions**0.5
+
+
 def test_iv_b_start_is_connected_inside_and_known_to_nobody_else():
     mission = small("random-walk")
     swarm = Swarm(mission, list(range(10)))
@@ -146,13 +180,6 @@ def test_policy_decides_before_the_robots_move(preset):
         assert np.all(ends_m[window] != ends_m[window + 1])
     own = np.arange(8)
     np.testing.assert_array_equal(swarm.buffers.position_m[:, own, own], ends_m[-1])
-
-
-class Silent(DecentralisedPolicy):
-    """Nobody ever transmits."""
-
-    def recipients(self, views):
-        return views.silence.copy()
 
 
 class SilentTwice(Silent):
@@ -320,11 +347,11 @@ def test_more_seeds_than_missions_are_an_error():
 
 
 @pytest.mark.parametrize("preset", PRESETS)
-def test_eq16_a_robot_does_not_react_to_one_it_has_not_heard(preset, monkeypatch, deaf_channel):
+def test_eq16_a_robot_does_not_react_to_one_it_has_not_heard(preset, monkeypatch):
     """Two flocks that differ in robot 7's velocity alone, and nobody hears robot 7."""
 
     def all_but_7_hear_0(position_m, recipient):
-        heard = deaf_channel(position_m, recipient)
+        heard = to_nobody(position_m, recipient)
         heard[:, 1:7] = 0
         return heard
 

@@ -1,0 +1,67 @@
+"""The headless picture as a process; taking one needs a Vulkan driver."""
+
+import ctypes.util
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+TOOL = Path(__file__).parent.parent.parent / "tools" / "picture.py"
+DRIVERS = [*Path("/usr/share/vulkan/icd.d").glob("*.json"), *Path("/etc/vulkan/icd.d").glob("*")]
+
+
+def picture(*arguments, cwd):
+    return subprocess.run(
+        [sys.executable, TOOL, *map(str, arguments)],
+        cwd=cwd, capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def replay(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("replay")
+    command = [sys.executable, "-m", "swarm_mj", "fly", "--windows", "30", "--record", "a.rrd"]
+    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    return folder / "a.rrd"
+
+
+@pytest.mark.skipif(
+    not DRIVERS or not ctypes.util.find_library("vulkan"), reason="no Vulkan driver on this machine"
+)
+def test_a_picture_shows_something(replay, tmp_path):
+    done = picture(replay, "--window", 20, "--out", "a.png", "--size", "1280x720", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    with Image.open(tmp_path / "a.png") as image:
+        pixels = np.asarray(image.convert("RGB"))
+    assert pixels.shape[1] == 1280
+    # Bright robots on a dark floor: neither an empty window nor a single colour.
+    assert (pixels.max(axis=2) > 180).mean() > 0.002
+    assert (pixels.max(axis=2) < 40).mean() > 0.3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--window", "31"], "window must be from 1 to 30, not 31"),
+        (["--window", "0"], "window must be from 1 to 30, not 0"),
+        (["--size", "big"], "size must be WIDTHxHEIGHT"),
+        (["--out", "missing/a.png"], "does not exist: missing"),
+    ],
+)
+def test_bad_input_is_one_clear_line(replay, tmp_path, arguments, complaint):
+    done = picture(replay, *arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert complaint in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_truncated_replay_is_refused(replay, tmp_path):
+    broken = tmp_path / "broken.rrd"
+    broken.write_bytes(replay.read_bytes()[:50_000])
+    done = picture(broken, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "no whole replay" in done.stderr

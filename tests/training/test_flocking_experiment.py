@@ -1,0 +1,35 @@
+"""The experiment on flocking, on a small scale."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+
+from swarm_mj.flight import fly
+from swarm_mj.mission import paper
+from swarm_mj.policies import make_policy
+from swarm_mj.swarm import Swarm
+
+FILE = Path(__file__).parent.parent.parent / "training" / "flocking_converges.py"
+
+
+def load():
+    spec = importlib.util.spec_from_file_location("flocking_converges", FILE)
+    experiment = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(experiment)
+    return experiment
+
+
+def test_the_share_left_is_last_over_first_variance():
+    experiment = load()
+    mission = paper("flocking", num_robots=6, num_windows=40, range_ratio=1.0)
+    settings = experiment.Settings(mission=mission, first_seed=3, num_missions=2)
+    left = experiment.left_over(settings, "round-robin")
+
+    swarm = Swarm(mission, [3, 4])
+    spread = [
+        swarm.bodies.velocity_mps.var(axis=1).sum(axis=1)
+        for _ in fly(swarm, make_policy("round-robin", mission))
+    ]
+    np.testing.assert_allclose(left, spread[-1] / spread[0], rtol=1e-9)
+    assert np.all(left < 0.01)
