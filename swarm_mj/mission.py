@@ -147,19 +147,18 @@ def reference(task: Task = "flocking", **overrides: Any) -> Mission:  # noqa: AN
         ValueError: A value is outside its range.
         TypeError: An override is no field of `Mission`.
     """
-    return replace(
-        paper(task),
-        preset="reference",
-        max_acceleration_mps2=10.0,
-        wall_hit="clip",
-        half_duplex="eavesdroppers",
-        flocking_set="moving",
-        silence_is_attempt=True,
-        moves_each_transmission=True,
-        tree_recomputed=task != "stationary",
-        tree_root_transmits=True,
-        **overrides,
-    )
+    code: dict[str, Any] = {
+        "preset": "reference",
+        "max_acceleration_mps2": 10.0,
+        "wall_hit": "clip",
+        "half_duplex": "eavesdroppers",
+        "flocking_set": "moving",
+        "silence_is_attempt": True,
+        "moves_each_transmission": True,
+        "tree_recomputed": task != "stationary",
+        "tree_root_transmits": True,
+    }
+    return replace(paper(task), **(code | overrides))
 
 
 PRESETS: dict[str, Callable[..., Mission]] = {"paper": paper, "reference": reference}

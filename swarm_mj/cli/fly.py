@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from swarm_mj.cli.interrupt import deferred_interrupt
 from swarm_mj.cli.options import add_mission_options, mission_of, new_parser, this_command
 from swarm_mj.cli.outputs import check_writable, write_text
 from swarm_mj.flight import Flown, Summary, fly, summarise
@@ -83,10 +84,9 @@ def run(options: argparse.Namespace) -> int:
         swarm = Swarm(mission, [options.seed])
         recorder = _recorder(options, swarm, policy) if path else None
     flight = _fly(swarm, policy, recorder, console)
-    if flight.flown:
-        with console.status("Writing ..."):
-            _write(options, mission, flight, path)
-        _print(options, flight, path)
+    with console.status("Writing ..."):
+        _write(options, mission, flight, path)
+    _print(options, flight, path)
     if flight.was_interrupted:
         console.print(f"Interrupted after {len(flight.flown)} of {mission.num_windows} windows.")
         return INTERRUPTED
@@ -121,9 +121,8 @@ def _recorder(options: argparse.Namespace, swarm: Swarm, policy: Policy) -> Reco
 
 
 def _fly(swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Console) -> _Flight:
-    """Flies with a progress bar; Ctrl-C ends the flight, and what was flown is kept."""
+    """Flies with a progress bar; Ctrl-C ends the flight after a whole window."""
     flown: list[Flown] = []
-    was_interrupted = False
     bar = Progress(
         TextColumn("Flying"),
         BarColumn(),
@@ -134,16 +133,16 @@ def _fly(swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Conso
         transient=True,
     )
     start_s = time.perf_counter()
-    try:
-        with bar:
-            task = bar.add_task("fly", total=swarm.mission.num_windows, age=0.0)
-            for window in fly(swarm, policy):
-                flown.append(window)
-                if recorder:
-                    recorder.add(window)
-                bar.update(task, advance=1, age=float(window.costs.age_windows[0]))
-    except KeyboardInterrupt:
-        was_interrupted = True
+    with deferred_interrupt() as is_interrupted, bar:
+        task = bar.add_task("fly", total=swarm.mission.num_windows, age=0.0)
+        for window in fly(swarm, policy):
+            flown.append(window)
+            if recorder:
+                recorder.add(window)
+            bar.update(task, advance=1, age=float(window.costs.age_windows[0]))
+            if is_interrupted():
+                break
+        was_interrupted = is_interrupted() and len(flown) < swarm.mission.num_windows
     wall_s = time.perf_counter() - start_s
     return _Flight(flown=flown, recorder=recorder, was_interrupted=was_interrupted, wall_s=wall_s)
 
@@ -160,7 +159,7 @@ def _write(
         "version": version(),
         "commit": commit(),
     }
-    if path and flight.recorder and flight.recorder.num_windows:
+    if path and flight.recorder:
         from swarm_mj.replay.write import write_replay  # rerun takes its time to import
 
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -153,32 +153,47 @@ def test_viewing_needs_a_display_and_says_so_first(tmp_path):
     assert files(tmp_path) == []
 
 
+# Flies as `swarm-mj` does, and tells by a file when the flight is well under way.
+FLY_AND_TELL = """
+import signal, sys
+from pathlib import Path
+from swarm_mj.cli import fly, main
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
+windows = fly.fly
+def told(*arguments):
+    for count, window in enumerate(windows(*arguments)):
+        if count == 40:
+            Path("under-way").touch()
+        yield window
+fly.fly = told
+sys.exit(main(sys.argv[1:]))
+"""
+
+
 def test_ctrl_c_leaves_a_readable_replay_of_what_was_flown(tmp_path):
-    command = [
-        *(sys.executable, "-m", "swarm_mj", "fly", "--windows", "100000", "--seed", "3"),
-        *("--record", "cut.rrd", "--json", "cut.json"),
-    ]
-    # A terminal's Ctrl-C reaches the process even if this test run ignores it.
     flight = subprocess.Popen(
-        command,
+        [
+            *(sys.executable, "-c", FLY_AND_TELL, "fly", "--windows", "100000", "--seed", "3"),
+            *("--record", "cut.rrd", "--json", "cut.json"),
+        ],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
-    time.sleep(6.0)
+    while flight.poll() is None and not (tmp_path / "under-way").exists():
+        time.sleep(0.01)
     flight.send_signal(signal.SIGINT)
     output, errors = flight.communicate(timeout=120)
     assert flight.returncode == 130, errors
     flown = windows(tmp_path / "cut.rrd")
     np.testing.assert_array_equal(flown, np.arange(1, len(flown) + 1))
-    assert 0 < len(flown) < 100_000
+    assert 40 < len(flown) < 100_000
     assert f"Interrupted after {len(flown)} of 100000 windows" in errors
     summary = json.loads((tmp_path / "cut.json").read_text())
     assert summary["interrupted"] is True
     assert summary["num_windows"] == len(flown)
-    assert files(tmp_path) == ["cut.json", "cut.rrd"]
+    assert files(tmp_path) == ["cut.json", "cut.rrd", "under-way"]
     assert f"{len(flown)} in" in output
 
 

@@ -1,0 +1,18 @@
+"""Ctrl-C noted first, obeyed at once the second time, and as ever afterwards."""
+
+import signal
+
+import pytest
+
+from swarm_mj.cli.interrupt import deferred_interrupt
+
+
+def test_the_first_ctrl_c_is_noted_and_the_second_interrupts():
+    before = signal.getsignal(signal.SIGINT)
+    with deferred_interrupt() as is_interrupted:
+        assert not is_interrupted()
+        signal.raise_signal(signal.SIGINT)
+        assert is_interrupted()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) == before
