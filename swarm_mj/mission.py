@@ -6,7 +6,8 @@ Where the paper's text and its authors' code differ, each difference is a field 
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import Field, dataclass, field, fields, replace
+from numbers import Integral, Real
 from typing import Any, Literal, get_args
 
 Task = Literal["stationary", "random-walk", "flocking"]
@@ -21,6 +22,12 @@ MISSION_DISTANCE_M = (
 )
 MISSION_DURATION_S = 50.0  # 500 windows of 100 ms: the duration that velocity ratios mean (IV-B)
 SQUARE_METRES_PER_KM2 = 1e6
+# What a field's annotation admits, NumPy's numbers included, and how a message calls it.
+KINDS: dict[Any, tuple[type, str]] = {
+    int: (Integral, "a whole number"),
+    float: (Real, "a number"),
+    bool: (bool, "True or False"),
+}
 
 
 def _quantity(
@@ -74,7 +81,7 @@ class Mission:
 
     def __post_init__(self) -> None:
         for spec in fields(self):
-            _check(spec.metadata, getattr(self, spec.name))
+            _check(spec, getattr(self, spec.name))
 
     @property
     def side_m(self) -> float:
@@ -102,17 +109,20 @@ class Mission:
         return self.boundary == "reflect"
 
 
-def _check(allowed: Any, value: Any) -> None:  # noqa: ANN401 - any field's metadata and value
-    """Raises ValueError when a field's value is not among its choices or in its range."""
+def _check(spec: Field[Any], value: Any) -> None:  # noqa: ANN401 - any field's value
+    """Raises ValueError when a field's value is of another kind, no choice, or out of range."""
+    allowed = spec.metadata
+    label = allowed.get("label", spec.name)
+    kind, described = KINDS.get(spec.type, (object, ""))
     if "choices" in allowed and value not in allowed["choices"]:
-        raise ValueError(
-            f"{allowed['label']} must be one of {', '.join(allowed['choices'])}, not {value!r}"
-        )
-    if "low" in allowed and not allowed["low"] <= value <= allowed["high"]:
-        raise ValueError(
-            f"{allowed['label']} must be from {allowed['low']:g} to {allowed['high']:g} "
-            f"[{allowed['unit']}], not {value:g}"
-        )
+        raise ValueError(f"{label} must be one of {', '.join(allowed['choices'])}, not {value!r}")
+    if "low" not in allowed:
+        is_allowed, limits = True, ""
+    else:
+        is_allowed = isinstance(value, Real) and allowed["low"] <= value <= allowed["high"]
+        limits = f" from {allowed['low']:g} to {allowed['high']:g} [{allowed['unit']}]"
+    if not is_allowed or not isinstance(value, kind):
+        raise ValueError(f"{label} must be {described}{limits}, not {value}")
 
 
 def paper(task: Task = "flocking", **overrides: Any) -> Mission:  # noqa: ANN401 - Mission's own fields

@@ -140,6 +140,7 @@ def _decode_strongest(
             total_mw = 0.0
             strongest_mw = 0.0
             strongest = j
+            is_silent = recipient[b, j] == j
             for s in range(num_senders):
                 i = sender[s]
                 if i != j:
@@ -148,10 +149,9 @@ def _decode_strongest(
                     squared_m2 = max(dx * dx + dy * dy, MIN_DISTANCE_M * MIN_DISTANCE_M)
                     received_mw = received_at_1_m_mw / squared_m2
                     total_mw += received_mw
-                    if received_mw > strongest_mw:
+                    may_hear = is_silent or (hears_while_sending and recipient[b, i] == j)
+                    if may_hear and received_mw > strongest_mw:
                         strongest_mw = received_mw
                         strongest = i
-            is_silent = recipient[b, j] == j
-            may_hear = is_silent or (hears_while_sending and recipient[b, strongest] == j)
             ratio = sinr(strongest_mw, total_mw - strongest_mw, noise_mw)
-            heard[b, j] = strongest if may_hear and is_received(ratio, threshold) else j
+            heard[b, j] = strongest if is_received(ratio, threshold) else j

@@ -33,7 +33,7 @@ class Stream:
         self._next = BLOCK
 
     def next(self) -> Float[np.ndarray, "B ..."]:
-        """The next draw of every mission."""
+        """The next draw of every mission; later draws overwrite it, so copy what you keep."""
         if self._next == BLOCK:
             shape = (BLOCK, *self._block.shape[2:])
             for b, rng in enumerate(self._rngs):

@@ -4,6 +4,7 @@ import math
 import runpy
 from dataclasses import FrozenInstanceError, fields
 
+import numpy as np
 import pytest
 
 from swarm_mj import mission as mission_module
@@ -142,6 +143,25 @@ def test_values_outside_their_range_are_refused(spec, value):
     assert f"from {spec.metadata['low']:g} to {spec.metadata['high']:g}" in allowed
     assert spec.metadata["unit"] in allowed
     assert float(given) == pytest.approx(value, rel=1e-5, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "kind"),
+    [
+        ("num_robots", 2.5, "a whole number from 2 to 1000"),
+        ("num_robots", "40", "a whole number from 2 to 1000"),
+        ("range_ratio", "wide", "a number from 0.01 to 10"),
+        ("silence_is_attempt", "no", "True or False"),
+    ],
+)
+def test_values_of_another_kind_are_refused(field, value, kind):
+    with pytest.raises(ValueError, match=f"must be {kind}.* not {value}"):
+        Unchecked(**{field: value})
+
+
+def test_numpy_s_numbers_are_numbers():
+    mission = Unchecked(num_robots=np.int64(20), range_ratio=np.float32(0.5))
+    assert mission.range_m == 500.0
 
 
 def test_every_range_keeps_out_what_no_mission_can_have():

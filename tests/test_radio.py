@@ -278,3 +278,18 @@ def test_the_random_scenes_hold_what_matters():
 
 def test_the_radio_is_a_channel():
     assert isinstance(radio(), Channel)
+
+
+def test_below_0_db_a_sender_hears_the_strongest_packet_meant_for_it():
+    """Robot 1 sends; robot 2 is nearer to it but speaks to robot 3, robot 0 speaks to robot 1."""
+    position_m = np.array([[[0.0, 0.0], [110.0, 0.0], [210.0, 0.0], [320.0, 0.0]]])
+    recipient = np.array([[1, 0, 3, 3]])
+    channel = FreeSpaceRadio(
+        power_mw=1.0,
+        noise_mw=1e-15,
+        threshold=0.1,
+        frequency_hz=2.4e9,
+        recipient_hears_while_sending=True,
+    )
+    # Signal 1 / 110^2 over interference 1 / 100^2 is 0.83, above the threshold of 0.1.
+    assert channel(position_m, recipient)[0, 1] == 0
