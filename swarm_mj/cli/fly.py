@@ -4,7 +4,7 @@ import argparse
 import json
 import math
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -81,6 +81,7 @@ def run(options: argparse.Namespace) -> int:
     path = _check_outputs(options)
     console = Console(stderr=True, highlight=False)
     with console.status("Preparing the swarm (compiles once, then it is cached) ..."):
+        _compile_ahead(options, mission)
         swarm = Swarm(mission, [options.seed])
         recorder = _recorder(options, swarm, policy) if path else None
     flight = _fly(swarm, policy, recorder, console)
@@ -114,6 +115,13 @@ def _fresh_name(options: argparse.Namespace) -> Path:
     stem = f"{options.task}-{options.policy}-seed{options.seed}-{datetime.now():%Y%m%d-%H%M%S}"
     candidates = [f"{stem}.rrd", *(f"{stem}-{count}.rrd" for count in range(2, 100))]
     return next(REPLAYS / name for name in candidates if not (REPLAYS / name).exists())
+
+
+def _compile_ahead(options: argparse.Namespace, mission: Mission) -> None:
+    """Flies a window of the smallest such mission, so that compiling is not timed as flying."""
+    smallest = replace(mission, num_robots=2, range_ratio=10.0, num_windows=1)
+    for _ in fly(Swarm(smallest, [0]), make_policy(options.policy, smallest, options.probability)):
+        pass
 
 
 def _recorder(options: argparse.Namespace, swarm: Swarm, policy: Policy) -> Recorder:
