@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from mujoco._functions import mj_step  # noqa: TID251 - the yardstick; typed nowhere else
-from mujoco._structs import MjData  # noqa: TID251 - as above
+from mujoco._functions import mj_step
+from mujoco._structs import MjData
 
 from swarm_mj.costs import mean_hops, window_costs
 from swarm_mj.mission import Mission, paper

@@ -4,7 +4,7 @@ Index order: `[b, i, j]` is what robot `i` of mission `b` knows about robot `j`.
 are the only ones that write a buffer, and they write it in place.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import no_type_check
 
 import numpy as np
@@ -29,6 +29,19 @@ class Buffers:
     def is_known(self) -> Bool[np.ndarray, "B N N"]:
         """Whether i has observed j, or heard of it, since the start (T > T_0)."""
         return self.timestamp > NEVER
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """B missions of N robots."""
+        num_missions, num_robots, _ = self.timestamp.shape
+        return num_missions, num_robots
+
+    def read_only(self) -> "Buffers":
+        """The same arrays, seen through views that cannot be written."""
+        views = {spec.name: getattr(self, spec.name).view() for spec in fields(self)}
+        for view in views.values():
+            view.flags.writeable = False
+        return Buffers(**views)
 
 
 def empty_buffers(num_missions: int, num_robots: int) -> Buffers:
@@ -76,7 +89,11 @@ def record_attempt(
         recipient: Whom each robot addresses; itself is silence.
         now: t [windows].
         silence_is_attempt: Whether a silent robot notes having addressed itself.
+
+    Raises:
+        ValueError: A recipient is no robot, or there is not one per robot.
     """
+    check_robots("recipient", recipient, buffers.shape)
     _write_attempt(buffers.last_attempt, recipient, now, silence_is_attempt)
 
 
@@ -89,8 +106,48 @@ def merge(buffers: Buffers, heard: Int[np.ndarray, "B N"]) -> None:
     Args:
         buffers: Written in place.
         heard: The sender that each robot decoded; itself is nobody.
+
+    Raises:
+        ValueError: A sender is no robot, or there is not one per robot.
     """
+    check_robots("sender heard", heard, buffers.shape)
     _merge_newer(buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent, heard)
+
+
+def check_robots(what: str, robots: Int[np.ndarray, "..."], shape: tuple[int, int]) -> None:
+    """Passes if there is one robot chosen per robot: the compiled loops here trust that.
+
+    Args:
+        what: What was chosen, for the message.
+        robots: The choices.
+        shape: B missions of N robots.
+
+    Raises:
+        ValueError: There are more or fewer choices, or one is no integer from 0 to N - 1.
+    """
+    if np.shape(robots) != shape:
+        given = np.shape(robots)
+        raise ValueError(f"{what} must have shape {shape}, missions by robots, not {given}")
+    if robots.dtype.kind not in "iu":
+        raise ValueError(f"{what} must be integers from 0 to {shape[1] - 1}, not {robots.dtype}")
+    first = _first_out_of_range(robots)
+    if first >= 0:
+        b, i = divmod(first, shape[1])
+        raise ValueError(
+            f"{what} of robot {i} in mission {b} must be from 0 to {shape[1] - 1}, "
+            f"not {robots[b, i]}"
+        )
+
+
+@njit(cache=True)
+@no_type_check
+def _first_out_of_range(robots: Int[np.ndarray, "B N"]) -> int:
+    num_missions, num_robots = robots.shape
+    for b in range(num_missions):
+        for i in range(num_robots):
+            if not 0 <= robots[b, i] < num_robots:
+                return b * num_robots + i
+    return -1
 
 
 @njit(cache=True)

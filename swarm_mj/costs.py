@@ -74,9 +74,14 @@ def count_packets(phases: tuple[Phase, Phase], *, has_response: bool) -> Packets
 
 
 def mean_hops(buffers: Buffers) -> Float[np.ndarray, "B"]:
-    """Mean depth of known teammates in the parent trees (II-B), 0 before anyone is known [hops]."""
+    """Mean depth of known teammates in the parent trees (II-B), 0 before anyone is known [hops].
+
+    Raises:
+        ValueError: Some parents lead nowhere, or in a circle.
+    """
     hops = np.empty(buffers.parent.shape[0])
-    _mean_depth(buffers.timestamp, buffers.parent, hops)
+    if not _mean_depth(buffers.timestamp, buffers.parent, hops):
+        raise ValueError("parents of known robots must lead back to the buffer's owner")
     return hops
 
 
@@ -173,7 +178,8 @@ def _mean_depth(
     timestamp: Float[np.ndarray, "B N N"],
     parent: Int[np.ndarray, "B N N"],
     hops: Float[np.ndarray, "B"],
-) -> None:
+) -> bool:
+    """Fills `hops`; returns whether all parents form trees."""
     num_missions, num_robots = parent.shape[:2]
     depth = np.empty(num_robots, dtype=np.int64)
     path = np.empty(num_robots, dtype=np.int64)
@@ -191,8 +197,11 @@ def _mean_depth(
                         path[length] = k
                         length += 1
                         k = parent[b, i, k]
+                        if k < 0 or length == num_robots:
+                            return False
                     for step in range(length - 1, -1, -1):
                         depth[path[step]] = depth[k] + length - step
                     total += depth[j]
                     num_known += 1
         hops[b] = total / num_known if num_known else 0.0
+    return True

@@ -46,7 +46,12 @@ def fly(swarm: Swarm, policy: Policy) -> Iterator[Flown]:
 
     Yields:
         What each window cost; the swarm stands at the end of that window.
+
+    Raises:
+        ValueError: The swarm has flown already.
     """
+    if np.any(swarm.now > 0):
+        raise ValueError(f"the swarm has flown {swarm.now[0]:g} windows already; restart it first")
     swarm.start(policy)
     for _ in range(swarm.mission.num_windows):
         costs = swarm.step(policy)

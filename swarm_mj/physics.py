@@ -12,12 +12,12 @@ from typing import no_type_check
 
 import numpy as np
 from jaxtyping import Float
-from mujoco import batch  # noqa: TID251 - the physics is MuJoCo's
+from mujoco import batch
 from numba import njit
 
 from swarm_mj.mission import Mission
 from swarm_mj.protocol import Bodies
-from swarm_mj.scene import compose, num_substeps, timestep_s
+from swarm_mj.scene import ROBOT_MASS_KG, compose, num_substeps, timestep_s
 
 OPEN, MIRROR, CLIP = 0, 1, 2  # what happens at the boundary
 
@@ -58,7 +58,12 @@ class Physics:
         Args:
             position_m: p_0 [m].
             velocity_mps: v_0 [m/s].
+
+        Raises:
+            ValueError: There is not one state per robot, or one is not finite.
         """
+        self._check_states("position", position_m)
+        self._check_states("velocity", velocity_mps)
         self._batch.reset()
         self._qpos[...] = position_m
         self._qvel[...] = velocity_mps
@@ -75,14 +80,30 @@ class Physics:
             The states after the window.
 
         Raises:
-            ValueError: An acceleration is not finite.
+            ValueError: An acceleration is not finite, or there is not one per robot.
         """
-        _check_finite(acceleration_mps2)
+        self._check_states("acceleration", acceleration_mps2)
         if self._mission.physics == "exact":
             self._step_exact(acceleration_mps2)
         else:
             self._step_contact(acceleration_mps2)
         return self._bodies
+
+    def _check_states(self, what: str, given: np.ndarray) -> None:
+        """Raises ValueError unless there is one finite vector per robot."""
+        expected = self._bodies.position_m.shape
+        if np.shape(given) != expected:
+            raise ValueError(
+                f"{what} must have shape {expected}, missions by robots by axes, "
+                f"not {np.shape(given)}"
+            )
+        first = _first_not_finite(given)
+        if first >= 0:
+            b, i, _ = np.unravel_index(first, expected)
+            raise ValueError(
+                f"{what} must be finite, not ({given[b, i, 0]:g}, {given[b, i, 1]:g}) "
+                f"of robot {i} in mission {b}"
+            )
 
     def _step_exact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
         self._batch.step()
@@ -106,14 +127,13 @@ class Physics:
         limit_mps = self._mission.max_velocity_mps
         limit_mps2 = self._mission.max_acceleration_mps2
         window_s, step_s = self._mission.window_s, timestep_s(self._mission)
-        # One constant force per window that ends at the clipped velocity of Eq. 15 ...
+        # One constant acceleration per window, which ends at the clipped velocity of Eq. 15 ...
         target_mps = self._qvel + np.clip(acceleration_mps2, -limit_mps2, limit_mps2) * window_s
-        force = (np.clip(target_mps, -limit_mps, limit_mps) - self._qvel) / window_s
+        held_mps2 = (np.clip(target_mps, -limit_mps, limit_mps) - self._qvel) / window_s
         for _ in range(num_substeps(self._mission)):
             # ... and after a bounce never pushes beyond the bound, from either side.
-            self._ctrl[...] = np.clip(
-                force, (-limit_mps - self._qvel) / step_s, (limit_mps - self._qvel) / step_s
-            )
+            lowest, highest = (-limit_mps - self._qvel) / step_s, (limit_mps - self._qvel) / step_s
+            self._ctrl[...] = ROBOT_MASS_KG * np.clip(held_mps2, lowest, highest)
             self._batch.step()
         np.clip(self._qvel, -limit_mps, limit_mps, out=self._qvel)  # rounding of the last step
         self._bodies = Bodies(position_m=self._qpos.copy(), velocity_mps=self._qvel.copy())
@@ -126,24 +146,12 @@ def _empty_like(bodies: Bodies) -> Bodies:
     )
 
 
-def _check_finite(acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
-    """Raises ValueError naming the first acceleration that is not finite."""
-    first = _first_not_finite(acceleration_mps2)
-    if first >= 0:
-        b, i, _ = np.unravel_index(first, acceleration_mps2.shape)
-        value = acceleration_mps2[b, i]
-        raise ValueError(
-            f"acceleration must be finite, not ({value[0]:g}, {value[1]:g}) m/s² "
-            f"of robot {i} in mission {b}"
-        )
-
-
 @njit(cache=True)
 @no_type_check
 def _first_not_finite(
-    acceleration_mps2: Float[np.ndarray, "B N 2"],
+    states: Float[np.ndarray, "B N 2"],
 ) -> int:
-    flat = acceleration_mps2.ravel()
+    flat = states.ravel()
     for n in range(flat.size):
         if not np.isfinite(flat[n]):
             return n
@@ -173,7 +181,7 @@ def _kick(
                 u = min(max(acceleration[b, i, axis], -limit_mps2), limit_mps2)
                 v = min(max(ctrl[b, i, axis] + u * dt_s, -limit_mps), limit_mps)
                 p = qpos[b, i, axis]
-                if wall != OPEN and abs(p) > wall_m:
+                while wall != OPEN and abs(p) > wall_m:
                     edge = wall_m if p > 0 else -wall_m
                     p = edge if wall == CLIP else 2 * edge - p
                     v = -v

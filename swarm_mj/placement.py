@@ -7,6 +7,7 @@ from jaxtyping import Float
 from numba import njit
 
 MAX_DRAWS = 20_000  # the sparsest of the paper's teams (range ratio 0.2) connects in a few hundred
+MAX_ROBOTS_DRAWN = 2_000_000  # bounds the draws of large teams, whose test takes longer
 
 
 def is_connected(position_m: Float[np.ndarray, "N 2"], range_m: float) -> bool:
@@ -39,14 +40,15 @@ def connected_positions(
         Positions [m].
 
     Raises:
-        ValueError: `MAX_DRAWS` draws were all disconnected.
+        ValueError: All draws were disconnected.
     """
-    for _ in range(MAX_DRAWS):
+    num_draws = min(MAX_DRAWS, MAX_ROBOTS_DRAWN // num_robots)
+    for _ in range(num_draws):
         position_m = rng.uniform(-half_side_m, half_side_m, size=(num_robots, 2))
         if is_connected(position_m, range_m):
             return position_m
     raise ValueError(
-        f"no connected team in {MAX_DRAWS} draws: {num_robots} robots with a range of "
+        f"no connected team in {num_draws} draws: {num_robots} robots with a range of "
         f"{range_m:g} m are too sparse for an area of {2 * half_side_m:.0f} m by "
         f"{2 * half_side_m:.0f} m; raise the range ratio or the density"
     )

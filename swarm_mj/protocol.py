@@ -96,7 +96,6 @@ def transmit(
     Raises:
         ValueError: A recipient, or a sender that the channel names, is no robot.
     """
-    check_robots("recipient", recipient)
     observe_self(buffers, bodies.position_m, bodies.velocity_mps, now)
     record_attempt(buffers, recipient, now, silence_is_attempt=silence_is_attempt)
     return _send(buffers, bodies, recipient, channel)
@@ -109,47 +108,13 @@ def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
     return answered
 
 
-def check_robots(what: str, robots: Int[np.ndarray, "B N"]) -> None:
-    """Passes if every robot's choice of a robot is one: compiled loops trust it.
-
-    Args:
-        what: What was chosen, for the message.
-        robots: From 0 to N - 1, one per robot.
-
-    Raises:
-        ValueError: One is out of range, or no integer.
-    """
-    num_robots = robots.shape[1]
-    if robots.dtype.kind not in "iu":
-        raise ValueError(f"{what} must be integers from 0 to {num_robots - 1}, not {robots.dtype}")
-    first = _first_out_of_range(robots)
-    if first >= 0:
-        b, i = divmod(first, num_robots)
-        raise ValueError(
-            f"{what} of robot {i} in mission {b} must be from 0 to {num_robots - 1}, "
-            f"not {robots[b, i]}"
-        )
-
-
 def _send(
     buffers: Buffers, bodies: Bodies, recipient: Int[np.ndarray, "B N"], channel: Channel
 ) -> Phase:
     """Everyone's packet through the channel and, decoded, into the buffers."""
     heard = channel(bodies.position_m, recipient)
-    check_robots("sender heard", heard)
     merge(buffers, heard)
-    return Phase(recipient=recipient, heard=heard)
-
-
-@njit(cache=True)
-@no_type_check
-def _first_out_of_range(robots: Int[np.ndarray, "B N"]) -> int:
-    num_missions, num_robots = robots.shape
-    for b in range(num_missions):
-        for i in range(num_robots):
-            if not 0 <= robots[b, i] < num_robots:
-                return b * num_robots + i
-    return -1
+    return Phase(recipient=recipient.copy(), heard=heard)
 
 
 @njit(cache=True)

@@ -85,9 +85,9 @@ class Recorder:
                 "velocity_mps": bodies.velocity_mps[0].copy(),
                 "recipient": np.stack([phase.recipient[0] for phase in phases]),
                 "heard": np.stack([phase.heard[0] for phase in phases]),
-                "is_known": buffers.is_known[0, own],
+                "is_known": buffers.is_known[0, own].copy(),
                 "believed_m": buffers.position_m[0, own].copy(),
-                "observer_age": age[own],
+                "observer_age": age[own].copy(),  # a view would keep the whole matrix
                 "parent": buffers.parent[0, own].copy(),
                 "age_mean": float(flown.costs.age_windows[0]),
                 "age_std": float(np.std(others)),

@@ -1,13 +1,15 @@
 """The scene: the arena and N robots, composed from the MJCF files in `assets/`."""
 
+import math
 from importlib import resources
 from pathlib import Path
 
-from mujoco._specs import MjSpec  # noqa: TID251 - the scene is MuJoCo's; typed nowhere else
+from mujoco._specs import MjSpec
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 
-CONTACT_STEP_S = 0.01  # step of the `contact` physics: ten per window of 100 ms
+CONTACT_STEP_S = 0.01  # longest step of the `contact` physics: ten per window of 100 ms
+ROBOT_RADIUS_M = 0.5  # assets/robot.xml
 ROBOT_MASS_KG = 1.0  # assets/robot.xml
 WALL_THICKNESS_M = 2.0  # half of it, assets/arena.xml
 WALL_HEIGHT_M = 5.0  # half of it, assets/arena.xml
@@ -40,17 +42,20 @@ def asset(name: str) -> Path:
 
 
 def timestep_s(mission: Mission) -> float:
-    """MuJoCo's step [s]: the whole window in `exact` physics, 10 ms or a tenth in `contact`."""
-    if mission.physics == "exact":
-        return mission.window_s
+    """MuJoCo's step [s]: the whole window in `exact` physics, 10 ms at most in `contact`."""
     return mission.window_s / num_substeps(mission)
 
 
 def num_substeps(mission: Mission) -> int:
-    """MuJoCo steps per window."""
+    """MuJoCo steps per window.
+
+    In `contact` so many that none is longer than 10 ms, nor long enough to leave the area by more
+    than the robot's radius: a limit acts one step after it was crossed.
+    """
     if mission.physics == "exact":
         return 1
-    return max(1, round(mission.window_s / CONTACT_STEP_S))
+    longest_s = min(CONTACT_STEP_S, ROBOT_RADIUS_M / mission.max_velocity_mps)
+    return math.ceil(mission.window_s / longest_s - 1e-9)
 
 
 def compose(mission: Mission) -> MjSpec:

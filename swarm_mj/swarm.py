@@ -1,11 +1,12 @@
 """The swarm: B missions side by side, window by window: motion, physics, radio, buffers, costs."""
 
 from collections.abc import Sequence
+from numbers import Integral
 
 import numpy as np
 from jaxtyping import Int
 
-from swarm_mj.buffers import Buffers, empty_buffers, observe_self
+from swarm_mj.buffers import Buffers, check_robots, empty_buffers, observe_self
 from swarm_mj.costs import WindowCosts, window_costs
 from swarm_mj.mission import Mission
 from swarm_mj.motion import initial_velocity, motion_of
@@ -55,11 +56,11 @@ class Swarm:
         Raises:
             ValueError: No seed, a negative one, or no connected team could be drawn.
         """
-        if not seeds or min(seeds) < 0:
-            raise ValueError(f"seeds must be one or more integers from 0, not {list(seeds)}")
+        _check_seeds(seeds)
         self.mission = mission
         self.channel = radio_of(mission) if channel is None else channel
         self._physics = Physics(mission, len(seeds), num_threads=num_threads)
+        self._num_missions = len(seeds)
         self.restart(seeds)
 
     def restart(self, seeds: Sequence[int]) -> None:
@@ -69,8 +70,9 @@ class Swarm:
             seeds: One per mission, as many as before.
 
         Raises:
-            ValueError: No connected team could be drawn.
+            ValueError: Not as many seeds, a negative one, or no connected team could be drawn.
         """
+        _check_seeds(seeds, self._num_missions)
         placement, motion, policy = zip(*(_streams(seed) for seed in seeds), strict=True)
         mission = self.mission
         position_m = [
@@ -85,6 +87,8 @@ class Swarm:
         self.buffers: Buffers = empty_buffers(len(seeds), mission.num_robots)
         observe_self(self.buffers, self.bodies.position_m, self.bodies.velocity_mps, self.now)
         self.phases: tuple[Phase, ...] = ()
+        self._read_only = self.buffers.read_only()
+        self._started: Policy | None = None
 
     @property
     def bodies(self) -> Bodies:
@@ -94,18 +98,28 @@ class Swarm:
     @property
     def views(self) -> LocalViews:
         """What every robot knows."""
-        return LocalViews(buffers=self.buffers, now=self.now, phases=self.phases)
+        return LocalViews(buffers=self._read_only, now=self.now, phases=self.phases)
 
     def start(self, policy: Policy) -> None:
-        """Gives a policy the missions' random streams; once, before its first window."""
+        """Gives a policy the missions' random streams and lets it forget earlier missions."""
         policy.start(self.mission.num_robots, self._policy_rngs)
+        self._started = policy
 
     def decide(self, policy: Policy) -> Int[np.ndarray, "B N"]:
-        """Whom each robot addresses next, from no more than the policy's type allows it to know."""
+        """Whom each robot addresses next, from no more than the policy's type allows it to know.
+
+        A policy that is new to these missions is started first.
+
+        Raises:
+            TypeError: The policy is neither decentralised nor centralised.
+        """
+        if policy is not self._started:
+            self.start(policy)
         if isinstance(policy, CentralisedPolicy):
             return policy.recipients(self.views, self.bodies)
-        assert isinstance(policy, DecentralisedPolicy)
-        return policy.recipients(self.views)
+        if isinstance(policy, DecentralisedPolicy):
+            return policy.recipients(self.views)
+        raise TypeError("a policy must be a DecentralisedPolicy or a CentralisedPolicy")
 
     def move(self) -> None:
         """Moves the robots through one window (Eq. 15)."""
@@ -125,7 +139,11 @@ class Swarm:
 
         Returns:
             What the window cost.
+
+        Raises:
+            ValueError: A recipient is no robot, or there is not one per robot; nothing has moved.
         """
+        check_robots("recipient", recipient, self.buffers.shape)
         self.move()
         phases = window(
             self.buffers,
@@ -135,30 +153,41 @@ class Swarm:
             self.now,
             silence_is_attempt=self.mission.silence_is_attempt,
         )
-        return self._finish(phases, has_response=True)
+        self.phases = phases
+        self.now = self.now + 2 * PHASE
+        return self._costs(phases, has_response=True)
 
     def _flood(self, policy: Policy) -> WindowCosts:
         """One window of two transmissions, each decided on what was known before it (IV-C)."""
-        phases = []
+        phases: list[Phase] = []
         for half in (1, 2):
             recipient = self.decide(policy)
+            check_robots("recipient", recipient, self.buffers.shape)
             if half == 1 or self.mission.moves_each_transmission:
                 self.move()
+            self.now = self.now + PHASE
             phase = transmit(
                 self.buffers,
                 self.bodies,
                 recipient,
                 self.channel,
-                self.now + half * PHASE,
+                self.now,
                 silence_is_attempt=self.mission.silence_is_attempt,
             )
             phases.append(phase)
-        return self._finish((phases[0], phases[1]), has_response=False)
+            self.phases = tuple(phases)
+        return self._costs((phases[0], phases[1]), has_response=False)
 
-    def _finish(self, phases: tuple[Phase, Phase], *, has_response: bool) -> WindowCosts:
-        self.phases = phases
-        self.now = self.now + 2 * PHASE
+    def _costs(self, phases: tuple[Phase, Phase], *, has_response: bool) -> WindowCosts:
         return window_costs(self.buffers, self.bodies, phases, self.now, has_response=has_response)
+
+
+def _check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
+    """Raises ValueError unless there are seeds, as many as expected, and none is negative."""
+    is_whole = all(isinstance(seed, Integral) and seed >= 0 for seed in seeds)
+    if not is_whole or len(seeds) != (expected or max(1, len(seeds))):
+        count = "one or more" if expected is None else str(expected)
+        raise ValueError(f"seeds must be {count} integers from 0, not {list(seeds)}")
 
 
 def _streams(seed: int) -> list[np.random.Generator]:

@@ -10,7 +10,7 @@ from channels import to_nobody, to_the_addressee, unreliable
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm_mj import protocol
+from swarm_mj import buffers
 from swarm_mj.buffers import empty_buffers, merge, observe_self, record_attempt
 from swarm_mj.protocol import Bodies, Phase, respondents, transmit, window
 
@@ -288,9 +288,9 @@ def test_a_channel_that_names_no_robot_is_refused():
 @pytest.mark.parametrize("kind", [float, bool])
 def test_robots_are_named_by_integers(kind):
     # As users load it: without the type checks that these tests run under.
-    check_robots = runpy.run_path(protocol.__file__)["check_robots"]
+    check_robots = runpy.run_path(buffers.__file__)["check_robots"]
     with pytest.raises(
         ValueError, match=f"recipient must be integers from 0 to 1, not {kind.__name__}"
     ):
-        check_robots("recipient", np.array([[0, 1]], dtype=kind))
-    check_robots("recipient", np.array([[0, 1]]))
+        check_robots("recipient", np.array([[0, 1]], dtype=kind), (1, 2))
+    check_robots("recipient", np.array([[0, 1]]), (1, 2))

@@ -41,6 +41,35 @@ def test_ages_are_those_of_the_buffers():
     np.testing.assert_array_equal(log.age_max, others.max(axis=1))
 
 
+def test_a_log_is_the_swarm_s_state_field_by_field():
+    mission = paper("flocking", num_robots=6, num_windows=8)
+    swarm = Swarm(mission, [2])
+    record = Recorder(swarm, observer=3)
+    seen = {"velocity_mps": [], "believed_m": [], "parent": [], "is_known": [], "heard": []}
+    variance = []
+    for window in fly(swarm, make_policy("mst", mission, 0.5)):
+        record.add(window)
+        seen["velocity_mps"].append(swarm.bodies.velocity_mps[0].copy())
+        seen["believed_m"].append(swarm.buffers.position_m[0, 3].copy())
+        seen["parent"].append(swarm.buffers.parent[0, 3].copy())
+        seen["is_known"].append(swarm.buffers.timestamp[0, 3] > 0)
+        seen["heard"].append([swarm.phases[0].heard[0], swarm.phases[1].heard[0]])
+        variance.append(swarm.bodies.velocity_mps[0].var(axis=0).sum())
+    log = record.log()
+    for field, rows in seen.items():
+        np.testing.assert_array_equal(getattr(log, field), rows, err_msg=field)
+    np.testing.assert_allclose(log.velocity_variance_m2ps2, variance, rtol=1e-9)
+
+
+def test_what_is_kept_does_not_keep_what_is_not():
+    """A row that is a view would hold its whole matrix in memory."""
+    swarm = Swarm(paper("stationary", num_robots=6), [0])
+    record = Recorder(swarm)
+    record.add(next(fly(swarm, make_policy("round-robin", swarm.mission))))
+    for name, kept in record._rows[0].items():
+        assert not isinstance(kept, np.ndarray) or kept.base is None, name
+
+
 def test_an_unknown_robot_is_as_old_as_the_mission():
     log, _ = flown_log()
     first = log.observer_age[0]

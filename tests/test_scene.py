@@ -199,7 +199,7 @@ def test_camera_sees_the_whole_area(num_robots):
 
 
 @pytest.mark.parametrize(
-    ("window_s", "steps"), [(0.1, 10), (0.05, 5), (0.01, 1), (0.014, 1), (0.25, 25), (2.0, 200)]
+    ("window_s", "steps"), [(0.1, 10), (0.05, 5), (0.01, 1), (0.014, 2), (0.25, 25), (2.0, 200)]
 )
 def test_steps_fill_the_window(window_s, steps):
     exact = paper(window_s=window_s)

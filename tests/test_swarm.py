@@ -431,3 +431,27 @@ def test_costs_are_of_the_end_of_the_window(policy):
         velocity_mps = swarm.bodies.velocity_mps[b]
         spread = [np.sum((v - velocity_mps.mean(axis=0)) ** 2) for v in velocity_mps]
         assert costs.velocity_variance_m2ps2[b] == pytest.approx(sum(spread) / 8)
+
+
+class Watchful(DecentralisedPolicy):
+    """Floods at random, and keeps what it saw of its own age and of the last phases."""
+
+    transmits_twice = True
+
+    def __init__(self):
+        self.own_age, self.num_phases = [], []
+
+    def recipients(self, views):
+        robots = np.arange(views.num_robots)
+        self.own_age.append(views.now[:, None] - views.buffers.timestamp[:, robots, robots])
+        self.num_phases.append(len(views.phases))
+        return (views.silence + 1) % views.num_robots
+
+
+def test_the_clock_and_the_last_phase_are_current_at_each_half_of_flooding():
+    policy = Watchful()
+    swarm = Swarm(paper("random-walk", num_robots=5, range_ratio=1.0), [1])
+    for _ in range(3):
+        swarm.step(policy)
+    np.testing.assert_array_equal(policy.own_age, 0.0)
+    assert policy.num_phases == [0, 1, 2, 1, 2, 1]

@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -115,8 +115,11 @@ def _viewer(size: str) -> Iterator[ViewerClient]:
         )
         try:
             yield _connect(viewer, port, said)
+        except (RuntimeError, ConnectionError) as error:  # the client's, when the viewer is gone
+            raise OSError(_complaint(said)) from error
         finally:
-            os.killpg(viewer.pid, signal.SIGTERM)
+            with suppress(ProcessLookupError):  # it may have died of its own
+                os.killpg(viewer.pid, signal.SIGTERM)
             viewer.wait()
 
 
@@ -126,12 +129,7 @@ def _connect(viewer: subprocess.Popen, port: int, said: IO[str]) -> ViewerClient
 
     def is_up() -> bool:
         if viewer.poll() is not None:
-            said.seek(0)
-            raise OSError(
-                "rerun's viewer stopped at once; without a graphics card it needs a software "
-                "Vulkan driver (Debian and Ubuntu: apt-get install mesa-vulkan-drivers). It said: "
-                + " ".join(said.read().split())[-400:]
-            )
+            raise OSError(_complaint(said))
         try:
             client = ViewerClient.connect(address)
             client.get_state()
@@ -142,6 +140,15 @@ def _connect(viewer: subprocess.Popen, port: int, said: IO[str]) -> ViewerClient
 
     _wait(is_up, START_TIMEOUT_S, "rerun's viewer did not start")
     return clients[0]
+
+
+def _complaint(said: IO[str]) -> str:
+    said.seek(0)
+    return (
+        "rerun's viewer stopped; without a graphics card it needs a software Vulkan driver "
+        "(Debian and Ubuntu: apt-get install mesa-vulkan-drivers). It said: "
+        + " ".join(said.read().split())[-400:]
+    )
 
 
 def _wait(is_done: Callable[[], bool], timeout_s: float, complaint: str) -> None:

@@ -8,9 +8,6 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from swarm_mj.cli import bench, fly, replay, scene
-from swarm_mj.provenance import version
-
 BAD_INPUT, INTERRUPTED = 2, 130
 
 
@@ -23,7 +20,10 @@ class _Parser(argparse.ArgumentParser):
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The parser of all commands."""
+    """The parser of all commands; imported here, so that Ctrl-C is heard while they load."""
+    from swarm_mj.cli import bench, fly, replay, scene
+    from swarm_mj.provenance import version
+
     parser = _Parser(
         prog="swarm-mj",
         description="Robot swarms on MuJoCo that share their state over a radio they compete for.",
@@ -44,12 +44,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
-    options = make_parser().parse_args(arguments)
     try:
+        options = make_parser().parse_args(arguments)
         return options.run(options)
     except (ValueError, OSError) as error:
-        print(f"swarm-mj: error: {error}", file=sys.stderr)  # noqa: T201 - the command's voice
+        sys.stderr.write(f"swarm-mj: error: {error}\n")
         return BAD_INPUT
     except KeyboardInterrupt:
-        print("swarm-mj: interrupted", file=sys.stderr)  # noqa: T201 - the command's voice
+        sys.stderr.write("swarm-mj: interrupted\n")
         return INTERRUPTED

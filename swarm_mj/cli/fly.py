@@ -3,6 +3,8 @@
 import argparse
 import json
 import math
+import os
+import shlex
 import time
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
@@ -85,8 +87,8 @@ def run(options: argparse.Namespace) -> int:
         swarm = Swarm(mission, [options.seed])
         recorder = _recorder(options, swarm, policy) if path else None
     flight = _fly(swarm, policy, recorder, console)
-    with console.status("Writing ..."):
-        _write(options, mission, flight, path)
+    with deferred_interrupt(), console.status("Writing ..."):
+        _write(_config(options, mission, policy), mission, flight, path, options.json)
     _print(options, flight, path)
     if flight.was_interrupted:
         console.print(f"Interrupted after {len(flight.flown)} of {mission.num_windows} windows.")
@@ -106,15 +108,17 @@ def _check_outputs(options: argparse.Namespace) -> Path | None:
     if path.suffix != ".rrd":
         raise ValueError(f"replay must be named *.rrd, not {path}")
     check_writable(path, "replay", must_be_new=not options.force)
+    if options.json and options.json.resolve() == path.resolve():
+        raise ValueError(f"--record and --json name the same file, {path}")
     if options.view:
         view_command(path)  # complains now if there is no display
     return path
 
 
 def _fresh_name(options: argparse.Namespace) -> Path:
-    stem = f"{options.task}-{options.policy}-seed{options.seed}-{datetime.now():%Y%m%d-%H%M%S}"
-    candidates = [f"{stem}.rrd", *(f"{stem}-{count}.rrd" for count in range(2, 100))]
-    return next(REPLAYS / name for name in candidates if not (REPLAYS / name).exists())
+    """A name of this process's own, for flights that start in the same second."""
+    when = f"{datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}"
+    return REPLAYS / f"{options.task}-{options.policy}-seed{options.seed}-{when}.rrd"
 
 
 def _compile_ahead(options: argparse.Namespace, mission: Mission) -> None:
@@ -155,25 +159,30 @@ def _fly(swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Conso
     return _Flight(flown=flown, recorder=recorder, was_interrupted=was_interrupted, wall_s=wall_s)
 
 
-def _write(
-    options: argparse.Namespace, mission: Mission, flight: _Flight, path: Path | None
-) -> None:
-    """Writes the replay and the summary."""
-    config = {
+def _config(options: argparse.Namespace, mission: Mission, policy: Policy) -> dict[str, Any]:
+    """Everything that makes this flight again."""
+    return {
         **asdict(mission),
         "policy": options.policy,
-        "probability": options.probability,
+        **policy.parameters,
         "seed": options.seed,
+        "observer": options.observer,
         "version": version(),
         "commit": commit(),
     }
+
+
+def _write(
+    config: dict[str, Any], mission: Mission, flight: _Flight, path: Path | None, json_: Path | None
+) -> None:
+    """Writes the replay and the summary."""
     if path and flight.recorder:
         from swarm_mj.replay.write import write_replay  # rerun takes its time to import
 
         path.parent.mkdir(parents=True, exist_ok=True)
         kept = {key: value for key, value in config.items() if value is not None}
         write_replay(flight.recorder.log(), mission, kept, path)
-    if options.json:
+    if json_:
         document = {
             "config": config,
             **_numbers(summarise(flight.flown)),
@@ -181,15 +190,15 @@ def _write(
             "interrupted": flight.was_interrupted,
             "replay": str(path) if path else None,
         }
-        write_text(options.json, json.dumps(document, indent=2) + "\n")
+        write_text(json_, json.dumps(document, indent=2) + "\n")
 
 
 def _print(options: argparse.Namespace, flight: _Flight, path: Path | None) -> None:
     """Prints the table and how to open the replay."""
-    console = Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True, markup=False)
     console.print(_table(options, summarise(flight.flown), flight.wall_s))
     if path:
-        console.print(f"Open the replay:  {this_command()} replay {path}")
+        console.print(f"Open the replay:  {this_command()} replay {shlex.quote(str(path))}")
 
 
 def _numbers(summary: Summary) -> dict[str, Any]:

@@ -21,7 +21,11 @@ def deferred_interrupt() -> Iterator[Callable[[], bool]]:
             signal.default_int_handler(signal_number, frame)
         was_pressed = True
 
-    before = signal.signal(signal.SIGINT, note)
+    before = signal.getsignal(signal.SIGINT)
+    if before == signal.SIG_IGN:  # a job that its shell shields from Ctrl-C stays so
+        yield lambda: False
+        return
+    signal.signal(signal.SIGINT, note)
     try:
         yield lambda: was_pressed
     finally:

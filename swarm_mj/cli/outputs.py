@@ -20,8 +20,12 @@ def check_writable(path: Path, what: str, *, must_be_new: bool = False) -> None:
     if must_be_new and path.exists():
         raise ValueError(f"{what} {path} exists; name another, or replace it with --force")
     folder = next(parent for parent in path.absolute().parents if parent.exists())
-    if not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise ValueError(f"{what} {path} cannot be written: no permission in {folder}")
+    probe = folder / f".{path.name}.{os.getpid()}.part"
+    try:
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise ValueError(f"{what} {path} cannot be written: {folder}: {error.strerror}") from error
 
 
 def write_text(path: Path, text: str) -> None:

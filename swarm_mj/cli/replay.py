@@ -31,6 +31,6 @@ def run(options: argparse.Namespace) -> int:
     if not options.web:
         return run_viewer(view_command(options.file))
     command, address = serve_command(options.file)
-    console = Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True, markup=False)
     console.print(f"Open {address}\nCtrl-C ends it.")
     return run_viewer(command)

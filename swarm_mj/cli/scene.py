@@ -1,6 +1,7 @@
 """`swarm-mj scene`: writes the composed MJCF model."""
 
 import argparse
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +28,9 @@ def run(options: argparse.Namespace) -> int:
     spec = compose(mission)
     spec.compile()
     write_text(options.out, spec.to_xml())
-    console = Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True, markup=False)
     console.print(
         f"Wrote {options.out}: {mission.num_robots} robots, {mission.side_m:.0f} m square"
     )
-    console.print(f"Open it:  python -m mujoco.viewer --mjcf={options.out}")
+    console.print(f"Open it:  python -m mujoco.viewer --mjcf={shlex.quote(str(options.out))}")
     return 0

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from dm_control import mujoco  # noqa: TID251 - the dm_control face
-from dm_control.mujoco import wrapper  # noqa: TID251 - as above
-from dm_control.rl import control  # noqa: TID251 - as above
+from dm_control import mujoco
+from dm_control.mujoco import wrapper
+from dm_control.rl import control
 from dm_env import specs
 from jaxtyping import Int
 

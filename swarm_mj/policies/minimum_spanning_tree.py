@@ -39,6 +39,11 @@ class MinimumSpanningTree(CentralisedPolicy):
         self._root_transmits = root_transmits
         self._parent: np.ndarray | None = None
 
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The probability of a transmission."""
+        return {"probability": self._probability}
+
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Forgets the last mission's tree; arguments as in `Policy.start`."""
         self._stream = Stream(rngs, uniform, (num_robots,))

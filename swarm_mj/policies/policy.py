@@ -17,11 +17,12 @@ class LocalViews:
     """What the robots know, one view a robot: `[b, i]` in every array belongs to robot i alone.
 
     Identities are the index i, the team's size is N; both are granted before the mission (II-C).
+    The buffers are live: they cannot be written, and change with the next window.
     """
 
     buffers: Buffers  # robot i's buffer is row [b, i]
     now: Float[np.ndarray, "B"]  # t on the synchronised clock [windows]
-    phases: tuple[Phase, ...]  # the last window: whom robot i addressed and whom it heard
+    phases: tuple[Phase, ...]  # since the last window began: whom robot i addressed and heard
 
     @property
     def num_robots(self) -> int:
@@ -39,6 +40,11 @@ class Policy:
     """Chooses whom every robot addresses in the next window; itself is silence."""
 
     transmits_twice: ClassVar[bool] = False  # flooding's window: two transmissions, no responses
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The numbers that the policy was made with, by name; kept beside what it costs."""
+        return {}
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Prepares for new missions; policies that draw or remember say more.

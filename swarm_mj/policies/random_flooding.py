@@ -30,6 +30,11 @@ class RandomFlooding(DecentralisedPolicy):
         """
         self._probability = check_probability(probability)
 
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The probability of a transmission."""
+        return {"probability": self._probability}
+
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Gives every robot its own stream of numbers; arguments as in `Policy.start`."""
         self._stream = Stream(rngs, uniform, (2, num_robots))

@@ -1,7 +1,7 @@
 """The replay's map: the area, the robots, what the observer believes, its tree, the radio."""
 
 import numpy as np
-import rerun as rr  # noqa: TID251 - part of the replay
+import rerun as rr
 
 from swarm_mj.mission import Mission
 from swarm_mj.recorder import Log

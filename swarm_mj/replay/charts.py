@@ -1,7 +1,7 @@
 """Beside the map: the observer's tree, the age matrix, the plots and the radio's state lanes."""
 
 import numpy as np
-import rerun as rr  # noqa: TID251 - part of the replay
+import rerun as rr
 from jaxtyping import Int
 
 from swarm_mj.policies.minimum_spanning_tree import ROOT, spanning_tree

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-import rerun.blueprint as rrb  # noqa: TID251 - part of the replay
+import rerun.blueprint as rrb
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.charts import TREE_HEIGHT, TREE_WIDTH

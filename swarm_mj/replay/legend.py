@@ -3,7 +3,7 @@
 import itertools
 
 import numpy as np
-import rerun as rr  # noqa: TID251 - part of the replay
+import rerun as rr
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.sheet import Sheet, screen

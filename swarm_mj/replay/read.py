@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Int
-from rerun.chunk import RrdReader  # noqa: TID251 - part of the replay
+from rerun.chunk import RrdReader
 
 from swarm_mj.replay.sheet import TIMELINE
 

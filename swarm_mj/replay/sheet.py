@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-import rerun as rr  # noqa: TID251 - part of the replay
+import rerun as rr
 from jaxtyping import Float, Int
 
 from swarm_mj.recorder import Log

@@ -6,7 +6,7 @@ nothing; so it is read off a `Tensor` that rerun itself serialised.
 
 import numpy as np
 import pyarrow as pa
-import rerun as rr  # noqa: TID251 - part of the replay
+import rerun as rr
 from jaxtyping import Float16
 
 

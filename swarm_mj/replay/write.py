@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 import numpy as np
-import rerun as rr  # noqa: TID251 - part of the replay
+import rerun as rr
 
 from swarm_mj.mission import Mission
 from swarm_mj.recorder import Log
@@ -33,6 +33,8 @@ def write_replay(log: Log, mission: Mission, config: dict[str, object], path: Pa
     try:
         _write(log, mission, config, unfinished, name=path.stem)
         unfinished.replace(path)
+    except RuntimeError as error:  # rerun's, when its writer fails
+        raise OSError(f"replay {path} could not be written: {error}") from error
     finally:
         unfinished.unlink(missing_ok=True)
 

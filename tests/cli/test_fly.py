@@ -140,6 +140,27 @@ def test_an_output_below_a_file_is_refused_before_the_flight(swarm_mj, tmp_path)
     assert (tmp_path / "file").read_text() == "kept"
 
 
+def test_replay_and_summary_need_names_of_their_own(swarm_mj, tmp_path):
+    done = swarm_mj("fly", *SHORT, "--record", "a.rrd", "--json", "./a.rrd")
+    assert done.returncode == 2
+    assert "same file" in done.stderr
+    assert files(tmp_path) == []
+
+
+def test_odd_names_are_kept_and_quoted(swarm_mj, tmp_path):
+    done = swarm_mj("fly", *SHORT, "--record", "a [red] b.rrd")
+    assert done.returncode == 0, done.stderr
+    assert "replay 'a [red] b.rrd'" in done.stdout
+    assert files(tmp_path) == ["a [red] b.rrd"]
+
+
+def test_the_summary_names_the_default_probability(swarm_mj, tmp_path):
+    swarm_mj("fly", *SHORT, "--no-record", "--json", "s.json", "--observer", 2)
+    config = json.loads((tmp_path / "s.json").read_text())["config"]
+    assert config["probability"] == 0.06
+    assert config["observer"] == 2
+
+
 def test_an_existing_replay_needs_force(swarm_mj, tmp_path):
     path = tmp_path / "a.rrd"
     path.write_text("precious")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from swarm_mj.replay import palette
 from swarm_mj.replay.links import fates
 from swarm_mj.replay.read import check_replay, windows
 from swarm_mj.replay.write import write_replay
@@ -126,6 +127,89 @@ def test_the_matrix_holds_every_pair_s_age(replay, two_way):
     np.testing.assert_array_equal(
         np.sort(shown, axis=1), np.sort(np.minimum(expected, full_scale), axis=1)
     )
+
+
+def static(path, entity, component):
+    """A component that never changes."""
+    (value,) = (
+        chunk.to_record_batch().column(component)
+        for chunk in RrdReader(path).stream().filter(content=entity)
+        if chunk.is_static and component in chunk.to_record_batch().schema.names
+    )
+    return np.array(value.flatten().flatten().to_pylist()).ravel()
+
+
+def test_rows_of_the_matrix_own_and_columns_are_owned(replay, two_way):
+    """The observer's row, wherever the walk put it, is what the observer knows."""
+    tensors = column(replay, "/ages", "Tensor:data").flatten().to_pylist()
+    shown = np.array(tensors[-1]["buffer"]).reshape(12, 12)
+    full_scale = shown.max()
+    own = np.sort(np.minimum(two_way.log.observer_age[-1], full_scale)).astype(np.float16)
+    about = np.minimum(two_way.log.age[-1, :, two_way.log.observer], full_scale)
+    assert any(np.array_equal(np.sort(row), own) for row in shown)
+    assert any(np.array_equal(np.sort(owned), np.sort(about)) for owned in shown.T)
+    assert not any(np.array_equal(np.sort(row), np.sort(about)) for row in shown)
+
+
+def test_north_is_up(replay):
+    np.testing.assert_array_equal(
+        static(replay, "/arena", "Transform3D:mat3x3"), [1, 0, 0, 0, -1, 0, 0, 0, 1]
+    )
+
+
+def test_robots_wear_the_colour_of_their_age(replay, two_way):
+    log = two_way.log
+    rgba = column(replay, "/arena/robots", "Points2D:colors").flatten().to_numpy()
+    shown = np.stack([(rgba >> shift) & 255 for shift in (24, 16, 8)], axis=-1).reshape(-1, 12, 3)
+    assert np.all(shown[:, log.observer] == 255)
+    assert np.all(shown[~log.is_known] == palette.UNKNOWN)
+    newest = log.is_known & (log.observer_age == 0.0) & (np.arange(12) != log.observer)
+    assert np.all(shown[newest] == (253, 231, 37))
+    luma = shown @ np.array([0.299, 0.587, 0.114])
+    others = log.is_known[-1] & (np.arange(12) != log.observer)
+    by_age = np.argsort(log.observer_age[-1][others])
+    assert np.all(np.diff(luma[-1][others][by_age]) <= 0)
+
+
+def test_circles_have_the_range_and_stand_around_transmitters(replay, two_way):
+    log = two_way.log
+    entity = "/arena/radio/range"
+    assert set(rows(replay, entity, "Ellipses2D:half_sizes")) == {250.0}
+    centres = rows(replay, entity, "Ellipses2D:centers", 2)
+    per_window = counts(replay, entity, "Ellipses2D:centers")
+    row, sender = np.nonzero(log.recipient[:, 0] != np.arange(12))
+    np.testing.assert_array_equal(per_window, np.bincount(row, minlength=len(log.window)))
+    expected = log.position_m[row, sender]
+    for window in range(len(log.window)):
+        here = np.repeat(np.arange(len(log.window)), per_window) == window
+        np.testing.assert_allclose(
+            sorted(centres[here].tolist()), sorted(expected[row == window].tolist()), rtol=1e-5
+        )
+
+
+def test_the_tree_on_the_map_joins_parents_and_children(replay, two_way):
+    log = two_way.log
+    strips = rows_of_strips(replay, "/arena/tree")
+    row, child = np.nonzero(log.is_known & (np.arange(12) != log.observer))
+    parent = log.parent[row, child]
+    expected = np.stack([log.position_m[row, parent], log.position_m[row, child]], axis=1)
+    np.testing.assert_allclose(strips, expected, rtol=1e-5, atol=1e-3)
+
+
+def rows_of_strips(path, entity):
+    """Straight lines as [start, end] pairs, all windows in a row."""
+    lines = column(path, entity, "LineStrips2D:strips").flatten()
+    return lines.flatten().flatten().to_numpy().reshape(-1, 2, 2)
+
+
+def test_the_clock_of_the_mission_runs_beside_the_windows(replay, two_way):
+    (chunk,) = (
+        chunk.to_record_batch()
+        for chunk in RrdReader(replay).stream().filter(content="/arena/robots")
+        if not chunk.is_static
+    )
+    nanoseconds = chunk.column("mission_time").to_numpy(zero_copy_only=False).astype(np.int64)
+    np.testing.assert_allclose(nanoseconds / 1e9, 0.1 * two_way.log.window)
 
 
 def test_plots_are_the_costs(replay, two_way):

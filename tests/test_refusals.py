@@ -1,0 +1,151 @@
+"""What library users may pass by mistake: refused with the value and the way out, never a crash.
+
+Compiled loops do not check their indices, so a wrong shape would end the process.
+"""
+
+import numpy as np
+import pytest
+
+from swarm_mj.buffers import empty_buffers, merge, record_attempt
+from swarm_mj.costs import mean_hops
+from swarm_mj.flight import fly
+from swarm_mj.mission import paper
+from swarm_mj.physics import Physics
+from swarm_mj.policies import RandomFlooding
+from swarm_mj.policies.policy import Policy
+from swarm_mj.swarm import Swarm
+
+NOW = np.ones(2)
+
+
+def small(**overrides):
+    return paper("random-walk", **({"num_robots": 5, "num_windows": 5} | overrides))
+
+
+@pytest.mark.parametrize("shape", [(1, 5), (2, 50), (2, 4), (3, 5)])
+def test_recipients_of_another_shape_are_refused_before_anyone_moves(shape):
+    swarm = Swarm(small(), [1, 2])
+    before = swarm.bodies.position_m.copy()
+    with pytest.raises(ValueError, match=r"recipient must have shape \(2, 5\)"):
+        swarm.exchange(np.zeros(shape, dtype=np.int64))
+    np.testing.assert_array_equal(swarm.bodies.position_m, before)
+
+
+@pytest.mark.parametrize("robot", [-1, 5, 10**8])
+def test_robots_that_do_not_exist_are_refused(robot):
+    swarm = Swarm(small(), [1, 2])
+    recipient = np.array([[0, 1, 2, 3, 4], [0, 1, robot, 3, 4]])
+    complaint = f"of robot 2 in mission 1 must be from 0 to 4, not {robot}"
+    with pytest.raises(ValueError, match=complaint):
+        swarm.exchange(recipient)
+    with pytest.raises(ValueError, match=complaint):
+        merge(empty_buffers(2, 5), recipient)
+    with pytest.raises(ValueError, match=complaint):
+        record_attempt(empty_buffers(2, 5), recipient, NOW)
+
+
+def test_a_channel_of_another_shape_is_refused():
+    swarm = Swarm(small(), [1], channel=lambda _position_m, _recipient: np.zeros((1, 9), int))
+    with pytest.raises(ValueError, match=r"sender heard must have shape \(1, 5\)"):
+        swarm.exchange(np.array([[0, 0, 0, 0, 0]]))
+
+
+@pytest.mark.parametrize("physics", ["exact", "contact"])
+def test_states_and_accelerations_must_be_one_finite_vector_per_robot(physics):
+    worlds = Physics(small(physics=physics), 2)
+    right, wrong = np.zeros((2, 5, 2)), np.zeros((1, 5, 2))
+    with pytest.raises(ValueError, match=r"acceleration must have shape \(2, 5, 2\)"):
+        worlds.step(wrong)
+    with pytest.raises(ValueError, match=r"position must have shape \(2, 5, 2\)"):
+        worlds.place(wrong, wrong)
+    with pytest.raises(ValueError, match=r"velocity must be finite, not .* of robot 0"):
+        worlds.place(right, np.full((2, 5, 2), np.nan))
+
+
+@pytest.mark.parametrize("parent", [-1, 0])
+def test_parents_that_form_no_tree_have_no_hops(parent):
+    """Parents that lead nowhere, and robot 0 as its own ancestor in robot 1's buffer."""
+    buffers = empty_buffers(1, 3)
+    buffers.timestamp[:] = 1.0
+    buffers.parent[:] = parent
+    with pytest.raises(ValueError, match="must lead back"):
+        mean_hops(buffers)
+
+
+@pytest.mark.parametrize("seeds", [[], [1], [1, 2, 3], [1, -2]])
+def test_restart_needs_a_seed_per_mission(seeds):
+    swarm = Swarm(small(), [1, 2])
+    with pytest.raises(ValueError, match="seeds must be 2 integers from 0"):
+        swarm.restart(seeds)
+
+
+def test_a_policy_new_to_the_missions_is_started():
+    swarm, again = Swarm(small(), [1]), Swarm(small(), [1])
+    policy = RandomFlooding(0.5)
+    again.start(policy)
+    expected = [again.step(policy).packets.attempted for _ in range(3)]
+    np.testing.assert_array_equal(
+        [swarm.step(policy).packets.attempted for _ in range(3)], expected
+    )
+    swarm.restart([1])
+    np.testing.assert_array_equal(
+        [swarm.step(policy).packets.attempted for _ in range(3)], expected
+    )
+
+
+def test_a_policy_must_say_what_it_knows():
+    with pytest.raises(TypeError, match="DecentralisedPolicy or a CentralisedPolicy"):
+        Swarm(small(), [1]).step(Policy())
+
+
+def test_a_swarm_flies_once():
+    swarm = Swarm(small(), [1])
+    list(fly(swarm, RandomFlooding(0.1)))
+    with pytest.raises(ValueError, match="flown 5 windows already; restart"):
+        next(fly(swarm, RandomFlooding(0.1)))
+
+
+def test_a_policy_cannot_write_what_it_sees():
+    swarm = Swarm(small(), [1])
+    with pytest.raises(ValueError, match="read-only"):
+        swarm.views.buffers.timestamp[:] = 5.0
+
+
+def test_a_policy_may_reuse_its_array():
+    """The record of a phase is a copy of what the policy returned."""
+    swarm = Swarm(small(), [1])
+    recipient = np.array([[1, 1, 2, 3, 4]])
+    swarm.exchange(recipient)
+    recipient[:] = 0
+    np.testing.assert_array_equal(swarm.phases[0].recipient, [[1, 1, 2, 3, 4]])
+
+
+@pytest.mark.parametrize("velocity_ratio", [0.15, 5.0])
+def test_the_mirror_folds_as_often_as_needed(velocity_ratio):
+    """In 10 s a robot crosses this area of 14 m many times; a triangle wave says where it ends."""
+    mission = small(
+        num_robots=2, density_per_km2=10_000.0, velocity_ratio=velocity_ratio, window_s=10.0
+    )
+    half = mission.half_side_m
+    speed = mission.max_velocity_mps
+    worlds = Physics(mission, 1)
+    worlds.place(np.zeros((1, 2, 2)), np.full((1, 2, 2), speed))
+    bodies = worlds.step(np.zeros((1, 2, 2)))
+    phase = (speed * 10.0 + half) % (4.0 * half)
+    expected = phase - half if phase <= 2.0 * half else 3.0 * half - phase
+    np.testing.assert_allclose(bodies.position_m, expected, atol=1e-9)
+    assert np.all(np.abs(bodies.velocity_mps) == speed)
+
+
+@pytest.mark.parametrize(("velocity_ratio", "window_s"), [(5.0, 0.1), (5.0, 0.014), (2.5, 0.014)])
+def test_fast_robots_leave_the_area_by_no_more_than_their_radius(velocity_ratio, window_s):
+    mission = small(physics="contact", velocity_ratio=velocity_ratio, window_s=window_s)
+    rng = np.random.default_rng(0)
+    worlds = Physics(mission, 4)
+    limit, speed = mission.half_side_m, mission.max_velocity_mps
+    worlds.place(rng.uniform(-limit, limit, (4, 5, 2)), rng.choice([-speed, speed], size=(4, 5, 2)))
+    worst = 0.0
+    for _ in range(int(8.0 * limit / speed / window_s)):
+        bodies = worlds.step(rng.normal(0.0, 20.0, (4, 5, 2)))
+        worst = max(worst, float(np.max(np.abs(bodies.position_m))))
+    assert limit < worst <= limit + 0.5
