@@ -70,7 +70,7 @@ class RandomWalk:
 
 
 class Flocking:
-    """Velocity consensus on what each robot has heard, clipped to plus or minus A_max (Eq. 16)."""
+    """Velocity consensus by `flocking`, clipped to plus or minus A_max (IV-A)."""
 
     def __init__(self, mission: Mission) -> None:
         self._limit_mps2 = mission.max_acceleration_mps2

@@ -122,7 +122,7 @@ class Swarm:
         raise TypeError("a policy must be a DecentralisedPolicy or a CentralisedPolicy")
 
     def move(self) -> None:
-        """Moves the robots through one window (Eq. 15)."""
+        """Moves the robots through one window, by their motion and the physics."""
         self._physics.step(self._motion(self.buffers, self.bodies))
 
     def step(self, policy: Policy) -> WindowCosts:

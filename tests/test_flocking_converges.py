@@ -79,3 +79,18 @@ def test_fig6_every_baseline_makes_the_flock_converge(name, preset):
     kept = summary.velocity_variance_last / start
     assert kept.max() < 1 / 3
     assert np.median(kept) < 1e-3
+
+
+@pytest.mark.parametrize("physics", ["exact", "contact"])
+@pytest.mark.parametrize("name", BASELINES)
+def test_a_flock_between_walls_converges_too(name, physics):
+    """The default flight: walls turn robots round now and then, so less agreement is left.
+
+    Of 100 seeds the median mission keeps 5e-4 and the worst 9 %; asked here are 5e-3 and a third.
+    """
+    swarm = Swarm(paper("flocking", physics=physics, boundary="reflect"), list(range(20)))
+    start = np.sum(spread_mps(swarm) ** 2, axis=1)
+    summary = summarise(list(fly(swarm, make_policy(name, swarm.mission))))
+    kept = summary.velocity_variance_last / start
+    assert kept.max() < 1 / 3
+    assert np.median(kept) < 5e-3

@@ -15,6 +15,7 @@ from dm_control.rl import control
 from dm_env import specs
 from jaxtyping import Int
 
+from swarm_mj.buffers import check_robots
 from swarm_mj.costs import age_of_information
 from swarm_mj.mission import Mission
 from swarm_mj.scene import compose
@@ -88,7 +89,7 @@ class SwarmPhysics(mujoco.Physics):
 
 
 class SwarmTask(_Task):
-    """Choose whom every robot addresses, so that what they know of each other is young (Eq. 10)."""
+    """Choose whom every robot addresses, so that what they know of each other is young."""
 
     def __init__(self, seed: int) -> None:
         """Takes the seed of the first episode's mission."""
@@ -107,7 +108,9 @@ class SwarmTask(_Task):
         Raises:
             ValueError: The action is not one integer from 0 to N - 1 per robot.
         """
-        physics.recipient = _checked(action, physics.swarm.mission.num_robots)[np.newaxis]
+        recipient = np.asarray(action)[np.newaxis]
+        check_robots("recipient", recipient, (1, physics.swarm.mission.num_robots))
+        physics.recipient = recipient.astype(np.int64)
 
     def after_step(self, physics: SwarmPhysics) -> None:  # noqa: ARG002 - a control.Task
         """Counts the window."""
@@ -131,27 +134,10 @@ class SwarmTask(_Task):
         )
 
     def get_reward(self, physics: SwarmPhysics) -> float:
-        """Minus the age of information after the window [windows] (Eq. 10)."""
+        """Minus the age of information after the window (cost of Eq. 10) [windows]."""
         age, _ = age_of_information(physics.swarm.buffers, physics.swarm.now)
         return -float(age[0])
 
     def get_termination(self, physics: SwarmPhysics) -> float | None:
         """A discount of 1 after the last window: a mission is cut off, it reaches no end."""
         return 1.0 if self._num_flown >= physics.swarm.mission.num_windows else None
-
-
-def _checked(action: np.ndarray | Sequence[int], num_robots: int) -> Int[np.ndarray, "N"]:
-    """A copy of the action, or a ValueError that says what is wrong with it."""
-    recipient = np.asarray(action)
-    if recipient.shape != (num_robots,) or not np.issubdtype(recipient.dtype, np.integer):
-        raise ValueError(
-            f"recipients must be {num_robots} integers, one per robot, "
-            f"not {recipient.dtype} of shape {recipient.shape}"
-        )
-    is_nobody = (recipient < 0) | (recipient >= num_robots)
-    if np.any(is_nobody):
-        i = int(np.argmax(is_nobody))
-        raise ValueError(
-            f"recipient of robot {i} must be from 0 to {num_robots - 1}, not {action[i]}"
-        )
-    return recipient.astype(np.int64)

@@ -168,10 +168,10 @@ def test_own_index_is_silence():
 @pytest.mark.parametrize(
     ("action", "message"),
     [
-        ([0, 1, 2, 6, 4, 5], "recipient of robot 3 must be from 0 to 5, not 6"),
-        ([0, 1, 2, 3, -1, 9], "recipient of robot 4 must be from 0 to 5, not -1"),
-        ([0, 1, 2], r"6 integers, one per robot, not int64 of shape \(3,\)"),
-        (np.zeros(6), r"6 integers, one per robot, not float64 of shape \(6,\)"),
+        ([0, 1, 2, 6, 4, 5], "recipient of robot 3 in mission 0 must be from 0 to 5, not 6"),
+        ([0, 1, 2, 3, -1, 9], "recipient of robot 4 in mission 0 must be from 0 to 5, not -1"),
+        ([0, 1, 2], r"recipient must have shape \(1, 6\), .* not \(1, 3\)"),
+        (np.zeros(6), "recipient must be integers from 0 to 5, not float64"),
     ],
 )
 def test_impossible_action_is_refused_and_nothing_moves(action, message):
