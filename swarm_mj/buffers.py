@@ -114,7 +114,7 @@ def merge(buffers: Buffers, heard: Int[np.ndarray, "B N"]) -> None:
     _merge_newer(buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent, heard)
 
 
-def check_robots(what: str, robots: Int[np.ndarray, "..."], shape: tuple[int, int]) -> None:
+def check_robots(what: str, robots: np.ndarray, shape: tuple[int, int]) -> None:
     """Passes if there is one robot chosen per robot: the compiled loops here trust that.
 
     Args:

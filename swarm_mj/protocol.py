@@ -1,4 +1,4 @@
-"""The protocol (III-B, Alg. 1): one communication window over any channel (Eq. 6).
+"""The protocol (III-B, Alg. 1): one communication window over any channel, f of Eq. 6.
 
 Two phases of half a window each: a transmission and its responses, or, for flooding, two
 transmissions that nobody answers (IV-C). Index order: `[b, i]` is robot `i` of mission `b`.
@@ -102,7 +102,7 @@ def transmit(
 
 
 def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
-    """Whom each robot answers: the sender it decoded, if that packet was meant for it (Alg. 1)."""
+    """Whom each robot answers: the sender it decoded, if that packet was meant for it."""
     answered = np.empty_like(transmission.recipient)
     _answer_senders(transmission.recipient, transmission.heard, answered)
     return answered

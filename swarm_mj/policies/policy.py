@@ -31,7 +31,7 @@ class LocalViews:
 
     @property
     def silence(self) -> Int[np.ndarray, "B N"]:
-        """The recipients that mean silence: everyone addresses itself (Alg. 1)."""
+        """The recipients that mean silence: everyone addresses itself."""
         num_missions, num_robots = self.buffers.timestamp.shape[:2]
         return np.broadcast_to(np.arange(num_robots), (num_missions, num_robots))
 
