@@ -15,17 +15,17 @@ def check_writable(path: Path, what: str, *, must_be_new: bool = False) -> None:
     Raises:
         ValueError: The file exists, is a folder, or its folder cannot be written.
     """
-    if path.is_dir():
-        raise ValueError(f"{what} {path} is a folder; name a file")
-    if must_be_new and path.exists():
-        raise ValueError(f"{what} {path} exists; name another, or replace it with --force")
-    folder = next(parent for parent in path.absolute().parents if parent.exists())
-    probe = folder / f".{path.name}.{os.getpid()}.part"
     try:
+        if path.is_dir():
+            raise ValueError(f"{what} {path} is a folder; name a file")
+        if must_be_new and path.exists():
+            raise ValueError(f"{what} {path} exists; name another, or replace it with --force")
+        folder = next(parent for parent in path.absolute().parents if parent.exists())
+        probe = folder / f".{path.name}.{os.getpid()}.part"
         probe.touch()
         probe.unlink()
     except OSError as error:
-        raise ValueError(f"{what} {path} cannot be written: {folder}: {error.strerror}") from error
+        raise ValueError(f"{what} {path} cannot be written: {error.strerror}") from error
 
 
 def write_text(path: Path, text: str) -> None:

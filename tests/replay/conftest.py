@@ -10,6 +10,7 @@ from swarm_mj.flight import fly
 from swarm_mj.mission import Mission, paper
 from swarm_mj.policies import make_policy
 from swarm_mj.recorder import Log, Recorder
+from swarm_mj.replay.write import write_replay
 from swarm_mj.swarm import Swarm
 
 
@@ -49,3 +50,10 @@ def two_way():
 def flooded():
     """Windows of two transmissions."""
     return record("random-flooding", 0.2)
+
+
+@pytest.fixture(scope="session")
+def replay(two_way, tmp_path_factory):
+    path = tmp_path_factory.mktemp("replays") / "mission.rrd"
+    write_replay(two_way.log, two_way.mission, {"seed": 5, "policy": "mst", "ratio": 0.25}, path)
+    return path

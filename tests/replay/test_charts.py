@@ -1,6 +1,7 @@
 """What the charts show, against plain loops."""
 
 import numpy as np
+from reading import column
 
 from swarm_mj.policies.minimum_spanning_tree import spanning_tree
 from swarm_mj.replay.charts import radio_states, rate, walk
@@ -47,3 +48,33 @@ def test_a_flooding_robot_delivers_if_either_packet_does(flooded):
         sent = [(p, log.recipient[t, p, i]) for p in (0, 1) if log.recipient[t, p, i] != i]
         got = any(log.heard[t, p, to] == i for p, to in sent)
         assert names[state[t, i]] == ("delivers" if got else "is lost")
+
+
+def test_rows_of_the_matrix_own_and_columns_are_owned(replay, two_way):
+    """The observer's row, wherever the walk put it, is what the observer knows."""
+    tensors = column(replay, "/ages", "Tensor:data").flatten().to_pylist()
+    shown = np.array(tensors[-1]["buffer"]).reshape(12, 12)
+    full_scale = shown.max()
+    own = np.sort(np.minimum(two_way.log.observer_age[-1], full_scale)).astype(np.float16)
+    about = np.minimum(two_way.log.age[-1, :, two_way.log.observer], full_scale)
+    assert any(np.array_equal(np.sort(row), own) for row in shown)
+    assert any(np.array_equal(np.sort(owned), np.sort(about)) for owned in shown.T)
+    assert not any(np.array_equal(np.sort(row), np.sort(about)) for row in shown)
+
+
+def test_the_matrix_holds_every_pair_s_age(replay, two_way):
+    tensors = column(replay, "/ages", "Tensor:data").flatten()
+    shown = np.stack([np.array(tensor["buffer"]) for tensor in tensors.to_pylist()])
+    expected = two_way.log.age.reshape(len(shown), -1)
+    full_scale = shown.max()
+    # Rows and columns are permuted alike, so the ages agree as a set.
+    np.testing.assert_array_equal(
+        np.sort(shown, axis=1), np.sort(np.minimum(expected, full_scale), axis=1)
+    )
+
+
+def test_plots_are_the_costs(replay, two_way):
+    shown = column(replay, "/plots/flock/variance", "Scalars:scalars").flatten().to_numpy()
+    np.testing.assert_allclose(shown, two_way.log.velocity_variance_m2ps2, rtol=1e-12)
+    values = column(replay, "/plots/age/mean", "Measurements:values").flatten().to_numpy()
+    np.testing.assert_allclose(values, two_way.log.age_mean, rtol=1e-6)

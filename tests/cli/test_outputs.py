@@ -1,0 +1,49 @@
+"""Files are checked before the work and written whole or not at all."""
+
+from pathlib import Path
+
+import pytest
+
+from swarm_mj.cli.outputs import check_writable, write_text
+
+
+def test_a_file_in_missing_folders_can_be_written(tmp_path):
+    path = tmp_path / "a" / "b" / "c.json"
+    check_writable(path, "summary", must_be_new=True)
+    assert list(tmp_path.iterdir()) == []
+    write_text(path, "text")
+    assert path.read_text() == "text"
+    assert [file.name for file in path.parent.iterdir()] == ["c.json"]
+
+
+@pytest.mark.parametrize("name", ["file/below", "x" * 300])
+def test_places_that_cannot_be_written_are_named(tmp_path, name):
+    (tmp_path / "file").write_text("kept")
+    with pytest.raises(ValueError, match=r"summary .* cannot be written"):
+        check_writable(tmp_path / name, "summary")
+    assert [file.name for file in tmp_path.iterdir()] == ["file"]
+
+
+def test_folders_and_existing_files_are_refused(tmp_path):
+    with pytest.raises(ValueError, match="is a folder"):
+        check_writable(tmp_path, "replay")
+    path = tmp_path / "old"
+    path.write_text("kept")
+    with pytest.raises(ValueError, match="--force"):
+        check_writable(path, "replay", must_be_new=True)
+    check_writable(path, "replay")
+
+
+def test_a_failing_write_leaves_the_old_file(tmp_path, monkeypatch):
+    path = tmp_path / "summary.json"
+    path.write_text("old")
+
+    def fail(self, *_args, **_kwargs):
+        self.touch()
+        raise OSError("disk full")
+
+    monkeypatch.setattr(Path, "write_text", fail)
+    with pytest.raises(OSError, match="disk full"):
+        write_text(path, "new")
+    assert path.read_text() == "old"
+    assert [file.name for file in tmp_path.iterdir()] == ["summary.json"]

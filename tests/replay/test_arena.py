@@ -1,0 +1,92 @@
+"""The replay's map, read back from the file, against the flight it shows."""
+
+import numpy as np
+import pytest
+from reading import column, counts, rows, rows_of_strips, static
+
+from swarm_mj.replay import palette
+from swarm_mj.replay.links import fates
+
+
+def test_positions_are_the_simulation_s(replay, two_way):
+    shown = rows(replay, "/arena/robots", "Points2D:positions", 12, 2)
+    np.testing.assert_allclose(shown, two_way.log.position_m, rtol=1e-6, atol=1e-4)
+
+
+@pytest.mark.parametrize("fate", ["delivered", "lost", "answered"])
+def test_arrows_are_as_many_as_the_packets_counted(replay, two_way, fate):
+    shown = counts(replay, f"/arena/radio/{fate}", "Arrows2D:vectors")
+    np.testing.assert_array_equal(shown, two_way.counted(fate))
+
+
+def test_a_delivered_packet_s_arrow_ends_at_its_receiver(replay, two_way):
+    links = fates(two_way.log)["delivered"]
+    entity = "/arena/radio/delivered"
+    start = rows(replay, entity, "Arrows2D:origins", 2)
+    way = rows(replay, entity, "Arrows2D:vectors", 2)
+    receiver = two_way.log.position_m[links.row, links.receiver]
+    np.testing.assert_allclose(start + way, receiver, rtol=1e-5, atol=1e-2)
+
+
+def test_a_lost_packet_s_arrow_stops_short(replay, two_way):
+    links = fates(two_way.log)["lost"]
+    start = two_way.log.position_m[links.row, links.sender]
+    full = two_way.log.position_m[links.row, links.receiver] - start
+    way = rows(replay, "/arena/radio/lost", "Arrows2D:vectors", 2)
+    np.testing.assert_allclose(way, 0.6 * full, rtol=1e-5, atol=1e-2)
+
+
+def test_rings_are_where_the_observer_believes_the_others(replay, two_way):
+    log = two_way.log
+    shown = log.is_known & (np.arange(12) != log.observer)
+    entity = "/arena/belief/ring"
+    np.testing.assert_array_equal(
+        counts(replay, entity, "Ellipses2D:centers"), np.sum(shown, axis=1)
+    )
+    centres = rows(replay, entity, "Ellipses2D:centers", 2)
+    np.testing.assert_allclose(centres, log.believed_m[shown], rtol=1e-6, atol=1e-4)
+
+
+def test_north_is_up(replay):
+    np.testing.assert_array_equal(
+        static(replay, "/arena", "Transform3D:mat3x3"), [1, 0, 0, 0, -1, 0, 0, 0, 1]
+    )
+
+
+def test_robots_wear_the_colour_of_their_age(replay, two_way):
+    log = two_way.log
+    rgba = column(replay, "/arena/robots", "Points2D:colors").flatten().to_numpy()
+    shown = np.stack([(rgba >> shift) & 255 for shift in (24, 16, 8)], axis=-1).reshape(-1, 12, 3)
+    assert np.all(shown[:, log.observer] == 255)
+    assert np.all(shown[~log.is_known] == palette.UNKNOWN)
+    newest = log.is_known & (log.observer_age == 0.0) & (np.arange(12) != log.observer)
+    assert np.all(shown[newest] == (253, 231, 37))
+    luma = shown @ np.array([0.299, 0.587, 0.114])
+    others = log.is_known[-1] & (np.arange(12) != log.observer)
+    by_age = np.argsort(log.observer_age[-1][others])
+    assert np.all(np.diff(luma[-1][others][by_age]) <= 0)
+
+
+def test_circles_have_the_range_and_stand_around_transmitters(replay, two_way):
+    log = two_way.log
+    entity = "/arena/radio/range"
+    assert set(rows(replay, entity, "Ellipses2D:half_sizes")) == {250.0}
+    centres = rows(replay, entity, "Ellipses2D:centers", 2)
+    per_window = counts(replay, entity, "Ellipses2D:centers")
+    row, sender = np.nonzero(log.recipient[:, 0] != np.arange(12))
+    np.testing.assert_array_equal(per_window, np.bincount(row, minlength=len(log.window)))
+    expected = log.position_m[row, sender]
+    for window in range(len(log.window)):
+        here = np.repeat(np.arange(len(log.window)), per_window) == window
+        np.testing.assert_allclose(
+            sorted(centres[here].tolist()), sorted(expected[row == window].tolist()), rtol=1e-5
+        )
+
+
+def test_the_tree_on_the_map_joins_parents_and_children(replay, two_way):
+    log = two_way.log
+    strips = rows_of_strips(replay, "/arena/tree")
+    row, child = np.nonzero(log.is_known & (np.arange(12) != log.observer))
+    parent = log.parent[row, child]
+    expected = np.stack([log.position_m[row, parent], log.position_m[row, child]], axis=1)
+    np.testing.assert_allclose(strips, expected, rtol=1e-5, atol=1e-3)

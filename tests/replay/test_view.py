@@ -1,0 +1,54 @@
+"""Opening replays: in a window where there is a display, else to a browser on this machine."""
+
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from swarm_mj.replay.view import LOOPBACK, run, serve_command, view_command
+
+FILE = Path("some where") / "mission.rrd"
+
+
+def test_a_window_needs_a_display(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(ValueError, match="no display"):
+        view_command(FILE)
+    monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
+    assert view_command(FILE)[-1] == str(FILE)
+
+
+def test_the_browser_s_server_binds_to_loopback_only():
+    command, address = serve_command(FILE)
+    assert command[command.index("--bind") + 1] == LOOPBACK == "127.0.0.1"
+    ports = [command[command.index(name) + 1] for name in ("--port", "--web-viewer-port")]
+    assert ports[0] != ports[1]
+    assert address.startswith(f"http://127.0.0.1:{ports[1]}/")
+    assert ports[0] in address
+
+
+def test_a_viewer_s_exit_code_is_ours():
+    assert run([sys.executable, "-c", "raise SystemExit(3)"]) == 3
+
+
+def test_the_page_is_served(replay):
+    command = [sys.executable, "-m", "swarm_mj", "replay", "--web", str(replay)]
+    server = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+    )
+    try:
+        address = ""
+        for line in server.stdout:
+            address = address or (line.split()[1] if line.startswith("Open http") else "")
+            if "Hosting a web-viewer" in line:
+                break
+        with urllib.request.urlopen(address, timeout=30) as page:
+            assert page.status == 200
+            assert b"rerun" in page.read().lower()
+    finally:
+        subprocess.run(["pkill", "-TERM", "-g", str(server.pid)], check=False)
+        server.communicate(timeout=30)
