@@ -42,7 +42,7 @@ def write_replay(log: Log, mission: Mission, config: dict[str, object], path: Pa
 def _write(log: Log, mission: Mission, config: dict[str, object], path: Path, *, name: str) -> None:
     path.touch()  # rerun reports a folder that cannot be written in its own log only
     rr.set_strict_mode(True)  # bad data raises; otherwise a column is silently missing
-    reach_m = max(mission.half_side_m, float(np.max(np.abs(log.position_m))))
+    reach_m = reach(log, mission)
     top_age = 1.05 * float(np.max(log.age_mean + log.age_std))
     blueprint = layout(log.observer, reach_m, top_age, has_flock=bool(np.any(log.velocity_mps)))
     with rr.RecordingStream(APPLICATION, send_properties=False) as recording:
@@ -55,6 +55,11 @@ def _write(log: Log, mission: Mission, config: dict[str, object], path: Path, *,
         lines = [f"- **{key}**: {value}" for key, value in config.items()]
         about = "\n".join([f"# {name}", *lines])
         recording.log("about", rr.TextDocument(about, media_type="text/markdown"), static=True)
+
+
+def reach(log: Log, mission: Mission) -> float:
+    """Half the width of a map that holds the area and everywhere the robots went [m]."""
+    return max(mission.half_side_m, float(np.max(np.abs(log.position_m))))
 
 
 def draw(sheet: Sheet, mission: Mission, reach_m: float) -> None:

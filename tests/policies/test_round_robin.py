@@ -2,8 +2,10 @@ import numpy as np
 import pytest
 
 from swarm_mj.buffers import empty_buffers
+from swarm_mj.mission import paper
 from swarm_mj.policies import LocalViews, RoundRobin
 from swarm_mj.protocol import Bodies
+from swarm_mj.swarm import Swarm
 
 # Four robots in the plane [m]; the third is nearest the centre.
 SQUARE_M = np.array([[-90.0, 0.0], [0.0, 80.0], [10.0, -10.0], [70.0, 70.0]])
@@ -59,3 +61,15 @@ def test_iv_c_base_is_chosen_anew_in_each_window():
     moved_m[3] = [1.0, 1.0]
     assert decided(SQUARE_M[None], 2) == [[0, 1, 2, 2]]
     assert decided(moved_m[None], 2) == [[0, 1, 3, 3]]
+
+
+def test_iv_c_nearest_means_the_straight_line():
+    """(3, 3) is 4.2 m from the centre by a straight line, (5, 0) is 5 m; along axes 6 and 5."""
+    mission = paper("stationary", num_robots=3)
+    swarm = Swarm(mission, [0])
+    bodies = Bodies(
+        position_m=np.array([[[5.0, 0.0], [3.0, 3.0], [9.0, 9.0]]]),
+        velocity_mps=np.zeros((1, 3, 2)),
+    )
+    recipient = RoundRobin().recipients(swarm.views, bodies)
+    np.testing.assert_array_equal(recipient, [[1, 1, 2]])

@@ -1,7 +1,7 @@
 """What the charts show, against plain loops."""
 
 import numpy as np
-from reading import column
+from reading import column, rows_of_strips
 
 from swarm_mj.policies.minimum_spanning_tree import spanning_tree
 from swarm_mj.replay.charts import radio_states, rate, walk
@@ -78,3 +78,12 @@ def test_plots_are_the_costs(replay, two_way):
     np.testing.assert_allclose(shown, two_way.log.velocity_variance_m2ps2, rtol=1e-12)
     values = column(replay, "/plots/age/mean", "Measurements:values").flatten().to_numpy()
     np.testing.assert_allclose(values, two_way.log.age_mean, rtol=1e-6)
+
+
+def test_the_tree_s_lines_join_nodes_a_hop_apart(replay, two_way):
+    strips = rows_of_strips(replay, "/tree/edges")
+    known = two_way.log.is_known & (np.arange(12) != two_way.log.observer)
+    assert len(strips) == np.sum(known)
+    hop = np.unique(np.round(strips[:, 1, 0] - strips[:, 0, 0], 3))
+    assert len(hop) == 1
+    assert hop[0] > 0

@@ -2,12 +2,14 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
 from swarm_mj.replay.read import check_replay, windows
-from swarm_mj.replay.write import write_replay
+from swarm_mj.replay.write import reach, write_replay
 
 ENTITIES = {
     "/arena/robots",
@@ -83,3 +85,10 @@ def test_a_flooded_stationary_flight_can_be_drawn_too(flooded, tmp_path):
     path = tmp_path / "flood.rrd"
     write_replay(flooded.log, flooded.mission, {"seed": 5}, path)
     assert len(windows(path)) == 30
+
+
+def test_the_map_holds_the_area_and_robots_outside_it(two_way):
+    log, mission = two_way.log, two_way.mission
+    assert reach(log, mission) == mission.half_side_m
+    far = replace(log, position_m=log.position_m + np.array([5e3, 0.0]))
+    assert reach(far, mission) == pytest.approx(5e3 + log.position_m[..., 0].max())
