@@ -17,7 +17,7 @@ from rich.table import Table
 
 from swarm_mj.cli.interrupt import deferred_interrupt
 from swarm_mj.cli.options import add_mission_options, mission_of, new_parser, this_command
-from swarm_mj.cli.outputs import check_writable, write_text
+from swarm_mj.cli.outputs import check_writable
 from swarm_mj.flight import Flown, Summary, fly, summarise
 from swarm_mj.mission import Mission
 from swarm_mj.policies import POLICIES, Policy, make_policy
@@ -26,6 +26,7 @@ from swarm_mj.recorder import Recorder
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import view_command
 from swarm_mj.swarm import Swarm
+from swarm_mj.whole_file import whole_file
 
 DONE, INTERRUPTED = 0, 130
 REPLAYS = Path("replays")
@@ -179,7 +180,6 @@ def _write(
     if path and flight.recorder:
         from swarm_mj.replay.write import write_replay  # rerun takes its time to import
 
-        path.parent.mkdir(parents=True, exist_ok=True)
         kept = {key: value for key, value in config.items() if value is not None}
         write_replay(flight.recorder.log(), mission, kept, path)
     if json_:
@@ -190,7 +190,8 @@ def _write(
             "interrupted": flight.was_interrupted,
             "replay": str(path) if path else None,
         }
-        write_text(json_, json.dumps(document, indent=2) + "\n")
+        with whole_file(json_) as part:
+            part.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 
 def _print(options: argparse.Namespace, flight: _Flight, path: Path | None) -> None:

@@ -1,7 +1,8 @@
-"""Files that commands write: checked before the work, whole or not at all."""
+"""Files that commands write, checked before the work."""
 
-import os
 from pathlib import Path
+
+from swarm_mj.whole_file import part_of
 
 
 def check_writable(path: Path, what: str, *, must_be_new: bool = False) -> None:
@@ -21,27 +22,8 @@ def check_writable(path: Path, what: str, *, must_be_new: bool = False) -> None:
         if must_be_new and path.exists():
             raise ValueError(f"{what} {path} exists; name another, or replace it with --force")
         folder = next(parent for parent in path.absolute().parents if parent.exists())
-        probe = folder / f".{path.name}.{os.getpid()}.part"
+        probe = part_of(folder / path.name)
         probe.touch()
         probe.unlink()
     except OSError as error:
         raise ValueError(f"{what} {path} cannot be written: {error.strerror}") from error
-
-
-def write_text(path: Path, text: str) -> None:
-    """Writes a text file that appears under its name only when it is whole.
-
-    Args:
-        path: The file, replaced if it exists; missing folders are made.
-        text: What it holds.
-
-    Raises:
-        OSError: It cannot be written.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        unfinished.write_text(text, encoding="utf-8")
-        unfinished.replace(path)
-    finally:
-        unfinished.unlink(missing_ok=True)

@@ -8,8 +8,9 @@ from typing import Any
 from rich.console import Console
 
 from swarm_mj.cli.options import add_mission_options, mission_of, new_parser
-from swarm_mj.cli.outputs import check_writable, write_text
+from swarm_mj.cli.outputs import check_writable
 from swarm_mj.scene import compose
+from swarm_mj.whole_file import whole_file
 
 
 def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no public type
@@ -27,7 +28,8 @@ def run(options: argparse.Namespace) -> int:
     check_writable(options.out, "scene", must_be_new=not options.force)
     spec = compose(mission)
     spec.compile()
-    write_text(options.out, spec.to_xml())
+    with whole_file(options.out) as part:
+        part.write_text(spec.to_xml(), encoding="utf-8")
     console = Console(highlight=False, soft_wrap=True, markup=False)
     console.print(
         f"Wrote {options.out}: {mission.num_robots} robots, {mission.side_m:.0f} m square"

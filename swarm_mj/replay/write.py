@@ -1,6 +1,5 @@
 """Writes a log as a rerun recording, its layout inside."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from swarm_mj.replay.layout import layout
 from swarm_mj.replay.legend import draw_legend
 from swarm_mj.replay.links import fates
 from swarm_mj.replay.sheet import Sheet
+from swarm_mj.whole_file import whole_file
 
 APPLICATION = "swarm_mj"
 
@@ -24,19 +24,16 @@ def write_replay(log: Log, mission: Mission, config: dict[str, object], path: Pa
         log: What was flown.
         mission: Its numbers.
         config: Kept in the file as recording properties; values are numbers, texts or booleans.
-        path: The file, replaced if it exists; its folder must exist.
+        path: The file, replaced if it exists; missing folders are made.
 
     Raises:
         OSError: The file cannot be written.
     """
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        _write(log, mission, config, unfinished, name=path.stem)
-        unfinished.replace(path)
+        with whole_file(path) as part:
+            _write(log, mission, config, part, name=path.stem)
     except RuntimeError as error:  # rerun's, when its writer fails
         raise OSError(f"replay {path} could not be written: {error}") from error
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 def _write(log: Log, mission: Mission, config: dict[str, object], path: Path, *, name: str) -> None:
