@@ -32,12 +32,12 @@ def new_parser(commands: Any, name: str, summary: str, epilog: str = "") -> argp
     )
 
 
-def this_command() -> str:
-    """How the reader can call this program: by name, or by its path if it is not on the PATH."""
-    program = Path(sys.executable).with_name("swarm-mj")
-    found = shutil.which("swarm-mj")
+def this_command(name: str = "swarm-mj") -> str:
+    """How the reader can call a program beside this Python: by name, or by path if it must be."""
+    program = Path(sys.executable).with_name(name)
+    found = shutil.which(name)
     if (found and Path(found) == program) or not program.exists():
-        return "swarm-mj"
+        return name
     return os.path.relpath(program)
 
 

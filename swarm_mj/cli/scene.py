@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
-from swarm_mj.cli.options import add_mission_options, mission_of, new_parser
+from swarm_mj.cli.options import add_mission_options, mission_of, new_parser, this_command
 from swarm_mj.cli.outputs import check_writable
 from swarm_mj.scene import compose
 from swarm_mj.whole_file import whole_file
@@ -32,7 +32,9 @@ def run(options: argparse.Namespace) -> int:
         part.write_text(spec.to_xml(), encoding="utf-8")
     console = Console(highlight=False, soft_wrap=True, markup=False)
     console.print(
-        f"Wrote {options.out}: {mission.num_robots} robots, {mission.side_m:.0f} m square"
+        f"Wrote {options.out}: {mission.num_robots} robots, {mission.side_m:.0f} m by {mission.side_m:.0f} m"
     )
-    console.print(f"Open it:  python -m mujoco.viewer --mjcf={shlex.quote(str(options.out))}")
+    console.print(
+        f"Open it:  {this_command('python')} -m mujoco.viewer --mjcf={shlex.quote(str(options.out))}"
+    )
     return 0
