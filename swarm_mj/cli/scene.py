@@ -31,10 +31,8 @@ def run(options: argparse.Namespace) -> int:
     with whole_file(options.out) as part:
         part.write_text(spec.to_xml(), encoding="utf-8")
     console = Console(highlight=False, soft_wrap=True, markup=False)
-    console.print(
-        f"Wrote {options.out}: {mission.num_robots} robots, {mission.side_m:.0f} m by {mission.side_m:.0f} m"
-    )
-    console.print(
-        f"Open it:  {this_command('python')} -m mujoco.viewer --mjcf={shlex.quote(str(options.out))}"
-    )
+    side = f"{mission.side_m:.0f} m"
+    console.print(f"Wrote {options.out}: {mission.num_robots} robots on {side} by {side}")
+    file = shlex.quote(str(options.out))
+    console.print(f"Open it:  {this_command('python')} -m mujoco.viewer --mjcf={file}")
     return 0
