@@ -24,10 +24,11 @@ def whole_file(path: Path) -> Iterator[Path]:
     Raises:
         OSError: The file cannot be written.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = part_of(path)
+    target = path.resolve()  # of a link, the file it leads to is replaced, not the link
+    target.parent.mkdir(parents=True, exist_ok=True)
+    part = part_of(target)
     try:
         yield part
-        part.replace(path)
+        part.replace(target)
     finally:
         part.unlink(missing_ok=True)

@@ -28,3 +28,13 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path, failure):
         write_half()
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_link_stays_and_its_file_is_replaced(tmp_path):
+    (tmp_path / "real").write_text("old")
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "real")
+    with whole_file(link) as part:
+        part.write_text("new")
+    assert link.is_symlink()
+    assert (tmp_path / "real").read_text() == "new"

@@ -19,6 +19,8 @@ def check_writable(path: Path, what: str, *, must_be_new: bool = False) -> None:
     try:
         if path.is_dir():
             raise ValueError(f"{what} {path} is a folder; name a file")
+        if path.exists() and not path.is_file():
+            raise ValueError(f"{what} {path} is a device or a pipe; name a file")
         if must_be_new and path.exists():
             raise ValueError(f"{what} {path} exists; name another, or replace it with --force")
         folder = next(parent for parent in path.absolute().parents if parent.exists())

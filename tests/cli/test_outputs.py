@@ -1,5 +1,7 @@
 """Files are checked before the work, and nothing is left by the check."""
 
+from pathlib import Path
+
 import pytest
 
 from swarm_mj.cli.outputs import check_writable
@@ -27,3 +29,8 @@ def test_folders_and_existing_files_are_refused(tmp_path):
     with pytest.raises(ValueError, match="--force"):
         check_writable(path, "replay", must_be_new=True)
     check_writable(path, "replay")
+
+
+def test_devices_are_refused():
+    with pytest.raises(ValueError, match="is a device or a pipe"):
+        check_writable(Path("/dev/null"), "summary")
