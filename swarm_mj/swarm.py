@@ -16,6 +16,8 @@ from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Loc
 from swarm_mj.protocol import PHASE, Bodies, Phase, transmit, window
 from swarm_mj.radio import Channel, FreeSpaceRadio, from_db, transmit_power_dbm
 
+MAX_SEED = 2**63 - 1  # the largest that a replay's properties keep
+
 
 def radio_of(mission: Mission) -> FreeSpaceRadio:
     """The mission's radio, its power such that the range is exact in silence (IV-B)."""
@@ -184,10 +186,10 @@ class Swarm:
 
 def _check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
     """Raises ValueError unless there are seeds, as many as expected, and none is negative."""
-    is_whole = all(isinstance(seed, Integral) and seed >= 0 for seed in seeds)
+    is_whole = all(isinstance(seed, Integral) and 0 <= seed <= MAX_SEED for seed in seeds)
     if not is_whole or len(seeds) != (expected or max(1, len(seeds))):
         count = "one or more" if expected is None else str(expected)
-        raise ValueError(f"seeds must be {count} integers from 0, not {list(seeds)}")
+        raise ValueError(f"seeds must be {count} integers from 0 to {MAX_SEED}, not {list(seeds)}")
 
 
 def _streams(seed: int) -> list[np.random.Generator]:

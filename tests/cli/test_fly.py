@@ -114,6 +114,7 @@ def test_contact_physics_flies(swarm_mj, tmp_path, boundary):
         (["--probability", "1.5"], "probability must be from 0 to 1, not 1.5"),
         (["--policy", "round-robin", "--probability", "0.1"], "takes no transmission probability"),
         (["--seed", "-1"], "not [-1]"),
+        (["--seed", "18446744073709551616"], "from 0 to 9223372036854775807"),
         (["--observer", "40"], "observer must be from 0 to 39, not 40"),
         (["--range-ratio", "0.02"], "too sparse"),
         (["--record", "replay.txt"], "must be named *.rrd"),
