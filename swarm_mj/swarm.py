@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Int
 
 from swarm_mj.buffers import Buffers, check_robots, empty_buffers, observe_self
+from swarm_mj.channel import radio_of
 from swarm_mj.costs import WindowCosts, window_costs
 from swarm_mj.mission import Mission
 from swarm_mj.motion import initial_velocity, motion_of
@@ -14,23 +15,9 @@ from swarm_mj.physics import Physics
 from swarm_mj.placement import connected_positions
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, LocalViews, Policy
 from swarm_mj.protocol import PHASE, Bodies, Phase, transmit, window
-from swarm_mj.radio import Channel, FreeSpaceRadio, from_db, transmit_power_dbm
+from swarm_mj.radio import Channel
 
 MAX_SEED = 2**63 - 1  # the largest that a replay's properties keep
-
-
-def radio_of(mission: Mission) -> FreeSpaceRadio:
-    """The mission's radio, its power such that the range is exact in silence (IV-B)."""
-    power_dbm = transmit_power_dbm(
-        mission.range_m, mission.frequency_hz, mission.noise_dbm, mission.sinr_threshold_db
-    )
-    return FreeSpaceRadio(
-        power_mw=from_db(power_dbm),
-        noise_mw=from_db(mission.noise_dbm),
-        threshold=from_db(mission.sinr_threshold_db),
-        frequency_hz=mission.frequency_hz,
-        recipient_hears_while_sending=mission.half_duplex == "eavesdroppers",
-    )
 
 
 class Swarm:

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from swarm_mj.buffers import empty_buffers, observe_self
+from swarm_mj.channel import radio_of
 from swarm_mj.costs import age_of_information
 from swarm_mj.mission import reference
 from swarm_mj.protocol import Bodies, window
-from swarm_mj.swarm import radio_of
 
 RECORDINGS = Path(__file__).parent / "golden"
 EVERY = 25  # windows between two recorded buffers

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm_mj.buffers import empty_buffers
+from swarm_mj.channel import radio_of
 from swarm_mj.costs import mean_hops, window_costs
 from swarm_mj.mission import paper, reference
 from swarm_mj.motion import flocking
@@ -13,7 +14,7 @@ from swarm_mj.physics import Physics
 from swarm_mj.policies import POLICIES, make_policy
 from swarm_mj.policies.minimum_spanning_tree import spanning_tree
 from swarm_mj.protocol import Bodies, window
-from swarm_mj.swarm import Swarm, radio_of
+from swarm_mj.swarm import Swarm
 
 NUM_ROBOTS, NUM_WINDOWS = 9, 6
 

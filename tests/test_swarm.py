@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from channels import to_nobody
 
+from swarm_mj.channel import radio_of
 from swarm_mj.mission import paper, reference
 from swarm_mj.motion import initial_velocity
 from swarm_mj.placement import is_connected
@@ -15,7 +16,7 @@ from swarm_mj.policies import (
     RoundRobin,
     make_policy,
 )
-from swarm_mj.swarm import Swarm, radio_of
+from swarm_mj.swarm import Swarm
 
 TASKS = ["stationary", "random-walk", "flocking"]
 PRESETS = [paper, reference]

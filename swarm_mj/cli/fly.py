@@ -55,7 +55,7 @@ def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no publi
         "--probability",
         type=float,
         default=None,
-        help="of a transmission, for random-flooding and mst (default: 0.06)",
+        help="of a transmission, for policies that have one (default: tuned for the regime)",
     )
     parser.add_argument("--seed", type=int, default=1, help="the same seed is the same mission")
     add_mission_options(parser)

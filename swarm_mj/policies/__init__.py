@@ -2,49 +2,108 @@
 
 from collections.abc import Callable
 
+from swarm_mj.channel import radio_of
 from swarm_mj.mission import Mission
+from swarm_mj.policies.aloha import Aloha
+from swarm_mj.policies.gossip import InnovationGossip
 from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
+from swarm_mj.policies.oracle import GreedyOracle, LookaheadOracle
+from swarm_mj.policies.planner import Planner
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, LocalViews, Policy
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.round_robin import RoundRobin
+from swarm_mj.policies.spatial_tdma import SpatialTdma
+from swarm_mj.policies.tdma import Tdma
+from swarm_mj.policies.tuning import tuned_probability
+from swarm_mj.radio import from_db
 
 __all__ = [
     "POLICIES",
+    "Aloha",
     "CentralisedPolicy",
     "DecentralisedPolicy",
+    "GreedyOracle",
+    "InnovationGossip",
     "LocalViews",
+    "LookaheadOracle",
     "MinimumSpanningTree",
+    "Planner",
     "Policy",
     "RandomFlooding",
     "RoundRobin",
+    "SpatialTdma",
+    "Tdma",
     "make_policy",
 ]
 
-DEFAULT_PROBABILITY = 0.06  # best of 0.04, 0.06, ..., 0.2 for 40 robots in each task (100 missions)
 
-
-def _random_flooding(mission: Mission, probability: float | None) -> Policy:  # noqa: ARG001
-    return RandomFlooding(DEFAULT_PROBABILITY if probability is None else probability)
+def _random_flooding(mission: Mission, probability: float | None) -> Policy:
+    return RandomFlooding(_or_tuned(probability, "random-flooding", mission))
 
 
 def _round_robin(mission: Mission, probability: float | None) -> Policy:  # noqa: ARG001
-    if probability is not None:
-        raise ValueError("round-robin takes no transmission probability")
+    _refuse(probability, "round-robin")
     return RoundRobin()
 
 
 def _mst(mission: Mission, probability: float | None) -> Policy:
     return MinimumSpanningTree(
-        DEFAULT_PROBABILITY if probability is None else probability,
+        _or_tuned(probability, "mst", mission),
         is_recomputed=mission.tree_recomputed,
         root_transmits=mission.tree_root_transmits,
     )
+
+
+def _aloha(mission: Mission, probability: float | None) -> Policy:
+    return Aloha(_or_tuned(probability, "aloha", mission), range_m=mission.range_m)
+
+
+def _gossip(mission: Mission, probability: float | None) -> Policy:
+    return InnovationGossip(_or_tuned(probability, "gossip", mission))
+
+
+def _tdma(mission: Mission, probability: float | None) -> Policy:  # noqa: ARG001
+    _refuse(probability, "tdma")
+    return Tdma()
+
+
+def _spatial_tdma(mission: Mission, probability: float | None) -> Policy:
+    _refuse(probability, "spatial-tdma")
+    return SpatialTdma(range_m=mission.range_m, threshold=from_db(mission.sinr_threshold_db))
+
+
+def _planner(mission: Mission, probability: float | None) -> Policy:
+    _refuse(probability, "planner")
+    return Planner(radio_of(mission), mission.window_s)
+
+
+def _planner_lone(mission: Mission, probability: float | None) -> Policy:
+    _refuse(probability, "planner-lone")
+    return Planner(radio_of(mission), mission.window_s, shares_pictures=False)
+
+
+def _oracle(mission: Mission, probability: float | None) -> Policy:
+    _refuse(probability, "oracle")
+    return GreedyOracle(radio_of(mission))
+
+
+def _oracle_lookahead(mission: Mission, probability: float | None) -> Policy:
+    _refuse(probability, "oracle-lookahead")
+    return LookaheadOracle(radio_of(mission))
 
 
 POLICIES: dict[str, Callable[[Mission, float | None], Policy]] = {
     "random-flooding": _random_flooding,
     "round-robin": _round_robin,
     "mst": _mst,
+    "aloha": _aloha,
+    "gossip": _gossip,
+    "tdma": _tdma,
+    "spatial-tdma": _spatial_tdma,
+    "planner-lone": _planner_lone,
+    "planner": _planner,
+    "oracle": _oracle,
+    "oracle-lookahead": _oracle_lookahead,
 }
 
 
@@ -54,7 +113,8 @@ def make_policy(name: str, mission: Mission, probability: float | None = None) -
     Args:
         name: A key of `POLICIES`.
         mission: Whose preset says how the baseline behaves where paper and code differ.
-        probability: Of transmission, for the policies that have one; None is their default.
+        probability: Of transmission, for the policies that have one; None is the one tuned for
+            the regime nearest to the mission's.
 
     Returns:
         The policy.
@@ -65,3 +125,13 @@ def make_policy(name: str, mission: Mission, probability: float | None = None) -
     if name not in POLICIES:
         raise ValueError(f"policy must be one of {', '.join(POLICIES)}, not {name!r}")
     return POLICIES[name](mission, probability)
+
+
+def _or_tuned(probability: float | None, name: str, mission: Mission) -> float:
+    return tuned_probability(name, mission) if probability is None else probability
+
+
+def _refuse(probability: float | None, name: str) -> None:
+    """Raises ValueError if a policy that has no probability is given one."""
+    if probability is not None:
+        raise ValueError(f"{name} takes no transmission probability; leave out {probability:g}")

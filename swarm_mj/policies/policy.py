@@ -42,6 +42,11 @@ class Policy:
     transmits_twice: ClassVar[bool] = False  # flooding's window: two transmissions, no responses
 
     @property
+    def carries_payload(self) -> bool:
+        """Whether packets carry more than T, M and P (II-B); the paper's bandwidth has no limit."""
+        return False
+
+    @property
     def parameters(self) -> dict[str, float]:
         """The numbers that the policy was made with, by name; kept beside what it costs."""
         return {}

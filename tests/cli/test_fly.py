@@ -13,6 +13,7 @@ import pytest
 from swarm_mj.flight import fly, summarise
 from swarm_mj.mission import paper
 from swarm_mj.policies import make_policy
+from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.replay.read import check_replay, windows
 from swarm_mj.swarm import Swarm
 
@@ -155,10 +156,12 @@ def test_odd_names_are_kept_and_quoted(swarm_mj, tmp_path):
     assert files(tmp_path) == ["a [red] b.rrd"]
 
 
-def test_the_summary_names_the_default_probability(swarm_mj, tmp_path):
+def test_the_summary_names_the_tuned_probability(swarm_mj, tmp_path):
+    """Not that of the tiny mission which is flown ahead to compile."""
     swarm_mj("fly", *SHORT, "--no-record", "--json", "s.json", "--observer", 2)
     config = json.loads((tmp_path / "s.json").read_text())["config"]
-    assert config["probability"] == 0.06
+    mission = paper("flocking", num_robots=6, range_ratio=0.5)
+    assert config["probability"] == tuned_probability("mst", mission)
     assert config["observer"] == 2
 
 

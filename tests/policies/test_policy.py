@@ -8,15 +8,20 @@ import pytest
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies import (
     POLICIES,
+    Aloha,
     CentralisedPolicy,
     DecentralisedPolicy,
+    InnovationGossip,
     LocalViews,
     MinimumSpanningTree,
     Policy,
     RandomFlooding,
     RoundRobin,
+    SpatialTdma,
+    Tdma,
     make_policy,
 )
+from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.swarm import Swarm
 
 MISSION = paper("flocking", num_robots=8)
@@ -156,20 +161,29 @@ def test_alg1_silence_is_addressing_oneself():
         ("random-flooding", RandomFlooding, 0.2),
         ("mst", MinimumSpanningTree, 0.2),
         ("round-robin", RoundRobin, None),
+        ("aloha", Aloha, 0.2),
+        ("gossip", InnovationGossip, 0.2),
+        ("tdma", Tdma, None),
+        ("spatial-tdma", SpatialTdma, None),
     ],
 )
-def test_iv_c_baselines_by_name(name, kind, probability):
+def test_policies_by_name(name, kind, probability):
     assert type(make_policy(name, MISSION)) is kind
     assert type(make_policy(name, MISSION, probability)) is kind
 
 
-@pytest.mark.parametrize("name", ["random-flooding", "mst"])
+TUNED = ["random-flooding", "mst", "aloha", "gossip"]
+
+
+@pytest.mark.parametrize("name", TUNED)
 def test_probability_reaches_the_policy(name):
-    """At 0 nobody transmits, at 1 nearly everybody does."""
+    """At 0 nobody transmits, at 1 nearly everybody does who has anything new to tell."""
     num_sending = []
     for probability in (0.0, 1.0):
         swarm = Swarm(MISSION, [1])
         policy = make_policy(name, MISSION, probability)
+        swarm.exchange(swarm.views.silence)
+        swarm.buffers.timestamp[:] = 1.0
         swarm.start(policy)
         num_sending.append(np.sum(swarm.decide(policy) != swarm.views.silence))
     assert num_sending[0] == 0
@@ -202,13 +216,24 @@ def test_unknown_policy_is_a_clear_error():
         make_policy("rumour", MISSION)
 
 
-@pytest.mark.parametrize("name", ["random-flooding", "mst"])
+@pytest.mark.parametrize("name", TUNED)
 @pytest.mark.parametrize("probability", [-0.1, 1.5, math.inf])
 def test_bad_probability_is_a_clear_error(name, probability):
     with pytest.raises(ValueError, match="probability must be from 0 to 1"):
         make_policy(name, MISSION, probability)
 
 
-def test_round_robin_has_no_probability():
-    with pytest.raises(ValueError, match="round-robin takes no transmission probability"):
-        make_policy("round-robin", MISSION, 0.5)
+@pytest.mark.parametrize("name", TUNED)
+@pytest.mark.parametrize("preset", [paper, reference])
+def test_probability_is_tuned_by_default_and_named(name, preset):
+    mission = preset("random-walk", num_robots=20)
+    parameters = make_policy(name, mission).parameters
+    assert parameters == {"probability": tuned_probability(name, mission)}
+    assert make_policy(name, mission, 0.17).parameters == {"probability": 0.17}
+
+
+@pytest.mark.parametrize("name", ["round-robin", "tdma", "spatial-tdma"])
+def test_a_schedule_has_no_probability(name):
+    assert make_policy(name, MISSION).parameters == {}
+    with pytest.raises(ValueError, match=f"{name} takes no transmission probability"):
+        make_policy(name, MISSION, 0.5)

@@ -1,0 +1,93 @@
+"""Slotted ALOHA broadcast (Abramson 1970; Roberts 1975)."""
+
+from collections.abc import Sequence
+from typing import ClassVar, no_type_check
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numba import njit
+
+from swarm_mj.policies.policy import DecentralisedPolicy, LocalViews, check_probability
+from swarm_mj.streams import Stream, uniform
+
+
+class Aloha(DecentralisedPolicy):
+    """Every robot broadcasts now and then, as often as its neighbourhood bears, unanswered.
+
+    In slotted ALOHA what counts is the load that all n stations offer together, so each of them
+    sends less the more there are. Here a slot is half a window, a neighbourhood's robots are its
+    stations, and `probability` is that anyone of them broadcasts in a slot: each does so with
+    1 - (1 - p)^(1/n). A robot takes for n the size of the team times the share of the robots it
+    knows that it believes in range; the whole team, then, until it has heard of anyone.
+
+    The difference to random flooding is this n: flooding has one probability for everyone and
+    knows nothing. The packet is addressed to the next identity, which stands for nobody in
+    particular. Uses the robot's own buffer, the identities, the team's size and the range.
+    """
+
+    transmits_twice: ClassVar[bool] = True
+
+    def __init__(self, probability: float, *, range_m: float) -> None:
+        """Prepares the policy.
+
+        Args:
+            probability: That anyone of a neighbourhood broadcasts in a half window.
+            range_m: Distance at which a lone transmission just decodes [m].
+
+        Raises:
+            ValueError: The probability is not in [0, 1].
+        """
+        self._probability = check_probability(probability)
+        self._range_m = range_m
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The probability that anyone of a neighbourhood broadcasts."""
+        return {"probability": self._probability}
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Gives every robot its own stream of numbers; arguments as in `Policy.start`."""
+        self._stream = Stream(rngs, uniform, (num_robots,))
+
+    def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
+        """The next identity, for each robot that draws a broadcast."""
+        everyone_silent = 1.0 - self._probability
+        chance = 1.0 - everyone_silent ** (1.0 / num_contenders(views, self._range_m))
+        anyone = (views.silence + 1) % views.num_robots
+        return np.where(self._stream.next() < chance, anyone, views.silence)
+
+
+def num_contenders(views: LocalViews, range_m: float) -> Float[np.ndarray, "B N"]:
+    """How many robots contend for each robot's neighbourhood, as far as it can tell.
+
+    Args:
+        views: What every robot knows.
+        range_m: The range of a packet [m].
+
+    Returns:
+        The team's size times the share of the known robots, itself included, believed in range.
+    """
+    contenders = np.empty(views.buffers.shape)
+    _count(views.buffers.is_known, views.buffers.position_m, range_m, contenders)
+    return contenders
+
+
+@njit(cache=True)
+@no_type_check
+def _count(
+    is_known: Bool[np.ndarray, "B N N"],
+    believed_m: Float[np.ndarray, "B N N 2"],
+    range_m: float,
+    contenders: Float[np.ndarray, "B N"],
+) -> None:
+    num_missions, num_robots = contenders.shape
+    for b in range(num_missions):
+        for i in range(num_robots):
+            num_known = num_near = 1
+            for j in range(num_robots):
+                if is_known[b, i, j] and j != i:
+                    dx = believed_m[b, i, j, 0] - believed_m[b, i, i, 0]
+                    dy = believed_m[b, i, j, 1] - believed_m[b, i, i, 1]
+                    num_known += 1
+                    num_near += dx * dx + dy * dy <= range_m * range_m
+            contenders[b, i] = num_robots * num_near / num_known

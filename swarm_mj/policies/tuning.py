@@ -1,0 +1,88 @@
+"""Transmission probabilities (IV-C: "some probability p") tuned per regime, and how.
+
+`tuned.csv` beside this file holds one row per policy and regime; `tools/tune.py` wrote it.
+"""
+
+import csv
+import math
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from swarm_mj.mission import Mission
+
+TABLE = Path(__file__).with_name("tuned.csv")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuned:
+    """The best probability of a policy in one regime: a row of the table, its columns in order."""
+
+    policy: str  # a name among `POLICIES`
+    preset: str
+    task: str
+    num_robots: int
+    range_ratio: float  # of 1 km
+    velocity_ratio: float  # of 1 km in 50 s; means nothing to a stationary team
+    probability: float  # the least mean age of a grid's
+    aoi_mean: float  # with it, over the episodes (Eq. 10) [windows]
+    aoi_sem: float  # standard error of that mean [windows]
+    episodes: int  # missions flown with every probability of the grid
+    first_seed: int  # of these, the others follow one by one
+    version: str  # of the code that tuned it
+    commit: str
+
+
+def tuned_probability(policy_name: str, mission: Mission) -> float:
+    """A policy's tuned probability in the regime that is nearest to a mission's.
+
+    Nearest by the ratios of team size, range and velocity, among the regimes of the same preset
+    and task: the mission's own where the table has it.
+
+    Args:
+        policy_name: A name among `POLICIES`.
+        mission: The regime.
+
+    Returns:
+        The probability.
+
+    Raises:
+        ValueError: The policy was not tuned for the mission's preset and task.
+    """
+    group = (policy_name, mission.preset, mission.task)
+    rows = [row for row in _table() if (row.policy, row.preset, row.task) == group]
+    if not rows:
+        raise ValueError(
+            f"{policy_name} has no tuned probability for {mission.preset} {mission.task} missions; "
+            "pass one, or run tools/tune.py"
+        )
+    return min(rows, key=lambda row: _distance(row, mission)).probability
+
+
+def read_table(path: Path) -> list[Tuned]:
+    """The rows of a table.
+
+    Raises:
+        OSError: The file cannot be read.
+        ValueError: A column is missing or unknown, or a number is none.
+    """
+    with path.open(encoding="utf-8", newline="") as file:
+        reader = csv.DictReader(file)
+        columns = list(Tuned.__annotations__)
+        if reader.fieldnames != columns:
+            raise ValueError(f"columns of {path} must be {', '.join(columns)}")
+        kinds = Tuned.__annotations__
+        return [Tuned(**{name: kinds[name](row[name]) for name in columns}) for row in reader]
+
+
+@cache
+def _table() -> list[Tuned]:
+    return read_table(TABLE)
+
+
+def _distance(row: Tuned, mission: Mission) -> float:
+    """How far a row's regime is from a mission's: in logarithms, squared."""
+    ratios = [row.num_robots / mission.num_robots, row.range_ratio / mission.range_ratio]
+    if mission.task != "stationary":
+        ratios.append(row.velocity_ratio / mission.velocity_ratio)
+    return sum(math.log(ratio) ** 2 for ratio in ratios)

@@ -1,0 +1,133 @@
+import itertools
+
+import pytest
+
+from swarm_mj.mission import paper, reference
+from swarm_mj.policies import tuning
+from swarm_mj.policies.tuning import TABLE, Tuned, read_table, tuned_probability
+
+AUTHORS_GRID = {0.04, 0.06, 0.08, 0.1, 0.12, 0.15}
+POLICIES = ("random-flooding", "mst", "aloha", "gossip")
+# The regimes of the paper's result figures (IV-B): task, robots, range, velocity.
+REGIMES = [
+    *[("stationary", 40, ratio, 0.15) for ratio in (0.2, 0.25, 0.5, 0.75, 1.0)],
+    *[("random-walk", size, 0.25, 0.15) for size in (10, 20, 40, 60, 80)],
+    *[("flocking", 40, 0.25, ratio) for ratio in (0.15, 0.25, 0.325, 0.5)],
+]
+HEADER = ",".join(Tuned.__annotations__)
+
+
+def row(probability, task="flocking", num_robots=40, range_ratio=0.25, velocity_ratio=0.15):
+    return Tuned(
+        policy="mst",
+        preset="paper",
+        task=task,
+        num_robots=num_robots,
+        range_ratio=range_ratio,
+        velocity_ratio=velocity_ratio,
+        probability=probability,
+        aoi_mean=40.0,
+        aoi_sem=1.0,
+        episodes=50,
+        first_seed=5000,
+        version="0",
+        commit="",
+    )
+
+
+def found(monkeypatch, rows, *regime, **overrides):
+    monkeypatch.setattr(tuning, "_table", lambda: rows)
+    return tuned_probability("mst", paper(*regime, **overrides))
+
+
+def test_iv_c_every_regime_of_the_figures_is_tuned_once_for_each_policy():
+    rows = read_table(TABLE)
+    regimes = [
+        (r.policy, r.preset, r.task, r.num_robots, r.range_ratio, r.velocity_ratio) for r in rows
+    ]
+    expected = [
+        (policy, preset, *regime)
+        for policy, preset, regime in itertools.product(POLICIES, ("paper", "reference"), REGIMES)
+    ]
+    assert regimes == expected
+
+
+def test_iv_c_rows_say_how_they_were_found():
+    """On enough missions, none of them an evaluation's; as the authors did, under `reference`."""
+    for tuned in read_table(TABLE):
+        assert 0.0 < tuned.probability < 1.0
+        assert tuned.episodes >= 50
+        assert tuned.first_seed >= 2000
+        assert 0.0 < tuned.aoi_sem < tuned.aoi_mean < 250.0
+        assert tuned.version
+        if tuned.preset == "reference" and tuned.policy in ("random-flooding", "mst"):
+            assert tuned.probability in AUTHORS_GRID
+
+
+def test_the_tables_own_regimes_are_met_exactly():
+    for tuned in read_table(TABLE):
+        make = {"paper": paper, "reference": reference}[tuned.preset]
+        mission = make(
+            tuned.task,
+            num_robots=tuned.num_robots,
+            range_ratio=tuned.range_ratio,
+            velocity_ratio=tuned.velocity_ratio,
+            num_windows=7,
+        )
+        assert tuned_probability(tuned.policy, mission) == tuned.probability
+
+
+@pytest.mark.parametrize(
+    ("num_robots", "expected"),
+    [(10, 0.1), (27, 0.1), (29, 0.2), (80, 0.2), (200, 0.2)],
+)
+def test_nearest_is_by_ratio(monkeypatch, num_robots, expected):
+    """Between 10 and 80 robots the border is sqrt(800) = 28.3, not 45."""
+    rows = [row(0.1, num_robots=10), row(0.2, num_robots=80)]
+    assert found(monkeypatch, rows, num_robots=num_robots) == expected
+
+
+def test_nearest_weighs_all_ratios_alike(monkeypatch):
+    """From 40 robots, range 0.5: twice the range is farther than 1.9 times the robots; 1.5 times
+    both (0.164 + 0.164 in squared logarithms) is nearer than either (0.480, 0.412)."""
+    range_off, size_off = row(0.1, range_ratio=1.0), row(0.2, num_robots=76, range_ratio=0.5)
+    both_off = row(0.3, num_robots=60, range_ratio=0.75)
+    assert found(monkeypatch, [range_off, size_off], range_ratio=0.5) == 0.2
+    assert found(monkeypatch, [range_off, size_off, both_off], range_ratio=0.5) == 0.3
+
+
+def test_velocity_counts_unless_the_team_stands_still(monkeypatch):
+    fast, slow = {"velocity_ratio": 0.5}, {"velocity_ratio": 0.16}
+    rows = [row(0.1, velocity_ratio=0.15), row(0.2, velocity_ratio=0.5)]
+    assert found(monkeypatch, rows, **fast) == 0.2
+    assert found(monkeypatch, rows, **slow) == 0.1
+    still = [
+        row(0.3, task="stationary", num_robots=39), row(0.4, task="stationary", velocity_ratio=0.5)
+    ]  # fmt: skip
+    assert found(monkeypatch, still, "stationary", **slow) == 0.4
+
+
+def test_a_preset_or_task_or_policy_that_was_not_tuned_is_a_clear_error(monkeypatch):
+    monkeypatch.setattr(tuning, "_table", lambda: [row(0.1)])
+    for name, mission in [
+        ("mst", paper("random-walk")),
+        ("mst", reference("flocking")),
+        ("gossip", paper("flocking")),
+    ]:
+        with pytest.raises(ValueError, match=rf"{name} has no tuned .* {mission.task}.*tune\.py"):
+            tuned_probability(name, mission)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("", "columns of .* must be policy, preset"),
+        (HEADER.replace("preset,", "") + "\n", "columns of .* must be policy, preset"),
+        (HEADER + "\nmst,paper,flocking,forty,0.25,0.15,0.1,40,1,50,5000,0,\n", "forty"),
+    ],
+)
+def test_a_broken_table_is_a_clear_error(tmp_path, text, complaint):
+    path = tmp_path / "tuned.csv"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=complaint):
+        read_table(path)
