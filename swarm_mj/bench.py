@@ -1,22 +1,34 @@
-"""How fast the simulation is: windows per second, whole and in parts, beside plain MuJoCo steps."""
+"""How fast the simulation is: windows per second, whole and in parts, beside plain MuJoCo steps.
+
+And how long an evaluation takes, the oracle, and a robot that plans.
+"""
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Int
 from mujoco._functions import mj_step
 from mujoco._structs import MjData
 
+from swarm_mj.channel import radio_of
 from swarm_mj.costs import mean_hops, window_costs
+from swarm_mj.evaluation.batch import fly_batch
+from swarm_mj.evaluation.jobs import run_jobs
+from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission, paper
-from swarm_mj.policies import RoundRobin
+from swarm_mj.policies import RoundRobin, make_policy
+from swarm_mj.policies.pictures import epoch_windows, freeze, make_plan
+from swarm_mj.policies.planner import DISCOVERY_EPOCHS
 from swarm_mj.protocol import window
+from swarm_mj.published import BASELINES
 from swarm_mj.scene import compose
 from swarm_mj.swarm import Swarm
 
+ORACLE_EPISODES = 4  # it takes its time
 REPETITIONS = 7  # of each measurement; their median counts, for machines are shared
+MISSION = paper("random-walk")
 AUTHORS_WINDOWS_PER_S = 500.0  # the authors' environment, one mission on one core: 350 to 600
 
 
@@ -35,6 +47,24 @@ class Timing:
         return 1e6 / self.windows_per_s / self.mj_step_us
 
 
+@dataclass(frozen=True, kw_only=True)
+class EvaluationTiming:
+    """How long an evaluation takes: random walks of 40 robots, from empty buffers to the last."""
+
+    episodes: int
+    num_jobs: int
+    baselines_s: float  # the paper's three baselines over all episodes, starting the jobs included
+    oracle_s: float  # the oracle over one episode, one process
+    plan_ms: float  # a planner's plan of one epoch: the longest that a robot thinks in a window
+    mj_step_us: float  # the yardstick of this run, as above
+
+    @property
+    def window_in_mj_steps(self) -> float:
+        """A window of the baselines on the wall clock, in plain mj_steps."""
+        num_windows = len(BASELINES) * self.episodes * MISSION.num_windows
+        return 1e6 * self.baselines_s / num_windows / self.mj_step_us
+
+
 def bench(num_missions: int, *, num_threads: int = 1, seconds: float = 2.0) -> Timing:
     """Times random walks of 40 robots with round robin.
 
@@ -46,8 +76,7 @@ def bench(num_missions: int, *, num_threads: int = 1, seconds: float = 2.0) -> T
     Returns:
         The timing.
     """
-    mission = paper("random-walk")
-    swarm = Swarm(mission, range(num_missions), num_threads=num_threads)
+    swarm = Swarm(MISSION, range(num_missions), num_threads=num_threads)
     policy = RoundRobin()
     swarm.start(policy)
     recipient = swarm.decide(policy)
@@ -66,11 +95,66 @@ def bench(num_missions: int, *, num_threads: int = 1, seconds: float = 2.0) -> T
     return Timing(
         num_missions=num_missions,
         windows_per_s=1e6 * num_missions / whole_us,
-        mj_step_us=_microseconds(_plain_steps(mission), seconds / 4),
+        mj_step_us=_microseconds(_plain_steps(MISSION), seconds / 4),
         parts_us={
             name: _microseconds(part, seconds / 4) / num_missions for name, part in parts.items()
         },
     )
+
+
+def bench_evaluation(episodes: int, *, num_jobs: int = 2, seconds: float = 2.0) -> EvaluationTiming:
+    """Times an evaluation of the paper's baselines, and the oracle.
+
+    Args:
+        episodes: Missions of each baseline; the oracle flies at most `ORACLE_EPISODES`.
+        num_jobs: Processes that share the baselines' missions.
+        seconds: About how long the plain steps are measured, four times over [s].
+
+    Returns:
+        The timing.
+    """
+    for policy in (*BASELINES, "oracle"):  # compiles, if it never has
+        _fly(Study(policies=(policy,), regimes=(replace(MISSION, num_windows=1),), episodes=1), 1)
+    baselines = Study(policies=BASELINES, regimes=(MISSION,), episodes=episodes)
+    num_oracles = min(episodes, ORACLE_EPISODES)
+    oracle = Study(policies=("oracle",), regimes=(MISSION,), episodes=num_oracles)
+    return EvaluationTiming(
+        episodes=episodes,
+        num_jobs=num_jobs,
+        baselines_s=_fly(baselines, num_jobs),
+        oracle_s=_fly(oracle, 1) / num_oracles,
+        plan_ms=_microseconds(_planning(), seconds / 4) / 1000.0,
+        mj_step_us=_microseconds(_plain_steps(MISSION), seconds / 4),
+    )
+
+
+def _fly(study: Study, num_jobs: int) -> float:
+    """Wall time of a study's missions [s]."""
+    start_s = time.perf_counter()
+    for _ in run_jobs(fly_batch, study.batches, num_jobs):
+        pass
+    return time.perf_counter() - start_s
+
+
+def _planning() -> Callable[[], object]:
+    """One robot's plan for an epoch, from what it knows when the discovery ends."""
+    swarm = Swarm(MISSION, [0])
+    planner = make_policy("planner", MISSION)
+    num_windows = epoch_windows(MISSION.num_robots)
+    for _ in range(DISCOVERY_EPOCHS * num_windows):
+        swarm.step(planner)
+    buffers, now = swarm.buffers, float(swarm.now[0])
+    pictures = freeze(
+        buffers.position_m[0],
+        buffers.velocity_mps[0],
+        buffers.timestamp[0],
+        buffers.is_known[0],
+        now,
+        MISSION.window_s,
+        num_windows / 2,
+    )
+    radio = radio_of(MISSION)
+    return lambda: make_plan(radio, pictures, 0, buffers.timestamp[0], now)
 
 
 def _talk(swarm: Swarm, recipient: Int[np.ndarray, "B N"]) -> Callable[[], object]:

@@ -4,6 +4,7 @@ import argparse
 import os
 import shutil
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, get_args
 
@@ -45,7 +46,7 @@ def add_mission_options(parser: argparse.ArgumentParser) -> None:
     """The options that make a mission."""
     group = parser.add_argument_group("mission")
     group.add_argument(
-        "--task", default="flocking", help=f"what the robots do: {_listed(get_args(Task))}"
+        "--task", default="flocking", help=f"what the robots do: {listed(get_args(Task))}"
     )
     group.add_argument(
         "--robots", type=int, default=DEFAULTS.num_robots, help="size of the team, 2 to 1000"
@@ -72,17 +73,17 @@ def add_mission_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--preset",
         default="paper",
-        help=f"{_listed(PRESETS)}: the paper's text, or what its authors' code does",
+        help=f"{listed(PRESETS)}: the paper's text, or what its authors' code does",
     )
     group.add_argument(
         "--physics",
         default=DEFAULTS.physics,
-        help=f"{_listed(get_args(PhysicsMode))}: Eq. 15 to rounding error, or forces and bounces",
+        help=f"{listed(get_args(PhysicsMode))}: Eq. 15 to rounding error, or forces and bounces",
     )
     group.add_argument(
         "--boundary",
         default=DEFAULTS.boundary,
-        help=f"{_listed(get_args(Boundary))}; the paper's flocks fly out of the area: none",
+        help=f"{listed(get_args(Boundary))}; the paper's flocks fly out of the area: none",
     )
 
 
@@ -93,7 +94,7 @@ def mission_of(options: argparse.Namespace) -> Mission:
         ValueError: A value is unknown or outside its range.
     """
     if options.preset not in PRESETS:
-        raise ValueError(f"preset must be one of {_listed(PRESETS)}, not {options.preset!r}")
+        raise ValueError(f"preset must be one of {listed(PRESETS)}, not {options.preset!r}")
     return PRESETS[options.preset](
         options.task,
         num_robots=options.robots,
@@ -105,5 +106,6 @@ def mission_of(options: argparse.Namespace) -> Mission:
     )
 
 
-def _listed(names: Any) -> str:  # noqa: ANN401 - any names
+def listed(names: Iterable[str]) -> str:
+    """Names in a row."""
     return ", ".join(names)

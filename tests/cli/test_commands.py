@@ -39,10 +39,22 @@ def test_replay_refuses_what_is_no_whole_replay(swarm_mj, tmp_path):
 
 
 def test_bench_prints_the_whole_and_its_parts(swarm_mj):
-    done = swarm_mj("bench", "--missions", 1, 3, "--seconds", 0.1)
+    done = swarm_mj("bench", "--missions", 1, 3, "--seconds", 0.1, "--episodes", 1)
     assert done.returncode == 0, done.stderr
     for row in ("windows per second", "plain mj_step", "radio and buffers", "move", "decide"):
         assert row in done.stdout
+    for row in (
+        "Evaluation: 1 random walks",
+        "random-flooding, round-robin, mst; 2 jobs",
+        "oracle",
+    ):
+        assert row in done.stdout
+
+
+def test_bench_leaves_the_evaluation_out(swarm_mj):
+    done = swarm_mj("bench", "--missions", 1, "--seconds", 0.1, "--episodes", 0)
+    assert done.returncode == 0, done.stderr
+    assert "Evaluation" not in done.stdout
 
 
 @pytest.mark.parametrize(
@@ -50,6 +62,8 @@ def test_bench_prints_the_whole_and_its_parts(swarm_mj):
     [
         (["--missions", "0"], "missions must be from 1 to 10000, not 0"),
         (["--threads", "0"], "threads must be from 1 to 256, not 0"),
+        (["--episodes", "-1"], "episodes must be from 0 to 10000, not -1"),
+        (["--jobs", "0"], "jobs must be from 1 to 256, not 0"),
         (["--seconds", "nan"], "seconds must be from 0.1 to 600, not nan"),
     ],
 )
@@ -59,7 +73,7 @@ def test_bench_refuses_bad_input(swarm_mj, options, complaint):
     assert complaint in done.stderr
 
 
-@pytest.mark.parametrize("command", ["fly", "replay", "scene", "bench"])
+@pytest.mark.parametrize("command", ["fly", "evaluate", "replay", "scene", "bench"])
 def test_help_suffices(swarm_mj, command):
     overview, detail = swarm_mj("--help"), swarm_mj(command, "--help")
     assert overview.returncode == detail.returncode == 0

@@ -1,0 +1,1 @@
+"""Evaluation (IV-B): policies over the same missions, in batches, on several processes."""

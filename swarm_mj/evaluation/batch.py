@@ -1,0 +1,138 @@
+"""A batch of missions: one policy in one regime, flown side by side, and what each cost."""
+
+from dataclasses import dataclass
+from typing import no_type_check
+
+import numpy as np
+from jaxtyping import Float, Int
+from numba import njit
+
+from swarm_mj.connectivity import ConnectivityFloor
+from swarm_mj.flight import Flown, fly
+from swarm_mj.mission import Mission
+from swarm_mj.policies import make_policy
+from swarm_mj.protocol import PHASE
+from swarm_mj.swarm import Swarm
+
+
+@dataclass(frozen=True, kw_only=True)
+class Batch:
+    """The work of one process at a time."""
+
+    policy: str  # a name among `POLICIES`
+    probability: float | None  # of a transmission; None is the policy's own
+    mission: Mission
+    seeds: tuple[int, ...]  # one per mission
+
+
+@dataclass(frozen=True, kw_only=True)
+class BatchCosts:
+    """What every mission of a batch cost: one number a mission, in the order of the seeds."""
+
+    aoi: list[float]  # Eq. 10, mean over windows [windows]
+    aoi_steady: list[float]  # as above, over the second half of the mission
+    aoi_floor: list[float]  # the connectivity floor, mean over windows [windows]
+    velocity_variance: list[float]  # Eq. 17, mean over windows [m²/s²]
+    hops: list[float]  # depth of the parent trees, mean over windows
+    complete_window: list[int | None]  # everyone had first heard of everyone
+    packets_attempted: list[int]
+    packets_delivered: list[int]
+    ages: list[int]  # of all missions: how often a robot's knowledge of another had each age,
+    # in half windows, from 0 to the mission's length
+
+
+def fly_batch(batch: Batch) -> BatchCosts:
+    """Flies a batch's missions from the first window to the last.
+
+    A mission's costs depend on its own seed, not on the missions beside it.
+
+    Raises:
+        ValueError: Unknown policy, a bad seed, or no connected team could be drawn.
+    """
+    swarm = Swarm(batch.mission, batch.seeds)
+    policy = make_policy(batch.policy, batch.mission, batch.probability)
+    tally = Tally(swarm)
+    for flown in fly(swarm, policy):
+        tally.add(flown)
+    return tally.costs()
+
+
+class Tally:
+    """Adds up what missions cost while they are flown.
+
+    Sums run window by window, so they round alike whatever the number of missions.
+    """
+
+    def __init__(self, swarm: Swarm) -> None:
+        """Starts at nothing; the swarm is at the start of its missions."""
+        mission, num_missions = swarm.mission, len(swarm.now)
+        self._swarm = swarm
+        self._floor = ConnectivityFloor(num_missions, mission.num_robots, mission.range_m)
+        self._num_steady = mission.num_windows - mission.num_windows // 2
+        self._aoi, self._steady, self._floor_age, self._variance, self._hops = np.zeros(
+            (5, num_missions)
+        )
+        self._attempted, self._delivered = np.zeros((2, num_missions), dtype=np.int64)
+        self._complete = np.full(num_missions, np.inf)
+        self._ages = np.zeros(round(mission.num_windows / PHASE) + 1, dtype=np.int64)
+
+    def add(self, flown: Flown) -> None:
+        """Adds a window; the swarm stands at its end."""
+        swarm, costs = self._swarm, flown.costs
+        self._aoi += costs.age_windows
+        if swarm.now[0] > swarm.mission.num_windows - self._num_steady:
+            self._steady += costs.age_windows
+        self._floor_age += self._floor.next(swarm.bodies.position_m, swarm.now)
+        self._variance += costs.velocity_variance_m2ps2
+        self._hops += flown.hops
+        self._attempted += costs.packets.attempted
+        self._delivered += costs.packets.delivered
+        complete = np.where(costs.is_complete, swarm.now, np.inf)
+        np.minimum(self._complete, complete, out=self._complete)
+        count_ages(swarm.buffers.timestamp, swarm.now, self._ages)
+
+    def costs(self) -> BatchCosts:
+        """What the missions cost, all windows of them flown."""
+        num_windows = self._swarm.mission.num_windows
+        return BatchCosts(
+            aoi=(self._aoi / num_windows).tolist(),
+            aoi_steady=(self._steady / self._num_steady).tolist(),
+            aoi_floor=(self._floor_age / num_windows).tolist(),
+            velocity_variance=(self._variance / num_windows).tolist(),
+            hops=(self._hops / num_windows).tolist(),
+            complete_window=[int(t) if np.isfinite(t) else None for t in self._complete],
+            packets_attempted=self._attempted.tolist(),
+            packets_delivered=self._delivered.tolist(),
+            ages=self._ages.tolist(),
+        )
+
+
+def count_ages(
+    timestamp: Float[np.ndarray, "B N N"],
+    now: Float[np.ndarray, "B"],
+    counts: Int[np.ndarray, "bins"],
+) -> None:
+    """Counts how old what each robot knows of each other robot is.
+
+    Args:
+        timestamp: T [windows].
+        now: t [windows].
+        counts: By age in half windows; added to in place.
+    """
+    _count_ages(timestamp, now, PHASE, counts)
+
+
+@njit(cache=True)
+@no_type_check
+def _count_ages(
+    timestamp: Float[np.ndarray, "B N N"],
+    now: Float[np.ndarray, "B"],
+    phase: float,
+    counts: Int[np.ndarray, "bins"],
+) -> None:
+    num_missions, num_robots = timestamp.shape[:2]
+    for b in range(num_missions):
+        for i in range(num_robots):
+            for j in range(num_robots):
+                counts[int((now[b] - timestamp[b, i, j]) / phase)] += 1
+            counts[int((now[b] - timestamp[b, i, i]) / phase)] -= 1

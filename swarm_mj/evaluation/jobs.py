@@ -1,0 +1,133 @@
+"""Work on several processes: each takes the next piece when it is done with its last."""
+
+import os
+import signal
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from itertools import islice
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from typing import Any, TypeVar
+
+Piece = TypeVar("Piece")
+Product = TypeVar("Product")
+
+# Jobs share the machine's cores, so none starts threads of its own.
+ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+
+
+def run_jobs(
+    work: Callable[[Piece], Product], pieces: Sequence[Piece], num_jobs: int
+) -> Generator[tuple[int, Product]]:
+    """Does all pieces of work.
+
+    Ctrl-C reaches this process only; whoever breaks off ends the others at once.
+
+    Args:
+        work: A function of a module, which other processes can import.
+        pieces: What to do; pickled on the way to another process, as are the products.
+        num_jobs: Processes; one is this process itself.
+
+    Yields:
+        A piece's index and its product, in the order in which they are done.
+
+    Raises:
+        OSError: A process ended before its work did.
+        Exception: What `work` raised of the first piece that failed.
+    """
+    if min(num_jobs, len(pieces)) <= 1:
+        yield from ((index, work(piece)) for index, piece in enumerate(pieces))
+        return
+    waiting = iter(enumerate(pieces))
+    under_way: dict[Connection, int] = {}
+    with _workers(work, min(num_jobs, len(pieces))) as workers:
+        for worker in workers:
+            _hand_out(waiting, worker, under_way)
+        while under_way:
+            for worker in _ready(under_way):
+                index, product = under_way.pop(worker), _receive(worker)
+                _hand_out(waiting, worker, under_way)
+                yield index, product
+
+
+def _hand_out(
+    waiting: Iterator[tuple[int, Any]], worker: Connection, under_way: dict[Connection, int]
+) -> None:
+    """Gives a worker the next piece, if there is one."""
+    for index, piece in islice(waiting, 1):
+        worker.send(piece)
+        under_way[worker] = index
+
+
+def _ready(under_way: dict[Connection, int]) -> list[Connection]:
+    """The workers that have something to say, waiting for the first."""
+    return [worker for worker in wait(list(under_way)) if isinstance(worker, Connection)]
+
+
+def _receive(worker: Connection) -> Any:  # noqa: ANN401 - any product
+    """A worker's product; raises what its work raised."""
+    try:
+        product, error = worker.recv()
+    except (EOFError, ConnectionError):
+        raise OSError("a job was ended from outside, perhaps for want of memory") from None
+    if error is not None:
+        raise error
+    return product
+
+
+@contextmanager
+def _workers(work: Callable[[Any], Any], num_jobs: int) -> Iterator[list[Connection]]:
+    """Processes that work until the block ends; yields a connection to each."""
+    context = get_context("spawn")
+    processes, connections = [], []
+    try:
+        with _shielded(), _one_thread():
+            for _ in range(num_jobs):
+                ours, theirs = context.Pipe()
+                process = context.Process(target=_serve, args=(work, theirs), daemon=True)
+                process.start()
+                theirs.close()  # so that a process's end is heard
+                processes.append(process)
+                connections.append(ours)
+        yield connections
+    finally:
+        for process in processes:
+            process.terminate()
+            process.join()
+
+
+def _serve(work: Callable[[Any], Any], connection: Connection) -> None:
+    """A process's life: works until nobody wants it any more."""
+    with suppress(EOFError, ConnectionError):
+        while True:
+            piece = connection.recv()
+            try:
+                reply = work(piece), None
+            except Exception as error:
+                reply = None, error
+            connection.send(reply)
+
+
+@contextmanager
+def _shielded() -> Iterator[None]:
+    """Processes started within it never hear Ctrl-C, not even while they load."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Processes started within it start no threads for numerics."""
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(ONE_THREAD)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

@@ -1,0 +1,114 @@
+"""The progress file: batches already flown, so that an interruption loses no more than one.
+
+Whole lines of JSON: first what the batches depend on, then one batch a line as it gets done. JSON
+gives floats back as they were, so a resumed evaluation ends in the same files.
+"""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from swarm_mj.evaluation.batch import BatchCosts
+
+
+def progress_path(output: Path) -> Path:
+    """Where the progress towards an output is kept: beside it."""
+    return output.with_name(f"{output.name}.progress")
+
+
+def start(path: Path, header: dict[str, Any]) -> None:
+    """Begins a progress file, in place of any other.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(_line(header))
+
+
+def append(path: Path, index: int, costs: BatchCosts) -> None:
+    """Adds a batch.
+
+    Args:
+        path: The progress file.
+        index: The batch's, among the study's.
+        costs: What it cost.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    with path.open("ab") as file:
+        file.write(_line({"batch": index, "costs": asdict(costs)}))
+
+
+def resume(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]:
+    """The batches of an interrupted evaluation; a line that was cut off is dropped from the file.
+
+    Args:
+        path: The progress file; begun anew if not even its header was written.
+        header: What the batches depend on now.
+
+    Returns:
+        What was flown, by the batches' indices.
+
+    Raises:
+        ValueError: The batches depended on something else, or the file is none of this kind.
+        OSError: The file cannot be read or written.
+    """
+    whole, _, cut_off = path.read_bytes().rpartition(b"\n")
+    if not whole:
+        start(path, header)
+        return {}
+    first, *lines = whole.split(b"\n")
+    _check_header(path, _parsed(path, first), header)
+    done = [_parsed(path, line) for line in lines]
+    try:
+        costs = {batch["batch"]: BatchCosts(**batch["costs"]) for batch in done}
+    except (KeyError, TypeError) as error:
+        raise ValueError(_damaged(path)) from error
+    if cut_off:
+        path.write_bytes(whole + b"\n")
+    return costs
+
+
+def _line(content: dict[str, Any]) -> bytes:
+    return json.dumps(content, allow_nan=False).encode() + b"\n"
+
+
+def _parsed(path: Path, line: bytes) -> dict[str, Any]:
+    try:
+        content = json.loads(line)
+    except ValueError as error:
+        raise ValueError(_damaged(path)) from error
+    if not isinstance(content, dict):
+        raise ValueError(_damaged(path))
+    return content
+
+
+def _damaged(path: Path) -> str:
+    return f"progress {path} is damaged; start over with --force instead of --resume"
+
+
+def _check_header(path: Path, before: dict[str, Any], now: dict[str, Any]) -> None:
+    """Raises ValueError, naming what differs first, unless both are the same."""
+    difference = _difference("", before, now)
+    if difference:
+        raise ValueError(
+            f"progress {path} is of another evaluation: {difference}; repeat that one, or start "
+            "over with --force instead of --resume"
+        )
+
+
+def _difference(name: str, before: Any, now: Any) -> str:  # noqa: ANN401 - anything in JSON
+    """Where two pieces of JSON first differ, in words; empty if nowhere."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        keys = dict.fromkeys([*now, *before])
+        found = (_difference(key, before.get(key), now.get(key)) for key in keys)
+        return next(filter(None, found), "")
+    if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        found = (_difference(name, *pair) for pair in zip(before, now, strict=True))
+        return next(filter(None, found), "")
+    if isinstance(before, list) and isinstance(now, list):
+        return f"it has {len(before)} {name}, not {len(now)}"
+    return "" if before == now else f"its {name} is {before!r}, not {now!r}"

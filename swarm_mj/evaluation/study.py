@@ -1,0 +1,98 @@
+"""A study: which policies meet which missions."""
+
+import json
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+from swarm_mj.evaluation.batch import Batch
+from swarm_mj.mission import Mission
+from swarm_mj.policies import Policy, make_policy
+from swarm_mj.provenance import commit, version
+from swarm_mj.swarm import MAX_SEED
+
+BATCH_SIZE = 25  # missions side by side: as fast as many, and little lost by an interruption
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """What an evaluation is asked for; every policy meets the same missions in each regime.
+
+    Raises:
+        ValueError: Nothing to evaluate, an unknown policy, or a number out of range.
+    """
+
+    policies: tuple[str, ...]  # names among `POLICIES`
+    regimes: tuple[Mission, ...]
+    episodes: int = 100  # missions of each policy in each regime
+    seed: int = 1000  # of the first mission; the others follow one by one
+    probability: float | None = None  # of a transmission; None is each policy's own
+    baseline: str | None = None  # whom the others are compared to; None is the first policy
+
+    def __post_init__(self) -> None:
+        if not self.policies or not self.regimes:
+            raise ValueError("an evaluation needs at least 1 policy and 1 regime")
+        if self.episodes < 1:
+            raise ValueError(f"episodes must be 1 or more, not {self.episodes}")
+        if not 0 <= self.seed <= MAX_SEED - self.episodes + 1:
+            raise ValueError(
+                f"seed must be from 0 to {MAX_SEED - self.episodes + 1}, the last of "
+                f"{self.episodes} episodes included, not {self.seed}"
+            )
+        for regime, policy in self.pairs:
+            self.make_policy(policy, regime)
+        if len(set(self.pairs)) < len(self.pairs):
+            raise ValueError("an evaluation needs each policy and each regime once")
+        if self.baseline is not None and self.baseline not in self.policies:
+            raise ValueError(
+                f"baseline must be one of the policies evaluated, {', '.join(self.policies)}, not "
+                f"{self.baseline!r}; add it with --policy {self.baseline}"
+            )
+
+    @property
+    def compared_to(self) -> str:
+        """The baseline's name."""
+        return self.policies[0] if self.baseline is None else self.baseline
+
+    @property
+    def pairs(self) -> list[tuple[Mission, str]]:
+        """Every regime with every policy, regime by regime."""
+        return list(product(self.regimes, self.policies))
+
+    @cached_property
+    def batches(self) -> tuple[Batch, ...]:
+        """All the work, pair by pair, in the order of the seeds."""
+        seeds = range(self.seed, self.seed + self.episodes)
+        return tuple(
+            Batch(
+                policy=policy,
+                probability=self.probability,
+                mission=regime,
+                seeds=tuple(seeds[start : start + BATCH_SIZE]),
+            )
+            for regime, policy in self.pairs
+            for start in range(0, self.episodes, BATCH_SIZE)
+        )
+
+    def make_policy(self, policy: str, regime: Mission) -> Policy:
+        """A policy as it is evaluated in a regime."""
+        return make_policy(policy, regime, self.probability)
+
+    def config(self, policy: str, regime: Mission) -> dict[str, Any]:
+        """All that a policy's missions in a regime depend on, but for their seeds."""
+        parameters = self.make_policy(policy, regime).parameters
+        return {**asdict(regime), "policy": policy, **parameters}
+
+    def header(self) -> dict[str, Any]:
+        """All that the batches' costs depend on, as JSON gives it back."""
+        header = {
+            "version": version(),
+            "commit": commit(),
+            "episodes": self.episodes,
+            "seed": self.seed,
+            "missions side by side": BATCH_SIZE,
+            "baseline": self.compared_to,
+            "policies and regimes": [self.config(policy, regime) for regime, policy in self.pairs],
+        }
+        return json.loads(json.dumps(header))

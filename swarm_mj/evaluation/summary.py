@@ -1,0 +1,159 @@
+"""What batches cost, summed up: one result per policy and regime."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from swarm_mj.evaluation.batch import BatchCosts
+from swarm_mj.evaluation.study import Study
+from swarm_mj.mission import Mission
+from swarm_mj.protocol import PHASE
+from swarm_mj.provenance import commit, version
+from swarm_mj.published import published
+from swarm_mj.results import Result
+from swarm_mj.statistics import Interval, Spread, bootstrap_interval, quantile_of_counts, spread
+from swarm_mj.statistics import standard_error as sem
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluated:
+    """A result and its missions, in the order of their seeds."""
+
+    result: Result
+    aoi: list[float]  # Eq. 10, mean over windows [windows]
+    velocity_variance: list[float]  # Eq. 17, mean over windows [m²/s²]
+
+
+def summarise(study: Study, costs: Mapping[int, BatchCosts]) -> list[Evaluated]:
+    """The results of a study, regime by regime, policy by policy.
+
+    Args:
+        study: What was asked for.
+        costs: What each batch cost, by its index in `study.batches`, in any order.
+
+    Returns:
+        One per policy and regime.
+
+    Raises:
+        ValueError: A batch is missing.
+    """
+    missing = len(study.batches) - len(costs)
+    if missing:
+        raise ValueError(f"{missing} of {len(study.batches)} batches are missing")
+    parts: dict[tuple[Mission, str], list[BatchCosts]] = {pair: [] for pair in study.pairs}
+    for index, batch in enumerate(study.batches):
+        parts[batch.mission, batch.policy].append(costs[index])
+    merged = {pair: merge(batches) for pair, batches in parts.items()}
+    made_by = {"version": version(), "commit": commit()}
+    return [
+        Evaluated(
+            result=Result(
+                **_regime(study, policy, regime),
+                **_aoi(own),
+                **_spread("velocity_variance", spread(np.array(own.velocity_variance))),
+                **_talk(own, regime),
+                **_differences(own, merged[regime, study.compared_to]),
+                **_published(policy, regime),
+                **made_by,
+                baseline=study.compared_to,
+                config=json.dumps(study.config(policy, regime)),
+            ),
+            aoi=own.aoi,
+            velocity_variance=own.velocity_variance,
+        )
+        for (regime, policy), own in merged.items()
+    ]
+
+
+def merge(batches: Sequence[BatchCosts]) -> BatchCosts:
+    """Batches of the same policy and regime as one, in the order given."""
+    lists = {
+        spec.name: [number for batch in batches for number in getattr(batch, spec.name)]
+        for spec in fields(BatchCosts)
+        if spec.name != "ages"
+    }
+    ages = np.sum([batch.ages for batch in batches], axis=0)
+    return BatchCosts(**lists, ages=ages.tolist())
+
+
+def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
+    names = (
+        *("task", "preset", "num_robots", "range_ratio", "velocity_ratio"),
+        *("boundary", "physics", "num_windows"),
+    )
+    parameters = study.make_policy(policy, regime).parameters
+    return {name: getattr(regime, name) for name in names} | {
+        "policy": policy,
+        "episodes": study.episodes,
+        "seed": study.seed,
+        "probability": parameters.get("probability"),
+    }
+
+
+def _aoi(costs: BatchCosts) -> dict[str, Any]:
+    aoi = spread(np.array(costs.aoi))
+    steady, floor = np.array(costs.aoi_steady), np.array(costs.aoi_floor)
+    ages = np.array(costs.ages)
+    return _spread("aoi", aoi) | {
+        "aoi_p95": aoi.p95,
+        "aoi_worst": aoi.worst,
+        "aoi_steady_mean": float(np.mean(steady)),
+        "aoi_steady_sem": sem(steady),
+        "age_p95": PHASE * quantile_of_counts(ages, 0.95),
+        "age_worst": PHASE * quantile_of_counts(ages, 1.0),
+        "aoi_floor_mean": float(np.mean(floor)),
+        "aoi_floor_sem": sem(floor),
+    }
+
+
+def _spread(cost: str, missions: Spread) -> dict[str, Any]:
+    return {
+        f"{cost}_mean": missions.mean,
+        f"{cost}_std": missions.std,
+        f"{cost}_sem": missions.sem,
+        **_interval(cost, missions.interval),
+        f"{cost}_median": missions.median,
+    }
+
+
+def _interval(name: str, interval: Interval) -> dict[str, Any]:
+    return {f"{name}_ci_low": interval.low, f"{name}_ci_high": interval.high}
+
+
+def _talk(costs: BatchCosts, regime: Mission) -> dict[str, Any]:
+    """Packets, hops, and when everyone had heard of everyone."""
+    attempted, delivered = sum(costs.packets_attempted), sum(costs.packets_delivered)
+    complete = [window for window in costs.complete_window if window is not None]
+    episodes = len(costs.aoi)
+    return {
+        "delivery_ratio": delivered / attempted if attempted else None,
+        "packets_per_window": attempted / (episodes * regime.num_windows),
+        "hops_mean": float(np.mean(costs.hops)),
+        "complete_window_median": float(np.median(complete)) if complete else None,
+        "complete_share": len(complete) / episodes,
+    }
+
+
+def _differences(costs: BatchCosts, baseline: BatchCosts) -> dict[str, Any]:
+    """Paired: the same missions, mission by mission; None of the baseline to itself."""
+    differences: dict[str, Any] = {}
+    for cost in ("aoi", "velocity_variance"):
+        name = f"{cost}_difference"
+        difference = np.array(getattr(costs, cost)) - np.array(getattr(baseline, cost))
+        differences |= {f"{name}_mean": None, **_interval(name, Interval(low=None, high=None))}
+        if costs is not baseline:
+            differences[f"{name}_mean"] = float(np.mean(difference))
+            differences |= _interval(name, bootstrap_interval(difference))
+    return differences
+
+
+def _published(policy: str, regime: Mission) -> dict[str, Any]:
+    points = published(policy, regime)
+    return {
+        f"published_{cost}_{figure}": getattr(points[cost], figure) if cost in points else None
+        for cost in ("aoi", "velocity_variance")
+        for figure in ("mean", "sem")
+    }

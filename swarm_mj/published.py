@@ -1,0 +1,112 @@
+"""The paper's result figures as numbers: mean and standard deviation over 100 missions a point.
+
+Source of `published.csv`: the data behind Figs. 3 to 6, which the paper's authors published with
+their code; one row per point and cost, methods named as in the figures.
+
+Figs. 3 and 4 both give a stationary team at range ratio 0.25, from different missions: Fig. 3 draws
+it as the baselines' level lines (44.43, 45.28, 42.02), Fig. 4 as a point of its curves (46.76,
+47.28, 43.31). Both are in `points`; beside an evaluation stands Fig. 4's, as the curve it belongs
+to is the one that evaluations sweep. Fig. 5's curves fit random walks, not stationary teams: its
+40 robots cost what random walks of 40 cost at range ratio 0.25 and velocity ratio 0.15.
+"""
+
+import csv
+import math
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from swarm_mj.mission import PRESETS, Mission
+
+METHODS = {
+    "random flooding": "random-flooding",
+    "round robin": "round-robin",
+    "minimum spanning tree": "mst",
+}
+BASELINES = tuple(METHODS.values())  # the paper's three, as `POLICIES` names them
+COSTS = {
+    "age of information [windows]": "aoi",
+    "velocity variance [m^2/s^2]": "velocity_variance",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Point:
+    """One point of one of the paper's curves."""
+
+    figure: str  # fig3_receptive_field, fig4_transmit_power, fig5_team_size or fig6_flocking
+    method: str  # as the figure names it
+    x_name: str  # receptive_field, range_ratio, num_robots or velocity_ratio
+    x: float
+    cost: str  # aoi [windows] or velocity_variance [m²/s²]
+    mean: float
+    std: float  # over the missions
+    episodes: int
+
+    @property
+    def sem(self) -> float:
+        """The mean's standard error."""
+        return self.std / math.sqrt(self.episodes)
+
+    @property
+    def policy(self) -> str | None:
+        """The method's name among `POLICIES`; None for the learned ones."""
+        return METHODS.get(self.method)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sweep:
+    """The figure that sweeps a field of a task's missions, all others as the paper sets them."""
+
+    figure: str
+    x_name: str
+    irrelevant: frozenset[str] = frozenset()  # fields that change nothing in this task
+
+
+SWEEPS = {
+    "stationary": Sweep(
+        figure="fig4_transmit_power",
+        x_name="range_ratio",
+        irrelevant=frozenset({"velocity_ratio"}),
+    ),
+    "random-walk": Sweep(figure="fig5_team_size", x_name="num_robots"),
+    "flocking": Sweep(figure="fig6_flocking", x_name="velocity_ratio"),
+}
+
+
+@cache
+def points() -> tuple[Point, ...]:
+    """All points of all curves, in the order of the file."""
+    with Path(__file__).with_suffix(".csv").open(newline="", encoding="utf-8") as file:
+        return tuple(
+            Point(
+                figure=row["figure"],
+                method=row["method"],
+                x_name=row["x_name"],
+                x=float(row["x"]),
+                cost=COSTS[row["cost"]],
+                mean=float(row["mean"]),
+                std=float(row["std"]),
+                episodes=int(row["episodes"]),
+            )
+            for row in csv.DictReader(file)
+        )
+
+
+def published(policy: str, mission: Mission) -> dict[str, Point]:
+    """What the paper reports for a policy in a regime, under either preset.
+
+    Args:
+        policy: A name among `POLICIES`.
+        mission: The regime; all that its figure does not sweep must be as its preset has it.
+
+    Returns:
+        The points by cost, `aoi` and `velocity_variance`; empty where the paper has none.
+    """
+    sweep = SWEEPS[mission.task]
+    free = {name: getattr(mission, name) for name in {sweep.x_name, *sweep.irrelevant}}
+    if mission != PRESETS[mission.preset](mission.task, **free):
+        return {}
+    x = getattr(mission, sweep.x_name)
+    found = (p for p in points() if p.figure == sweep.figure and p.policy == policy)
+    return {point.cost: point for point in found if point.x == x}

@@ -1,0 +1,115 @@
+"""Statistics over missions: means with their errors, bootstrap intervals, quantiles of counts."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+CONFIDENCE = 0.95
+RESAMPLES = 9999  # of a bootstrap; SciPy's own choice
+BATCH = 1000  # resamples at once: bounds the memory that many samples take
+RESAMPLING_SEED = 0  # the same samples have the same interval, wherever they come from
+ROUNDING = 1e-12  # samples that differ by no more than this share of their size are constant
+
+
+@dataclass(frozen=True, kw_only=True)
+class Interval:
+    """The bootstrap interval of a mean; None where samples do not vary, or there is only one."""
+
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spread:
+    """How samples are spread, in their own unit."""
+
+    mean: float
+    std: float | None  # of the sample, n - 1 in the denominator; None of one sample
+    sem: float | None  # the mean's standard error, std / sqrt(n)
+    interval: Interval
+    median: float
+    p95: float  # between samples, linear
+    worst: float  # the largest
+
+
+def spread(samples: Float[np.ndarray, "n"]) -> Spread:
+    """Mean, errors and quantiles of independent samples.
+
+    Args:
+        samples: One or more.
+
+    Returns:
+        Their spread.
+
+    Raises:
+        ValueError: There are no samples.
+    """
+    if samples.size == 0:
+        raise ValueError("statistics need at least 1 sample, not 0")
+    return Spread(
+        mean=float(np.mean(samples)),
+        std=standard_deviation(samples),
+        sem=standard_error(samples),
+        interval=bootstrap_interval(samples),
+        median=float(np.median(samples)),
+        p95=float(np.percentile(samples, 95.0)),
+        worst=float(np.max(samples)),
+    )
+
+
+def standard_deviation(samples: Float[np.ndarray, "n"]) -> float | None:
+    """Of the sample, n - 1 in the denominator; None of fewer than two."""
+    return float(np.std(samples, ddof=1)) if samples.size > 1 else None
+
+
+def standard_error(samples: Float[np.ndarray, "n"]) -> float | None:
+    """Of the mean, std / sqrt(n); None of fewer than two samples."""
+    std = standard_deviation(samples)
+    return None if std is None else std / math.sqrt(samples.size)
+
+
+def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> Interval:
+    """Bias-corrected and accelerated bootstrap interval of the mean (Efron 1987).
+
+    Args:
+        samples: Independent ones; for paired differences, one difference per pair.
+
+    Returns:
+        The interval of 95 %, the same whenever the samples are.
+    """
+    largest = float(np.max(np.abs(samples), initial=0.0))
+    if samples.size < 2 or float(np.ptp(samples)) <= ROUNDING * largest:
+        return Interval(low=None, high=None)
+    from scipy.stats import bootstrap  # takes its time to import
+
+    found = bootstrap(
+        (samples,),
+        np.mean,
+        confidence_level=CONFIDENCE,
+        n_resamples=RESAMPLES,
+        batch=BATCH,
+        method="BCa",
+        rng=np.random.default_rng(RESAMPLING_SEED),
+    ).confidence_interval
+    return Interval(low=float(found.low), high=float(found.high))
+
+
+def quantile_of_counts(counts: Int[np.ndarray, "bins"], share: float) -> int:
+    """The first bin at or below which at least this share of everything counted lies.
+
+    Args:
+        counts: How often each bin was met.
+        share: From 0 to 1.
+
+    Returns:
+        The bin's index.
+
+    Raises:
+        ValueError: Nothing was counted.
+    """
+    total = int(np.sum(counts))
+    if total == 0:
+        raise ValueError("a quantile needs at least 1 count, not 0")
+    return int(np.searchsorted(np.cumsum(counts), share * total))

@@ -1,0 +1,185 @@
+"""`swarm-mj evaluate` as a process: what it prints, writes, refuses, and how it goes on."""
+
+import json
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from swarm_mj.cli import main
+from swarm_mj.flight import fly, summarise
+from swarm_mj.mission import paper
+from swarm_mj.policies import make_policy
+from swarm_mj.results import COLUMNS, read_results
+from swarm_mj.swarm import Swarm
+
+SMALL = ("--robots", "5", "--windows", "12", "--range-ratio", "0.5")
+# Four batches: 30 missions are flown as 25 and 5, under each policy.
+TWO_POLICIES = (*SMALL, "--policy", "mst", "round-robin", "--episodes", "30")
+BOTH = ("--json", "r.json", "--csv", "r.csv")
+
+
+def files(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The files of an evaluation that nothing interrupted."""
+    folder = tmp_path_factory.mktemp("whole")
+    command = [sys.executable, "-m", "swarm_mj", "evaluate", *TWO_POLICIES, *BOTH]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert files(folder) == ["r.csv", "r.json"]
+    return folder
+
+
+def same_files(folder, whole):
+    assert files(folder) == files(whole)
+    for name in files(whole):
+        assert (folder / name).read_bytes() == (whole / name).read_bytes()
+
+
+def test_results_are_what_the_library_computes(whole):
+    results = read_results(whole / "r.csv")
+    objects = json.loads((whole / "r.json").read_text())["results"]
+    mission = paper("flocking", num_robots=5, num_windows=12, range_ratio=0.5)
+    for result, row, policy in zip(results, objects, ("mst", "round-robin"), strict=True):
+        flight = fly(Swarm(mission, range(1000, 1030)), make_policy(policy, mission))
+        summary = summarise(list(flight))
+        np.testing.assert_allclose(row["episode_aoi"], summary.aoi_mean)
+        np.testing.assert_allclose(row["episode_velocity_variance"], summary.velocity_variance_mean)
+        assert result.aoi_mean == pytest.approx(summary.aoi_mean.mean())
+        assert list(row) == [*COLUMNS, "episode_aoi", "episode_velocity_variance"]
+        assert {name: row[name] for name in COLUMNS} == {n: getattr(result, n) for n in COLUMNS}
+
+
+def test_two_jobs_end_in_the_same_files(swarm_mj, tmp_path, whole):
+    done = swarm_mj("evaluate", *TWO_POLICIES, *BOTH, "--jobs", 2)
+    assert done.returncode == 0, done.stderr
+    same_files(tmp_path, whole)
+
+
+# Evaluates as `swarm-mj` does, and ends itself by a signal when so many batches are kept.
+EVALUATE_AND_END = """
+import os, signal, sys
+from swarm_mj.cli import main
+from swarm_mj.evaluation import progress
+which, count = int(sys.argv[1]), int(sys.argv[2])
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
+append, kept = progress.append, []
+def ending(*arguments):
+    append(*arguments)
+    kept.append(arguments)
+    if len(kept) == count:
+        os.kill(os.getpid(), which)
+progress.append = ending
+sys.exit(main(sys.argv[3:]))
+"""
+
+
+def evaluate_and_end(folder, which, count, *arguments):
+    command = [sys.executable, "-c", EVALUATE_AND_END, str(int(which)), str(count), "evaluate"]
+    return subprocess.run(
+        [*command, *map(str, arguments)],
+        cwd=folder, capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("count", [1, 3])
+def test_ctrl_c_keeps_what_was_flown_and_resuming_ends_in_the_same_files(
+    swarm_mj, tmp_path, whole, jobs, count
+):
+    done = evaluate_and_end(tmp_path, signal.SIGINT, count, *TWO_POLICIES, *BOTH, "--jobs", jobs)
+    assert done.returncode == 130, done.stderr
+    assert "of 60 missions; the same command with --resume continues" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert files(tmp_path) == ["r.json.progress"]
+    lines = (tmp_path / "r.json.progress").read_text().splitlines()
+    assert len(lines) == 1 + count
+    resumed = swarm_mj("evaluate", *TWO_POLICIES, *BOTH, "--resume", "--jobs", 3 - jobs)
+    assert resumed.returncode == 0, resumed.stderr
+    same_files(tmp_path, whole)
+
+
+def test_a_killed_evaluation_resumes_even_if_its_last_line_was_cut(swarm_mj, tmp_path, whole):
+    done = evaluate_and_end(tmp_path, signal.SIGKILL, 2, *TWO_POLICIES, *BOTH)
+    assert done.returncode == -signal.SIGKILL
+    path = tmp_path / "r.json.progress"
+    path.write_bytes(path.read_bytes()[:-9])
+    assert swarm_mj("evaluate", *TWO_POLICIES, *BOTH, "--resume").returncode == 0
+    same_files(tmp_path, whole)
+
+
+def test_resuming_flies_only_what_is_left(tmp_path):
+    """Three of four batches are kept, so the second kept batch never comes."""
+    evaluate_and_end(tmp_path, signal.SIGKILL, 3, *TWO_POLICIES, *BOTH)
+    done = evaluate_and_end(tmp_path, signal.SIGKILL, 2, *TWO_POLICIES, *BOTH, "--resume")
+    assert done.returncode == 0, done.stderr
+
+
+def test_progress_needs_a_word_on_what_to_do_with_it(swarm_mj, tmp_path, whole):
+    evaluate_and_end(tmp_path, signal.SIGKILL, 1, *TWO_POLICIES, *BOTH)
+    kept = (tmp_path / "r.json.progress").read_bytes()
+    refused = swarm_mj("evaluate", *TWO_POLICIES, *BOTH)
+    other = swarm_mj("evaluate", *TWO_POLICIES, *BOTH, "--resume", "--seed", 1)
+    assert refused.returncode == other.returncode == 2
+    assert "continue it with --resume, or start over with --force" in refused.stderr
+    assert "its seed is 1000, not 1; repeat that one" in other.stderr
+    assert (tmp_path / "r.json.progress").read_bytes() == kept
+    assert swarm_mj("evaluate", *TWO_POLICIES, *BOTH, "--force").returncode == 0
+    same_files(tmp_path, whole)
+
+
+def test_resuming_what_never_began_begins_it(swarm_mj, tmp_path, whole):
+    assert swarm_mj("evaluate", *TWO_POLICIES, *BOTH, "--resume").returncode == 0
+    same_files(tmp_path, whole)
+
+
+@pytest.mark.parametrize("output", ["json", "csv"])
+def test_existing_results_need_force(swarm_mj, tmp_path, output):
+    arguments = ("evaluate", *SMALL, "--episodes", 2, f"--{output}", "out/r")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "r").write_text("precious")
+    refused = swarm_mj(*arguments)
+    assert refused.returncode == 2
+    assert "--force" in refused.stderr
+    assert (tmp_path / "out" / "r").read_text() == "precious"
+    assert files(tmp_path) == ["out/r"]
+    assert swarm_mj(*arguments, "--force").returncode == 0
+    assert "aoi_mean" in (tmp_path / "out" / "r").read_text()
+    assert files(tmp_path) == ["out/r"]
+
+
+def test_one_mission_of_one_window_has_results(swarm_mj, tmp_path):
+    done = swarm_mj("evaluate", *SMALL, "--windows", 1, "--episodes", 1, "--csv", "r.csv")
+    assert done.returncode == 0, done.stderr
+    assert [result.aoi_sem for result in read_results(tmp_path / "r.csv")] == [None] * 3
+    assert "connectivity floor" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        (["--episodes", "0"], "episodes must be 1 or more, not 0"),
+        (["--jobs", "0"], "jobs must be from 1 to 256, not 0"),
+        (["--robots", "10", "1"], "a whole number from 2 to 1000 [robots], not 1"),
+        (["--preset", "mine"], "preset must be one of paper, reference, not 'mine'"),
+        (["--policy", "magic"], "policy must be one of"),
+        (["--baseline", "magic"], "baseline must be one of the policies evaluated"),
+        (["--range-ratio", "0.02", "--csv", "r.csv", "--jobs", "2"], "too sparse"),
+        (["--resume"], "--resume needs the --json or --csv"),
+        (["--csv", "r", "--json", "./r"], "same file"),
+        (["--csv", "."], "is a folder"),
+    ],
+)
+def test_bad_input_is_one_clear_line(capsys, monkeypatch, tmp_path, options, complaint):
+    monkeypatch.chdir(tmp_path)
+    assert main(["evaluate", *options]) == 2
+    printed = capsys.readouterr()
+    assert complaint in printed.err
+    assert len(printed.err.strip().splitlines()) == 1
+    assert printed.out == ""

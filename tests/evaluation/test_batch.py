@@ -1,0 +1,113 @@
+"""A batch's costs against flights summed up apart, and missions that do not depend on company."""
+
+import numpy as np
+import pytest
+
+from swarm_mj.evaluation.batch import Batch, count_ages, fly_batch
+from swarm_mj.evaluation.summary import merge
+from swarm_mj.flight import fly, summarise
+from swarm_mj.mission import paper, reference
+from swarm_mj.placement import is_connected
+from swarm_mj.policies import POLICIES, make_policy
+from swarm_mj.swarm import Swarm
+
+SEEDS = (5, 6, 7)
+
+
+def small(task="random-walk", **overrides):
+    return paper(task, **({"num_robots": 6, "num_windows": 31} | overrides))
+
+
+def batch(mission, policy="mst", seeds=SEEDS, probability=0.3):
+    return Batch(policy=policy, probability=probability, mission=mission, seeds=seeds)
+
+
+@pytest.mark.parametrize("policy", ["mst", "random-flooding"])
+def test_costs_are_those_of_the_flight(policy):
+    mission = small("flocking")
+    costs = fly_batch(batch(mission, policy))
+    swarm = Swarm(mission, SEEDS)
+    flown, ages = [], []
+    for window in fly(swarm, make_policy(policy, mission, 0.3)):
+        flown.append(window)
+        age = swarm.now[:, None, None] - swarm.buffers.timestamp
+        ages.extend(age[:, ~np.eye(6, dtype=bool)].ravel().tolist())
+    summary = summarise(flown)
+    np.testing.assert_allclose(costs.aoi, summary.aoi_mean)
+    np.testing.assert_allclose(costs.velocity_variance, summary.velocity_variance_mean)
+    np.testing.assert_allclose(costs.hops, summary.hops_mean)
+    np.testing.assert_array_equal(costs.packets_attempted, summary.packets_attempted)
+    np.testing.assert_array_equal(costs.packets_delivered, summary.packets_delivered)
+    expected = [None if np.isnan(t) else t for t in summary.complete_window]
+    assert costs.complete_window == expected
+    steady = [window.costs.age_windows for window in flown[15:]]  # the later 16 of 31
+    np.testing.assert_allclose(costs.aoi_steady, np.mean(steady, axis=0))
+    assert costs.ages == [ages.count(half / 2.0) for half in range(2 * 31 + 1)]
+
+
+def test_the_floor_is_the_age_that_falling_apart_leaves():
+    """Connected teams at rest have none; from when a team first falls apart it has."""
+    assert fly_batch(batch(small("stationary"))).aoi_floor == [0.0, 0.0, 0.0]
+    fast = small(velocity_ratio=2.0)
+    swarm, fell_apart = Swarm(fast, SEEDS), np.zeros(3, dtype=bool)
+    for _ in fly(swarm, make_policy("mst", fast)):
+        fell_apart |= [not is_connected(p, fast.range_m) for p in swarm.bodies.position_m]
+    floor = np.array(fly_batch(batch(fast)).aoi_floor)
+    np.testing.assert_array_equal(floor > 0.0, fell_apart)
+    assert fell_apart.any()
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+@pytest.mark.parametrize("task", ["random-walk", "flocking"])
+def test_a_mission_does_not_depend_on_those_beside_it(policy, task):
+    mission = small(task)
+    together = fly_batch(batch(mission, policy, probability=None))
+    apart = [fly_batch(batch(mission, policy, (s,), probability=None)) for s in SEEDS]
+    assert merge(apart) == together
+    swapped = fly_batch(batch(mission, policy, SEEDS[::-1], probability=None))
+    assert swapped.aoi == together.aoi[::-1]
+
+
+def courses(task, make=paper):
+    """Where everyone is at the start and at the end, under each policy."""
+    mission = make(task, num_robots=6, num_windows=20)
+    for name in POLICIES:
+        policy = make_policy(name, mission)
+        swarm = Swarm(mission, SEEDS)
+        start = swarm.bodies.position_m.copy()
+        list(fly(swarm, policy))
+        yield policy, start, swarm.bodies
+
+
+@pytest.mark.parametrize("task", ["stationary", "random-walk", "flocking"])
+def test_every_policy_meets_the_same_teams(task):
+    starts = [start for _, start, _ in courses(task)]
+    assert len(starts) == len(POLICIES)
+    for start in starts[1:]:
+        np.testing.assert_array_equal(start, starts[0])
+
+
+def test_every_policy_meets_the_same_random_walks():
+    ends = [bodies for _, _, bodies in courses("random-walk")]
+    for end in ends[1:]:
+        np.testing.assert_array_equal(end.position_m, ends[0].position_m)
+        np.testing.assert_array_equal(end.velocity_mps, ends[0].velocity_mps)
+
+
+def test_the_codes_random_walks_are_the_same_but_for_flooding():
+    """There, flooding's robots move twice a window."""
+    ends = [
+        bodies.position_m
+        for policy, _, bodies in courses("random-walk", reference)
+        if not policy.transmits_twice
+    ]
+    for end in ends[1:]:
+        np.testing.assert_array_equal(end, ends[0])
+
+
+def test_ages_by_hand():
+    """Of three robots at t = 2; one's age about oneself does not count."""
+    timestamp = np.array([[[2.0, 1.5, 0.0], [1.0, 2.0, 2.0], [0.0, 1.0, 2.0]]])
+    counts = np.array([10, 0, 0, 0, 0])
+    count_ages(timestamp, np.array([2.0]), counts)
+    assert counts.tolist() == [10 + 1, 1, 2, 0, 2]  # 0; 0.5; 1, 1; none; 2, 2

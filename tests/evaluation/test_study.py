@@ -1,0 +1,66 @@
+"""What a study is made of, and what it refuses."""
+
+import json
+
+import pytest
+
+from swarm_mj.evaluation.study import BATCH_SIZE, Study
+from swarm_mj.mission import paper
+
+SMALL = paper("random-walk", num_robots=6)
+LARGE = paper("random-walk", num_robots=8)
+
+
+def study(**overrides):
+    return Study(**({"policies": ("mst", "round-robin"), "regimes": (SMALL, LARGE)} | overrides))
+
+
+def test_batches_hold_every_seed_of_every_policy_and_regime_once():
+    batches = study(episodes=2 * BATCH_SIZE + 3, seed=7).batches
+    for regime in (SMALL, LARGE):
+        for policy in ("mst", "round-robin"):
+            own = [b for b in batches if b.mission == regime and b.policy == policy]
+            assert [len(b.seeds) for b in own] == [BATCH_SIZE, BATCH_SIZE, 3]
+            assert [s for b in own for s in b.seeds] == list(range(7, 7 + 2 * BATCH_SIZE + 3))
+    assert len(batches) == 4 * 3
+
+
+def test_the_baseline_is_the_first_policy_unless_named():
+    assert study().compared_to == "mst"
+    assert study(baseline="round-robin").compared_to == "round-robin"
+
+
+def test_the_header_tells_what_costs_depend_on():
+    header = study(policies=("mst",), probability=0.2, episodes=3, seed=9).header()
+    assert header == json.loads(json.dumps(header))
+    assert (header["episodes"], header["seed"], header["baseline"]) == (3, 9, "mst")
+    assert header["version"]
+    first, second = header["policies and regimes"]
+    assert (first["num_robots"], second["num_robots"]) == (6, 8)
+    assert first["probability"] == second["probability"] == 0.2
+    assert first["sinr_threshold_db"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("overrides", "complaint"),
+    [
+        ({"policies": ()}, "at least 1 policy and 1 regime"),
+        ({"regimes": ()}, "at least 1 policy and 1 regime"),
+        ({"policies": ("mst", "mst")}, "each policy and each regime once"),
+        ({"regimes": (SMALL, SMALL)}, "each policy and each regime once"),
+        ({"policies": ("magic",)}, "policy must be one of .*, not 'magic'"),
+        ({"episodes": 0}, "episodes must be 1 or more, not 0"),
+        ({"episodes": -3}, "episodes must be 1 or more, not -3"),
+        ({"seed": -1}, "seed must be from 0 to .*, not -1"),
+        ({"seed": 2**63 - 1}, "seed must be from 0 to 9223372036854775708, .* 100 episodes"),
+        ({"probability": 1.5}, "probability must be from 0 to 1, not 1.5"),
+        ({"baseline": "random-flooding"}, "add it with --policy random-flooding"),
+    ],
+)
+def test_what_a_study_refuses(overrides, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        study(**({"policies": ("mst",)} | overrides))
+
+
+def test_the_last_seed_is_allowed():
+    assert study(seed=2**63 - 100).batches[-1].seeds[-1] == 2**63 - 1

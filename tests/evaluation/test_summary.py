@@ -1,0 +1,184 @@
+"""Results summed up from made-up batches, against hand arithmetic and scipy."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.stats
+
+from swarm_mj.evaluation import study as study_module
+from swarm_mj.evaluation.batch import BatchCosts
+from swarm_mj.evaluation.study import Study
+from swarm_mj.evaluation.summary import merge, summarise
+from swarm_mj.mission import paper, reference
+
+STATIONARY = reference("stationary")
+
+
+@pytest.fixture(autouse=True)
+def _batches_of_two(monkeypatch):
+    monkeypatch.setattr(study_module, "BATCH_SIZE", 2)
+
+
+def costs(aoi, **overrides):
+    """Missions of 500 windows: 1000 ages of 0, and what else is overridden."""
+    n = len(aoi)
+    made_up = {
+        "aoi": aoi,
+        "aoi_steady": [age - 0.5 for age in aoi],
+        "aoi_floor": [age / 4.0 for age in aoi],
+        "velocity_variance": [age / 10.0 for age in aoi],
+        "hops": [1.0] * n,
+        "complete_window": [None] * n,
+        "packets_attempted": [1000] * n,
+        "packets_delivered": [250] * n,
+        "ages": [1000] + [0] * 1000,
+    }
+    return BatchCosts(**(made_up | overrides))
+
+
+def two_policies(regime=STATIONARY, **overrides):
+    policies = ("mst", "round-robin")
+    return Study(policies=policies, regimes=(regime,), episodes=3, seed=5, **overrides)
+
+
+MST = [
+    costs(
+        [40.0, 46.0],
+        complete_window=[30, None],
+        hops=[2.0, 3.0],
+        ages=[95] + [0] * 300 + [5] + [0] * 699,
+    ),
+    costs([43.0], complete_window=[40], hops=[4.0], ages=[5] + [0] * 9 + [5] + [0] * 990),
+]
+ROUND_ROBIN = [
+    costs([41.0, 48.0], packets_attempted=[0, 0], packets_delivered=[0, 0]),
+    costs([49.0], packets_attempted=[0], packets_delivered=[0]),
+]
+
+
+def results(study=None):
+    """The results of both policies."""
+    parts = dict(enumerate([*MST, *ROUND_ROBIN]))
+    return [each.result for each in summarise(study or two_policies(), parts)]
+
+
+def test_age_of_information_by_hand():
+    """40, 43, 46: the mean's distances are 3, 0, 3; 18 / 2 = 9 is the variance."""
+    mst, _ = results()
+    assert mst.aoi_mean == 43.0
+    assert mst.aoi_std == pytest.approx(3.0)
+    assert mst.aoi_sem == pytest.approx(3.0 / math.sqrt(3.0))
+    assert mst.aoi_median == 43.0
+    assert mst.aoi_p95 == pytest.approx(43.0 + 0.9 * 3.0)
+    assert mst.aoi_worst == 46.0
+    assert mst.aoi_steady_mean == 42.5
+    assert mst.aoi_floor_mean == pytest.approx(43.0 / 4.0)
+    assert mst.aoi_floor_sem == pytest.approx(3.0 / 4.0 / math.sqrt(3.0))
+    assert mst.aoi_ci_low < 43.0 < mst.aoi_ci_high
+
+
+def test_ages_of_all_batches_are_pooled():
+    """110 ages: 95 and 5 of 0, five of 10 half windows, five of 301. 95 % are the first 104.5."""
+    mst, _ = results()
+    assert mst.age_p95 == 5.0
+    assert mst.age_worst == 150.5
+
+
+def test_velocity_variance_by_hand():
+    mst, _ = results()
+    assert mst.velocity_variance_mean == pytest.approx(4.3)
+    assert mst.velocity_variance_std == pytest.approx(0.3)
+    assert mst.velocity_variance_sem == pytest.approx(0.3 / math.sqrt(3.0))
+    assert mst.velocity_variance_median == pytest.approx(4.3)
+    assert mst.velocity_variance_ci_low < 4.3 < mst.velocity_variance_ci_high
+
+
+def test_talk_by_hand():
+    mst, round_robin = results()
+    assert mst.delivery_ratio == 0.25
+    assert mst.packets_per_window == 2.0
+    assert mst.hops_mean == 3.0
+    assert (mst.complete_window_median, mst.complete_share) == (35.0, pytest.approx(2 / 3))
+    assert (round_robin.delivery_ratio, round_robin.packets_per_window) == (None, 0.0)
+    assert (round_robin.complete_window_median, round_robin.complete_share) == (None, 0.0)
+
+
+def test_differences_are_paired():
+    """49 - 43, 48 - 46, 41 - 40 are 6, 2, 1: their spread is not that of the ages."""
+    mst, round_robin = results()
+    assert mst.baseline == round_robin.baseline == "mst"
+    assert round_robin.aoi_difference_mean == pytest.approx(3.0)
+    assert round_robin.velocity_variance_difference_mean == pytest.approx(0.3)
+    interval = scipy.stats.bootstrap(
+        ([1.0, 2.0, 6.0],), np.mean, rng=np.random.default_rng(1)
+    ).confidence_interval
+    assert round_robin.aoi_difference_ci_low == pytest.approx(interval.low, abs=0.4)
+    assert round_robin.aoi_difference_ci_high == pytest.approx(interval.high, abs=0.4)
+    for cost in ("aoi", "velocity_variance"):
+        for figure in ("mean", "ci_low", "ci_high"):
+            assert getattr(mst, f"{cost}_difference_{figure}") is None
+
+
+def test_the_baseline_can_be_named():
+    mst, round_robin = results(two_policies(baseline="round-robin"))
+    assert mst.aoi_difference_mean == pytest.approx(-3.0)
+    assert round_robin.aoi_difference_mean is None
+
+
+def test_the_regime_the_paper_and_the_origin_stand_beside():
+    mst, round_robin = results()
+    assert (mst.policy, mst.task, mst.preset, mst.num_robots) == (
+        *("mst", "stationary", "reference", 40),
+    )
+    assert (mst.episodes, mst.seed, mst.num_windows, mst.boundary) == (3, 5, 500, "reflect")
+    assert mst.probability is not None
+    assert round_robin.probability is None
+    assert mst.published_aoi_mean == 43.3069
+    assert mst.published_aoi_sem == pytest.approx(0.97449)
+    assert mst.published_velocity_variance_mean is None
+    assert mst.version
+    config = json.loads(mst.config)
+    assert config["policy"] == "mst"
+    assert config["probability"] == mst.probability
+    assert config["max_acceleration_mps2"] == 10.0
+
+
+def test_flocks_have_a_published_variance_too():
+    flock, _ = results(two_policies(paper("flocking", velocity_ratio=0.5)))
+    assert flock.published_velocity_variance_mean == 1.9393
+    assert flock.published_velocity_variance_sem == pytest.approx(0.08339)
+
+
+def test_one_mission_has_no_errors_and_a_difference():
+    study = replace(two_policies(), episodes=1)
+    parts = {0: costs([4.0]), 1: costs([6.0])}
+    mst, round_robin = (each.result for each in summarise(study, parts))
+    for name in ("std", "sem", "ci_low", "ci_high", "steady_sem", "floor_sem"):
+        assert getattr(mst, f"aoi_{name}") is None
+    assert (mst.aoi_mean, mst.aoi_median, mst.aoi_p95, mst.aoi_worst) == (4.0,) * 4
+    assert round_robin.aoi_difference_mean == 2.0
+    assert round_robin.aoi_difference_ci_low is None
+
+
+def test_missions_come_in_the_order_of_their_seeds_whatever_was_done_first():
+    parts = dict(enumerate([*MST, *ROUND_ROBIN]))
+    backwards = dict(reversed(parts.items()))
+    evaluated = summarise(two_policies(), backwards)
+    assert evaluated == summarise(two_policies(), parts)
+    assert evaluated[0].aoi == [40.0, 46.0, 43.0]
+    assert evaluated[1].velocity_variance == pytest.approx([4.1, 4.8, 4.9])
+
+
+def test_a_missing_batch_is_a_clear_error():
+    with pytest.raises(ValueError, match="3 of 4 batches are missing"):
+        summarise(two_policies(), {0: MST[0]})
+
+
+def test_merging_joins_lists_and_adds_ages():
+    merged = merge(MST)
+    assert merged.aoi == [40.0, 46.0, 43.0]
+    assert merged.complete_window == [30, None, 40]
+    assert (merged.ages[0], merged.ages[10], merged.ages[301]) == (100, 5, 5)
