@@ -4,13 +4,14 @@ BIN := .venv/bin
 READY := .venv/ready
 ARGS ?=
 
-.PHONY: help setup fly bench check test format picture clean
+.PHONY: help setup fly bench check test format figures picture clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
 	@echo "make test    set up if needed and run the tests"
 	@echo "make check   formatter, linter and type checker"
 	@echo "make bench   time the simulation on this machine"
+	@echo "make figures remake the paper's figures; evaluates what training/results/ lacks"
 	@echo "make picture remake the README's picture (needs a Vulkan driver)"
 	@echo "make setup   create .venv from pinned constraints; PYTHON=python3.12 chooses another"
 	@echo "make clean   remove .venv, replays and caches"
@@ -43,6 +44,13 @@ test: setup
 format: setup
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+figures: setup
+	$(BIN)/python training/paper_figures.py $(ARGS)
+	for preset in reference paper; do \
+	  $(BIN)/swarm-mj figures training/results/$$preset-*.csv --out assets/figures/$$preset --force \
+	    || exit; \
+	done
 
 picture: setup
 	$(BIN)/swarm-mj fly --record replays/readme.rrd --force

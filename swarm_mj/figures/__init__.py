@@ -1,0 +1,1 @@
+"""The paper's figures: ours and the published curves in one style, drawn without a display."""

@@ -1,0 +1,108 @@
+"""The experiment evaluates what is missing, once, and hands it over whole."""
+
+import importlib.util
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+
+from swarm_mj.cli import make_parser
+from swarm_mj.cli.study_options import study_of
+from swarm_mj.published import points, published
+
+FILE = Path(__file__).parent.parent.parent / "training" / "paper_figures.py"
+NAMES = [
+    f"{preset}-{task}.csv"
+    for preset in ("reference", "paper")
+    for task in ("stationary", "random-walk", "flocking")
+]
+
+
+@pytest.fixture
+def experiment(monkeypatch):
+    spec = importlib.util.spec_from_file_location("paper_figures", FILE)
+    module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "paper_figures", module)  # dataclasses look there
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def calls(experiment, monkeypatch):
+    """The commands called; instead of flying, each writes itself as its result."""
+    seen = []
+
+    def command(arguments):
+        seen.append(arguments)
+        path = Path(arguments[arguments.index("--csv") + 1])
+        if path.name in broken:
+            return 130
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(shlex.join(arguments))
+        return 0
+
+    broken = set()
+    monkeypatch.setattr(experiment, "swarm_mj", command)
+    seen_and_broken = seen, broken
+    return seen_and_broken
+
+
+@pytest.fixture
+def settings(experiment, tmp_path):
+    return experiment.Settings(results=tmp_path / "results", drafts=tmp_path / "drafts")
+
+
+def files(folder):
+    return sorted(path.name for path in folder.iterdir()) if folder.exists() else []
+
+
+def test_the_commands_cover_every_published_regime(experiment, calls, settings):
+    seen, _ = calls
+    assert experiment.evaluate(settings, 3, force=False) == 0
+    studies = [study_of(make_parser().parse_args(arguments)) for arguments in seen]
+    assert all((study.episodes, study.seed) == (100, 1000) for study in studies)
+    found = [
+        (regime.preset, point)
+        for study in studies
+        for regime in study.regimes
+        for point in published("mst", regime).values()
+    ]
+    wanted = [p for p in points() if p.policy == "mst" and p.figure != "fig3_receptive_field"]
+    assert len(found) == 2 * len(wanted)
+    assert set(found) == {(preset, point) for preset in settings.presets for point in wanted}
+    assert {arguments[arguments.index("--jobs") + 1] for arguments in seen} == {"3"}
+
+
+def test_what_is_there_is_kept(experiment, calls, settings):
+    seen, _ = calls
+    settings.results.mkdir()
+    (settings.results / NAMES[0]).write_text("mine")
+    assert experiment.evaluate(settings, 1, force=False) == 0
+    assert len(seen) == 5
+    assert all("--resume" in arguments and "--force" not in arguments for arguments in seen)
+    assert (settings.results / NAMES[0]).read_text() == "mine"
+    assert files(settings.results) == sorted(NAMES)
+    assert experiment.evaluate(settings, 1, force=False) == 0
+    assert len(seen) == 5
+
+
+def test_an_interruption_hands_over_nothing_and_the_next_run_goes_on(experiment, calls, settings):
+    seen, broken = calls
+    broken.add(NAMES[2])
+    assert experiment.evaluate(settings, 1, force=False) == 130
+    assert files(settings.results) == []
+    assert files(settings.drafts) == sorted(NAMES[:2])
+    broken.clear()
+    assert experiment.evaluate(settings, 1, force=False) == 0
+    assert len(seen) == 3 + 4
+    assert files(settings.results) == sorted(NAMES)
+    assert files(settings.drafts) == []
+
+
+def test_force_makes_all_anew(experiment, calls, settings):
+    seen, _ = calls
+    experiment.evaluate(settings, 1, force=False)
+    experiment.evaluate(settings, 1, force=True)
+    assert len(seen) == 12
+    assert all("--force" in arguments for arguments in seen[6:])
