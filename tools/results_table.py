@@ -1,0 +1,84 @@
+"""Results of the paper's figures as Markdown tables, ours with the published values beside them.
+
+    python tools/results_table.py training/results/paper-*.csv
+
+One table per file and cost: policies down, the swept number across, mean ± standard error over
+missions, published values in brackets.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from swarm_mj.published import SWEEPS
+from swarm_mj.results import Result, read_results
+
+DONE, BAD_INPUT = 0, 2
+COSTS = {"aoi": ("age of information [windows]", 1), "velocity_variance": ("m²/s²", 3)}
+
+
+def table(results: Sequence[Result], cost: str) -> str:
+    """One cost of one task and preset.
+
+    Args:
+        results: Of one task and preset.
+        cost: `aoi` or `velocity_variance`.
+
+    Returns:
+        Markdown; the policies of least cost first.
+    """
+    swept = SWEEPS[results[0].task].x_name
+    xs = sorted({getattr(result, swept) for result in results})
+    cells = {(result.policy, getattr(result, swept)): _cell(result, cost) for result in results}
+    policies = sorted(
+        {result.policy for result in results},
+        key=lambda policy: sum(
+            getattr(result, f"{cost}_mean") for result in results if result.policy == policy
+        ),
+    )
+    label, _ = COSTS[cost]
+    rows = [
+        [f"{swept.replace('_', ' ')}, {label}", *(f"{x:g}" for x in xs)],
+        ["---"] * (len(xs) + 1),
+        *([policy, *(cells.get((policy, x), "") for x in xs)] for policy in policies),
+    ]
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+
+
+def _cell(result: Result, cost: str) -> str:
+    """Ours, and the published value in brackets if there is one."""
+    _, digits = COSTS[cost]
+    ours = _plus_minus(result, cost, digits)
+    published = _plus_minus(result, f"published_{cost}", digits)
+    return f"{ours} ({published})" if published else ours
+
+
+def _plus_minus(result: Result, name: str, digits: int) -> str:
+    mean, sem = getattr(result, f"{name}_mean"), getattr(result, f"{name}_sem")
+    if mean is None:
+        return ""
+    return f"{mean:.{digits}f}" if sem is None else f"{mean:.{digits}f} ± {sem:.{digits}f}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Prints the tables; returns the exit code."""
+    parser = argparse.ArgumentParser(description="Results as Markdown tables.")
+    parser.add_argument("files", type=Path, nargs="+", help="made by swarm-mj evaluate --csv")
+    options = parser.parse_args(arguments)
+    try:
+        for path in options.files:
+            results = read_results(path)
+            kinds = {(result.task, result.preset) for result in results}
+            for task, preset in sorted(kinds):
+                own = [r for r in results if (r.task, r.preset) == (task, preset)]
+                for cost in COSTS if task == "flocking" else ["aoi"]:
+                    print(f"{task}, preset {preset}\n\n{table(own, cost)}\n")
+    except (ValueError, OSError) as error:
+        sys.stderr.write(f"results_table: error: {error}\n")
+        return BAD_INPUT
+    return DONE
+
+
+if __name__ == "__main__":
+    sys.exit(main())
