@@ -1,4 +1,4 @@
-"""The connectivity floor: the age that no radio protocol can go below, however it shares."""
+"""The connectivity floor: the age that no radio goes below, if robots rest while they talk."""
 
 from typing import no_type_check
 

@@ -149,10 +149,11 @@ class Swarm:
     def _flood(self, policy: Policy) -> WindowCosts:
         """One window of two transmissions, each decided on what was known before it (IV-C)."""
         phases: list[Phase] = []
+        moves_twice = policy.moves_each_transmission and self.mission.moves_each_transmission
         for half in (1, 2):
             recipient = self.decide(policy)
             check_robots("recipient", recipient, self.buffers.shape)
-            if half == 1 or self.mission.moves_each_transmission:
+            if half == 1 or moves_twice:
                 self.move()
             self.now = self.now + PHASE
             phase = transmit(

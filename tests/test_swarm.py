@@ -92,7 +92,7 @@ def test_every_policy_meets_the_same_missions(preset, physics):
     paths = []
     for name in POLICIES:
         swarm, policy = Swarm(mission, [1, 2]), make_policy(name, mission)
-        moves = 2 if mission.moves_each_transmission and policy.transmits_twice else 1
+        moves = 2 if mission.moves_each_transmission and policy.moves_each_transmission else 1
         swarm.start(policy)
         path = [swarm.bodies.position_m]
         for _ in range(12 // moves):
@@ -186,7 +186,7 @@ def test_policy_decides_before_the_robots_move(preset):
 class SilentTwice(Silent):
     """Nobody ever transmits, twice per window."""
 
-    transmits_twice = True
+    transmits_twice = moves_each_transmission = True
 
 
 @pytest.mark.parametrize("physics", MODES)

@@ -10,12 +10,16 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from statistics import mean
 
 from swarm_mj.published import SWEEPS
 from swarm_mj.results import Result, read_results
 
 DONE, BAD_INPUT = 0, 2
-COSTS = {"aoi": ("age of information [windows]", 1), "velocity_variance": ("m²/s²", 3)}
+COSTS = {
+    "aoi": ("age of information [windows]", 1),
+    "velocity_variance": ("velocity variance [m²/s²]", 3),
+}
 
 
 def table(results: Sequence[Result], cost: str) -> str:
@@ -30,10 +34,12 @@ def table(results: Sequence[Result], cost: str) -> str:
     """
     swept = SWEEPS[results[0].task].x_name
     xs = sorted({getattr(result, swept) for result in results})
+    if len({(result.policy, getattr(result, swept)) for result in results}) < len(results):
+        raise ValueError(f"results must have each policy once at each {swept}")
     cells = {(result.policy, getattr(result, swept)): _cell(result, cost) for result in results}
     policies = sorted(
         {result.policy for result in results},
-        key=lambda policy: sum(
+        key=lambda policy: mean(
             getattr(result, f"{cost}_mean") for result in results if result.policy == policy
         ),
     )
@@ -55,10 +61,10 @@ def _cell(result: Result, cost: str) -> str:
 
 
 def _plus_minus(result: Result, name: str, digits: int) -> str:
-    mean, sem = getattr(result, f"{name}_mean"), getattr(result, f"{name}_sem")
-    if mean is None:
+    value, sem = getattr(result, f"{name}_mean"), getattr(result, f"{name}_sem")
+    if value is None:
         return ""
-    return f"{mean:.{digits}f}" if sem is None else f"{mean:.{digits}f} ± {sem:.{digits}f}"
+    return f"{value:.{digits}f}" if sem is None else f"{value:.{digits}f} ± {sem:.{digits}f}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

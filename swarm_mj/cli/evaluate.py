@@ -56,14 +56,15 @@ def run(options: argparse.Namespace) -> int:
     study = study_of(options)
     kept = _check_outputs(options)
     console = Console(stderr=True, highlight=False)
-    costs = _begin(kept, study, is_resumed=options.resume) if kept else {}
+    header = study.header()
+    costs = _begin(kept, header, is_resumed=options.resume) if kept else {}
     try:
         _fly(study, costs, options.jobs, kept, console)
     except KeyboardInterrupt:
         console.print(_interrupted(study, costs, kept))
         return INTERRUPTED
     with deferred_interrupt():
-        evaluated = summarise(study, costs)
+        evaluated = summarise(study, costs, header)
         _write(options, evaluated)
         if kept:
             kept.unlink()
@@ -91,11 +92,11 @@ def _check_outputs(options: argparse.Namespace) -> Path | None:
     return kept
 
 
-def _begin(kept: Path, study: Study, *, is_resumed: bool) -> dict[int, BatchCosts]:
+def _begin(kept: Path, header: dict[str, Any], *, is_resumed: bool) -> dict[int, BatchCosts]:
     """The batches already flown; begins the progress file if there are none."""
     if is_resumed and kept.exists():
-        return progress.resume(kept, study.header())
-    progress.start(kept, study.header())
+        return progress.resume(kept, header)
+    progress.start(kept, header)
     return {}
 
 

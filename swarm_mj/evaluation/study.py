@@ -9,7 +9,7 @@ from typing import Any
 from swarm_mj.evaluation.batch import Batch
 from swarm_mj.mission import Mission
 from swarm_mj.policies import Policy, make_policy
-from swarm_mj.provenance import commit, version
+from swarm_mj.provenance import code_digest, commit, version
 from swarm_mj.swarm import MAX_SEED
 
 BATCH_SIZE = 25  # missions side by side: as fast as many, and little lost by an interruption
@@ -89,6 +89,7 @@ class Study:
         header = {
             "version": version(),
             "commit": commit(),
+            "code": code_digest(),
             "episodes": self.episodes,
             "seed": self.seed,
             "missions side by side": BATCH_SIZE,

@@ -11,7 +11,6 @@ from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
 from swarm_mj.protocol import PHASE
-from swarm_mj.provenance import commit, version
 from swarm_mj.published import published
 from swarm_mj.results import Result
 from swarm_mj.statistics import Interval, Spread, bootstrap_interval, quantile_of_counts, spread
@@ -27,12 +26,15 @@ class Evaluated:
     velocity_variance: list[float]  # Eq. 17, mean over windows [m²/s²]
 
 
-def summarise(study: Study, costs: Mapping[int, BatchCosts]) -> list[Evaluated]:
+def summarise(
+    study: Study, costs: Mapping[int, BatchCosts], made_by: Mapping[str, Any]
+) -> list[Evaluated]:
     """The results of a study, regime by regime, policy by policy.
 
     Args:
         study: What was asked for.
         costs: What each batch cost, by its index in `study.batches`, in any order.
+        made_by: The code's `version` and `commit` when the first of them began.
 
     Returns:
         One per policy and regime.
@@ -47,17 +49,19 @@ def summarise(study: Study, costs: Mapping[int, BatchCosts]) -> list[Evaluated]:
     for index, batch in enumerate(study.batches):
         parts[batch.mission, batch.policy].append(costs[index])
     merged = {pair: merge(batches) for pair, batches in parts.items()}
-    made_by = {"version": version(), "commit": commit()}
     return [
         Evaluated(
             result=Result(
                 **_regime(study, policy, regime),
                 **_aoi(own),
                 **_spread("velocity_variance", spread(np.array(own.velocity_variance))),
-                **_talk(own, regime),
+                **_talk(
+                    own, regime, is_broadcast=study.make_policy(policy, regime).transmits_twice
+                ),
                 **_differences(own, merged[regime, study.compared_to]),
                 **_published(policy, regime),
-                **made_by,
+                version=made_by["version"],
+                commit=made_by["commit"],
                 baseline=study.compared_to,
                 config=json.dumps(study.config(policy, regime)),
             ),
@@ -123,16 +127,17 @@ def _interval(name: str, interval: Interval) -> dict[str, Any]:
     return {f"{name}_ci_low": interval.low, f"{name}_ci_high": interval.high}
 
 
-def _talk(costs: BatchCosts, regime: Mission) -> dict[str, Any]:
-    """Packets, hops, and when everyone had heard of everyone."""
+def _talk(costs: BatchCosts, regime: Mission, *, is_broadcast: bool) -> dict[str, Any]:
+    """Packets, hops, and when everyone knew everyone; a broadcast is for nobody in particular."""
     attempted, delivered = sum(costs.packets_attempted), sum(costs.packets_delivered)
     complete = [window for window in costs.complete_window if window is not None]
     episodes = len(costs.aoi)
+    median = np.median(complete + [np.inf] * (episodes - len(complete)))
     return {
-        "delivery_ratio": delivered / attempted if attempted else None,
+        "delivery_ratio": delivered / attempted if attempted and not is_broadcast else None,
         "packets_per_window": attempted / (episodes * regime.num_windows),
         "hops_mean": float(np.mean(costs.hops)),
-        "complete_window_median": float(np.median(complete)) if complete else None,
+        "complete_window_median": float(median) if np.isfinite(median) else None,
         "complete_share": len(complete) / episodes,
     }
 

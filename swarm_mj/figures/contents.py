@@ -14,7 +14,7 @@ OPTIONS = {
     "range_ratio": "--range-ratio",
     "velocity_ratio": "--velocity-ratio",
 }
-# All but two that take an hour a regime: the lookahead oracle, and lone planners that move.
+# All but the two slow ones: the lookahead oracle, and lone planners, who plan one by one.
 DRAWN = (
     "tdma",  # first: the others are compared to it
     "random-flooding",

@@ -1,8 +1,8 @@
 """One style for all figures: each method's colour and marker, type, and what files say of it.
 
 Hues are Okabe and Ito's and Tol's, which stay apart for colour-blind eyes; markers differ too. Ours
-is solid and filled, what the paper published dashed and hollow, in the same colour. The oracle is a
-bound: black and thin.
+is solid and filled, what the paper published dashed and hollow, in the same colour. The oracle,
+which no team could fly, is black and thin.
 """
 
 from contextlib import AbstractContextManager

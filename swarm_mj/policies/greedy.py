@@ -355,7 +355,8 @@ def _pair_gains(
     return gains
 
 
-# Adding in any order lets the compiler use its vectors; whole halves add up exactly.
+# Adding in any order lets the compiler use its vectors. Whole halves add up exactly; squares and
+# expected halves to rounding, so robots that plan alike need machines alike.
 @njit(cache=True, fastmath={"reassoc", "nnan", "nsz"})
 @no_type_check
 def _gain(

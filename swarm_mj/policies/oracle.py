@@ -46,7 +46,8 @@ class _Oracle(CentralisedPolicy):
 class GreedyOracle(_Oracle):
     """Adds pairs while the age that the window removes grows: myopic, and not optimal.
 
-    Centralised: it is told all buffers and all true positions.
+    Centralised: it is told all buffers and all true positions. It addresses nobody who sends, even
+    where the authors' code would let that robot hear.
     """
 
     def _window(

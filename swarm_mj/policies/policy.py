@@ -40,6 +40,7 @@ class Policy:
     """Chooses whom every robot addresses in the next window; itself is silence."""
 
     transmits_twice: ClassVar[bool] = False  # flooding's window: two transmissions, no responses
+    moves_each_transmission: ClassVar[bool] = False  # where the mission's field of that name is set
 
     @property
     def carries_payload(self) -> bool:

@@ -18,6 +18,7 @@ class RandomFlooding(DecentralisedPolicy):
     """
 
     transmits_twice: ClassVar[bool] = True
+    moves_each_transmission: ClassVar[bool] = True  # the authors' other policies move once
 
     def __init__(self, probability: float) -> None:
         """Prepares the policy.

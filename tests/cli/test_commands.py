@@ -73,7 +73,7 @@ def test_bench_refuses_bad_input(swarm_mj, options, complaint):
     assert complaint in done.stderr
 
 
-@pytest.mark.parametrize("command", ["fly", "evaluate", "replay", "scene", "bench"])
+@pytest.mark.parametrize("command", ["fly", "evaluate", "figures", "replay", "scene", "bench"])
 def test_help_suffices(swarm_mj, command):
     overview, detail = swarm_mj("--help"), swarm_mj(command, "--help")
     assert overview.returncode == detail.returncode == 0

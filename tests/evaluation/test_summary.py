@@ -59,10 +59,13 @@ ROUND_ROBIN = [
 ]
 
 
+MADE_BY = {"version": "1.2.3", "commit": "abc"}
+
+
 def results(study=None):
     """The results of both policies."""
     parts = dict(enumerate([*MST, *ROUND_ROBIN]))
-    return [each.result for each in summarise(study or two_policies(), parts)]
+    return [each.result for each in summarise(study or two_policies(), parts, MADE_BY)]
 
 
 def test_age_of_information_by_hand():
@@ -101,7 +104,7 @@ def test_talk_by_hand():
     assert mst.delivery_ratio == 0.25
     assert mst.packets_per_window == 2.0
     assert mst.hops_mean == 3.0
-    assert (mst.complete_window_median, mst.complete_share) == (35.0, pytest.approx(2 / 3))
+    assert (mst.complete_window_median, mst.complete_share) == (40.0, pytest.approx(2 / 3))
     assert (round_robin.delivery_ratio, round_robin.packets_per_window) == (None, 0.0)
     assert (round_robin.complete_window_median, round_robin.complete_share) == (None, 0.0)
 
@@ -155,7 +158,7 @@ def test_flocks_have_a_published_variance_too():
 def test_one_mission_has_no_errors_and_a_difference():
     study = replace(two_policies(), episodes=1)
     parts = {0: costs([4.0]), 1: costs([6.0])}
-    mst, round_robin = (each.result for each in summarise(study, parts))
+    mst, round_robin = (each.result for each in summarise(study, parts, MADE_BY))
     for name in ("std", "sem", "ci_low", "ci_high", "steady_sem", "floor_sem"):
         assert getattr(mst, f"aoi_{name}") is None
     assert (mst.aoi_mean, mst.aoi_median, mst.aoi_p95, mst.aoi_worst) == (4.0,) * 4
@@ -166,15 +169,15 @@ def test_one_mission_has_no_errors_and_a_difference():
 def test_missions_come_in_the_order_of_their_seeds_whatever_was_done_first():
     parts = dict(enumerate([*MST, *ROUND_ROBIN]))
     backwards = dict(reversed(parts.items()))
-    evaluated = summarise(two_policies(), backwards)
-    assert evaluated == summarise(two_policies(), parts)
+    evaluated = summarise(two_policies(), backwards, MADE_BY)
+    assert evaluated == summarise(two_policies(), parts, MADE_BY)
     assert evaluated[0].aoi == [40.0, 46.0, 43.0]
     assert evaluated[1].velocity_variance == pytest.approx([4.1, 4.8, 4.9])
 
 
 def test_a_missing_batch_is_a_clear_error():
     with pytest.raises(ValueError, match="3 of 4 batches are missing"):
-        summarise(two_policies(), {0: MST[0]})
+        summarise(two_policies(), {0: MST[0]}, MADE_BY)
 
 
 def test_merging_joins_lists_and_adds_ages():

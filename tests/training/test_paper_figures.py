@@ -1,8 +1,8 @@
 """The experiment evaluates what is missing, once, and hands it over whole."""
 
 import importlib.util
-import shlex
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,11 +10,13 @@ import pytest
 from swarm_mj.cli import make_parser
 from swarm_mj.cli.study_options import study_of
 from swarm_mj.published import points, published
+from swarm_mj.results import read_results, write_csv
+from tests.figures.synthetic import result
 
 FILE = Path(__file__).parent.parent.parent / "training" / "paper_figures.py"
 NAMES = [
     f"{preset}-{task}.csv"
-    for preset in ("reference", "paper")
+    for preset in ("paper", "reference")
     for task in ("stationary", "random-walk", "flocking")
 ]
 
@@ -39,13 +41,13 @@ def calls(experiment, monkeypatch):
         if path.name in broken:
             return 130
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(shlex.join(arguments))
+        write_csv(path, [replace(result("mst"), commit=made_by[0])])
         return 0
 
-    broken = set()
+    broken, made_by = set(), ["abc"]
+    monkeypatch.setattr(experiment, "commit", lambda: "abc")
     monkeypatch.setattr(experiment, "swarm_mj", command)
-    seen_and_broken = seen, broken
-    return seen_and_broken
+    return seen, broken, made_by
 
 
 @pytest.fixture
@@ -58,10 +60,10 @@ def files(folder):
 
 
 def test_the_commands_cover_every_published_regime(experiment, calls, settings):
-    seen, _ = calls
+    seen, *_ = calls
     assert experiment.evaluate(settings, 3, force=False) == 0
     studies = [study_of(make_parser().parse_args(arguments)) for arguments in seen]
-    assert all((study.episodes, study.seed) == (100, 1000) for study in studies)
+    assert all((study.episodes, study.seed) == (100, 2000) for study in studies)
     found = [
         (regime.preset, point)
         for study in studies
@@ -75,7 +77,7 @@ def test_the_commands_cover_every_published_regime(experiment, calls, settings):
 
 
 def test_what_is_there_is_kept(experiment, calls, settings):
-    seen, _ = calls
+    seen, *_ = calls
     settings.results.mkdir()
     (settings.results / NAMES[0]).write_text("mine")
     assert experiment.evaluate(settings, 1, force=False) == 0
@@ -88,7 +90,7 @@ def test_what_is_there_is_kept(experiment, calls, settings):
 
 
 def test_an_interruption_hands_over_nothing_and_the_next_run_goes_on(experiment, calls, settings):
-    seen, broken = calls
+    seen, broken, _ = calls
     broken.add(NAMES[2])
     assert experiment.evaluate(settings, 1, force=False) == 130
     assert files(settings.results) == []
@@ -101,8 +103,31 @@ def test_an_interruption_hands_over_nothing_and_the_next_run_goes_on(experiment,
 
 
 def test_force_makes_all_anew(experiment, calls, settings):
-    seen, _ = calls
+    seen, *_ = calls
     experiment.evaluate(settings, 1, force=False)
     experiment.evaluate(settings, 1, force=True)
     assert len(seen) == 12
-    assert all("--force" in arguments for arguments in seen[6:])
+
+
+def test_an_interrupted_force_goes_on_without_it(experiment, calls, settings):
+    seen, broken, _ = calls
+    experiment.evaluate(settings, 1, force=False)
+    broken.add(NAMES[1])
+    assert experiment.evaluate(settings, 1, force=True) == 130
+    assert files(settings.results) == []
+    broken.clear()
+    assert experiment.evaluate(settings, 1, force=False) == 0
+    assert len(seen) == 6 + 2 + 5
+
+
+def test_drafts_of_another_commit_are_made_anew(experiment, calls, settings):
+    seen, broken, made_by = calls
+    made_by[0] = "def"
+    broken.add(NAMES[2])
+    experiment.evaluate(settings, 1, force=False)
+    broken.clear()
+    made_by[0] = "abc"
+    assert experiment.evaluate(settings, 1, force=False) == 0
+    assert len(seen) == 3 + 6
+    commits = {read_results(settings.results / name)[0].commit for name in NAMES}
+    assert commits == {"abc"}

@@ -1,0 +1,67 @@
+"""The README's tables, from made-up results."""
+
+import importlib.util
+import shutil
+from pathlib import Path
+
+import pytest
+
+from swarm_mj.results import write_csv
+from tests.figures.synthetic import result, sweep
+
+TOOL = Path(__file__).parent.parent.parent / "tools" / "results_table.py"
+
+
+@pytest.fixture(scope="module")
+def tool():
+    spec = importlib.util.spec_from_file_location("results_table", TOOL)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_policies_down_the_swept_number_across_the_least_cost_first(tool, tmp_path, capsys):
+    rows = [
+        *sweep("mst", "range_ratio", {0.25: (43.0, 1.0), 0.5: (16.54, 0.1)}),
+        *sweep("oracle", "range_ratio", {0.5: (5.0, 0.25), 0.25: (12.04, 0.06)}),
+    ]
+    write_csv(tmp_path / "some.csv", rows)
+    assert tool.main([str(tmp_path / "some.csv")]) == 0
+    assert capsys.readouterr().out == (
+        "stationary, preset reference\n\n"
+        "| range ratio, age of information [windows] | 0.25 | 0.5 |\n"
+        "| --- | --- | --- |\n"
+        "| oracle | 12.0 ± 0.1 | 5.0 ± 0.2 |\n"
+        "| mst | 43.0 ± 1.0 | 16.5 ± 0.1 |\n\n"
+    )
+
+
+def test_published_values_stand_in_brackets_and_flocks_have_a_second_table(tool):
+    flock = result(
+        "mst",
+        "flocking",
+        aoi_mean=46.0,
+        aoi_sem=1.25,
+        published_aoi_mean=46.2565,
+        published_aoi_sem=1.48173,
+        velocity_variance_mean=0.1701,
+        velocity_variance_sem=0.0123,
+    )
+    assert "| mst | 46.0 ± 1.2 (46.3 ± 1.5) |" in tool.table([flock], "aoi")
+    assert "| mst | 0.170 ± 0.012 |" in tool.table([flock], "velocity_variance")
+
+
+def test_a_policy_missing_somewhere_and_one_without_errors(tool):
+    rows = [
+        *sweep("mst", "num_robots", {10: (11.0, None), 20: (22.0, None)}, task="random-walk"),
+        *sweep("tdma", "num_robots", {20: (9.0, 1.0)}, task="random-walk"),
+    ]
+    table = tool.table(rows, "aoi").splitlines()
+    assert table[2:] == ["| tdma |  | 9.0 ± 1.0 |", "| mst | 11.0 | 22.0 |"]
+
+
+def test_files_that_are_no_results_are_a_clear_error(tool, tmp_path, capsys):
+    shutil.copy(TOOL, tmp_path / "tool.csv")
+    assert tool.main([str(tmp_path / "tool.csv")]) == 2
+    assert tool.main([str(tmp_path / "nothing.csv")]) == 2
+    assert capsys.readouterr().err.count("results_table: error: ") == 2
