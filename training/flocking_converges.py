@@ -6,7 +6,9 @@ Flies the same missions with every policy and prints how much of the velocity va
 the end. Flocks without a boundary are the paper's, reflected ones the default flight's.
 """
 
+import argparse
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,8 +18,9 @@ from rich.table import Table
 
 from swarm_mj.flight import fly, summarise
 from swarm_mj.mission import Mission, paper
-from swarm_mj.policies import POLICIES, make_policy
+from swarm_mj.policies import make_policy
 from swarm_mj.provenance import commit, version
+from swarm_mj.published import BASELINES
 from swarm_mj.swarm import Swarm
 
 
@@ -42,8 +45,10 @@ def left_over(settings: Settings, policy_name: str) -> np.ndarray:
     return summary.velocity_variance_last / summary.velocity_variance_first
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the experiment; returns its exit code."""
+    parser = argparse.ArgumentParser(description="How far flocks agree on a velocity.")
+    parser.parse_args(arguments)
     open_area = Settings()
     walled = replace(open_area, mission=replace(open_area.mission, boundary="reflect"))
     table = Table(title=f"Velocity variance left, {open_area.num_missions} missions")
@@ -52,7 +57,7 @@ def main() -> int:
     for heading in ("median", "mean", "worst", f"below {open_area.agreed_share:.0%}"):
         table.add_column(heading, justify="right")
     for settings in (open_area, walled):
-        for name in POLICIES:
+        for name in BASELINES:
             share = left_over(settings, name)
             numbers = (np.median(share), np.mean(share), np.max(share))
             agreed = np.mean(share < settings.agreed_share)
