@@ -14,7 +14,8 @@ OPTIONS = {
     "range_ratio": "--range-ratio",
     "velocity_ratio": "--velocity-ratio",
 }
-# All but the two slow ones: the lookahead oracle, and lone planners, who plan one by one.
+# All but the two slow ones: the lookahead oracle, and lone planners, who plan one by one. Beside
+# published values stands what they can be compared to, so the planner is left out there.
 DRAWN = (
     "tdma",  # first: the others are compared to it
     "random-flooding",
@@ -84,7 +85,8 @@ class ResultFigure:
 
     def arguments(self, preset: str) -> Sequence[str]:
         """What `swarm-mj` is called with to make the figure's results, but for the file."""
-        command = ["evaluate", "--policy", *DRAWN, "--task", self.task, "--preset", preset]
+        drawn = [policy for policy in DRAWN if preset == "paper" or policy != "planner"]
+        command = ["evaluate", "--policy", *drawn, "--task", self.task, "--preset", preset]
         if self.sweeps_missions:
             command += [OPTIONS[self.x_name], *(f"{x:g}" for x in self.xs)]
         return command
