@@ -14,8 +14,8 @@ OPTIONS = {
     "range_ratio": "--range-ratio",
     "velocity_ratio": "--velocity-ratio",
 }
-# All but the two slow ones: the lookahead oracle, and lone planners, who plan one by one. The planner
-# is drawn under `paper` only: it takes as long as all others together.
+# All but the two slow ones: the lookahead oracle, and lone planners, who plan one by one. The
+# planner is drawn under `paper` only: it takes as long as all others together.
 DRAWN = (
     "tdma",  # first: the others are compared to it
     "random-flooding",
