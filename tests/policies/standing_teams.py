@@ -1,0 +1,79 @@
+"""Teams that stand still, what they know, and what a window of Alg. 1 would make of it."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from swarm_mj.buffers import empty_buffers
+from swarm_mj.channel import radio_of
+from swarm_mj.mission import Mission
+from swarm_mj.placement import connected_positions
+from swarm_mj.protocol import PHASE, Bodies, transmit, window
+from swarm_mj.radio import FreeSpaceRadio
+
+
+@dataclass(frozen=True, kw_only=True)
+class Team:
+    """A connected team after some windows of random flooding."""
+
+    radio: FreeSpaceRadio
+    position_m: np.ndarray  # [robot, axis]
+    timestamp: np.ndarray  # T, [robot, subject], in windows
+    now: float  # t [windows]
+
+    @property
+    def num_robots(self):
+        return len(self.position_m)
+
+
+def flooded_team(mission: Mission, seed: int) -> Team:
+    """A team of the mission; 0 to 9 windows have passed, in which a fifth of all spoke."""
+    rng = np.random.default_rng(seed)
+    robots, radio = np.arange(mission.num_robots), radio_of(mission)
+    position_m = connected_positions(len(robots), mission.half_side_m, mission.range_m, rng)
+    bodies = Bodies(position_m=position_m[None], velocity_mps=np.zeros((1, len(robots), 2)))
+    buffers, now = empty_buffers(1, len(robots)), np.zeros(1)
+    for _ in range(2 * rng.integers(0, 10)):
+        now = now + PHASE
+        speaks = rng.random(len(robots)) < 0.2
+        anyone = rng.integers(0, len(robots), len(robots))
+        transmit(buffers, bodies, np.where(speaks, anyone, robots)[None], radio, now)
+    return Team(
+        radio=radio, position_m=position_m, timestamp=buffers.timestamp[0], now=float(now[0])
+    )
+
+
+def after_windows(team: Team, recipients: Any) -> np.ndarray:
+    """T after each of some windows in a row, by the protocol [window, robot, subject]."""
+    buffers, known = empty_buffers(1, team.num_robots), []
+    buffers.timestamp[0] = team.timestamp
+    bodies = Bodies(
+        position_m=team.position_m[None], velocity_mps=np.zeros((1, team.num_robots, 2))
+    )
+    for w, recipient in enumerate(recipients):
+        window(buffers, bodies, np.array([recipient]), team.radio, np.array([team.now + w]))
+        known.append(buffers.timestamp[0].copy())
+    return np.array(known)
+
+
+def knowledge_after(team: Team, choices: np.ndarray) -> np.ndarray:
+    """The sum of all T after one window, for each choice of recipients, side by side [windows]."""
+    shape = (len(choices), team.num_robots)
+    buffers = empty_buffers(*shape)
+    buffers.timestamp[:] = team.timestamp
+    bodies = Bodies(
+        position_m=np.broadcast_to(team.position_m, (*shape, 2)).copy(),
+        velocity_mps=np.zeros((*shape, 2)),
+    )
+    window(buffers, bodies, choices, team.radio, np.full(len(choices), team.now))
+    return np.sum(buffers.timestamp, axis=(1, 2))
+
+
+def single_pairs(num_robots: int) -> np.ndarray:
+    """For every i and r, the recipients by which i alone speaks, to r [i and r, robot]."""
+    choices = np.tile(np.arange(num_robots), (num_robots**2, 1))
+    for pair in range(num_robots**2):
+        i, r = divmod(pair, num_robots)
+        choices[pair, i] = r
+    return choices
