@@ -30,7 +30,8 @@ def _regime(result: Result) -> str:
     """A table's title."""
     return (
         f"{result.task}, preset {result.preset}: {result.num_robots} robots, range ratio "
-        f"{result.range_ratio:g}, velocity ratio {result.velocity_ratio:g}"
+        f"{result.range_ratio:g}, velocity ratio {result.velocity_ratio:g}, boundary "
+        f"{result.boundary},\n{result.num_windows} windows of {result.physics} physics"
     )
 
 

@@ -12,6 +12,7 @@ from swarm_mj.policies import Policy, make_policy
 from swarm_mj.provenance import code_digest, commit, version
 from swarm_mj.swarm import MAX_SEED
 
+MAX_EPISODES = 100_000
 BATCH_SIZE = 25  # missions side by side: as fast as many, and little lost by an interruption
 
 
@@ -33,8 +34,8 @@ class Study:
     def __post_init__(self) -> None:
         if not self.policies or not self.regimes:
             raise ValueError("an evaluation needs at least 1 policy and 1 regime")
-        if self.episodes < 1:
-            raise ValueError(f"episodes must be 1 or more, not {self.episodes}")
+        if not 1 <= self.episodes <= MAX_EPISODES:
+            raise ValueError(f"episodes must be from 1 to {MAX_EPISODES}, not {self.episodes}")
         if not 0 <= self.seed <= MAX_SEED - self.episodes + 1:
             raise ValueError(
                 f"seed must be from 0 to {MAX_SEED - self.episodes + 1}, the last of "

@@ -128,7 +128,8 @@ def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, its: Sequence[Curv
     axes.set_xscale(figure.x_scale)
     axes.set_yscale(panel.scale)
     x = np.concatenate([curve.x for curve in its])
-    y = np.concatenate([curve.mean for curve in its])
+    y = np.concatenate([curve.mean + way * curve.sem for curve in its for way in (-1.0, 0.0, 1.0)])
+    y = y[(y > 0.0) if panel.scale == "log" else np.isfinite(y)]
     axes.set_xlim(*_widened(x, 0.03, figure.x_scale))
     axes.set_ylim(*_widened(y, HEADROOM, panel.scale))
     axes.xaxis.set_major_locator(FixedLocator(np.unique(x).tolist()))

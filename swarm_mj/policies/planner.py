@@ -103,7 +103,7 @@ class _Team(ABC):
             self._epoch = epoch
             self._begin_epoch(views.buffers, b, now)
         if not self._plans:
-            return self._discover(int(now), np.ones(len(self._order), dtype=np.bool_))
+            return self._discover(int(now))
         return self._fly_plans(int(now), window)
 
     def _listen(self, heard: Int[np.ndarray, "N"], now: float) -> None:
@@ -124,7 +124,7 @@ class _Team(ABC):
             buffers.position_m[b],
             buffers.velocity_mps[b],
             buffers.timestamp[b],
-            buffers.is_known[b] | (self._everyone[:, None] == self._everyone),
+            buffers.is_known[b],
             now,
             self._window_s,
             epochs_ahead * self._epoch_windows,
@@ -136,20 +136,19 @@ class _Team(ABC):
         for key, holds in self._holders().items():
             scheduled = self._plans[key].recipient[window]
             if not self._plans[key].is_complete and now % DISCOVERY_EVERY == 0:
-                scheduled = self._discover(now // DISCOVERY_EVERY, holds)
+                scheduled = self._discover(now // DISCOVERY_EVERY)
             recipient[holds] = scheduled[holds]
         return recipient
 
-    def _discover(self, turn: int, may_speak: Bool[np.ndarray, "N"]) -> Int[np.ndarray, "N"]:
+    def _discover(self, turn: int) -> Int[np.ndarray, "N"]:
         """The robot whose turn it is addresses the neighbour it has longest not heard directly."""
         num_robots = len(self._order)
         speaker = self._order[turn % num_robots]
         recipient = self._everyone.copy()
-        if may_speak[speaker]:
-            directly = self._directly[speaker]
-            stalest = int(np.argmin(np.where(directly > NEVER, directly, np.inf)))
-            anyone = self._order[(turn + 1) % num_robots]
-            recipient[speaker] = stalest if directly[stalest] > NEVER else anyone
+        directly = self._directly[speaker]
+        stalest = int(np.argmin(np.where(directly > NEVER, directly, np.inf)))
+        anyone = self._order[(turn + 1) % num_robots]
+        recipient[speaker] = stalest if directly[stalest] > NEVER else anyone
         return recipient
 
 

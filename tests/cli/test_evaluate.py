@@ -164,7 +164,7 @@ def test_one_mission_of_one_window_has_results(swarm_mj, tmp_path):
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        (["--episodes", "0"], "episodes must be 1 or more, not 0"),
+        (["--episodes", "0"], "episodes must be from 1 to 100000, not 0"),
         (["--jobs", "0"], "jobs must be from 1 to 256, not 0"),
         (["--robots", "10", "1"], "a whole number from 2 to 1000 [robots], not 1"),
         (["--preset", "mine"], "preset must be one of paper, reference, not 'mine'"),
