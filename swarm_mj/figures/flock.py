@@ -91,7 +91,7 @@ def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
         _draw(left, mission, start, colours)
         _draw(right, mission, end, colours)
         _frame((left, right), np.concatenate([start.position_m, end.position_m]))
-        drawing.colorbar(colours, cax=bar, label="from the team's mean velocity [m/s]")
+        drawing.colorbar(colours, cax=bar, label="distance from the team's mean velocity [m/s]")
         _write(drawing, mission, policy_name, seed)
     return drawing
 
