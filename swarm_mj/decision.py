@@ -1,0 +1,84 @@
+"""From a network's numbers to a decision (III-C): logits over recipients, silence among them."""
+
+from typing import no_type_check
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
+from numba import njit
+from torch import Tensor
+
+IMPOSSIBLE = -1e9  # the logit of a recipient that may not be addressed; finite, so that 0 p stays 0
+
+
+def recipient_logits(
+    output: Float[Tensor, "R N O"],
+    owner: Int[Tensor, "R"],
+    may_address: Bool[Tensor, "R N"],
+    silence_logit: float = 0.0,
+) -> Float[Tensor, "R N"]:
+    """Logits over whom each robot addresses; oneself is silence.
+
+    With one number per node it is the node's logit. With two, as in the authors' code, they are the
+    logits of addressing it at full and at zero power; all that send nothing count together.
+
+    Args:
+        output: The network's numbers, O is 1 or 2.
+        owner: The robot of each row.
+        may_address: Recipients to choose among; the owner's own entry is always one.
+        silence_logit: Added to silence.
+
+    Returns:
+        The logits; `IMPOSSIBLE` where `may_address` is False.
+    """
+    own = owner[:, None]
+    logits = output[:, :, 0]
+    if output.shape[2] > 1:
+        unsent = torch.cat([output[:, :, 1], logits.gather(1, own)], dim=1)
+        logits = logits.scatter(1, own, torch.logsumexp(unsent, dim=1, keepdim=True))
+    if silence_logit:
+        bias = torch.full_like(own, 0, dtype=logits.dtype) + silence_logit
+        logits = logits.scatter_add(1, own, bias)
+    return logits.masked_fill(~may_address, IMPOSSIBLE)
+
+
+def sample(
+    logits: Float[np.ndarray, "R N"], uniform: Float[np.ndarray, "R"]
+) -> Int[np.ndarray, "R"]:
+    """A recipient from each row's Boltzmann distribution, by its cumulated probabilities.
+
+    Args:
+        logits: Over recipients.
+        uniform: One number in [0, 1) a row; the same number is the same decision.
+
+    Returns:
+        The recipients.
+    """
+    chosen = np.empty(logits.shape[0], dtype=np.int64)
+    _sample(logits, uniform, chosen)
+    return chosen
+
+
+@njit(cache=True)
+@no_type_check
+def _sample(
+    logits: Float[np.ndarray, "R N"],
+    uniform: Float[np.ndarray, "R"],
+    chosen: Int[np.ndarray, "R"],
+) -> None:
+    num_rows, num_nodes = logits.shape
+    weight = np.empty(num_nodes)
+    for r in range(num_rows):
+        highest = logits[r].max()
+        total = 0.0
+        for k in range(num_nodes):
+            weight[k] = np.exp(logits[r, k] - highest)
+            total += weight[k]
+        left = uniform[r] * total
+        chosen[r] = 0
+        for k in range(num_nodes):
+            if weight[k] > 0.0:
+                chosen[r] = k  # the last possible one, should rounding leave a rest
+                left -= weight[k]
+                if left < 0.0:
+                    break

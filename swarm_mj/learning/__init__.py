@@ -1,0 +1,1 @@
+"""Training (III-C): stable-baselines3's PPO over batched missions."""

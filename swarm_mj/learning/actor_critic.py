@@ -1,0 +1,168 @@
+"""The policies that stable-baselines3's PPO trains: Aggregation GNNs that act and that value."""
+
+from dataclasses import replace
+from typing import Any
+
+import torch
+from gymnasium import spaces
+from jaxtyping import Bool, Float, Int
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.type_aliases import PyTorchObs, Schedule
+from torch import Tensor
+
+from swarm_mj.decision import recipient_logits
+from swarm_mj.gnn import AggregationGnn, GnnShape
+
+
+class GnnActorCritic(ActorCriticPolicy):
+    """Logits over recipients for every robot, and one value for every robot.
+
+    The two come from separate networks (III-C), or, to save time, from one whose last number per
+    node is the value.
+    """
+
+    def __init__(
+        self,
+        observation_space: spaces.Space,
+        action_space: spaces.Space,
+        lr_schedule: Schedule,
+        *,
+        shape: GnnShape,
+        shares_trunk: bool,
+        silence_logit: float,
+        **others: Any,  # noqa: ANN401 - ActorCriticPolicy's own
+    ) -> None:
+        """Makes the networks; what is not named here is stable-baselines3's."""
+        self._shape, self._shares_trunk = shape, shares_trunk
+        self._silence_logit = silence_logit
+        super().__init__(observation_space, action_space, lr_schedule, **others)
+
+    def _build(self, lr_schedule: Schedule) -> None:
+        extra = 1 if self._shares_trunk else 0
+        self.network = AggregationGnn(
+            replace(self._shape, num_outputs=self._shape.num_outputs + extra)
+        )
+        if not self._shares_trunk:
+            self.value_network = AggregationGnn(replace(self._shape, num_outputs=1))
+        self.optimizer = torch.optim.Adam(
+            self.parameters(), lr=lr_schedule(1.0), **self.optimizer_kwargs
+        )
+
+    def acting_network(self) -> AggregationGnn:
+        """A copy of the network that acts, without what values."""
+        with torch.device("meta"):  # draws no random numbers
+            network = AggregationGnn(self._shape)
+        weights = {name: t.detach().cpu().clone() for name, t in self.network.state_dict().items()}
+        for name in ("output.weight", "output.bias"):
+            weights[name] = weights[name][: self._shape.num_outputs].clone()
+        network.load_state_dict(weights, assign=True)
+        return network.requires_grad_(False)
+
+    def take_acting_network(self, given: AggregationGnn) -> None:
+        """Begins with another network's weights; its shape is this one's."""
+        own = self.network.state_dict()
+        with torch.no_grad():
+            for name, tensor in given.state_dict().items():
+                own[name][: len(tensor)].copy_(tensor)
+
+    def _robots(
+        self,
+        node: Float[Tensor, "R N F"],
+        parent: Int[Tensor, "R N"],
+        may_address: Bool[Tensor, "R N"],
+        owner: Int[Tensor, "R"],
+    ) -> tuple[Float[Tensor, "R N"], Float[Tensor, "R N"]]:
+        """Logits over recipients, and a value for every node, of every robot's graph."""
+        output = self.network(node, parent)
+        if self._shares_trunk:
+            values, output = output[:, :, -1], output[:, :, :-1]
+        else:
+            values = self.value_network(node, parent)[:, :, 0]
+        logits = recipient_logits(output, owner, may_address, self._silence_logit)
+        return logits, values
+
+    def logits_and_value(
+        self, obs: PyTorchObs
+    ) -> tuple[Float[Tensor, "E *robots N"], Float[Tensor, "E"]]:
+        """What the decisions of each environment are drawn from, and its value."""
+        assert isinstance(obs, dict)
+        owner = obs["owner"].long()
+        logits, values = self._robots(
+            obs["node"], obs["parent"].long(), obs["may_address"].bool(), owner.squeeze(1)
+        )
+        return logits, values.gather(1, owner).squeeze(1)
+
+    def forward(
+        self,
+        obs: PyTorchObs,
+        deterministic: bool = False,
+    ) -> tuple[Int[Tensor, "E *robots"], Float[Tensor, "E"], Float[Tensor, "E"]]:
+        """Actions, values and the actions' log-probabilities."""
+        logits, value = self.logits_and_value(obs)
+        actions = logits.argmax(-1) if deterministic else gumbel_sample(logits)
+        return actions, value, log_probability(logits, actions)
+
+    def evaluate_actions(
+        self, obs: PyTorchObs, actions: Tensor
+    ) -> tuple[Float[Tensor, "E"], Float[Tensor, "E"], Float[Tensor, "E"]]:
+        """Values, the actions' log-probabilities and entropies."""
+        logits, value = self.logits_and_value(obs)
+        return value, log_probability(logits, actions.long()), entropy(logits)
+
+    def predict_values(self, obs: PyTorchObs) -> Float[Tensor, "E"]:
+        """The environments' values."""
+        return self.logits_and_value(obs)[1]
+
+
+class TeamActorCritic(GnnActorCritic):
+    """A joint decision: its log-probability, entropy and value are sums over the robots (III-C).
+
+    There is one difference between the presets: the paper's value is one scalar per robot, of its
+    own node; the authors' code sums the scalars of all nodes of all robots' graphs.
+    """
+
+    def __init__(self, *spaces_and_schedule: Any, sums_nodes: bool, **others: Any) -> None:  # noqa: ANN401 - GnnActorCritic's
+        """Takes whether all nodes count in the value; the rest is `GnnActorCritic`'s."""
+        self._sums_nodes = sums_nodes
+        super().__init__(*spaces_and_schedule, **others)
+
+    def logits_and_value(
+        self, obs: PyTorchObs
+    ) -> tuple[Float[Tensor, "E *robots N"], Float[Tensor, "E"]]:
+        """What the decisions of each team are drawn from, and its value."""
+        assert isinstance(obs, dict)
+        num_teams, num_robots = obs["may_address"].shape[:2]
+        owner = torch.arange(num_robots, device=obs["node"].device).repeat(num_teams)
+        logits, values = self._robots(
+            obs["node"].flatten(0, 1),
+            obs["parent"].long().flatten(0, 1),
+            obs["may_address"].bool().flatten(0, 1),
+            owner,
+        )
+        shape = (num_teams, num_robots)
+        counted = obs["is_robot"].bool()[:, :, None] & obs["is_robot"].bool()[:, None, :]
+        if not self._sums_nodes:
+            counted = counted & torch.eye(num_robots, dtype=torch.bool, device=counted.device)
+        value = (values.unflatten(0, shape) * counted).flatten(1).sum(1)
+        return logits.unflatten(0, shape), value
+
+
+def gumbel_sample(logits: Float[Tensor, "*rows N"]) -> Int[Tensor, "*rows"]:
+    """A draw from each row's Boltzmann distribution: the largest of logits and Gumbel noise."""
+    exponential = torch.empty_like(logits).exponential_()
+    return (logits - exponential.log()).argmax(-1)
+
+
+def log_probability(
+    logits: Float[Tensor, "E *robots N"], actions: Int[Tensor, "E *robots"]
+) -> Float[Tensor, "E"]:
+    """Of each environment's actions, by Boltzmann distributions; summed over its robots."""
+    chosen = logits.log_softmax(-1).gather(-1, actions[..., None]).squeeze(-1)
+    return chosen.flatten(1).sum(1) if chosen.dim() > 1 else chosen
+
+
+def entropy(logits: Float[Tensor, "E *robots N"]) -> Float[Tensor, "E"]:
+    """Of each environment's Boltzmann distributions [nats]; summed over its robots."""
+    log_p = logits.log_softmax(-1)
+    each = -(log_p.exp() * log_p).sum(-1)
+    return each.flatten(1).sum(1) if each.dim() > 1 else each

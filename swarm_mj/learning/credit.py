@@ -1,0 +1,119 @@
+"""A robot's own credit: what a window's gain would have lost had the robot stayed silent.
+
+The difference reward of Wolpert and Tumer (2001): the window is replayed without the robot, through
+the same channel and by the same protocol. Its sum has the gradient of the team's gain, and a silent
+robot's credit is 0.
+"""
+
+from typing import no_type_check
+
+import numpy as np
+from jaxtyping import Float, Int
+from numba import njit
+
+from swarm_mj.protocol import PHASE, Phase, respondents
+from swarm_mj.radio import Channel
+
+
+def credits_of(
+    timestamp: Float[np.ndarray, "B N N"],
+    position_m: Float[np.ndarray, "B N 2"],
+    recipient: Int[np.ndarray, "B N"],
+    channel: Channel,
+    now: Float[np.ndarray, "B"],
+) -> Float[np.ndarray, "B N"]:
+    """The age that the team would not have lost in a window without each robot.
+
+    Args:
+        timestamp: T at the end of the window before [windows].
+        position_m: Where the robots are in this window [m].
+        recipient: Whom each robot addresses; itself is silence.
+        channel: Who decodes whom.
+        now: t at the start of the window [windows].
+
+    Returns:
+        The credit of every robot, summed over pairs of robots [windows]; it may be negative.
+    """
+    mission, sender = np.nonzero(recipient != np.arange(recipient.shape[1]))
+    alone = recipient[mission]  # one row per sender: everyone's recipients without it
+    alone[np.arange(sender.size), sender] = sender
+    rows = np.concatenate([np.arange(len(now)), mission])
+    gained = gain(
+        timestamp, position_m[rows], np.concatenate([recipient, alone]), channel, now[rows], rows
+    )
+    credit = np.zeros(recipient.shape)
+    credit[mission, sender] = gained[mission] - gained[len(now) :]
+    return credit
+
+
+def gain(
+    timestamp: Float[np.ndarray, "B N N"],
+    position_m: Float[np.ndarray, "W N 2"],
+    recipient: Int[np.ndarray, "W N"],
+    channel: Channel,
+    now: Float[np.ndarray, "W"],
+    mission: Int[np.ndarray, "W"],
+) -> Float[np.ndarray, "W"]:
+    """How much age W windows of Alg. 1 take from what robots know about others.
+
+    Args:
+        timestamp: T before the windows [windows]; left as it is.
+        position_m: Where the robots are [m].
+        recipient: Whom each robot addresses; itself is silence.
+        channel: Who decodes whom.
+        now: t at the start of each window [windows].
+        mission: Which mission's T each window starts from.
+
+    Returns:
+        The sum over pairs of robots of what T rises by [windows].
+    """
+    heard = channel(position_m, recipient)
+    answered = respondents(Phase(recipient=recipient, heard=heard))
+    heard_answer = channel(position_m, answered)
+    gained = np.empty(len(mission))
+    _replay(timestamp, mission, heard, heard_answer, now, PHASE, gained)
+    return gained
+
+
+@njit(cache=True)
+@no_type_check
+def _replay(
+    timestamp: Float[np.ndarray, "B N N"],
+    mission: Int[np.ndarray, "W"],
+    heard: Int[np.ndarray, "W N"],
+    heard_answer: Int[np.ndarray, "W N"],
+    now: Float[np.ndarray, "W"],
+    phase: float,
+    gained: Float[np.ndarray, "W"],
+) -> None:
+    """Timestamps alone, through the two phases: who merges whose packet."""
+    num_robots = timestamp.shape[1]
+    for w in range(mission.shape[0]):
+        before = timestamp[mission[w]].copy()
+        for i in range(num_robots):
+            before[i, i] = now[w] + phase
+        after = before.copy()
+        gained[w] = _merge(before, heard[w], after)
+        for i in range(num_robots):
+            after[i, i] = now[w] + 2 * phase
+        before[...] = after
+        gained[w] += _merge(before, heard_answer[w], after)
+
+
+@njit(cache=True)
+@no_type_check
+def _merge(
+    packet: Float[np.ndarray, "N N"],
+    heard: Int[np.ndarray, "N"],
+    timestamp: Float[np.ndarray, "N N"],
+) -> float:
+    """Newer timestamps win, as in the buffers; returns by how much they rose in sum."""
+    rise = 0.0
+    for i in range(heard.shape[0]):
+        k = heard[i]
+        if k != i:
+            for j in range(heard.shape[0]):
+                if timestamp[i, j] < packet[k, j]:
+                    rise += packet[k, j] - timestamp[i, j]
+                    timestamp[i, j] = packet[k, j]
+    return rise
