@@ -16,6 +16,7 @@ def recipient_logits(
     owner: Int[Tensor, "R"],
     may_address: Bool[Tensor, "R N"],
     silence_logit: float = 0.0,
+    has_turn: Bool[Tensor, "R"] | None = None,
 ) -> Float[Tensor, "R N"]:
     """Logits over whom each robot addresses; oneself is silence.
 
@@ -27,6 +28,7 @@ def recipient_logits(
         owner: The robot of each row.
         may_address: Recipients to choose among; the owner's own entry is always one.
         silence_logit: Added to silence.
+        has_turn: Whose turn it is, so that nothing is added to their silence; None is nobody.
 
     Returns:
         The logits; `IMPOSSIBLE` where `may_address` is False.
@@ -37,7 +39,9 @@ def recipient_logits(
         unsent = torch.cat([output[:, :, 1], logits.gather(1, own)], dim=1)
         logits = logits.scatter(1, own, torch.logsumexp(unsent, dim=1, keepdim=True))
     if silence_logit:
-        bias = torch.full_like(own, 0, dtype=logits.dtype) + silence_logit
+        bias = torch.full_like(own, silence_logit, dtype=logits.dtype)
+        if has_turn is not None:
+            bias = bias.masked_fill(has_turn[:, None], 0.0)
         logits = logits.scatter_add(1, own, bias)
     return logits.masked_fill(~may_address, IMPOSSIBLE)
 

@@ -1,6 +1,6 @@
 """The command line, one file per command.
 
-`swarm-mj fly | evaluate | figures | replay | scene | bench`.
+`swarm-mj fly | evaluate | train | figures | replay | scene | bench`.
 
 Exit codes: 0 done, 2 bad input, 130 interrupted.
 """
@@ -23,7 +23,7 @@ class _Parser(argparse.ArgumentParser):
 
 def make_parser() -> argparse.ArgumentParser:
     """The parser of all commands; imported here, so that Ctrl-C is heard while they load."""
-    from swarm_mj.cli import bench, evaluate, figures, fly, replay, scene
+    from swarm_mj.cli import bench, evaluate, figures, fly, replay, scene, train
     from swarm_mj.provenance import version
 
     parser = _Parser(
@@ -32,7 +32,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"swarm-mj {version()}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for command in (fly, evaluate, figures, replay, scene, bench):
+    for command in (fly, evaluate, train, figures, replay, scene, bench):
         command.add_parser(commands)
     return parser
 

@@ -10,12 +10,14 @@ from rich.table import Table
 from swarm_mj.results import Result
 
 MIN_WIDTH = 100  # of the console; narrower ones wrap lines rather than cut numbers off
+NAME_WIDTH = 22  # of a policy that fits in there; a longer directory's name widens the table
 NONE = "-"
 
 
 def print_results(results: Sequence[Result]) -> None:
     """Prints a table per regime; results of a regime stand together."""
-    width = max(MIN_WIDTH, Console().width)
+    longest = max(len(result.policy) for result in results)
+    width = max(MIN_WIDTH + max(0, longest - NAME_WIDTH), Console().width)
     console = Console(highlight=False, markup=False, width=width)
     for regime, group in groupby(results, _regime):
         of_regime = sorted(group, key=lambda result: result.aoi_mean)

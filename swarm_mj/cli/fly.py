@@ -20,7 +20,7 @@ from swarm_mj.cli.options import add_mission_options, mission_of, new_parser, th
 from swarm_mj.cli.outputs import check_writable
 from swarm_mj.flight import Flown, Summary, fly, summarise
 from swarm_mj.mission import Mission
-from swarm_mj.policies import POLICIES, Policy, make_policy
+from swarm_mj.policies import POLICIES, Policy, is_learned, make_policy, normalised
 from swarm_mj.provenance import commit, version
 from swarm_mj.recorder import Recorder
 from swarm_mj.replay.view import run as run_viewer
@@ -50,12 +50,22 @@ def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no publi
         "Fly one mission and record its replay.",
         epilog="Exit codes: 0 done, 2 bad input, 130 interrupted (what was flown is recorded).",
     )
-    parser.add_argument("--policy", default="mst", help=f"who talks to whom: {', '.join(POLICIES)}")
+    parser.add_argument(
+        "--policy",
+        type=normalised,
+        default="mst",
+        help=f"who talks to whom: {', '.join(POLICIES)}, or a directory with a learned policy",
+    )
     parser.add_argument(
         "--probability",
         type=float,
         default=None,
         help="of a transmission, for policies that have one (default: tuned for the regime)",
+    )
+    parser.add_argument(
+        "--deterministic",
+        action="store_true",
+        help="a learned policy takes the most probable recipient instead of a draw",
     )
     parser.add_argument("--seed", type=int, default=1, help="the same seed is the same mission")
     add_mission_options(parser)
@@ -80,7 +90,7 @@ def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no publi
 def run(options: argparse.Namespace) -> int:
     """Runs the command; returns its exit code."""
     mission = mission_of(options)
-    policy = make_policy(options.policy, mission, options.probability)
+    policy = _make_policy(options, mission)
     path = _check_outputs(options)
     console = Console(stderr=True, highlight=False)
     with console.status("Preparing the swarm (compiles once, then it is cached) ..."):
@@ -95,6 +105,12 @@ def run(options: argparse.Namespace) -> int:
         console.print(f"Interrupted after {len(flight.flown)} of {mission.num_windows} windows.")
         return INTERRUPTED
     return run_viewer(view_command(path)) if options.view and path else DONE
+
+
+def _make_policy(options: argparse.Namespace, mission: Mission) -> Policy:
+    return make_policy(
+        options.policy, mission, options.probability, is_deterministic=options.deterministic
+    )
 
 
 def _check_outputs(options: argparse.Namespace) -> Path | None:
@@ -119,13 +135,21 @@ def _check_outputs(options: argparse.Namespace) -> Path | None:
 def _fresh_name(options: argparse.Namespace) -> Path:
     """A name of this process's own, for flights that start in the same second."""
     when = f"{datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}"
-    return REPLAYS / f"{options.task}-{options.policy}-seed{options.seed}-{when}.rrd"
+    return REPLAYS / f"{options.task}-{_short(options.policy)}-seed{options.seed}-{when}.rrd"
+
+
+def _short(policy: str) -> str:
+    """A policy's name without the path: `x` of runs/x/policy."""
+    if not is_learned(policy):
+        return policy
+    path = Path(policy).resolve()
+    return path.parent.name if path.name == "policy" else path.name
 
 
 def _compile_ahead(options: argparse.Namespace, mission: Mission) -> None:
     """Flies a window of the smallest such mission, so that compiling is not timed as flying."""
     smallest = replace(mission, num_robots=2, range_ratio=10.0, num_windows=1)
-    for _ in fly(Swarm(smallest, [0]), make_policy(options.policy, smallest, options.probability)):
+    for _ in fly(Swarm(smallest, [0]), _make_policy(options, smallest)):
         pass
 
 

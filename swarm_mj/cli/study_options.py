@@ -8,20 +8,29 @@ from typing import Any, get_args
 from swarm_mj.cli.options import DEFAULTS, listed
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import PRESETS, Boundary, Mission, PhysicsMode, Task
-from swarm_mj.policies import POLICIES
+from swarm_mj.policies import POLICIES, normalised
 from swarm_mj.published import BASELINES
 
 
 def add_study_options(parser: argparse.ArgumentParser) -> None:
     """Adds them; those that sweep take several values."""
     _add_several(
-        parser, "--policy", str, BASELINES, f"who talks to whom: {listed(POLICIES)}, or all"
+        parser,
+        "--policy",
+        str,
+        BASELINES,
+        f"who talks to whom: {listed(POLICIES)}, all of these, or directories of learned policies",
     )
     parser.add_argument(
         "--probability",
         type=float,
         default=None,
         help="of a transmission, for policies that have one (default: tuned)",
+    )
+    parser.add_argument(
+        "--deterministic",
+        action="store_true",
+        help="learned policies take the most probable recipient instead of a draw",
     )
     parser.add_argument("--episodes", type=int, default=100, help="missions per regime")
     parser.add_argument(
@@ -43,16 +52,18 @@ def study_of(options: argparse.Namespace) -> Study:
     """
     policies = _several(options, "--policy")
     if "all" in policies:
-        policies = list(dict.fromkeys(name for name in [*policies, *POLICIES] if name != "all"))
+        policies = [name for name in [*policies, *POLICIES] if name != "all"]
+    baseline = options.baseline
     axes = ("--preset", "--task", "--robots", "--velocity-ratio", "--range-ratio")
     regimes = product(*(_several(options, axis) for axis in axes))
     return Study(
-        policies=tuple(policies),
+        policies=tuple(dict.fromkeys(map(normalised, policies))),
         regimes=tuple(_mission(options, *regime) for regime in regimes),
         episodes=options.episodes,
         seed=options.seed,
         probability=options.probability,
-        baseline=options.baseline,
+        is_deterministic=options.deterministic,
+        baseline=None if baseline is None else normalised(baseline),
     )
 
 

@@ -1,25 +1,34 @@
 """`swarm-mj train`: trains a communication policy by PPO on the physics scene."""
 
 import argparse
+import os
 import shlex
 import sys
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
 
 from swarm_mj.cli.interrupt import deferred_interrupt
-from swarm_mj.cli.options import DEFAULTS, listed, new_parser, this_command
-from swarm_mj.graphs.graph import FeatureSet
-from swarm_mj.mission import PRESETS, Boundary, Task
+from swarm_mj.cli.options import DEFAULTS, new_parser, this_command
+from swarm_mj.cli.outputs import check_writable
+from swarm_mj.cli.train_options import add_options
+from swarm_mj.cli.train_progress import Watch, age_of
+from swarm_mj.cli.train_settings import (
+    asked_limits,
+    asked_settings,
+    check_memory,
+    stored_settings,
+)
+from swarm_mj.mission import PRESETS
 
 if TYPE_CHECKING:
-    from swarm_mj.learning.session import Status
+    from swarm_mj.learning.progress import Progress
+    from swarm_mj.learning.run_folder import Run
 
 DONE, INTERRUPTED = 0, 130
-EVERYTHING = 1.0  # the bar's whole
-BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's arm
 
 
 def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no public type
@@ -28,103 +37,138 @@ def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no publi
         commands,
         "train",
         "Train a communication policy by PPO; the best one is OUT/policy.",
-        epilog="A run that was interrupted, or killed, goes on with --out OUT --resume. "
-        "TensorBoard: tensorboard --logdir runs. "
-        "Exit codes: 0 done, 2 bad input, 130 interrupted (all is kept).",
+        epilog="A run that was interrupted, or killed, goes on with --out OUT --resume and ends "
+        "as if it had not been. OUT holds settings.json, curve.csv, tensorboard, policy and "
+        "checkpoint.pt. Exit codes: 0 done, 2 bad input, 130 interrupted (--resume goes on).",
     )
-    parser.add_argument("--out", type=Path, required=True, metavar="runs/NAME", help="the run")
-    parser.add_argument("--resume", action="store_true", help="go on with the run in OUT")
-    parser.add_argument(
-        "--budget", type=int, help="team decisions (default: 200000; 2000000 with arm team)"
-    )
-    parser.add_argument("--minutes", type=float, help="stop after so long, evaluations included")
-    _add_learning_options(parser.add_argument_group("learning"))
-    _add_mission_options(parser.add_argument_group("missions"))
+    add_options(parser)
     parser.set_defaults(run=run)
-
-
-def _add_learning_options(group: Any) -> None:  # noqa: ANN401 - argparse names no public type
-    """What a resumed run takes from its folder; unset means the arm's own."""
-    group.add_argument(
-        "--arm",
-        help="robot (default): every robot is paid its own credit, learns in minutes; team: the "
-        "paper's way",
-    )
-    group.add_argument("--seed", type=int, help="the same seed is the same policy (default: 0)")
-    group.add_argument(
-        "--features",
-        help=f"{listed(get_args(FeatureSet))} (default: extended; the preset's own with arm team)",
-    )
-    group.add_argument("--receptive-field", type=int, help="K, message passes (default: 1; team 5)")
-    group.add_argument("--latent", type=int, help="width of every layer (default: 32; team 64)")
-    group.add_argument("--linear", action="store_true", default=None, help="the linear variant")
-    group.add_argument("--reward", help="aoi (default), or velocity-variance with arm team")
-    group.add_argument(
-        "--missions", type=int, help="side by side, a multiple of 4 (default: 16; team 32)"
-    )
-    group.add_argument("--init", type=Path, metavar="POLICY", help="begin with a stored policy")
-    group.add_argument("--evaluate-every", type=int, help="team decisions (default: 10000)")
-    group.add_argument("--replay-every", type=int, help="team decisions between two replays")
-    group.add_argument("--learning-rate", type=float, help="of Adam, at the start")
-    group.add_argument("--entropy", type=float, help="weight of the entropy bonus")
-    group.add_argument("--discount", type=float, help="gamma (default: 0; team 0.99)")
-    group.add_argument("--threads", type=int, help="torch's (default: 1)")
-
-
-def _add_mission_options(group: Any) -> None:  # noqa: ANN401 - argparse names no public type
-    group.add_argument("--task", help=f"{listed(get_args(Task))} (default: stationary)")
-    group.add_argument("--preset", help=f"{listed(PRESETS)} (default: paper)")
-    group.add_argument(
-        "--robots", type=int, nargs="+", help="size of the team; several are trained on together"
-    )
-    group.add_argument("--range-ratio", type=float, help=f"(default: {DEFAULTS.range_ratio})")
-    group.add_argument("--velocity-ratio", type=float, help=f"(default: {DEFAULTS.velocity_ratio})")
-    group.add_argument("--windows", type=int, help=f"per mission (default: {DEFAULTS.num_windows})")
-    group.add_argument("--boundary", help=f"{listed(get_args(Boundary))} (default: the preset's)")
 
 
 def run(options: argparse.Namespace) -> int:
     """Runs the command; returns its exit code."""
-    console = Console(stderr=True, highlight=False)
-    with console.status("Preparing (torch takes its time; compiles once) ..."):
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    with console.status("Preparing (torch takes its time to load) ..."):
+        asked = _asked_run(options)
         from swarm_mj.learning.run import train
-        from swarm_mj.learning.session import POLICY, Limits
-        from swarm_mj.policies.stored import read_policy
+    try:
+        with deferred_interrupt() as is_interrupted:
+            with Watch(console, asked.limits, is_interrupted) as watch:
+                progress = train(
+                    asked.training,
+                    options.out,
+                    asked.limits,
+                    listener=watch,
+                    init=asked.init,
+                    is_resumed=options.resume,
+                    command=asked.command,
+                )
+            is_over = not watch.has_stopped
+            _print(options.out, asked, progress, is_over=is_over)
+    except KeyboardInterrupt:
+        go_on = _resume_command(options.out)
+        console.print(f"Broken off; the last checkpoint is kept.\nGo on:    {go_on}", markup=False)
+        return INTERRUPTED
+    if not is_over:
+        console.print(f"Interrupted after {progress.decisions:,} decisions; all is kept.")
+    return DONE if is_over else INTERRUPTED
 
-        init = read_policy(options.init)[0] if options.init else None
-        training = _stored(options) if options.resume else _asked(options)
-        _check(options, training, init)
-    limits = Limits(
-        decisions=options.budget or (None if options.minutes else BUDGETS[training.arm]),
-        minutes=options.minutes,
-        replay_every=options.replay_every,
+
+def _asked_run(options: argparse.Namespace) -> "Run":
+    """What the options ask for; raises ValueError before anything is written."""
+    from swarm_mj.learning.run_folder import SETTINGS, Run, check_new, read_run
+    from swarm_mj.policies.stored import read_policy
+
+    if options.resume:
+        stored = read_run(options.out)
+        training = stored_settings(options, stored.training)
+        limits = asked_limits(options, training.arm, stored.limits)
+        asked = replace(stored, training=training, limits=limits)
+    else:
+        check_new(options.out)
+        init = read_policy(options.init)[1] if options.init else None
+        training = asked_settings(options, init)
+        limits = asked_limits(options, training.arm)
+        command = shlex.join(["swarm-mj", *sys.argv[1:]])
+        asked = Run(training=training, limits=limits, command=command, init=options.init)
+    check_writable(options.out / SETTINGS, "run")
+    check_memory(asked.training, _memory_bytes())
+    return asked
+
+
+def _memory_bytes() -> int | None:
+    """This machine's memory, if it tells."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):
+        return None
+
+
+def _print(out: Path, asked: "Run", progress: "Progress", *, is_over: bool) -> None:
+    """Prints what the run came to, and what to do with it."""
+    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console.print(_table(out, asked, progress))
+    for label, line in _next_commands(out, asked, progress, is_over=is_over):
+        console.print(f"{label:10}{line}")
+
+
+def _table(out: Path, asked: "Run", progress: "Progress") -> Table:
+    training = asked.training
+    sizes = ", ".join(map(str, training.robots))
+    table = Table(
+        title=f"{out}: arm {training.arm}, {training.mission.task}, {sizes} robots",
+        title_justify="left",
+        show_header=False,
     )
-    bar = Progress(
-        TextColumn("Training"),
-        BarColumn(),
-        TextColumn("{task.fields[text]}"),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-    )
-    with deferred_interrupt() as is_interrupted, bar:
-        task = bar.add_task("train", total=EVERYTHING, text="")
-
-        def listen(status: "Status") -> bool:
-            _show(bar, task, status, limits.decisions, limits.minutes)
-            return not is_interrupted()
-
-        progress = train(
-            training,
-            options.out,
-            limits,
-            listener=listen,
-            init=init,
-            is_resumed=options.resume,
-            command=shlex.join(["swarm-mj", *sys.argv[1:]]),
+    best = progress.best
+    if best is not None:
+        table.add_row("held-out age, at first", f"{age_of(progress.curve[0])} windows")
+        table.add_row(
+            "held-out age, best policy",
+            f"{age_of(best)} windows, after {best['decisions']:,.0f} decisions",
         )
-        was_interrupted = is_interrupted()
-    Console(highlight=False, soft_wrap=True, markup=False).print(
-        "todo", progress, POLICY, this_command()
-    )
-    return INTERRUPTED if was_interrupted else DONE
+        if training.reward == "velocity-variance":
+            first, last = (row["velocity_variance"] for row in (progress.curve[0], best))
+            table.add_row("velocity variance, of these", f"{first:.4f}, {last:.4f} m²/s²")
+    table.add_row("decisions", f"{progress.decisions:,}")
+    table.add_row("minutes", f"{progress.minutes:.1f}")
+    table.add_row("best policy", str(out / "policy") if best else "none yet")
+    return table
+
+
+def _next_commands(
+    out: Path, asked: "Run", progress: "Progress", *, is_over: bool
+) -> list[tuple[str, str]]:
+    """What to do next, and the commands that do it."""
+    name, policy, mission = this_command(), shlex.quote(str(out / "policy")), _mission_flags(asked)
+    lines = [
+        ("Watch:", f"{this_command('tensorboard')} --logdir {shlex.quote(str(out))}"),
+        ("Go on:", _resume_command(out, 2 * progress.decisions if is_over else None)),
+    ]
+    if progress.best is None:
+        return lines
+    return [
+        ("Fly:", f"{name} fly --policy {policy} {mission}"),
+        ("Evaluate:", f"{name} evaluate --policy {policy} tdma {mission}"),
+        *lines,
+    ]
+
+
+def _mission_flags(asked: "Run") -> str:
+    """The options that name the missions trained on, for commands whose defaults are others."""
+    mission, training = asked.training.mission, asked.training
+    values = {
+        "--task": (mission.task, None),
+        "--preset": (mission.preset, DEFAULTS.preset),
+        "--robots": (training.robots[0], DEFAULTS.num_robots),
+        "--range-ratio": (mission.range_ratio, DEFAULTS.range_ratio),
+        "--velocity-ratio": (mission.velocity_ratio, DEFAULTS.velocity_ratio),
+        "--windows": (mission.num_windows, DEFAULTS.num_windows),
+        "--boundary": (mission.boundary, PRESETS[mission.preset](mission.task).boundary),
+    }
+    return " ".join(f"{flag} {value}" for flag, (value, usual) in values.items() if value != usual)
+
+
+def _resume_command(out: Path, budget: int | None = None) -> str:
+    more = "" if budget is None else f" --budget {budget}"
+    return f"{this_command()} train --out {shlex.quote(str(out))} --resume{more}"

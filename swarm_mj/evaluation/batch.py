@@ -11,6 +11,7 @@ from swarm_mj.connectivity import ConnectivityFloor
 from swarm_mj.flight import Flown, fly
 from swarm_mj.mission import Mission
 from swarm_mj.policies import make_policy
+from swarm_mj.policies.policy import Parameters
 from swarm_mj.protocol import PHASE
 from swarm_mj.swarm import Swarm
 
@@ -19,8 +20,10 @@ from swarm_mj.swarm import Swarm
 class Batch:
     """The work of one process at a time."""
 
-    policy: str  # a name among `POLICIES`
+    policy: str  # a name among `POLICIES`, or a directory
     probability: float | None  # of a transmission; None is the policy's own
+    is_deterministic: bool = False  # a learned policy takes its most probable recipient
+    parameters: Parameters | None = None  # what it must have, where that is known
     mission: Mission
     seeds: tuple[int, ...]  # one per mission
 
@@ -47,10 +50,20 @@ def fly_batch(batch: Batch) -> BatchCosts:
     A mission's costs depend on its own seed, not on the missions beside it.
 
     Raises:
-        ValueError: Unknown policy, a bad seed, or no connected team could be drawn.
+        ValueError: Unknown policy, one that has changed, a bad seed, or no connected team could be
+            drawn.
     """
     swarm = Swarm(batch.mission, batch.seeds)
-    policy = make_policy(batch.policy, batch.mission, batch.probability)
+    policy = make_policy(
+        batch.policy,
+        batch.mission,
+        batch.probability,
+        is_deterministic=batch.is_deterministic,
+    )
+    if batch.parameters is not None and policy.parameters != batch.parameters:
+        raise ValueError(
+            f"policy {batch.policy} has changed since the evaluation began; evaluate a copy of it"
+        )
     tally = Tally(swarm)
     for flown in fly(swarm, policy):
         tally.add(flown)

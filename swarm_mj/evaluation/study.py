@@ -8,7 +8,8 @@ from typing import Any
 
 from swarm_mj.evaluation.batch import Batch
 from swarm_mj.mission import Mission
-from swarm_mj.policies import Policy, make_policy
+from swarm_mj.policies import Policy, is_learned, make_policy
+from swarm_mj.policies.policy import Parameters
 from swarm_mj.provenance import code_digest, commit, version
 from swarm_mj.swarm import MAX_SEED
 
@@ -24,11 +25,12 @@ class Study:
         ValueError: Nothing to evaluate, an unknown policy, or a number out of range.
     """
 
-    policies: tuple[str, ...]  # names among `POLICIES`
+    policies: tuple[str, ...]  # names among `POLICIES`, or directories of learned ones
     regimes: tuple[Mission, ...]
     episodes: int = 100  # missions of each policy in each regime
     seed: int = 1000  # of the first mission; the others follow one by one
     probability: float | None = None  # of a transmission; None is each policy's own
+    is_deterministic: bool = False  # whether learned policies take the most probable recipient
     baseline: str | None = None  # whom the others are compared to; None is the first policy
 
     def __post_init__(self) -> None:
@@ -41,8 +43,12 @@ class Study:
                 f"seed must be from 0 to {MAX_SEED - self.episodes + 1}, the last of "
                 f"{self.episodes} episodes included, not {self.seed}"
             )
-        for regime, policy in self.pairs:
-            self.make_policy(policy, regime)
+        if self.is_deterministic and not any(map(is_learned, self.policies)):
+            raise ValueError(
+                "only learned policies can be deterministic, and none is among "
+                f"{', '.join(self.policies)}; leave it out, or add one"
+            )
+        _ = self.parameters  # makes every policy, so that a bad one is refused now
         if len(set(self.pairs)) < len(self.pairs):
             raise ValueError("an evaluation needs each policy and each regime once")
         if self.baseline is not None and self.baseline not in self.policies:
@@ -69,6 +75,8 @@ class Study:
             Batch(
                 policy=policy,
                 probability=self.probability,
+                is_deterministic=self.is_deterministic and is_learned(policy),
+                parameters=self.parameters[regime, policy],
                 mission=regime,
                 seeds=tuple(seeds[start : start + BATCH_SIZE]),
             )
@@ -76,14 +84,19 @@ class Study:
             for start in range(0, self.episodes, BATCH_SIZE)
         )
 
+    @cached_property
+    def parameters(self) -> dict[tuple[Mission, str], Parameters]:
+        """What each policy was made with in each regime when the study began."""
+        return {pair: self.make_policy(pair[1], pair[0]).parameters for pair in self.pairs}
+
     def make_policy(self, policy: str, regime: Mission) -> Policy:
         """A policy as it is evaluated in a regime."""
-        return make_policy(policy, regime, self.probability)
+        is_deterministic = self.is_deterministic and is_learned(policy)
+        return make_policy(policy, regime, self.probability, is_deterministic=is_deterministic)
 
     def config(self, policy: str, regime: Mission) -> dict[str, Any]:
         """All that a policy's missions in a regime depend on, but for their seeds."""
-        parameters = self.make_policy(policy, regime).parameters
-        return {**asdict(regime), "policy": policy, **parameters}
+        return {**asdict(regime), "policy": policy, **self.parameters[regime, policy]}
 
     def header(self) -> dict[str, Any]:
         """All that the batches' costs depend on, as JSON gives it back."""

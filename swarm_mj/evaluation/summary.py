@@ -88,7 +88,7 @@ def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
         *("task", "preset", "num_robots", "range_ratio", "velocity_ratio"),
         *("boundary", "physics", "num_windows"),
     )
-    parameters = study.make_policy(policy, regime).parameters
+    parameters = study.parameters[regime, policy]
     return {name: getattr(regime, name) for name in names} | {
         "policy": policy,
         "episodes": study.episodes,

@@ -16,8 +16,10 @@ from swarm_mj.graphs.memory import Memory
 from swarm_mj.graphs.turns import write_turns
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import LocalViews
+from swarm_mj.policies.spatial_tdma import write_joined
+from swarm_mj.radio import from_db
 
-TURN_RADII = (1.0, 1.5, 2.0, 3.0)  # [ranges]
+TURN_RADII = (1.5, 2.0, 3.0)  # [ranges]
 ADDRESS_RANGES = 1.2  # a teammate believed farther away is not worth addressing [ranges]
 LONG_WINDOWS = 500.0  # ages count by their logarithm, up to 1 at this one [windows]
 FAR_RANGES = 4.0  # distances count up to here [ranges]
@@ -44,18 +46,19 @@ class ExtendedObserver:
         "news to it, by its last packet",  # of oneself: to all in range together
         "news to it, if it heard what was said last",  # as above
         "rank of its turn",
-        "has a turn, 1 range apart",
         "has a turn, 1.5 ranges apart",
         "has a turn, 2 ranges apart",
         "has a turn, 3 ranges apart",
+        "has a turn, by interference",
         "neighbours",
         "share of the team known",
         "size of the team",
     )
 
     def __init__(self, mission: Mission) -> None:
-        """Takes the radio's range from the mission."""
+        """Takes the radio's range and threshold from the mission."""
         self._range_m = mission.range_m
+        self._threshold = from_db(mission.sinr_threshold_db)
         self._radius_m = mission.range_m * np.array(TURN_RADII)
 
     def start(self, num_missions: int, num_robots: int) -> None:
@@ -80,15 +83,26 @@ class ExtendedObserver:
             memory.neighbour,
             memory.said,
             self._range_m,
-            self._radius_m,
             node,
             may_address,
+        )
+        has_joined = node[..., 14]  # by the rule of spatial TDMA
+        is_known = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
+        write_turns(buffers.position_m, is_known, views.now, self._radius_m, node[..., 11:14])
+        write_joined(
+            buffers.position_m,
+            is_known,
+            views.now.astype(np.int64),
+            self._range_m,
+            self._threshold,
+            has_joined,
         )
         rows = (num_missions * num_robots, num_robots)
         return Graphs(
             node=node.reshape(*rows, len(self.names)),
             parent=buffers.parent.reshape(rows),
             may_address=may_address.reshape(rows),
+            has_turn=np.diagonal(has_joined, axis1=1, axis2=2).reshape(-1) > 0.0,
         )
 
 
@@ -137,12 +151,10 @@ def _fill(
     neighbour: Float32[np.ndarray, "B N N N"],
     said: Float32[np.ndarray, "B N N"],
     range_m: float,
-    radius_m: Float[np.ndarray, "radii"],
     node: Float32[np.ndarray, "B N N F"],
     may_address: Bool[np.ndarray, "B N N"],
 ) -> None:
     num_missions, num_robots = now.shape[0], timestamp.shape[1]
-    taken = np.empty(num_robots, dtype=np.int64)
     for b in range(num_missions):
         for i in range(num_robots):
             is_known = timestamp[b, i] > NEVER
@@ -151,9 +163,6 @@ def _fill(
                 b, i, timestamp, position_m, is_known, last_attempt, now[b], heard, addressed_by,
                 neighbour, said, range_m, node[b, i], may_address[b, i],
             )  # fmt: skip
-            write_turns(
-                position_m[b, i], is_known, int(now[b]), radius_m, taken, node[b, i, :, 11:15]
-            )
             _fill_oneself(i, _log_age(now[b], sent[b, i]), node[b, i])
             may_address[b, i, i] = True
 

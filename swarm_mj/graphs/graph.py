@@ -5,7 +5,7 @@ of mission `b`.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal, Protocol
+from typing import ClassVar, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float32, Int
@@ -25,8 +25,10 @@ class Graphs:
     node: Float32[np.ndarray, "R N F"]  # V: features, normalised
     parent: Int[np.ndarray, "R N"]  # P: the node that k's state came over first, or NO_PARENT
     may_address: Bool[np.ndarray, "R N"]  # recipients worth a thought; oneself, silence, always is
+    has_turn: Bool[np.ndarray, "R"]  # whether a common order lets the robot speak now
 
 
+@runtime_checkable
 class Observer(Protocol):
     """Makes graphs of local views; one that remembers packets must see every window."""
 
@@ -128,4 +130,5 @@ def everyone_addressable(node: Float32[np.ndarray, "B N N F"], buffers: Buffers)
         node=node.reshape(*rows, num_features),
         parent=buffers.parent.reshape(rows),
         may_address=np.ones(rows, dtype=np.bool_),
+        has_turn=np.zeros(rows[0], dtype=np.bool_),
     )

@@ -70,6 +70,7 @@ class GnnActorCritic(ActorCriticPolicy):
         node: Float[Tensor, "R N F"],
         parent: Int[Tensor, "R N"],
         may_address: Bool[Tensor, "R N"],
+        has_turn: Bool[Tensor, "R"],
         owner: Int[Tensor, "R"],
     ) -> tuple[Float[Tensor, "R N"], Float[Tensor, "R N"]]:
         """Logits over recipients, and a value for every node, of every robot's graph."""
@@ -78,7 +79,7 @@ class GnnActorCritic(ActorCriticPolicy):
             values, output = output[:, :, -1], output[:, :, :-1]
         else:
             values = self.value_network(node, parent)[:, :, 0]
-        logits = recipient_logits(output, owner, may_address, self._silence_logit)
+        logits = recipient_logits(output, owner, may_address, self._silence_logit, has_turn)
         return logits, values
 
     def logits_and_value(
@@ -88,7 +89,11 @@ class GnnActorCritic(ActorCriticPolicy):
         assert isinstance(obs, dict)
         owner = obs["owner"].long()
         logits, values = self._robots(
-            obs["node"], obs["parent"].long(), obs["may_address"].bool(), owner.squeeze(1)
+            obs["node"],
+            obs["parent"].long(),
+            obs["may_address"].bool(),
+            obs["has_turn"].bool().squeeze(1),
+            owner.squeeze(1),
         )
         return logits, values.gather(1, owner).squeeze(1)
 
@@ -108,6 +113,11 @@ class GnnActorCritic(ActorCriticPolicy):
         """Values, the actions' log-probabilities and entropies."""
         logits, value = self.logits_and_value(obs)
         return value, log_probability(logits, actions.long()), entropy(logits)
+
+    def _predict(
+        self, observation: PyTorchObs, deterministic: bool = False
+    ) -> Int[Tensor, "E *robots"]:
+        return self(observation, deterministic)[0]
 
     def predict_values(self, obs: PyTorchObs) -> Float[Tensor, "E"]:
         """The environments' values."""
@@ -137,6 +147,7 @@ class TeamActorCritic(GnnActorCritic):
             obs["node"].flatten(0, 1),
             obs["parent"].long().flatten(0, 1),
             obs["may_address"].bool().flatten(0, 1),
+            obs["has_turn"].bool().flatten(),
             owner,
         )
         shape = (num_teams, num_robots)

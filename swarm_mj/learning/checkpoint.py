@@ -4,8 +4,8 @@ One file of tensors, numbers and strings. It is read without running code from i
 or not there.
 """
 
+import io
 import json
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,29 +14,24 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
+from swarm_mj.learning import progress as progresses
 from swarm_mj.learning.env import MissionsEnv
 from swarm_mj.learning.missions import Course
+from swarm_mj.learning.progress import Progress
+from swarm_mj.learning.settings import Training
 from swarm_mj.whole_file import whole_file
 
 CHECKPOINT_VERSION = 1
 
 
-@dataclass(kw_only=True)
-class Progress:
-    """Where a run stands, beside PPO's own state."""
-
-    minutes: float = 0.0  # of training, evaluations included, over all sessions
-    next_evaluation: int = 0  # team decisions
-    next_replay: int = 0  # team decisions
-    best_objective: float = float("inf")
-    curve: list[dict[str, float]] = field(default_factory=list)  # one row an evaluation
-
-
-def save(path: Path, model: PPO, rng: np.random.Generator, progress: Progress) -> None:
+def save(
+    path: Path, training: Training, model: PPO, rng: np.random.Generator, progress: Progress
+) -> None:
     """Writes a checkpoint; call it between rollouts.
 
     Args:
         path: The file.
+        training: The run's settings.
         model: Its environment is a `MissionsEnv`, normalised or not.
         rng: Draws the missions' seeds.
         progress: Kept along.
@@ -44,10 +39,10 @@ def save(path: Path, model: PPO, rng: np.random.Generator, progress: Progress) -
     Raises:
         OSError: The file cannot be written.
     """
-    env = missions_of(model)
-    courses = [group.course() for group in env.groups]
+    courses = [group.course() for group in missions_of(model).groups]
     state: dict[str, Any] = {
         "version": CHECKPOINT_VERSION,
+        "training": json.dumps(training.to_json()),
         "policy": model.policy.state_dict(),
         "optimizer": model.policy.optimizer.state_dict(),
         "num_timesteps": model.num_timesteps,
@@ -63,29 +58,75 @@ def save(path: Path, model: PPO, rng: np.random.Generator, progress: Progress) -
         ],
         "reward_normaliser": _normaliser_state(model),
         "torch_rng": torch.get_rng_state(),
+        "cuda_rng": torch.cuda.get_rng_state(model.device) if _is_on_cuda(model) else None,
         "numpy_rng": _legacy_numpy_state(),
         "seeds_rng": json.dumps(rng.bit_generator.state),
-        "progress": json.dumps(vars(progress)),
+        "progress": progress.to_json(),
     }
+    content = io.BytesIO()
+    torch.save(state, content)
     with whole_file(path) as part:
-        torch.save(state, part)
+        part.write_bytes(content.getbuffer())
 
 
-def load(path: Path, model: PPO, rng: np.random.Generator) -> Progress:
+def load(path: Path, training: Training, model: PPO, rng: np.random.Generator) -> Progress:
     """Puts a run back to where a checkpoint was made.
 
     Args:
         path: The file.
-        model: Of the same settings; it and its missions are changed.
+        training: The run's settings.
+        model: Made of these settings; it and its missions are changed.
         rng: As in `save`; changed.
 
     Returns:
         The progress.
 
     Raises:
-        ValueError: The file is damaged, foreign, or of a newer version.
+        ValueError: The file is damaged, foreign, of a newer version or of other settings.
+        OSError: The file cannot be read.
     """
     state = _read(path)
+    try:
+        if json.loads(state["training"]) != json.loads(json.dumps(training.to_json())):
+            raise ValueError("it was made with other settings than the run's")
+        return _restore(state, model, rng)
+    except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise ValueError(
+            f"checkpoint {path} is damaged, or another run's ({reason}); begin a new run with "
+            "another --out"
+        ) from error
+
+
+def missions_of(model: PPO) -> MissionsEnv:
+    """The environment inside what may be wrapped around it."""
+    env = model.get_env()
+    inner = env.unwrapped if env is not None else None
+    assert isinstance(inner, MissionsEnv)
+    return inner
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Raises ValueError for what is no checkpoint of this version."""
+    try:
+        state = torch.load(path, map_location="cpu", weights_only=True)
+    except OSError:
+        raise
+    except Exception as error:  # torch names no exception of its own for damaged files
+        raise ValueError(
+            f"checkpoint {path} is damaged, or none; begin a new run with another --out"
+        ) from error
+    if not isinstance(state, dict) or "version" not in state:
+        raise ValueError(f"{path} is no checkpoint of swarm-mj train")
+    if state["version"] != CHECKPOINT_VERSION:
+        raise ValueError(
+            f"checkpoint {path} has version {state['version']!r:.40}, and this swarm_mj reads "
+            f"{CHECKPOINT_VERSION}; resume with the version that wrote it"
+        )
+    return state
+
+
+def _restore(state: dict[str, Any], model: PPO, rng: np.random.Generator) -> Progress:
     model.policy.load_state_dict(state["policy"])
     model.policy.optimizer.load_state_dict(state["optimizer"])
     model.num_timesteps = state["num_timesteps"]
@@ -105,35 +146,15 @@ def load(path: Path, model: PPO, rng: np.random.Generator) -> Progress:
     model._last_episode_starts = state["episode_starts"].numpy()
     _restore_normaliser(model, state["reward_normaliser"])
     torch.set_rng_state(state["torch_rng"])
+    if state["cuda_rng"] is not None and _is_on_cuda(model):
+        torch.cuda.set_rng_state(state["cuda_rng"], model.device)
     _restore_legacy_numpy(state["numpy_rng"])
     rng.bit_generator.state = json.loads(state["seeds_rng"])
-    return Progress(**json.loads(state["progress"]))
+    return progresses.from_json(state["progress"])
 
 
-def missions_of(model: PPO) -> MissionsEnv:
-    """The environment inside what may be wrapped around it."""
-    env = model.get_env()
-    inner = env.unwrapped if env is not None else None
-    assert isinstance(inner, MissionsEnv)
-    return inner
-
-
-def _read(path: Path) -> dict[str, Any]:
-    """Raises ValueError for what is no checkpoint."""
-    try:
-        state = torch.load(path, weights_only=True)
-    except OSError:
-        raise
-    except Exception as error:  # torch names no exception of its own for damaged files
-        raise ValueError(f"checkpoint {path} is damaged or none: {error}") from error
-    if not isinstance(state, dict) or "version" not in state:
-        raise ValueError(f"{path} is no checkpoint of swarm-mj train")
-    if state["version"] != CHECKPOINT_VERSION:
-        raise ValueError(
-            f"checkpoint {path} has version {state['version']}, this swarm_mj reads "
-            f"{CHECKPOINT_VERSION}; resume with the version that wrote it"
-        )
-    return state
+def _is_on_cuda(model: PPO) -> bool:
+    return model.device.type == "cuda"
 
 
 def _legacy_numpy_state() -> str:

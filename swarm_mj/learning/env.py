@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,11 @@ class MissionsEnv(VecEnv):
     """What both arms have in common: groups of missions, each one swarm."""
 
     def __init__(
-        self, groups: Sequence[Group], num_envs: int, observation: spaces.Dict, action: spaces.Space
+        self,
+        groups: Sequence[Group],
+        num_envs: int,
+        observation: spaces.Space,
+        action: spaces.Space,
     ) -> None:
         self.groups = list(groups)
         self.num_nodes = largest_team(groups)
@@ -45,8 +50,8 @@ class MissionsEnv(VecEnv):
         return sum(group.num_missions for group in self.groups)
 
     def reset(self) -> Observation:
-        """What is seen at the start; the first missions began when the groups were made."""
-        return self.observe([group.first_graphs for group in self.groups])
+        """What is seen at the start of the missions under way; those that have begun start over."""
+        return self.observe([_at_the_start(group) for group in self.groups])
 
     def step_async(self, actions: np.ndarray) -> None:
         """Takes the actions; `step_wait` flies them."""
@@ -93,6 +98,13 @@ class MissionsEnv(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
 
+def _at_the_start(group: Group) -> Graphs:
+    course = group.course()
+    if len(course.recipients) == 0:
+        return group.first_graphs
+    return group.fly_again(replace(course, recipients=course.recipients[:0]))
+
+
 def largest_team(groups: Sequence[Group]) -> int:
     """Robots of the largest team, to which the others are padded."""
     return max(group.mission.num_robots for group in groups)
@@ -115,4 +127,5 @@ def graph_spaces(
         "node": spaces.Box(-np.inf, np.inf, (*rows, num_nodes, num_features), np.float32),
         "parent": spaces.Box(-1, num_nodes - 1, (*rows, num_nodes), np.int32),
         "may_address": spaces.MultiBinary([*rows, num_nodes]),
+        "has_turn": spaces.MultiBinary([*rows, 1]),
     }

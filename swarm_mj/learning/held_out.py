@@ -1,14 +1,18 @@
 """How a network flies missions that training never sees."""
 
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
+from jaxtyping import Float, Int
 
 from swarm_mj.gnn import AggregationGnn
 from swarm_mj.graphs.observers import make_observer
 from swarm_mj.learning.settings import HELD_OUT_SEED, Training
 from swarm_mj.mission import Mission
 from swarm_mj.policies.learned import LearnedPolicy
+from swarm_mj.statistics import standard_error
 from swarm_mj.swarm import Swarm
 
 
@@ -17,16 +21,26 @@ class HeldOut:
     """Means over held-out missions; over all team sizes, where there are several."""
 
     aoi: float  # Eq. 10 [windows]
-    aoi_sem: float  # standard error over the missions [windows]
+    aoi_sem: float | None  # standard error over the missions [windows]; None of one mission
     aoi_steady: float  # over the second half of the missions [windows]
     velocity_variance: float  # Eq. 17 [m²/s²]
     packets_per_window: float
     delivery_ratio: float
     objective: float  # what the best policy has least of: the reward's cost, each size alike
 
-    def to_json(self) -> dict[str, float]:
+    def to_json(self) -> dict[str, float | None]:
         """All numbers by name."""
         return asdict(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Flown:
+    """What held-out missions of one team size cost, window by window."""
+
+    age_windows: Float[np.ndarray, "windows B"]
+    velocity_variance_m2ps2: Float[np.ndarray, "windows B"]
+    attempted: Int[np.ndarray, "windows B"]
+    delivered: Int[np.ndarray, "windows B"]
 
 
 def held_out_policy(training: Training, network: AggregationGnn, mission: Mission) -> LearnedPolicy:
@@ -40,43 +54,69 @@ def held_out_missions(training: Training) -> list[Mission]:
     return [replace(training.mission, num_robots=size) for size in training.robots]
 
 
-def evaluate(training: Training, network: AggregationGnn) -> HeldOut:
+def evaluate(
+    training: Training,
+    network: AggregationGnn,
+    on_window: Callable[[float], None] = lambda share: None,  # noqa: ARG005
+) -> HeldOut:
     """Flies the held-out missions; draws nothing from the generators of the training.
 
     Args:
         training: Names the missions.
-        network: That acts.
+        network: That acts, on any device.
+        on_window: Told after every window what share is flown; what it raises ends the evaluation.
 
     Returns:
         What they cost.
     """
-    seeds = range(HELD_OUT_SEED, HELD_OUT_SEED + training.held_out)
-    costs = []
-    for mission in held_out_missions(training):
-        swarm = Swarm(mission, seeds)
-        policy = held_out_policy(training, network, mission)
-        windows = [swarm.step(policy) for _ in range(mission.num_windows)]
-        costs.append(
-            (
-                np.array([window.age_windows for window in windows]),
-                np.array([window.velocity_variance_m2ps2 for window in windows]),
-                np.array([window.packets.attempted for window in windows]),
-                np.array([window.packets.delivered for window in windows]),
-            )
-        )
-    age, variance, attempted, delivered = ([each[n] for each in costs] for n in range(4))
-    by_mission = np.concatenate([each.mean(axis=0) for each in age])
-    objective = [each.mean() / size for each, size in zip(age, training.robots, strict=True)]
+    missions = held_out_missions(training)
+    flown = [
+        _fly(training, network, mission, lambda share, n=n: on_window((n + share) / len(missions)))
+        for n, mission in enumerate(missions)
+    ]
+    age = [each.age_windows for each in flown]
+    variance = [each.velocity_variance_m2ps2 for each in flown]
+    objective = [each / size for each, size in zip(age, training.robots, strict=True)]
     if training.reward == "velocity-variance":
-        objective = [each.mean() for each in variance]
+        objective = variance
+    attempted = sum(int(each.attempted.sum()) for each in flown)
     return HeldOut(
-        aoi=float(by_mission.mean()),
-        aoi_sem=float(by_mission.std() / np.sqrt(by_mission.size)),
-        aoi_steady=float(np.mean([each[len(each) // 2 :].mean() for each in age])),
-        velocity_variance=float(np.mean([each.mean() for each in variance])),
-        packets_per_window=float(np.mean([each.mean() for each in attempted])),
-        delivery_ratio=float(
-            sum(each.sum() for each in delivered) / max(1, sum(each.sum() for each in attempted))
-        ),
-        objective=float(np.mean(objective)),
+        aoi=_mean(age),
+        aoi_sem=_standard_error([each.mean(axis=0) for each in age]),
+        aoi_steady=_mean([each[len(each) // 2 :] for each in age]),
+        velocity_variance=_mean(variance),
+        packets_per_window=attempted / sum(each.size for each in age),
+        delivery_ratio=sum(int(each.delivered.sum()) for each in flown) / max(1, attempted),
+        objective=_mean(objective),
     )
+
+
+def _fly(
+    training: Training,
+    network: AggregationGnn,
+    mission: Mission,
+    on_window: Callable[[float], None],
+) -> _Flown:
+    swarm = Swarm(mission, range(HELD_OUT_SEED, HELD_OUT_SEED + training.held_out))
+    policy = held_out_policy(training, network, mission)
+    windows = []
+    for window in range(mission.num_windows):
+        windows.append(swarm.step(policy))
+        on_window((window + 1) / mission.num_windows)
+    return _Flown(
+        age_windows=np.array([each.age_windows for each in windows]),
+        velocity_variance_m2ps2=np.array([each.velocity_variance_m2ps2 for each in windows]),
+        attempted=np.array([each.packets.attempted for each in windows]),
+        delivered=np.array([each.packets.delivered for each in windows]),
+    )
+
+
+def _mean(by_size: Sequence[Float[np.ndarray, "windows B"]]) -> float:
+    return float(np.mean([each.mean() for each in by_size]))
+
+
+def _standard_error(by_size: Sequence[Float[np.ndarray, "B"]]) -> float | None:
+    """Of the mean over sizes; sizes differ, but they are not drawn."""
+    errors = [standard_error(each) for each in by_size]
+    known = [error for error in errors if error is not None]
+    return math.hypot(*known) / len(known) if len(known) == len(errors) else None

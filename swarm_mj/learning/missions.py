@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
+from jaxtyping import Float, Int
 
 from swarm_mj.buffers import NO_PARENT
 from swarm_mj.graphs.graph import Graphs, Observer
@@ -178,9 +178,7 @@ def make_groups(
     ]
 
 
-def padded(
-    graphs: Sequence[Graphs], num_nodes: int
-) -> tuple[Float32[np.ndarray, "R M F"], Int[np.ndarray, "R M"], Bool[np.ndarray, "R M"]]:
+def padded(graphs: Sequence[Graphs], num_nodes: int) -> dict[str, np.ndarray]:
     """All groups' graphs in one batch, with unconnected nodes that nobody may address.
 
     Args:
@@ -188,7 +186,7 @@ def padded(
         num_nodes: M.
 
     Returns:
-        Features, parents, and who may be addressed.
+        The arrays of `Graphs` by name, R rows of M nodes; `has_turn` is [R, 1].
     """
     num_rows = sum(len(each.node) for each in graphs)
     node = np.zeros((num_rows, num_nodes, graphs[0].node.shape[2]), dtype=np.float32)
@@ -201,4 +199,5 @@ def padded(
         parent[rows, :num_robots] = each.parent
         may_address[rows, :num_robots] = each.may_address
         start = rows.stop
-    return node, parent, may_address
+    has_turn = np.concatenate([each.has_turn for each in graphs])[:, None]
+    return {"node": node, "parent": parent, "may_address": may_address, "has_turn": has_turn}

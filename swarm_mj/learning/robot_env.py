@@ -36,8 +36,7 @@ class RobotEnv(MissionsEnv):
 
     def observe(self, graphs: Sequence[Graphs]) -> Observation:
         """The rows' graphs, stacked and padded."""
-        node, parent, may_address = padded(graphs, self.num_nodes)
-        return {"node": node, "parent": parent, "may_address": may_address, "owner": self._owner}
+        return {**padded(graphs, self.num_nodes), "owner": self._owner}
 
     def step_wait(self) -> Step:
         """One window of all missions."""
@@ -62,12 +61,11 @@ class RobotEnv(MissionsEnv):
         starts = [0, *self._ends]
         for start, outcome in zip(starts, self.outcomes, strict=True):
             if outcome.last_graphs is not None and outcome.is_cut:
-                node, parent, may_address = padded([outcome.last_graphs], self.num_nodes)
-                for row in range(len(node)):
-                    last = {"node": node[row], "parent": parent[row]}
-                    last |= {"may_address": may_address[row], "owner": self._owner[start + row]}
+                last = padded([outcome.last_graphs], self.num_nodes)
+                last["owner"] = self._owner[start : start + len(last["node"])]
+                for row in range(len(last["node"])):
                     infos[start + row] = {
-                        "terminal_observation": last,
+                        "terminal_observation": {name: last[name][row] for name in last},
                         "TimeLimit.truncated": True,
                     }
         return infos

@@ -1,11 +1,13 @@
 """A training run (III-C): stable-baselines3's PPO, from empty folder to stored policy.
 
 A run's folder holds `settings.json`, `checkpoint.pt`, `curve.csv` (one row an evaluation),
-`tensorboard/`, `policy/` (the best so far) and, on request, `replays/`.
+`tensorboard/`, `policy/` (the best so far), `init/` (the policy it began with, if any) and, on
+request, `replays/`.
 """
 
-import json
+import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -14,19 +16,29 @@ from stable_baselines3.common.buffers import DictRolloutBuffer
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from swarm_mj.gnn import AggregationGnn
 from swarm_mj.learning import checkpoint
 from swarm_mj.learning.actor_critic import GnnActorCritic, TeamActorCritic
-from swarm_mj.learning.checkpoint import Progress, missions_of
+from swarm_mj.learning.checkpoint import missions_of
 from swarm_mj.learning.missions import make_groups
+from swarm_mj.learning.progress import Progress, write_curve
 from swarm_mj.learning.robot_env import RobotEnv
-from swarm_mj.learning.session import CHECKPOINT, SETTINGS, Limits, Listener, Session, Stopped
+from swarm_mj.learning.run_folder import (
+    CHECKPOINT,
+    CURVE,
+    TENSORBOARD,
+    Limits,
+    Run,
+    check_new,
+    own_init,
+    remove_parts,
+    write_run,
+)
+from swarm_mj.learning.session import Listener, Session, Stopped
 from swarm_mj.learning.settings import Training
 from swarm_mj.learning.speakers import SpeakersBuffer
 from swarm_mj.learning.team_env import TeamEnv
-from swarm_mj.whole_file import whole_file
+from swarm_mj.policies.stored import read_policy
 
-TENSORBOARD = "tensorboard"
 NO_BUDGET = 10**15  # team decisions
 
 
@@ -34,7 +46,7 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
     """PPO over fresh missions, and the generator that draws their seeds.
 
     Raises:
-        ValueError: The missions cannot be made of these settings.
+        ValueError: The missions or the minibatches cannot be made of these settings.
     """
     torch.set_num_threads(training.threads)
     rng = np.random.default_rng(training.seed)
@@ -48,37 +60,58 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
     )
     ppo = training.ppo
     env: VecEnv = RobotEnv(groups) if training.arm == "robot" else TeamEnv(groups, training.reward)
-    num_rows = env.num_envs * ppo.num_steps
+    batch_size = _batch_size(training, env.num_envs)
     if training.reward == "velocity-variance":  # as in the authors' code
         env = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=ppo.discount)
     decay = StepDecay(training)
-    model = PPO(
-        GnnActorCritic if training.arm == "robot" else TeamActorCritic,
-        env,
-        learning_rate=decay,
-        n_steps=ppo.num_steps,
-        batch_size=-(-num_rows // ppo.num_minibatches),
-        n_epochs=ppo.num_epochs,
-        gamma=ppo.discount,
-        gae_lambda=ppo.gae_lambda,
-        clip_range=ppo.clip,
-        clip_range_vf=ppo.clip if ppo.clips_value else None,
-        ent_coef=ppo.entropy,
-        vf_coef=ppo.value,
-        max_grad_norm=ppo.max_gradient_norm,
-        seed=training.seed % 2**32,
-        normalize_advantage=not training.drops_silence,
-        rollout_buffer_class=SpeakersBuffer if training.drops_silence else DictRolloutBuffer,
-        policy_kwargs={
-            "shape": training.network,
-            "shares_trunk": training.shares_trunk,
-            "silence_logit": training.silence_logit,
-            "optimizer_kwargs": {"eps": ppo.adam_epsilon},
-            **({} if training.arm == "robot" else {"sums_nodes": training.sums_nodes}),
-        },
-    )
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "You have specified a mini-batch size")  # one is smaller
+        model = PPO(
+            GnnActorCritic if training.arm == "robot" else TeamActorCritic,
+            env,
+            learning_rate=decay,
+            n_steps=ppo.num_steps,
+            batch_size=batch_size,
+            n_epochs=ppo.num_epochs,
+            gamma=ppo.discount,
+            gae_lambda=ppo.gae_lambda,
+            clip_range=ppo.clip,
+            clip_range_vf=ppo.clip if ppo.clips_value else None,
+            ent_coef=ppo.entropy,
+            vf_coef=ppo.value,
+            max_grad_norm=ppo.max_gradient_norm,
+            seed=training.seed % 2**32,
+            normalize_advantage=not training.drops_silence,
+            rollout_buffer_class=SpeakersBuffer if training.drops_silence else DictRolloutBuffer,
+            policy_kwargs=_policy_settings(training),
+        )
     decay.model = model
     return model, rng
+
+
+def _batch_size(training: Training, num_envs: int) -> int:
+    """Rows of a minibatch.
+
+    Raises:
+        ValueError: It would be less than 2, of which advantages have no spread.
+    """
+    num_rows, num_minibatches = num_envs * training.ppo.num_steps, training.ppo.num_minibatches
+    if num_rows < 2 * num_minibatches:
+        raise ValueError(
+            f"a rollout of {num_rows} rows is too small for {num_minibatches} minibatches; train "
+            f"on {-(-2 * num_minibatches // training.ppo.num_steps)} or more missions"
+        )
+    return -(-num_rows // num_minibatches)
+
+
+def _policy_settings(training: Training) -> dict[str, Any]:
+    settings: dict[str, Any] = {
+        "shape": training.network,
+        "shares_trunk": training.shares_trunk,
+        "silence_logit": training.silence_logit,
+        "optimizer_kwargs": {"eps": training.ppo.adam_epsilon},
+    }
+    return settings if training.arm == "robot" else settings | {"sums_nodes": training.sums_nodes}
 
 
 class StepDecay:
@@ -102,7 +135,7 @@ def train(
     limits: Limits,
     *,
     listener: Listener,
-    init: AggregationGnn | None = None,
+    init: Path | None = None,
     is_resumed: bool = False,
     command: str = "",
 ) -> Progress:
@@ -113,30 +146,29 @@ def train(
         folder: The run's folder; made if it is not there.
         limits: When to stop.
         listener: Told how it goes.
-        init: A network of the same shape to begin with.
-        is_resumed: Go on from the folder's checkpoint, if it got as far as one.
+        init: A stored policy to begin with, whose network is the settings'.
+        is_resumed: Go on from the folder's checkpoint, or start over if it did not get that far.
         command: Noted beside the policy.
 
     Returns:
         Where the run stands.
 
     Raises:
-        ValueError: The missions cannot be made, or the checkpoint is damaged or foreign.
+        ValueError: The missions cannot be made, the folder is another's, the checkpoint is damaged
+            or foreign, or training has diverged.
         OSError: The folder cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    with whole_file(folder / SETTINGS) as part:
-        part.write_text(json.dumps(training.to_json(), indent=2) + "\n", encoding="utf-8")
-    model, rng = make_model(training)
+    model, rng = make_model(training)  # first, for its errors
+    if not is_resumed:
+        check_new(folder)
+    remove_parts(folder)
+    run = Run(training=training, limits=limits, command=command, init=init)
+    write_run(folder, run)
+    progress = _go_to_checkpoint(folder, run, model, rng)
     model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))
-    if init is not None:
-        assert isinstance(model.policy, GnnActorCritic)
-        model.policy.take_acting_network(init)
-    kept = folder / CHECKPOINT
-    progress = checkpoint.load(kept, model, rng) if is_resumed and kept.exists() else Progress()
-    session = Session(training, folder, limits, progress, rng, listener, command)
-    num_teams, num_envs = missions_of(model).num_teams, missions_of(model).num_envs
-    wanted = -(-(limits.decisions or NO_BUDGET) // num_teams) * num_envs
+    session = Session(run, folder, progress, rng, listener)
+    env = missions_of(model)
+    wanted = -(-(limits.decisions or NO_BUDGET) // env.num_teams) * env.num_envs
     try:
         if wanted > model.num_timesteps:
             model.learn(
@@ -145,7 +177,23 @@ def train(
                 log_interval=NO_BUDGET,  # the session dumps, with team decisions on the axis
                 reset_num_timesteps=model.num_timesteps == 0,
             )
-            session.finish()
+        session.init_callback(model)
+        session.finish()
     except Stopped:
         pass
+    finally:
+        model.logger.close()
     return progress
+
+
+def _go_to_checkpoint(folder: Path, run: Run, model: PPO, rng: np.random.Generator) -> Progress:
+    """Takes a run to its last checkpoint, or to its beginning."""
+    kept = folder / CHECKPOINT
+    if kept.exists():
+        progress = checkpoint.load(kept, run.training, model, rng)
+        write_curve(folder / CURVE, progress.curve)
+        return progress
+    if run.init is not None:
+        assert isinstance(model.policy, GnnActorCritic)
+        model.policy.take_acting_network(read_policy(own_init(folder, run.init))[0])
+    return Progress()

@@ -46,9 +46,8 @@ class TeamEnv(MissionsEnv):
         return self._observe(graphs, self._is_robot)
 
     def _observe(self, graphs: Sequence[Graphs], is_robot: np.ndarray) -> Observation:
-        node, parent, may_address = padded(graphs, self.num_nodes)
         observation = {"is_robot": is_robot}
-        for name, rows in (("node", node), ("parent", parent), ("may_address", may_address)):
+        for name, rows in padded(graphs, self.num_nodes).items():
             teams = np.zeros((*is_robot.shape, *rows.shape[1:]), dtype=rows.dtype)
             teams[is_robot] = rows
             observation[name] = teams

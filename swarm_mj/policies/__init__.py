@@ -1,6 +1,11 @@
-"""Communication policies (IV-C), one file each, and the one table of their names."""
+"""Communication policies (IV-C), one file each, and the one table of their names.
 
+A learned policy has no name: it is the directory that holds it.
+"""
+
+import os
 from collections.abc import Callable
+from pathlib import Path
 
 from swarm_mj.channel import radio_of
 from swarm_mj.mission import Mission
@@ -33,7 +38,9 @@ __all__ = [
     "RoundRobin",
     "SpatialTdma",
     "Tdma",
+    "is_learned",
     "make_policy",
+    "normalised",
 ]
 
 
@@ -107,24 +114,64 @@ POLICIES: dict[str, Callable[[Mission, float | None], Policy]] = {
 }
 
 
-def make_policy(name: str, mission: Mission, probability: float | None = None) -> Policy:
+def is_learned(name: str) -> bool:
+    """Whether a policy's name is that of a directory: it has a separator, or there is one."""
+    return name not in POLICIES and (_is_path(name) or os.path.isdir(name))
+
+
+def normalised(name: str) -> str:
+    """A policy's name as typed, but a directory's without what does not change where it leads."""
+    if not is_learned(name):
+        return name
+    plain = os.path.normpath(name)
+    return plain if is_learned(plain) else os.path.join(os.curdir, plain)
+
+
+def make_policy(
+    name: str,
+    mission: Mission,
+    probability: float | None = None,
+    *,
+    is_deterministic: bool = False,
+) -> Policy:
     """A policy by its name on the command line.
 
     Args:
-        name: A key of `POLICIES`.
-        mission: Whose preset says how the baseline behaves where paper and code differ.
+        name: A key of `POLICIES`, or a directory with a learned policy.
+        mission: Whose preset says how the baseline behaves where paper and code differ, and whose
+            numbers normalise what a learned policy sees.
         probability: Of transmission, for the policies that have one; None is the one tuned for
             the regime nearest to the mission's.
+        is_deterministic: Whether a learned policy takes the most probable recipient instead of a
+            draw.
 
     Returns:
         The policy.
 
     Raises:
-        ValueError: Unknown name, or a probability that is out of range or not the policy's.
+        ValueError: Unknown name, a directory without a sound policy, a probability that is out of
+            range or not the policy's, or a policy that is not learned made deterministic.
+        OSError: A learned policy cannot be read.
     """
+    if is_learned(name):
+        from swarm_mj.policies.stored import load_policy  # torch takes its time to import
+
+        _refuse(probability, name)
+        return load_policy(Path(name), mission, is_deterministic=is_deterministic)
     if name not in POLICIES:
-        raise ValueError(f"policy must be one of {', '.join(POLICIES)}, not {name!r}")
+        raise ValueError(
+            f"policy must be one of {', '.join(POLICIES)}, or a directory with a learned policy, "
+            f"not {name!r}"
+        )
+    if is_deterministic:
+        raise ValueError(
+            f"{name} is not learned; only learned policies can be deterministic, so leave it out"
+        )
     return POLICIES[name](mission, probability)
+
+
+def _is_path(name: str) -> bool:
+    return any(separator in name for separator in (os.sep, os.altsep) if separator)
 
 
 def _or_tuned(probability: float | None, name: str, mission: Mission) -> float:

@@ -1,7 +1,7 @@
 """What a policy may know is its type (Eq. 9): local views, or the truth."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,6 +10,8 @@ from jaxtyping import Float, Int
 
 from swarm_mj.buffers import Buffers
 from swarm_mj.protocol import Bodies, Phase
+
+Parameters = Mapping[str, bool | int | float | str]  # what a policy was made with, by name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +50,8 @@ class Policy:
         return False
 
     @property
-    def parameters(self) -> dict[str, float]:
-        """The numbers that the policy was made with, by name; kept beside what it costs."""
+    def parameters(self) -> Parameters:
+        """What the policy was made with, by name; kept beside what it costs."""
         return {}
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar, no_type_check
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Float32, Int
 from numba import njit
 
 from swarm_mj.policies.policy import DecentralisedPolicy, LocalViews
@@ -57,6 +57,45 @@ class SpatialTdma(DecentralisedPolicy):
             is_sending,
         )
         return np.where(is_sending, (views.silence + 1) % views.num_robots, views.silence)
+
+
+@njit(cache=True)
+@no_type_check
+def write_joined(
+    believed_m: Float[np.ndarray, "B N N 2"],
+    is_known: Bool[np.ndarray, "B N N"],
+    turn: Int[np.ndarray, "B"],
+    range_m: float,
+    threshold: float,
+    has_joined: Float32[np.ndarray, "B N N"],
+) -> None:
+    """Writes who sends by the rule, in the order of identities and by each robot's own beliefs.
+
+    Args:
+        believed_m: Where robot i believes the others to be [m].
+        is_known: Whom it knows; after the first unknown robot that is asked nobody joins.
+        turn: Whose turn it is, mod N.
+        range_m: Distance at which a lone transmission just decodes [m].
+        threshold: Least SINR that decodes, linear [1].
+        has_joined: 1 where robot k sends, by robot i's beliefs, else 0; overwritten.
+    """
+    num_missions, num_robots = is_known.shape[:2]
+    has_joined[...] = 0.0
+    for b in range(num_missions):
+        owner = turn[b] % num_robots
+        for i in range(num_robots):
+            is_sender = np.zeros(num_robots, dtype=np.bool_)
+            signal, total = np.zeros(num_robots), np.zeros(num_robots)
+            if is_known[b, i, owner]:
+                has_joined[b, i, owner] = 1.0
+                _join(owner, believed_m[b, i], range_m, threshold, is_sender, signal, total)
+            for place in range(num_robots):
+                k = (turn[b] + num_robots // 2 + place) % num_robots
+                if not (is_known[b, i, owner] and is_known[b, i, k]):
+                    break
+                if _may_join(k, believed_m[b, i], range_m, threshold, is_sender, signal, total):
+                    has_joined[b, i, k] = 1.0
+                    _join(k, believed_m[b, i], range_m, threshold, is_sender, signal, total)
 
 
 @njit(cache=True)

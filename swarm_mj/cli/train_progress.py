@@ -1,0 +1,149 @@
+"""What a training run shows while it goes on: a bar, and a line for every evaluation."""
+
+import math
+from collections.abc import Callable
+from datetime import timedelta
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+from rich.table import Column
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from swarm_mj.learning.run_folder import Limits
+    from swarm_mj.learning.session import Status
+
+FINISHING = "finishing this rollout, then all is kept; Ctrl-C again breaks off at once"
+WHOLE = 1.0  # the bar's total
+BAR_WIDTH = 12
+
+
+class _What(ProgressColumn):
+    """What the run is at; looked up whenever the bar is drawn, so Ctrl-C shows at once."""
+
+    def __init__(self, is_interrupted: Callable[[], bool]) -> None:
+        super().__init__(Column(no_wrap=True, min_width=len("Evaluating")))
+        self._is_interrupted = is_interrupted
+
+    def render(self, task: Task) -> Text:
+        return Text("Finishing" if self._is_interrupted() else task.fields["what"])
+
+
+class Watch:
+    """The listener of a run: shows where it stands, and passes Ctrl-C on."""
+
+    def __init__(
+        self, console: Console, limits: "Limits", is_interrupted: Callable[[], bool]
+    ) -> None:
+        """Prepares the bar; it is drawn within a `with` statement.
+
+        Args:
+            console: Where to draw.
+            limits: Of the run.
+            is_interrupted: Whether Ctrl-C was pressed.
+        """
+        self._console, self._limits, self._is_interrupted = console, limits, is_interrupted
+        self._bar = Progress(
+            _What(is_interrupted),
+            BarColumn(BAR_WIDTH),
+            TextColumn("{task.fields[text]}"),
+            console=console,
+            transient=True,
+        )
+        self._task = self._bar.add_task("", total=WHOLE, what="Training", text="")
+        self._start: Status | None = None  # of this session
+        self._num_rows = 0
+        self.has_stopped = False  # whether the run was told to stop
+
+    def __enter__(self) -> "Watch":
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._bar.stop()
+
+    def __call__(self, status: "Status") -> bool:
+        """Shows a status; returns whether to go on."""
+        if self._start is None:
+            self._start = status
+            self._num_rows = len(status.progress.curve)
+        self._print_new_row(status)
+        self._bar.update(
+            self._task,
+            completed=share_done(status, self._limits),
+            what="Training" if status.evaluated is None else "Evaluating",
+            text=_text(status, self._start, self._limits),
+        )
+        if self._is_interrupted() and not self.has_stopped:
+            self.has_stopped = True
+            self._console.print(f"Interrupted: {FINISHING}.")
+        return not self.has_stopped
+
+    def _print_new_row(self, status: "Status") -> None:
+        curve = status.progress.curve
+        if len(curve) > self._num_rows:
+            self._num_rows = len(curve)
+            row = curve[-1]
+            note = "  best so far" if row is status.progress.best else ""
+            self._console.print(
+                f"{row['decisions']:>11,.0f} decisions {row['minutes']:7.1f} min   "
+                f"held-out age {age_of(row)}{note}"
+            )
+
+
+def share_done(status: "Status", limits: "Limits") -> float:
+    """How much of a run is done, by the limit that it is nearest to."""
+    shares = [0.0]
+    if limits.decisions:
+        shares.append(status.decisions / limits.decisions)
+    if limits.minutes:
+        shares.append(status.minutes / limits.minutes)
+    return min(WHOLE, max(shares))
+
+
+def minutes_left(status: "Status", start: "Status", limits: "Limits") -> float | None:
+    """Until the first limit, at this session's speed; None until it has one.
+
+    Args:
+        status: Now.
+        start: When this session began.
+        limits: Of the run.
+    """
+    left = []
+    if limits.minutes:
+        left.append(limits.minutes - status.minutes)
+    made = status.decisions - start.decisions
+    if limits.decisions and made:
+        lasts = (status.minutes - start.minutes) / made  # minutes a decision
+        left.append(lasts * (limits.decisions - status.decisions))
+    return max(0.0, min(left)) if left else None
+
+
+def age_of(row: dict[str, float]) -> str:
+    """A held-out age of information, with its standard error if it has one [windows]."""
+    error = f" ± {row['aoi_sem']:.2f}" if "aoi_sem" in row else ""
+    return f"{row['aoi']:.2f}{error}"
+
+
+def _text(status: "Status", start: "Status", limits: "Limits") -> str:
+    parts = [f"{status.decisions:,} decisions"]
+    if status.evaluated is not None:
+        parts.append(f"held-out missions {status.evaluated:.0%}")
+    elif not math.isnan(status.aoi):
+        parts.append(f"age {status.aoi:.1f}")
+    if status.progress.curve:
+        parts.append(f"held out {status.progress.curve[-1]['aoi']:.1f}")
+    made, minutes = status.decisions - start.decisions, status.minutes - start.minutes
+    if made and minutes:
+        parts.append(f"{made / minutes / 60.0:.0f}/s")
+    left = minutes_left(status, start, limits)
+    if left is not None:
+        parts.append(f"{timedelta(seconds=round(60.0 * left))} left")
+    return ", ".join(parts)

@@ -1,0 +1,146 @@
+"""A run's folder: what is where, and `settings.json`, from which a run starts over or goes on."""
+
+import json
+import shutil
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from swarm_mj.learning.settings import Training, arm_settings, from_json
+from swarm_mj.mission import Mission
+from swarm_mj.whole_file import whole_file
+from swarm_mj.whole_folder import present_folder, whole_folder
+
+SETTINGS, CHECKPOINT, CURVE = "settings.json", "checkpoint.pt", "curve.csv"
+INIT, POLICY, REPLAYS, TENSORBOARD = "init", "policy", "replays", "tensorboard"
+FORMAT = "swarm_mj training run"
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """How far a run goes, and what it leaves behind on the way."""
+
+    decisions: int | None = None  # team decisions in all sessions together
+    minutes: float | None = None  # in all sessions together, evaluations included
+    replay_every: int | None = None  # team decisions between two replays
+    checkpoint_every_s: float = 10.0  # least time between two checkpoints
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """What a run was asked for."""
+
+    training: Training
+    limits: Limits
+    command: str  # that began it
+    init: Path | None = None  # the stored policy that it begins with
+
+
+def write_run(folder: Path, run: Run) -> None:
+    """Writes a run's `settings.json`.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    document = {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "training": run.training.to_json(),
+        "limits": asdict(run.limits),
+        "command": run.command,
+        "init": None if run.init is None else str(run.init.resolve()),
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    with whole_file(folder / SETTINGS) as part:
+        part.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+
+
+def read_run(folder: Path) -> Run:
+    """What a run was asked for when it began, or last went on.
+
+    Raises:
+        ValueError: There is no run, or its settings are damaged, foreign or of a newer version.
+        OSError: The settings cannot be read.
+    """
+    path = folder / SETTINGS
+    if not path.is_file():
+        raise ValueError(f"{folder} holds no run to go on with; to begin one, leave out --resume")
+    try:
+        return _run_of(json.loads(path.read_bytes()))
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise ValueError(f"settings {path} are damaged, or no run's: {error}") from error
+
+
+def check_new(folder: Path) -> None:
+    """Passes if a run can begin in a folder.
+
+    Raises:
+        ValueError: It holds a run, or anything else.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"run {folder} is a file; name a folder")
+    if (folder / SETTINGS).exists():
+        raise ValueError(
+            f"{folder} holds a run; go on with it by --resume, or name another folder by --out"
+        )
+    names = {path.name for path in folder.iterdir()} if folder.exists() else set()
+    others = sorted(name for name in names if not name.endswith(".part"))
+    if others:
+        raise ValueError(f"{folder} holds {others[0]}, which is no run's; name another by --out")
+
+
+def own_init(folder: Path, init: Path) -> Path:
+    """A run's own copy of the policy that it begins with, made if it is not there.
+
+    Raises:
+        OSError: The policy cannot be read, or the folder not be written.
+    """
+    own = folder / INIT
+    if not own.exists():
+        with whole_folder(own) as part:
+            shutil.copytree(present_folder(init), part, dirs_exist_ok=True)
+    return own
+
+
+def remove_parts(folder: Path) -> None:
+    """Removes what killed sessions of a run had not finished writing."""
+    for part in folder.glob(".*.part"):
+        if part.is_dir():
+            shutil.rmtree(part, ignore_errors=True)
+        else:
+            part.unlink(missing_ok=True)
+
+
+def _run_of(document: Any) -> Run:  # noqa: ANN401 - anything in JSON
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise ValueError(f'the format must be "{FORMAT}"')
+    if document["format_version"] != FORMAT_VERSION:
+        raise ValueError(
+            f"the format_version is {document['format_version']!r:.40}, and this swarm_mj reads "
+            f"{FORMAT_VERSION}; resume with the version that wrote it"
+        )
+    _check_kinds("training", document["training"], _some_training())
+    return Run(
+        training=from_json(document["training"]),
+        limits=Limits(**document["limits"]),
+        command=str(document["command"]),
+        init=None if document["init"] is None else Path(document["init"]),
+    )
+
+
+def _some_training() -> dict[str, Any]:
+    return json.loads(json.dumps(arm_settings("robot", Mission(), (2,)).to_json()))
+
+
+def _check_kinds(name: str, given: Any, sample: Any) -> None:  # noqa: ANN401 - anything in JSON
+    """Raises ValueError unless a piece of JSON has the kinds of values that a sample has."""
+    allowed = (int, float) if isinstance(sample, float) else (type(sample),)
+    if type(given) not in allowed:  # in JSON, true is no number
+        raise ValueError(f"{name} is {given!r:.40}, which is of another kind")
+    if isinstance(sample, dict):
+        for key, value in sample.items():
+            _check_kinds(f"{name}.{key}", given[key], value)
+    if isinstance(sample, list):
+        for value in given:
+            _check_kinds(name, value, sample[0])

@@ -1,0 +1,110 @@
+"""The card of a stored policy, for whoever finds it: what it is, where it comes from, its costs."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from swarm_mj.policies.policy_config import PolicyConfig
+
+EDGES = {
+    "paper": "parents hear their children",
+    "reference": "children hear their parents",
+    "both": "parents and children hear each other",
+}
+
+
+def model_card(config: PolicyConfig) -> str:
+    """A README in Markdown that says what the config holds, and nothing else.
+
+    Of `training` and `evaluation` it lists every value, under dotted names; lists of objects become
+    tables, a text named `command` a block.
+    """
+    training = dict(_flat(config.training))
+    task = next((v for k, v in training.items() if _last(k) == "task" and isinstance(v, str)), "")
+    commit = f", commit {config.commit}" if config.commit else ""
+    parts = [
+        "# A learned communication policy of swarm_mj",
+        _network(config),
+        "## Fly it",
+        f"    swarm-mj fly --policy DIR --task {task or 'TASK'}",
+        "`DIR` is this folder. Teams of any size fly with it; `swarm-mj evaluate` takes it too.",
+        "## Training",
+        *_described(training),
+        f"By swarm_mj {config.version}{commit}.",
+        "## Evaluation",
+        *_described(dict(_flat(config.evaluation))),
+        "## Licence",
+        "Apache-2.0, as swarm_mj.",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _network(config: PolicyConfig) -> str:
+    shape = config.network
+    kind = "linear Aggregation GNN" if shape.is_linear else "Aggregation GNN"
+    return (
+        "Every robot evaluates this network on its own buffer, seen as a graph, and draws from the "
+        "result whom it addresses in the next window, or that it stays silent.\n\n"
+        f"- network: {kind}, receptive field {shape.receptive_field}, width {shape.latent}, "
+        f"{shape.depth} layers in each MLP; {EDGES[shape.edges]}\n"
+        f"- features: `{config.features}`, {shape.num_features} for each robot\n"
+        f"- outputs: {shape.num_outputs} for each robot; {config.silence_logit:g} is added to the "
+        "logit of silence"
+    )
+
+
+def _described(values: Mapping[str, Any]) -> Iterator[str]:
+    """Paragraphs: a list of what is simple, then tables and commands."""
+    if not values:
+        yield "Nothing was noted."
+    blocks = {key: value for key, value in values.items() if _is_command(key, value)}
+    tables = {key: value for key, value in values.items() if _is_table(value)}
+    simple = [f"- {k}: {_text(v)}" for k, v in values.items() if k not in blocks | tables]
+    if simple:
+        yield "\n".join(simple)
+    for command in blocks.values():
+        yield "    " + _one_line(command)
+    for key, rows in tables.items():
+        yield f"{key}:\n\n{_table(rows)}"
+
+
+def _is_command(key: str, value: Any) -> bool:  # noqa: ANN401 - anything in JSON
+    return _last(key) == "command" and isinstance(value, str)
+
+
+def _is_table(value: Any) -> bool:  # noqa: ANN401 - anything in JSON
+    return isinstance(value, list) and bool(value) and all(isinstance(row, dict) for row in value)
+
+
+def _table(rows: Sequence[Mapping[str, Any]]) -> str:
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    lines = [columns, ["---"] * len(columns)]
+    lines += [[_text(row[key]) if key in row else "" for key in columns] for row in rows]
+    return "\n".join("| " + " | ".join(map(_cell, line)) + " |" for line in lines)
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Values within objects, under dotted names."""
+    for key, value in values.items():
+        if isinstance(value, dict) and value:
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield _one_line(f"{prefix}{key}"), value
+
+
+def _last(key: str) -> str:
+    return key.rpartition(".")[2]
+
+
+def _text(value: Any) -> str:  # noqa: ANN401 - anything in JSON
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return _one_line(value if isinstance(value, str) else json.dumps(value))
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _cell(text: str) -> str:
+    return _one_line(text).replace("|", "\\|")

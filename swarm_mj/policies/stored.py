@@ -1,0 +1,157 @@
+"""A policy on disk: a folder of its weights, what they belong to, and a card for its reader."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load, save
+from torch import Tensor
+
+from swarm_mj.gnn import AggregationGnn
+from swarm_mj.graphs.observers import make_observer
+from swarm_mj.mission import Mission
+from swarm_mj.policies.learned import LearnedPolicy
+from swarm_mj.policies.model_card import model_card
+from swarm_mj.policies.policy_config import PolicyConfig, from_json, to_json
+from swarm_mj.whole_folder import present_folder, whole_folder
+
+WEIGHTS, CONFIG, CARD = "model.safetensors", "config.json", "README.md"
+CONTENTS = {WEIGHTS, CONFIG, CARD}
+MAX_BYTES = {WEIGHTS: 64_000_000, CONFIG: 1_000_000}
+WAY_OUT = "copy it again, or make one with `swarm-mj train`"
+
+
+def save_policy(
+    folder: Path, network: AggregationGnn, config: PolicyConfig, card: str | None = None
+) -> None:
+    """Writes a policy, whole or not at all; whoever is killed leaves the old one or the new one.
+
+    Args:
+        folder: Where; a policy there is replaced, and missing parents are made.
+        network: The weights, from any device.
+        config: What they belong to.
+        card: The README; `model_card` of the config unless given.
+
+    Raises:
+        ValueError: `load_policy` would not take it, or the folder holds other files than a
+            policy's.
+        OSError: The folder cannot be written.
+    """
+    if config.network != network.shape:
+        raise ValueError(f"config describes {config.network}, but the network is {network.shape}")
+    tensors = {name: t.detach().cpu().contiguous() for name, t in network.state_dict().items()}
+    _check_tensors(tensors, _empty(config))
+    contents = {
+        WEIGHTS: save(tensors),
+        CONFIG: to_json(config).encode(),
+        CARD: (model_card(config) if card is None else card).encode(),
+    }
+    for name in MAX_BYTES:
+        _check_size(name, len(contents[name]))
+    _check_replaceable(folder)
+    with whole_folder(folder) as part:
+        for name, content in contents.items():
+            (part / name).write_bytes(content)
+
+
+def load_policy(folder: Path, mission: Mission, *, is_deterministic: bool = False) -> LearnedPolicy:
+    """A policy, ready to fly a mission, which may be of another kind than it was trained on.
+
+    Args:
+        folder: Where `save_policy` wrote it.
+        mission: Whose area, duration and range normalise what the robots see.
+        is_deterministic: Take the most probable recipient instead of a draw.
+
+    Returns:
+        The policy.
+
+    Raises:
+        ValueError: There is none, or it is damaged, foreign, oversized or of a newer version.
+        OSError: It cannot be read.
+    """
+    network, config = read_policy(folder)
+    return LearnedPolicy(
+        network,
+        make_observer(config.features, mission),
+        silence_logit=config.silence_logit,
+        is_deterministic=is_deterministic,
+    )
+
+
+def read_policy(folder: Path) -> tuple[AggregationGnn, PolicyConfig]:
+    """A policy's network, with its weights, and its config; errors as of `load_policy`."""
+    present = present_folder(folder)
+    if not present.exists():
+        raise ValueError(
+            f"policy {folder} does not exist; name a directory that `swarm-mj train` wrote, such "
+            "as runs/NAME/policy"
+        )
+    if not present.is_dir():
+        raise ValueError(f"policy {folder} is a file; name the directory that holds the policy")
+    name = CONFIG
+    try:
+        config = from_json(_read(present, name))
+        name = WEIGHTS
+        return _network(config, _read(present, name)), config
+    except ValueError as error:
+        raise ValueError(f"{folder / name}: {error}; {WAY_OUT}") from error
+
+
+def _read(folder: Path, name: str) -> bytes:
+    """A file's bytes.
+
+    Raises:
+        ValueError: It is missing or oversized.
+    """
+    path = folder / name
+    if not path.is_file():
+        raise ValueError("there is no such file")
+    _check_size(name, path.stat().st_size)
+    return path.read_bytes()
+
+
+def _check_size(name: str, size: int) -> None:
+    if size > MAX_BYTES[name]:
+        raise ValueError(f"{name} may have up to {MAX_BYTES[name]} bytes, not {size}")
+
+
+def _network(config: PolicyConfig, data: bytes) -> AggregationGnn:
+    """The network with the weights of a safetensors file."""
+    try:
+        tensors = {name: tensor.clone() for name, tensor in load(data).items()}
+    except (SafetensorError, AssertionError, KeyError, RuntimeError, ValueError) as error:
+        raise ValueError(f"it is damaged, or no safetensors file ({error})") from error
+    network = _empty(config)
+    _check_tensors(tensors, network)
+    network.load_state_dict(tensors, assign=True)
+    return network
+
+
+def _empty(config: PolicyConfig) -> AggregationGnn:
+    """The network without weights: it takes no memory, and draws no random numbers."""
+    with torch.device("meta"):
+        return AggregationGnn(config.network)
+
+
+def _check_tensors(tensors: Mapping[str, Tensor], network: AggregationGnn) -> None:
+    """Raises ValueError unless these are a network's tensors, all of them finite."""
+    expected = network.state_dict()
+    for name in sorted(expected.keys() ^ tensors.keys()):
+        known = "lacks the" if name in expected else "has an unknown"
+        raise ValueError(f"it {known} tensor {name:.80}")
+    for name, tensor in tensors.items():
+        wanted, given = (f"{list(t.shape)} of {t.dtype}" for t in (expected[name], tensor))
+        if given != wanted:
+            raise ValueError(f"tensor {name} must be {wanted}, not {given}")
+        if not torch.isfinite(tensor).all():
+            raise ValueError(f"tensor {name} has numbers that are not finite")
+
+
+def _check_replaceable(folder: Path) -> None:
+    """Raises ValueError if something else than a policy would be lost."""
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"policy {folder} is a file; name another place, or remove it")
+    others = {path.name for path in folder.iterdir()} - CONTENTS if folder.exists() else ()
+    for name in sorted(others):
+        raise ValueError(f"{folder} holds {name}, which is no policy's; name another directory")

@@ -1,0 +1,172 @@
+"""Learned policies where the others are: flown, evaluated, resumed, drawn."""
+
+import json
+
+import pytest
+import torch
+from tiny_policies import save_tiny
+
+from swarm_mj.cli import main
+from swarm_mj.evaluation.batch import fly_batch
+from swarm_mj.evaluation.jobs import run_jobs
+from swarm_mj.evaluation.study import Study
+from swarm_mj.mission import paper
+from swarm_mj.replay.read import windows
+from swarm_mj.results import read_results
+
+pytestmark = pytest.mark.usefixtures("runs")
+SMALL = ("--robots", "5", "--windows", "12", "--range-ratio", "0.5")
+
+
+@pytest.fixture
+def runs(tmp_path, monkeypatch):
+    """A working directory with two trained policies."""
+    monkeypatch.chdir(tmp_path)
+    save_tiny(tmp_path / "runs" / "x" / "policy", "extended")
+    save_tiny(tmp_path / "runs" / "y", "paper", seed=2)
+    return tmp_path / "runs"
+
+
+def test_a_flight_is_recorded_and_summed_up(swarm_mj, tmp_path):
+    done = swarm_mj("fly", *SMALL, "--policy", "./runs/x/policy/", "--json", "s.json")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.strip() == ""
+    assert "flocking, runs/x/policy, 5 robots" in done.stdout
+    (replay,) = (tmp_path / "replays").iterdir()
+    assert replay.name.startswith("flocking-x-seed1-")
+    assert len(windows(replay)) == 12
+    config = json.loads((tmp_path / "s.json").read_text())["config"]
+    assert config["policy"] == "runs/x/policy"
+    assert config["receptive_field"] == 1
+    assert config["is_deterministic"] is False
+    assert len(config["digest"]) == 12
+
+
+@pytest.mark.parametrize(
+    ("folder", "policy"), [(".", "runs/y"), ("runs", "y"), ("runs/y", "."), ("runs/x", "../y/")]
+)
+def test_a_replay_is_named_after_the_policys_directory(tmp_path, monkeypatch, folder, policy):
+    monkeypatch.chdir(tmp_path / folder)
+    assert main(["fly", *SMALL, "--policy", policy]) == 0
+    (replay,) = (tmp_path / folder / "replays").iterdir()
+    assert replay.name.startswith("flocking-y-seed1-")
+
+
+def test_the_mode_is_flown_on_request(runs):
+    costs = {}
+    for name, options in {"a": [], "b": ["--deterministic"], "c": ["--deterministic"]}.items():
+        flown = ["fly", *SMALL, "--policy", "runs/x/policy", "--no-record", "--json", name]
+        assert main([*flown, *options, "--seed", "2"]) == 0
+        costs[name] = json.loads((runs.parent / name).read_text())
+        del costs[name]["wall_seconds"]
+    assert costs["b"] == costs["c"]
+    assert costs["a"]["packets_attempted"] != costs["b"]["packets_attempted"]
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        (["fly", "--policy", "runs/z"], "policy runs/z does not exist; name a directory"),
+        (["fly", "--policy", "runs/x"], "runs/x/config.json: there is no such file"),
+        (["fly", "--policy", "runs/y/config.json"], "is a file; name the directory"),
+        (["fly", "--policy", "runs/y", "--probability", "0.1"], "takes no transmission probab"),
+        (["fly", "--policy", "mst", "--deterministic"], "mst is not learned; only learned"),
+        (["evaluate", "--policy", "mst", "--deterministic"], "none is among mst; leave it out"),
+        (["evaluate", "--policy", "mst", "runs/z"], "policy runs/z does not exist"),
+        (["evaluate", "--policy", "runs/y", "--probability", "0.1"], "takes no transmission prob"),
+        (["evaluate", "--policy", "runs/y", "--baseline", "runs/x"], "not 'runs/x'; add it with"),
+    ],
+)
+def test_bad_input_is_one_clear_line(capsys, options, complaint):
+    assert main(options) == 2
+    printed = capsys.readouterr()
+    assert complaint in printed.err
+    assert len(printed.err.strip().splitlines()) == 1
+    assert printed.out == ""
+
+
+def test_an_evaluation_beside_other_policies(capsys, tmp_path):
+    """The same numbers from one process and from two; names as typed, without what is too much."""
+    policies = ["--policy", "runs/x/policy/", "./runs/y", "mst", "runs/y/", "--baseline", "runs//y"]
+    for jobs in ("1", "2"):
+        evaluated = ["evaluate", *SMALL, *policies, "--episodes", "30", "--jobs", jobs]
+        assert main([*evaluated, "--csv", f"{jobs}.csv", "--json", f"{jobs}.json"]) == 0
+    for kind in ("csv", "json"):
+        one, two = ((tmp_path / f"{jobs}.{kind}").read_bytes() for jobs in "12")
+        assert one == two
+    results = read_results(tmp_path / "1.csv")
+    assert [result.policy for result in results] == ["runs/x/policy", "runs/y", "mst"]
+    assert {result.baseline for result in results} == {"runs/y"}
+    assert [result.probability is None for result in results] == [True, True, False]
+    configs = [json.loads(result.config) for result in results]
+    assert [config.get("receptive_field") for config in configs] == [1, 1, None]
+    assert configs[0]["digest"] != configs[1]["digest"]
+    assert "runs/x/policy" in capsys.readouterr().out
+
+
+def test_a_long_name_leaves_the_table_whole(capsys, runs):
+    """As does a short one: headers and numbers stand in their columns, uncut."""
+    name = "runs/" + 60 * "z"
+    save_tiny(runs.parent / name)
+    for policy in ("runs/y", name):
+        assert main(["evaluate", *SMALL, "--policy", "mst", policy, "--episodes", "3"]) == 0
+        printed = capsys.readouterr().out
+        assert "difference velocity packets published" in printed
+        assert "…" not in printed
+        (row,) = (line for line in printed.splitlines() if line.startswith(policy))
+        assert "±" in row
+        assert len(row.split()) == 10
+
+
+def test_deterministic_learned_policies_fly_beside_others(tmp_path):
+    options = ["--policy", "runs/y", "mst", "--episodes", "2", "--deterministic", "--csv", "r.csv"]
+    assert main(["evaluate", *SMALL, *options]) == 0
+    configs = [json.loads(result.config) for result in read_results(tmp_path / "r.csv")]
+    assert [config.get("is_deterministic") for config in configs] == [True, None]
+
+
+def test_a_resumed_evaluation_is_of_the_same_weights(capsys, runs, tmp_path):
+    """An evaluation that only began: its progress file holds what it depends on."""
+    evaluated = ["evaluate", *SMALL, "--policy", "runs/y", "--episodes", "2", "--csv", "r.csv"]
+    progress = tmp_path / "r.csv.progress"
+    study = Study(
+        policies=("runs/y",),
+        regimes=(paper("flocking", num_robots=5, num_windows=12, range_ratio=0.5),),
+        episodes=2,
+    )
+    progress.write_text(json.dumps(study.header()) + "\n")
+    save_tiny(runs / "y", "paper", seed=3)
+    assert main([*evaluated, "--resume"]) == 2
+    assert "is of another evaluation: its digest is" in capsys.readouterr().err
+    save_tiny(runs / "y", "paper", seed=2)
+    assert main([*evaluated, "--resume"]) == 0
+    assert not progress.exists()
+
+
+def test_weights_that_change_amid_an_evaluation_are_noticed(runs):
+    """Training may replace the policy meanwhile; a result is of one policy."""
+    mission = paper("stationary", num_robots=5, num_windows=3)
+    study = Study(policies=("runs/y",), regimes=(mission,), episodes=1)
+    fly_batch(study.batches[0])
+    before = study.config("runs/y", mission)
+    save_tiny(runs / "y", "paper", seed=3)
+    with pytest.raises(ValueError, match="policy runs/y has changed since the evaluation began"):
+        fly_batch(study.batches[0])
+    assert study.config("runs/y", mission) == before
+
+
+def num_threads(_piece):
+    return torch.get_num_threads()
+
+
+def test_jobs_start_no_threads_of_torchs():
+    assert [threads for _, threads in run_jobs(num_threads, range(2), 2)] == [1, 1]
+
+
+def test_figures_take_results_of_learned_policies(tmp_path):
+    options = ["--task", "stationary", "--policy", "mst", "runs/x/policy", "--episodes", "1"]
+    assert main(["evaluate", *options, "--csv", "r.csv"]) == 0
+    drawn = ["figures", "r.csv", "--out", "f", "--figure", "fig3", "fig4", "--format", "svg"]
+    assert main(drawn) == 0
+    for name in ("fig3", "fig4"):
+        assert "runs/x/policy" in (tmp_path / "f" / f"{name}.svg").read_text()

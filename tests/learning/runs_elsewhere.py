@@ -1,0 +1,136 @@
+"""Runs in a process of their own, where they may be killed, and no test's type checks slow them.
+
+    python runs_elsewhere.py FOLDER
+
+Writes what came out to FOLDER/results.json. Before the last child is forked torch computes in
+children only: its threads would not survive the fork.
+"""
+
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+
+import numpy as np
+import torch._dynamo  # noqa: F401 - optimisers import it late, so every child would
+from small_runs import StopAfter, difference, end_of, run, small_training
+
+from swarm_mj.cli import main
+from swarm_mj.decision import sample
+from swarm_mj.learning.missions import Group
+from swarm_mj.mission import paper
+
+RESUMED = {
+    "robot": {},
+    "robot, discounted": {"discount": 0.9},
+    "robot, walking, two sizes": {"task": "random-walk", "sizes": (4, 6)},
+    "team": {"arm": "team"},
+    "team, two sizes": {"arm": "team", "sizes": (4, 6)},
+    "team, for the flock": {"arm": "team", "task": "flocking", "reward": "velocity-variance"},
+}
+
+
+def resumed(folder):
+    """How runs that were interrupted twice differ from those that were not, by name."""
+    return {name: _interrupted_twice(folder / name, asked) for name, asked in RESUMED.items()}
+
+
+def _interrupted_twice(folder, asked):
+    """Once in the first missions, once after missions have been cut, ended and begun anew."""
+    training = small_training(**asked)
+    decisions = 6 * 8 * training.missions
+    run(training, folder / "whole", decisions)
+    stopped = [
+        run(training, folder / "cut", decisions, StopAfter(windows), is_resumed=is_resumed)
+        for is_resumed, windows in ((False, 5), (True, 25))
+    ]
+    run(training, folder / "cut", decisions, is_resumed=True)
+    went = [progress.decisions for progress in stopped]
+    return {
+        "difference": difference(end_of(folder / "whole"), end_of(folder / "cut")),
+        "stopped in time": 0 < went[0] < went[1] < decisions,
+    }
+
+
+ASKED = (
+    *("--robots", "4", "--windows", "12", "--range-ratio", "1", "--missions", "4"),
+    *("--held-out", "2", "--evaluate-every", "128", "--budget", "256", "--seed", "5"),
+    *("--learning-rate", "0.01"),  # so that each evaluation has a better policy to keep
+)
+
+
+def killed(folder):
+    """How killed and resumed runs differ from one that was not, by the moment.
+
+    A run is killed after each file or folder that it puts in its place, so every state that its
+    folder can be in is met.
+    """
+    os.chdir(folder)
+    _load_compiled_functions()
+    policy = _in_a_child(lambda: main(["train", "--out", "first", "--latent", "4", *ASKED]))
+    asked = ("train", "--init", "first/policy", *ASKED)
+    moments = folder / "moments"
+    whole = _in_a_child(lambda: _train_and_die([*asked, "--out", "whole"], None, moments))
+    found = {"exit codes": [policy, whole], "moments": {}}
+    for moment, placed in enumerate(moments.read_text().split()):
+        out = f"killed-{moment}"
+        died = _in_a_child(lambda: _train_and_die([*asked, "--out", out], moment, moments))  # noqa: B023
+        went_on = _in_a_child(lambda: main(["train", "--out", out, "--resume"]))  # noqa: B023
+        left = sorted(path.name for path in Path(out).iterdir() if path.name.startswith("."))
+        found["moments"][f"{moment} {placed}"] = {
+            "exit codes": [died, went_on],
+            "difference": difference(end_of(Path("whole")), end_of(Path(out))),
+            "left over": left,
+        }
+    return found
+
+
+def _train_and_die(arguments, moment, moments):
+    """Trains as `swarm-mj train`, and dies after the file of this number is placed."""
+    placed = []
+
+    def then_die(place):
+        def placing(self, target):
+            place(self, target)
+            placed.append(f"{Path(target).name}")
+            if len(placed) - 1 == moment:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+        return placing
+
+    Path.replace, Path.rename = then_die(Path.replace), then_die(Path.rename)
+    code = main(arguments)
+    moments.write_text("\n".join(placed))
+    return code
+
+
+def _load_compiled_functions():
+    """Once, for all children: the simulation, the features, the credits, the draws."""
+    mission = paper("stationary", num_robots=4, range_ratio=1.0)
+    group = Group(mission, "extended", 2, np.random.default_rng(1), first_windows=2)
+    for _ in range(2):
+        group.step(np.array([[1, 1, 2, 3], [0, 1, 0, 3]]), with_credit=True)
+    sample(np.zeros((2, 3), dtype=np.float32), np.array([0.1, 0.9]))
+
+
+def _in_a_child(work):
+    """Does the work in a forked process; returns its exit code, negative for a signal."""
+    child = os.fork()
+    if child == 0:
+        sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115 - it exits at once
+        os._exit(work())
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def learned(folder):
+    """Held-out ages of 5 robots before and after a short training."""
+    training = small_training(seed=1, held_out=10, evaluate_every=1_000)
+    curve = run(training, folder / "learned", 2_000).curve
+    return {"decisions": [row["decisions"] for row in curve], "age": [row["aoi"] for row in curve]}
+
+
+if __name__ == "__main__":
+    where = Path(sys.argv[1])
+    results = {work.__name__: work(where) for work in (killed, resumed, learned)}
+    (where / "results.json").write_text(json.dumps(results, indent=1))

@@ -1,0 +1,78 @@
+"""Training runs of a second or less, and what they leave."""
+
+import json
+import math
+from dataclasses import replace
+
+import torch
+
+from swarm_mj.learning.run import train
+from swarm_mj.learning.run_folder import CHECKPOINT, Limits
+from swarm_mj.learning.settings import arm_settings
+from swarm_mj.mission import paper
+
+torch.set_num_threads(1)  # tests share the machine's cores
+
+
+def small_training(arm="robot", task="stationary", sizes=(5,), discount=None, **changes):
+    """Settings of tiny networks on short missions; rollouts of 32 decisions, 64 of two sizes."""
+    mission = paper(task, num_robots=sizes[0], num_windows=20, range_ratio=0.6)
+    its = arm_settings(arm, mission, sizes, seed=3)
+    ppo = replace(its.ppo, num_steps=8, num_minibatches=3, num_epochs=2)
+    network = replace(its.network, latent=6, depth=2, receptive_field=1)
+    usual = {
+        "ppo": ppo if discount is None else replace(ppo, discount=discount),
+        "network": network,
+        "missions": 4 * len(sizes),
+        "evaluate_every": 64 * len(sizes),
+        "held_out": 2,
+    }
+    return replace(its, **usual | changes)
+
+
+def go_on(_status):
+    """A listener that never has enough."""
+    return True
+
+
+class StopAfter:
+    """A listener that has had enough after so many windows; evaluations do not count."""
+
+    def __init__(self, windows):
+        self.left = windows
+
+    def __call__(self, status):
+        self.left -= status.evaluated is None
+        return self.left > 0
+
+
+def run(training, folder, decisions=192, listener=go_on, **options):
+    """Trains; checkpoints stand between all rollouts."""
+    limits = Limits(decisions=decisions, checkpoint_every_s=0.0)
+    return train(training, folder, limits, listener=listener, **options)
+
+
+def end_of(folder):
+    """All that a run has come to but its time: weights, optimiser, random states, curve, policy."""
+    state = torch.load(folder / CHECKPOINT, weights_only=True)
+    progress = json.loads(state.pop("progress"))
+    progress["minutes"] = progress["tally"]["seconds"] = None
+    for row in progress["curve"]:
+        row["minutes"] = row["rollout/decisions_per_s"] = None
+    policy = (folder / "policy" / "model.safetensors").read_bytes()
+    curve = (folder / "curve.csv").read_text().splitlines()
+    return {**state, "progress": progress, "policy file": policy, "curve rows": len(curve)}
+
+
+def difference(first, second, name=""):
+    """Where two nested things of tensors differ first, in any bit; empty if nowhere."""
+    if isinstance(first, torch.Tensor):
+        return "" if torch.equal(first, second) else name
+    if isinstance(first, dict) and first.keys() == second.keys():
+        found = (difference(first[key], second[key], f"{name} {key}") for key in first)
+        return next(filter(None, found), "")
+    if isinstance(first, list) and len(first) == len(second):
+        found = (difference(a, b, name) for a, b in zip(first, second, strict=True))
+        return next(filter(None, found), "")
+    both_are_nan = all(isinstance(x, float) and math.isnan(x) for x in (first, second))
+    return "" if first == second or both_are_nan else name

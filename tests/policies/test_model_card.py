@@ -1,0 +1,61 @@
+"""The card says what the config holds, in Markdown, and nothing else."""
+
+from tiny_policies import tiny_config, tiny_network
+
+from swarm_mj.policies.model_card import model_card
+
+
+def card(**overrides):
+    network = tiny_network(edges="both")
+    return model_card(tiny_config(network, **overrides))
+
+
+def test_the_card_of_a_trained_policy():
+    written = card(
+        training={
+            "settings": {"task": "random-walk", "robots": [10, 20], "rate": 0.0003},
+            "command": "swarm-mj train --task random-walk\n  --robots 10 20",
+            "seed": 3,
+        },
+        evaluation={
+            "episodes": 100,
+            "results": [{"robots": 10, "aoi": 7.123456789}, {"robots": 80, "note": "a|b\nc"}],
+        },
+    )
+    for line in (
+        "- network: Aggregation GNN, receptive field 1, width 6, 2 layers in each MLP; parents and "
+        "children hear each other",
+        "- features: `extended`, 18 for each robot",
+        "- outputs: 1 for each robot; 1.5 is added to the logit of silence",
+        "    swarm-mj fly --policy DIR --task random-walk",
+        "- settings.robots: [10, 20]",
+        "- settings.rate: 0.0003",
+        "    swarm-mj train --task random-walk --robots 10 20",
+        "- seed: 3",
+        "By swarm_mj 1.2.3, commit abc123.",
+        "- episodes: 100",
+        "| robots | aoi | note |",
+        "| 10 | 7.12346 |  |",
+        "| 80 |  | a\\|b c |",
+        "Apache-2.0, as swarm_mj.",
+    ):
+        assert line in written.splitlines()
+
+
+def test_what_is_not_known_is_not_said():
+    written = card(training={}, evaluation={}, commit=None, silence_logit=0.0)
+    assert written.count("Nothing was noted.") == 2
+    assert "--task TASK" in written
+    assert "commit" not in written
+    assert "By swarm_mj 1.2.3." in written
+    assert "|" not in written
+
+
+def test_odd_values_stay_on_their_lines():
+    """Whatever a value holds, it stays on its line."""
+    odd = {"# a": "b\n# c", "empty": {}, "none": None, "rows": [], "flags": [{"x": {"y": [1]}}]}
+    written = card(training=odd, evaluation={"command": "x\ny"}).splitlines()
+    for line in ("- # a: b # c", "- empty: {}", "- none: null", "- rows: []", '| {"y": [1]} |'):
+        assert line in written
+    assert "    x y" in written
+    assert sum(line.startswith("#") for line in written) == 5

@@ -1,0 +1,146 @@
+"""What a config says, and everything that is none."""
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+from tiny_policies import FEATURES, tiny_config, tiny_network
+
+from swarm_mj.policies.policy_config import from_json, to_json
+
+
+@pytest.fixture
+def sound():
+    """The content of a sound config."""
+    return json.loads(to_json(tiny_config(tiny_network())))
+
+
+def refused(content, complaint):
+    text = content if isinstance(content, str | bytes) else json.dumps(content)
+    with pytest.raises(ValueError, match=complaint) as error:
+        from_json(text)
+    assert len(str(error.value)) < 200
+
+
+@pytest.mark.parametrize("features", FEATURES)
+@pytest.mark.parametrize("commit", ["abc123", None])
+def test_a_config_comes_back_as_it_was(features, commit):
+    network = tiny_network(features, num_outputs=2, edges="reference", is_linear=True)
+    config = tiny_config(network, features, commit=commit, silence_logit=-2.25)
+    assert from_json(to_json(config)) == config
+    assert from_json(to_json(config).encode()) == config
+
+
+def test_a_whole_number_is_a_number(sound):
+    config = from_json(json.dumps(sound | {"silence_logit": 3}))
+    assert config.silence_logit == 3.0
+    assert type(config.silence_logit) is float
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("", "it is no JSON"),
+        ("{", "it is no JSON"),
+        (b"\xff\xfe\x00\x01", "it is no JSON"),
+        ("[" * 100_000, "it is no JSON"),
+        ("9" * 100_000, "it is no JSON"),
+        ("[]", "it must be an object, not a list"),
+        ("null", "it must be an object, not null"),
+        ("0.5", "it must be an object, not a number"),
+        ("{}", 'its format must be "swarm_mj policy"'),
+        ('{"format": "another"}', 'its format must be "swarm_mj policy"'),
+        ('{"format": "swarm_mj policy"}', "format_version must be a whole number from 1, not null"),
+        ('{"format": "swarm_mj policy", "format_version": 1}', "it lacks the key network"),
+    ],
+)
+def test_what_is_no_config(text, complaint):
+    refused(text, complaint)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "complaint"),
+    [
+        ("format_version", 2, "its format_version is 2, and this swarm_mj reads 1; update it"),
+        ("format_version", True, "format_version must be a whole number from 1, not true"),
+        ("format_version", 0, "format_version must be a whole number from 1, not 0"),
+        ("format_version", 1.0, "format_version must be a whole number from 1, not 1.0"),
+        ("wings", 2, "it has an unknown key, wings"),
+        ("w" * 1000, 2, "it has an unknown key, www"),
+        ("network", [1], r"network must be an object, not \[1\]"),
+        ("features", "paper", "num_features is 18, but the paper features are 8"),
+        ("features", "all", "features must be one of paper, reference, extended, not 'all'"),
+        ("features", 7, "features must be a text, not 7"),
+        ("silence_logit", "3", 'silence_logit must be a number or a whole number, not "3"'),
+        ("silence_logit", 100.5, "silence_logit must be from -100 to 100, not 100.5"),
+        ("silence_logit", -1e300, r"silence_logit must be from -100 to 100, not -1e\+300"),
+        ("silence_logit", math.nan, "NaN is no finite number"),
+        ("silence_logit", -math.inf, "-Infinity is no finite number"),
+        ("training", [], r"training must be an object, not \[\]"),
+        ("training", {"minutes": math.inf}, "Infinity is no finite number"),
+        ("evaluation", None, "evaluation must be an object, not null"),
+        ("evaluation", "x" * 1000, 'evaluation must be an object, not "xxx'),
+        ("commit", 5, "commit must be a text or null, not 5"),
+        ("version", None, "version must be a text, not null"),
+    ],
+)
+def test_what_no_config_says(sound, key, value, complaint):
+    refused(sound | {key: value}, complaint)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "complaint"),
+    [
+        ("wings", 2, r"it has an unknown key, network\.wings"),
+        ("latent", 6.0, r"network\.latent must be a whole number, not 6\.0"),
+        ("latent", True, "network.latent must be a whole number, not true"),
+        ("latent", "6", 'network.latent must be a whole number, not "6"'),
+        ("latent", None, "network.latent must be a whole number, not null"),
+        ("latent", 10**6, "latent is 1000000: choose one from 1 to 1024"),
+        ("latent", 0, "latent is 0"),
+        ("receptive_field", -1, "receptive_field is -1"),
+        ("depth", 99, "depth is 99"),
+        ("is_linear", 1, "network.is_linear must be true or false, not 1"),
+        ("edges", "all", 'network.edges must be one of paper, reference, both, not "all"'),
+        ("edges", 3, "network.edges must be a text, not 3"),
+        ("num_outputs", 3, "num_outputs must be 1 or 2, not 3"),
+        ("num_features", 8, "num_features is 8, but the extended features are 18"),
+    ],
+)
+def test_what_no_network_is(sound, key, value, complaint):
+    refused(sound | {"network": sound["network"] | {key: value}}, complaint)
+
+
+def test_numbers_too_large_to_be_finite(sound):
+    refused(json.dumps(sound).replace('"aoi": 4.25', '"aoi": 1e999'), "1e999 is no finite number")
+
+
+def test_every_key_is_needed(sound):
+    for key in sound:
+        less = {name: value for name, value in sound.items() if name != key}
+        its = {"format": "its format must", "format_version": "its format_version must"}
+        refused(less, its.get(key, f"it lacks the key {key}"))
+    for key in sound["network"]:
+        less = {name: value for name, value in sound["network"].items() if name != key}
+        refused(sound | {"network": less}, f"it lacks the key network.{key}")
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [{"training": {"x": math.nan}}, {"training": {"x": {1, 2}}}, {"evaluation": {"x": 1j}}],
+)
+def test_what_is_no_json_is_not_written(overrides):
+    with pytest.raises(ValueError, match="config must be JSON all through"):
+        to_json(tiny_config(tiny_network(), **overrides))
+
+
+def test_a_config_made_by_hand_is_checked_too():
+    config = tiny_config(tiny_network())
+    for overrides, complaint in (
+        ({"features": "paper"}, "num_features is 18"),
+        ({"silence_logit": math.nan}, "silence_logit must be from -100 to 100, not nan"),
+        ({"network": replace(config.network, num_outputs=3)}, "num_outputs must be 1 or 2"),
+    ):
+        with pytest.raises(ValueError, match=complaint):
+            replace(config, **overrides)

@@ -1,0 +1,112 @@
+"""The authors' trained policy, in our network and our simulation: does it cost what they published?
+
+    python tools/reference_policy.py stationary_40_receptive_field_5.npz
+
+Their weights (NumPy arrays by TensorFlow name) become a policy directory, which flies under the
+`reference` preset; its mean age of information is compared with theirs in standard errors.
+"""
+
+import argparse
+import math
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from swarm_mj.evaluation.batch import fly_batch
+from swarm_mj.evaluation.jobs import run_jobs
+from swarm_mj.evaluation.study import Study
+from swarm_mj.gnn import AggregationGnn, GnnShape
+from swarm_mj.mission import reference
+from swarm_mj.policies.policy_config import PolicyConfig
+from swarm_mj.policies.stored import save_policy
+from swarm_mj.provenance import version
+
+DONE, TOO_FAR, BAD_INPUT = 0, 1, 2
+THEIR_AOI, THEIR_SEM = 37.5, 1.0  # over 100 episodes of their simulator [windows]
+MOST_STANDARD_ERRORS = 3.0
+SHAPE = GnnShape(num_features=7, num_outputs=2, edges="reference")
+PARTS = {  # our parts by theirs
+    "encoder.node": "encoder/node_model",
+    "encoder.edge": "encoder/edge_model",
+    "core.node": "graph_net/node_block",
+    "core.edge": "graph_net/edge_block",
+    "decoder.node": "decoder/node_model",
+}
+OUTPUT = "policy_model/output/node_model/node_output"
+
+
+def network_of(path: Path) -> AggregationGnn:
+    """The acting network of the authors' weights.
+
+    Raises:
+        ValueError: The file holds other arrays.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            names = {"output": f"policy/{OUTPUT}/"} | {
+                f"{ours}.{layer}": f"policy/{theirs}/mlp/linear_{layer}/"
+                for ours, theirs in PARTS.items()
+                for layer in range(SHAPE.depth)
+            }
+            weights = {}
+            for ours, theirs in names.items():
+                weights[f"{ours}.weight"] = torch.from_numpy(arrays[f"{theirs}w"].T.copy())
+                weights[f"{ours}.bias"] = torch.from_numpy(arrays[f"{theirs}b"])
+        network = AggregationGnn(SHAPE)
+        network.load_state_dict(weights)
+    except (KeyError, RuntimeError) as error:
+        raise ValueError(f"{path} does not hold the authors' weights: {error}") from error
+    return network
+
+
+def store(path: Path, folder: Path) -> None:
+    """Writes the authors' weights as a policy directory."""
+    config = PolicyConfig(
+        network=SHAPE,
+        features="reference",
+        training={"weights": "by Tolstaya et al., MIT licence", "task": "stationary"},
+        evaluation={"published_aoi": THEIR_AOI, "published_sem": THEIR_SEM},
+        commit=None,
+        version=version(),
+    )
+    save_policy(folder, network_of(path), config)
+
+
+def costs_of(folder: Path, episodes: int, seed: int, num_jobs: int) -> list[float]:
+    """Each mission's mean age of information under the `reference` preset [windows]."""
+    study = Study(
+        policies=(str(folder),), regimes=(reference("stationary"),), episodes=episodes, seed=seed
+    )
+    flown = dict(run_jobs(fly_batch, study.batches, num_jobs))
+    return [aoi for index in sorted(flown) for aoi in flown[index].aoi]
+
+
+def main() -> int:
+    """Runs the tool; returns 1 if the costs are too far apart."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("weights", type=Path, help="the authors' .npz")
+    parser.add_argument("--out", type=Path, help="keep the policy directory here")
+    parser.add_argument("--episodes", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=2000, help="of the first mission")
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    options = parser.parse_args()
+    try:
+        with tempfile.TemporaryDirectory() as scratch:
+            folder = options.out or Path(scratch) / "policy"
+            store(options.weights, folder)
+            costs = costs_of(folder, options.episodes, options.seed, options.jobs)
+    except (ValueError, OSError) as error:
+        sys.stderr.write(f"reference_policy: error: {error}\n")
+        return BAD_INPUT
+    mean, sem = float(np.mean(costs)), float(np.std(costs, ddof=1) / math.sqrt(len(costs)))
+    apart = (mean - THEIR_AOI) / math.hypot(sem, THEIR_SEM)
+    print(f"here {mean:.2f} ± {sem:.2f} windows over {len(costs)} missions")
+    print(f"published {THEIR_AOI} ± {THEIR_SEM}: {apart:+.2f} combined standard errors apart")
+    return DONE if abs(apart) <= MOST_STANDARD_ERRORS else TOO_FAR
+
+
+if __name__ == "__main__":
+    sys.exit(main())
