@@ -36,7 +36,8 @@ def recipient_logits(
     own = owner[:, None]
     logits = output[:, :, 0]
     if output.shape[2] > 1:
-        unsent = torch.cat([output[:, :, 1], logits.gather(1, own)], dim=1)
+        zero_power = output[:, :, 1].masked_fill(~may_address, IMPOSSIBLE)
+        unsent = torch.cat([zero_power, logits.gather(1, own)], dim=1)
         logits = logits.scatter(1, own, torch.logsumexp(unsent, dim=1, keepdim=True))
     if silence_logit:
         bias = torch.full_like(own, silence_logit, dtype=logits.dtype)

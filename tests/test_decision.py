@@ -15,8 +15,8 @@ FULL = torch.tensor([[0.5, 1.0, -2.0], [3.0, 0.0, 1.0]])
 ZERO = torch.tensor([[0.0, -1.0, 0.25], [1.0, 2.0, 4.0]])
 
 
-def logits(output, may_address=ALL, silence_logit=0.0):
-    return recipient_logits(output, OWNER, may_address, silence_logit).tolist()
+def logits(output, may_address=ALL, silence_logit=0.0, has_turn=None):
+    return recipient_logits(output, OWNER, may_address, silence_logit, has_turn).tolist()
 
 
 def test_eq9_one_number_per_node_is_its_logit_and_ones_own_is_silence():
@@ -25,6 +25,14 @@ def test_eq9_one_number_per_node_is_its_logit_and_ones_own_is_silence():
 
 def test_the_silence_logit_is_added_to_ones_own():
     assert logits(FULL[:, :, None], silence_logit=2.0) == [[2.5, 1.0, -2.0], [3.0, 0.0, 3.0]]
+
+
+@pytest.mark.parametrize(
+    ("has_turn", "own_0", "own_2"), [([True, False], 0.5, 3.0), ([False, False], 2.5, 3.0)]
+)
+def test_nothing_is_added_to_silence_in_ones_turn(has_turn, own_0, own_2):
+    found = logits(FULL[:, :, None], silence_logit=2.0, has_turn=torch.tensor(has_turn))
+    assert found == [[own_0, 1.0, -2.0], [3.0, 0.0, own_2]]
 
 
 @pytest.mark.parametrize("silence_logit", [0.0, -1.5])

@@ -4,6 +4,7 @@ From its own buffer, the packets it sent and decoded, its identity, the team's s
 """
 
 import math
+from dataclasses import replace
 from typing import ClassVar, no_type_check
 
 import numpy as np
@@ -104,6 +105,20 @@ class ExtendedObserver:
             may_address=may_address.reshape(rows),
             has_turn=np.diagonal(has_joined, axis1=1, axis2=2).reshape(-1) > 0.0,
         )
+
+
+class LocalObserver(ExtendedObserver):
+    """The extended features without whose turn it is: nothing that a common order grants."""
+
+    names: ClassVar[tuple[str, ...]] = tuple(
+        name for name in ExtendedObserver.names if "turn" not in name
+    )
+
+    def graphs(self, views: LocalViews) -> Graphs:
+        """What every robot's network sees now; must see every window."""
+        seen = super().graphs(views)
+        is_kept = np.array([name in self.names for name in ExtendedObserver.names])
+        return replace(seen, node=seen.node[:, :, is_kept], has_turn=np.zeros_like(seen.has_turn))
 
 
 @njit(cache=True)

@@ -14,7 +14,7 @@ from swarm_mj.buffers import Buffers
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 from swarm_mj.policies.policy import LocalViews
 
-FeatureSet = Literal["paper", "reference", "extended"]
+FeatureSet = Literal["paper", "reference", "local", "extended"]
 REFERENCE_WINDOWS = 500.0  # what the authors' code divides times by, whatever the mission [windows]
 
 

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 
-from swarm_mj.graphs.extended import ExtendedObserver
+from swarm_mj.graphs.extended import ExtendedObserver, LocalObserver
 from swarm_mj.graphs.graph import Observer, PaperObserver, ReferenceObserver
 from swarm_mj.mission import Mission
 
 OBSERVERS: dict[str, Callable[[Mission], Observer]] = {
     "paper": PaperObserver,
     "reference": ReferenceObserver,
+    "local": LocalObserver,
     "extended": ExtendedObserver,
 }
 

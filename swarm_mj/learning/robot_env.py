@@ -31,7 +31,10 @@ class RobotEnv(MissionsEnv):
         )
         self._ends = np.cumsum(num_rows)[:-1]
         self._owner = np.concatenate(
-            [np.tile(np.arange(g.mission.num_robots), g.num_missions) for g in groups]
+            [
+                np.tile(np.arange(g.mission.num_robots, dtype=np.int32), g.num_missions)
+                for g in groups
+            ]
         )[:, None]
 
     def observe(self, graphs: Sequence[Graphs]) -> Observation:

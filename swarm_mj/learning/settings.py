@@ -37,9 +37,9 @@ class PpoSettings:
     adam_epsilon: float = 1e-6
 
 
-# III-C, and for what it leaves open the authors' code, whose value loss has an extra 1/2. Decay "for
-# every 500 steps", counted in optimiser steps, would leave 3e-6 of the rate after the paper's
-# 2 million observations: the code's 5000 are taken.
+# III-C, and for what it leaves open the authors' code, whose value loss has an extra 1/2. A decay
+# every 500 optimiser steps would leave 3e-6 of the rate after the paper's 2 million observations:
+# the code's 5000 are taken.
 TEAM_REFERENCE = PpoSettings(
     learning_rate=1e-4,
     decay=0.95,
@@ -66,7 +66,7 @@ ROBOT = PpoSettings(
     gae_lambda=0.9,
     clip=0.2,
     clips_value=False,
-    entropy=0.003,
+    entropy=0.01,
     value=0.5,
 )
 
@@ -85,7 +85,7 @@ class Training:
     features: FeatureSet
     network: GnnShape  # that acts
     shares_trunk: bool  # whether values come from the acting network's last stage but one number
-    silence_logit: float  # what silence has ahead at the start
+    silence_logit: float  # what silence has ahead, but in a robot's own turn
     reward: Reward
     ppo: PpoSettings
     missions: int  # side by side
@@ -155,7 +155,7 @@ def arm_settings(arm: str, mission: Mission, robots: Sequence[int], seed: int = 
             edges="both",
         ),
         shares_trunk=True,
-        silence_logit=5.0,
+        silence_logit=7.0,
         ppo=ROBOT,
         missions=16,
         evaluate_every=10_000,

@@ -38,7 +38,7 @@ class LearnedPolicy(DecentralisedPolicy):
             network: Of one or two numbers per node, as `recipient_logits` takes them, on any
                 device.
             observer: Makes the graphs it was trained on.
-            silence_logit: Added to silence.
+            silence_logit: Added to silence, but in a robot's own turn.
             is_deterministic: Take the most probable recipient instead of a draw.
         """
         self._network = network

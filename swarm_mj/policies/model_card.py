@@ -49,7 +49,7 @@ def _network(config: PolicyConfig) -> str:
         f"{shape.depth} layers in each MLP; {EDGES[shape.edges]}\n"
         f"- features: `{config.features}`, {shape.num_features} for each robot\n"
         f"- outputs: {shape.num_outputs} for each robot; {config.silence_logit:g} is added to the "
-        "logit of silence"
+        "logit of silence" + (" but in its own turn" if config.features == "extended" else "")
     )
 
 

@@ -48,7 +48,7 @@ class PolicyConfig:
 
     network: GnnShape
     features: str  # the name of a feature set, see `make_observer`
-    silence_logit: float = 0.0  # added to silence
+    silence_logit: float = 0.0  # added to silence, but in a robot's own turn
     training: dict[str, Any]  # JSON: the settings, the seed, the budget spent, the command
     evaluation: dict[str, Any]  # JSON: what it cost on which missions
     commit: str | None  # the code that trained it

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from mixed_missions import MISSION as WALK
-from mixed_missions import NUM_ROBOTS, SEEDS, flown, mixed_views
+from mixed_missions import NUM_ROBOTS, SEEDS, flown, mixed_views, renamed
 
 from swarm_mj.buffers import empty_buffers
 from swarm_mj.graphs.extended import ExtendedObserver
@@ -113,6 +113,13 @@ def check_turns(found, *apart_1_5_2_3, by_interference):
     check(found, **{"has a turn, by interference": by_interference})
 
 
+def has_turn(view):
+    """Whether each robot has a turn by its own beliefs."""
+    observer = ExtendedObserver(MISSION)
+    observer.start(1, 4)
+    return observer.graphs(view).has_turn.tolist()
+
+
 @pytest.mark.parametrize(
     ("now", "rank", "turns"),
     [
@@ -140,6 +147,19 @@ def test_turns_by_distance_and_by_interference():
     views[0].buffers.position_m[0, OBSERVER, :, 1] = 0.0
     alone = [0, 1, 0, 0]
     check_turns(seen(views)[0], [0, 1, 1, 0], alone, alone, by_interference=[0, 1, 0, 1])
+    assert has_turn(views[0]) == [False, True, False, False]
+
+
+def test_a_robot_has_the_turn_that_it_believes_it_has():
+    """Robot 1 believes what robot 3 believed above, and so it, not the leader, is robot 3."""
+    buffers = empty_buffers(1, 4)
+    buffers.timestamp[0, 3] = [4.0, 5.0, 5.0, 9.0]
+    buffers.position_m[0, 3, :, 0] = [-100.0, 0.0, 400.0, 300.0]
+    view = LocalViews(buffers=buffers, now=np.array([9.0]), phases=())
+    assert has_turn(view) == [False, True, False, True]
+    buffers.position_m[0, 3, 0, 0] = 50.0  # robot 0 would lose what the leader tells it
+    buffers.position_m[0, 3, 3, 0] = 120.0
+    assert has_turn(view) == [False, True, False, False]
 
 
 def phase(recipient, heard):
@@ -241,7 +261,7 @@ def test_eq9_a_graph_rests_on_what_its_robot_can_know(robot):
     num_others = 0
     for pair in zip(*mixed_views(robot), strict=True):
         graphs, same = (o.graphs(view) for o, view in zip(observers, pair, strict=True))
-        for name in ("node", "parent", "may_address"):
+        for name in ("node", "parent", "may_address", "has_turn"):
             np.testing.assert_array_equal(getattr(graphs, name)[rows], getattr(same, name)[rows])
         num_others += np.any(graphs.node != same.node)
     assert num_others > 50
@@ -273,18 +293,3 @@ def test_names_matter_for_turns_only():
         same = other.graphs(renamed(view, name, new_name)).node.reshape(node.shape)
         expected = node[:, name][:, :, name]
         np.testing.assert_allclose(same[..., ~is_turn], expected[..., ~is_turn], atol=1e-6)
-
-
-def renamed(view, name, new_name):
-    """The view of a team whose robot i is robot name[i] of this one."""
-    buffers = copy.deepcopy(view.buffers)
-    for field, array in vars(view.buffers).items():
-        pairs = np.ascontiguousarray(array[:, name][:, :, name])
-        if field == "parent":
-            pairs = np.where(pairs < 0, pairs, new_name[pairs])
-        vars(buffers)[field] = pairs
-    phases = tuple(
-        Phase(recipient=new_name[phase.recipient[:, name]], heard=new_name[phase.heard[:, name]])
-        for phase in view.phases
-    )
-    return LocalViews(buffers=buffers, now=view.now, phases=phases)

@@ -62,6 +62,7 @@ def test_the_edges_are_the_parents_and_anyone_may_be_addressed(features):
     graphs = started(make_observer(features, MISSION)).graphs(views_of_robot_1())
     assert graphs.parent.tolist()[1] == [3, NO_PARENT, NO_PARENT, NO_PARENT]
     assert np.all(graphs.may_address)
+    assert not np.any(graphs.has_turn)
 
 
 @pytest.mark.parametrize("features", OBSERVERS)
@@ -82,7 +83,7 @@ def test_rows_are_robots_mission_by_mission(features):
             ),
         )
         expected = alone.graphs(own)
-        for name in ("node", "parent", "may_address"):
+        for name in ("node", "parent", "may_address", "has_turn"):
             rows = getattr(graphs, name)
             assert len(rows) == 12
             np.testing.assert_array_equal(rows[4:8], getattr(expected, name), err_msg=str(window))

@@ -93,14 +93,16 @@ def test_a_course_of_no_windows_is_the_start():
 
 def test_padding_adds_nodes_that_nobody_hears_or_addresses():
     small, large = groups_of((3, 5), 4, 2)
-    node, parent, may_address = padded([small.first_graphs, large.first_graphs], 5)
-    assert node.shape[:2] == (2 * 3 + 2 * 5, 5)
-    np.testing.assert_array_equal(node[:6, :3], small.first_graphs.node)
-    np.testing.assert_array_equal(node[6:], large.first_graphs.node)
-    np.testing.assert_array_equal(parent[:6, :3], small.first_graphs.parent)
-    assert np.all(node[:6, 3:] == 0.0)
-    assert np.all(parent[:6, 3:] == NO_PARENT)
-    assert not np.any(may_address[:6, 3:])
+    rows = padded([small.first_graphs, large.first_graphs], 5)
+    assert rows["node"].shape[:2] == (2 * 3 + 2 * 5, 5)
+    for name in ("node", "parent", "may_address"):
+        np.testing.assert_array_equal(rows[name][:6, :3], getattr(small.first_graphs, name))
+        np.testing.assert_array_equal(rows[name][6:], getattr(large.first_graphs, name))
+    assert np.all(rows["node"][:6, 3:] == 0.0)
+    assert np.all(rows["parent"][:6, 3:] == NO_PARENT)
+    assert not np.any(rows["may_address"][:6, 3:])
+    turns = np.concatenate([small.first_graphs.has_turn, large.first_graphs.has_turn])
+    np.testing.assert_array_equal(rows["has_turn"][:, 0], turns)
 
 
 def test_sizes_take_turns():

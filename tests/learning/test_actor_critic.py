@@ -1,0 +1,205 @@
+"""What PPO sees of the networks: log-probabilities, entropies and values, robot by robot."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from small_runs import small_training
+from torch.distributions import Categorical
+
+from swarm_mj.learning.actor_critic import entropy, gumbel_sample, log_probability
+from swarm_mj.learning.checkpoint import missions_of
+from swarm_mj.learning.run import make_model
+from swarm_mj.learning.settings import arm_settings
+from swarm_mj.mission import PRESETS
+
+RUNS = [
+    (arm, preset, sizes)
+    for arm in ("robot", "team")
+    for preset in ("paper", "reference")
+    for sizes in ((5,), (3, 5))
+]
+
+
+def model_of(arm, preset, sizes):
+    """A model whose weights are large enough that decisions depend on what is seen."""
+    mission = PRESETS[preset]("random-walk", num_robots=5, num_windows=20, range_ratio=0.6)
+    training = arm_settings(arm, mission, sizes, seed=1)
+    training = replace(training, missions=4, network=replace(training.network, latent=8, depth=2))
+    model, _ = make_model(training)
+    with torch.no_grad():
+        for weight in model.policy.parameters():
+            weight *= 2.0
+    return model, training
+
+
+def after_some_windows(model, count=3):
+    """What everyone sees after a few windows of the model's own decisions, and its actions."""
+    env = missions_of(model)
+    observation = model.get_env().reset()
+    for _ in range(count):
+        actions, _ = model.predict(observation)
+        observation, _, _, _ = env.step(actions)
+    return as_tensors(observation)
+
+
+def as_tensors(observation):
+    return {name: torch.as_tensor(rows) for name, rows in observation.items()}
+
+
+def plain_logits(output, owner, may_address, silence_logit):
+    """Over the recipients of one robot, from its network's numbers, one after the other."""
+    address = output[:, 0].tolist()
+    if output.shape[1] == 2:
+        at_zero_power = output[:, 1].tolist()
+        address[owner] = float(np.logaddexp.reduce([*at_zero_power, address[owner]]))
+    address[owner] += silence_logit
+    return torch.tensor([a if may_address[k] else -np.inf for k, a in enumerate(address)])
+
+
+def robot_by_robot(model, training):
+    """Each real robot's distribution and values, from its own graph without padding, as a list.
+
+    A row for each mission of: the robots' distributions, and their graphs' values, node by node.
+    """
+    policy, missions = model.policy, []
+    env = missions_of(model)
+    for group, outcome in zip(env.groups, env.outcomes, strict=True):
+        graphs = outcome.graphs
+        num_robots = group.mission.num_robots
+        for b in range(group.num_missions):
+            robots = []
+            for i in range(num_robots):
+                row = b * num_robots + i
+                seen = (
+                    torch.tensor(graphs.node[row])[None],
+                    torch.tensor(graphs.parent[row]).long()[None],
+                )
+                output = policy.network(*seen)[0]
+                if training.shares_trunk:
+                    values, output = output[:, -1], output[:, :-1]
+                else:
+                    values = policy.value_network(*seen)[0, :, 0]
+                bias = 0.0 if graphs.has_turn[row] else training.silence_logit
+                logits = plain_logits(output, i, graphs.may_address[row], bias)
+                robots.append((Categorical(logits=logits), values.detach()))
+            missions.append(robots)
+    return missions
+
+
+@pytest.mark.parametrize(("arm", "preset", "sizes"), RUNS)
+def test_log_probabilities_entropies_and_values_are_those_of_a_loop_over_robots(arm, preset, sizes):
+    model, training = model_of(arm, preset, sizes)
+    observation = after_some_windows(model)
+    actions, value, log_p = model.policy(observation)
+    again = model.policy.evaluate_actions(observation, actions)
+    expected = {"value": [], "log_p": [], "entropy": []}
+    missions = robot_by_robot(model, training)
+    if arm == "robot":
+        rows = actions.split([len(m) for m in missions])
+        for robots, chosen in zip(missions, rows, strict=True):
+            for i, (distribution, values) in enumerate(robots):
+                expected["value"].append(values[i])
+                expected["log_p"].append(distribution.log_prob(chosen[i]))
+                expected["entropy"].append(distribution.entropy())
+    else:
+        for robots, chosen in zip(missions, actions, strict=True):
+            each = list(enumerate(robots))
+            counted = [v.sum() if preset == "reference" else v[i] for i, (_, v) in each]
+            expected["value"].append(sum(counted))
+            expected["log_p"].append(sum(d.log_prob(chosen[i]) for i, (d, _) in each))
+            expected["entropy"].append(sum(d.entropy() for _, (d, _) in each))
+    for name, found in (("value", value), ("log_p", log_p)):
+        torch.testing.assert_close(
+            found.detach(), torch.stack(expected[name]), atol=2e-5, rtol=1e-4
+        )
+    for name, found in zip(("value", "log_p", "entropy"), again, strict=True):
+        torch.testing.assert_close(
+            found.detach(), torch.stack(expected[name]), atol=2e-5, rtol=1e-4
+        )
+    torch.testing.assert_close(model.policy.predict_values(observation), value)
+
+
+@pytest.mark.parametrize("arm", ["robot", "team"])
+def test_robots_that_do_not_exist_are_silent_and_add_nothing(arm):
+    model, _ = model_of(arm, "paper", (3, 5))
+    observation = after_some_windows(model)
+    actions, _, _ = model.policy(observation)
+    if arm == "team":
+        unused = ~observation["is_robot"].bool()
+        everyone = torch.arange(5).expand_as(actions)
+        assert torch.equal(actions[unused], everyone[unused])
+    logits, _ = model.policy.logits_and_value(observation)
+    may_address = observation["may_address"].bool()
+    assert torch.all(logits.softmax(-1)[~may_address] == 0.0)
+    assert torch.all(torch.gather(may_address, -1, actions[..., None]))
+
+
+def test_draws_have_the_frequencies_of_the_boltzmann_distribution():
+    torch.manual_seed(1)
+    logits = torch.tensor([1.0, 0.0, -2.0, 2.5, -1e9])
+    count = 40_000
+    drawn = torch.bincount(gumbel_sample(logits.expand(count, 5)), minlength=5) / count
+    expected = torch.softmax(logits, 0)
+    error = (expected * (1 - expected) / count).sqrt()
+    assert torch.all((drawn - expected).abs() <= 4.0 * error)
+    assert drawn[4] == 0.0
+
+
+def test_draws_of_different_robots_are_independent():
+    torch.manual_seed(1)
+    both = gumbel_sample(torch.zeros(20_000, 2, 2)).float()
+    correlation = torch.corrcoef(both.T)[0, 1]
+    assert abs(correlation) < 4.0 / np.sqrt(20_000)
+
+
+def test_sums_over_robots_by_hand():
+    """Two robots, of which one chooses between 1:3 odds, and one has no choice."""
+    logits = torch.tensor([[[0.0, np.log(3.0), -1e9], [-1e9, 5.0, -1e9]]], dtype=torch.float32)
+    chosen = torch.tensor([[1, 1]])
+    torch.testing.assert_close(
+        log_probability(logits, chosen), torch.tensor([np.log(0.75)]).float()
+    )
+    plain = -(0.25 * np.log(0.25) + 0.75 * np.log(0.75))
+    torch.testing.assert_close(entropy(logits), torch.tensor([plain]).float())
+
+
+@pytest.mark.parametrize("arm", ["robot", "team"])
+def test_the_mode_is_taken_on_request(arm):
+    model, _ = model_of(arm, "paper", (5,))
+    observation = after_some_windows(model)
+    actions, _, _ = model.policy(observation, deterministic=True)
+    logits, _ = model.policy.logits_and_value(observation)
+    assert torch.equal(actions, logits.argmax(-1))
+    predicted, _ = model.predict(
+        {name: rows.numpy() for name, rows in observation.items()}, deterministic=True
+    )
+    np.testing.assert_array_equal(predicted, actions)
+
+
+@pytest.mark.parametrize("arm", ["robot", "team"])
+def test_the_acting_network_is_a_copy_of_what_acts(arm):
+    model, training = model_of(arm, "reference", (5,))
+    dice = torch.get_rng_state()
+    copied = model.policy.acting_network()
+    assert torch.equal(torch.get_rng_state(), dice)
+    assert copied.shape == training.network
+    observation = after_some_windows(model)
+    graphs = [observation[name].flatten(0, -n) for name, n in (("node", 3), ("parent", 2))]
+    seen = (graphs[0], graphs[1].long())
+    whole = model.policy.network(*seen)[..., : training.network.num_outputs]
+    torch.testing.assert_close(copied(*seen), whole.detach(), atol=1e-6, rtol=1e-5)
+    with torch.no_grad():
+        model.policy.network.output.weight.zero_()
+    assert torch.any(copied.output.weight != 0.0)
+
+
+@pytest.mark.parametrize("arm", ["robot", "team"])
+def test_training_begins_with_the_network_it_is_given(arm):
+    first, second = (make_model(small_training(arm, seed=seed))[0] for seed in (1, 2))
+    given = first.policy.acting_network()
+    assert torch.any(second.policy.acting_network().output.weight != given.output.weight)
+    second.policy.take_acting_network(given)
+    for name, tensor in second.policy.acting_network().state_dict().items():
+        assert torch.equal(tensor, given.state_dict()[name])
