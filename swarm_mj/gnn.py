@@ -163,10 +163,8 @@ class AggregationGnn(nn.Module):
             node_hidden=node_hidden,
             has_relu=self.shape.depth > 1,
         )
-        of_every_stage = [parts.after(encoded)] + [
-            parts.after(last_node)
-        ] * self.shape.receptive_field
-        return NonLinearStages(encoder=encoder, parts=of_every_stage, core=core)
+        later = [parts.after(last_node)] * self.shape.receptive_field
+        return NonLinearStages(encoder=encoder, parts=[parts.after(encoded), *later], core=core)
 
     def _linear_stages(self) -> LinearStages:
         *encoder, encoded = layers_of(self.encoder.node)

@@ -56,13 +56,22 @@ def test_two_numbers_make_the_probabilities_of_the_2_n_actions():
         np.testing.assert_allclose(found[row], expected, rtol=1e-6)
 
 
-@pytest.mark.parametrize("num_outputs", [1, 2])
-def test_masked_recipients_are_impossible_and_change_no_other(num_outputs):
-    may_address = torch.tensor([[True, False, True], [False, True, True]])
-    output = torch.stack([FULL, ZERO], dim=2)[:, :, :num_outputs]
-    masked, free = np.array(logits(output, may_address)), np.array(logits(output))
-    assert np.all(masked[~may_address.numpy()] == IMPOSSIBLE)
-    np.testing.assert_array_equal(masked[may_address.numpy()], free[may_address.numpy()])
+MASKED = torch.tensor([[True, False, True], [False, True, True]])
+
+
+def test_masked_recipients_are_impossible_and_change_no_other():
+    masked, free = np.array(logits(FULL[:, :, None], MASKED)), np.array(logits(FULL[:, :, None]))
+    assert np.all(masked[~MASKED.numpy()] == IMPOSSIBLE)
+    np.testing.assert_array_equal(masked[MASKED.numpy()], free[MASKED.numpy()])
+
+
+def test_of_two_numbers_a_masked_recipient_counts_at_neither_power():
+    """As padding of a mixed team must not: zero power to it is no way to be silent."""
+    own_0 = math.log(math.exp(0.0) + math.exp(0.25) + math.exp(0.5))
+    own_2 = math.log(math.exp(2.0) + math.exp(4.0) + math.exp(1.0))
+    found = logits(torch.stack([FULL, ZERO], dim=2), MASKED)
+    expected = [[own_0, IMPOSSIBLE, -2.0], [IMPOSSIBLE, 0.0, own_2]]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize("num_outputs", [1, 2])

@@ -1,7 +1,8 @@
 """`swarm-mj bench`: how fast the simulation and evaluations are on this machine."""
 
 import argparse
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -9,6 +10,9 @@ from rich.table import Table
 from swarm_mj.bench import AUTHORS_WINDOWS_PER_S, EvaluationTiming, Timing, bench, bench_evaluation
 from swarm_mj.cli.options import new_parser
 from swarm_mj.published import BASELINES
+
+if TYPE_CHECKING:
+    from swarm_mj.bench_learning import LearningTiming
 
 LIMITS = {"missions": (1, 10_000), "threads": (1, 256), "episodes": (0, 10_000), "jobs": (1, 256)}
 
@@ -27,7 +31,7 @@ def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no publi
         default=[1, 32, 256],
         help="how many missions stand side by side",
     )
-    parser.add_argument("--threads", type=int, default=1, help="of MuJoCo")
+    parser.add_argument("--threads", type=int, default=1, help="of MuJoCo and torch")
     parser.add_argument("--seconds", type=float, default=2.0, help="per measurement, about")
     parser.add_argument(
         "--episodes",
@@ -36,11 +40,24 @@ def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no publi
         help="of each baseline in the evaluation that is timed; 0 leaves it out",
     )
     parser.add_argument("--jobs", type=int, default=2, help="processes of that evaluation")
+    parser.add_argument(
+        "--no-learning", action="store_true", help="leave out the networks and the training"
+    )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Runs the command; returns its exit code."""
+    _check(options)
+    with Console(stderr=True).status("Measuring ...") as status:
+        tables = list(_measure(options, status.update))
+    console = Console(highlight=False)
+    for table in tables:
+        console.print(table)
+    return 0
+
+
+def _check(options: argparse.Namespace) -> None:
     for name, (low, high) in LIMITS.items():
         given = getattr(options, name)
         for value in given if isinstance(given, list) else [given]:
@@ -48,22 +65,24 @@ def run(options: argparse.Namespace) -> int:
                 raise ValueError(f"{name} must be from {low} to {high}, not {value}")
     if not 0.1 <= options.seconds <= 600.0:
         raise ValueError(f"seconds must be from 0.1 to 600, not {options.seconds:g}")
-    timings, evaluation = [], None
-    with Console(stderr=True).status("Measuring ...") as status:
-        for num_missions in options.missions:
-            status.update(f"Measuring {num_missions} missions side by side ...")
-            timing = bench(num_missions, num_threads=options.threads, seconds=options.seconds)
-            timings.append(timing)
-        if options.episodes:
-            status.update(f"Measuring an evaluation of {options.episodes} missions ...")
-            evaluation = bench_evaluation(
-                options.episodes, num_jobs=options.jobs, seconds=options.seconds
-            )
-    console = Console(highlight=False)
-    console.print(_table(timings))
-    if evaluation:
-        console.print(_evaluation_table(evaluation))
-    return 0
+
+
+def _measure(options: argparse.Namespace, say: Callable[[str], None]) -> Iterator[Table]:
+    timings = []
+    for num_missions in options.missions:
+        say(f"Measuring {num_missions} missions side by side ...")
+        timings.append(bench(num_missions, num_threads=options.threads, seconds=options.seconds))
+    yield _table(timings)
+    if options.episodes:
+        say(f"Measuring an evaluation of {options.episodes} missions ...")
+        yield _evaluation_table(
+            bench_evaluation(options.episodes, num_jobs=options.jobs, seconds=options.seconds)
+        )
+    if not options.no_learning:
+        say("Measuring networks and training (a minute or two) ...")
+        from swarm_mj.bench_learning import bench_learning  # torch takes its time to import
+
+        yield _learning_table(bench_learning(threads=options.threads, seconds=options.seconds))
 
 
 def _table(timings: list[Timing]) -> Table:
@@ -81,6 +100,26 @@ def _table(timings: list[Timing]) -> Table:
     table.add_row("plain mj_step, µs", *(f"{t.mj_step_us:.2f}" for t in timings), end_section=True)
     for part in timings[0].parts_us:
         table.add_row(f"{part}, µs", *(f"{t.parts_us[part]:.2f}" for t in timings))
+    return table
+
+
+def _learning_table(timing: "LearningTiming") -> Table:
+    table = Table(
+        title="Learning: 40 stationary robots, team decisions per second",
+        title_justify="left",
+        show_header=False,
+    )
+    table.add_column()
+    table.add_column(justify="right")
+    for each in timing.networks:
+        missions = f"{each.num_missions} mission{'s' if each.num_missions > 1 else ''}"
+        table.add_row(f"the paper's network, {missions}, forward", f"{each.forward_per_s:.0f}")
+        table.add_row("  in 64 x 64 layers over as many nodes", f"{each.forward_in_layers:.1f} x")
+        table.add_row("  forward and backward", f"{each.backward_per_s:.0f}")
+    for arm, per_s in timing.training_per_s.items():
+        table.add_row(f"training, arm {arm}", f"{per_s:.1f}")
+    for name, decision_us in timing.own_decision_us.items():
+        table.add_row(f"one robot's decision, {name} network, µs", f"{decision_us:.0f}")
     return table
 
 

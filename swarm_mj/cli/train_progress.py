@@ -51,6 +51,7 @@ class Watch:
             TextColumn("{task.fields[text]}"),
             console=console,
             transient=True,
+            disable=not console.is_terminal,
         )
         self._task = self._bar.add_task("", total=WHOLE, what="Training", text="")
         self._start: Status | None = None  # of this session

@@ -71,7 +71,9 @@ class ExtendedObserver:
         self._memory.update(views)
         buffers, memory = views.buffers, self._memory
         num_missions, num_robots = buffers.shape
-        node = np.empty((num_missions, num_robots, num_robots, len(self.names)), dtype=np.float32)
+        node = np.empty(
+            (num_missions, num_robots, num_robots, len(ExtendedObserver.names)), dtype=np.float32
+        )
         may_address = np.empty((num_missions, num_robots, num_robots), dtype=np.bool_)
         _fill(
             buffers.timestamp,
@@ -100,7 +102,7 @@ class ExtendedObserver:
         )
         rows = (num_missions * num_robots, num_robots)
         return Graphs(
-            node=node.reshape(*rows, len(self.names)),
+            node=node.reshape(*rows, len(ExtendedObserver.names)),
             parent=buffers.parent.reshape(rows),
             may_address=may_address.reshape(rows),
             has_turn=np.diagonal(has_joined, axis1=1, axis2=2).reshape(-1) > 0.0,

@@ -81,7 +81,7 @@ class PaperObserver:
         num_missions, num_robots = buffers.shape
         node = np.empty((num_missions, num_robots, num_robots, len(self.names)), dtype=np.float32)
         node[..., 0] = np.eye(num_robots)
-        node[..., 1] = buffers.is_known
+        node[..., 1] = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
         node[..., 2] = buffers.timestamp / self._num_windows
         node[..., 3:5] = buffers.position_m / self._side_m
         node[..., 5:7] = buffers.velocity_mps * (self._duration_s / self._side_m)

@@ -6,6 +6,7 @@ or not there.
 
 import io
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -107,15 +108,17 @@ def missions_of(model: PPO) -> MissionsEnv:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    """Raises ValueError for what is no checkpoint of this version."""
+    """Raises ValueError for what is no whole checkpoint of this version."""
+    content = io.BytesIO(path.read_bytes())
     try:
-        state = torch.load(path, map_location="cpu", weights_only=True)
-    except OSError:
-        raise
+        with zipfile.ZipFile(content) as archive:
+            flawed = archive.testzip()
+        content.seek(0)
+        state = None if flawed else torch.load(content, map_location="cpu", weights_only=True)
     except Exception as error:  # torch names no exception of its own for damaged files
-        raise ValueError(
-            f"checkpoint {path} is damaged, or none; begin a new run with another --out"
-        ) from error
+        raise ValueError(_damaged(path)) from error
+    if flawed:
+        raise ValueError(_damaged(path))
     if not isinstance(state, dict) or "version" not in state:
         raise ValueError(f"{path} is no checkpoint of swarm-mj train")
     if state["version"] != CHECKPOINT_VERSION:
@@ -124,6 +127,10 @@ def _read(path: Path) -> dict[str, Any]:
             f"{CHECKPOINT_VERSION}; resume with the version that wrote it"
         )
     return state
+
+
+def _damaged(path: Path) -> str:
+    return f"checkpoint {path} is damaged, or none; begin a new run with another --out"
 
 
 def _restore(state: dict[str, Any], model: PPO, rng: np.random.Generator) -> Progress:

@@ -158,13 +158,11 @@ def train(
             or foreign, or training has diverged.
         OSError: The folder cannot be written.
     """
-    model, rng = make_model(training)  # first, for its errors
     if not is_resumed:
         check_new(folder)
-    remove_parts(folder)
+    model, rng = make_model(training)
     run = Run(training=training, limits=limits, command=command, init=init)
-    write_run(folder, run)
-    progress = _go_to_checkpoint(folder, run, model, rng)
+    progress = _resumed(folder, run, model, rng) or _begun(folder, run, model)
     model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))
     session = Session(run, folder, progress, rng, listener)
     env = missions_of(model)
@@ -186,13 +184,22 @@ def train(
     return progress
 
 
-def _go_to_checkpoint(folder: Path, run: Run, model: PPO, rng: np.random.Generator) -> Progress:
-    """Takes a run to its last checkpoint, or to its beginning."""
+def _resumed(folder: Path, run: Run, model: PPO, rng: np.random.Generator) -> Progress | None:
+    """Takes a run to its last checkpoint; None if it did not get as far as one."""
     kept = folder / CHECKPOINT
-    if kept.exists():
-        progress = checkpoint.load(kept, run.training, model, rng)
-        write_curve(folder / CURVE, progress.curve)
-        return progress
+    if not kept.exists():
+        return None
+    progress = checkpoint.load(kept, run.training, model, rng)
+    remove_parts(folder)
+    write_run(folder, run)
+    write_curve(folder / CURVE, progress.curve)
+    return progress
+
+
+def _begun(folder: Path, run: Run, model: PPO) -> Progress:
+    """Takes a run to its beginning; once its settings are written, it can be resumed."""
+    remove_parts(folder)
+    write_run(folder, run)
     if run.init is not None:
         assert isinstance(model.policy, GnnActorCritic)
         model.policy.take_acting_network(read_policy(own_init(folder, run.init))[0])

@@ -101,5 +101,5 @@ def test_features_are_finite_and_named(features):
 
 
 def test_unknown_features_are_a_clear_error():
-    with pytest.raises(ValueError, match="one of paper, reference, extended, not 'all'"):
+    with pytest.raises(ValueError, match="one of paper, reference, local, extended, not 'all'"):
         make_observer("all", MISSION)

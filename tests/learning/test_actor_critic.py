@@ -52,7 +52,7 @@ def plain_logits(output, owner, may_address, silence_logit):
     """Over the recipients of one robot, from its network's numbers, one after the other."""
     address = output[:, 0].tolist()
     if output.shape[1] == 2:
-        at_zero_power = output[:, 1].tolist()
+        at_zero_power = output[may_address, 1].tolist()
         address[owner] = float(np.logaddexp.reduce([*at_zero_power, address[owner]]))
     address[owner] += silence_logit
     return torch.tensor([a if may_address[k] else -np.inf for k, a in enumerate(address)])

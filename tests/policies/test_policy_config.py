@@ -70,7 +70,7 @@ def test_what_is_no_config(text, complaint):
         ("w" * 1000, 2, "it has an unknown key, www"),
         ("network", [1], r"network must be an object, not \[1\]"),
         ("features", "paper", "num_features is 18, but the paper features are 8"),
-        ("features", "all", "features must be one of paper, reference, extended, not 'all'"),
+        ("features", "all", "features must be one of paper, reference, local, extended, not 'all'"),
         ("features", 7, "features must be a text, not 7"),
         ("silence_logit", "3", 'silence_logit must be a number or a whole number, not "3"'),
         ("silence_logit", 100.5, "silence_logit must be from -100 to 100, not 100.5"),

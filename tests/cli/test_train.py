@@ -1,0 +1,251 @@
+"""`swarm-mj train`: what it prints, writes, refuses, and how it goes on."""
+
+import os
+import shlex
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import torch
+
+from swarm_mj.cli import main
+from swarm_mj.learning.run_folder import read_run
+from swarm_mj.learning.session import Session
+from swarm_mj.policies.stored import read_policy
+from swarm_mj.replay.read import windows
+
+MISSIONS = ("--robots", "4", "--windows", "12", "--range-ratio", "1", "--missions", "4")
+SMALL = (*MISSIONS, "--latent", "4", "--held-out", "2", "--evaluate-every", "128")
+ROLLOUT = 128  # decisions: 4 missions for 32 windows
+
+
+def train(*arguments):
+    """Runs the command in this process, in the folder that it is in."""
+    torch.set_num_threads(1)
+    return main(["train", *map(str, arguments)])
+
+
+def files(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty folder, and this process in it."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A folder with a finished run in `runs/whole`, and the process that made it."""
+    folder = tmp_path_factory.mktemp("whole")
+    command = [sys.executable, "-m", "swarm_mj", "train", "--out", "runs/whole", *SMALL]
+    done = subprocess.run(
+        [*command, "--budget", "256", "--replay-every", "200"],
+        cwd=folder, capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    return folder, done
+
+
+def test_a_run_prints_its_evaluations_and_what_it_came_to(whole):
+    _, done = whole
+    assert done.returncode == 0, done.stderr
+    lines = done.stderr.strip().splitlines()
+    assert len(lines) == 3, "something warns"
+    for line, decisions in zip(lines, (0, 128, 256), strict=True):
+        assert line.split()[:2] == [f"{decisions}", "decisions"]
+        assert "held-out age" in line
+    for row in ("held-out age, at first", "held-out age, best policy", "decisions", "minutes"):
+        assert row in done.stdout
+    assert "runs/whole: arm robot, stationary, 4 robots" in done.stdout
+
+
+def test_a_run_leaves_what_it_says(whole):
+    folder, _ = whole
+    left = [name for name in files(folder) if "tfevents" not in name]
+    assert left == [
+        *(f"runs/whole/{name}" for name in ("checkpoint.pt", "curve.csv")),
+        *(
+            f"runs/whole/policy/{name}"
+            for name in ("README.md", "config.json", "model.safetensors")
+        ),
+        *(f"runs/whole/replays/decisions-000000{n}.rrd" for n in ("000", "256")),
+        "runs/whole/settings.json",
+    ]
+    assert len(windows(folder / "runs/whole/replays/decisions-000000256.rrd")) == 12
+    _, config = read_policy(folder / "runs/whole/policy")
+    assert config.training["command"].startswith("swarm-mj train --out runs/whole --robots 4")
+    assert read_run(folder / "runs/whole").limits.decisions == 256
+
+
+@pytest.mark.parametrize("label", ["Fly:", "Evaluate:", "Go on:"])
+def test_the_commands_that_it_prints_work(whole, monkeypatch, capsys, label):
+    folder, done = whole
+    monkeypatch.chdir(folder)
+    (line,) = (line for line in done.stdout.splitlines() if line.startswith(label))
+    arguments = shlex.split(line.removeprefix(label))[1:]
+    extra = {"Fly:": ["--no-record"], "Evaluate:": ["--episodes", "2"], "Go on:": []}[label]
+    assert main([*arguments, *extra]) == 0
+    capsys.readouterr()
+
+
+class SignalsAt:
+    """Sends Ctrl-C in certain windows of the training, or of its evaluations."""
+
+    def __init__(self, monkeypatch, method, *calls):
+        original, count = getattr(Session, method), 0
+
+        def signalling(session, *arguments):
+            nonlocal count
+            count += 1
+            if count in calls:
+                signal.raise_signal(signal.SIGINT)
+            return original(session, *arguments)
+
+        self.before = signal.signal(signal.SIGINT, signal.default_int_handler)
+        monkeypatch.setattr(Session, method, signalling)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        signal.signal(signal.SIGINT, self.before)
+
+
+@pytest.mark.usefixtures("here")
+def test_ctrl_c_finishes_the_rollout_and_tells_how_to_go_on(monkeypatch, capsys):
+    with monkeypatch.context() as patch, SignalsAt(patch, "_on_step", 40):
+        assert train("--out", "r", *SMALL, "--budget", 512) == 130
+    printed = capsys.readouterr()
+    assert "Interrupted: finishing this rollout, then all is kept; Ctrl-C again" in printed.err
+    assert "Interrupted after 256 decisions; all is kept." in printed.err
+    assert "train --out r --resume\n" in printed.out
+    assert train("--out", "r", "--resume") == 0
+    printed = capsys.readouterr()
+    assert [line.split()[0] for line in printed.err.splitlines()] == ["256", "384", "512"]
+
+
+def test_ctrl_c_in_an_evaluation_leaves_it_for_later(here, monkeypatch, capsys):
+    with monkeypatch.context() as patch, SignalsAt(patch, "_on_window", 5):
+        assert train("--out", "r", *SMALL, "--budget", 128) == 130
+    assert "none yet" in capsys.readouterr().out
+    assert train("--out", "r", "--resume") == 0
+    assert (here / "r" / "policy" / "config.json").exists()
+
+
+def test_a_second_ctrl_c_breaks_off_and_leaves_nothing_half_done(here, monkeypatch, capsys):
+    with monkeypatch.context() as patch, SignalsAt(patch, "_on_step", 40, 45):
+        assert train("--out", "r", *SMALL, "--budget", 256) == 130
+    printed = capsys.readouterr()
+    assert "Broken off; the last checkpoint is kept." in printed.err
+    assert "train --out r --resume\n" in printed.err
+    assert "Traceback" not in printed.err
+    assert not [path for path in (here / "r").iterdir() if path.name.startswith(".")]
+    assert train("--out", "r", "--resume") == 0
+
+
+def test_ctrl_c_while_it_is_being_prepared_leaves_nothing(here, monkeypatch, capsys):
+    def interrupted(*_arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("swarm_mj.cli.train.asked_settings", interrupted)
+    assert train("--out", "r", *SMALL) == 130
+    assert "interrupted" in capsys.readouterr().err
+    assert files(here) == []
+
+
+def test_limits_are_kept_and_may_be_moved(here, capsys):
+    train("--out", "r", *SMALL, "--budget", 128)
+    train("--out", "r", "--resume", "--budget", 256, "--replay-every", 256)
+    assert read_run(here / "r").limits.decisions == 256
+    assert read_run(here / "r").limits.replay_every == 256
+    assert len(list((here / "r" / "replays").iterdir())) == 1 + 1
+    train("--out", "r", "--resume", "--minutes", 1e-6)
+    limits = read_run(here / "r").limits
+    assert (limits.decisions, limits.minutes) == (None, 1e-6)
+    command = read_run(here / "r").command
+    assert "--budget 128" in command or "pytest" in command
+    capsys.readouterr()
+
+
+@pytest.mark.usefixtures("here")
+def test_options_of_the_run_may_be_repeated(capsys):
+    train("--out", "r", *SMALL, "--budget", 128)
+    assert train("--out", "r", *SMALL, "--arm", "robot", "--seed", 0, "--resume") == 0
+    capsys.readouterr()
+
+
+def test_a_run_begins_with_a_policy_and_its_network(whole, here, capsys):
+    """Which has 4 wide layers, whatever the arm's own are."""
+    policy = whole[0] / "runs" / "whole" / "policy"
+    assert train("--out", "r", *MISSIONS, "--held-out", 2, "--init", policy, "--budget", 1) == 0
+    assert read_policy(here / "r" / "policy")[0].shape.latent == 4
+    capsys.readouterr()
+
+
+@pytest.mark.usefixtures("here")
+def test_arm_team_trains_a_flock_for_its_velocities(capsys):
+    options = ("--arm", "team", "--task", "flocking", "--reward", "velocity-variance")
+    assert train("--out", "r", *SMALL, *options, "--budget", 1) == 0
+    assert "velocity variance, of these" in capsys.readouterr().out
+
+
+def test_missions_of_several_sizes_are_shared_out_evenly(here, capsys):
+    several = ("--robots", 3, 4, 5, "--windows", 12, "--range-ratio", 1, "--latent", 4)
+    assert train("--out", "r", *several, "--held-out", 1, "--budget", 1) == 0
+    training = read_run(here / "r").training
+    assert (training.robots, training.missions, training.groups) == ((3, 4, 5), 18, 3)
+    assert "stationary, 3, 4, 5 robots" in capsys.readouterr().out
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_the_work(here, capsys):
+    (here / "locked").mkdir(mode=0o500)
+    if os.access(here / "locked", os.W_OK):
+        pytest.skip("this user may write anywhere")
+    assert train("--out", "locked/run", *SMALL) == 2
+    assert "cannot be written" in capsys.readouterr().err
+
+
+def test_the_parser_of_all_commands_does_not_wait_for_torch():
+    script = """
+import sys
+from swarm_mj.cli import make_parser
+make_parser()
+print([name for name in ("torch", "stable_baselines3", "tensorboard") if name in sys.modules])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
+
+
+def test_help_suffices(capsys):
+    for arguments in (["--help"], ["train", "--help"]):
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        assert ended.value.code == 0
+        shown = " ".join(capsys.readouterr().out.split())
+        assert "train" in shown
+        assert "None" not in shown
+    for text in (
+        "(default: robot)",
+        "(default: 200000, team: 2000000; none with --minutes)",
+        "K, message passes (default: 1, team: 5)",
+        "who hears whom in the graph: paper, reference, both (default: both, team: the preset's",
+        "of Adam, at the start (default: 0.001, team: 0.0001)",
+        "(default: stationary)",
+        "Exit codes",
+    ):
+        assert text in shown
+
+
+@pytest.mark.usefixtures("here")
+def test_a_path_with_odd_letters_is_kept_and_quoted(capsys):
+    out = Path("runs") / "a [red] b"
+    assert train("--out", out, *SMALL, "--budget", 1) == 0
+    printed = capsys.readouterr().out
+    assert "train --out 'runs/a [red] b' --resume" in printed
+    assert "runs/a [red] b: arm robot" in printed

@@ -1,0 +1,159 @@
+"""`swarm-mj train` refuses bad input in one clear line, before anything is written."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from swarm_mj.cli import main
+
+SMALL = (
+    *("--robots", "4", "--windows", "12", "--range-ratio", "1", "--missions", "4"),
+    *("--latent", "4", "--held-out", "1", "--budget", "1"),
+)
+# Runs command lines one after the other, and tells how each ended and which files it left.
+MANY = """
+import contextlib, io, json, sys
+from pathlib import Path
+from swarm_mj.cli import main
+ends = []
+for arguments in json.load(sys.stdin):
+    out, err = io.StringIO(), io.StringIO()
+    before = {path: path.stat().st_mtime_ns for path in Path().rglob("*")}
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            code = main(["train", *arguments])
+        except SystemExit as end:
+            code = end.code
+    after = {path: path.stat().st_mtime_ns for path in Path().rglob("*")}
+    ends.append([code, out.getvalue(), err.getvalue(), before == after])
+json.dump(ends, sys.stdout)
+"""
+NEW, DONE = ("--out", "new"), ("--out", "done", "--resume")
+REFUSED = [
+    ((), "the following arguments are required: --out"),
+    ((*NEW, "--arm", "both"), "arm must be one of robot, team, not 'both'"),
+    ((*NEW, "--features", "all"), "features must be one of paper, reference, extended, not 'all'"),
+    ((*NEW, "--reward", "speed"), "reward must be one of aoi, velocity-variance, not 'speed'"),
+    ((*NEW, "--reward", "velocity-variance"), "choose arm team, or reward aoi"),
+    (
+        (*NEW, "--arm", "team", "--reward", "velocity-variance"),
+        "depends on who talks only if the robots flock; add --task flocking",
+    ),
+    ((*NEW, "--edges", "none"), "edges"),
+    ((*NEW, "--task", "swim"), "task must be one of stationary, random-walk, flocking, not 'swim'"),
+    ((*NEW, "--preset", "mine"), "preset must be one of paper, reference, not 'mine'"),
+    ((*NEW, "--boundary", "torus"), "boundary must be one of reflect, none, not 'torus'"),
+    ((*NEW, "--robots", "1"), "a whole number from 2 to 1000 [robots], not 1"),
+    ((*NEW, "--robots", "10", "201"), "robots must be from 2 to 200, not 201"),
+    ((*NEW, "--robots", "10", "0"), "not 0"),
+    ((*NEW, "--robots", "many"), "argument --robots: invalid int value: 'many'"),
+    ((*NEW, "--range-ratio", "0.02"), "too sparse"),
+    ((*NEW, "--range-ratio", "nan"), "not nan"),
+    ((*NEW, "--windows", "0"), "from 1 to 100000 [windows], not 0"),
+    ((*NEW, "--seed", "-1"), "seed must be from 0 to 9223372036854775807, not -1"),
+    ((*NEW, "--seed", "9223372036854775808"), "not 9223372036854775808"),
+    ((*NEW, "--seed", "x"), "invalid int value: 'x'"),
+    ((*NEW, "--latent", "0"), "latent must be from 1 to 1024, not 0"),
+    ((*NEW, "--depth", "9"), "depth must be from 1 to 8, not 9"),
+    ((*NEW, "--receptive-field", "-1"), "receptive_field must be from 0 to 16, not -1"),
+    ((*NEW, "--missions", "0"), "missions must be from 1 to 4096, not 0"),
+    ((*NEW, "--missions", "1000000000"), "missions must be from 1 to 4096"),
+    (
+        (*NEW, "--missions", "16", "--robots", "4", "5", "6"),
+        "missions must be a multiple of the 3 team sizes, such as 15, 18, not 16",
+    ),
+    ((*NEW, "--arm", "team", "--preset", "reference", "--missions", "1"), "is too small for 4"),
+    ((*NEW, "--missions", "4096", "--robots", "200"), "more than half of this machine's"),
+    ((*NEW, "--learning-rate", "0"), "--learning-rate must be from 1e-09 to 1, not 0"),
+    ((*NEW, "--learning-rate", "nan"), "not nan"),
+    ((*NEW, "--entropy", "-1"), "--entropy must be from 0 to 10, not -1"),
+    ((*NEW, "--discount", "1.5"), "--discount must be from 0 to 1, not 1.5"),
+    ((*NEW, "--threads", "0"), "threads must be from 1 to 256, not 0"),
+    ((*NEW, "--held-out", "0"), "held-out missions must be from 1 to 10000, not 0"),
+    ((*NEW, "--evaluate-every", "0"), "evaluation interval must be from 1"),
+    ((*NEW, "--budget", "0"), "budget must be from 1 to 1000000000000, not 0"),
+    ((*NEW, "--replay-every", "0"), "replay-every must be from 1 to 1000000000000, not 0"),
+    ((*NEW, "--minutes", "0"), "minutes must be a number above 0, not 0"),
+    ((*NEW, "--minutes", "nan"), "minutes must be a number above 0, not nan"),
+    ((*NEW, "--minutes", "inf"), "minutes must be a number above 0, not inf"),
+    ((*NEW, "--wings", "2"), "unrecognized arguments: --wings 2"),
+    ((*NEW, "--resume"), "new holds no run to go on with; to begin one, leave out --resume"),
+    ((*NEW, "--init", "nothing"), "policy nothing does not exist"),
+    ((*NEW, "--init", "damaged"), "damaged/config.json"),
+    (
+        (*NEW, "--init", "done/policy", "--latent", "8"),
+        "--latent 8 is not what the policy done/policy has, 4; leave it out",
+    ),
+    ((*NEW, "--init", "done/policy", "--features", "paper"), "--features paper is not what the"),
+    ((*NEW, "--init", "done/policy", "--linear"), "--linear True is not what the policy"),
+    (("--out", "done"), "done holds a run; go on with it by --resume, or name another folder"),
+    (("--out", "done/checkpoint.pt"), "is a file; name a folder"),
+    (("--out", "done/checkpoint.pt/new"), "cannot be written"),
+    (("--out", "other"), "other holds thesis.tex, which is no run's; name another by --out"),
+    ((*DONE, "--latent", "8"), "--latent 8 is not what the run in done has, 4; leave it out"),
+    ((*DONE, "--robots", "4", "5"), "--robots 4 5 is not what the run in done has, 4; leave"),
+    ((*DONE, "--seed", "1"), "--seed 1 is not what the run in done has, 0; leave it out"),
+    ((*DONE, "--task", "flocking"), "--task flocking is not what the run in done has, stationary"),
+    ((*DONE, "--discount", "0.5"), "--discount 0.5 is not what the run in done has, 0.0; leave"),
+    ((*DONE, "--init", "done/policy"), "done has begun, so --init done/policy is too late"),
+    ((*DONE, "--budget", "-1"), "budget must be from 1"),
+    (("--out", "cut-settings", "--resume"), "settings.json are damaged, or no run's"),
+    (("--out", "new-settings", "--resume"), "format_version is 2, and this swarm_mj reads 1"),
+    (("--out", "cut-checkpoint", "--resume"), "checkpoint.pt is damaged, or none; begin a new"),
+    (("--out", "mixed-up", "--resume"), "it was made with other settings than the run's"),
+]
+
+
+def prepare(folder):
+    """The folders that the refused command lines name, made of those of a finished run."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert main(["train", "--out", "done", *SMALL]) == 0
+    checkpoint = (folder / "done" / "checkpoint.pt").read_bytes()
+    settings = json.loads((folder / "done" / "settings.json").read_text())
+    newer = settings | {"format_version": 2}
+    ppo = settings["training"]["ppo"] | {"entropy": 0.125}
+    other = settings | {"training": settings["training"] | {"ppo": ppo}}
+    made = {
+        "other/thesis.tex": b"precious",
+        "damaged/config.json": b"{",
+        "cut-settings/settings.json": as_bytes(settings)[:-40],
+        "new-settings/settings.json": as_bytes(newer),
+        "cut-checkpoint/settings.json": as_bytes(settings),
+        "cut-checkpoint/checkpoint.pt": checkpoint[:-40],
+        "mixed-up/settings.json": as_bytes(other),
+        "mixed-up/checkpoint.pt": checkpoint,
+    }
+    for name, content in made.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_bytes(content)
+
+
+def as_bytes(document):
+    return json.dumps(document).encode()
+
+
+@pytest.fixture(scope="module")
+def refusals(tmp_path_factory):
+    """How all refused command lines ended; one process takes them in turn."""
+    folder = tmp_path_factory.mktemp("refusals")
+    prepare(folder)
+    lines = [list(arguments) for arguments, _ in REFUSED]
+    done = subprocess.run(
+        [sys.executable, "-c", MANY], input=json.dumps(lines),
+        cwd=folder, capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("number", range(len(REFUSED)), ids=lambda n: " ".join(REFUSED[n][0]))
+def test_bad_input_is_one_clear_line_and_changes_nothing(refusals, number):
+    code, out, err, is_unchanged = refusals[number]
+    assert code == 2
+    assert REFUSED[number][1] in err
+    assert len(err.strip().splitlines()) == 1
+    assert out == ""
+    assert is_unchanged

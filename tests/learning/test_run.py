@@ -1,0 +1,152 @@
+"""Runs as a whole: the optimiser's schedule, beginnings, minibatches, refusals."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from small_runs import go_on, run, small_training
+from tiny_policies import save_tiny
+
+from swarm_mj.learning.checkpoint import missions_of
+from swarm_mj.learning.run import StepDecay, make_model, train
+from swarm_mj.learning.run_folder import INIT, SETTINGS, Limits
+from swarm_mj.policies.stored import read_policy
+
+
+def with_ppo(training, **changes):
+    return replace(training, ppo=replace(training.ppo, **changes))
+
+
+def test_the_learning_rate_falls_in_steps_of_the_optimiser():
+    """3 minibatches a pass: 4 passes are 12 steps."""
+    training = with_ppo(small_training(), learning_rate=0.5, decay=0.1, decay_steps=12)
+    model, _ = make_model(training)
+    assert model.lr_schedule(1.0) == 0.5
+    for passes, rate in ((3, 0.5), (4, 0.05), (7, 0.05), (8, 0.005), (10, 0.005)):
+        model._n_updates = passes
+        assert model.lr_schedule(0.3) == pytest.approx(rate)
+
+
+def test_the_optimiser_steps_at_that_rate(tmp_path):
+    """Two passes a rollout and three minibatches a pass: the third rollout begins at step 12."""
+    training = with_ppo(small_training(), learning_rate=1e-3, decay=0.5, decay_steps=12)
+    rates = []
+
+    def note(status):
+        if status.evaluated is None and status.decisions % 32 == 0:
+            rates.append(optimiser_of[0].param_groups[0]["lr"])
+        return True
+
+    optimiser_of = []
+    original = torch.optim.Adam.__init__
+
+    def noting(self, *arguments, **named):
+        original(self, *arguments, **named)
+        optimiser_of.append(self)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(torch.optim.Adam, "__init__", noting)
+        run(training, tmp_path / "run", 128, note)
+    made = int(next(iter(optimiser_of[0].state.values()))["step"])
+    assert made == 4 * 2 * 3
+    assert optimiser_of[0].param_groups[0]["lr"] == pytest.approx(0.5e-3)
+    assert rates[0] == pytest.approx(1e-3)
+
+
+def test_the_same_settings_are_the_same_policy_and_other_seeds_others(tmp_path):
+    weights = []
+    for name, seed in (("a", 1), ("b", 1), ("c", 2)):
+        run(small_training(seed=seed), tmp_path / name, 64)
+        weights.append((tmp_path / name / "policy" / "model.safetensors").read_bytes())
+    assert weights[0] == weights[1] != weights[2]
+
+
+@pytest.mark.parametrize("arm", ["robot", "team"])
+def test_a_run_begins_with_the_policy_it_is_given(tmp_path, arm):
+    """The best policy before the first rollout is that policy itself."""
+    given = save_tiny(tmp_path / "given", "extended")
+    training = small_training(arm, network=given.shape, features="extended", held_out=1)
+
+    def enough(status):
+        return status.evaluated is not None or not status.progress.curve
+
+    run(training, tmp_path / "run", listener=enough, init=tmp_path / "given")
+    for folder in ("policy", INIT):
+        kept, _ = read_policy(tmp_path / "run" / folder)
+        for name, tensor in kept.state_dict().items():
+            assert torch.equal(tensor, given.state_dict()[name])
+
+
+def test_mixed_sizes_are_trained_on_and_evaluated_together(tmp_path):
+    training = small_training(sizes=(3, 6))
+    model, _ = make_model(training)
+    sizes = [group.mission.num_robots for group in missions_of(model).groups]
+    assert sizes == [3, 6, 3, 6]
+    progress = run(training, tmp_path / "run", 64)
+    _, config = read_policy(tmp_path / "run" / "policy")
+    assert config.evaluation["missions"] == 4
+    assert config.training["robots"] == [3, 6]
+    assert progress.decisions == 64
+
+
+def test_minibatches_need_two_rows_each():
+    team = with_ppo(small_training("team", missions=4), num_steps=1, num_minibatches=3)
+    with pytest.raises(ValueError, match="a rollout of 4 rows is too small for 3 minibatches"):
+        make_model(team)
+    with pytest.raises(ValueError, match="train on 6 or more missions"):
+        make_model(team)
+
+
+def test_uneven_minibatches_are_no_cause_for_a_warning():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        make_model(with_ppo(small_training(), num_minibatches=7))
+
+
+def test_missions_that_cannot_be_made_leave_nothing(tmp_path):
+    training = small_training()
+    sparse = replace(training, mission=replace(training.mission, range_ratio=0.01))
+    with pytest.raises(ValueError, match="too sparse"):
+        train(sparse, tmp_path / "run", Limits(decisions=1), listener=go_on)
+    assert not (tmp_path / "run").exists()
+
+
+def test_training_that_diverges_says_so_and_keeps_what_was_before(tmp_path):
+    training = with_ppo(small_training(), learning_rate=1e30, max_gradient_norm=1e30)
+    with pytest.raises(ValueError, match=r"no longer finite after \d+ decisions; begin a new run"):
+        run(training, tmp_path / "run", 320)
+    read_policy(tmp_path / "run" / "policy")
+
+
+def test_a_budget_is_met_by_whole_rollouts_and_no_more(tmp_path):
+    for budget, made in ((1, 32), (32, 32), (33, 64)):
+        progress = run(small_training(held_out=1), tmp_path / f"{budget}", budget)
+        assert progress.decisions == made
+        assert progress.curve[-1]["decisions"] == made
+
+
+def test_a_run_that_is_done_does_nothing_more_when_resumed(tmp_path):
+    training = small_training(held_out=1)
+    first = run(training, tmp_path / "run", 64)
+    heard = []
+    again = run(training, tmp_path / "run", 64, heard.append, is_resumed=True)
+    assert again.curve == first.curve
+    assert heard == []
+    assert (tmp_path / "run" / SETTINGS).exists()
+
+
+def test_threads_are_torchs():
+    before = torch.get_num_threads()
+    try:
+        make_model(small_training(threads=2))
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(before)
+
+
+def test_a_schedule_without_a_model_is_at_its_beginning():
+    """Policies are made before the model that counts."""
+    assert StepDecay(small_training())(1.0) == small_training().ppo.learning_rate
+    assert np.isfinite(StepDecay(small_training())(0.0))

@@ -1,0 +1,92 @@
+"""A run's settings: the arms' own, what is refused, and JSON."""
+
+import json
+from dataclasses import asdict, replace
+
+import pytest
+from small_runs import small_training
+
+from swarm_mj.graphs.observers import make_observer
+from swarm_mj.learning.settings import arm_settings, from_json
+from swarm_mj.mission import PRESETS, paper, reference
+
+ARMS = [(arm, preset) for arm in ("robot", "team") for preset in PRESETS]
+
+
+@pytest.mark.parametrize(("arm", "preset"), ARMS)
+def test_settings_come_back_from_json_as_they_were(arm, preset):
+    training = arm_settings(arm, PRESETS[preset]("random-walk"), (10, 40), seed=2**62)
+    assert from_json(json.loads(json.dumps(training.to_json()))) == training
+
+
+@pytest.mark.parametrize(("arm", "preset"), ARMS)
+def test_a_network_takes_what_its_features_are(arm, preset):
+    training = arm_settings(arm, PRESETS[preset]("random-walk"), (10,))
+    names = make_observer(training.features, training.mission).names
+    assert training.network.num_features == len(names)
+
+
+def test_arm_team_is_the_papers():
+    """III-C: Adam at 1e-4 that decays by 0.95, gamma 0.99, clip 0.1, 32 missions, K = 5."""
+    training = arm_settings("team", paper("stationary"), (40,))
+    ppo, network = training.ppo, training.network
+    assert (ppo.learning_rate, ppo.decay, ppo.discount, ppo.clip) == (1e-4, 0.95, 0.99, 0.1)
+    assert (network.receptive_field, network.latent, network.depth) == (5, 64, 3)
+    assert not network.is_linear
+    assert (training.features, network.edges, network.num_outputs) == ("paper", "paper", 1)
+    assert training.missions * ppo.num_steps == 64 * ppo.num_minibatches
+    assert not training.shares_trunk
+    assert not training.sums_nodes
+
+
+def test_arm_team_under_the_reference_preset_is_the_authors():
+    training = arm_settings("team", reference("stationary"), (40,))
+    network = training.network
+    assert (training.features, network.edges, network.num_outputs) == ("reference", "reference", 2)
+    assert training.sums_nodes
+    assert training.silence_logit == 0.0
+
+
+def test_silence_is_dropped_only_where_it_earns_nothing():
+    robot = arm_settings("robot", paper("stationary"), (40,))
+    assert robot.drops_silence == (robot.ppo.discount == 0.0)
+    assert not replace(robot, ppo=replace(robot.ppo, discount=0.5)).drops_silence
+    assert not small_training("team").drops_silence
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"missions": 0}, "missions must be from 1 to 4096, not 0"),
+        ({"missions": 4097}, "missions must be from 1 to 4096, not 4097"),
+        ({"seed": -1}, "seed must be from 0 to 9223372036854775807, not -1"),
+        ({"seed": 2**63}, "not 9223372036854775808"),
+        ({"evaluate_every": 0}, "evaluation interval must be from 1"),
+        ({"held_out": 0}, "held-out missions must be from 1 to 10000, not 0"),
+        ({"threads": 0}, "threads must be from 1 to 256, not 0"),
+        ({"robots": (10, 1)}, "robots must be from 2 to 200, not 1"),
+        ({"robots": (201,)}, "robots must be from 2 to 200, not 201"),
+        ({"reward": "velocity-variance"}, "reward velocity-variance is a team's"),
+    ],
+)
+def test_what_is_out_of_range_is_refused(changes, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        replace(small_training(), **changes)
+
+
+def test_an_unknown_arm_is_refused():
+    with pytest.raises(ValueError, match="arm must be one of robot, team, not 'both'"):
+        arm_settings("both", paper("stationary"), (40,))
+
+
+@pytest.mark.parametrize("part", ["network", "ppo", "mission", ""])
+def test_settings_of_another_version_are_refused(part):
+    """A key too few, or one too many."""
+    whole = asdict(small_training())
+    for change in (lambda its: its.popitem(), lambda its: its.update(wings=2)):
+        given = json.loads(json.dumps(whole))
+        change(given[part] if part else given)
+        if part and given[part].keys() < whole[part].keys():
+            continue  # a part's last key may have a default
+        with pytest.raises(ValueError, match="not the settings of this version's training runs"):
+            from_json(given)
