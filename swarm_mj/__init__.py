@@ -15,6 +15,13 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     II-C    Eq. 9   local policy             policies.policy.DecentralisedPolicy
     II-C    Eq. 10  age of information       costs.age_of_information
     III-B   Alg. 1  the protocol's window    protocol.window
+    III-A           a buffer as a graph      graphs.graph.Graphs
+    III-A   Eq. 11  GN block                 gnn_block.gn_block
+    III-A   Eq. 12  mean aggregation         gnn_edges.EdgeSet.add_mean_
+    III-A   Eq. 13  non-linear updates       gnn_block.Core
+    III-A   Eq. 14  Aggregation GNN          gnn.AggregationGnn
+    III-C           decisions                decision.recipient_logits
+    III-C           PPO                      learning.run.make_model
     IV-A    Eq. 15  dynamics                 physics.Physics.step
     IV-A    Eq. 16  flocking control         motion.flocking
     IV-A    Eq. 17  velocity variance        costs.velocity_variance
@@ -25,7 +32,7 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     IV-C            minimum spanning tree    policies.minimum_spanning_tree.MinimumSpanningTree
 
 Around the paper: `scene` (MJCF), `swarm` (B missions side by side), `flight` (a policy from the
-first window to the last), more `policies` than the paper's, `evaluation`, `statistics`,
+first window to the last), more `policies` than the paper's, more `graphs` and ways of `learning`, `evaluation`, `statistics`,
 `connectivity`, `results` and `published` (where policies stand), `figures` (V: Figs. 2 to 6),
 `recorder` and `replay` (what is seen), `envs` (other libraries' faces), `bench` (speed), `cli` (the
 command line).

@@ -18,7 +18,7 @@ def recipient_logits(
     silence_logit: float = 0.0,
     has_turn: Bool[Tensor, "R"] | None = None,
 ) -> Float[Tensor, "R N"]:
-    """Logits over whom each robot addresses; oneself is silence.
+    """Logits over whom each robot addresses; oneself is silence (III-C).
 
     With one number per node it is the node's logit. With two, as in the authors' code, they are the
     logits of addressing it at full and at zero power; all that send nothing count together.

@@ -47,7 +47,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code.
     """
     try:
-        options = make_parser().parse_args(arguments)
+        typed = sys.argv[1:] if arguments is None else list(arguments)
+        options = make_parser().parse_args(typed)
+        options.typed = typed
         return options.run(options)
     except (ValueError, OSError) as error:
         sys.stderr.write(f"swarm-mj: error: {error}\n")

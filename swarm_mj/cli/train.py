@@ -3,7 +3,6 @@
 import argparse
 import os
 import shlex
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -89,7 +88,7 @@ def _asked_run(options: argparse.Namespace) -> "Run":
         init = read_policy(options.init)[1] if options.init else None
         training = asked_settings(options, init)
         limits = asked_limits(options, training.arm)
-        command = shlex.join(["swarm-mj", *sys.argv[1:]])
+        command = shlex.join(["swarm-mj", *options.typed])
         asked = Run(training=training, limits=limits, command=command, init=options.init)
     check_writable(options.out / SETTINGS, "run")
     check_memory(asked.training, _memory_bytes())

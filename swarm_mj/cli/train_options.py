@@ -1,40 +1,41 @@
 """The options of `swarm-mj train`, and where in a run's settings they stand."""
 
 import argparse
+from functools import reduce
 from pathlib import Path
 from typing import Any, get_args
 
-from swarm_mj.cli.options import DEFAULTS, listed
+from swarm_mj.cli.options import listed
 from swarm_mj.graphs.graph import FeatureSet
 from swarm_mj.mission import PRESETS, Boundary, Task
 
 BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's arm
-# Where an option stands in the settings, and what it is unless given: in arm robot, in arm team.
-PLACES: dict[str, tuple[str, object, object]] = {
-    "arm": ("arm", "robot", "team"),
-    "seed": ("seed", 0, 0),
-    "features": ("features", "extended", None),
-    "receptive_field": ("network.receptive_field", 1, 5),
-    "latent": ("network.latent", 32, 64),
-    "depth": ("network.depth", 2, 3),
-    "edges": ("network.edges", "both", None),
-    "linear": ("network.is_linear", False, False),
-    "reward": ("reward", "aoi", "aoi"),
-    "missions": ("missions", 16, 32),
-    "learning_rate": ("ppo.learning_rate", 0.001, 0.0001),
-    "entropy": ("ppo.entropy", 0.003, 1e-6),
-    "discount": ("ppo.discount", 0.0, 0.99),
-    "threads": ("threads", 1, 1),
-    "evaluate_every": ("evaluate_every", 10_000, 10_000),
-    "held_out": ("held_out", 12, 12),
-    "task": ("mission.task", "stationary", "stationary"),
-    "preset": ("mission.preset", "paper", "paper"),
-    "robots": ("robots", (DEFAULTS.num_robots,), (DEFAULTS.num_robots,)),
-    "range_ratio": ("mission.range_ratio", DEFAULTS.range_ratio, DEFAULTS.range_ratio),
-    "velocity_ratio": ("mission.velocity_ratio", DEFAULTS.velocity_ratio, DEFAULTS.velocity_ratio),
-    "windows": ("mission.num_windows", DEFAULTS.num_windows, DEFAULTS.num_windows),
-    "boundary": ("mission.boundary", None, None),
-}  # None: the preset's own
+# Where an option stands in the settings; unless given, it is the arm's own.
+PLACES = {
+    "arm": "arm",
+    "seed": "seed",
+    "features": "features",
+    "receptive_field": "network.receptive_field",
+    "latent": "network.latent",
+    "depth": "network.depth",
+    "edges": "network.edges",
+    "linear": "network.is_linear",
+    "reward": "reward",
+    "missions": "missions",
+    "learning_rate": "ppo.learning_rate",
+    "entropy": "ppo.entropy",
+    "discount": "ppo.discount",
+    "threads": "threads",
+    "evaluate_every": "evaluate_every",
+    "held_out": "held_out",
+    "task": "mission.task",
+    "preset": "mission.preset",
+    "robots": "robots",
+    "range_ratio": "mission.range_ratio",
+    "velocity_ratio": "mission.velocity_ratio",
+    "windows": "mission.num_windows",
+    "boundary": "mission.boundary",
+}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -102,18 +103,45 @@ def _add_mission_options(group: Any) -> None:  # noqa: ANN401 - argparse names n
 
 def _add(group: Any, flag: str, kind: type, text: str, nargs: str | None = None) -> None:  # noqa: ANN401 - as above
     """An option that is unset by default; its help tells what that means."""
-    _, robot, team = PLACES[option_name(flag)]
-    default = shown(robot)
-    if team != robot and flag != "--arm":
-        default += f", team: {shown(team)}"
-    group.add_argument(flag, type=kind, nargs=nargs, help=f"{text} (default: {default})")
+    action = group.add_argument(flag, type=kind, nargs=nargs)
+    action.own = _ArmsOwn(option_name(flag))
+    action.help = f"{text} (default: %(own)s)"
+
+
+class _ArmsOwn:
+    """The defaults of an option as text; looked up when they are shown, for it imports torch."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __str__(self) -> str:
+        if self._name == "arm":
+            return "robot"
+        robot, team = (_own_default(arm, PLACES[self._name]) for arm in ("robot", "team"))
+        return robot if robot == team else f"{robot}, team: {team}"
+
+
+def _own_default(arm: str, place: str) -> str:
+    from swarm_mj.learning.settings import arm_settings
+
+    usual, other = (
+        stored_value(arm_settings(arm, mission, (mission.num_robots,)), place)
+        for mission in (PRESETS["paper"]("stationary"), PRESETS["reference"]("flocking"))
+    )
+    depends = usual != other and place not in ("mission.preset", "mission.task")
+    return "the preset's own" if depends else shown(usual)
+
+
+def stored_value(settings: object, place: str) -> object:
+    """A value by its dotted place in a run's settings."""
+    return reduce(getattr, place.split("."), settings)
 
 
 def shown(value: object) -> str:
     """A setting's value as it is typed."""
     if isinstance(value, tuple):
         return " ".join(map(str, value))
-    return "the preset's own" if value is None else str(value)
+    return str(value)
 
 
 def option_name(flag: str) -> str:

@@ -6,11 +6,10 @@ The settings bring torch along, which takes its time to import; so functions imp
 import argparse
 import math
 from dataclasses import replace
-from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 from swarm_mj.cli.options import DEFAULTS, listed
-from swarm_mj.cli.train_options import BUDGETS, PLACES, option_flag, shown
+from swarm_mj.cli.train_options import BUDGETS, PLACES, option_flag, shown, stored_value
 from swarm_mj.mission import PRESETS, Mission
 
 if TYPE_CHECKING:
@@ -187,7 +186,7 @@ def _groups(missions: int, num_sizes: int) -> int:
 def _changed(training: "Training", options: argparse.Namespace) -> "Training":
     """The settings with what the options say in place of the arm's own."""
     parts: dict[str, dict[str, Any]] = {"network": {}, "ppo": {}, "": {}}
-    for name, (place, _, _) in PLACES.items():
+    for name, place in PLACES.items():
         owner, _, its = place.rpartition(".")
         value = getattr(options, name)
         if owner in parts and name != "robots" and value is not None:
@@ -233,11 +232,11 @@ def _refuse_others(
     options: argparse.Namespace, training: "Training", prefix: str, whose: str
 ) -> None:
     """Raises ValueError if a given option is not what it is in the settings."""
-    for name, (place, _, _) in PLACES.items():
+    for name, place in PLACES.items():
         given = _sizes(options) if name == "robots" and options.robots else getattr(options, name)
         if given is None or not place.startswith(prefix):
             continue
-        stored = reduce(getattr, place.split("."), training)
+        stored = stored_value(training, place)
         if given != stored:
             flag = f"{option_flag(name)} {shown(given)}"
             raise ValueError(f"{flag} is not what {whose} has, {shown(stored)}; leave it out")

@@ -20,7 +20,7 @@ REFERENCE_WINDOWS = 500.0  # what the authors' code divides times by, whatever t
 
 @dataclass(frozen=True, kw_only=True)
 class Graphs:
-    """The graphs of R robots, each with a node for every robot of its team."""
+    """The graphs of R robots, each with a node for every robot of its team (III-A)."""
 
     node: Float32[np.ndarray, "R N F"]  # V: features, normalised
     parent: Int[np.ndarray, "R N"]  # P: the node that k's state came over first, or NO_PARENT

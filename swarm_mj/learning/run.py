@@ -43,7 +43,7 @@ NO_BUDGET = 10**15  # team decisions
 
 
 def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
-    """PPO over fresh missions, and the generator that draws their seeds.
+    """PPO over fresh missions (III-C), and the generator that draws their seeds.
 
     Raises:
         ValueError: The missions or the minibatches cannot be made of these settings.

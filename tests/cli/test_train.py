@@ -1,6 +1,5 @@
 """`swarm-mj train`: what it prints, writes, refuses, and how it goes on."""
 
-import os
 import shlex
 import signal
 import subprocess
@@ -77,7 +76,7 @@ def test_a_run_leaves_what_it_says(whole):
     ]
     assert len(windows(folder / "runs/whole/replays/decisions-000000256.rrd")) == 12
     _, config = read_policy(folder / "runs/whole/policy")
-    assert config.training["command"].startswith("swarm-mj train --out runs/whole --robots 4")
+    assert config.training["command"].startswith("swarm-mj train --out runs/whole --robots 4 ")
     assert read_run(folder / "runs/whole").limits.decisions == 256
 
 
@@ -166,8 +165,7 @@ def test_limits_are_kept_and_may_be_moved(here, capsys):
     train("--out", "r", "--resume", "--minutes", 1e-6)
     limits = read_run(here / "r").limits
     assert (limits.decisions, limits.minutes) == (None, 1e-6)
-    command = read_run(here / "r").command
-    assert "--budget 128" in command or "pytest" in command
+    assert read_run(here / "r").command.endswith("--evaluate-every 128 --budget 128")
     capsys.readouterr()
 
 
@@ -201,14 +199,6 @@ def test_missions_of_several_sizes_are_shared_out_evenly(here, capsys):
     assert "stationary, 3, 4, 5 robots" in capsys.readouterr().out
 
 
-def test_a_folder_that_cannot_be_written_is_refused_before_the_work(here, capsys):
-    (here / "locked").mkdir(mode=0o500)
-    if os.access(here / "locked", os.W_OK):
-        pytest.skip("this user may write anywhere")
-    assert train("--out", "locked/run", *SMALL) == 2
-    assert "cannot be written" in capsys.readouterr().err
-
-
 def test_the_parser_of_all_commands_does_not_wait_for_torch():
     script = """
 import sys
@@ -233,10 +223,7 @@ def test_help_suffices(capsys):
     for text in (
         "(default: robot)",
         "(default: 200000, team: 2000000; none with --minutes)",
-        "K, message passes (default: 1, team: 5)",
-        "who hears whom in the graph: paper, reference, both (default: both, team: the preset's",
-        "of Adam, at the start (default: 0.001, team: 0.0001)",
-        "(default: stationary)",
+        "goes on with --out OUT --resume",
         "Exit codes",
     ):
         assert text in shown

@@ -17,24 +17,25 @@ MANY = """
 import contextlib, io, json, sys
 from pathlib import Path
 from swarm_mj.cli import main
+def files():
+    return {path: path.is_file() and path.stat().st_mtime_ns for path in Path().rglob("*")}
 ends = []
 for arguments in json.load(sys.stdin):
     out, err = io.StringIO(), io.StringIO()
-    before = {path: path.stat().st_mtime_ns for path in Path().rglob("*")}
+    before = files()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
             code = main(["train", *arguments])
         except SystemExit as end:
             code = end.code
-    after = {path: path.stat().st_mtime_ns for path in Path().rglob("*")}
-    ends.append([code, out.getvalue(), err.getvalue(), before == after])
+    ends.append([code, out.getvalue(), err.getvalue(), before == files()])
 json.dump(ends, sys.stdout)
 """
 NEW, DONE = ("--out", "new"), ("--out", "done", "--resume")
 REFUSED = [
     ((), "the following arguments are required: --out"),
     ((*NEW, "--arm", "both"), "arm must be one of robot, team, not 'both'"),
-    ((*NEW, "--features", "all"), "features must be one of paper, reference, extended, not 'all'"),
+    ((*NEW, "--features", "all"), "features must be one of paper, reference,"),
     ((*NEW, "--reward", "speed"), "reward must be one of aoi, velocity-variance, not 'speed'"),
     ((*NEW, "--reward", "velocity-variance"), "choose arm team, or reward aoi"),
     (

@@ -41,6 +41,6 @@ def test_killed_at_any_moment_it_resumes_and_ends_as_if_it_had_not_been(results)
 
 
 def test_a_short_training_beats_its_own_start(results):
-    """On missions that it never trained on; over seeds 1 to 7 the age fell to 0.2 to 0.4 of it."""
-    ages = results["learned"]["age"]
+    """On missions that it never trained on; with seeds 1 to 7 it fell to 0.32 to 0.39."""
+    ages = results["learned"]
     assert ages[-1] < 0.6 * ages[0]

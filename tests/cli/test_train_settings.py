@@ -1,0 +1,181 @@
+"""From options to settings and limits; what the help says is what the arms have."""
+
+import argparse
+from dataclasses import replace
+from functools import reduce
+
+import pytest
+from tiny_policies import tiny_config, tiny_network
+
+from swarm_mj.cli.train_options import BUDGETS, add_options
+from swarm_mj.cli.train_settings import (
+    asked_limits,
+    asked_settings,
+    check_memory,
+    rollout_bytes,
+    stored_settings,
+)
+from swarm_mj.learning.run import make_model
+from swarm_mj.learning.run_folder import Limits
+from swarm_mj.learning.settings import arm_settings
+from swarm_mj.mission import paper
+
+
+def parsed(*arguments):
+    parser = argparse.ArgumentParser()
+    add_options(parser)
+    return parser.parse_args(["--out", "runs/x", *map(str, arguments)])
+
+
+def asked(*arguments):
+    return asked_settings(parsed(*arguments))
+
+
+def test_the_defaults_that_the_help_shows_are_those_of_the_arms():
+    parser = argparse.ArgumentParser()
+    add_options(parser)
+    shown = " ".join(parser.format_help().split())
+    robot, team = (arm_settings(arm, paper("stationary"), (40,)) for arm in ("robot", "team"))
+    for text in (
+        f"message passes (default: {robot.network.receptive_field}, team: 5)",
+        f"width of every layer (default: {robot.network.latent}, team: 64)",
+        f"of Adam, at the start (default: {robot.ppo.learning_rate}, team: 0.0001)",
+        f"weight of the entropy bonus (default: {robot.ppo.entropy}, team: 1e-06)",
+        f"(default: {robot.features}, team: the preset's own)",
+        f"flown side by side (default: {robot.missions}, team: {team.missions})",
+        "is the same policy (default: 0)",
+        "stationary, random-walk, flocking (default: stationary)",
+        "paper, reference (default: paper)",
+        "several are trained on together (default: 40)",
+        "reflect, none (default: the preset's own)",
+        f"of each team size (default: {robot.held_out})",
+        f"(default: {BUDGETS['robot']}, team: {BUDGETS['team']}; none with --minutes)",
+    ):
+        assert text in shown
+
+
+@pytest.mark.parametrize("arm", BUDGETS)
+def test_without_options_a_run_is_the_arms_own(arm):
+    assert asked("--arm", arm) == arm_settings(arm, paper("stationary"), (40,))
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "place"),
+    [
+        ("--seed", 7, "seed"),
+        ("--receptive-field", 3, "network.receptive_field"),
+        ("--latent", 5, "network.latent"),
+        ("--depth", 4, "network.depth"),
+        ("--edges", "reference", "network.edges"),
+        ("--learning-rate", 0.5, "ppo.learning_rate"),
+        ("--entropy", 0.25, "ppo.entropy"),
+        ("--discount", 0.75, "ppo.discount"),
+        ("--threads", 2, "threads"),
+        ("--evaluate-every", 123, "evaluate_every"),
+        ("--held-out", 9, "held_out"),
+        ("--task", "flocking", "mission.task"),
+        ("--preset", "reference", "mission.preset"),
+        ("--range-ratio", 0.5, "mission.range_ratio"),
+        ("--velocity-ratio", 0.5, "mission.velocity_ratio"),
+        ("--windows", 77, "mission.num_windows"),
+        ("--boundary", "none", "mission.boundary"),
+    ],
+)
+def test_every_option_reaches_its_setting_and_no_other(option, value, place):
+    usual, changed = asked(), asked(option, value)
+    assert reduce(getattr, place.split("."), changed) == value
+    if option not in ("--task", "--preset"):  # of which others follow
+        owner, _, its = place.rpartition(".")
+        part = getattr(usual, owner) if owner else usual
+        part = replace(part, **{its: value})
+        assert changed == (replace(usual, **{owner: part}) if owner else part)
+
+
+def test_features_bring_the_networks_inputs_along():
+    training = asked("--features", "paper")
+    assert (training.features, training.network.num_features) == ("paper", 8)
+
+
+def test_the_linear_variant_is_asked_for_by_its_flag():
+    assert asked("--linear").network.is_linear
+    assert not asked().network.is_linear
+
+
+def test_the_preset_decides_the_papers_arm():
+    code = asked("--arm", "team", "--preset", "reference")
+    assert (code.features, code.network.num_outputs, code.sums_nodes) == ("reference", 2, True)
+    assert code.mission.half_duplex == "eavesdroppers"
+
+
+@pytest.mark.parametrize(
+    ("sizes", "missions", "groups"),
+    [((10,), 16, 4), ((10, 20), 16, 4), ((10, 20, 40), 18, 3), ((2, 3, 4, 5, 6), 20, 5)],
+)
+def test_sizes_share_the_missions_evenly(sizes, missions, groups):
+    training = asked("--robots", *sizes)
+    assert (training.robots, training.missions, training.groups) == (sizes, missions, groups)
+
+
+@pytest.mark.parametrize(
+    ("missions", "groups"), [(1, 1), (2, 2), (3, 3), (6, 3), (7, 7), (8, 4), (10, 5), (14, 2)]
+)
+def test_groups_are_as_near_to_four_as_the_missions_allow(missions, groups):
+    assert asked("--missions", missions).groups == groups
+
+
+def test_a_size_counts_once():
+    assert asked("--robots", 10, 20, 10).robots == (10, 20)
+
+
+def test_a_policy_to_begin_with_brings_its_network():
+    config = tiny_config(tiny_network("reference", num_outputs=2), "reference")
+    training = asked_settings(parsed("--init", "p", "--latent", 6, "--seed", 3), config)
+    assert training.network == config.network
+    assert (training.features, training.silence_logit) == ("reference", 1.5)
+    with pytest.raises(ValueError, match="--depth 3 is not what the policy p has, 2; leave it"):
+        asked_settings(parsed("--init", "p", "--depth", 3), config)
+
+
+def test_a_run_that_goes_on_has_its_own_settings():
+    training = asked("--latent", 5)
+    assert stored_settings(parsed("--latent", 5, "--robots", 40), training) == training
+    with pytest.raises(ValueError, match="--arm team is not what the run in runs/x has, robot"):
+        stored_settings(parsed("--arm", "team"), training)
+
+
+@pytest.mark.parametrize(
+    ("options", "decisions", "minutes"),
+    [
+        ((), 200_000, None),
+        (("--budget", 5), 5, None),
+        (("--minutes", 2), None, 2.0),
+        (("--budget", 5, "--minutes", 2), 5, 2.0),
+    ],
+)
+def test_a_new_run_stops_as_asked_or_by_the_arms_budget(options, decisions, minutes):
+    limits = asked_limits(parsed(*options), "robot")
+    assert (limits.decisions, limits.minutes) == (decisions, minutes)
+
+
+def test_a_run_that_goes_on_stops_as_before_or_as_asked_now():
+    stored = Limits(decisions=5, minutes=1.0, replay_every=3)
+    assert asked_limits(parsed(), "robot", stored) == stored
+    moved = asked_limits(parsed("--minutes", 2, "--replay-every", 9), "robot", stored)
+    assert moved == Limits(decisions=None, minutes=2.0, replay_every=9)
+
+
+@pytest.mark.parametrize("arm", ["robot", "team"])
+def test_the_estimate_of_memory_is_of_the_arrays_that_are_made(arm):
+    training = asked("--arm", arm, "--robots", 6, "--range-ratio", 0.5, "--missions", 4)
+    buffer = make_model(training)[0].rollout_buffer
+    made = sum(rows.nbytes for rows in buffer.observations.values())
+    assert made < rollout_bytes(training) < 2.0 * made
+
+
+def test_rollouts_may_take_half_of_the_memory():
+    training = asked("--robots", 100)
+    needed = rollout_bytes(training)
+    check_memory(training, 2 * needed)
+    check_memory(training, None)
+    with pytest.raises(ValueError, match="choose fewer --missions or --robots"):
+        check_memory(training, 2 * needed - 2)
