@@ -17,8 +17,9 @@ class RobotArm:
     """The settings; the rest is arm `robot`'s own."""
 
     seeds: tuple[int, ...] = (0, 1, 2)
-    minutes: float = 10.0  # per seed, one core
+    minutes: float = 6.0  # per seed, one core
     local_seeds: tuple[int, ...] = (0,)  # of the features that know nothing of turns
+    local_minutes: float = 9.0
     episodes: int = 100
 
     def __call__(self) -> None:
@@ -27,9 +28,12 @@ class RobotArm:
             train(
                 f"robot-40-{features}-seed{seed}",
                 f"--arm robot --task stationary --robots 40 --features {features} --seed {seed} "
-                f"--minutes {self.minutes:g} --evaluate-every 5000".split(),
+                f"--minutes {minutes:g} --evaluate-every 5000".split(),
             )
-            for features, seeds in (("extended", self.seeds), ("local", self.local_seeds))
+            for features, seeds, minutes in (
+                ("extended", self.seeds, self.minutes),
+                ("local", self.local_seeds, self.local_minutes),
+            )
             for seed in seeds
         ]
         evaluate(

@@ -58,7 +58,7 @@ TEAM_PAPER = replace(TEAM_REFERENCE, num_minibatches=2, value=0.5)  # minibatche
 ROBOT = PpoSettings(
     learning_rate=1e-3,
     decay=0.95,
-    decay_steps=1000,
+    decay_steps=200,
     num_steps=32,
     num_minibatches=10,
     num_epochs=2,
@@ -66,7 +66,7 @@ ROBOT = PpoSettings(
     gae_lambda=0.9,
     clip=0.2,
     clips_value=False,
-    entropy=0.01,
+    entropy=0.002,
     value=0.5,
 )
 
