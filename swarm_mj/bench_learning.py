@@ -10,24 +10,23 @@ from jaxtyping import Int
 from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_mj.gnn import AggregationGnn, GnnShape
-from swarm_mj.graphs.graph import Graphs
+from swarm_mj.graphs.graph import Graphs, PaperObserver
 from swarm_mj.graphs.observers import make_observer
 from swarm_mj.learning.run import make_model
 from swarm_mj.learning.settings import arm_settings
-from swarm_mj.mission import paper
+from swarm_mj.mission import Mission, paper
 from swarm_mj.policies import RoundRobin
 from swarm_mj.swarm import Swarm
 
 NUM_ROBOTS = 40
 WARM_UP_WINDOWS = 100  # after which most robots know most others
 REPETITIONS = 5  # of each measurement; their median counts, for machines are shared
-MISSION = paper("stationary", num_robots=NUM_ROBOTS)
-SHAPE = GnnShape(num_features=len(make_observer("paper", MISSION).names))  # the paper's
+SHAPE = GnnShape(num_features=len(PaperObserver.names))  # the paper's
 
 
 @dataclass(frozen=True, kw_only=True)
 class NetworkTiming:
-    """The paper's network (K = 5, width 64) for teams of 40 robots, on the CPU.
+    """The paper's network (K = 5, width 64) on the CPU.
 
     The yardstick is a plain product of the same numbers: as many rows as the network has nodes,
     through one 64 by 64 layer, in the same run.
@@ -53,10 +52,13 @@ class LearningTiming:
     training_per_s: dict[str, float]  # team decisions, rollouts and optimisation, by arm
 
 
-def bench_learning(*, threads: int = 1, seconds: float = 2.0) -> LearningTiming:
+def bench_learning(
+    *, num_robots: int = NUM_ROBOTS, threads: int = 1, seconds: float = 2.0
+) -> LearningTiming:
     """Times the networks and the arms; no weights are kept.
 
     Args:
+        num_robots: N.
         threads: torch's.
         seconds: About how long each measurement takes [s].
 
@@ -64,17 +66,24 @@ def bench_learning(*, threads: int = 1, seconds: float = 2.0) -> LearningTiming:
         The timing.
     """
     torch.set_num_threads(threads)
-    arms = {"robot": arm_settings("robot", MISSION, (NUM_ROBOTS,)).network, "paper's": SHAPE}
+    mission = paper("stationary", num_robots=num_robots)
+    robot = arm_settings("robot", mission, (num_robots,))
+    own = {"arm robot's": (robot.network, robot.features), "the paper's": (SHAPE, "paper")}
     return LearningTiming(
-        networks=tuple(_network_timing(missions, seconds) for missions in (1, 32)),
-        own_decision_us={name: _own_decision_us(shape, seconds) for name, shape in arms.items()},
-        training_per_s={arm: _training_per_s(arm, threads, seconds) for arm in ("robot", "team")},
+        networks=tuple(_network_timing(mission, missions, seconds) for missions in (1, 32)),
+        own_decision_us={
+            name: _own_decision_us(mission, shape, features, seconds)
+            for name, (shape, features) in own.items()
+        },
+        training_per_s={
+            arm: _training_per_s(arm, mission, threads, seconds) for arm in ("robot", "team")
+        },
     )
 
 
-def _network_timing(num_missions: int, seconds: float) -> NetworkTiming:
+def _network_timing(mission: Mission, num_missions: int, seconds: float) -> NetworkTiming:
     network = AggregationGnn(SHAPE)
-    node, parent = _tensors(_graphs("paper", num_missions))
+    node, parent = _tensors(_graphs(mission, "paper", num_missions))
     layer = torch.nn.Linear(SHAPE.latent, SHAPE.latent)
     rows = torch.randn(node.shape[0] * node.shape[1], SHAPE.latent)
 
@@ -90,19 +99,18 @@ def _network_timing(num_missions: int, seconds: float) -> NetworkTiming:
     )
 
 
-def _own_decision_us(shape: GnnShape, seconds: float) -> float:
+def _own_decision_us(mission: Mission, shape: GnnShape, features: str, seconds: float) -> float:
     """One robot's network on its own graph [µs]."""
-    features = "paper" if shape == SHAPE else "extended"
     network = AggregationGnn(shape)
-    node, parent = (rows[:1] for rows in _tensors(_graphs(features, 1)))
+    node, parent = (rows[:1] for rows in _tensors(_graphs(mission, features, 1)))
     return _microseconds(_inferring(lambda: network(node, parent)), seconds / 2)
 
 
-def _training_per_s(arm: str, threads: int, seconds: float) -> float:
+def _training_per_s(arm: str, mission: Mission, threads: int, seconds: float) -> float:
     """Team decisions over whole rollouts and the optimisation after each, the first left out."""
-    settings = arm_settings(arm, MISSION, (NUM_ROBOTS,))
+    settings = arm_settings(arm, mission, (mission.num_robots,))
     ppo, share = settings.ppo, settings.groups
-    # One group of missions, and minibatches of the arm's own size, so that it ends in time.
+    # One group of missions, and minibatches of about the arm's own size, so that it ends in time.
     fewer = replace(
         settings,
         threads=threads,
@@ -141,11 +149,11 @@ class _Clock(BaseCallback):
         return self.num_rollouts < 1 or self.elapsed_s < self._seconds
 
 
-def _graphs(features: str, num_missions: int) -> Graphs:
+def _graphs(mission: Mission, features: str, num_missions: int) -> Graphs:
     """What teams see that have talked for a while."""
-    swarm, policy = Swarm(MISSION, range(num_missions)), RoundRobin()
-    observer = make_observer(features, MISSION)
-    observer.start(num_missions, NUM_ROBOTS)
+    swarm, policy = Swarm(mission, range(num_missions)), RoundRobin()
+    observer = make_observer(features, mission)
+    observer.start(num_missions, mission.num_robots)
     graphs = observer.graphs(swarm.views)
     for _ in range(WARM_UP_WINDOWS):
         swarm.step(policy)

@@ -35,6 +35,11 @@ PARTS = {  # our parts by theirs
     "core.edge": "graph_net/edge_block",
     "decoder.node": "decoder/node_model",
 }
+CARD = """# The trained policy of Tolstaya et al.
+
+Weights by the authors of *Learning Connectivity for Data Distribution in Robot Teams*, MIT licence;
+converted by `tools/reference_policy.py`. Fly it with `--preset reference`.
+"""
 OUTPUT = "policy_model/output/node_model/node_output"
 
 
@@ -72,7 +77,7 @@ def store(path: Path, folder: Path) -> None:
         commit=None,
         version=version(),
     )
-    save_policy(folder, network_of(path), config)
+    save_policy(folder, network_of(path), config, card=CARD)
 
 
 def costs_of(folder: Path, episodes: int, seed: int, num_jobs: int) -> list[float]:

@@ -3,7 +3,8 @@
     python training/both_arms.py
 
 Arm `team` has the authors' settings: their features, edges, network and PPO. At 40 robots it makes
-a few decisions a second on a CPU, so the comparison is made where it can get somewhere.
+a few decisions a second on a CPU, so the comparison is made where it can get somewhere. Arm `robot`
+is flown with its own features, and with the authors' seven, which know of no turns.
 """
 
 import sys
@@ -19,18 +20,23 @@ class BothArms:
     num_robots: int = 10
     seed: int = 0
     team_minutes: float = 40.0
-    robot_minutes: float = 6.0
+    robot_minutes: float = 4.0
     episodes: int = 100
 
     def __call__(self) -> None:
         """Trains both, then evaluates both."""
         missions = f"--preset reference --task stationary --robots {self.num_robots}"
+        runs = (
+            ("robot", f"--arm robot --minutes {self.robot_minutes:g}"),
+            ("robot-seven", f"--arm robot --features reference --minutes {self.robot_minutes:g}"),
+            ("team", f"--arm team --minutes {self.team_minutes:g}"),
+        )
         policies = [
             train(
-                f"{arm}-{self.num_robots}-reference-seed{self.seed}",
-                f"--arm {arm} {missions} --seed {self.seed} --minutes {minutes:g}".split(),
+                f"{name}-{self.num_robots}-reference-seed{self.seed}",
+                f"{options} {missions} --seed {self.seed}".split(),
             )
-            for arm, minutes in (("robot", self.robot_minutes), ("team", self.team_minutes))
+            for name, options in runs
         ]
         evaluate(
             f"both-arms-{self.num_robots}",

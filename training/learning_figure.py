@@ -16,7 +16,7 @@ from swarm_mj.figures.style import save
 from swarm_mj.results import read_results
 
 PURPLE, ORANGE, BLUE = "#aa3377", "#d55e00", "#0072b2"
-PUBLISHED_GNN = 34.8  # Fig. 4 at range ratio 0.25, the paper's best at 40 stationary robots
+PUBLISHED_GNN = 34.8  # Fig. 4 at range ratio 0.25, in the authors' simulator [windows]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +29,7 @@ class LearningFigure:
 
     def __call__(self) -> None:
         """Draws it."""
-        robot_40 = _levels("robot-40", ("tdma", "spatial-tdma"))
+        robot_40 = _levels("robot-40", ("tdma", "planner"))
         both = _levels("both-arms-10", ("tdma", "mst"))
         panels = [
             LearningPanel(
@@ -39,13 +39,16 @@ class LearningFigure:
                     _curve("with turns", PURPLE, "robot-40-extended-seed*"),
                     _curve("without turns (local)", ORANGE, "robot-40-local-seed*"),
                 ),
-                levels=(*robot_40, Level(policy="GNN", aoi=PUBLISHED_GNN)),
+                levels=(*robot_40, Level(policy="GNN", label="published GNN", aoi=PUBLISHED_GNN)),
             ),
             LearningPanel(
                 title=self.arms_title,
                 x="decisions",
                 curves=(
                     _curve("arm robot", PURPLE, "robot-10-reference-seed*"),
+                    _curve(
+                        "arm robot, authors' features", ORANGE, "robot-seven-10-reference-seed*"
+                    ),
                     _curve("arm team", BLUE, "team-10-reference-seed*"),
                 ),
                 levels=both,

@@ -16,7 +16,7 @@ class TeamSizes:
     trained_on: int = 20
     flown_with: tuple[int, ...] = (10, 20, 40, 80)
     seed: int = 0
-    minutes: float = 6.0
+    minutes: float = 4.0
     episodes: int = 100
 
     def __call__(self) -> None:

@@ -18,7 +18,7 @@ X_LABELS = {"decisions": "team decisions, thousands", "minutes": "minutes of tra
 X_UNITS = {"decisions": 1000.0, "minutes": 1.0}
 PALE, BAND = 0.85, 0.15  # of lines, of their standard errors
 LINES = ("-", "--", ":")  # of the seeds of one method
-MOST_AGE = 1.25  # the axis ends above the highest level, by so much; curves begin far above it
+MOST_AGE = 1.25  # the axis ends above the highest level, by so much; curves may begin above it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +36,7 @@ class Level:
 
     policy: str  # a name with a look
     aoi: float  # [windows]
+    label: str = ""  # instead of the look's own
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +99,7 @@ def _fill(axes: Axes, panel: LearningPanel) -> None:
         look = look_of(level.policy)
         axes.axhline(level.aoi, color=look.colour, linewidth=0.9, linestyle=(0, (1, 1.5)))
         axes.annotate(
-            f"{look.label} {level.aoi:.1f}",
+            f"{level.label or look.label} {level.aoi:.1f}",
             (1.01, level.aoi),
             xycoords=("axes fraction", "data"),
             color=look.ink,

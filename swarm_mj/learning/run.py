@@ -126,7 +126,8 @@ class StepDecay:
         """The rate of the coming optimiser steps."""
         num_updates = 0 if self.model is None else self.model._n_updates  # epochs so far
         num_steps = num_updates * self._ppo.num_minibatches
-        return self._ppo.learning_rate * self._ppo.decay ** (num_steps // self._ppo.decay_steps)
+        share = self._ppo.decay ** (num_steps // self._ppo.decay_steps)
+        return self._ppo.learning_rate * max(share, self._ppo.least_share)
 
 
 def train(

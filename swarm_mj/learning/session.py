@@ -25,7 +25,7 @@ from swarm_mj.provenance import commit, version
 from swarm_mj.recorder import Recorder
 from swarm_mj.swarm import Swarm
 
-OPTIMISER = ("entropy_loss", "explained_variance", "approx_kl", "clip_fraction", "value_loss")
+OPTIMISER = ("entropy", "explained_variance", "approx_kl", "clip_fraction", "value_loss")
 
 
 class Stopped(Exception):  # noqa: N818 - nothing went wrong
@@ -106,6 +106,12 @@ class Session(BaseCallback):
         self._tell()
         return True
 
+    def _on_rollout_end(self) -> None:
+        # PPO's own mean is over the rows it learns from; over all rows, a decision's negative
+        # log-probability has the entropy for its mean.
+        log_p = self._ppo.rollout_buffer.log_probs
+        self.logger.record("train/entropy", -float(log_p.mean()))
+
     def _tell(self, evaluated: float | None = None) -> None:
         status = Status(
             decisions=self.decisions,
@@ -181,8 +187,6 @@ class Session(BaseCallback):
         logged = self.logger.name_to_value
         names = {name: f"train/{name}" for name in OPTIMISER if f"train/{name}" in logged}
         means = {label: float(logged[label]) for label in names.values()}
-        if means:
-            means["train/entropy"] = -means.pop("train/entropy_loss")
         return means
 
     def _config(self, decisions: int, held_out: HeldOut) -> PolicyConfig:

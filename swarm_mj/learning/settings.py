@@ -23,7 +23,8 @@ class PpoSettings:
 
     learning_rate: float  # of Adam
     decay: float  # of the learning rate ...
-    decay_steps: int  # ... in each of so many optimiser steps
+    decay_steps: int  # ... in each of so many optimiser steps ...
+    least_share: float = 0.0  # ... but not below this share of it
     num_steps: int  # windows of each mission in a rollout
     num_minibatches: int  # that a rollout is shared out to
     num_epochs: int  # passes over a rollout
@@ -59,6 +60,7 @@ ROBOT = PpoSettings(
     learning_rate=1e-3,
     decay=0.95,
     decay_steps=200,
+    least_share=0.1,
     num_steps=32,
     num_minibatches=10,
     num_epochs=2,
@@ -163,7 +165,12 @@ def arm_settings(arm: str, mission: Mission, robots: Sequence[int], seed: int = 
 
 
 def _team_settings(mission: Mission, robots: tuple[int, ...], seed: int) -> Training:
-    """III-C, or the authors' code: other features, edges, and two numbers per node."""
+    """III-C, or the authors' code: other features, and two numbers per node.
+
+    Both have the code's edges. Over the text's, which lead from children to parents, nothing of the
+    robot itself reaches a teammate's node: whom it addresses could depend neither on where it is
+    nor on the time.
+    """
     is_reference = mission.preset == "reference"
     features: FeatureSet = "reference" if is_reference else "paper"
     return Training(
@@ -174,7 +181,7 @@ def _team_settings(mission: Mission, robots: tuple[int, ...], seed: int) -> Trai
         network=GnnShape(
             num_features=_num_features(features),
             num_outputs=2 if is_reference else 1,
-            edges="reference" if is_reference else "paper",
+            edges="reference",
         ),
         shares_trunk=False,
         silence_logit=0.0 if is_reference else EVEN_SILENCE,

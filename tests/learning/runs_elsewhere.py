@@ -54,6 +54,19 @@ def _interrupted_twice(folder, asked):
     }
 
 
+def timed(folder):
+    """How the end of a run that minutes have stopped differs from that of one that went through.
+
+    But for its curve, which has an evaluation more for every such stop, and so for the best policy.
+    """
+    training = small_training()
+    run(training, folder / "through", 192)
+    minutes = 0.0
+    while run(training, folder / "timed", 192, minutes=minutes, is_resumed=minutes > 0) < 192:
+        minutes += 0.1 / 60.0
+    return ""
+
+
 ASKED = (
     *("--robots", "4", "--windows", "12", "--range-ratio", "1", "--missions", "4"),
     *("--held-out", "2", "--evaluate-every", "128", "--budget", "256", "--seed", "5"),

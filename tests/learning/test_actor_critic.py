@@ -191,8 +191,9 @@ def test_the_acting_network_is_a_copy_of_what_acts(arm):
     whole = model.policy.network(*seen)[..., : training.network.num_outputs]
     torch.testing.assert_close(copied(*seen), whole.detach(), atol=1e-6, rtol=1e-5)
     with torch.no_grad():
-        model.policy.network.output.weight.zero_()
-    assert torch.any(copied.output.weight != 0.0)
+        for weight in model.policy.network.parameters():
+            weight.zero_()
+    assert all(torch.any(weight != 0.0) for weight in copied.parameters())
 
 
 @pytest.mark.parametrize("arm", ["robot", "team"])

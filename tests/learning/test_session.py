@@ -39,7 +39,7 @@ def whole(tmp_path_factory):
     folder, heard = tmp_path_factory.mktemp("run"), []
 
     def listen(status):
-        heard.append((status.decisions, status.evaluated, len(status.progress.curve)))
+        heard.append((status.decisions, status.evaluated, status.aoi))
         return True
 
     limits = Limits(decisions=192, replay_every=100)
@@ -61,6 +61,8 @@ def test_tensorboard_has_the_numbers_that_matter(whole):
     assert logged == expected
     entropy = [event.value for event in events.Scalars("train/entropy")]
     assert all(value > 0.0 for value in entropy)
+    steps = {event.step for tag in events.Tags()["scalars"] for event in events.Scalars(tag)}
+    assert steps == {row["decisions"] for row in progress.curve}
 
 
 def test_the_curve_is_a_table_of_every_evaluation(whole):
@@ -68,6 +70,15 @@ def test_the_curve_is_a_table_of_every_evaluation(whole):
     with (folder / CURVE).open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["aoi"]) for row in rows] == [row["aoi"] for row in progress.curve]
+
+
+def test_a_curve_that_is_ahead_of_the_checkpoint_is_put_right_on_resuming(tmp_path):
+    run(TRAINING, tmp_path / "run", 32)
+    path = tmp_path / "run" / CURVE
+    kept = path.read_text()
+    path.write_text(kept + kept.splitlines()[-1] + "\n")
+    run(TRAINING, tmp_path / "run", 32, is_resumed=True)
+    assert path.read_text() == kept
 
 
 def test_the_best_policy_is_the_one_of_the_best_evaluation(whole):
@@ -105,6 +116,16 @@ def test_listeners_hear_of_every_window_and_of_evaluations(whole):
     shares = [evaluated for _, evaluated, _ in heard if evaluated is not None]
     assert len(shares) == 4 * TRAINING.mission.num_windows
     assert shares.count(1.0) == 4
+
+
+def test_the_totals_of_an_evaluation_are_of_the_windows_since_the_last(whole):
+    """Every window is heard of once after its last evaluation; all have as many missions."""
+    _, progress, heard = whole
+    ages = {decisions: aoi for decisions, evaluated, aoi in heard if evaluated is None}
+    for before, row in zip(progress.curve, progress.curve[1:], strict=False):
+        its = [age for at, age in ages.items() if before["decisions"] < at <= row["decisions"]]
+        assert len(its) == 16
+        assert row["rollout/aoi"] == pytest.approx(sum(its) / 16)
 
 
 def test_a_better_policy_takes_the_place_of_the_last_and_a_worse_one_does_not(
