@@ -129,7 +129,7 @@ class Session(BaseCallback):
         progress.optimiser = self._optimiser_means() or progress.optimiser
         is_new = not progress.curve or progress.curve[-1]["decisions"] < decisions
         is_due = is_new and (is_last or decisions >= progress.next_evaluation)
-        if is_due and self._goes_on:
+        if is_due:
             self._evaluate(decisions)
         every = self._limits.replay_every
         if every and decisions >= progress.next_replay and self._goes_on:

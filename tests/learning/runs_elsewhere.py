@@ -15,11 +15,14 @@ from pathlib import Path
 
 import numpy as np
 import torch._dynamo  # noqa: F401 - optimisers import it late, so every child would
-from small_runs import StopAfter, difference, end_of, run, small_training
+from small_runs import StopAfter, difference, end_of, go_on, run, small_training
 
 from swarm_mj.cli import main
 from swarm_mj.decision import sample
 from swarm_mj.learning.missions import Group
+from swarm_mj.learning.progress import Progress
+from swarm_mj.learning.run import train
+from swarm_mj.learning.run_folder import Limits
 from swarm_mj.mission import paper
 
 RESUMED = {
@@ -55,16 +58,24 @@ def _interrupted_twice(folder, asked):
 
 
 def timed(folder):
-    """How the end of a run that minutes have stopped differs from that of one that went through.
+    """How the end of a run that was stopped by the clock differs from that of one that was not.
 
-    But for its curve, which has an evaluation more for every such stop, and so for the best policy.
+    But for what one evaluation more at every stop brings: rows of the curve, and so the best
+    policy.
     """
     training = small_training()
-    run(training, folder / "through", 192)
-    minutes = 0.0
-    while run(training, folder / "timed", 192, minutes=minutes, is_resumed=minutes > 0) < 192:
-        minutes += 0.1 / 60.0
-    return ""
+    run(training, folder / "untimed", 192)
+    progress, num_sessions = Progress(), 0
+    while progress.decisions < 192:
+        limits = Limits(decisions=192, minutes=progress.minutes + 0.1 / 60.0)
+        progress = train(
+            training, folder / "timed", limits, listener=go_on, is_resumed=num_sessions > 0
+        )
+        num_sessions += 1
+    ends = [end_of(folder / name) for name in ("untimed", "timed")]
+    for end in ends:
+        del end["progress"], end["policy file"], end["curve rows"]
+    return {"difference": difference(*ends), "sessions": num_sessions}
 
 
 ASKED = (
@@ -155,5 +166,5 @@ def learned(folder):
 
 if __name__ == "__main__":
     where = Path(sys.argv[1])
-    results = {work.__name__: work(where) for work in (killed, resumed, learned)}
+    results = {work.__name__: work(where) for work in (killed, resumed, timed, learned)}
     (where / "results.json").write_text(json.dumps(results, indent=1))

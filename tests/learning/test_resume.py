@@ -29,6 +29,11 @@ def test_interrupted_twice_it_ends_as_if_it_had_not_been(results, name):
     assert results["resumed"][name] == {"difference": "", "stopped in time": True}
 
 
+def test_stopped_by_the_clock_it_ends_as_if_it_had_not_been(results):
+    assert results["timed"]["difference"] == ""
+    assert results["timed"]["sessions"] > 1
+
+
 def test_killed_at_any_moment_it_resumes_and_ends_as_if_it_had_not_been(results):
     """Also while a policy takes another's place, and before there is a checkpoint."""
     killed = results["killed"]

@@ -20,11 +20,13 @@ def with_ppo(training, **changes):
 
 
 def test_the_learning_rate_falls_in_steps_of_the_optimiser():
-    """3 minibatches a pass: 4 passes are 12 steps."""
-    training = with_ppo(small_training(), learning_rate=0.5, decay=0.1, decay_steps=12)
+    """3 minibatches a pass: 4 passes are 12 steps. No rate is below a hundredth of the first."""
+    training = with_ppo(
+        small_training(), learning_rate=0.5, decay=0.1, decay_steps=12, least_share=0.01
+    )
     model, _ = make_model(training)
     assert model.lr_schedule(1.0) == 0.5
-    for passes, rate in ((3, 0.5), (4, 0.05), (7, 0.05), (8, 0.005), (10, 0.005)):
+    for passes, rate in ((3, 0.5), (4, 0.05), (7, 0.05), (8, 0.005), (12, 0.005)):
         model._n_updates = passes
         assert model.lr_schedule(0.3) == pytest.approx(rate)
 

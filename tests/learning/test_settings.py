@@ -4,8 +4,10 @@ import json
 from dataclasses import asdict, replace
 
 import pytest
+import torch
 from small_runs import small_training
 
+from swarm_mj.gnn import AggregationGnn
 from swarm_mj.graphs.observers import make_observer
 from swarm_mj.learning.settings import arm_settings, from_json
 from swarm_mj.mission import PRESETS, paper, reference
@@ -33,7 +35,7 @@ def test_arm_team_is_the_papers():
     assert (ppo.learning_rate, ppo.decay, ppo.discount, ppo.clip) == (1e-4, 0.95, 0.99, 0.1)
     assert (network.receptive_field, network.latent, network.depth) == (5, 64, 3)
     assert not network.is_linear
-    assert (training.features, network.edges, network.num_outputs) == ("paper", "paper", 1)
+    assert (training.features, network.edges, network.num_outputs) == ("paper", "reference", 1)
     assert training.missions * ppo.num_steps == 64 * ppo.num_minibatches
     assert not training.shares_trunk
     assert not training.sums_nodes
@@ -72,6 +74,20 @@ def test_silence_is_dropped_only_where_it_earns_nothing():
 def test_what_is_out_of_range_is_refused(changes, complaint):
     with pytest.raises(ValueError, match=complaint):
         replace(small_training(), **changes)
+
+
+@pytest.mark.parametrize("preset", [paper, reference])
+def test_whom_a_robot_addresses_can_depend_on_where_it_is(preset):
+    """The text's edges lead from children to parents: the robot's own state reached nobody."""
+    mission = preset("stationary", num_robots=4)
+    torch.manual_seed(0)
+    network = AggregationGnn(arm_settings("team", mission, (4,)).network)
+    node = torch.rand(1, 4, network.shape.num_features)
+    parent = torch.tensor([[-1, 0, 1, 0]])
+    moved = node.clone()
+    moved[0, 0] += 1.0
+    change = (network(moved, parent) - network(node, parent)).abs().amax(dim=2)
+    assert torch.all(change > 0.0)
 
 
 def test_an_unknown_arm_is_refused():
