@@ -29,7 +29,7 @@ class LearningFigure:
 
     def __call__(self) -> None:
         """Draws it."""
-        robot_40 = _levels("robot-40", ("tdma", "planner"))
+        robot_40 = _levels("robot-40", ("tdma", "spatial-tdma"))
         both = _levels("both-arms-10", ("tdma", "mst"))
         panels = [
             LearningPanel(

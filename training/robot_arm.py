@@ -38,7 +38,7 @@ class RobotArm:
         ]
         evaluate(
             "robot-40",
-            ["tdma", "spatial-tdma", "planner", "gossip", *policies],
+            ["tdma", "spatial-tdma", "mst", *policies],
             f"--task stationary --robots 40 --episodes {self.episodes} --jobs 2".split(),
         )
 

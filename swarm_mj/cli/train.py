@@ -124,7 +124,7 @@ def _table(out: Path, asked: "Run", progress: "Progress") -> Table:
         table.add_row("held-out age, at first", f"{age_of(progress.curve[0])} windows")
         table.add_row(
             "held-out age, best policy",
-            f"{age_of(best)} windows, after {best['decisions']:,.0f} decisions",
+            f"{age_of(best)} windows, after {best['decisions']:,.0f} decisions; chosen on these",
         )
         if training.reward == "velocity-variance":
             first, last = (row["velocity_variance"] for row in (progress.curve[0], best))

@@ -134,7 +134,7 @@ def rollout_bytes(training: "Training") -> int:
     nodes = max(training.robots)
     rows = training.missions * nodes  # a graph each
     graph = nodes * (4 * training.network.num_features + 4 + 1)  # features, parent, may address
-    remembered = 4 * nodes**2 if training.features == "extended" else 0
+    remembered = 4 * nodes**2 if training.features in ("local", "extended") else 0
     return rows * (graph * (training.ppo.num_steps + 1) + remembered)
 
 

@@ -15,6 +15,9 @@ class SpeakersBuffer(DictRolloutBuffer):
     Without discount a robot's advantage is its credit, and a silent robot's is 0: its row adds
     nothing to the policy's gradient. So most of the rows, which cost as much as the others, can be
     left out; some stay for the entropy. Credits are not normalised, for their zero means something.
+
+    What PPO logs of its passes (value, clipping, divergence) is over the rows kept, where speech is
+    more frequent than it is; values, which nothing reads without discount, are learned from these.
     """
 
     def compute_returns_and_advantage(self, last_values: object, dones: np.ndarray) -> None:
