@@ -1,6 +1,7 @@
 """The README's Python runs, and its commands exist."""
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -21,7 +22,7 @@ def test_an_example_runs(example, capsys):
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_is_understood(command):
-    assert make_parser().parse_args(command.split()).run
+    assert make_parser().parse_args(shlex.split(command, comments=True)).run
 
 
 def test_there_are_examples_and_every_file_named_in_the_map_exists():

@@ -4,6 +4,7 @@ Each experiment calls the commands that a reader would type, so a run that is in
 when the experiment is started again.
 """
 
+import argparse
 import shutil
 import sys
 from collections.abc import Sequence
@@ -60,6 +61,10 @@ def evaluate(name: str, policies: Sequence[Path | str], options: Sequence[str]) 
 def run(experiment: object) -> int:
     """Runs an experiment, a callable; returns its exit code."""
     assert callable(experiment)
+    argparse.ArgumentParser(
+        description=sys.modules["__main__"].__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    ).parse_args()
     try:
         experiment()
     except Failed as failed:

@@ -9,7 +9,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from learning import RESULTS
+from learning import RESULTS, run
 
 from swarm_mj.figures.learning import LearningCurve, LearningPanel, Level, draw_learning
 from swarm_mj.figures.style import save
@@ -71,4 +71,4 @@ def _levels(name: str, policies: tuple[str, ...]) -> tuple[Level, ...]:
 
 
 if __name__ == "__main__":
-    sys.exit(LearningFigure()())
+    sys.exit(run(LearningFigure()))

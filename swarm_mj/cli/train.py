@@ -68,6 +68,8 @@ def run(options: argparse.Namespace) -> int:
         go_on = _resume_command(options.out)
         console.print(f"Broken off; the last checkpoint is kept.\nGo on:    {go_on}", markup=False)
         return INTERRUPTED
+    if not watch.has_begun:
+        console.print("Nothing was left to train: raise --budget or --minutes, which count in all.")
     if not is_over:
         console.print(f"Interrupted after {progress.decisions:,} decisions; all is kept.")
     return DONE if is_over else INTERRUPTED

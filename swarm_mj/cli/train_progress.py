@@ -57,6 +57,7 @@ class Watch:
         self._start: Status | None = None  # of this session
         self._num_rows = 0
         self.has_stopped = False  # whether the run was told to stop
+        self.has_begun = False  # whether there was anything to do
 
     def __enter__(self) -> "Watch":
         self._bar.start()
@@ -75,6 +76,7 @@ class Watch:
         if self._start is None:
             self._start = status
             self._num_rows = len(status.progress.curve)
+        self.has_begun = True
         self._print_new_row(status)
         self._bar.update(
             self._task,

@@ -27,7 +27,8 @@ def model_card(config: PolicyConfig) -> str:
         _network(config),
         "## Fly it",
         f"    swarm-mj fly --policy DIR --task {task or 'TASK'}",
-        "`DIR` is this folder. Teams of any size fly with it; `swarm-mj evaluate` takes it too.",
+        "`DIR` is this folder; `swarm-mj evaluate` takes it too. Teams of any size fly with it; "
+        "those much larger than the ones it was trained on may fare badly.",
         "## Training",
         *_described(training),
         f"By swarm_mj {config.version}{commit}.",

@@ -89,6 +89,8 @@ def read_policy(folder: Path) -> tuple[AggregationGnn, PolicyConfig]:
         )
     if not present.is_dir():
         raise ValueError(f"policy {folder} is a file; name the directory that holds the policy")
+    if not (present / CONFIG).exists() and (present / "policy" / CONFIG).exists():
+        raise ValueError(f"{folder} is a run; name the policy in it, {folder / 'policy'}")
     name = CONFIG
     try:
         config = from_json(_read(present, name))
