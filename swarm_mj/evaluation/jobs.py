@@ -7,6 +7,7 @@ from contextlib import contextmanager, suppress
 from itertools import islice
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
+from multiprocessing.synchronize import Event
 from typing import Any, TypeVar
 
 Piece = TypeVar("Piece")
@@ -15,13 +16,15 @@ Product = TypeVar("Product")
 # Jobs share the machine's cores, so none starts threads of its own.
 ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
 
+POLL_S = 0.05  # how often a process that loads is looked at when all is broken off
+
 
 def run_jobs(
     work: Callable[[Piece], Product], pieces: Sequence[Piece], num_jobs: int
 ) -> Generator[tuple[int, Product]]:
     """Does all pieces of work.
 
-    Ctrl-C reaches this process only; whoever breaks off ends the others at once.
+    Ctrl-C reaches this process only; whoever breaks off ends the others, once they have loaded.
 
     Args:
         work: A function of a module, which other processes can import.
@@ -79,25 +82,32 @@ def _receive(worker: Connection) -> Any:  # noqa: ANN401 - any product
 def _workers(work: Callable[[Any], Any], num_jobs: int) -> Iterator[list[Connection]]:
     """Processes that work until the block ends; yields a connection to each."""
     context = get_context("spawn")
-    processes, connections = [], []
+    processes, connections, loaded = [], [], []
     try:
         with _shielded(), _one_thread():
             for _ in range(num_jobs):
                 ours, theirs = context.Pipe()
-                process = context.Process(target=_serve, args=(work, theirs), daemon=True)
+                loaded.append(context.Event())
+                process = context.Process(
+                    target=_serve, args=(work, theirs, loaded[-1]), daemon=True
+                )
                 process.start()
                 theirs.close()  # so that a process's end is heard
                 processes.append(process)
                 connections.append(ours)
         yield connections
     finally:
-        for process in processes:
+        for process, is_loaded in zip(processes, loaded, strict=False):
+            # Libraries run programs of their own while they load, and complain if they are left.
+            while process.is_alive() and not is_loaded.wait(POLL_S):
+                pass
             process.terminate()
             process.join()
 
 
-def _serve(work: Callable[[Any], Any], connection: Connection) -> None:
+def _serve(work: Callable[[Any], Any], connection: Connection, is_loaded: Event) -> None:
     """A process's life: works until nobody wants it any more."""
+    is_loaded.set()
     with suppress(EOFError, ConnectionError):
         while True:
             piece = connection.recv()

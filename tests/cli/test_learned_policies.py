@@ -67,7 +67,7 @@ def test_the_mode_is_flown_on_request(runs):
     ("options", "complaint"),
     [
         (["fly", "--policy", "runs/z"], "policy runs/z does not exist; name a directory"),
-        (["fly", "--policy", "runs/x"], "runs/x/config.json: there is no such file"),
+        (["fly", "--policy", "runs/x"], "runs/x is a run; name the policy in it, runs/x/policy"),
         (["fly", "--policy", "runs/y/config.json"], "is a file; name the directory"),
         (["fly", "--policy", "runs/y", "--probability", "0.1"], "takes no transmission probab"),
         (["fly", "--policy", "mst", "--deterministic"], "mst is not learned; only learned"),

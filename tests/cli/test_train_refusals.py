@@ -31,7 +31,7 @@ for arguments in json.load(sys.stdin):
     ends.append([code, out.getvalue(), err.getvalue(), before == files()])
 json.dump(ends, sys.stdout)
 """
-NEW, DONE = ("--out", "new"), ("--out", "done", "--resume")
+NEW, DONE = ("--out", "new", "--budget", "1"), ("--out", "done", "--resume")
 REFUSED = [
     ((), "the following arguments are required: --out"),
     ((*NEW, "--arm", "both"), "arm must be one of robot, team, not 'both'"),
