@@ -21,7 +21,7 @@ setup: $(READY)
 $(READY): pyproject.toml tools/constraints.txt
 	@$(PYTHON) -c "import sys; sys.exit(0 if sys.version_info >= (3, 11) else \
 	  f'swarm_mj needs Python 3.11 or newer, not {sys.version.split()[0]}; try make PYTHON=python3.11')"
-	@echo "Setting up .venv (a few minutes and 2.5 GB, once) ..."
+	@echo "Setting up .venv (a few minutes and 2.7 GB, once) ..."
 	@$(PYTHON) -m venv .venv
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check \
 	  --constraint tools/constraints.txt --editable '.[dev]'

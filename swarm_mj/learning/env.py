@@ -22,18 +22,20 @@ class MissionsEnv(VecEnv):
     def __init__(
         self,
         groups: Sequence[Group],
-        num_envs: int,
+        sizes: Sequence[int],
         observation: spaces.Space,
         action: spaces.Space,
     ) -> None:
+        """Takes the groups, already started, and how many environments each of them is."""
         self.groups = list(groups)
         self.num_nodes = largest_team(groups)
         self.outcomes: list[Outcome] = []  # of the last window, group by group
         self._actions = np.zeros(0)
+        self._ends = np.cumsum(sizes)
+        self._sizes = list(sizes)
         self.render_mode = None
-        super().__init__(num_envs, observation, action)
+        super().__init__(sum(sizes), observation, action)
 
-    @abstractmethod
     def observe(self, graphs: Sequence[Graphs]) -> Observation:
         """All groups' graphs as one observation.
 
@@ -43,6 +45,19 @@ class MissionsEnv(VecEnv):
         Returns:
             The observation of all environments.
         """
+        return self._observe(graphs, slice(0, self.num_envs))
+
+    @abstractmethod
+    def _observe(self, graphs: Sequence[Graphs], envs: slice) -> Observation:
+        """The graphs of neighbouring groups, which are these environments."""
+
+    @abstractmethod
+    def _step_group(self, group: Group, actions: np.ndarray) -> Outcome:
+        """One window of a group."""
+
+    @abstractmethod
+    def _reward_of(self, group: Group, outcome: Outcome) -> np.ndarray:
+        """What a group's environments are paid for a window."""
 
     @property
     def num_teams(self) -> int:
@@ -56,6 +71,34 @@ class MissionsEnv(VecEnv):
     def step_async(self, actions: np.ndarray) -> None:
         """Takes the actions; `step_wait` flies them."""
         self._actions = actions
+
+    def step_wait(self) -> Step:
+        """One window of all missions."""
+        actions = np.split(self._actions, self._ends[:-1])
+        steps = zip(self.groups, actions, strict=True)
+        self.outcomes = [self._step_group(group, chosen) for group, chosen in steps]
+        paid = zip(self.groups, self.outcomes, strict=True)
+        reward = np.concatenate([self._reward_of(group, outcome) for group, outcome in paid])
+        has_ended = [outcome.last_graphs is not None for outcome in self.outcomes]
+        return (
+            self.observe([outcome.graphs for outcome in self.outcomes]),
+            reward.astype(np.float32),
+            np.repeat(has_ended, self._sizes),
+            self._infos(),
+        )
+
+    def _infos(self) -> list[dict[str, Any]]:
+        """Empty, but for missions that were cut: what was seen last there has a value."""
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for outcome, size, end in zip(self.outcomes, self._sizes, self._ends, strict=True):
+            if outcome.last_graphs is not None and outcome.is_cut:
+                last = self._observe([outcome.last_graphs], slice(end - size, end))
+                for env in range(size):
+                    infos[end - size + env] = {
+                        "terminal_observation": {name: last[name][env] for name in last},
+                        "TimeLimit.truncated": True,
+                    }
+        return infos
 
     def close(self) -> None:
         """There is nothing to release."""

@@ -110,8 +110,8 @@ class Group:
 
     def course(self) -> Course:
         """What `fly_again` needs."""
-        shape = (0, self.num_missions, self.mission.num_robots)
-        recipients = np.array(self._recipients, dtype=np.int16).reshape(-1, *shape[1:])
+        teams = (self.num_missions, self.mission.num_robots)
+        recipients = np.array(self._recipients, dtype=np.int16).reshape(-1, *teams)
         return Course(seeds=list(self._seeds), last_window=self._last_window, recipients=recipients)
 
     def fly_again(self, course: Course) -> Graphs:
