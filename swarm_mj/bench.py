@@ -93,13 +93,13 @@ def bench(num_missions: int, *, num_threads: int = 1, seconds: float = 2.0) -> T
         "radio alone": lambda: swarm.channel(swarm.bodies.position_m, recipient),
         "hops (flights only)": lambda: mean_hops(swarm.buffers),
     }
-    whole_us = _microseconds(lambda: swarm.step(policy), seconds)
+    whole_us = microseconds(lambda: swarm.step(policy), seconds)
     return Timing(
         num_missions=num_missions,
         windows_per_s=1e6 * num_missions / whole_us,
-        mj_step_us=_microseconds(_plain_steps(MISSION), seconds / 4),
+        mj_step_us=microseconds(_plain_steps(MISSION), seconds / 4),
         parts_us={
-            name: _microseconds(part, seconds / 4) / num_missions for name, part in parts.items()
+            name: microseconds(part, seconds / 4) / num_missions for name, part in parts.items()
         },
     )
 
@@ -125,9 +125,9 @@ def bench_evaluation(episodes: int, *, num_jobs: int = 2, seconds: float = 2.0) 
         num_jobs=num_jobs,
         baselines_s=_fly(baselines, num_jobs),
         oracle_s=_fly(oracle, 1) / num_oracles,
-        plan_ms=_microseconds(_planning(MISSION), seconds / 4) / 1000.0,
-        dense_plan_ms=_microseconds(_planning(DENSE), seconds / 4) / 1000.0,
-        mj_step_us=_microseconds(_plain_steps(MISSION), seconds / 4),
+        plan_ms=microseconds(_planning(MISSION), seconds / 4) / 1000.0,
+        dense_plan_ms=microseconds(_planning(DENSE), seconds / 4) / 1000.0,
+        mj_step_us=microseconds(_plain_steps(MISSION), seconds / 4),
     )
 
 
@@ -178,8 +178,13 @@ def _plain_steps(mission: Mission) -> Callable[[], None]:
     return lambda: mj_step(model, data)
 
 
-def _microseconds(call: Callable[[], object], seconds: float) -> float:
-    """Median time of a call [µs]."""
+def microseconds(call: Callable[[], object], seconds: float) -> float:
+    """Median time of a call [µs].
+
+    Args:
+        call: What is timed, after a call that is not.
+        seconds: About how long the measurement takes [s].
+    """
     call()
     start_s = time.perf_counter()
     call()

@@ -9,6 +9,7 @@ import torch
 from jaxtyping import Int
 from stable_baselines3.common.callbacks import BaseCallback
 
+from swarm_mj.bench import microseconds
 from swarm_mj.gnn import AggregationGnn, GnnShape
 from swarm_mj.graphs.graph import Graphs, PaperObserver
 from swarm_mj.graphs.observers import make_observer
@@ -20,7 +21,6 @@ from swarm_mj.swarm import Swarm
 
 NUM_ROBOTS = 40
 WARM_UP_WINDOWS = 100  # after which most robots know most others
-REPETITIONS = 5  # of each measurement; their median counts, for machines are shared
 SHAPE = GnnShape(num_features=len(PaperObserver.names))  # the paper's
 
 
@@ -90,12 +90,12 @@ def _network_timing(mission: Mission, num_missions: int, seconds: float) -> Netw
     def learn() -> None:
         network(node, parent).sum().backward()
 
-    forward_us = _microseconds(_inferring(lambda: network(node, parent)), seconds)
+    forward_us = microseconds(_inferring(lambda: network(node, parent)), seconds)
     return NetworkTiming(
         num_missions=num_missions,
         forward_per_s=1e6 * num_missions / forward_us,
-        backward_per_s=1e6 * num_missions / _microseconds(learn, seconds),
-        layer_us=_microseconds(_inferring(lambda: layer(rows)), seconds / 2) / num_missions,
+        backward_per_s=1e6 * num_missions / microseconds(learn, seconds),
+        layer_us=microseconds(_inferring(lambda: layer(rows)), seconds / 2) / num_missions,
     )
 
 
@@ -103,7 +103,7 @@ def _own_decision_us(mission: Mission, shape: GnnShape, features: str, seconds: 
     """One robot's network on its own graph [µs]."""
     network = AggregationGnn(shape)
     node, parent = (rows[:1] for rows in _tensors(_graphs(mission, features, 1)))
-    return _microseconds(_inferring(lambda: network(node, parent)), seconds / 2)
+    return microseconds(_inferring(lambda: network(node, parent)), seconds / 2)
 
 
 def _training_per_s(arm: str, mission: Mission, threads: int, seconds: float) -> float:
@@ -172,15 +172,3 @@ def _inferring(call: Callable[[], object]) -> Callable[[], None]:
             call()
 
     return infer
-
-
-def _microseconds(call: Callable[[], object], seconds: float) -> float:
-    """Median time of a call [µs]."""
-    for _ in range(2):
-        call()
-    times_s, start_s = [], time.perf_counter()
-    while len(times_s) < REPETITIONS or time.perf_counter() - start_s < seconds:
-        before_s = time.perf_counter()
-        call()
-        times_s.append(time.perf_counter() - before_s)
-    return 1e6 * float(np.median(times_s))
