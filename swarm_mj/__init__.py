@@ -31,9 +31,10 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     IV-C            round robin              policies.round_robin.RoundRobin
     IV-C            minimum spanning tree    policies.minimum_spanning_tree.MinimumSpanningTree
 
-Around the paper: `scene` (MJCF), `swarm` (B missions side by side), `flight` (a policy from the
-first window to the last), more `policies` than the paper's, more `graphs` and ways of `learning`,
-`evaluation`, `statistics`, `connectivity`, `results` and `published` (where policies stand),
+Around the paper: `scene` (MJCF), `swarm` (B missions side by side), `switch_off` (robots that
+fail), `flight` (a policy from the first window to the last), more `policies` than the paper's, more
+`graphs` and ways of `learning`, `evaluation`, `statistics`, `connectivity`, `results` and
+`published` (where policies stand),
 `figures` (V: Figs. 2 to 6, and learning curves), `recorder` and `replay` (what is seen), `envs`
 (other libraries' faces), `bench` and `bench_learning` (speed), `cli` (the command line).
 """

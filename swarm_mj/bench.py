@@ -19,8 +19,10 @@ from swarm_mj.evaluation.jobs import run_jobs
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission, paper
 from swarm_mj.policies import RoundRobin, make_policy
-from swarm_mj.policies.pictures import epoch_windows, freeze, make_plan
-from swarm_mj.policies.planner import DISCOVERY_EPOCHS
+from swarm_mj.policies.pictures import freeze
+from swarm_mj.policies.plan import Plan
+from swarm_mj.policies.planner import regular_length
+from swarm_mj.policies.stored_scorer import shipped_scorer
 from swarm_mj.protocol import window
 from swarm_mj.published import BASELINES
 from swarm_mj.scene import compose
@@ -140,24 +142,31 @@ def _fly(study: Study, num_jobs: int) -> float:
 
 
 def _planning(mission: Mission) -> Callable[[], object]:
-    """One robot's plan for an epoch, from what it knows when the discovery ends."""
+    """One robot's plan for an epoch, from what it knows after two rounds of TDMA."""
     swarm = Swarm(mission, [0])
-    planner = make_policy("planner", mission)
-    num_windows = epoch_windows(mission.num_robots)
-    for _ in range(DISCOVERY_EPOCHS * num_windows):
-        swarm.step(planner)
+    tdma = make_policy("tdma", mission)
+    num_windows = regular_length(mission.num_robots)
+    for _ in range(mission.num_robots):
+        swarm.step(tdma)
     buffers, now = swarm.buffers, float(swarm.now[0])
-    pictures = freeze(
-        buffers.position_m[0],
-        buffers.velocity_mps[0],
-        buffers.timestamp[0],
-        buffers.is_known[0],
-        now,
-        mission.window_s,
-        num_windows / 2,
-    )
-    radio = radio_of(mission)
-    return lambda: make_plan(radio, pictures, 0, buffers.timestamp[0], now)
+    radio, scorer = radio_of(mission), shipped_scorer()
+
+    def plan() -> object:
+        pictures = freeze(
+            buffers.position_m[0],
+            buffers.velocity_mps[0],
+            buffers.timestamp[0],
+            buffers.is_known[0],
+            now,
+            mission.window_s,
+            num_windows / 2.0,
+            num_windows * 10.0,
+        )
+        is_free = np.ones(2 * num_windows, dtype=bool)
+        timestamp = buffers.timestamp[0]
+        return Plan(radio, scorer, pictures, 0, timestamp, now, is_free).outcome()
+
+    return plan
 
 
 def _talk(swarm: Swarm, recipient: Int[np.ndarray, "B N"]) -> Callable[[], object]:

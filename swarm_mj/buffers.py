@@ -61,6 +61,7 @@ def observe_self(
     position_m: Float[np.ndarray, "B N 2"],
     velocity_mps: Float[np.ndarray, "B N 2"],
     now: Float[np.ndarray, "B"],
+    is_on: Bool[np.ndarray, "B N"] | None = None,
 ) -> None:
     """Writes every robot's own state and the time into its own buffer (Eq. 5).
 
@@ -69,9 +70,16 @@ def observe_self(
         position_m: True positions [m].
         velocity_mps: True velocities [m/s].
         now: t [windows].
+        is_on: Who observes; None is everyone.
     """
     _write_own(
-        buffers.timestamp, buffers.position_m, buffers.velocity_mps, position_m, velocity_mps, now
+        buffers.timestamp,
+        buffers.position_m,
+        buffers.velocity_mps,
+        position_m,
+        velocity_mps,
+        now,
+        is_on,
     )
 
 
@@ -81,6 +89,7 @@ def record_attempt(
     now: Float[np.ndarray, "B"],
     *,
     silence_is_attempt: bool = False,
+    is_on: Bool[np.ndarray, "B N"] | None = None,
 ) -> None:
     """Notes when each robot last addressed its recipient (Eq. 7).
 
@@ -89,12 +98,13 @@ def record_attempt(
         recipient: Whom each robot addresses; itself is silence.
         now: t [windows].
         silence_is_attempt: Whether a silent robot notes having addressed itself.
+        is_on: Who notes anything; None is everyone.
 
     Raises:
         ValueError: A recipient is no robot, or there is not one per robot.
     """
     check_robots("recipient", recipient, buffers.shape)
-    _write_attempt(buffers.last_attempt, recipient, now, silence_is_attempt)
+    _write_attempt(buffers.last_attempt, recipient, now, silence_is_attempt, is_on)
 
 
 def merge(buffers: Buffers, heard: Int[np.ndarray, "B N"]) -> None:
@@ -159,10 +169,13 @@ def _write_own(
     position_m: Float[np.ndarray, "B N 2"],
     velocity_mps: Float[np.ndarray, "B N 2"],
     now: Float[np.ndarray, "B"],
+    is_on: Bool[np.ndarray, "B N"] | None,
 ) -> None:
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
+            if is_on is not None and not is_on[b, i]:  # None is compiled apart, without the test
+                continue
             timestamp[b, i, i] = now[b]
             for axis in range(2):
                 believed_m[b, i, i, axis] = position_m[b, i, axis]
@@ -176,10 +189,13 @@ def _write_attempt(
     recipient: Int[np.ndarray, "B N"],
     now: Float[np.ndarray, "B"],
     silence_is_attempt: bool,
+    is_on: Bool[np.ndarray, "B N"] | None,
 ) -> None:
     num_missions, num_robots = recipient.shape
     for b in range(num_missions):
         for i in range(num_robots):
+            if is_on is not None and not is_on[b, i]:
+                continue
             if silence_is_attempt or recipient[b, i] != i:
                 last_attempt[b, i, recipient[b, i]] = now[b]
 

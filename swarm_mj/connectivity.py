@@ -29,19 +29,31 @@ class ConnectivityFloor:
         self._range_m = range_m
 
     def next(
-        self, position_m: Float[np.ndarray, "B N 2"], now: Float[np.ndarray, "B"]
+        self,
+        position_m: Float[np.ndarray, "B N 2"],
+        now: Float[np.ndarray, "B"],
+        is_on: Bool[np.ndarray, "B N"] | None = None,
     ) -> Float[np.ndarray, "B"]:
         """Shares within connected parts, and says how old what everyone knows then is.
 
         Args:
             position_m: True positions, after the robots have moved [m].
             now: t at the end of the window [windows].
+            is_on: Who shares, and whose pairs count; None is everyone.
 
         Returns:
             The mean over all pairs, oneself included, as age of information has it [windows].
         """
         age = np.empty(now.shape)
-        _share(self._timestamp, position_m, self._range_m, now, age)
+        everyone = np.ones(position_m.shape[:2], dtype=np.bool_)
+        _share(
+            self._timestamp,
+            position_m,
+            self._range_m,
+            now,
+            everyone if is_on is None else is_on,
+            age,
+        )
         return age
 
 
@@ -52,6 +64,7 @@ def _share(
     position_m: Float[np.ndarray, "B N 2"],
     range_m: float,
     now: Float[np.ndarray, "B"],
+    is_on: Bool[np.ndarray, "B N"],
     age: Float[np.ndarray, "B"],
 ) -> None:
     num_missions, num_robots = position_m.shape[:2]
@@ -59,14 +72,15 @@ def _share(
     part = np.empty(num_robots, dtype=np.int64)
     newest = np.empty(num_robots)
     for b in range(num_missions):
-        is_met[:] = False
+        is_met[:] = ~is_on[b]  # who is off passes nothing on
         total = 0.0
         for i in range(num_robots):
             if not is_met[i]:
                 num_members = _gather(position_m[b], range_m, i, is_met, part)
                 _pool(timestamp[b], part[:num_members], now[b], newest)
-                total += num_members * newest.sum()
-        age[b] = now[b] - total / (num_robots * num_robots)
+                total += num_members * newest[is_on[b]].sum()
+        num_on = is_on[b].sum()
+        age[b] = now[b] - total / (num_on * num_on)
 
 
 @njit(cache=True)

@@ -27,27 +27,40 @@ class Packets:
 
 
 def age_of_information(
-    buffers: Buffers, now: Float[np.ndarray, "B"]
+    buffers: Buffers,
+    now: Float[np.ndarray, "B"],
+    is_on: Bool[np.ndarray, "B N"] | None = None,
 ) -> tuple[Float[np.ndarray, "B"], Bool[np.ndarray, "B"]]:
     """Mean over all pairs i, j of t - T^{i,j}, own age included (Eq. 10).
 
     Args:
         buffers: What everyone knows.
         now: t [windows].
+        is_on: Whose pairs count, at least one robot's in each mission; None is everyone's.
 
     Returns:
-        The age [windows], and whether everyone has heard of everyone.
+        The age [windows], and whether everyone of these has heard of everyone of these.
     """
     age = np.empty(now.shape)
     is_complete = np.empty(now.shape, dtype=np.bool_)
-    _mean_age(buffers.timestamp, now, age, is_complete)
+    _mean_age(buffers.timestamp, now, is_on, age, is_complete)
     return age, is_complete
 
 
-def velocity_variance(velocity_mps: Float[np.ndarray, "B N 2"]) -> Float[np.ndarray, "B"]:
-    """Mean squared distance of a robot's velocity from the team's mean [m²/s²] (Eq. 17)."""
+def velocity_variance(
+    velocity_mps: Float[np.ndarray, "B N 2"], is_on: Bool[np.ndarray, "B N"] | None = None
+) -> Float[np.ndarray, "B"]:
+    """Mean squared distance of a robot's velocity from the team's mean [m²/s²] (Eq. 17).
+
+    Args:
+        velocity_mps: Every robot's [m/s].
+        is_on: Who makes up the team; None is everyone.
+
+    Returns:
+        The variance, per mission.
+    """
     variance = np.empty(velocity_mps.shape[0])
-    _variance(velocity_mps, variance)
+    _variance(velocity_mps, is_on, variance)
     return variance
 
 
@@ -73,14 +86,24 @@ def count_packets(phases: tuple[Phase, Phase], *, has_response: bool) -> Packets
     return Packets(attempted=count[0], delivered=count[1], overheard=count[2], answered=count[3])
 
 
-def mean_hops(buffers: Buffers) -> Float[np.ndarray, "B"]:
+def mean_hops(
+    buffers: Buffers, is_on: Bool[np.ndarray, "B N"] | None = None
+) -> Float[np.ndarray, "B"]:
     """Mean depth of known teammates in the parent trees (II-B), 0 before anyone is known [hops].
+
+    Args:
+        buffers: What everyone knows.
+        is_on: Whose depths in whose trees count, whoever is on the way; None is everyone.
+
+    Returns:
+        The depth, per mission.
 
     Raises:
         ValueError: Some parents lead nowhere, or in a circle.
     """
     hops = np.empty(buffers.parent.shape[0])
-    if not _mean_depth(buffers.timestamp, buffers.parent, hops):
+    counts = np.ones(buffers.shape, dtype=np.bool_) if is_on is None else is_on
+    if not _mean_depth(buffers.timestamp, buffers.parent, counts, hops):
         raise ValueError("parents of known robots must lead back to the buffer's owner")
     return hops
 
@@ -102,23 +125,26 @@ def window_costs(
     now: Float[np.ndarray, "B"],
     *,
     has_response: bool,
+    is_on: Bool[np.ndarray, "B N"] | None = None,
 ) -> WindowCosts:
     """Everything one window cost; arguments as in the functions above."""
-    age, is_complete = age_of_information(buffers, now)
+    age, is_complete = age_of_information(buffers, now, is_on)
     return WindowCosts(
         age_windows=age,
         is_complete=is_complete,
-        velocity_variance_m2ps2=velocity_variance(bodies.velocity_mps),
+        velocity_variance_m2ps2=velocity_variance(bodies.velocity_mps, is_on),
         packets=count_packets(phases, has_response=has_response),
     )
 
 
+# In these, None for `is_on` is compiled apart: without the tests, as fast as if it did not exist.
 # Times are halves of a window, so their sum is exact and adding in any order changes nothing.
 @njit(cache=True, fastmath={"reassoc"})
 @no_type_check
 def _mean_age(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
+    is_on: Bool[np.ndarray, "B N"] | None,
     age: Float[np.ndarray, "B"],
     is_complete: Bool[np.ndarray, "B"],
 ) -> None:
@@ -126,11 +152,16 @@ def _mean_age(
     for b in range(num_missions):
         total = 0.0
         num_unknown = 0
+        num_on = num_robots if is_on is None else is_on[b].sum()
         for i in range(num_robots):
+            if is_on is not None and not is_on[b, i]:
+                continue
             for j in range(num_robots):
+                if is_on is not None and not is_on[b, j]:
+                    continue
                 total += timestamp[b, i, j]
                 num_unknown += timestamp[b, i, j] <= NEVER
-        age[b] = now[b] - total / (num_robots * num_robots)
+        age[b] = now[b] - total / (num_on * num_on)
         is_complete[b] = num_unknown == 0
 
 
@@ -138,18 +169,22 @@ def _mean_age(
 @no_type_check
 def _variance(
     velocity_mps: Float[np.ndarray, "B N 2"],
+    is_on: Bool[np.ndarray, "B N"] | None,
     variance: Float[np.ndarray, "B"],
 ) -> None:
     num_missions, num_robots = velocity_mps.shape[:2]
     for b in range(num_missions):
         total = 0.0
+        num_on = num_robots if is_on is None else is_on[b].sum()
         for axis in range(2):
             mean = 0.0
             for i in range(num_robots):
-                mean += velocity_mps[b, i, axis] / num_robots
+                if is_on is None or is_on[b, i]:
+                    mean += velocity_mps[b, i, axis] / num_on
             for i in range(num_robots):
-                total += (velocity_mps[b, i, axis] - mean) ** 2
-        variance[b] = total / num_robots
+                if is_on is None or is_on[b, i]:
+                    total += (velocity_mps[b, i, axis] - mean) ** 2
+        variance[b] = total / num_on
 
 
 @njit(cache=True)
@@ -177,6 +212,7 @@ def _count(
 def _mean_depth(
     timestamp: Float[np.ndarray, "B N N"],
     parent: Int[np.ndarray, "B N N"],
+    is_on: Bool[np.ndarray, "B N"],
     hops: Float[np.ndarray, "B"],
 ) -> bool:
     """Fills `hops`; returns whether all parents form trees."""
@@ -186,7 +222,7 @@ def _mean_depth(
     for b in range(num_missions):
         total = 0
         num_known = 0
-        for i in range(num_robots):
+        for i in np.nonzero(is_on[b])[0]:
             depth[:] = -1
             depth[i] = 0
             for j in range(num_robots):
@@ -201,7 +237,7 @@ def _mean_depth(
                             return False
                     for step in range(length - 1, -1, -1):
                         depth[path[step]] = depth[k] + length - step
-                    total += depth[j]
-                    num_known += 1
+                    total += is_on[b, j] * depth[j]
+                    num_known += is_on[b, j]
         hops[b] = total / num_known if num_known else 0.0
     return True

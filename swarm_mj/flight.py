@@ -55,7 +55,7 @@ def fly(swarm: Swarm, policy: Policy) -> Iterator[Flown]:
     swarm.start(policy)
     for _ in range(swarm.mission.num_windows):
         costs = swarm.step(policy)
-        yield Flown(costs=costs, hops=mean_hops(swarm.buffers))
+        yield Flown(costs=costs, hops=mean_hops(swarm.buffers, swarm.is_on))
 
 
 def summarise(flown: Sequence[Flown]) -> Summary:

@@ -68,6 +68,15 @@ class Mission:
     sinr_threshold_db: float = _quantity(1.0, "SINR threshold", "dB", "IV-B", -30.0, 60.0)
     noise_dbm: float = _quantity(-50.0, "noise power", "dBm", "IV-B", -200.0, 50.0)
     frequency_hz: float = _quantity(2.4e9, "centre frequency", "Hz", "IV-B", 1e6, 1e12)
+    # Half-way, and nobody is told who; `switch_off` says how many robots that is.
+    switched_off: float = _quantity(
+        0.0,
+        "fraction of the robots that is switched off",
+        "of the team",
+        "not the paper's",
+        0.0,
+        0.9,
+    )
 
     physics: PhysicsMode = _choice("exact", "physics", "Eq. 15 or forces", PhysicsMode)
     boundary: Boundary = _choice("reflect", "boundary", "IV-A", Boundary)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import no_type_check
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numba import njit
 
 from swarm_mj.buffers import Buffers, merge, observe_self, record_attempt
@@ -41,6 +41,7 @@ def window(
     now: Float[np.ndarray, "B"],
     *,
     silence_is_attempt: bool = False,
+    is_on: Bool[np.ndarray, "B N"] | None = None,
 ) -> tuple[Phase, Phase]:
     """One communication window: a transmission phase, then a response phase (Alg. 1).
 
@@ -55,6 +56,7 @@ def window(
         channel: Who decodes whom (Eq. 6).
         now: t at the start of the window [windows].
         silence_is_attempt: Whether silence counts as addressing oneself (Eq. 7).
+        is_on: Who takes part; the others neither send, decode nor observe. None is everyone.
 
     Returns:
         The transmission and the response phase.
@@ -63,11 +65,17 @@ def window(
         ValueError: A recipient, or a sender that the channel names, is no robot.
     """
     transmission = transmit(
-        buffers, bodies, recipient, channel, now + PHASE, silence_is_attempt=silence_is_attempt
+        buffers,
+        bodies,
+        recipient,
+        channel,
+        now + PHASE,
+        silence_is_attempt=silence_is_attempt,
+        is_on=is_on,
     )
 
-    observe_self(buffers, bodies.position_m, bodies.velocity_mps, now + 2 * PHASE)
-    response = _send(buffers, bodies, respondents(transmission), channel)
+    observe_self(buffers, bodies.position_m, bodies.velocity_mps, now + 2 * PHASE, is_on)
+    response = _send(buffers, bodies, respondents(transmission), channel, is_on)
     return transmission, response
 
 
@@ -79,6 +87,7 @@ def transmit(
     now: Float[np.ndarray, "B"],
     *,
     silence_is_attempt: bool = False,
+    is_on: Bool[np.ndarray, "B N"] | None = None,
 ) -> Phase:
     """One transmission phase: the first half of Alg. 1, and each half of flooding's window.
 
@@ -89,6 +98,7 @@ def transmit(
         channel: Who decodes whom (Eq. 6).
         now: t of this phase [windows].
         silence_is_attempt: Whether silence counts as addressing oneself (Eq. 7).
+        is_on: Who takes part; the others neither send, decode nor observe. None is everyone.
 
     Returns:
         The phase.
@@ -96,9 +106,9 @@ def transmit(
     Raises:
         ValueError: A recipient, or a sender that the channel names, is no robot.
     """
-    observe_self(buffers, bodies.position_m, bodies.velocity_mps, now)
-    record_attempt(buffers, recipient, now, silence_is_attempt=silence_is_attempt)
-    return _send(buffers, bodies, recipient, channel)
+    observe_self(buffers, bodies.position_m, bodies.velocity_mps, now, is_on)
+    record_attempt(buffers, recipient, now, silence_is_attempt=silence_is_attempt, is_on=is_on)
+    return _send(buffers, bodies, recipient, channel, is_on)
 
 
 def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
@@ -109,12 +119,26 @@ def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
 
 
 def _send(
-    buffers: Buffers, bodies: Bodies, recipient: Int[np.ndarray, "B N"], channel: Channel
+    buffers: Buffers,
+    bodies: Bodies,
+    recipient: Int[np.ndarray, "B N"],
+    channel: Channel,
+    is_on: Bool[np.ndarray, "B N"] | None,
 ) -> Phase:
     """Everyone's packet through the channel and, decoded, into the buffers."""
-    heard = channel(bodies.position_m, recipient)
+    sent_to = _or_oneself(recipient, is_on)
+    heard = _or_oneself(channel(bodies.position_m, sent_to), is_on)
     merge(buffers, heard)
-    return Phase(recipient=recipient.copy(), heard=heard)
+    return Phase(recipient=sent_to.copy(), heard=heard)
+
+
+def _or_oneself(
+    robots: Int[np.ndarray, "B N"], is_on: Bool[np.ndarray, "B N"] | None
+) -> Int[np.ndarray, "B N"]:
+    """One robot per robot, and of those that are off themselves: silence, or nobody heard."""
+    if is_on is None:
+        return robots
+    return np.where(is_on, robots, np.arange(is_on.shape[1], dtype=robots.dtype))
 
 
 @njit(cache=True)

@@ -27,6 +27,7 @@ class Log:
     position_m: Float[np.ndarray, "T N 2"]  # p [m]
     velocity_mps: Float[np.ndarray, "T N 2"]  # v [m/s]
     recipient: Int[np.ndarray, "T 2 N"]  # S^i in both phases; itself: silent
+    is_on: Bool[np.ndarray, "T N"]  # whether a robot was switched on
     heard: Int[np.ndarray, "T 2 N"]  # whom robot j decoded in both phases; itself: nobody
     has_response: bool  # whether the second phase answers the first
     is_known: Bool[np.ndarray, "T N"]  # whether the observer has heard of j
@@ -36,7 +37,7 @@ class Log:
     age_window: Int[np.ndarray, "K"]  # the windows of the age matrix, every stride-th
     age: Float[np.ndarray, "K N N"]  # t - T^{i,j} [windows]
     age_mean: Float[np.ndarray, "T"]  # Eq. 10 [windows]
-    age_std: Float[np.ndarray, "T"]  # over all pairs of different robots [windows]
+    age_std: Float[np.ndarray, "T"]  # over all pairs of different robots that are on [windows]
     age_max: Float[np.ndarray, "T"]  # the worst pair's [windows]
     velocity_variance_m2ps2: Float[np.ndarray, "T"]  # Eq. 17
 
@@ -75,7 +76,9 @@ class Recorder:
         """Records the window that was just flown."""
         buffers, bodies, phases = self._swarm.buffers, self._swarm.bodies, self._swarm.phases
         age = self._swarm.now[0] - buffers.timestamp[0]
-        others = age[~np.eye(len(age), dtype=bool)]
+        num_robots = len(age)
+        is_on = np.ones(num_robots, bool) if self._swarm.is_on is None else self._swarm.is_on[0]
+        others = age[is_on[:, None] & is_on & ~np.eye(num_robots, dtype=bool)]
         own = self._observer
         if len(self._rows) % self._stride == 0:
             self._age.append(age.astype(np.float32))
@@ -85,6 +88,7 @@ class Recorder:
                 "velocity_mps": bodies.velocity_mps[0].copy(),
                 "recipient": np.stack([phase.recipient[0] for phase in phases]),
                 "heard": np.stack([phase.heard[0] for phase in phases]),
+                "is_on": is_on.copy(),
                 "is_known": buffers.is_known[0, own].copy(),
                 "believed_m": buffers.position_m[0, own].copy(),
                 "observer_age": age[own].copy(),  # a view would keep the whole matrix

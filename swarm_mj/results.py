@@ -4,7 +4,7 @@ import csv
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import Field, asdict, dataclass, fields
+from dataclasses import MISSING, Field, asdict, dataclass, fields
 from pathlib import Path
 from types import NoneType
 from typing import Any, get_args
@@ -30,6 +30,7 @@ class Result:
     boundary: str
     physics: str
     num_windows: int
+    switched_off: float = 0.0  # fraction of the robots, half-way; files made before it have none
     episodes: int
     seed: int  # of the first mission; the others follow one by one
     probability: float | None  # of a transmission, for the policies that have one
@@ -89,7 +90,8 @@ def read_results(path: Path) -> list[Result]:
     """The rows of a results file that `swarm-mj evaluate --csv` wrote.
 
     Args:
-        path: The CSV file; columns that no result has are passed over.
+        path: The CSV file; columns that no result has are passed over, and those with a default
+            may be missing.
 
     Returns:
         One or more results, in the file's order.
@@ -150,7 +152,8 @@ def write_json(
 
 
 def _check_header(path: Path, header: Sequence[str]) -> None:
-    missing = [name for name in COLUMNS if name not in header]
+    needed = [spec.name for spec in fields(Result) if spec.default is MISSING]
+    missing = [name for name in needed if name not in header]
     if missing:
         raise ValueError(f"results {path} lack the columns {', '.join(missing)}; {WAY_OUT}")
 
@@ -159,7 +162,8 @@ def _result(place: str, row: dict[str, Any]) -> Result:
     """One row; `place` says which, for the message."""
     if None in row or None in row.values():
         raise ValueError(f"results {place}: as many cells as columns are needed; {WAY_OUT}")
-    return Result(**{spec.name: _value(place, spec, row[spec.name]) for spec in fields(Result)})
+    given = (spec for spec in fields(Result) if spec.name in row)
+    return Result(**{spec.name: _value(place, spec, row[spec.name]) for spec in given})
 
 
 def _value(place: str, spec: Field[Any], text: str) -> Any:  # noqa: ANN401 - any field's value

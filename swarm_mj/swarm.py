@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from numbers import Integral
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 
 from swarm_mj.buffers import Buffers, check_robots, empty_buffers, observe_self
 from swarm_mj.channel import radio_of
@@ -16,6 +16,7 @@ from swarm_mj.placement import connected_positions
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, LocalViews, Policy
 from swarm_mj.protocol import PHASE, Bodies, Phase, transmit, window
 from swarm_mj.radio import Channel
+from swarm_mj.switch_off import draw_is_on, first_window_without
 
 MAX_SEED = 2**63 - 1  # the largest that a replay's properties keep
 
@@ -62,7 +63,7 @@ class Swarm:
             ValueError: Not as many seeds, a negative one, or no connected team could be drawn.
         """
         _check_seeds(seeds, self._num_missions)
-        placement, motion, policy = zip(*(_streams(seed) for seed in seeds), strict=True)
+        placement, motion, policy, outage = zip(*(_streams(seed) for seed in seeds), strict=True)
         mission = self.mission
         position_m = [
             connected_positions(mission.num_robots, mission.half_side_m, mission.range_m, rng)
@@ -72,6 +73,8 @@ class Swarm:
         self._physics.place(np.stack(position_m), np.stack(velocity_mps))
         self._motion = motion_of(mission, motion)
         self._policy_rngs = policy
+        self._stays_on = draw_is_on(mission, outage)
+        self.is_on: Bool[np.ndarray, "B N"] | None = None  # in the last window; None: everyone
         self.now = np.zeros(len(seeds))  # t [windows]
         self.buffers: Buffers = empty_buffers(len(seeds), mission.num_robots)
         observe_self(self.buffers, self.bodies.position_m, self.bodies.velocity_mps, self.now)
@@ -133,6 +136,7 @@ class Swarm:
             ValueError: A recipient is no robot, or there is not one per robot; nothing has moved.
         """
         check_robots("recipient", recipient, self.buffers.shape)
+        self._switch_off()
         self.move()
         phases = window(
             self.buffers,
@@ -141,6 +145,7 @@ class Swarm:
             self.channel,
             self.now,
             silence_is_attempt=self.mission.silence_is_attempt,
+            is_on=self.is_on,
         )
         self.phases = phases
         self.now = self.now + 2 * PHASE
@@ -148,6 +153,7 @@ class Swarm:
 
     def _flood(self, policy: Policy) -> WindowCosts:
         """One window of two transmissions, each decided on what was known before it (IV-C)."""
+        self._switch_off()
         phases: list[Phase] = []
         moves_twice = policy.moves_each_transmission and self.mission.moves_each_transmission
         for half in (1, 2):
@@ -163,13 +169,26 @@ class Swarm:
                 self.channel,
                 self.now,
                 silence_is_attempt=self.mission.silence_is_attempt,
+                is_on=self.is_on,
             )
             phases.append(phase)
             self.phases = tuple(phases)
         return self._costs((phases[0], phases[1]), has_response=False)
 
     def _costs(self, phases: tuple[Phase, Phase], *, has_response: bool) -> WindowCosts:
-        return window_costs(self.buffers, self.bodies, phases, self.now, has_response=has_response)
+        return window_costs(
+            self.buffers,
+            self.bodies,
+            phases,
+            self.now,
+            has_response=has_response,
+            is_on=self.is_on,
+        )
+
+    def _switch_off(self) -> None:
+        """Before a window: switches off, half-way, whoever is to be."""
+        if self.now[0] >= first_window_without(self.mission):
+            self.is_on = self._stays_on
 
 
 def _check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
@@ -181,5 +200,5 @@ def _check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
 
 
 def _streams(seed: int) -> list[np.random.Generator]:
-    """Placement, motion and policy of one mission draw apart, so policies meet equal missions."""
-    return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3)]
+    """Placement, motion, policy and outages draw apart, so policies meet equal missions."""
+    return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)]

@@ -36,6 +36,17 @@ def test_a_courier_brings_what_it_last_knew():
     assert floor.next(near_0, np.array([3.0])) == pytest.approx([(1 + 1 + 2 + 1) / 9])
 
 
+def test_who_is_off_passes_nothing_on_and_does_not_count():
+    """1 is between 0 and 2, and is switched off after the first window."""
+    floor, place_m = ConnectivityFloor(1, 3, 1.0), on_a_line(0.0, 1.0, 2.0)
+    assert floor.next(place_m, np.array([1.0])) == [0.0]
+    is_on = np.array([[True, False, True]])
+    # 0 and 2 know each other from t = 1, and themselves.
+    assert floor.next(place_m, np.array([2.0]), is_on) == pytest.approx([2 * 1 / 4])
+    assert floor.next(place_m, np.array([3.0]), is_on) == pytest.approx([2 * 2 / 4])
+    assert floor.next(place_m, np.array([4.0]), np.ones((1, 3), dtype=bool)) == [0.0]
+
+
 def test_neighbours_are_at_most_the_range_apart():
     assert ConnectivityFloor(1, 2, 1.0).next(on_a_line(0.0, 1.0), np.ones(1)) == [0.0]
     assert ConnectivityFloor(1, 2, 1.0).next(on_a_line(0.0, 1.01), np.ones(1)) == [0.5]
@@ -63,11 +74,24 @@ def test_floor_as_by_components_of_a_graph(seed, num_missions, num_robots):
 @pytest.mark.parametrize("task", ["stationary", "random-walk", "flocking"])
 def test_no_policy_goes_below_the_floor(name, task):
     """Teams so fast and sparse that they fall apart."""
-    mission = paper(task, num_robots=8, num_windows=60, velocity_ratio=2.0, boundary="reflect")
+    _assert_above_the_floor(
+        name, paper(task, num_robots=8, num_windows=60, velocity_ratio=2.0, boundary="reflect")
+    )
+
+
+@pytest.mark.parametrize("name", ["random-flooding", "mst", "tdma"])
+def test_nor_with_robots_that_fail(name):
+    _assert_above_the_floor(
+        name,
+        paper("random-walk", num_robots=8, num_windows=60, velocity_ratio=2.0, switched_off=0.4),
+    )
+
+
+def _assert_above_the_floor(name, mission):
     swarm = Swarm(mission, [1, 2, 3])
     floor = ConnectivityFloor(3, 8, mission.range_m)
     floors = []
     for flown in fly(swarm, make_policy(name, mission)):
-        floors.append(floor.next(swarm.bodies.position_m, swarm.now))
+        floors.append(floor.next(swarm.bodies.position_m, swarm.now, swarm.is_on))
         assert np.all(flown.costs.age_windows >= floors[-1] - 1e-9)
-    assert (np.max(floors) > 0.0) == (task != "stationary")
+    assert (np.max(floors) > 0.0) == (mission.task != "stationary")

@@ -21,6 +21,13 @@ from swarm_mj.protocol import Bodies, Phase, window
 seeds = st.integers(0, 2**32 - 1)
 
 
+def some_on(rng, num_missions, num_robots):
+    """Who is on: at least one in each mission, not as many in each."""
+    is_on = rng.random((num_missions, num_robots)) < 0.6
+    is_on[np.arange(num_missions), rng.integers(0, num_robots, num_missions)] = True
+    return is_on
+
+
 def times(timestamp):
     timestamp = np.array(timestamp, dtype=float)
     return replace(empty_buffers(*timestamp.shape[:2]), timestamp=timestamp)
@@ -99,6 +106,45 @@ def test_eq10_as_numpy_takes_means(seed, num_missions, num_robots):
     age, is_complete = age_of_information(times(timestamp), now)
     assert age == pytest.approx((now[:, None, None] - timestamp).mean(axis=(1, 2)))
     assert (is_complete == (timestamp.min(axis=(1, 2)) > 0)).all()
+
+
+@given(seed=seeds, num_missions=st.integers(1, 4), num_robots=st.integers(1, 9))
+@settings(max_examples=50, deadline=None)
+def test_eq10_eq17_of_those_that_are_on_by_plain_loops(seed, num_missions, num_robots):
+    rng = np.random.default_rng(seed)
+    timestamp = rng.integers(0, 40, (num_missions, num_robots, num_robots)) / 2.0
+    now = rng.integers(20, 30, num_missions).astype(float)
+    velocity = rng.normal(size=(num_missions, num_robots, 2))
+    is_on = some_on(rng, num_missions, num_robots)
+    age, is_complete = age_of_information(times(timestamp), now, is_on)
+    variance = velocity_variance(velocity, is_on)
+    for b in range(num_missions):
+        on = [i for i in range(num_robots) if is_on[b, i]]
+        known = [timestamp[b, i, j] for i in on for j in on]
+        assert age[b] == pytest.approx(sum(now[b] - t for t in known) / len(known))
+        assert is_complete[b] == all(t > 0 for t in known)
+        mean = sum(velocity[b, i] for i in on) / len(on)
+        squares = [np.sum((velocity[b, i] - mean) ** 2) for i in on]
+        assert variance[b] == pytest.approx(sum(squares) / len(on), abs=1e-12)
+
+
+@given(seed=seeds, num_missions=st.integers(1, 4), num_robots=st.integers(1, 9))
+@settings(max_examples=50, deadline=None)
+def test_with_everyone_on_costs_are_the_same_bit_for_bit(seed, num_missions, num_robots):
+    rng = np.random.default_rng(seed)
+    buffers, now = some_trees(rng, num_missions, num_robots), rng.integers(1, 9, num_missions) / 2.0
+    position_m, velocity_mps = rng.normal(size=(2, num_missions, num_robots, 2))
+    bodies = Bodies(position_m=position_m, velocity_mps=velocity_mps)
+    phases = some_phase(rng, num_missions, num_robots), some_phase(rng, num_missions, num_robots)
+    everyone = np.ones((num_missions, num_robots), dtype=bool)
+    some, all_ = (
+        window_costs(buffers, bodies, phases, now, has_response=True, is_on=is_on)
+        for is_on in (everyone, None)
+    )
+    assert some.age_windows.tolist() == all_.age_windows.tolist()
+    assert some.is_complete.tolist() == all_.is_complete.tolist()
+    assert some.velocity_variance_m2ps2.tolist() == all_.velocity_variance_m2ps2.tolist()
+    assert mean_hops(buffers, everyone).tolist() == mean_hops(buffers).tolist()
 
 
 def test_everyone_knows_everyone_first_in_the_third_window():
@@ -193,15 +239,17 @@ def test_hops_are_none_before_anyone_is_known():
 @settings(max_examples=100, deadline=None)
 def test_hops_as_by_walking_up_the_tree(seed, num_missions, num_robots):
     buffers = some_trees(np.random.default_rng(seed), num_missions, num_robots)
-    hops = mean_hops(buffers)
-    for b in range(num_missions):
-        depths = [
-            depth(buffers.parent[b, i], i, j)
-            for i in range(num_robots)
-            for j in range(num_robots)
-            if buffers.timestamp[b, i, j] > 0 and j != i
-        ]
-        assert hops[b] == pytest.approx(sum(depths) / len(depths) if depths else 0.0)
+    everyone = np.ones((num_missions, num_robots), dtype=bool)
+    for is_on in (None, some_on(np.random.default_rng(seed), num_missions, num_robots)):
+        hops, counts = mean_hops(buffers, is_on), everyone if is_on is None else is_on
+        for b in range(num_missions):
+            depths = [
+                depth(buffers.parent[b, i], i, j)  # over anyone
+                for i in range(num_robots)
+                for j in range(num_robots)
+                if buffers.timestamp[b, i, j] > 0 and j != i and counts[b, i] and counts[b, j]
+            ]
+            assert hops[b] == pytest.approx(sum(depths) / len(depths) if depths else 0.0)
 
 
 def test_a_windows_costs_are_each_of_them():

@@ -46,6 +46,7 @@ def test_the_papers_numbers(preset):
     assert mission.sinr_threshold_db == 1.0
     assert mission.noise_dbm == -50.0
     assert mission.frequency_hz == 2.4e9
+    assert mission.switched_off == 0.0
     # "The team of 40 robots operates in a mission area of 1 km²", "250 meters", "V_max = 3 m/s".
     assert mission.side_m == pytest.approx(1000.0)
     assert mission.half_side_m == pytest.approx(500.0)
@@ -122,7 +123,8 @@ def test_every_quantity_names_its_unit_and_source(spec):
     assert spec.metadata["label"]
     assert spec.metadata["unit"]
     assert spec.metadata["source"]
-    assert spec.metadata["low"] < spec.default < spec.metadata["high"]
+    assert spec.metadata["low"] <= spec.default < spec.metadata["high"]
+    assert (spec.metadata["low"] == spec.default) == (spec.name == "switched_off")
 
 
 @pytest.mark.parametrize("spec", QUANTITIES, ids=lambda spec: spec.name)
@@ -176,10 +178,12 @@ def test_every_range_keeps_out_what_no_mission_can_have():
         "sinr_threshold_db",
         "noise_dbm",
         "frequency_hz",
+        "switched_off",
     }
     for spec in QUANTITIES:
         in_decibel = spec.metadata["unit"].startswith("dB")  # these may well be negative
-        assert in_decibel or not spec.metadata["low"] <= 0 <= spec.metadata["high"]
+        may_be_none = spec.name == "switched_off"
+        assert in_decibel or may_be_none or not spec.metadata["low"] <= 0 <= spec.metadata["high"]
 
 
 @pytest.mark.parametrize("spec", CHOICES, ids=lambda spec: spec.name)

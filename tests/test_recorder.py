@@ -41,6 +41,23 @@ def test_ages_are_those_of_the_buffers():
     np.testing.assert_array_equal(log.age_max, others.max(axis=1))
 
 
+def test_statistics_are_of_the_robots_that_are_on():
+    mission = paper("random-walk", num_robots=7, num_windows=9, switched_off=0.3)
+    swarm = Swarm(mission, [3])
+    record = Recorder(swarm)
+    ages = []
+    for window in fly(swarm, make_policy("mst", mission, 0.4)):
+        record.add(window)
+        on = [i for i in range(7) if swarm.is_on is None or swarm.is_on[0, i]]
+        timestamp = swarm.buffers.timestamp[0]
+        ages.append([swarm.now[0] - timestamp[i, j] for i in on for j in on if i != j])
+    log = record.log()
+    assert np.sum(log.is_on, axis=1).tolist() == [7] * 4 + [5] * 5
+    np.testing.assert_array_equal(log.is_on[-1], swarm.is_on[0])
+    np.testing.assert_allclose(log.age_std, [np.std(its) for its in ages])
+    np.testing.assert_allclose(log.age_max, [np.max(its) for its in ages])
+
+
 def test_a_log_is_the_swarm_s_state_field_by_field():
     mission = paper("flocking", num_robots=6, num_windows=8)
     swarm = Swarm(mission, [2])

@@ -97,6 +97,18 @@ def test_cells_that_are_not_what_they_must_be(tmp_path, cells, complaint):
         read_results(tmp_path / "r.csv")
 
 
+def test_files_from_before_robots_could_be_switched_off_are_read(tmp_path):
+    write_csv(tmp_path / "r.csv", [some_result(switched_off=0.0)])
+    header, row = (tmp_path / "r.csv").read_text().splitlines()
+    place = COLUMNS.index("switched_off")
+    old = [",".join(cells[:place] + cells[place + 1 :]) for cells in [header.split(",")]]
+    cells = row.split(",", place + 1)
+    (tmp_path / "old.csv").write_text("\n".join([*old, ",".join(cells[:place] + cells[-1:])]))
+    assert read_results(tmp_path / "old.csv") == [some_result(switched_off=0.0)]
+    write_csv(tmp_path / "r.csv", [some_result(switched_off=0.2)])
+    assert read_results(tmp_path / "r.csv")[0].switched_off == 0.2
+
+
 def test_missing_columns_are_named(tmp_path):
     without = [name for name in COLUMNS if name not in ("aoi_sem", "task")]
     (tmp_path / "r.csv").write_text(",".join(without) + "\n")

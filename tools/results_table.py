@@ -2,8 +2,8 @@
 
     python tools/results_table.py training/results/paper-*.csv
 
-One table per file and cost: policies down, the swept number across, mean ± standard error over
-missions, published values in brackets.
+One table per file, task, preset, fraction switched off and cost: policies down, the swept number
+across, mean ± standard error over missions, published values in brackets.
 """
 
 import argparse
@@ -26,7 +26,7 @@ def table(results: Sequence[Result], cost: str) -> str:
     """One cost of one task and preset.
 
     Args:
-        results: Of one task and preset.
+        results: Of one task and preset, and one fraction of robots switched off.
         cost: `aoi` or `velocity_variance`.
 
     Returns:
@@ -67,6 +67,12 @@ def _plus_minus(result: Result, name: str, digits: int) -> str:
     return f"{value:.{digits}f}" if sem is None else f"{value:.{digits}f} ± {sem:.{digits}f}"
 
 
+def _kind(result: Result) -> tuple[str, ...]:
+    """What makes tables of their own, in words."""
+    fate = f"{result.switched_off:.0%} of the robots off half-way"
+    return (result.task, f"preset {result.preset}", *([fate] if result.switched_off else []))
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Prints the tables; returns the exit code."""
     parser = argparse.ArgumentParser(description="Results as Markdown tables.")
@@ -75,11 +81,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         for path in options.files:
             results = read_results(path)
-            kinds = {(result.task, result.preset) for result in results}
-            for task, preset in sorted(kinds):
-                own = [r for r in results if (r.task, r.preset) == (task, preset)]
-                for cost in COSTS if task == "flocking" else ["aoi"]:
-                    print(f"{task}, preset {preset}\n\n{table(own, cost)}\n")
+            for kind in sorted({_kind(result) for result in results}):
+                own = [result for result in results if _kind(result) == kind]
+                for cost in COSTS if own[0].task == "flocking" else ["aoi"]:
+                    print(f"{', '.join(kind)}\n\n{table(own, cost)}\n")
     except (ValueError, OSError) as error:
         sys.stderr.write(f"results_table: error: {error}\n")
         return BAD_INPUT

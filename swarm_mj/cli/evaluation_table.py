@@ -30,10 +30,11 @@ def print_results(results: Sequence[Result]) -> None:
 
 def _regime(result: Result) -> str:
     """A table's title."""
+    fate = f", {result.switched_off:.0%} of the robots off half-way" if result.switched_off else ""
     return (
         f"{result.task}, preset {result.preset}: {result.num_robots} robots, range ratio "
         f"{result.range_ratio:g}, velocity ratio {result.velocity_ratio:g}, boundary "
-        f"{result.boundary},\n{result.num_windows} windows of {result.physics} physics"
+        f"{result.boundary},\n{result.num_windows} windows of {result.physics} physics{fate}"
     )
 
 

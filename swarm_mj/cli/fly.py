@@ -147,8 +147,8 @@ def _short(policy: str) -> str:
 
 
 def _compile_ahead(options: argparse.Namespace, mission: Mission) -> None:
-    """Flies a window of the smallest such mission, so that compiling is not timed as flying."""
-    smallest = replace(mission, num_robots=2, range_ratio=10.0, num_windows=1)
+    """Flies such a mission in small, with both its halves, so that compiling is not timed."""
+    smallest = replace(mission, num_robots=3, range_ratio=10.0, num_windows=2)
     for _ in fly(Swarm(smallest, [0]), _make_policy(options, smallest)):
         pass
 
@@ -240,8 +240,11 @@ def _numbers(summary: Summary) -> dict[str, Any]:
 
 def _table(options: argparse.Namespace, summary: Summary, wall_s: float) -> Table:
     numbers = _numbers(summary)
+    team = f"{options.robots} robots"
+    if options.switched_off:
+        team += f", {options.switched_off:.0%} of them off half-way"
     table = Table(
-        title=f"{options.task}, {options.policy}, {options.robots} robots, seed {options.seed}",
+        title=f"{options.task}, {options.policy}, {team}, seed {options.seed}",
         title_justify="left",
         show_header=False,
     )

@@ -85,6 +85,12 @@ def add_mission_options(parser: argparse.ArgumentParser) -> None:
         default=DEFAULTS.boundary,
         help=f"{listed(get_args(Boundary))}; the paper's flocks fly out of the area: none",
     )
+    group.add_argument(
+        "--switched-off",
+        type=float,
+        default=DEFAULTS.switched_off,
+        help="fraction of the robots that is switched off half-way, and nobody is told, 0 to 0.9",
+    )
 
 
 def mission_of(options: argparse.Namespace) -> Mission:
@@ -103,6 +109,7 @@ def mission_of(options: argparse.Namespace) -> Mission:
         num_windows=options.windows,
         physics=options.physics,
         boundary=options.boundary,
+        switched_off=options.switched_off,
     )
 
 

@@ -54,7 +54,7 @@ def study_of(options: argparse.Namespace) -> Study:
     if "all" in policies:
         policies = [name for name in [*policies, *POLICIES] if name != "all"]
     baseline = options.baseline
-    axes = ("--preset", "--task", "--robots", "--velocity-ratio", "--range-ratio")
+    axes = ("--preset", "--task", "--robots", "--velocity-ratio", "--range-ratio", "--switched-off")
     regimes = product(*(_several(options, axis) for axis in axes))
     return Study(
         policies=tuple(dict.fromkeys(map(normalised, policies))),
@@ -74,6 +74,7 @@ def _mission(
     num_robots: int,
     velocity_ratio: float,
     range_ratio: float,
+    switched_off: float,
 ) -> Mission:
     if preset not in PRESETS:
         raise ValueError(f"preset must be one of {listed(PRESETS)}, not {preset!r}")
@@ -83,6 +84,7 @@ def _mission(
         num_robots=num_robots,
         velocity_ratio=velocity_ratio,
         range_ratio=range_ratio,
+        switched_off=switched_off,
         num_windows=options.windows,
         physics=options.physics,
         **boundary,
@@ -107,6 +109,7 @@ def _add_regimes(parser: argparse.ArgumentParser) -> None:
         group, "--velocity-ratio", float, [DEFAULTS.velocity_ratio], "as for fly, 0.001 to 5"
     )
     _add_several(group, "--range-ratio", float, [DEFAULTS.range_ratio], "as for fly, 0.01 to 10")
+    _add_several(group, "--switched-off", float, [DEFAULTS.switched_off], "as for fly, 0 to 0.9")
     group.add_argument(
         "--windows", type=int, default=DEFAULTS.num_windows, help="length, 1 to 100000"
     )

@@ -135,7 +135,8 @@ class SwarmTask(_Task):
 
     def get_reward(self, physics: SwarmPhysics) -> float:
         """Minus the age of information after the window (cost of Eq. 10) [windows]."""
-        age, _ = age_of_information(physics.swarm.buffers, physics.swarm.now)
+        swarm = physics.swarm
+        age, _ = age_of_information(swarm.buffers, swarm.now, swarm.is_on)
         return -float(age[0])
 
     def get_termination(self, physics: SwarmPhysics) -> float | None:

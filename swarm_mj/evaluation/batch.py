@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import no_type_check
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numba import njit
 
 from swarm_mj.connectivity import ConnectivityFloor
@@ -95,14 +95,14 @@ class Tally:
         self._aoi += costs.age_windows
         if swarm.now[0] > swarm.mission.num_windows - self._num_steady:
             self._steady += costs.age_windows
-        self._floor_age += self._floor.next(swarm.bodies.position_m, swarm.now)
+        self._floor_age += self._floor.next(swarm.bodies.position_m, swarm.now, swarm.is_on)
         self._variance += costs.velocity_variance_m2ps2
         self._hops += flown.hops
         self._attempted += costs.packets.attempted
         self._delivered += costs.packets.delivered
         complete = np.where(costs.is_complete, swarm.now, np.inf)
         np.minimum(self._complete, complete, out=self._complete)
-        count_ages(swarm.buffers.timestamp, swarm.now, self._ages)
+        count_ages(swarm.buffers.timestamp, swarm.now, self._ages, swarm.is_on)
 
     def costs(self) -> BatchCosts:
         """What the missions cost, all windows of them flown."""
@@ -124,6 +124,7 @@ def count_ages(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
     counts: Int[np.ndarray, "bins"],
+    is_on: Bool[np.ndarray, "B N"] | None = None,
 ) -> None:
     """Counts how old what each robot knows of each other robot is.
 
@@ -131,8 +132,9 @@ def count_ages(
         timestamp: T [windows].
         now: t [windows].
         counts: By age in half windows; added to in place.
+        is_on: Whose pairs count; None is everyone's.
     """
-    _count_ages(timestamp, now, PHASE, counts)
+    _count_ages(timestamp, now, PHASE, is_on, counts)
 
 
 @njit(cache=True)
@@ -141,11 +143,15 @@ def _count_ages(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
     phase: float,
+    is_on: Bool[np.ndarray, "B N"] | None,
     counts: Int[np.ndarray, "bins"],
 ) -> None:
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
+            if is_on is not None and not is_on[b, i]:
+                continue
             for j in range(num_robots):
-                counts[int((now[b] - timestamp[b, i, j]) / phase)] += 1
+                if is_on is None or is_on[b, j]:
+                    counts[int((now[b] - timestamp[b, i, j]) / phase)] += 1
             counts[int((now[b] - timestamp[b, i, i]) / phase)] -= 1

@@ -86,7 +86,7 @@ def merge(batches: Sequence[BatchCosts]) -> BatchCosts:
 def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
     names = (
         *("task", "preset", "num_robots", "range_ratio", "velocity_ratio"),
-        *("boundary", "physics", "num_windows"),
+        *("boundary", "physics", "num_windows", "switched_off"),
     )
     parameters = study.parameters[regime, policy]
     return {name: getattr(regime, name) for name in names} | {

@@ -18,8 +18,10 @@ from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Loc
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.round_robin import RoundRobin
 from swarm_mj.policies.spatial_tdma import SpatialTdma
+from swarm_mj.policies.stored_scorer import is_scorer, load_scorer, shipped_scorer
 from swarm_mj.policies.tdma import Tdma
 from swarm_mj.policies.tuning import tuned_probability
+from swarm_mj.policies.worth import RuleOfThumb, Scorer
 from swarm_mj.radio import from_db
 
 __all__ = [
@@ -81,12 +83,12 @@ def _spatial_tdma(mission: Mission, probability: float | None) -> Policy:
 
 def _planner(mission: Mission, probability: float | None) -> Policy:
     _refuse(probability, "planner")
-    return Planner(radio_of(mission), mission.window_s)
+    return plan_with(RuleOfThumb(), mission)
 
 
-def _planner_lone(mission: Mission, probability: float | None) -> Policy:
-    _refuse(probability, "planner-lone")
-    return Planner(radio_of(mission), mission.window_s, shares_pictures=False)
+def _gnn(mission: Mission, probability: float | None) -> Policy:
+    _refuse(probability, "gnn")
+    return plan_with(shipped_scorer(), mission)
 
 
 def _oracle(mission: Mission, probability: float | None) -> Policy:
@@ -107,11 +109,22 @@ POLICIES: dict[str, Callable[[Mission, float | None], Policy]] = {
     "gossip": _gossip,
     "tdma": _tdma,
     "spatial-tdma": _spatial_tdma,
-    "planner-lone": _planner_lone,
     "planner": _planner,
+    "gnn": _gnn,
     "oracle": _oracle,
     "oracle-lookahead": _oracle_lookahead,
 }
+
+
+def plan_with(scorer: Scorer, mission: Mission) -> Planner:
+    """The planner of a mission, with a scorer that says what news is worth."""
+    return Planner(
+        radio_of(mission),
+        scorer,
+        window_s=mission.window_s,
+        range_m=mission.range_m,
+        side_m=mission.side_m,
+    )
 
 
 def is_learned(name: str) -> bool:
@@ -157,6 +170,8 @@ def make_policy(
         from swarm_mj.policies.stored import load_policy  # torch takes its time to import
 
         _refuse(probability, name)
+        if is_scorer(Path(name)):
+            return plan_with(load_scorer(Path(name)), mission)
         return load_policy(Path(name), mission, is_deterministic=is_deterministic)
     if name not in POLICIES:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""Pictures of the team, and the plans that follow from them: what the planner's robots agree on.
+"""Pictures of the team: what the planner's robots agree on.
 
 Index order: row `i` of every array is robot i's picture, column `k` what it says about robot k.
 """
@@ -8,10 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.policies.schedule import greedy_schedule, links_between
-from swarm_mj.radio import FreeSpaceRadio
-
-SHORTEST_EPOCH = 10  # windows; longer for teams above twice that
 FORESIGHT = 15.0  # windows that a robot is expected to keep its velocity for
 SPREAD = 0.45  # of the distance that robots apart in velocity cover: how far beliefs are off
 
@@ -23,24 +19,12 @@ class Pictures:
     A picture is never changed; packets carry it whole, so i's name stands for it.
     """
 
-    is_known: Bool[np.ndarray, "N N"]  # whether k is in i's picture
+    is_known: Bool[np.ndarray, "N N"]  # whether i had ever heard of k
+    is_fresh: Bool[np.ndarray, "N N"]  # whether that was not too long ago
     position_m: Float[np.ndarray, "N N 2"]  # where k will be amid the epoch it is made for [m]
     spread_m: Float[np.ndarray, "N N"]  # standard deviation of that, per axis [m]
+    timestamp: Float[np.ndarray, "N N"]  # when k observed what is believed of it [windows]
     rank: Int[np.ndarray, "N"]  # the best picture has rank 0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Plan:
-    """What follows from a picture."""
-
-    recipient: Int[np.ndarray, "E N"]  # whom each robot addresses in each window of the epoch
-    timestamp: Float[np.ndarray, "N N"]  # T after the epoch, as expected [windows]
-    is_complete: bool  # whether the picture had all robots
-
-
-def epoch_windows(num_robots: int) -> int:
-    """Length of an epoch: long enough for a picture to reach all of a team [windows]."""
-    return max(SHORTEST_EPOCH, num_robots // 2)
 
 
 def freeze(
@@ -51,6 +35,7 @@ def freeze(
     now: float,
     window_s: float,
     windows_ahead: float,
+    fresh_windows: float,
 ) -> Pictures:
     """Every robot's picture, row i from buffer i alone.
 
@@ -62,9 +47,11 @@ def freeze(
         now: t [windows].
         window_s: Duration of a window [s].
         windows_ahead: How far ahead the middle of the epoch is that they are made for [windows].
+        fresh_windows: Age up to which a robot counts as fresh [windows].
 
     Returns:
-        The pictures.
+        The pictures; the best has most robots fresh, then the least mean age of these, then the
+        lowest identity.
     """
     num_known = np.sum(is_known, axis=1)
     age = np.where(is_known, now - timestamp, 0.0)
@@ -72,35 +59,13 @@ def freeze(
     mean_mps = np.sum(velocity_mps * is_known[..., None], axis=1) / num_known[:, None]
     apart_mps = (velocity_mps - mean_mps[:, None]) * is_known[..., None]
     variance = np.sum(apart_mps**2, axis=(1, 2)) / num_known
+    is_fresh = is_known & (age <= fresh_windows)
+    num_fresh = np.sum(is_fresh, axis=1)  # one at least, itself
     return Pictures(
         is_known=is_known.copy(),
+        is_fresh=is_fresh,
         position_m=position_m + velocity_mps * np.minimum(ahead, FORESIGHT)[..., None] * window_s,
         spread_m=SPREAD * np.sqrt(variance)[:, None] * window_s * ahead,
-        rank=np.argsort(np.lexsort((np.sum(age, axis=1) / num_known, -num_known))),
+        timestamp=timestamp.copy(),
+        rank=np.argsort(np.lexsort((np.sum(age * is_fresh, axis=1) / num_fresh, -num_fresh))),
     )
-
-
-def make_plan(
-    radio: FreeSpaceRadio,
-    pictures: Pictures,
-    whose: int,
-    timestamp: Float[np.ndarray, "N N"],
-    now: float,
-) -> Plan:
-    """What the epoch that begins now should be, by one picture; it depends on nothing else.
-
-    Args:
-        radio: The mission's channel.
-        pictures: The pictures made for this epoch.
-        whose: The robot whose picture counts.
-        timestamp: T as the epoch begins, as far as is known with that picture [windows].
-        now: t as the epoch begins [windows].
-
-    Returns:
-        The plan.
-    """
-    is_known = pictures.is_known[whose]
-    links = links_between(radio, pictures.position_m[whose], pictures.spread_m[whose], is_known)
-    num_windows = epoch_windows(len(timestamp))
-    recipient, after = greedy_schedule(timestamp, now, links, num_windows, is_squared=True)
-    return Plan(recipient=recipient, timestamp=after, is_complete=bool(np.all(is_known)))

@@ -1,225 +1,246 @@
 """The common-knowledge planner: every robot computes the whole team's schedule, and flies its part.
 
-Identities, the team's size, a speaking order and the clock are common before the mission, so robots
-that hold the same picture of the team agree on a schedule without a word. Time is cut into epochs:
+Identities, the team's size, its area, speaking orders and the clock are common before the mission,
+so robots that hold the same picture of the team agree on a schedule without a word. Every half
+window any robot may speak; nobody answers. Time is cut into epochs:
 
-1. In the first epochs, the discovery, one robot after the other speaks, as in TDMA, to whichever
-   neighbour it has not heard directly for longest, which answers.
-2. As an epoch begins, every robot freezes a picture of the team from its own buffer. Its packets
-   carry the best picture for the next epoch and the one it flies by; whoever decodes a better one
-   takes it over and passes it on. The best knows most robots, then has the least age, then comes
-   from the lower identity; so a connected team soon holds one picture, whoever is in it.
-3. In the next epoch every robot runs the same greedy scheduler (`greedy.py`) on the best picture it
-   holds and addresses whom the schedule says. Timestamps at the beginning are those that the last
+1. In the first, the discovery, robots speak in turns (`discovery.py`).
+2. As each further epoch begins, every robot freezes a picture of the team from its own buffer. Its
+   packets carry the best picture for the next epoch and the one it flies by; whoever decodes a
+   better one takes it over and passes it on. The best has most robots heard of lately, then the
+   least age, then the lower identity; so a connected team soon holds one picture, whoever is in it.
+3. In the next epoch every robot runs the same scheduler (`broadcasts.py`) on the best picture it
+   holds, and speaks when the schedule says so. Timestamps at the beginning are those that the last
    schedule leaves; nobody needs to report what it decoded.
 
 What fails, fails softly. Believed positions spread with their age and with how differently the
-robots move, so packets over doubtful links are expected to come through with a probability, and
-teammates out of reach are called now and then. A robot that missed the best picture flies by the
-best it has, may collide, still answers and still listens. While a picture lacks robots, every
-`DISCOVERY_EVERY`-th window goes on with the discovery, so that nobody stays unheard of.
+robots move, so packets over doubtful links are expected to come through with a probability. A
+robot that missed the best picture flies by the best it has, may collide, and still listens. While
+a picture lacks robots, some windows are left to the discovery, and while robots have not been
+heard of for long, some are left to seeking them.
 """
 
-from abc import ABC, abstractmethod
-from collections.abc import Hashable, Sequence
+import math
+from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Int
 
 from swarm_mj.buffers import NEVER, Buffers
-from swarm_mj.policies.pictures import Pictures, Plan, epoch_windows, freeze, make_plan
-from swarm_mj.policies.policy import DecentralisedPolicy, LocalViews
+from swarm_mj.policies.discovery import Discovery
+from swarm_mj.policies.greedy import HALVES
+from swarm_mj.policies.pictures import Pictures, freeze
+from swarm_mj.policies.plan import Plan
+from swarm_mj.policies.policy import DecentralisedPolicy, LocalViews, Parameters
+from swarm_mj.policies.worth import Scorer
+from swarm_mj.protocol import PHASE
 from swarm_mj.radio import FreeSpaceRadio
 
-# These numbers, and those of `pictures`, were the best of a few tried on 20 missions (seeds from
-# 1000) of 40 robots, stationary and walking.
-DISCOVERY_EPOCHS = 3  # before the first schedule: one and a half rounds for teams above 20
-DISCOVERY_EVERY = 4  # windows, while a picture lacks robots
-FORGET_EVERY = 5  # epochs: how often robots that share no pictures begin anew
+# These numbers, and those of `pictures` and `discovery`, were the best of a few tried on 20
+# missions (seeds from 1000), mostly of 40 robots, stationary and walking.
+FIRST_EPOCH = 1.0  # rounds of N windows: the discovery, before the first pictures
+EARLY_EPOCH = 0.25  # rounds: the two epochs after it
+EPOCH = 0.5  # rounds: all others; a picture must reach all of a team
+SHORTEST_EPOCH = 10  # windows
+FRESH = 1.0  # rounds without news, after which a robot is sought
 
 
 class Planner(DecentralisedPolicy):
     """Every robot plans for the whole team from a picture that its teammates hold too.
 
-    Uses its own buffer, its identity, the team's size, the clock, the radio's numbers and a common
-    speaking order. Packets carry, beyond T, M and P, the sender's two pictures: who made each and
-    from how old knowledge, N flags of who is known, N believed positions, N spreads and N²
-    timestamps. Without them (`shares_pictures=False`) every robot plans by its own picture alone,
-    which agrees with its teammates' only where nobody moves.
+    Uses its own buffer, its identity, the team's size and area, the clock, the radio's numbers and
+    common speaking orders. Packets carry, beyond T, M and P, the sender's two pictures: who made
+    each, N ages, N believed positions, N spreads and N² timestamps.
     """
 
+    transmits_twice: ClassVar[bool] = True
+
     def __init__(
-        self, radio: FreeSpaceRadio, window_s: float, *, shares_pictures: bool = True
+        self,
+        radio: FreeSpaceRadio,
+        scorer: Scorer,
+        *,
+        window_s: float,
+        range_m: float,
+        side_m: float,
     ) -> None:
         """Prepares the policy.
 
         Args:
             radio: The mission's channel.
+            scorer: What news is worth to the schedules.
             window_s: Duration of a window [s].
-            shares_pictures: Whether packets carry pictures.
+            range_m: Distance up to which a lone packet decodes [m].
+            side_m: Side of the area that the robots start in [m].
         """
         self._radio = radio
         self._window_s = window_s
-        self._shares_pictures = shares_pictures
+        self._range_m = range_m
+        self._num_reaches = side_m**2 / (math.pi * range_m**2)
+        self._scorer = scorer
+
+    @property
+    def parameters(self) -> Parameters:
+        """The scorer's."""
+        return self._scorer.parameters
 
     @property
     def carries_payload(self) -> bool:
-        """Whether packets carry pictures."""
-        return self._shares_pictures
+        """Packets carry pictures."""
+        return True
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Draws each mission's speaking order and forgets; arguments as in `Policy.start`."""
-        kind = _SharingTeam if self._shares_pictures else _LoneTeam
+        """Draws each mission's speaking orders and forgets; arguments as in `Policy.start`."""
         self._teams = [
-            kind(self._radio, self._window_s, rng.permutation(num_robots)) for rng in rngs
+            _Team(
+                self._radio,
+                self._window_s,
+                self._scorer,
+                Discovery(num_robots, self._num_reaches, self._range_m, rng),
+            )
+            for rng in rngs
         ]
 
     def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """The robots' parts of the schedules they hold, or of the discovery."""
-        return np.stack([team.recipients(views, b) for b, team in enumerate(self._teams)])
+        """The next identity, for whoever speaks; who is addressed changes nothing."""
+        speaks = np.stack([team.speaks(views, b) for b, team in enumerate(self._teams)])
+        return np.where(speaks, (views.silence + 1) % views.num_robots, views.silence)
 
 
-class _Team(ABC):
+class _Team:
     """The robots of one mission, side by side: row i of every array is robot i's memory."""
 
-    def __init__(self, radio: FreeSpaceRadio, window_s: float, order: Int[np.ndarray, "N"]) -> None:
-        num_robots = len(order)
+    def __init__(
+        self, radio: FreeSpaceRadio, window_s: float, scorer: Scorer, discovery: Discovery
+    ) -> None:
         self._radio = radio
         self._window_s = window_s
-        self._order = order
-        self._epoch_windows = epoch_windows(num_robots)
+        self._scorer = scorer
+        self._discovery = discovery
+        self._everyone = np.arange(discovery.num_robots)
+        self._starts = epoch_starts(discovery.num_robots)
         self._epoch = -1
-        self._everyone = np.arange(num_robots)
-        self._directly = np.full((num_robots, num_robots), NEVER)  # when i last decoded k [windows]
-        self._plans: dict[Hashable, Plan] = {}  # of this epoch; robots that hold one share it
-
-    def recipients(self, views: LocalViews, b: int) -> Int[np.ndarray, "N"]:
-        """Whom the robots of mission b address."""
-        now = float(views.now[b])
-        for phase in views.phases:
-            self._listen(phase.heard[b], now)
-        epoch, window = divmod(int(now), self._epoch_windows)
-        if epoch != self._epoch:
-            self._epoch = epoch
-            self._begin_epoch(views.buffers, b, now)
-        if not self._plans:
-            return self._discover(int(now))
-        return self._fly_plans(int(now), window)
-
-    def _listen(self, heard: Int[np.ndarray, "N"], now: float) -> None:
-        """Notes who was decoded."""
-        decoded = heard != self._everyone
-        self._directly[self._everyone[decoded], heard[decoded]] = now
-
-    @abstractmethod
-    def _begin_epoch(self, buffers: Buffers, b: int, now: float) -> None:
-        """Freezes pictures, and leaves in `_plans` what follows from those in use."""
-
-    @abstractmethod
-    def _holders(self) -> dict[Hashable, Bool[np.ndarray, "N"]]:
-        """Which robots fly by which plan."""
-
-    def _freeze(self, buffers: Buffers, b: int, now: float, epochs_ahead: float) -> Pictures:
-        return freeze(
-            buffers.position_m[b],
-            buffers.velocity_mps[b],
-            buffers.timestamp[b],
-            buffers.is_known[b],
-            now,
-            self._window_s,
-            epochs_ahead * self._epoch_windows,
-        )
-
-    def _fly_plans(self, now: int, window: int) -> Int[np.ndarray, "N"]:
-        """Each robot's part of the plan it holds, or of the discovery that goes on."""
-        recipient = self._everyone.copy()
-        for key, holds in self._holders().items():
-            scheduled = self._plans[key].recipient[window]
-            if not self._plans[key].is_complete and now % DISCOVERY_EVERY == 0:
-                scheduled = self._discover(now // DISCOVERY_EVERY)
-            recipient[holds] = scheduled[holds]
-        return recipient
-
-    def _discover(self, turn: int) -> Int[np.ndarray, "N"]:
-        """The robot whose turn it is addresses the neighbour it has longest not heard directly."""
-        num_robots = len(self._order)
-        speaker = self._order[turn % num_robots]
-        recipient = self._everyone.copy()
-        directly = self._directly[speaker]
-        stalest = int(np.argmin(np.where(directly > NEVER, directly, np.inf)))
-        anyone = self._order[(turn + 1) % num_robots]
-        recipient[speaker] = stalest if directly[stalest] > NEVER else anyone
-        return recipient
-
-
-class _SharingTeam(_Team):
-    """Packets carry the picture the sender flies by, and the best it has for the next epoch."""
-
-    def __init__(self, radio: FreeSpaceRadio, window_s: float, order: Int[np.ndarray, "N"]) -> None:
-        super().__init__(radio, window_s, order)
+        self._plans: dict[int, Plan] = {}  # of this epoch, by whose picture it follows from
         self._current: Pictures | None = None  # made for this epoch
         self._upcoming: Pictures | None = None  # made for the next one
         self._holds = self._everyone  # whose current picture i flies by
         self._will_hold = self._everyone  # whose upcoming picture is the best that i has
         self._continues = self._everyone  # whose plan i flew by when it froze its upcoming one
 
-    def _listen(self, heard: Int[np.ndarray, "N"], now: float) -> None:
-        """Notes who was decoded, and takes over its pictures where they are better."""
-        super()._listen(heard, now)
+    def speaks(self, views: LocalViews, b: int) -> Bool[np.ndarray, "N"]:
+        """Which robots of mission b speak in this half window."""
+        now = float(views.now[b])
+        half_window = round(now / PHASE)
+        heard = views.phases[-1].heard[b] if views.phases else self._everyone
+        before = self._holds
+        self._take_over(heard)
+        if half_window % HALVES == 0 and now >= self._start(self._epoch + 1):
+            self._epoch += 1
+            self._begin_epoch(views.buffers, b, now)
+        if self._current is None:
+            return self._discovery.speaks(half_window, views.buffers, b)
+        speaks = np.zeros(len(self._everyone), dtype=bool)
+        for whose in np.unique(self._holds).tolist():
+            holds = self._holds == whose
+            speaks[holds] = self._by_plan(whose, half_window, heard, before, views.buffers, b)[
+                holds
+            ]
+        return speaks
+
+    def _by_plan(
+        self,
+        whose: int,
+        half_window: int,
+        heard: Int[np.ndarray, "N"],
+        before: Int[np.ndarray, "N"],
+        buffers: Buffers,
+        b: int,
+    ) -> Bool[np.ndarray, "N"]:
+        """Who speaks by the plan from this picture; what it says of others is not used."""
+        plan = self._plan(whose)
+        if self._discovery.is_discovered(half_window, plan.is_complete):
+            return self._discovery.speaks(half_window, buffers, b)
+        if self._discovery.is_sought(half_window, plan.is_fresh):
+            was_fresh = self._current.is_fresh[before] if self._current else plan.is_fresh
+            return self._discovery.seeks(half_window, plan.is_fresh, was_fresh, heard, buffers, b)
+        return plan.speaks(half_window - HALVES * self._start(self._epoch))
+
+    def _take_over(self, heard: Int[np.ndarray, "N"]) -> None:
+        """Whoever decoded someone takes over its pictures where they are better."""
         if self._current is not None:
             self._holds = _better(self._current, self._holds, self._holds[heard])
         if self._upcoming is not None:
             self._will_hold = _better(self._upcoming, self._will_hold, self._will_hold[heard])
 
     def _begin_epoch(self, buffers: Buffers, b: int, now: float) -> None:
-        ended = self._plans
-        self._current, self._holds = self._upcoming, self._will_hold
+        """Flies by the pictures made for this epoch, and freezes those for the next."""
+        self._ended, self._ended_continues = self._plans, self._continues
         self._plans = {}
-        if self._current is not None:
-            unknown = np.full(self._directly.shape, NEVER)
-            for whose in np.unique(self._holds).tolist():
-                before = ended.get(int(self._continues[whose]))
-                timestamp = before.timestamp if before else unknown
-                self._plans[whose] = make_plan(self._radio, self._current, whose, timestamp, now)
-        if self._epoch >= DISCOVERY_EPOCHS - 1:
-            self._upcoming = self._freeze(buffers, b, now, epochs_ahead=1.5)
+        self._current, self._holds = self._upcoming, self._will_hold
+        if self._epoch > 0:
+            length, next_length = (self._length(self._epoch + ahead) for ahead in (0, 1))
+            self._upcoming = freeze(
+                buffers.position_m[b],
+                buffers.velocity_mps[b],
+                buffers.timestamp[b],
+                buffers.is_known[b],
+                now,
+                self._window_s,
+                length + next_length / 2.0,
+                max(FRESH * len(self._everyone), 2.0 * SHORTEST_EPOCH),
+            )
             self._will_hold, self._continues = self._everyone, self._holds
 
-    def _holders(self) -> dict[Hashable, Bool[np.ndarray, "N"]]:
-        return {whose: self._holds == whose for whose in np.unique(self._holds).tolist()}
+    def _plan(self, whose: int) -> Plan:
+        """The plan that follows from someone's picture."""
+        if whose not in self._plans and self._current is not None:
+            before = self._ended.get(int(self._ended_continues[whose]))
+            start = self._start(self._epoch)
+            half_windows = HALVES * start + np.arange(HALVES * self._length(self._epoch))
+            is_complete = bool(np.all(self._current.is_known[whose]))
+            is_fresh = self._current.is_fresh[whose]
+            self._plans[whose] = Plan(
+                self._radio,
+                self._scorer,
+                self._current,
+                whose,
+                before.outcome() if before else np.full(is_fresh.shape * 2, NEVER),
+                float(start),
+                np.array([self._is_free(int(h), is_complete, is_fresh) for h in half_windows]),
+            )
+        return self._plans[whose]
+
+    def _is_free(
+        self, half_window: int, is_complete: bool, is_fresh: Bool[np.ndarray, "N"]
+    ) -> bool:
+        """Whether a half window is left to the plan."""
+        return not (
+            self._discovery.is_discovered(half_window, is_complete)
+            or self._discovery.is_sought(half_window, is_fresh)
+        )
+
+    def _start(self, epoch: int) -> int:
+        """When an epoch begins [windows]."""
+        regular = epoch - (len(self._starts) - 1)
+        if regular <= 0:
+            return self._starts[epoch]
+        return self._starts[-1] + regular * regular_length(len(self._everyone))
+
+    def _length(self, epoch: int) -> int:
+        return self._start(epoch + 1) - self._start(epoch)
 
 
-class _LoneTeam(_Team):
-    """Packets carry T, M and P alone: everyone plans by its own picture.
+def epoch_starts(num_robots: int) -> tuple[int, ...]:
+    """When the first epochs begin; the last of these is the first of regular length [windows]."""
+    early = max(2, round(EARLY_EPOCH * num_robots))
+    first = max(2, round(FIRST_EPOCH * num_robots))
+    return (0, first, first + early, first + 2 * early)
 
-    Robots whose pictures became equal at different times must come to equal plans too, so everyone
-    forgets what the last plan led to, every `FORGET_EVERY` epochs and when its picture changes.
-    Robots share a computed plan if their pictures are equal and have been since the same epoch.
-    """
 
-    def __init__(self, radio: FreeSpaceRadio, window_s: float, order: Int[np.ndarray, "N"]) -> None:
-        super().__init__(radio, window_s, order)
-        self._keys: dict[int, tuple[Hashable, int]] = {}  # i's picture, and its first epoch
-
-    def _begin_epoch(self, buffers: Buffers, b: int, now: float) -> None:
-        is_forgotten = self._epoch % FORGET_EVERY == 0
-        ended, before = ({}, {}) if is_forgotten else (self._plans, self._keys)
-        self._plans, self._keys = {}, {}
-        if self._epoch >= DISCOVERY_EPOCHS:
-            pictures = self._freeze(buffers, b, now, epochs_ahead=0.5)
-            unknown = np.full(self._directly.shape, NEVER)
-            for i in self._everyone.tolist():
-                content = _content(pictures, i)
-                content_before, first_epoch = before.get(i, (None, self._epoch))
-                key = (content, first_epoch if content == content_before else self._epoch)
-                self._keys[i] = key
-                if key not in self._plans:
-                    timestamp = ended[key].timestamp if key in ended else unknown
-                    self._plans[key] = make_plan(self._radio, pictures, i, timestamp, now)
-
-    def _holders(self) -> dict[Hashable, Bool[np.ndarray, "N"]]:
-        keys = self._keys.values()
-        return {key: np.array([held == key for held in keys]) for key in self._plans}
+def regular_length(num_robots: int) -> int:
+    """How long an epoch is, but for the first ones [windows]."""
+    return max(SHORTEST_EPOCH, round(EPOCH * num_robots))
 
 
 def _better(
@@ -227,9 +248,3 @@ def _better(
 ) -> Int[np.ndarray, "N"]:
     """Whichever of two pictures has the better rank, robot by robot."""
     return np.where(pictures.rank[theirs] < pictures.rank[mine], theirs, mine)
-
-
-def _content(pictures: Pictures, i: int) -> Hashable:
-    """All that a plan by picture i depends on."""
-    parts = (pictures.is_known[i], pictures.position_m[i], pictures.spread_m[i])
-    return tuple(part.tobytes() for part in parts)

@@ -35,13 +35,14 @@ def draw_area(sheet: Sheet, mission: Mission) -> None:
 
 
 def draw_robots(sheet: Sheet, full_scale: float) -> None:
-    """Robots in the colour of the age of what the observer knows, headings and trails."""
+    """Robots in the colour of the age of what the observer knows, or off; headings and trails."""
     log = sheet.log
     num_windows, num_robots = log.parent.shape
     per_window = [num_robots] * num_windows
     where = log.position_m.reshape(-1, 2)
     colours = palette.age_colours(log.observer_age, full_scale, log.is_known)
     colours[:, log.observer] = palette.OBSERVER
+    colours[~log.is_on] = palette.SWITCHED_OFF
     names = [f"r{i}" for i in range(num_robots)]
     sheet.fixed(
         "arena/robots",

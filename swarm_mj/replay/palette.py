@@ -20,6 +20,7 @@ BELIEF: Colour = (104, 118, 144)
 TREE: Colour = (92, 104, 126)
 OBSERVER: Colour = (255, 255, 255)
 UNKNOWN: Colour = (84, 86, 94)
+SWITCHED_OFF: Colour = (46, 48, 54)
 HEADING: Colour = (205, 210, 220)
 
 DELIVERED: Colour = (0, 205, 145)

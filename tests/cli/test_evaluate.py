@@ -4,6 +4,7 @@ import json
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -139,6 +140,31 @@ def test_resuming_what_never_began_begins_it(swarm_mj, tmp_path, whole):
     same_files(tmp_path, whole)
 
 
+FAIL = ("--switched-off", "0", "0.4", "--policy", "mst", "--episodes", "3")
+
+
+def test_robots_that_fail_are_another_regime_in_results_and_progress(swarm_mj, tmp_path):
+    evaluate_and_end(tmp_path, signal.SIGKILL, 1, *SMALL, *FAIL, *BOTH)
+    other = swarm_mj("evaluate", *SMALL, *FAIL, *BOTH, "--resume", "--switched-off", 0.2)
+    alike = ("--switched-off", "0", "0.2", *FAIL[3:])
+    another = swarm_mj("evaluate", *SMALL, *alike, *BOTH, "--resume")
+    assert other.returncode == another.returncode == 2
+    assert "its switched_off is 0.4, not 0.2; repeat that one" in another.stderr
+    done = swarm_mj("evaluate", *SMALL, *FAIL, *BOTH, "--resume")
+    assert done.returncode == 0, done.stderr
+    assert "12 windows of exact physics, 40% of the robots off half-way" in done.stdout
+    results = read_results(tmp_path / "r.csv")
+    assert [result.switched_off for result in results] == [0.0, 0.4]
+    assert [json.loads(result.config)["switched_off"] for result in results] == [0.0, 0.4]
+    rows = json.loads((tmp_path / "r.json").read_text())["results"]
+    for fraction, row in zip((0.0, 0.4), rows, strict=True):
+        mission = paper("flocking", num_robots=5, num_windows=12, range_ratio=0.5)
+        mission = replace(mission, switched_off=fraction)
+        flight = fly(Swarm(mission, [1000, 1001, 1002]), make_policy("mst", mission))
+        np.testing.assert_allclose(row["episode_aoi"], summarise(list(flight)).aoi_mean)
+    assert rows[0]["aoi_mean"] != rows[1]["aoi_mean"]
+
+
 @pytest.mark.parametrize("output", ["json", "csv"])
 def test_existing_results_need_force(swarm_mj, tmp_path, output):
     arguments = ("evaluate", *SMALL, "--episodes", 2, f"--{output}", "out/r")
@@ -167,6 +193,10 @@ def test_one_mission_of_one_window_has_results(swarm_mj, tmp_path):
         (["--episodes", "0"], "episodes must be from 1 to 100000, not 0"),
         (["--jobs", "0"], "jobs must be from 1 to 256, not 0"),
         (["--robots", "10", "1"], "a whole number from 2 to 1000 [robots], not 1"),
+        (
+            ["--switched-off", "0.95"],
+            "switched off must be a number from 0 to 0.9 [of the team], not 0.95",
+        ),
         (["--preset", "mine"], "preset must be one of paper, reference, not 'mine'"),
         (["--policy", "magic"], "policy must be one of"),
         (["--baseline", "magic"], "baseline must be one of the policies evaluated"),

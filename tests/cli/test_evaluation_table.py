@@ -72,6 +72,16 @@ def test_the_freshest_comes_first_in_each_regime(printed):
     assert sum("preset paper: 1 robots" in line for line in lines) == 2
 
 
+def test_regimes_in_which_robots_fail_are_apart_and_say_so(printed):
+    results = [some_result("a", 3.0, switched_off=0.0), some_result("a", 4.0, switched_off=0.2)]
+    lines = printed(results, 100)
+    assert sum("preset paper: 1 robots" in line for line in lines) == 2
+    assert [line for line in lines if "windows of" in line] == [
+        "1 windows of paper physics",
+        "1 windows of paper physics, 20% of the robots off half-way",
+    ]
+
+
 def test_what_does_not_exist_is_a_dash(printed):
     lines = printed([some_result("mst", 2.0, **NOTHING)], 100)
     first = next(index for index, line in enumerate(lines) if line.startswith("mst"))

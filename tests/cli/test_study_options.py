@@ -31,6 +31,13 @@ def test_sweeps_multiply_and_values_follow_one_flag_or_several():
     )
 
 
+def test_how_many_fail_is_swept_too():
+    assert study("--robots", 10, "--switched-off", 0, 0.2).regimes == (
+        paper("flocking", num_robots=10),
+        paper("flocking", num_robots=10, switched_off=0.2),
+    )
+
+
 def test_all_is_every_policy_after_those_named():
     assert study("--policy", "all").policies == tuple(POLICIES)
     assert study("--policy", "mst", "--policy", "all").policies[0] == "mst"

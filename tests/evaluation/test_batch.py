@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from swarm_mj.connectivity import ConnectivityFloor
 from swarm_mj.evaluation.batch import Batch, count_ages, fly_batch
 from swarm_mj.evaluation.summary import merge
 from swarm_mj.flight import fly, summarise
@@ -22,16 +23,19 @@ def batch(mission, policy="mst", seeds=SEEDS, probability=0.3):
     return Batch(policy=policy, probability=probability, mission=mission, seeds=seeds)
 
 
+@pytest.mark.parametrize("switched_off", [0.0, 0.5])
 @pytest.mark.parametrize("policy", ["mst", "random-flooding"])
-def test_costs_are_those_of_the_flight(policy):
-    mission = small("flocking")
+def test_costs_are_those_of_the_flight(policy, switched_off):
+    mission = small("flocking", switched_off=switched_off)
     costs = fly_batch(batch(mission, policy))
     swarm = Swarm(mission, SEEDS)
     flown, ages = [], []
     for window in fly(swarm, make_policy(policy, mission, 0.3)):
         flown.append(window)
         age = swarm.now[:, None, None] - swarm.buffers.timestamp
-        ages.extend(age[:, ~np.eye(6, dtype=bool)].ravel().tolist())
+        is_on = np.ones((3, 6), dtype=bool) if swarm.is_on is None else swarm.is_on
+        is_pair = is_on[:, :, None] & is_on[:, None, :] & ~np.eye(6, dtype=bool)
+        ages.extend(age[is_pair].tolist())
     summary = summarise(flown)
     np.testing.assert_allclose(costs.aoi, summary.aoi_mean)
     np.testing.assert_allclose(costs.velocity_variance, summary.velocity_variance_mean)
@@ -55,6 +59,18 @@ def test_the_floor_is_the_age_that_falling_apart_leaves():
     floor = np.array(fly_batch(batch(fast)).aoi_floor)
     np.testing.assert_array_equal(floor > 0.0, fell_apart)
     assert fell_apart.any()
+
+
+def test_the_floor_is_that_of_the_robots_that_are_on():
+    mission = small("stationary", num_robots=12, switched_off=0.6)
+    swarm, by_hand = Swarm(mission, SEEDS), ConnectivityFloor(3, 12, mission.range_m)
+    floors = [
+        by_hand.next(swarm.bodies.position_m, swarm.now, swarm.is_on)
+        for _ in fly(swarm, make_policy("mst", mission))
+    ]
+    floor = fly_batch(batch(mission)).aoi_floor
+    np.testing.assert_allclose(floor, np.mean(floors, axis=0))
+    assert max(floor) > 0.0  # whoever stood between the others is off
 
 
 @pytest.mark.parametrize("policy", POLICIES)
@@ -111,3 +127,6 @@ def test_ages_by_hand():
     counts = np.array([10, 0, 0, 0, 0])
     count_ages(timestamp, np.array([2.0]), counts)
     assert counts.tolist() == [10 + 1, 1, 2, 0, 2]  # 0; 0.5; 1, 1; none; 2, 2
+    counts[:] = 0
+    count_ages(timestamp, np.array([2.0]), counts, np.array([[True, True, False]]))
+    assert counts.tolist() == [0, 1, 1, 0, 0]  # the third robot is off: 0.5 and 1 are left

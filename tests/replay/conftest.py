@@ -53,6 +53,12 @@ def flooded():
 
 
 @pytest.fixture(scope="session")
+def failing():
+    """Of 12 robots 3 are switched off after 15 of 30 windows."""
+    return record("mst", 0.3, switched_off=0.25)
+
+
+@pytest.fixture(scope="session")
 def replay(two_way, tmp_path_factory):
     path = tmp_path_factory.mktemp("replays") / "mission.rrd"
     write_replay(two_way.log, two_way.mission, {"seed": 5, "policy": "mst", "ratio": 0.25}, path)

@@ -6,6 +6,7 @@ from reading import column, counts, rows, rows_of_strips, static
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.links import fates
+from swarm_mj.replay.write import write_replay
 
 
 def test_positions_are_the_simulation_s(replay, two_way):
@@ -65,6 +66,15 @@ def test_robots_wear_the_colour_of_their_age(replay, two_way):
     others = log.is_known[-1] & (np.arange(12) != log.observer)
     by_age = np.argsort(log.observer_age[-1][others])
     assert np.all(np.diff(luma[-1][others][by_age]) <= 0)
+
+
+def test_robots_that_are_off_are_dark(failing, tmp_path):
+    write_replay(failing.log, failing.mission, {"seed": 5}, tmp_path / "off.rrd")
+    rgba = column(tmp_path / "off.rrd", "/arena/robots", "Points2D:colors").flatten().to_numpy()
+    shown = np.stack([(rgba >> shift) & 255 for shift in (24, 16, 8)], axis=-1).reshape(-1, 12, 3)
+    is_dark = np.all(shown == palette.SWITCHED_OFF, axis=-1)
+    np.testing.assert_array_equal(is_dark, ~failing.log.is_on)
+    assert np.sum(is_dark, axis=1).tolist() == [0] * 15 + [3] * 15
 
 
 def test_circles_have_the_range_and_stand_around_transmitters(replay, two_way):

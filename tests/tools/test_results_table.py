@@ -36,6 +36,18 @@ def test_policies_down_the_swept_number_across_the_least_cost_first(tool, tmp_pa
     )
 
 
+def test_robots_that_fail_have_a_table_of_their_own(tool, tmp_path, capsys):
+    rows = [
+        result("mst", aoi_mean=43.0, aoi_sem=1.0),
+        result("mst", aoi_mean=50.0, aoi_sem=1.0, switched_off=0.2),
+    ]
+    write_csv(tmp_path / "some.csv", rows)
+    assert tool.main([str(tmp_path / "some.csv")]) == 0
+    printed = capsys.readouterr().out
+    assert "stationary, preset reference\n\n|" in printed
+    assert "stationary, preset reference, 20% of the robots off half-way\n\n|" in printed
+
+
 def test_published_values_stand_in_brackets_and_flocks_have_a_second_table(tool):
     flock = result(
         "mst",

@@ -1,0 +1,107 @@
+"""Plans: what an epoch should be, by one picture of the team."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from swarm_mj.policies.broadcasts import Foresight, schedule
+from swarm_mj.policies.greedy import HALVES
+from swarm_mj.policies.pictures import Pictures
+from swarm_mj.policies.schedule import links_between
+from swarm_mj.policies.worth import Scorer
+from swarm_mj.radio import FreeSpaceRadio
+
+# A robot's plan of an epoch of 40 robots takes some tens of ms with these (see README); larger
+# teams would take the cube of that, so they look less far ahead.
+FAR = Foresight(branches=6, half_windows=6)
+NEAR = Foresight(branches=3, half_windows=4)
+NONE = Foresight(branches=1, half_windows=1)
+LARGEST_FAR, LARGEST_NEAR = 50, 100  # robots
+CHUNK = 10  # half windows that are planned at a time
+
+
+def foresight_of(num_robots: int) -> Foresight:
+    """How far a team of this size looks ahead."""
+    if num_robots <= LARGEST_FAR:
+        return FAR
+    return NEAR if num_robots <= LARGEST_NEAR else NONE
+
+
+class Plan:
+    """Who speaks in each half window of an epoch; it depends on one picture and on nothing else.
+
+    It is worked out as far as somebody asks for.
+    """
+
+    def __init__(
+        self,
+        radio: FreeSpaceRadio,
+        scorer: Scorer,
+        pictures: Pictures,
+        whose: int,
+        timestamp: Float[np.ndarray, "N N"],
+        now: float,
+        is_free: Bool[np.ndarray, "P"],
+    ) -> None:
+        """Prepares the plan.
+
+        Args:
+            radio: The mission's channel.
+            scorer: What news is worth.
+            pictures: The pictures made for this epoch.
+            whose: The robot whose picture counts.
+            timestamp: T as the epoch begins, as far as is known with that picture [windows].
+            now: t as the epoch begins [windows].
+            is_free: Which half windows of the epoch the plan may fill.
+        """
+        is_known, is_fresh = pictures.is_known[whose], pictures.is_fresh[whose]
+        self._links = links_between(
+            radio, pictures.position_m[whose], pictures.spread_m[whose], is_known
+        )
+        self._worth = scorer(self._links)
+        self._foresight = foresight_of(len(timestamp))
+        self._now = HALVES * now
+        self._timestamp = (HALVES * _corrected(timestamp, pictures, whose)).astype(np.float32)
+        ahead = np.ones(self._foresight.half_windows, dtype=bool)
+        self._is_free = np.concatenate([is_free, ahead])
+        self._speaks = np.zeros((len(is_free), len(timestamp)), dtype=bool)
+        self._num_planned = 0
+        self.is_complete = bool(np.all(is_known))  # whether the picture had all robots
+        self.is_fresh = is_fresh  # who was fresh in it
+
+    def speaks(self, half_window: int) -> Bool[np.ndarray, "N"]:
+        """Who speaks in a half window of the epoch."""
+        while self._num_planned <= half_window:
+            self._extend()
+        return self._speaks[half_window]
+
+    def outcome(self) -> Float[np.ndarray, "N N"]:
+        """T after the epoch, as expected [windows]."""
+        while self._num_planned < len(self._speaks):
+            self._extend()
+        return self._timestamp.astype(np.float64) / HALVES
+
+    def _extend(self) -> None:
+        begin = self._num_planned
+        end = min(begin + CHUNK, len(self._speaks))
+        schedule(
+            self._timestamp,
+            self._now + begin,
+            self._links,
+            self._worth,
+            self._foresight,
+            self._is_free[begin:],
+            self._speaks[begin:end],
+        )
+        self._num_planned = end
+
+
+def _corrected(
+    timestamp: Float[np.ndarray, "N N"], pictures: Pictures, whose: int
+) -> Float[np.ndarray, "N N"]:
+    """T without what the last plan expected from robots that were not heard of since.
+
+    Nobody can know of such a robot what is newer than that, nor can it know anything newer.
+    """
+    lost = ~pictures.is_fresh[whose]
+    heard = np.where(lost, pictures.timestamp[whose], np.inf)
+    return np.minimum(timestamp, np.minimum(heard[:, None], heard[None, :]))
