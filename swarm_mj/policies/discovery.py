@@ -12,6 +12,7 @@ from swarm_mj.policies.greedy import HALVES
 
 SPEAKERS_PER_REACH = 0.4  # at once, in the first two rounds of the discovery
 MOST_SPEAKERS = 8
+FAST_ROUNDS = 1  # of so many
 LATER_SHARE = 0.5  # of these in all further rounds
 POLITE = 1.5  # ranges within which a speaker known to come first silences another
 NUM_ROUNDS = 40  # after which the orders repeat
@@ -38,7 +39,9 @@ class Discovery:
         self._order = rng.permutation(num_robots)
         self._place = np.argsort(self._order)
         at_once = int(np.clip(round(SPEAKERS_PER_REACH * num_reaches), 1, MOST_SPEAKERS))
-        counts = [at_once] * 2 + [max(1, int(at_once * LATER_SHARE))] * (NUM_ROUNDS - 2)
+        counts = [at_once] * FAST_ROUNDS + [max(1, int(at_once * LATER_SHARE))] * (
+            NUM_ROUNDS - FAST_ROUNDS
+        )
         self._groups = [
             group
             for count in counts

@@ -10,20 +10,16 @@ from swarm_mj.policies.schedule import links_between
 from swarm_mj.policies.worth import Scorer
 from swarm_mj.radio import FreeSpaceRadio
 
-# A robot's plan of an epoch of 40 robots takes some tens of ms with these (see README); larger
-# teams would take the cube of that, so they look less far ahead.
-FAR = Foresight(branches=6, half_windows=6)
-NEAR = Foresight(branches=3, half_windows=4)
+# Larger teams would take the cube of a team of 40's time, so they do not look ahead.
+FAR = Foresight(branches=4, half_windows=4)
 NONE = Foresight(branches=1, half_windows=1)
-LARGEST_FAR, LARGEST_NEAR = 50, 100  # robots
+LARGEST_FAR = 50  # robots
 CHUNK = 10  # half windows that are planned at a time
 
 
 def foresight_of(num_robots: int) -> Foresight:
     """How far a team of this size looks ahead."""
-    if num_robots <= LARGEST_FAR:
-        return FAR
-    return NEAR if num_robots <= LARGEST_NEAR else NONE
+    return FAR if num_robots <= LARGEST_FAR else NONE
 
 
 class Plan:
