@@ -18,7 +18,7 @@ def add_study_options(parser: argparse.ArgumentParser) -> None:
         parser,
         "--policy",
         str,
-        BASELINES,
+        DEFAULT_POLICIES,
         f"who talks to whom: {listed(POLICIES)}, all of these, or directories of learned policies",
     )
     parser.add_argument(

@@ -67,6 +67,11 @@ class WorthNetwork:
         self._digest = digest
 
     @property
+    def weights(self) -> Mapping[str, Float[np.ndarray, "..."]]:
+        """The arrays of `SHAPES`, by name."""
+        return self._parameters
+
+    @property
     def parameters(self) -> Mapping[str, str]:
         """A digest that changes with its weights."""
         return {"digest": self._digest}
