@@ -12,6 +12,9 @@ from swarm_mj.policies import POLICIES, normalised
 from swarm_mj.published import BASELINES
 
 
+DEFAULT_POLICIES = ("gnn", *BASELINES)
+
+
 def add_study_options(parser: argparse.ArgumentParser) -> None:
     """Adds them; those that sweep take several values."""
     _add_several(
