@@ -4,7 +4,7 @@ And how long an evaluation takes, the oracle, and a robot that plans.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +32,7 @@ ORACLE_EPISODES = 4  # it takes its time
 REPETITIONS = 7  # of each measurement; their median counts, for machines are shared
 MISSION = paper("random-walk")
 DENSE = replace(MISSION, range_ratio=1.0)
+PLAN_SIZES = (40, 80, 200)  # robots
 AUTHORS_WINDOWS_PER_S = 500.0  # the authors' environment, one mission on one core: 350 to 600
 
 
@@ -58,8 +59,8 @@ class EvaluationTiming:
     num_jobs: int
     baselines_s: float  # the paper's three baselines over all episodes, starting the jobs included
     oracle_s: float  # the oracle over one episode, one process
-    plan_ms: float  # a robot's plan of one epoch, made at once
-    dense_plan_ms: float  # as above, where everyone hears everyone
+    plan_ms: Mapping[int, float]  # by team size: a robot's plan of one epoch, made at once
+    dense_plan_ms: float  # of the first size, where everyone hears everyone
     mj_step_us: float  # the yardstick of this run, as above
 
     @property
@@ -127,7 +128,10 @@ def bench_evaluation(episodes: int, *, num_jobs: int = 2, seconds: float = 2.0) 
         num_jobs=num_jobs,
         baselines_s=_fly(baselines, num_jobs),
         oracle_s=_fly(oracle, 1) / num_oracles,
-        plan_ms=microseconds(_planning(MISSION), seconds / 4) / 1000.0,
+        plan_ms={
+            size: microseconds(_planning(replace(MISSION, num_robots=size)), seconds / 4) / 1000.0
+            for size in PLAN_SIZES
+        },
         dense_plan_ms=microseconds(_planning(DENSE), seconds / 4) / 1000.0,
         mj_step_us=microseconds(_plain_steps(MISSION), seconds / 4),
     )
@@ -142,11 +146,11 @@ def _fly(study: Study, num_jobs: int) -> float:
 
 
 def _planning(mission: Mission) -> Callable[[], object]:
-    """One robot's plan for an epoch, from what it knows after two rounds of TDMA."""
+    """One robot's plan for an epoch, from what it knows after four rounds of TDMA."""
     swarm = Swarm(mission, [0])
     tdma = make_policy("tdma", mission)
     num_windows = regular_length(mission.num_robots)
-    for _ in range(mission.num_robots):
+    for _ in range(2 * mission.num_robots):
         swarm.step(tdma)
     buffers, now = swarm.buffers, float(swarm.now[0])
     radio, scorer = radio_of(mission), shipped_scorer()
