@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from swarm_mj.policies.stored_scorer import load_scorer, save_scorer
+from swarm_mj.policies.stored_scorer import is_scorer, load_scorer, save_scorer
 
 DONE, BAD_INPUT = 0, 2
 CARD = "# A shuffled policy\n\nThe weights of {source}, permuted within each array, seed {seed}.\n"
@@ -27,9 +27,12 @@ def shuffle(source: Path, target: Path, seed: int) -> None:
         seed: Of the permutations.
 
     Raises:
-        ValueError: The source is no learned planner.
+        ValueError: The source is no learned planner, or the target is the source or anything else
+            than a learned planner.
         OSError: A folder cannot be read or written.
     """
+    if target.resolve() == source.resolve() or (target.exists() and not is_scorer(target)):
+        raise ValueError(f"{target} is no copy to replace; name another folder, or remove it")
     rng = np.random.default_rng(seed)
     weights = {
         name: rng.permutation(array.ravel()).reshape(array.shape)

@@ -21,8 +21,9 @@ from swarm_mj.learning.plan_training import PlanTraining
 from swarm_mj.policies.stored_scorer import save_scorer
 from swarm_mj.provenance import commit, version
 
-OUT = Path("runs/plan_network")
-CURVE = Path("training/results/learning/plan-network-curve.csv")
+ROOT = Path(__file__).resolve().parent.parent
+OUT = ROOT / "runs" / "plan_network"
+CURVE = ROOT / "training" / "results" / "learning" / "plan-network-curve.csv"
 COLUMNS = ("minutes", "generation", "candidates", "held_out", "step_size")
 CARD = """# The network of policy `gnn`
 
@@ -35,8 +36,8 @@ speaks when. Packets carry the planner's pictures beyond T, M and P.
   (`swarm_mj/learning/plan_practice.py`); these weights are of generation {generations}, of 24
   candidates each, after {minutes:.1f} minutes on one core
 - seed: {seed}; commit: {commit}; swarm_mj {version}
-- age of information of its plans over that of the rule's, on teams that were never trained on, and
-  that the choice of the generation was made by: {held_out:.3f}
+- age of information of its plans over that of the rule's, on teams that were never trained on but
+  by which the generation was chosen: {held_out:.3f}
 - what it costs on missions never seen, beside all other policies and with its weights shuffled:
   `training/RESULTS.md`, `training/results/` and the README
 
@@ -59,16 +60,17 @@ def train(minutes: float, seed: int, step_size: float) -> None:
         bar.update(task, completed=spent)
         for now in training.generations() if spent < minutes else ():
             spent = (time.monotonic() - start) / 60.0
-            _append(curve, (f"{spent:.2f}", now.generation, *_shown(now)))
-            if now.held_out < best:
+            if now.held_out < best:  # before the curve says so, or a kill between would lose it
                 best = now.held_out
                 _save(training, seed, minutes, spent, now.generation, best)
+            _append(curve, (f"{spent:.2f}", now.generation, *_shown(now)))
             described = f"generation {now.generation}, best {best:.3f} of the rule's age"
             bar.update(task, completed=spent, description=described)
             if spent >= minutes:
                 break
-    CURVE.parent.mkdir(parents=True, exist_ok=True)
-    CURVE.write_text(curve.read_text())
+    if curve.exists():
+        CURVE.parent.mkdir(parents=True, exist_ok=True)
+        CURVE.write_text(curve.read_text())
 
 
 def _shown(now: object) -> list[str]:
@@ -117,8 +119,13 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="of the training (default: 1)")
     parser.add_argument("--step-size", type=float, default=0.015, help="the first (default: 0.015)")
     options = parser.parse_args()
+    if options.minutes <= 0.0 or options.seed < 0 or options.step_size <= 0.0:
+        parser.error("--minutes and --step-size must be above 0, and --seed from 0")
     try:
         train(options.minutes, options.seed, options.step_size)
+    except (ValueError, OSError) as error:
+        sys.stderr.write(f"error: {error}\n")
+        return 2
     except KeyboardInterrupt:
         sys.stderr.write("interrupted; start it again to go on\n")
         return 130

@@ -42,6 +42,9 @@ class _Flight:
     wall_s: float
 
 
+COMPILING_WINDOWS = 10  # in which three robots do all that a flight does, schedules included
+
+
 def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no public type
     """Adds the command."""
     parser = new_parser(
@@ -148,7 +151,7 @@ def _short(policy: str) -> str:
 
 def _compile_ahead(options: argparse.Namespace, mission: Mission) -> None:
     """Flies such a mission in small, with both its halves, so that compiling is not timed."""
-    smallest = replace(mission, num_robots=3, range_ratio=10.0, num_windows=2)
+    smallest = replace(mission, num_robots=3, range_ratio=10.0, num_windows=COMPILING_WINDOWS)
     for _ in fly(Swarm(smallest, [0]), _make_policy(options, smallest)):
         pass
 

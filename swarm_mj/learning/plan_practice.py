@@ -17,13 +17,12 @@ from swarm_mj.mission import Mission, paper
 from swarm_mj.placement import connected_positions
 from swarm_mj.policies.broadcasts import fly, schedule
 from swarm_mj.policies.greedy import HALVES, Links
-from swarm_mj.policies.plan import NONE
+from swarm_mj.policies.plan import NO_FORESIGHT
+from swarm_mj.policies.planner import regular_length
 from swarm_mj.policies.schedule import links_between
 from swarm_mj.policies.worth import Scorer
 
 NUM_EPOCHS = 3  # the first brings the team from nothing to its steady state, and does not count
-EPOCH = 0.5  # rounds of N windows
-SHORTEST_EPOCH = 10  # windows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +97,7 @@ def mean_age(team: Team, scorer: Scorer) -> float:
         now = float(epoch * num_halves)
         speaks = np.zeros((num_halves, num_robots), dtype=bool)
         is_free = np.ones(num_halves, dtype=bool)
-        schedule(expected, now, believed, scorer(believed), NONE, is_free, speaks)
+        schedule(expected, now, believed, scorer(believed), NO_FORESIGHT, is_free, speaks)
         ages.append(fly(true, now, team.links, speaks))
     return float(np.mean(ages[1:])) / HALVES
 
@@ -118,7 +117,7 @@ def _draw_team(name: str, exercise: Exercise, rng: np.random.Generator) -> Team:
         exercise=name,
         links=links_between(radio, position_m),
         believed=believed,
-        epoch_windows=max(SHORTEST_EPOCH, round(EPOCH * num_robots)),
+        epoch_windows=regular_length(num_robots),
     )
 
 

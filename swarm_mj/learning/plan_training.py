@@ -57,20 +57,26 @@ class PlanTraining:
             seed: Of the imitation, the teams and the candidates.
             step_size: Standard deviation of the first candidates.
             measure_every: Generations between two measurements on held-out teams.
+
+        Raises:
+            ValueError: The file is of another seed or step size, or no such file at all.
         """
         self._path = path
         self._seed = seed
         self._measure_every = measure_every
         self._losses: list[np.ndarray] = []  # of the candidates, one array a generation
         self._found: list[np.ndarray] = []  # the candidates
-        stored = dict(np.load(path)) if path.exists() else {}
+        stored = _stored(path, seed, step_size)
+        self._step_size = step_size
         self._start = stored["start"] if stored else imitated(seed)
         options = {"popsize": POPULATION, "seed": seed + 1, "verbose": -9}
         self._evolution = cma.CMAEvolutionStrategy(self._start, step_size, options)
         for found, losses in zip(stored.get("found", ()), stored.get("losses", ()), strict=True):
             self._evolution.ask()
             self._tell(found, losses)
-        self._held_out = draw_teams(EXERCISES, np.random.default_rng(HELD_OUT_SEED))
+        self._held_out = draw_teams(
+            EXERCISES, np.random.default_rng([HELD_OUT_SEED, HELD_OUT_SEED])
+        )
 
     @property
     def mean(self) -> dict[str, Float[np.ndarray, "..."]]:
@@ -111,9 +117,27 @@ class PlanTraining:
             np.savez(
                 file,
                 start=self._start,
+                settings=np.array([self._seed, self._step_size]),
                 found=np.stack(self._found),
                 losses=np.stack(self._losses),
             )
+
+
+def _stored(path: Path, seed: int, step_size: float) -> dict[str, np.ndarray]:
+    """What a training's file holds; nothing if there is none."""
+    if not path.exists():
+        return {}
+    try:
+        stored = dict(np.load(path))
+        settings = stored["settings"].tolist()
+    except (OSError, ValueError, KeyError, EOFError) as error:
+        raise ValueError(f"{path} is no training's file ({error}); remove it") from error
+    if settings != [seed, step_size]:
+        raise ValueError(
+            f"{path} was begun with seed {settings[0]:g} and step size {settings[1]:g}, not "
+            f"{seed} and {step_size:g}; give these, or remove it"
+        )
+    return stored
 
 
 def ages(teams: list[Team], scorer: RuleOfThumb | WorthNetwork) -> Float[np.ndarray, "K"]:

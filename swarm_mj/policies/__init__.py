@@ -170,6 +170,8 @@ def make_policy(
         from swarm_mj.policies.stored import load_policy  # torch takes its time to import
 
         _refuse(probability, name)
+        if is_scorer(Path(name)) and is_deterministic:
+            raise ValueError(f"{name} draws nothing; leave --deterministic out")
         if is_scorer(Path(name)):
             return plan_with(load_scorer(Path(name)), mission)
         return load_policy(Path(name), mission, is_deterministic=is_deterministic)
@@ -179,9 +181,7 @@ def make_policy(
             f"not {name!r}"
         )
     if is_deterministic:
-        raise ValueError(
-            f"{name} is not learned; only learned policies can be deterministic, so leave it out"
-        )
+        raise ValueError(f"{name} draws from no network's distribution; leave --deterministic out")
     return POLICIES[name](mission, probability)
 
 

@@ -17,7 +17,7 @@ another.
 from typing import NamedTuple, no_type_check
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32
+from jaxtyping import Bool, Float, Float32, Int
 from numba import njit
 
 from swarm_mj.policies.greedy import Links
@@ -48,7 +48,7 @@ class _Air(NamedTuple):
 
     total_mw: Float[np.ndarray, "N"]
     strongest_mw: Float[np.ndarray, "N"]
-    strongest: Float[np.ndarray, "N"]  # who is received with that power, int64
+    strongest: Int[np.ndarray, "N"]  # who is received with that power
 
 
 @njit(cache=True)
@@ -179,6 +179,7 @@ def _choose(
     """Fills `speaks` with a half window's speakers, a given first one before all others."""
     num_robots = timestamp.shape[0]
     gain = _gains(timestamp, now, reach, worth)
+    has_news = _has_news(gain)
     air = _silent_air(num_robots)
     speaks[:] = False
     value = 0.0
@@ -188,7 +189,7 @@ def _choose(
     while True:
         best, best_value = NOBODY, value * worth.least_share
         for i in range(num_robots):
-            if not speaks[i]:
+            if not speaks[i] and has_news[i]:
                 with_i = _value(links, gain, air, speaks, i)
                 if with_i > best_value:
                     best, best_value = i, with_i
@@ -196,6 +197,18 @@ def _choose(
             return
         value = best_value
         _speak(links, air, speaks, best)
+
+
+@njit(cache=True)
+@no_type_check
+def _has_news(gain: Float[np.ndarray, "N N"]) -> Bool[np.ndarray, "N"]:
+    """Whether it is worth anything to anyone that i speaks; who has none had better listen."""
+    has_news = np.zeros(gain.shape[0], dtype=np.bool_)
+    for i in range(gain.shape[0]):
+        for j in range(gain.shape[0]):
+            if gain[i, j] > 0.0:
+                has_news[i] = True
+    return has_news
 
 
 @njit(cache=True)
@@ -237,8 +250,8 @@ def _value(
             added_mw = received_mw[also, j]
             is_stronger = added_mw > strongest_mw[j]
             sender = also if is_stronger else strongest[j]
-            if gain[sender, j] != 0.0:
-                signal_mw = added_mw if is_stronger else strongest_mw[j]
+            signal_mw = added_mw if is_stronger else strongest_mw[j]
+            if signal_mw > 0.0 and gain[sender, j] != 0.0:
                 noise = noise_mw + (total_mw[j] + added_mw - signal_mw)
                 value += gain[sender, j] * _chance(
                     signal_mw, noise, threshold, sharpness[sender, j]

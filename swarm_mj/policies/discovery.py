@@ -10,13 +10,14 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.buffers import Buffers
 from swarm_mj.policies.greedy import HALVES
 
-SPEAKERS_PER_REACH = 0.4  # at once, in the first two rounds of the discovery
+SPEAKERS_PER_REACH = 0.4  # at once, while everyone speaks for the first time
 MOST_SPEAKERS = 8
-FAST_ROUNDS = 1  # of so many
-LATER_SHARE = 0.5  # of these in all further rounds
+FAST_ROUNDS = 1  # times that everyone speaks with so many others
+LATER_SHARE = 0.5  # of these speak at once from then on
 POLITE = 1.5  # ranges within which a speaker known to come first silences another
-NUM_ROUNDS = 40  # after which the orders repeat
-SEEK_AFTER, LATEST_SEEK = 5.0, 200  # rounds, at most windows, after which robots are sought instead
+NUM_ROUNDS = 40  # times that everyone speaks, after which the orders repeat
+SEEK_AFTER = 5.0  # times N windows, after which robots are sought instead
+LATEST_SEEK = 200  # windows: then in any case
 SEEK_EVERY = 5  # windows, while robots are lost
 
 

@@ -60,7 +60,7 @@ def freeze(
     apart_mps = (velocity_mps - mean_mps[:, None]) * is_known[..., None]
     variance = np.sum(apart_mps**2, axis=(1, 2)) / num_known
     is_fresh = is_known & (age <= fresh_windows)
-    num_fresh = np.sum(is_fresh, axis=1)  # one at least, itself
+    num_fresh = np.maximum(np.sum(is_fresh, axis=1), 1)  # a robot that is off grows old to itself
     return Pictures(
         is_known=is_known.copy(),
         is_fresh=is_fresh,

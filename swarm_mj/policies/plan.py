@@ -10,16 +10,22 @@ from swarm_mj.policies.schedule import links_between
 from swarm_mj.policies.worth import Scorer
 from swarm_mj.radio import FreeSpaceRadio
 
-# Larger teams would take the cube of a team of 40's time, so they do not look ahead.
+# Looking ahead takes time that grows with N³, so larger teams do not. Where nobody moves, plans
+# come true as they are, and looking further ahead is worth it.
+FARTHER = Foresight(branches=6, half_windows=6)
 FAR = Foresight(branches=4, half_windows=4)
-NONE = Foresight(branches=1, half_windows=1)
+NO_FORESIGHT = Foresight(branches=1, half_windows=1)
 LARGEST_FAR = 50  # robots
+GONE = 3.0  # rounds of N windows without news, after which a plan does without a robot
+SHORTEST_ROUND = 20  # windows
 CHUNK = 10  # half windows that are planned at a time
 
 
-def foresight_of(num_robots: int) -> Foresight:
-    """How far a team of this size looks ahead."""
-    return FAR if num_robots <= LARGEST_FAR else NONE
+def foresight_of(num_robots: int, *, is_certain: bool) -> Foresight:
+    """How far a team of this size looks ahead, on positions that are certain or only believed."""
+    if num_robots > LARGEST_FAR:
+        return NO_FORESIGHT
+    return FARTHER if is_certain else FAR
 
 
 class Plan:
@@ -50,11 +56,13 @@ class Plan:
             is_free: Which half windows of the epoch the plan may fill.
         """
         is_known, is_fresh = pictures.is_known[whose], pictures.is_fresh[whose]
+        is_gone = now - pictures.timestamp[whose] > GONE * max(len(timestamp), SHORTEST_ROUND)
         self._links = links_between(
-            radio, pictures.position_m[whose], pictures.spread_m[whose], is_known
+            radio, pictures.position_m[whose], pictures.spread_m[whose], is_known & ~is_gone
         )
         self._worth = scorer(self._links)
-        self._foresight = foresight_of(len(timestamp))
+        is_certain = not np.any(pictures.spread_m[whose])
+        self._foresight = foresight_of(len(timestamp), is_certain=is_certain)
         self._now = HALVES * now
         self._timestamp = (HALVES * _corrected(timestamp, pictures, whose)).astype(np.float32)
         ahead = np.ones(self._foresight.half_windows, dtype=bool)
@@ -65,7 +73,13 @@ class Plan:
         self.is_fresh = is_fresh  # who was fresh in it
 
     def speaks(self, half_window: int) -> Bool[np.ndarray, "N"]:
-        """Who speaks in a half window of the epoch."""
+        """Who speaks in a half window of the epoch.
+
+        Raises:
+            IndexError: The epoch is over.
+        """
+        if half_window >= len(self._speaks):
+            raise IndexError(f"the plan has {len(self._speaks)} half windows, not {half_window}")
         while self._num_planned <= half_window:
             self._extend()
         return self._speaks[half_window]

@@ -4,8 +4,8 @@ Identities, the team's size, its area, speaking orders and the clock are common 
 so robots that hold the same picture of the team agree on a schedule without a word. Every half
 window any robot may speak; nobody answers. Time is cut into epochs:
 
-1. In the first, the discovery, robots speak in turns (`discovery.py`).
-2. As each further epoch begins, every robot freezes a picture of the team from its own buffer. Its
+1. In the first two, the discovery, robots speak in turns (`discovery.py`).
+2. As each but the first begins, every robot freezes a picture of the team from its own buffer. Its
    packets carry the best picture for the next epoch and the one it flies by; whoever decodes a
    better one takes it over and passes it on. The best has most robots heard of lately, then the
    least age, then the lower identity; so a connected team soon holds one picture, whoever is in it.
@@ -13,11 +13,12 @@ window any robot may speak; nobody answers. Time is cut into epochs:
    holds, and speaks when the schedule says so. Timestamps at the beginning are those that the last
    schedule leaves; nobody needs to report what it decoded.
 
-What fails, fails softly. Believed positions spread with their age and with how differently the
+Believed positions spread with their age and with how differently the
 robots move, so packets over doubtful links are expected to come through with a probability. A
 robot that missed the best picture flies by the best it has, may collide, and still listens. While
-a picture lacks robots, some windows are left to the discovery, and while robots have not been
-heard of for long, some are left to seeking them.
+a picture lacks robots it is not flown by, and the discovery goes on, for up to five rounds or 200
+windows; then, and whenever robots have not been heard of for long, every fifth window is left to
+seeking them.
 """
 
 import math
@@ -39,7 +40,7 @@ from swarm_mj.radio import FreeSpaceRadio
 
 # These numbers, and those of `pictures` and `discovery`, were the best of a few tried on 20
 # missions (seeds from 1000), mostly of 40 robots, stationary and walking.
-FIRST_EPOCH = 1.0  # rounds of N windows: the discovery, before the first pictures
+FIRST_EPOCH = 1.0  # rounds of N windows: before the first pictures are made
 EARLY_EPOCH = 0.25  # rounds: the two epochs after it
 EPOCH = 0.5  # rounds: all others; a picture must reach all of a team
 SHORTEST_EPOCH = 10  # windows
@@ -120,6 +121,7 @@ class _Team:
         self._discovery = discovery
         self._everyone = np.arange(discovery.num_robots)
         self._starts = epoch_starts(discovery.num_robots)
+        self._first: float | None = None  # when the first decision was asked for [windows]
         self._epoch = -1
         self._plans: dict[int, Plan] = {}  # of this epoch, by whose picture it follows from
         self._current: Pictures | None = None  # made for this epoch
@@ -127,25 +129,28 @@ class _Team:
         self._holds = self._everyone  # whose current picture i flies by
         self._will_hold = self._everyone  # whose upcoming picture is the best that i has
         self._continues = self._everyone  # whose plan i flew by when it froze its upcoming one
+        self._ended = self._plans  # of the epoch before, and what went with them
+        self._ended_continues = self._continues
 
     def speaks(self, views: LocalViews, b: int) -> Bool[np.ndarray, "N"]:
         """Which robots of mission b speak in this half window."""
-        now = float(views.now[b])
+        if self._first is None:
+            self._first = float(views.now[b])
+        now = float(views.now[b]) - self._first
         half_window = round(now / PHASE)
         heard = views.phases[-1].heard[b] if views.phases else self._everyone
         before = self._holds
         self._take_over(heard)
         if half_window % HALVES == 0 and now >= self._start(self._epoch + 1):
             self._epoch += 1
-            self._begin_epoch(views.buffers, b, now)
+            self._begin_epoch(views.buffers, b, float(views.now[b]))
         if self._current is None:
             return self._discovery.speaks(half_window, views.buffers, b)
         speaks = np.zeros(len(self._everyone), dtype=bool)
         for whose in np.unique(self._holds).tolist():
             holds = self._holds == whose
-            speaks[holds] = self._by_plan(whose, half_window, heard, before, views.buffers, b)[
-                holds
-            ]
+            by_plan = self._by_plan(whose, half_window, heard, before, views.buffers, b)
+            speaks[holds] = by_plan[holds]
         return speaks
 
     def _by_plan(
@@ -206,7 +211,7 @@ class _Team:
                 self._current,
                 whose,
                 before.outcome() if before else np.full(is_fresh.shape * 2, NEVER),
-                float(start),
+                start + (self._first or 0.0),
                 np.array([self._is_free(int(h), is_complete, is_fresh) for h in half_windows]),
             )
         return self._plans[whose]

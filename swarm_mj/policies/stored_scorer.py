@@ -61,12 +61,18 @@ def load_scorer(folder: Path) -> WorthNetwork:
     present = present_folder(folder)
     try:
         config = json.loads(_read(present / CONFIG))
+        if not isinstance(config, dict) or config.get("format") != FORMAT:
+            raise ValueError(f'its format must be "{FORMAT}"')
         version = config.get("format_version")
         if version != FORMAT_VERSION:
             raise ValueError(f"its format_version must be {FORMAT_VERSION}, not {version!r:.40}")
         data = _read(present / WEIGHTS)
-        return WorthNetwork(load(data), hashlib.sha256(data).hexdigest()[:DIGITS])
-    except (SafetensorError, ValueError, KeyError, AttributeError) as error:
+        tensors = load(data)
+        for name, array in tensors.items():
+            if array.dtype != np.float32:
+                raise ValueError(f"tensor {name:.80} must be of float32, not {array.dtype}")
+        return WorthNetwork(tensors, hashlib.sha256(data).hexdigest()[:DIGITS])
+    except (SafetensorError, ValueError, KeyError, RecursionError) as error:
         raise ValueError(f"policy {folder}: {error}; {WAY_OUT}") from error
 
 
@@ -75,7 +81,7 @@ def is_scorer(folder: Path) -> bool:
     path = present_folder(folder) / CONFIG
     try:
         config = json.loads(_read(path))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return False
     return isinstance(config, dict) and config.get("format") == FORMAT
 

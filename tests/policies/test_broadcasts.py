@@ -273,7 +273,6 @@ def test_who_is_unknown_neither_tells_nor_learns(seed, num_robots):
     np.testing.assert_array_equal(after[unknown, others], before[unknown, others])
 
 
-@pytest.mark.xfail(strict=True, reason="who adds nothing is added where less than all must remain")
 @pytest.mark.parametrize("share", [0.5, 0.95])
 def test_who_is_unknown_is_not_told_to_speak(share):
     """Robot 3 hears nobody and is heard by nobody, as far as is known."""
