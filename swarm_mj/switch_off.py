@@ -15,7 +15,7 @@ MIN_ON = 2  # robots stay on whatever the fraction, so that there is an age of i
 
 
 def num_switched_off(mission: Mission) -> int:
-    """How many robots are switched off: to the nearest; 1 or more of a fraction, 2 or more stay on."""
+    """How many robots are switched off: to the nearest, at least 1, but at least 2 stay on."""
     if mission.switched_off == 0.0:
         return 0
     nearest = max(1, round(mission.switched_off * mission.num_robots))

@@ -1,6 +1,6 @@
 """Communication policies (IV-C), one file each, and the one table of their names.
 
-A learned policy has no name: it is the directory that holds it.
+A learned policy has no name but that of the directory that holds it, except the shipped one, `gnn`.
 """
 
 import os
