@@ -14,8 +14,8 @@ OPTIONS = {
     "range_ratio": "--range-ratio",
     "velocity_ratio": "--velocity-ratio",
 }
-# All but the two slow ones: the lookahead oracle, and lone planners, who plan one by one. The
-# planner is drawn under `paper` only: it takes as long as all others together.
+# All but the slow lookahead oracle. The planners are drawn under `paper` only: they take as long as
+# all others together.
 DRAWN = (
     "tdma",  # first: the others are compared to it
     "random-flooding",
@@ -25,8 +25,10 @@ DRAWN = (
     "gossip",
     "spatial-tdma",
     "planner",
+    "gnn",
     "oracle",
 )
+PAPER_ONLY = ("planner", "gnn")
 Scale = Literal["linear", "log"]
 
 
@@ -85,7 +87,7 @@ class ResultFigure:
 
     def arguments(self, preset: str) -> Sequence[str]:
         """What `swarm-mj` is called with to make the figure's results, but for the file."""
-        drawn = [policy for policy in DRAWN if preset == "paper" or policy != "planner"]
+        drawn = [policy for policy in DRAWN if preset == "paper" or policy not in PAPER_ONLY]
         command = ["evaluate", "--policy", *drawn, "--task", self.task, "--preset", preset]
         if self.sweeps_missions:
             command += [OPTIONS[self.x_name], *(f"{x:g}" for x in self.xs)]

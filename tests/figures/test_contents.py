@@ -32,9 +32,9 @@ def test_the_command_named_evaluates_the_drawn_policies_in_the_figures_regimes(f
     program, *arguments = shlex.split(figure.command(preset))
     study = study_of(make_parser().parse_args(arguments))
     assert program == "swarm-mj"
-    left_out = {"planner-lone", "oracle-lookahead"}
+    left_out = {"oracle-lookahead"}
     if preset == "reference":
-        left_out.add("planner")
+        left_out |= {"planner", "gnn"}
     assert set(study.policies) == set(POLICIES) - left_out
     assert study.compared_to == "tdma"
     assert {regime.preset for regime in study.regimes} == {preset}

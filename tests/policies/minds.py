@@ -1,20 +1,21 @@
-"""The planner's robots, one object each, which share nothing; and the planner's flights.
+"""The planner's robots, one object each, which share nothing; and flights of a planner beside them.
 
 A mind is handed its own buffer row and copies of the packets that it decoded, and plans alone.
 """
 
 import copy
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from swarm_mj.channel import radio_of
-from swarm_mj.policies import DecentralisedPolicy, make_policy
-from swarm_mj.policies.schedule import greedy_schedule, links_between
-from swarm_mj.radio import FreeSpaceRadio
+from swarm_mj.mission import Mission
+from swarm_mj.policies import DecentralisedPolicy, discovery, pictures, plan, plan_with, planner
+from swarm_mj.policies.broadcasts import schedule
+from swarm_mj.policies.schedule import links_between
+from swarm_mj.policies.worth import RuleOfThumb, Scorer
 from swarm_mj.swarm import Swarm
-
-WINDOW_S = 0.1
 
 
 @dataclass(kw_only=True)
@@ -22,128 +23,187 @@ class Picture:
     """One robot's belief, as it travels in a packet."""
 
     is_known: np.ndarray  # [subject]
+    is_fresh: np.ndarray  # [subject]
     position_m: np.ndarray  # [subject, axis]
     spread_m: np.ndarray  # [subject]
+    seen: np.ndarray  # T of its maker [subject]
+    before: np.ndarray  # T of everyone at the start of the epoch it is for, as its maker expects
     goodness: tuple[int, float, int]  # the less the better
-    timestamp: np.ndarray  # T at the start of the epoch it is for, as its maker expects
 
-    def content(self):
-        return [array.tolist() for array in (self.is_known, self.position_m, self.spread_m)]
+    @property
+    def is_complete(self):
+        return all(self.is_known.tolist())
+
+
+def common_orders(seed, mission):
+    """The order of the search and the groups of the discovery, in a round each [round, group].
+
+    Of those that reach over the area a share speaks at once, and fewer after the first rounds; one
+    at least, and never all.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[2])
+    num_robots = mission.num_robots
+    order = rng.permutation(num_robots).tolist()
+    reaches = mission.side_m**2 / (math.pi * mission.range_m**2)
+    at_once = max(1, min(discovery.MOST_SPEAKERS, round(discovery.SPEAKERS_PER_REACH * reaches)))
+    later = max(1, math.floor(at_once * discovery.LATER_SHARE))
+    rounds = []
+    for k in range(discovery.NUM_ROUNDS):
+        count = min(at_once if k < discovery.FAST_ROUNDS else later, num_robots - 1)
+        robots = rng.permutation(num_robots).tolist()
+        rounds.append([robots[first : first + count] for first in range(0, num_robots, count)])
+    return order, rounds
 
 
 @dataclass(kw_only=True)
 class Mind:
-    """One robot: its identity, the common speaking order and radio, and its memory."""
+    """One robot: its identity, what is common before the mission, and its memory."""
 
     me: int
+    mission: Mission
+    scorer: Scorer
     order: list[int]
-    radio: FreeSpaceRadio
-    shares_pictures: bool
-    directly: dict[int, float] = field(default_factory=dict)  # when it last decoded whom
+    groups: list[list[int]]
+    epoch: int = -1
+    begins: int = 0  # when the next epoch does [windows]
     current: Picture | None = None
     upcoming: Picture | None = None
-    recipients: np.ndarray | None = None  # its plan's
+    flown: Picture | None = None  # what it flew by in the half window before
+    heard: int | None = None  # whom it decoded then
+    took_over: int = 0  # how often it found a better picture amid an epoch
+    schedule: list[bool] = field(default_factory=list)  # whether it speaks, by half windows
     after: np.ndarray | None = None  # T that its plan leads to
-    epoch: int = -1
-    epoch_began: float = 0.0
 
-    @property
-    def num_windows(self):
-        return max(10, len(self.order) // 2)
+    def length(self, epoch):
+        """The discovery, two early ones, then all others [windows]."""
+        if epoch >= 3:
+            return max(planner.SHORTEST_EPOCH, round(planner.EPOCH * len(self.order)))
+        rounds = planner.FIRST_EPOCH if epoch == 0 else planner.EARLY_EPOCH
+        return max(2, round(rounds * len(self.order)))
 
-    def packet(self):
-        """What it sends beyond T, M and P."""
-        return copy.deepcopy((self.current, self.upcoming)) if self.shares_pictures else None
+    def hear(self, sender, packet):
+        """One half window: whom it decoded, if anybody, and what came beside T, M and P."""
+        self.heard = sender
+        current, upcoming = packet or (None, None)
+        if current is not None and current.goodness < self.current.goodness:
+            self.current, self.took_over = current, self.took_over + 1
+            self.plan()
+        if upcoming is not None and upcoming.goodness < self.upcoming.goodness:
+            self.upcoming = upcoming
 
-    def hear(self, sender, packet, now):
-        self.directly[sender] = now
-        if packet is not None:
-            current, upcoming = packet
-            if current is not None and current.goodness < self.current.goodness:
-                self.current = current
-                self.plan()
-            if upcoming is not None and upcoming.goodness < self.upcoming.goodness:
-                self.upcoming = upcoming
+    def speaks(self, row, half_window):
+        """Whether it does in the half window that begins now."""
+        if half_window == 2 * self.begins:
+            self.begin(row, half_window // 2)
+        flown, self.flown = self.flown, self.current
+        if self.current is None or self.calls(half_window):
+            return self.has_its_turn(row, half_window)
+        if self.seeks(half_window):
+            turn = half_window // 2 // discovery.SEEK_EVERY
+            if half_window % 2 == 0:
+                return self.order[turn % len(self.order)] == self.me
+            return self.answers(row, turn, flown)
+        return self.schedule[half_window - 2 * (self.begins - self.length(self.epoch))]
 
-    def plan(self):
-        """The epoch as its picture has it, from the beginning."""
-        held = self.current
-        links = links_between(self.radio, held.position_m, held.spread_m, held.is_known)
-        self.recipients, self.after = greedy_schedule(
-            held.timestamp, self.epoch_began, links, self.num_windows, is_squared=True
-        )
-
-    def unknown(self):
-        return np.zeros((len(self.order), len(self.order)))
-
-    def picture(self, row, now, epochs_ahead, timestamp):
-        """Frozen from its own buffer row: T, positions and velocities of everyone it heard of."""
-        seen, position_m, velocity_mps = row
-        is_known = seen > 0.0
-        is_known[self.me] = True
-        subjects = np.flatnonzero(is_known).tolist()
-        age = [now - float(seen[k]) if k in subjects else 0.0 for k in range(len(self.order))]
-        mean_mps = np.sum(velocity_mps[subjects], axis=0) / len(subjects)
-        squared_off = [np.sum((velocity_mps[k] - mean_mps) ** 2) for k in subjects]
-        deviation_mps = np.sqrt(sum(squared_off) / len(subjects))
-        ahead = np.array(age) + epochs_ahead * self.num_windows
-        moves_s = np.minimum(ahead, 15.0) * WINDOW_S
-        return Picture(
-            is_known=is_known,
-            position_m=position_m + velocity_mps * moves_s[:, None],
-            spread_m=0.45 * deviation_mps * WINDOW_S * ahead,
-            goodness=(-len(subjects), sum(age) / len(subjects), self.me),
-            timestamp=timestamp,
-        )
-
-    def decide(self, row, now):
-        """Whom it addresses in the window that begins now."""
-        if int(now) // self.num_windows != self.epoch:
-            self.epoch, self.epoch_began = int(now) // self.num_windows, now
-            if self.shares_pictures:
-                self.begin_sharing(row, now)
-            else:
-                self.begin_alone(row, now)
-        if self.recipients is None:
-            return self.discover(int(now))
-        if int(now) % 4 == 0 and not all(self.current.is_known.tolist()):
-            return self.discover(int(now) // 4)
-        return int(self.recipients[int(now - self.epoch_began), self.me])
-
-    def begin_sharing(self, row, now):
+    def begin(self, row, now):
         """The best picture it holds becomes the one it flies by; it freezes its own for later."""
+        self.epoch += 1
+        self.begins += self.length(self.epoch)
         self.current, self.upcoming = self.upcoming, None
         if self.current is not None:
             self.plan()
-        if self.epoch >= 2:
-            after = self.unknown() if self.after is None else self.after
-            self.upcoming = self.picture(row, now, 1.5, after)
+        if self.epoch >= 1:
+            ahead = self.length(self.epoch) + self.length(self.epoch + 1) / 2
+            self.upcoming = self.picture(row, now, ahead)
 
-    def begin_alone(self, row, now):
-        """Its own picture; T goes on only while the picture stays, and not every fifth epoch."""
-        if self.epoch >= 3:
-            before, after = self.current, self.after
-            self.current = self.picture(row, now, 0.5, self.unknown())
-            is_same = before is not None and before.content() == self.current.content()
-            if is_same and self.epoch % 5 != 0:
-                self.current.timestamp = after
-            self.plan()
+    def picture(self, row, now, windows_ahead):
+        """Frozen from its own buffer row: T, positions and velocities of everyone it heard of."""
+        seen, position_m, velocity_mps = row
+        num_robots, window_s = len(seen), self.mission.window_s
+        known = [k for k in range(num_robots) if seen[k] > 0.0]
+        age = [float(now - seen[k]) if k in known else 0.0 for k in range(num_robots)]
+        oldest = max(planner.FRESH * num_robots, 2 * planner.SHORTEST_EPOCH)
+        fresh = [k for k in known if age[k] <= oldest]
+        mean_mps = np.sum(velocity_mps[known], axis=0) / len(known)
+        off = sum(np.sum((velocity_mps[k] - mean_mps) ** 2) for k in known)
+        ahead = np.array(age) + windows_ahead
+        moves_s = np.minimum(ahead, pictures.FORESIGHT) * window_s
+        robots, empty = np.arange(num_robots), np.zeros((num_robots, num_robots))
+        return Picture(
+            is_known=np.isin(robots, known),
+            is_fresh=np.isin(robots, fresh),
+            position_m=position_m + velocity_mps * moves_s[:, None],
+            spread_m=pictures.SPREAD * np.sqrt(off / len(known)) * window_s * ahead,
+            seen=seen,
+            before=empty if self.after is None else self.after,
+            goodness=(-len(fresh), sum(age[k] for k in fresh) / len(fresh), self.me),
+        )
 
-    def discover(self, turn):
-        num_robots = len(self.order)
-        if self.order[turn % num_robots] != self.me:
-            return self.me
-        if not self.directly:
-            return self.order[(turn + 1) % num_robots]
-        return min(self.directly, key=lambda k: (self.directly[k], k))
+    def plan(self):
+        """The epoch as its picture has it, from the beginning, in one go."""
+        held, length = self.current, self.length(self.epoch)
+        begun = self.begins - length
+        unheard = begun - np.array(held.seen)
+        is_there = held.is_known & (unheard <= plan.GONE * max(20, len(unheard)))
+        links = links_between(radio_of(self.mission), held.position_m, held.spread_m, is_there)
+        known = held.before.copy()
+        for k in np.flatnonzero(~held.is_fresh):
+            known[k] = np.minimum(known[k], held.seen[k])
+            known[:, k] = np.minimum(known[:, k], held.seen[k])
+        foresight = plan.foresight_of(len(known), is_certain=not held.spread_m.any())
+        is_free = [
+            not (self.calls(h) or self.seeks(h)) for h in range(2 * begun, 2 * self.begins)
+        ] + [True] * foresight.half_windows
+        halves = (2 * known).astype(np.float32)
+        speaks = np.zeros((2 * length, len(known)), dtype=bool)
+        worth = self.scorer(links)
+        schedule(halves, 2.0 * begun, links, worth, foresight, np.array(is_free), speaks)
+        self.schedule, self.after = speaks[:, self.me].tolist(), halves.astype(float) / 2
+
+    def calls(self, half_window):
+        """Whether the discovery goes on, by its picture."""
+        return not self.current.is_complete and not self.is_late(half_window)
+
+    def seeks(self, half_window):
+        """Whether the lost are sought, by its picture: now and then."""
+        is_lacking = not all(self.current.is_fresh.tolist())
+        return (
+            self.is_late(half_window)
+            and is_lacking
+            and half_window // 2 % discovery.SEEK_EVERY == 0
+        )
+
+    def is_late(self, half_window):
+        """After some rounds, or many windows."""
+        rounds = discovery.SEEK_AFTER * len(self.order)
+        return half_window >= 2 * min(rounds, discovery.LATEST_SEEK)
+
+    def has_its_turn(self, row, half_window):
+        """Whether it is one of the group, and knows nobody near who comes before."""
+        group = self.groups[half_window % len(self.groups)]
+        if self.me not in group:
+            return False
+        here_m, reach_m = row[1][self.me], discovery.POLITE * self.mission.range_m
+        return not any(is_near(row, k, here_m, reach_m) for k in group[: group.index(self.me)])
+
+    def answers(self, row, turn, flown):
+        """Whether it tells somebody lost, whom it just heard, that it is; or calls as one lost."""
+        if self.heard is not None and not flown.is_fresh[self.heard]:
+            there_m = row[1][self.heard]
+            before = self.order[: self.order.index(self.me)]
+            return not any(
+                flown.is_fresh[k] and is_near(row, k, there_m, self.mission.range_m)
+                for k in before
+                if k != self.heard
+            )
+        lost = [k for k in self.order if not self.current.is_fresh[k]]
+        return lost[turn % len(lost)] == self.me
 
 
-def converse(minds, heard, now):
-    """One phase: all packets are written, then everyone reads the one it decoded."""
-    packets = [mind.packet() for mind in minds]
-    for mind, sender in zip(minds, heard, strict=True):
-        if sender != mind.me:
-            mind.hear(sender, packets[sender], now)
+def is_near(row, k, place_m, reach_m):
+    """Whether the buffer's owner knows k to be within reach of a place."""
+    seen, position_m, _ = row
+    return seen[k] > 0.0 and np.hypot(*(position_m[k] - place_m)) < reach_m
 
 
 def rows(buffers, i):
@@ -152,74 +212,71 @@ def rows(buffers, i):
     return [array[0, i].copy() for array in arrays]
 
 
-@dataclass
-class Flight:
-    """One mission of a planner, window by window."""
+class Flight(DecentralisedPolicy):
+    """A planner that flies one mission, and notes what it decides."""
 
-    swarm: Swarm
-    policy: DecentralisedPolicy
+    transmits_twice = True
 
-    @classmethod
-    def of(cls, mission, seed, name="planner", channel=None):
-        swarm, policy = Swarm(mission, [seed], channel=channel), make_policy(name, mission)
-        swarm.start(policy)
-        return cls(swarm=swarm, policy=policy)
+    def __init__(self, mission, seed, *, channel=None, scorer=None):
+        self.scorer = RuleOfThumb() if scorer is None else scorer
+        self.mission, self.seed = mission, seed
+        self.planner = plan_with(self.scorer, mission)
+        self.swarm = Swarm(mission, [seed], channel=channel)
+        self.spoke = []  # [half window][robot]
 
     @property
     def team(self):
-        return self.policy._teams[0]
+        return self.planner._teams[0]
 
-    def windows(self, num_windows):
-        """Flies on; yields when each window began, and whom the robots address in it."""
+    def start(self, num_robots, rngs):
+        self.planner.start(num_robots, rngs)
+
+    def recipients(self, views):
+        recipient = self.planner.recipients(views)
+        self.spoke.append((recipient != views.silence)[0])
+        return recipient
+
+    def fly(self, num_windows):
+        """Flies on, and returns who spoke in each of these half windows."""
         for _ in range(num_windows):
-            recipient = self.swarm.decide(self.policy)
-            yield int(self.swarm.now[0]), recipient[0]
-            self.swarm.exchange(recipient)
+            self.swarm.step(self)
+        return np.array(self.spoke[len(self.spoke) - 2 * num_windows :])
 
 
-def cut_off(mission, robot, windows, *, is_mute=True, is_deaf=True):
-    """The mission's radio, but in these windows nobody hears the robot, nor it anybody."""
-    radio, num_calls = radio_of(mission), 0
+class Witnessed(Flight):
+    """A flight beside minds that share nothing, which must decide the same throughout."""
 
-    def channel(position_m, recipient):
-        nonlocal num_calls
-        window, num_calls = num_calls // 2, num_calls + 1
-        heard = radio(position_m, recipient)
-        if window in windows:
-            heard = np.where((heard == robot) & is_mute, np.arange(heard.shape[1]), heard)
-            heard[:, robot] = robot if is_deaf else heard[:, robot]
-        return heard
+    def __init__(self, mission, seed, **rest):
+        super().__init__(mission, seed, **rest)
+        order, rounds = common_orders(seed, mission)
+        groups = [group for groups in rounds for group in groups]
+        self.minds = [
+            Mind(me=i, mission=mission, scorer=self.scorer, order=order, groups=groups)
+            for i in range(mission.num_robots)
+        ]
 
-    return channel
+    def recipients(self, views):
+        recipient = super().recipients(views)
+        if views.phases:
+            self.converse(views.phases[-1].heard[0].tolist())
+        half_window = round(2 * float(views.now[0]))
+        for mind in self.minds:
+            speaks = mind.speaks(rows(views.buffers, mind.me), half_window)
+            expected = (mind.me + 1) % len(self.minds) if speaks else mind.me
+            assert recipient[0, mind.me] == expected, (half_window, mind.me)
+        return recipient
 
+    def converse(self, heard):
+        """One half window: all packets are written, then everyone reads the one it decoded."""
+        packets = {
+            i: copy.deepcopy((self.minds[i].current, self.minds[i].upcoming)) for i in set(heard)
+        }
+        for mind, sender in zip(self.minds, heard, strict=True):
+            if sender == mind.me:
+                mind.hear(None, None)
+            else:
+                mind.hear(sender, copy.deepcopy(packets[sender]))
 
-def minds_of(flight, mission):
-    return [
-        Mind(
-            me=i,
-            order=flight.team._order.tolist(),
-            radio=radio_of(mission),
-            shares_pictures=flight.policy.carries_payload,
-        )
-        for i in range(mission.num_robots)
-    ]
-
-
-def thinks_alike(mission, seed, name, num_windows, channel=None):
-    """Flies the planner beside minds that share nothing, which must decide the same throughout.
-
-    Returns:
-        The minds, and how often one took over a better picture amid an epoch.
-    """
-    flight = Flight.of(mission, seed, name, channel)
-    minds, num_taken = minds_of(flight, mission), 0
-    for now, recipient in flight.windows(num_windows):
-        for phase in flight.swarm.phases:
-            before = [mind.current for mind in minds]
-            converse(minds, phase.heard[0].tolist(), float(now))
-            num_taken += sum(
-                mind.current is not old for mind, old in zip(minds, before, strict=True)
-            )
-        decided = [mind.decide(rows(flight.swarm.buffers, mind.me), float(now)) for mind in minds]
-        assert decided == recipient.tolist(), f"window {now}"
-    return minds, num_taken
+    @property
+    def num_taken(self):
+        return sum(mind.took_over for mind in self.minds)

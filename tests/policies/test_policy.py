@@ -14,6 +14,7 @@ from swarm_mj.policies import (
     InnovationGossip,
     LocalViews,
     MinimumSpanningTree,
+    Planner,
     Policy,
     RandomFlooding,
     RoundRobin,
@@ -25,11 +26,10 @@ from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.swarm import Swarm
 
 MISSION = paper("flocking", num_robots=8)
-DECENTRALISED = [
-    name for name in POLICIES if isinstance(make_policy(name, MISSION), DecentralisedPolicy)
-]
+CENTRALISED = ["round-robin", "mst", "oracle", "oracle-lookahead"]
+DECENTRALISED = [name for name in POLICIES if name not in CENTRALISED]
 # What robots learn from their packets' payload is in no view: test_planner.py holds them to Eq. 9.
-CARRIES_PAYLOAD = ["planner"]
+CARRIES_PAYLOAD = ["planner", "gnn"]
 VIEWED = [name for name in DECENTRALISED if name not in CARRIES_PAYLOAD]
 ROW = 3  # the robot whose knowledge the law keeps
 
@@ -140,7 +140,8 @@ def test_eq9_the_law_above_tells_cheats_from_honest_policies(cheat, honest):
 @pytest.mark.parametrize("name", POLICIES)
 def test_every_named_policy_is_of_one_kind(name):
     policy = make_policy(name, MISSION)
-    assert isinstance(policy, DecentralisedPolicy) != isinstance(policy, CentralisedPolicy)
+    assert isinstance(policy, CentralisedPolicy) == (name in CENTRALISED)
+    assert isinstance(policy, DecentralisedPolicy) == (name in DECENTRALISED)
 
 
 @pytest.mark.parametrize("kind", [DecentralisedPolicy, CentralisedPolicy])
@@ -173,6 +174,8 @@ def test_alg1_silence_is_addressing_oneself():
         ("gossip", InnovationGossip, 0.2),
         ("tdma", Tdma, None),
         ("spatial-tdma", SpatialTdma, None),
+        ("planner", Planner, None),
+        ("gnn", Planner, None),
     ],
 )
 def test_policies_by_name(name, kind, probability):
@@ -240,7 +243,7 @@ def test_probability_is_tuned_by_default_and_named(name, preset):
     assert make_policy(name, mission, 0.17).parameters == {"probability": 0.17}
 
 
-@pytest.mark.parametrize("name", ["round-robin", "tdma", "spatial-tdma"])
+@pytest.mark.parametrize("name", ["round-robin", "tdma", "spatial-tdma", "planner"])
 def test_a_schedule_has_no_probability(name):
     assert make_policy(name, MISSION).parameters == {}
     with pytest.raises(ValueError, match=f"{name} takes no transmission probability"):
