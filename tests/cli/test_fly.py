@@ -29,7 +29,7 @@ def test_the_default_flight_leaves_a_replay_of_the_default_mission(swarm_mj, tmp
     assert done.returncode == 0, done.stderr
     (replay,) = (tmp_path / "replays").iterdir()
     assert f"replay replays/{replay.name}" in done.stdout
-    assert "flocking, mst, 40 robots" in done.stdout
+    assert "flocking, gnn, 40 robots" in done.stdout
     assert len(windows(replay)) == 500
     assert replay.stat().st_size < 5e6
 
@@ -60,7 +60,8 @@ def test_a_summary_is_what_the_library_computes(swarm_mj, tmp_path):
 
 
 def test_what_never_happened_is_null(swarm_mj, tmp_path):
-    done = swarm_mj("fly", *SHORT, "--probability", 0, "--no-record", "--json", "s.json")
+    options = ("--policy", "mst", "--probability", 0)
+    done = swarm_mj("fly", *SHORT, *options, "--no-record", "--json", "s.json")
     assert done.returncode == 0
     assert json.loads((tmp_path / "s.json").read_text())["complete_window"] is None
     assert "never" in done.stdout
@@ -75,7 +76,8 @@ def test_every_task_and_preset_flies(swarm_mj, tmp_path, task, preset):
 
 
 def test_robots_can_be_switched_off(swarm_mj, tmp_path):
-    options = ("--task", "stationary", "--seed", 7, "--probability", 0.3, "--switched-off", 0.5)
+    options = ("--task", "stationary", "--seed", 7, "--policy", "mst", "--probability", 0.3)
+    options += ("--switched-off", 0.5)
     done = swarm_mj("fly", *SHORT, *options, "--record", "a.rrd", "--json", "a.json")
     assert done.returncode == 0, done.stderr
     assert "stationary, mst, 6 robots, 50% of them off half-way, seed 7" in done.stdout
@@ -131,7 +133,7 @@ def test_contact_physics_flies(swarm_mj, tmp_path, boundary):
         (["--preset", "mine"], "preset must be one of paper, reference, not 'mine'"),
         (["--physics", "quantum"], "physics must be one of exact, contact, not 'quantum'"),
         (["--boundary", "torus"], "boundary must be one of reflect, none, not 'torus'"),
-        (["--probability", "1.5"], "probability must be from 0 to 1, not 1.5"),
+        (["--policy", "mst", "--probability", "1.5"], "probability must be from 0 to 1, not 1.5"),
         (["--policy", "round-robin", "--probability", "0.1"], "takes no transmission probability"),
         (["--seed", "-1"], "not [-1]"),
         (["--seed", "18446744073709551616"], "from 0 to 9223372036854775807"),
@@ -177,7 +179,8 @@ def test_odd_names_are_kept_and_quoted(swarm_mj, tmp_path):
 
 def test_the_summary_names_the_tuned_probability(swarm_mj, tmp_path):
     """Not that of the tiny mission which is flown ahead to compile."""
-    swarm_mj("fly", *SHORT, "--no-record", "--json", "s.json", "--observer", 2)
+    options = ("--policy", "mst", "--observer", 2)
+    swarm_mj("fly", *SHORT, *options, "--no-record", "--json", "s.json")
     config = json.loads((tmp_path / "s.json").read_text())["config"]
     mission = paper("flocking", num_robots=6, range_ratio=0.5)
     assert config["probability"] == tuned_probability("mst", mission)

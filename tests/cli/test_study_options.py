@@ -10,12 +10,12 @@ def study(*arguments):
     return study_of(make_parser().parse_args(["evaluate", *map(str, arguments)]))
 
 
-def test_the_default_is_the_papers_baselines_on_the_papers_flocks():
+def test_the_default_is_the_shipped_policy_and_the_papers_baselines_on_the_papers_flocks():
     default = study()
-    assert default.policies == ("random-flooding", "round-robin", "mst")
+    assert default.policies == ("gnn", "random-flooding", "round-robin", "mst")
     assert default.regimes == (paper("flocking"),)
     assert default.regimes[0].boundary == "none"
-    assert (default.episodes, default.seed, default.compared_to) == (100, 1000, "random-flooding")
+    assert (default.episodes, default.seed, default.compared_to) == (100, 1000, "gnn")
 
 
 def test_sweeps_multiply_and_values_follow_one_flag_or_several():
