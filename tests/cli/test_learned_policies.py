@@ -70,7 +70,7 @@ def test_the_mode_is_flown_on_request(runs):
         (["fly", "--policy", "runs/x"], "runs/x is a run; name the policy in it, runs/x/policy"),
         (["fly", "--policy", "runs/y/config.json"], "is a file; name the directory"),
         (["fly", "--policy", "runs/y", "--probability", "0.1"], "takes no transmission probab"),
-        (["fly", "--policy", "mst", "--deterministic"], "mst is not learned; only learned"),
+        (["fly", "--policy", "mst", "--deterministic"], "mst draws from no network"),
         (["evaluate", "--policy", "mst", "--deterministic"], "none is among mst; leave it out"),
         (["evaluate", "--policy", "mst", "runs/z"], "policy runs/z does not exist"),
         (["evaluate", "--policy", "runs/y", "--probability", "0.1"], "takes no transmission prob"),
