@@ -75,5 +75,5 @@ def test_only_a_learned_policy_is_made_deterministic():
     policy = make_policy("mine", MISSION, is_deterministic=True)
     assert policy.parameters["is_deterministic"] is True
     for name in POLICIES:
-        with pytest.raises(ValueError, match=f"{name} is not learned; only learned policies can"):
+        with pytest.raises(ValueError, match=f"{name} draws from no network"):
             make_policy(name, MISSION, is_deterministic=True)
