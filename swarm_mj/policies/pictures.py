@@ -9,6 +9,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 FORESIGHT = 15.0  # windows that a robot is expected to keep its velocity for
+# Where nobody moves and fewer than this share are fresh, robots are not lost but fly by plans that
+# differ; pictures of the same places must then come to the same plan, whoever is fresh in them.
+WHOLE = 0.75
 SPREAD = 0.45  # of the distance that robots apart in velocity cover: how far beliefs are off
 
 
@@ -61,11 +64,14 @@ def freeze(
     variance = np.sum(apart_mps**2, axis=(1, 2)) / num_known
     is_fresh = is_known & (age <= fresh_windows)
     num_fresh = np.maximum(np.sum(is_fresh, axis=1), 1)  # a robot that is off grows old to itself
+    spread_m = SPREAD * np.sqrt(variance)[:, None] * window_s * ahead
+    rests = np.all(is_known, axis=1) & ~np.any(spread_m, axis=1)
+    is_divided = rests & (num_fresh < WHOLE * is_known.shape[1])
     return Pictures(
         is_known=is_known.copy(),
-        is_fresh=is_fresh,
+        is_fresh=is_fresh | is_divided[:, None],
         position_m=position_m + velocity_mps * np.minimum(ahead, FORESIGHT)[..., None] * window_s,
-        spread_m=SPREAD * np.sqrt(variance)[:, None] * window_s * ahead,
+        spread_m=spread_m,
         timestamp=timestamp.copy(),
         rank=np.argsort(np.lexsort((np.sum(age * is_fresh, axis=1) / num_fresh, -num_fresh))),
     )

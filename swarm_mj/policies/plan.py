@@ -58,7 +58,10 @@ class Plan:
         is_known, is_fresh = pictures.is_known[whose], pictures.is_fresh[whose]
         is_gone = now - pictures.timestamp[whose] > GONE * max(len(timestamp), SHORTEST_ROUND)
         self._links = links_between(
-            radio, pictures.position_m[whose], pictures.spread_m[whose], is_known & ~is_gone
+            radio,
+            pictures.position_m[whose],
+            pictures.spread_m[whose],
+            is_known & ~(is_gone & ~is_fresh),
         )
         self._worth = scorer(self._links)
         is_certain = not np.any(pictures.spread_m[whose])

@@ -44,6 +44,7 @@ FIRST_EPOCH = 1.0  # rounds of N windows: before the first pictures are made
 EARLY_EPOCH = 0.25  # rounds: the two epochs after it
 EPOCH = 0.5  # rounds: all others; a picture must reach all of a team
 SHORTEST_EPOCH = 10  # windows
+FORGET_EVERY = 5  # epochs: how often resting teams plan anew, so that divided ones agree again
 FRESH = 1.0  # rounds without news, after which a robot is sought
 
 
@@ -201,6 +202,8 @@ class _Team:
         """The plan that follows from someone's picture."""
         if whose not in self._plans and self._current is not None:
             before = self._ended.get(int(self._ended_continues[whose]))
+            if self._epoch % FORGET_EVERY == 0 and not np.any(self._current.spread_m[whose]):
+                before = None
             start = self._start(self._epoch)
             half_windows = HALVES * start + np.arange(HALVES * self._length(self._epoch))
             is_complete = bool(np.all(self._current.is_known[whose]))
@@ -210,7 +213,7 @@ class _Team:
                 self._scorer,
                 self._current,
                 whose,
-                before.outcome() if before else np.full(is_fresh.shape * 2, NEVER),
+                np.full(is_fresh.shape * 2, NEVER) if before is None else before.outcome(),
                 start + (self._first or 0.0),
                 np.array([self._is_free(int(h), is_complete, is_fresh) for h in half_windows]),
             )

@@ -129,9 +129,10 @@ class Mind:
         ahead = np.array(age) + windows_ahead
         moves_s = np.minimum(ahead, pictures.FORESIGHT) * window_s
         robots, empty = np.arange(num_robots), np.zeros((num_robots, num_robots))
+        is_divided = len(known) == num_robots and off == 0.0 and len(fresh) < 0.75 * num_robots
         return Picture(
             is_known=np.isin(robots, known),
-            is_fresh=np.isin(robots, fresh),
+            is_fresh=np.isin(robots, known if is_divided else fresh),
             position_m=position_m + velocity_mps * moves_s[:, None],
             spread_m=pictures.SPREAD * np.sqrt(off / len(known)) * window_s * ahead,
             seen=seen,
@@ -144,9 +145,11 @@ class Mind:
         held, length = self.current, self.length(self.epoch)
         begun = self.begins - length
         unheard = begun - np.array(held.seen)
-        is_there = held.is_known & (unheard <= plan.GONE * max(20, len(unheard)))
+        is_near = unheard <= plan.GONE * max(20, len(unheard))
+        is_there = held.is_known & (is_near | held.is_fresh)
         links = links_between(radio_of(self.mission), held.position_m, held.spread_m, is_there)
-        known = held.before.copy()
+        rests = not held.spread_m.any()
+        known = held.before * (not (rests and self.epoch % planner.FORGET_EVERY == 0))
         for k in np.flatnonzero(~held.is_fresh):
             known[k] = np.minimum(known[k], held.seen[k])
             known[:, k] = np.minimum(known[:, k], held.seen[k])
