@@ -104,10 +104,19 @@ def test_who_was_not_heard_of_for_long_does_not_count(fresh_windows, rank, num_f
 def test_who_does_not_even_observe_itself_ranks_last():
     """Robot 0 was switched off at t = 5 and knows all, as of then."""
     timestamp = np.array([[5.0, 5.0, 5.0], [5.0, 20.0, 18.0], [5.0, 16.0, 20.0]])
-    nothing = np.zeros((3, 3, 2))
-    pictures = freeze(nothing, nothing, timestamp, timestamp > 0.0, NOW, 0.1, 5.0, 10.0)
+    nothing, moving = np.zeros((3, 3, 2)), np.eye(3)[..., None] * np.ones(2)
+    pictures = freeze(nothing, moving, timestamp, timestamp > 0.0, NOW, 0.1, 5.0, 10.0)
     assert pictures.rank.tolist() == [2, 0, 1]
     assert np.sum(pictures.is_fresh, axis=1).tolist() == [0, 2, 2]
+
+
+def test_where_nobody_moves_and_many_are_stale_all_count_as_fresh():
+    """Two of three are fresh, fewer than three quarters: the team is divided, nobody is lost."""
+    timestamp = np.array([[20.0, 5.0, 18.0], [5.0, 20.0, 18.0], [19.0, 16.0, 20.0]])
+    nothing = np.zeros((3, 3, 2))
+    pictures = freeze(nothing, nothing, timestamp, timestamp > 0.0, NOW, 0.1, 5.0, 10.0)
+    assert np.all(pictures.is_fresh)
+    assert pictures.rank.tolist() == [1, 2, 0]  # which still counts who is
 
 
 def test_pictures_as_good_rank_by_identity():

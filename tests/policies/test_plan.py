@@ -210,7 +210,7 @@ def test_who_was_not_heard_of_for_three_rounds_is_planned_without():
     free = np.ones(24, dtype=bool)
     whole = Plan(team.radio, RuleOfThumb(), pictures, 0, team.timestamp, now, free)
     assert all_speakers(whole)[:, 2].any()
-    pictures.timestamp[0, 2] = 1.0
+    pictures.timestamp[0, 2], pictures.is_fresh[0, 2] = 1.0, False
     without = Plan(team.radio, RuleOfThumb(), pictures, 0, team.timestamp, now, free)
     assert not all_speakers(without)[:, 2].any()
 
