@@ -24,9 +24,9 @@ QUESTIONS = {
     "reference-walking": "--preset reference --task random-walk --robots 10 40 --episodes 20",
     "reference-flocking": "--preset reference --task flocking --episodes 20",
     "contact": "--physics contact --task random-walk --episodes 10",
-    "ranges": "--task stationary --range-ratio 0.18 0.3 0.4 --episodes 20",
-    "speeds": "--task random-walk --velocity-ratio 0.05 0.3 0.5 --episodes 20",
-    "team-sizes": "--task stationary --robots 10 20 80 120 200 --episodes 10",
+    "ranges": "--task stationary --range-ratio 0.18 0.3 0.4 --episodes 10",
+    "speeds": "--task random-walk --velocity-ratio 0.05 0.3 0.5 --episodes 10",
+    "team-sizes": "--task stationary --robots 10 20 80 120 200 --episodes 6",
 }
 # The oracle goes on addressing robots that are off, and takes minutes a mission of 200 robots.
 WITHOUT_ORACLE = ("switched-off", "switched-off-walking", "team-sizes")

@@ -25,6 +25,8 @@ FIXED = {
 RING = 1.6  # a published marker's size, of ours
 HEADROOM = 0.06  # of the axis, beyond the highest and the lowest curve
 
+SHORT = 7  # of a commit's digits
+
 
 def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
     """A result figure of the paper, ours and the published curves.
@@ -56,14 +58,17 @@ def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
             _fill(axes, figure, panel, curves(figure, panel.cost, found))
         grid[-1, 0].set_xlabel(figure.x_label)
         _head(drawing, figure, found[0], height_in)
-        drawing.text(LEFT, 0.12 / height_in, caption(figure, found[0]), fontsize=7, color=FAINT)
+        drawing.text(LEFT, 0.12 / height_in, caption(figure, found), fontsize=7, color=FAINT)
     return drawing
 
 
-def caption(figure: ResultFigure, result: Result) -> str:
-    """Where the numbers come from, from any of the figure's results."""
+def caption(figure: ResultFigure, results: Sequence[Result]) -> str:
+    """Where the numbers come from, with all commits that made some."""
+    result = results[0]
     last = result.seed + result.episodes - 1
-    code = f"swarm_mj {result.version}" + (f", commit {result.commit}" if result.commit else "")
+    commits = list(dict.fromkeys(each.commit[:SHORT] for each in results if each.commit))
+    noun = "commit" if len(commits) == 1 else "commits"
+    code = f"swarm_mj {result.version}" + (f", {noun} {', '.join(commits)}" if commits else "")
     return (
         f"{figure.name}, preset {result.preset}: {result.episodes} episodes, seeds {result.seed} "
         f"to {last}, {result.num_windows} windows each; {code}"

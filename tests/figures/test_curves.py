@@ -8,6 +8,7 @@ from synthetic import altered, everything, result, sweep
 
 from swarm_mj.figures.contents import RESULT_FIGURES
 from swarm_mj.figures.curves import curves, preset_of, results_of
+from swarm_mj.figures.drawing import caption
 
 FIG3, FIG4, FIG5, FIG6 = RESULT_FIGURES.values()
 
@@ -86,7 +87,6 @@ def test_a_single_episode_has_no_error():
         ("episodes", 7, "one episodes, not 4 .tdma at range_ratio 0.25. and 7"),
         ("seed", 51, "one seed, not 50"),
         ("version", "1.2.4", r"one version, not 1\.2\.3"),
-        ("commit", None, "one commit, not abc123 .* and None .mst at range_ratio 0.25"),
         ("num_windows", 250, "num_windows is 500, not 250"),
         ("boundary", "none", "boundary is reflect, not none"),
         ("physics", "contact", "physics is exact, not contact"),
@@ -138,3 +138,10 @@ def test_a_config_that_is_no_json_object_is_refused(config):
 def test_costs_that_cannot_be_are_refused():
     with pytest.raises(ValueError, match=r"aoi_mean must be above 0, not 0 \(mst at range_ratio"):
         found(FIG4, [result("mst", aoi_mean=0.0)])
+
+
+def test_results_of_several_commits_are_drawn_and_all_named():
+    mixed = altered([result("tdma"), result("mst")], commit="def456")
+    assert found(FIG4, mixed)
+    assert "commits abc123, def456" in caption(FIG4, mixed)
+    assert "commit abc123" in caption(FIG4, mixed[:1])
