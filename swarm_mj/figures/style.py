@@ -73,7 +73,7 @@ LOOKS = {
     "gossip": Look(label="gossip", colour="#882255", marker="P", size=5.0),
     "tdma": Look(label="TDMA", colour="#0072b2", marker="D", size=4.0),
     "spatial-tdma": Look(label="spatial TDMA", colour="#332288", marker="h", size=5.5),
-    "planner": Look(label="planner", colour="#a05a2c", marker="d"),
+    "planner": Look(label="planner", colour="#80391e", marker="d"),
     "gnn": Look(label="gnn (ours)", colour="#d55e00", marker="*", size=8.0),
     "oracle": Look(label="greedy oracle", colour="#000000", marker=".", size=5.0, width=0.8),
     "GNN": Look(label="GNN", colour="#cc79a7", marker="X"),

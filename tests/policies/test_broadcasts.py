@@ -77,10 +77,10 @@ def received(links, speakers, j):
     return sender, 1.0 / (1.0 + math.exp(-1.702 * deviations))
 
 
-def worth_of(known, now, links, worth, speakers):
+def worth_of(known, now, links, worth, speakers, receivers=None):
     """The worth of a half window: the sum over receivers and subjects of r (w + w' r + w'' a)."""
     total, subjects = 0.0, range(len(known))
-    for j in subjects:
+    for j in subjects if receivers is None else receivers:
         sender, chance = received(links, speakers, j)
         for k in subjects if chance else ():
             r = max(known[sender][k] - known[j][k], 0.0)
@@ -93,7 +93,11 @@ def choices(known, now, links, worth, first=(), tolerance=0.0):
     """The speakers by greed; several answers where candidates are as good up to a tolerance."""
     speakers = list(first)
     value = worth_of(known, now, links, worth, speakers)
-    others = [i for i in range(len(known)) if i not in speakers]
+    robots = range(len(known))
+    has_news = {
+        i for i in robots if any(worth_of(known, now, links, worth, [i], [j]) > 0.0 for j in robots)
+    }
+    others = [i for i in robots if i in has_news and i not in speakers]
     values = {i: worth_of(known, now, links, worth, [*speakers, i]) for i in others}
     enough = {i: v for i, v in values.items() if v > value * worth.least_share - tolerance}
     best = max(enough.values(), default=-math.inf)
