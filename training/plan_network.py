@@ -119,7 +119,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="of the training (default: 1)")
     parser.add_argument("--step-size", type=float, default=0.015, help="the first (default: 0.015)")
     options = parser.parse_args()
-    if options.minutes <= 0.0 or options.seed < 0 or options.step_size <= 0.0:
+    if not (options.minutes > 0.0 and options.seed >= 0 and options.step_size > 0.0):
         parser.error("--minutes and --step-size must be above 0, and --seed from 0")
     try:
         train(options.minutes, options.seed, options.step_size)
