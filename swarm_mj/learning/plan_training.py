@@ -6,6 +6,7 @@ The network begins by imitating `RuleOfThumb`, by gradient descent. CMA-ES (Hans
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import cma
@@ -104,8 +105,12 @@ class PlanTraining:
 
     def measure(self) -> float:
         """The age that the mean's plans leave on held-out teams, relative to the rule's."""
-        rule = ages(self._held_out, RuleOfThumb())
-        return relative(self._held_out, rule, _network(self.mean))
+        return relative(self._held_out, self._held_out_rule, _network(self.mean))
+
+    @cached_property
+    def _held_out_rule(self) -> Float[np.ndarray, "K"]:
+        """The rule's ages on the held-out teams, which never change."""
+        return ages(self._held_out, RuleOfThumb())
 
     def _tell(self, candidates: Float[np.ndarray, "P S"], losses: Float[np.ndarray, "P"]) -> None:
         self._evolution.tell(list(candidates), list(losses))

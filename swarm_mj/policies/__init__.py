@@ -167,13 +167,13 @@ def make_policy(
         OSError: A learned policy cannot be read.
     """
     if is_learned(name):
+        _refuse(probability, name)
+        if is_scorer(Path(name)):
+            if is_deterministic:
+                raise ValueError(f"{name} draws nothing; leave --deterministic out")
+            return plan_with(load_scorer(Path(name)), mission)
         from swarm_mj.policies.stored import load_policy  # torch takes its time to import
 
-        _refuse(probability, name)
-        if is_scorer(Path(name)) and is_deterministic:
-            raise ValueError(f"{name} draws nothing; leave --deterministic out")
-        if is_scorer(Path(name)):
-            return plan_with(load_scorer(Path(name)), mission)
         return load_policy(Path(name), mission, is_deterministic=is_deterministic)
     if name not in POLICIES:
         raise ValueError(

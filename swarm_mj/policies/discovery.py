@@ -106,7 +106,6 @@ class Discovery:
             found = heard[i]
             could = self._are_near(buffers, b, i, buffers.position_m[b, i, found], 1.0)
             could &= was_fresh[i]
-            could[found] = False
             speaks[i] = not np.any(could & (self._place < self._place[i]))
         return speaks
 
