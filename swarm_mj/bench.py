@@ -22,7 +22,7 @@ from swarm_mj.policies import RoundRobin, make_policy
 from swarm_mj.policies.pictures import freeze
 from swarm_mj.policies.plan import Plan
 from swarm_mj.policies.planner import regular_length
-from swarm_mj.policies.stored_scorer import shipped_scorer
+from swarm_mj.policies.worth import RuleOfThumb
 from swarm_mj.protocol import window
 from swarm_mj.published import BASELINES
 from swarm_mj.scene import compose
@@ -118,11 +118,11 @@ def bench_evaluation(episodes: int, *, num_jobs: int = 2, seconds: float = 2.0) 
     Returns:
         The timing.
     """
-    for policy in (*BASELINES, "oracle"):  # compiles, if it never has
+    for policy in (*BASELINES, "greedy-oracle"):  # compiles, if it never has
         _fly(Study(policies=(policy,), regimes=(replace(MISSION, num_windows=1),), episodes=1), 1)
     baselines = Study(policies=BASELINES, regimes=(MISSION,), episodes=episodes)
     num_oracles = min(episodes, ORACLE_EPISODES)
-    oracle = Study(policies=("oracle",), regimes=(MISSION,), episodes=num_oracles)
+    oracle = Study(policies=("greedy-oracle",), regimes=(MISSION,), episodes=num_oracles)
     return EvaluationTiming(
         episodes=episodes,
         num_jobs=num_jobs,
@@ -153,7 +153,7 @@ def _planning(mission: Mission) -> Callable[[], object]:
     for _ in range(2 * mission.num_robots):
         swarm.step(tdma)
     buffers, now = swarm.buffers, float(swarm.now[0])
-    radio, scorer = radio_of(mission), shipped_scorer()
+    radio, scorer = radio_of(mission), RuleOfThumb()
 
     def plan() -> object:
         pictures = freeze(

@@ -36,7 +36,7 @@ WITHOUT_ORACLE = ("switched-off", "switched-off-walking", "team-sizes")
 class Settings:
     """What is flown, and on which missions."""
 
-    policies: tuple[str, ...] = ("tdma", "gnn")
+    policies: tuple[str, ...] = ("tdma", "planner")
     first_seed: int = 2000
 
 
@@ -46,7 +46,7 @@ def answer(settings: Settings, jobs: int, *, force: bool) -> int:
         path = RESULTS / f"{name}.csv"
         if path.exists() and not force:
             continue
-        policies = [*settings.policies, *(() if name in WITHOUT_ORACLE else ("oracle",))]
+        policies = [*settings.policies, *(() if name in WITHOUT_ORACLE else ("greedy-oracle",))]
         command = ["evaluate", "--policy", *policies, *options.split()]
         command += ["--seed", str(settings.first_seed), "--jobs", str(jobs)]
         code = swarm_mj([*command, "--csv", str(path), "--force"])

@@ -56,7 +56,7 @@ def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no publi
     parser.add_argument(
         "--policy",
         type=normalised,
-        default="gnn",
+        default="planner",
         help=f"who talks to whom: {', '.join(POLICIES)}, or a directory with a learned policy",
     )
     parser.add_argument(

@@ -11,7 +11,7 @@ from swarm_mj.mission import PRESETS, Boundary, Mission, PhysicsMode, Task
 from swarm_mj.policies import POLICIES, normalised
 from swarm_mj.published import BASELINES
 
-DEFAULT_POLICIES = ("gnn", *BASELINES)
+DEFAULT_POLICIES = ("planner", *BASELINES)
 
 
 def add_study_options(parser: argparse.ArgumentParser) -> None:

@@ -25,10 +25,9 @@ DRAWN = (
     "gossip",
     "spatial-tdma",
     "planner",
-    "gnn",
-    "oracle",
+    "greedy-oracle",
 )
-PAPER_ONLY = ("planner", "gnn")
+PAPER_ONLY = ("planner",)
 Scale = Literal["linear", "log"]
 
 

@@ -1,6 +1,6 @@
 """Communication policies (IV-C), one file each, and the one table of their names.
 
-A learned policy has no name but that of the directory that holds it, except the shipped one, `gnn`.
+A learned policy has no name but that of the directory that holds it.
 """
 
 import os
@@ -18,10 +18,9 @@ from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Loc
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.round_robin import RoundRobin
 from swarm_mj.policies.spatial_tdma import SpatialTdma
-from swarm_mj.policies.stored_scorer import is_scorer, load_scorer, shipped_scorer
 from swarm_mj.policies.tdma import Tdma
 from swarm_mj.policies.tuning import tuned_probability
-from swarm_mj.policies.worth import RuleOfThumb, Scorer
+from swarm_mj.policies.worth import RuleOfThumb
 from swarm_mj.radio import from_db
 
 __all__ = [
@@ -83,16 +82,17 @@ def _spatial_tdma(mission: Mission, probability: float | None) -> Policy:
 
 def _planner(mission: Mission, probability: float | None) -> Policy:
     _refuse(probability, "planner")
-    return plan_with(RuleOfThumb(), mission)
-
-
-def _gnn(mission: Mission, probability: float | None) -> Policy:
-    _refuse(probability, "gnn")
-    return plan_with(shipped_scorer(), mission)
+    return Planner(
+        radio_of(mission),
+        RuleOfThumb(),
+        window_s=mission.window_s,
+        range_m=mission.range_m,
+        side_m=mission.side_m,
+    )
 
 
 def _oracle(mission: Mission, probability: float | None) -> Policy:
-    _refuse(probability, "oracle")
+    _refuse(probability, "greedy-oracle")
     return GreedyOracle(radio_of(mission))
 
 
@@ -110,21 +110,9 @@ POLICIES: dict[str, Callable[[Mission, float | None], Policy]] = {
     "tdma": _tdma,
     "spatial-tdma": _spatial_tdma,
     "planner": _planner,
-    "gnn": _gnn,
-    "oracle": _oracle,
+    "greedy-oracle": _oracle,
     "oracle-lookahead": _oracle_lookahead,
 }
-
-
-def plan_with(scorer: Scorer, mission: Mission) -> Planner:
-    """The planner of a mission, with a scorer that says what news is worth."""
-    return Planner(
-        radio_of(mission),
-        scorer,
-        window_s=mission.window_s,
-        range_m=mission.range_m,
-        side_m=mission.side_m,
-    )
 
 
 def is_learned(name: str) -> bool:
@@ -168,10 +156,6 @@ def make_policy(
     """
     if is_learned(name):
         _refuse(probability, name)
-        if is_scorer(Path(name)):
-            if is_deterministic:
-                raise ValueError(f"{name} draws nothing; leave --deterministic out")
-            return plan_with(load_scorer(Path(name)), mission)
         from swarm_mj.policies.stored import load_policy  # torch takes its time to import
 
         return load_policy(Path(name), mission, is_deterministic=is_deterministic)

@@ -46,7 +46,7 @@ def test_bench_prints_the_whole_and_its_parts(swarm_mj):
     for row in (
         "Evaluation: 1 random walks",
         "random-flooding, round-robin, mst; 2 jobs",
-        "oracle",
+        "greedy-oracle",
     ):
         assert row in done.stdout
 

@@ -75,7 +75,7 @@ def test_a_figure_without_points_is_named_with_its_command_and_none_is_written(s
     line = refusal(swarm_mj("figures", "some.csv", "--out", ".", "--figure", "fig4", "fig6"))
     assert "fig6 has no points" in line
     assert "swarm-mj evaluate --policy tdma " in line
-    assert " oracle --task flocking --preset reference" in line
+    assert " greedy-oracle --task flocking --preset reference" in line
     assert [path.name for path in tmp_path.iterdir()] == ["some.csv"]
 
 

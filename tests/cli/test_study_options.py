@@ -12,10 +12,10 @@ def study(*arguments):
 
 def test_the_default_is_the_shipped_policy_and_the_papers_baselines_on_the_papers_flocks():
     default = study()
-    assert default.policies == ("gnn", "random-flooding", "round-robin", "mst")
+    assert default.policies == ("planner", "random-flooding", "round-robin", "mst")
     assert default.regimes == (paper("flocking"),)
     assert default.regimes[0].boundary == "none"
-    assert (default.episodes, default.seed, default.compared_to) == (100, 1000, "gnn")
+    assert (default.episodes, default.seed, default.compared_to) == (100, 1000, "planner")
 
 
 def test_sweeps_multiply_and_values_follow_one_flag_or_several():

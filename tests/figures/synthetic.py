@@ -36,7 +36,7 @@ def everything(preset="reference"):
         result("tdma", preset=preset, aoi_mean=26.0, aoi_sem=0.25),
         result("tdma", "random-walk", preset, aoi_mean=12.0, aoi_sem=0.3, num_robots=20),
         result(
-            "oracle",
+            "greedy-oracle",
             "flocking",
             preset,
             aoi_mean=12.0,

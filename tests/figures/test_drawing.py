@@ -126,7 +126,9 @@ def test_title_regime_and_caption_say_what_is_shown(figure):
 
 
 def test_ticks_are_the_published_places_and_all_curves_are_inside():
-    (axes,) = draw(FIG4, sweep("oracle", "range_ratio", {0.2: (20.0, 0.5), 0.3: (11.0, 0.1)})).axes
+    (axes,) = draw(
+        FIG4, sweep("greedy-oracle", "range_ratio", {0.2: (20.0, 0.5), 0.3: (11.0, 0.1)})
+    ).axes
     np.testing.assert_array_equal(axes.get_xticks(), [0.2, 0.25, 0.3, 0.5, 0.75, 1.0])
     low, high = axes.get_ylim()
     assert low < 8.57
@@ -149,7 +151,7 @@ def test_nothing_that_is_written_overlaps_or_leaves_the_page():
 
 
 def test_the_oracle_is_a_thin_black_line():
-    (axes,) = draw(FIG4, sweep("oracle", "range_ratio", {0.2: (20.0, 0.5)})).axes
+    (axes,) = draw(FIG4, sweep("greedy-oracle", "range_ratio", {0.2: (20.0, 0.5)})).axes
     line, _, _ = bars(axes)["greedy oracle"]
     others = [
         other.get_linewidth()

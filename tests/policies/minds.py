@@ -11,7 +11,7 @@ import numpy as np
 
 from swarm_mj.channel import radio_of
 from swarm_mj.mission import Mission
-from swarm_mj.policies import DecentralisedPolicy, discovery, pictures, plan, plan_with, planner
+from swarm_mj.policies import DecentralisedPolicy, discovery, make_policy, pictures, plan, planner
 from swarm_mj.policies.broadcasts import schedule
 from swarm_mj.policies.schedule import links_between
 from swarm_mj.policies.worth import RuleOfThumb, Scorer
@@ -220,10 +220,10 @@ class Flight(DecentralisedPolicy):
 
     transmits_twice = True
 
-    def __init__(self, mission, seed, *, channel=None, scorer=None):
-        self.scorer = RuleOfThumb() if scorer is None else scorer
+    def __init__(self, mission, seed, *, channel=None):
+        self.scorer = RuleOfThumb()
         self.mission, self.seed = mission, seed
-        self.planner = plan_with(self.scorer, mission)
+        self.planner = make_policy("planner", mission)
         self.swarm = Swarm(mission, [seed], channel=channel)
         self.spoke = []  # [half window][robot]
 

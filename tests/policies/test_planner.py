@@ -9,7 +9,6 @@ from swarm_mj.mission import paper, reference
 from swarm_mj.policies import discovery, make_policy, plan, planner
 from swarm_mj.policies.broadcasts import Foresight
 from swarm_mj.policies.planner import epoch_starts, regular_length
-from swarm_mj.policies.worth_network import SHAPES, WorthNetwork
 from swarm_mj.swarm import Swarm
 
 TASKS = ["stationary", "random-walk", "flocking"]
@@ -86,17 +85,6 @@ def test_eq9_sharing_is_planning_apart_where_pictures_differ(mission, seed, chan
     flight = Witnessed(mission, seed, channel=channel)
     flight.fly(90 if mission is SMALL else 60)
     assert flight.num_taken > 0
-
-
-def test_eq9_sharing_is_planning_apart_whatever_news_is_worth():
-    """With a network of random weights, which is no rule of thumb."""
-    rng = np.random.default_rng(0)
-    weights = {name: rng.standard_normal(shape) for name, shape in SHAPES.items()}
-    mission = paper("random-walk", num_robots=10)
-    network, rule = Witnessed(mission, 5, scorer=WorthNetwork(weights, "")), Flight(mission, 5)
-    assert np.any(network.fly(40) != rule.fly(40))
-    assert network.planner.parameters == {"digest": ""}
-    assert rule.planner.parameters == {}
 
 
 def test_ii_b_packets_carry_pictures_and_nobody_answers():

@@ -26,10 +26,10 @@ from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.swarm import Swarm
 
 MISSION = paper("flocking", num_robots=8)
-CENTRALISED = ["round-robin", "mst", "oracle", "oracle-lookahead"]
+CENTRALISED = ["round-robin", "mst", "greedy-oracle", "oracle-lookahead"]
 DECENTRALISED = [name for name in POLICIES if name not in CENTRALISED]
 # What robots learn from their packets' payload is in no view: test_planner.py holds them to Eq. 9.
-CARRIES_PAYLOAD = ["planner", "gnn"]
+CARRIES_PAYLOAD = ["planner"]
 VIEWED = [name for name in DECENTRALISED if name not in CARRIES_PAYLOAD]
 ROW = 3  # the robot whose knowledge the law keeps
 
@@ -175,7 +175,6 @@ def test_alg1_silence_is_addressing_oneself():
         ("tdma", Tdma, None),
         ("spatial-tdma", SpatialTdma, None),
         ("planner", Planner, None),
-        ("gnn", Planner, None),
     ],
 )
 def test_policies_by_name(name, kind, probability):

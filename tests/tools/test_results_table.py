@@ -23,7 +23,7 @@ def tool():
 def test_policies_down_the_swept_number_across_the_least_cost_first(tool, tmp_path, capsys):
     rows = [
         *sweep("mst", "range_ratio", {0.25: (43.0, 1.0), 0.5: (16.54, 0.1)}),
-        *sweep("oracle", "range_ratio", {0.5: (5.0, 0.25), 0.25: (12.04, 0.06)}),
+        *sweep("greedy-oracle", "range_ratio", {0.5: (5.0, 0.25), 0.25: (12.04, 0.06)}),
     ]
     write_csv(tmp_path / "some.csv", rows)
     assert tool.main([str(tmp_path / "some.csv")]) == 0
@@ -31,7 +31,7 @@ def test_policies_down_the_swept_number_across_the_least_cost_first(tool, tmp_pa
         "stationary, preset reference\n\n"
         "| range ratio, age of information [windows] | 0.25 | 0.5 |\n"
         "| --- | --- | --- |\n"
-        "| oracle | 12.0 ± 0.1 | 5.0 ± 0.2 |\n"
+        "| greedy-oracle | 12.0 ± 0.1 | 5.0 ± 0.2 |\n"
         "| mst | 43.0 ± 1.0 | 16.5 ± 0.1 |\n\n"
     )
 
