@@ -4,29 +4,29 @@ Source: Tolstaya, Butler, Mox, Paulos, Kumar, Ribeiro: Learning Connectivity for
 in Robot Teams. Where its text and its authors' code differ, see `mission.paper` and
 `mission.reference`. The map from the paper to the code:
 
-    II-A    Eq. 1   path loss                radio.path_loss_db
-    II-A    Eq. 2   channel gain             radio.channel_gain
-    II-A    Eq. 3   SINR                     radio.sinr
-    II-A    Eq. 4   reception                radio.is_received
-    II-B    Eq. 5   self-observation         buffers.observe_self
-    II-B    Eq. 6   channel f                radio.Channel
-    II-B    Eq. 7   last attempt             buffers.record_attempt
-    II-B    Eq. 8   merge                    buffers.merge
+    II-A    Eq. 1   path loss                radio.free_space.path_loss_db
+    II-A    Eq. 2   channel gain             radio.free_space.channel_gain
+    II-A    Eq. 3   SINR                     radio.free_space.sinr
+    II-A    Eq. 4   reception                radio.free_space.is_received
+    II-B    Eq. 5   self-observation         protocol.buffers.observe_self
+    II-B    Eq. 6   channel f                radio.free_space.Channel
+    II-B    Eq. 7   last attempt             protocol.buffers.record_attempt
+    II-B    Eq. 8   merge                    protocol.buffers.merge
     II-C    Eq. 9   local policy             policies.policy.DecentralisedPolicy
-    II-C    Eq. 10  age of information       costs.age_of_information
-    III-B   Alg. 1  the protocol's window    protocol.window
-    III-A           a buffer as a graph      graphs.graph.Graphs
-    III-A   Eq. 11  GN block                 gnn_block.gn_block
-    III-A   Eq. 12  mean aggregation         gnn_edges.EdgeSet.add_mean_
-    III-A   Eq. 13  non-linear updates       gnn_block.Core
-    III-A   Eq. 14  Aggregation GNN          gnn.AggregationGnn
-    III-C           decisions                decision.recipient_logits
+    II-C    Eq. 10  age of information       protocol.costs.age_of_information
+    III-B   Alg. 1  the protocol's window    protocol.window.window
+    III-A           a buffer as a graph      gnn.graphs.Graphs
+    III-A   Eq. 11  GN block                 gnn.block.gn_block
+    III-A   Eq. 12  mean aggregation         gnn.edges.EdgeSet.add_mean_
+    III-A   Eq. 13  non-linear updates       gnn.block.Core
+    III-A   Eq. 14  Aggregation GNN          gnn.network.AggregationGnn
+    III-C           decisions                gnn.action_distribution.recipient_logits
     III-C           PPO                      learning.run.make_model
-    IV-A    Eq. 15  dynamics                 physics.Physics.step
-    IV-A    Eq. 16  flocking control         motion.flocking
-    IV-A    Eq. 17  velocity variance        costs.velocity_variance
-    IV-B            mission specification    mission.Mission
-    IV-B            initial positions        placement.connected_positions
+    IV-A    Eq. 15  dynamics                 physics.worlds.Physics.step
+    IV-A    Eq. 16  flocking control         control.motion.flocking
+    IV-A    Eq. 17  velocity variance        protocol.costs.velocity_variance
+    IV-B            mission specification    mission.specification.Mission
+    IV-B            initial positions        mission.placement.connected_positions
     IV-C            random flooding          policies.random_flooding.RandomFlooding
     IV-C            round robin              policies.round_robin.RoundRobin
     IV-C            minimum spanning tree    policies.minimum_spanning_tree.MinimumSpanningTree

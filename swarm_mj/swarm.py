@@ -6,17 +6,19 @@ from numbers import Integral
 import numpy as np
 from jaxtyping import Bool, Int
 
-from swarm_mj.buffers import Buffers, check_robots, empty_buffers, observe_self
-from swarm_mj.channel import radio_of
-from swarm_mj.costs import WindowCosts, window_costs
+from swarm_mj.control.motion import initial_velocity, motion_of
 from swarm_mj.mission import Mission
-from swarm_mj.motion import initial_velocity, motion_of
-from swarm_mj.physics import Physics
-from swarm_mj.placement import connected_positions
-from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, LocalViews, Policy
-from swarm_mj.protocol import PHASE, Bodies, Phase, transmit, window
-from swarm_mj.radio import Channel
-from swarm_mj.switch_off import draw_is_on, first_window_without
+from swarm_mj.mission.placement import connected_positions
+from swarm_mj.mission.robot_failures import draw_is_on, first_window_without
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.physics.worlds import Physics
+from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
+from swarm_mj.protocol.buffers import Buffers, check_robots, empty_buffers, observe_self
+from swarm_mj.protocol.costs import WindowCosts, window_costs
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import PHASE, Phase, transmit, window
+from swarm_mj.radio.free_space import Channel
+from swarm_mj.radio.mission_radio import radio_of
 
 MAX_SEED = 2**63 - 1  # the largest that a replay's properties keep
 
@@ -83,7 +85,7 @@ class Swarm:
         self._started: Policy | None = None
 
     @property
-    def bodies(self) -> Bodies:
+    def bodies(self) -> RobotStates:
         """Where the robots truly are."""
         return self._physics.bodies
 

@@ -9,8 +9,8 @@ import copy
 import numpy as np
 
 from swarm_mj.mission import paper
-from swarm_mj.policies import LocalViews
-from swarm_mj.protocol import Phase
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import Phase
 from swarm_mj.swarm import Swarm
 
 NUM_ROBOTS, NUM_WINDOWS, SEEDS = 7, 60, (3, 4)

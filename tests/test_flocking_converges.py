@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from channels import to_nobody
 
-from swarm_mj.flight import fly, summarise
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies import make_policy
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.rollout import fly, summarise
 from swarm_mj.swarm import Swarm
 
 NUM_WINDOWS = 100  # in which a spread of 3 m/s shrinks to 0.1 mm/s, far above rounding errors

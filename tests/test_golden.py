@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarm_mj.buffers import empty_buffers, observe_self
-from swarm_mj.channel import radio_of
-from swarm_mj.costs import age_of_information
 from swarm_mj.mission import reference
-from swarm_mj.protocol import Bodies, window
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.protocol.buffers import empty_buffers, observe_self
+from swarm_mj.protocol.costs import age_of_information
+from swarm_mj.protocol.window import window
+from swarm_mj.radio.mission_radio import radio_of
 
 RECORDINGS = Path(__file__).parent / "golden"
 EVERY = 25  # windows between two recorded buffers
@@ -28,7 +29,7 @@ recorded_teams = pytest.mark.parametrize("name", TEAMS)
 
 def bodies(recording, row):
     state = recording["pos_vel"][row]
-    return Bodies(position_m=state[None, :, :2].copy(), velocity_mps=state[None, :, 2:].copy())
+    return RobotStates(position_m=state[None, :, :2].copy(), velocity_mps=state[None, :, 2:].copy())
 
 
 @cache

@@ -5,15 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_mj.buffers import empty_buffers
-from swarm_mj.channel import radio_of
-from swarm_mj.costs import mean_hops, window_costs
+from swarm_mj.control.motion import flocking
 from swarm_mj.mission import paper, reference
-from swarm_mj.motion import flocking
-from swarm_mj.physics import Physics
-from swarm_mj.policies import POLICIES, make_policy
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.minimum_spanning_tree import spanning_tree
-from swarm_mj.protocol import Bodies, window
+from swarm_mj.policies.registry import POLICIES, make_policy
+from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.protocol.costs import mean_hops, window_costs
+from swarm_mj.protocol.window import window
+from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.swarm import Swarm
 
 NUM_ROBOTS, NUM_WINDOWS = 9, 6
@@ -37,7 +38,7 @@ def test_renaming_the_robots_renames_everything(preset, seed):
     """Robot i of the renamed team is robot name[i] of the other one."""
     rng = np.random.default_rng(seed)
     mission = preset("flocking", num_robots=NUM_ROBOTS)
-    bodies = Bodies(
+    bodies = RobotStates(
         position_m=rng.uniform(-200.0, 200.0, (1, NUM_ROBOTS, 2)),
         velocity_mps=rng.uniform(-3.0, 3.0, (1, NUM_ROBOTS, 2)),
     )
@@ -46,7 +47,7 @@ def test_renaming_the_robots_renames_everything(preset, seed):
     recipients = np.where(is_sent, anyone, np.arange(NUM_ROBOTS))
     name = rng.permutation(NUM_ROBOTS)
     new_name = np.argsort(name)
-    renamed_bodies = Bodies(
+    renamed_bodies = RobotStates(
         position_m=bodies.position_m[:, name], velocity_mps=bodies.velocity_mps[:, name]
     )
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from swarm_mj.evaluation.published import BASELINES, points
+from swarm_mj.evaluation.results import read_results
 from swarm_mj.policies.tuning import TABLE, read_table
-from swarm_mj.published import BASELINES, points
-from swarm_mj.results import read_results
 
 RESULTS = Path(__file__).parent.parent / "training" / "results"
 OURS = [

@@ -6,13 +6,13 @@ Compiled loops do not check their indices, so a wrong shape would end the proces
 import numpy as np
 import pytest
 
-from swarm_mj.buffers import empty_buffers, merge, record_attempt
-from swarm_mj.costs import mean_hops
-from swarm_mj.flight import fly
 from swarm_mj.mission import paper
-from swarm_mj.physics import Physics
-from swarm_mj.policies import RandomFlooding
+from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.policy import Policy
+from swarm_mj.policies.random_flooding import RandomFlooding
+from swarm_mj.protocol.buffers import empty_buffers, merge, record_attempt
+from swarm_mj.protocol.costs import mean_hops
+from swarm_mj.rollout import fly
 from swarm_mj.swarm import Swarm
 
 NOW = np.ones(2)

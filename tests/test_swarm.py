@@ -4,18 +4,14 @@ import numpy as np
 import pytest
 from channels import to_nobody
 
-from swarm_mj.channel import radio_of
+from swarm_mj.control.motion import initial_velocity
 from swarm_mj.mission import paper, reference
-from swarm_mj.motion import initial_velocity
-from swarm_mj.placement import is_connected
-from swarm_mj.policies import (
-    POLICIES,
-    CentralisedPolicy,
-    DecentralisedPolicy,
-    RandomFlooding,
-    RoundRobin,
-    make_policy,
-)
+from swarm_mj.mission.placement import is_connected
+from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy
+from swarm_mj.policies.random_flooding import RandomFlooding
+from swarm_mj.policies.registry import POLICIES, make_policy
+from swarm_mj.policies.round_robin import RoundRobin
+from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.swarm import Swarm
 
 TASKS = ["stationary", "random-walk", "flocking"]

@@ -36,7 +36,10 @@ def run(installed, tmp_path, *arguments):
 
 def test_assets_come_from_the_wheel(installed, tmp_path):
     done = run(
-        installed, tmp_path, "-c", "from swarm_mj.scene import asset; print(asset('arena.xml'))"
+        installed,
+        tmp_path,
+        "-c",
+        "from swarm_mj.io.assets import asset; print(asset('arena.xml'))",
     )
     assert done.stdout.strip() == str(installed / "swarm_mj" / "assets" / "arena.xml")
 

@@ -2,8 +2,8 @@
 
 import torch
 
-from swarm_mj.gnn import AggregationGnn, GnnShape
-from swarm_mj.graphs.observers import make_observer
+from swarm_mj.gnn.feature_sets import make_observer
+from swarm_mj.gnn.network import AggregationGnn, GnnShape
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.policies.stored import save_policy

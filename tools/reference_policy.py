@@ -18,11 +18,11 @@ import torch
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.evaluation.jobs import run_jobs
 from swarm_mj.evaluation.study import Study
-from swarm_mj.gnn import AggregationGnn, GnnShape
+from swarm_mj.gnn.network import AggregationGnn, GnnShape
+from swarm_mj.io.provenance import version
 from swarm_mj.mission import reference
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.policies.stored import save_policy
-from swarm_mj.provenance import version
 
 DONE, TOO_FAR, BAD_INPUT = 0, 1, 2
 THEIR_AOI, THEIR_SEM = 37.5, 1.0  # over 100 episodes of their simulator [windows]

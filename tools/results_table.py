@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from statistics import mean
 
-from swarm_mj.published import SWEEPS
-from swarm_mj.results import Result, read_results
+from swarm_mj.evaluation.published import SWEEPS
+from swarm_mj.evaluation.results import Result, read_results
 
 DONE, BAD_INPUT = 0, 2
 COSTS = {

@@ -20,12 +20,12 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from swarm_mj.io.atomic_file import whole_file
+from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import PRESETS, Mission
-from swarm_mj.policies import make_policy
+from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tuning import TABLE, Tuned, read_table
-from swarm_mj.provenance import commit, version
 from swarm_mj.swarm import Swarm
-from swarm_mj.whole_file import whole_file
 
 DONE, BAD_INPUT, INTERRUPTED = 0, 2, 130
 FIRST_SEED = 5000  # an evaluation's begin at 1000

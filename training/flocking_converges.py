@@ -16,11 +16,11 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from swarm_mj.flight import fly, summarise
+from swarm_mj.evaluation.published import BASELINES
+from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission, paper
-from swarm_mj.policies import make_policy
-from swarm_mj.provenance import commit, version
-from swarm_mj.published import BASELINES
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.rollout import fly, summarise
 from swarm_mj.swarm import Swarm
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from learning import RESULTS, run
 
-from swarm_mj.figures.learning import LearningCurve, LearningPanel, Level, draw_learning
-from swarm_mj.figures.style import save
-from swarm_mj.results import read_results
+from swarm_mj.evaluation.figures.learning import LearningCurve, LearningPanel, Level, draw_learning
+from swarm_mj.evaluation.figures.style import save
+from swarm_mj.evaluation.results import read_results
 
 PURPLE, ORANGE, BLUE = "#aa3377", "#d55e00", "#0072b2"
 PUBLISHED_GNN = 34.8  # Fig. 4 at range ratio 0.25, in the authors' simulator [windows]

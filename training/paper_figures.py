@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from swarm_mj.cli import main as swarm_mj
+from swarm_mj.evaluation.figures.contents import RESULT_FIGURES, ResultFigure
 from swarm_mj.evaluation.progress import progress_path
-from swarm_mj.figures.contents import RESULT_FIGURES, ResultFigure
-from swarm_mj.provenance import commit
-from swarm_mj.results import read_results
+from swarm_mj.evaluation.results import read_results
+from swarm_mj.io.provenance import commit
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -24,7 +24,7 @@ class _Parser(argparse.ArgumentParser):
 def make_parser() -> argparse.ArgumentParser:
     """The parser of all commands; imported here, so that Ctrl-C is heard while they load."""
     from swarm_mj.cli import bench, evaluate, figures, fly, replay, scene, train
-    from swarm_mj.provenance import version
+    from swarm_mj.io.provenance import version
 
     parser = _Parser(
         prog="swarm-mj",

@@ -7,13 +7,19 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.bench import AUTHORS_WINDOWS_PER_S, EvaluationTiming, Timing, bench, bench_evaluation
+from swarm_mj.benchmark.simulation import (
+    AUTHORS_WINDOWS_PER_S,
+    EvaluationTiming,
+    Timing,
+    bench,
+    bench_evaluation,
+)
 from swarm_mj.cli.options import new_parser
-from swarm_mj.policies.planner import regular_length
-from swarm_mj.published import BASELINES
+from swarm_mj.evaluation.published import BASELINES
+from swarm_mj.policies.planner.policy import regular_length
 
 if TYPE_CHECKING:
-    from swarm_mj.bench_learning import LearningTiming
+    from swarm_mj.benchmark.learning import LearningTiming
 
 LIMITS = {"missions": (1, 10_000), "threads": (1, 256), "episodes": (0, 10_000), "jobs": (1, 256)}
 
@@ -81,7 +87,7 @@ def _measure(options: argparse.Namespace, say: Callable[[str], None]) -> Iterato
         )
     if not options.no_learning:
         say("Measuring networks and training (a minute or two) ...")
-        from swarm_mj.bench_learning import bench_learning  # torch takes its time to import
+        from swarm_mj.benchmark.learning import bench_learning  # torch takes its time to import
 
         yield _learning_table(bench_learning(threads=options.threads, seconds=options.seconds))
 

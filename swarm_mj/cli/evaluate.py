@@ -16,9 +16,9 @@ from swarm_mj.cli.study_options import add_study_options, study_of
 from swarm_mj.evaluation import progress
 from swarm_mj.evaluation.batch import BatchCosts, fly_batch
 from swarm_mj.evaluation.jobs import run_jobs
+from swarm_mj.evaluation.results import write_csv, write_json
 from swarm_mj.evaluation.study import Study
 from swarm_mj.evaluation.summary import Evaluated, summarise
-from swarm_mj.results import write_csv, write_json
 
 DONE, INTERRUPTED = 0, 130
 MAX_JOBS = 256

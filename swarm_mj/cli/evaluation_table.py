@@ -7,7 +7,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.results import Result
+from swarm_mj.evaluation.results import Result
 
 MIN_WIDTH = 100  # of the console; narrower ones wrap lines rather than cut numbers off
 NAME_WIDTH = 22  # of a policy that fits in there; a longer directory's name widens the table

@@ -8,8 +8,8 @@ from rich.console import Console
 
 from swarm_mj.cli.options import new_parser
 from swarm_mj.cli.outputs import check_writable
-from swarm_mj.figures.contents import FIGURES, FLOCK, FORMATS
-from swarm_mj.results import read_results
+from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS
+from swarm_mj.evaluation.results import read_results
 
 
 def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no public type
@@ -41,8 +41,10 @@ def run(options: argparse.Namespace) -> int:
     results = [result for path in options.results for result in read_results(path)]
     paths = {name: _paths(options, name) for name in options.figure or FIGURES}
     with Console(stderr=True).status("Drawing ...") as status:
-        from swarm_mj.figures.gallery import draw_figure  # matplotlib takes its time to import
-        from swarm_mj.figures.style import save
+        from swarm_mj.evaluation.figures.gallery import (
+            draw_figure,  # matplotlib takes its time to import
+        )
+        from swarm_mj.evaluation.figures.style import save
 
         drawn = {}
         for name in paths:

@@ -18,15 +18,16 @@ from rich.table import Table
 from swarm_mj.cli.interrupt import deferred_interrupt
 from swarm_mj.cli.options import add_mission_options, mission_of, new_parser, this_command
 from swarm_mj.cli.outputs import check_writable
-from swarm_mj.flight import Flown, Summary, fly, summarise
+from swarm_mj.io.atomic_file import whole_file
+from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
-from swarm_mj.policies import POLICIES, Policy, is_learned, make_policy, normalised
-from swarm_mj.provenance import commit, version
-from swarm_mj.recorder import Recorder
+from swarm_mj.policies.policy import Policy
+from swarm_mj.policies.registry import POLICIES, is_learned, make_policy, normalised
+from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import view_command
+from swarm_mj.rollout import Flown, Summary, fly, summarise
 from swarm_mj.swarm import Swarm
-from swarm_mj.whole_file import whole_file
 
 DONE, INTERRUPTED = 0, 130
 REPLAYS = Path("replays")

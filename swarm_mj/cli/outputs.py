@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from swarm_mj.whole_file import part_of
+from swarm_mj.io.atomic_file import part_of
 
 
 def check_writable(path: Path, what: str, *, must_be_new: bool = False) -> None:

@@ -9,8 +9,8 @@ from rich.console import Console
 
 from swarm_mj.cli.options import add_mission_options, mission_of, new_parser, this_command
 from swarm_mj.cli.outputs import check_writable
-from swarm_mj.scene import compose
-from swarm_mj.whole_file import whole_file
+from swarm_mj.io.atomic_file import whole_file
+from swarm_mj.physics.scene import compose
 
 
 def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no public type

@@ -6,10 +6,10 @@ from itertools import product
 from typing import Any, get_args
 
 from swarm_mj.cli.options import DEFAULTS, listed
+from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import PRESETS, Boundary, Mission, PhysicsMode, Task
-from swarm_mj.policies import POLICIES, normalised
-from swarm_mj.published import BASELINES
+from swarm_mj.policies.registry import POLICIES, normalised
 
 DEFAULT_POLICIES = ("planner", *BASELINES)
 

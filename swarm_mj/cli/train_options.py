@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from swarm_mj.cli.options import listed
-from swarm_mj.graphs.graph import FeatureSet
+from swarm_mj.gnn.graphs import FeatureSet
 from swarm_mj.mission import PRESETS, Boundary, Task
 
 BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's arm

@@ -200,7 +200,7 @@ def _changed(training: "Training", options: argparse.Namespace) -> "Training":
 
 
 def _num_features(features: str) -> int:
-    from swarm_mj.graphs.observers import make_observer
+    from swarm_mj.gnn.feature_sets import make_observer
 
     return len(make_observer(features, DEFAULTS).names)
 

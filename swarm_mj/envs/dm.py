@@ -15,10 +15,10 @@ from dm_control.rl import control
 from dm_env import specs
 from jaxtyping import Int
 
-from swarm_mj.buffers import check_robots
-from swarm_mj.costs import age_of_information
 from swarm_mj.mission import Mission
-from swarm_mj.scene import compose
+from swarm_mj.physics.scene import compose
+from swarm_mj.protocol.buffers import check_robots
+from swarm_mj.protocol.costs import age_of_information
 from swarm_mj.swarm import Swarm
 
 _Task: Any = control.Task  # untyped: pyright reads its abstract methods as returning None

@@ -7,12 +7,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numba import njit
 
-from swarm_mj.connectivity import ConnectivityFloor
-from swarm_mj.flight import Flown, fly
+from swarm_mj.evaluation.lower_bound import ConnectivityFloor
 from swarm_mj.mission import Mission
-from swarm_mj.policies import make_policy
 from swarm_mj.policies.policy import Parameters
-from swarm_mj.protocol import PHASE
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.protocol.window import PHASE
+from swarm_mj.rollout import Flown, fly
 from swarm_mj.swarm import Swarm
 
 

@@ -7,10 +7,10 @@ from itertools import product
 from typing import Any
 
 from swarm_mj.evaluation.batch import Batch
+from swarm_mj.io.provenance import code_digest, commit, version
 from swarm_mj.mission import Mission
-from swarm_mj.policies import Policy, is_learned, make_policy
-from swarm_mj.policies.policy import Parameters
-from swarm_mj.provenance import code_digest, commit, version
+from swarm_mj.policies.policy import Parameters, Policy
+from swarm_mj.policies.registry import is_learned, make_policy
 from swarm_mj.swarm import MAX_SEED
 
 MAX_EPISODES = 100_000

@@ -8,13 +8,19 @@ from typing import Any
 import numpy as np
 
 from swarm_mj.evaluation.batch import BatchCosts
+from swarm_mj.evaluation.published import published
+from swarm_mj.evaluation.results import Result
+from swarm_mj.evaluation.statistics import (
+    Interval,
+    Spread,
+    bootstrap_interval,
+    quantile_of_counts,
+    spread,
+)
+from swarm_mj.evaluation.statistics import standard_error as sem
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
-from swarm_mj.protocol import PHASE
-from swarm_mj.published import published
-from swarm_mj.results import Result
-from swarm_mj.statistics import Interval, Spread, bootstrap_interval, quantile_of_counts, spread
-from swarm_mj.statistics import standard_error as sem
+from swarm_mj.protocol.window import PHASE
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,8 +10,8 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.type_aliases import PyTorchObs, Schedule
 from torch import Tensor
 
-from swarm_mj.decision import recipient_logits
-from swarm_mj.gnn import AggregationGnn, GnnShape
+from swarm_mj.gnn.action_distribution import recipient_logits
+from swarm_mj.gnn.network import AggregationGnn, GnnShape
 
 
 class GnnActorCritic(ActorCriticPolicy):

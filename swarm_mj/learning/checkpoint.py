@@ -15,12 +15,12 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
+from swarm_mj.io.atomic_file import whole_file
 from swarm_mj.learning import progress as progresses
 from swarm_mj.learning.env import MissionsEnv
 from swarm_mj.learning.missions import Course
 from swarm_mj.learning.progress import Progress
 from swarm_mj.learning.settings import Training
-from swarm_mj.whole_file import whole_file
 
 CHECKPOINT_VERSION = 1
 

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from numba import njit
 
-from swarm_mj.protocol import PHASE, Phase, respondents
-from swarm_mj.radio import Channel
+from swarm_mj.protocol.window import PHASE, Phase, respondents
+from swarm_mj.radio.free_space import Channel
 
 
 def credits_of(

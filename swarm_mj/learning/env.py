@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv
 
-from swarm_mj.graphs.graph import Graphs
+from swarm_mj.gnn.graphs import Graphs
 from swarm_mj.learning.missions import Group, Outcome
 
 Observation = dict[str, np.ndarray]

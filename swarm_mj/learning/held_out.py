@@ -7,12 +7,12 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from swarm_mj.gnn import AggregationGnn
-from swarm_mj.graphs.observers import make_observer
+from swarm_mj.evaluation.statistics import standard_error
+from swarm_mj.gnn.feature_sets import make_observer
+from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.learning.settings import HELD_OUT_SEED, Training
 from swarm_mj.mission import Mission
-from swarm_mj.policies.learned import LearnedPolicy
-from swarm_mj.statistics import standard_error
+from swarm_mj.policies.gnn import LearnedPolicy
 from swarm_mj.swarm import Swarm
 
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from swarm_mj.buffers import NO_PARENT
-from swarm_mj.graphs.graph import Graphs, Observer
-from swarm_mj.graphs.observers import make_observer
+from swarm_mj.gnn.feature_sets import make_observer
+from swarm_mj.gnn.graphs import Graphs, Observer
 from swarm_mj.learning.credit import credits_of
 from swarm_mj.mission import Mission
+from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.swarm import Swarm
 
 FIRST_TRAINING_SEED = 2**40  # training draws seeds from here on, so that small ones are never seen

@@ -5,8 +5,8 @@ import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+from swarm_mj.io.atomic_file import whole_file
 from swarm_mj.learning.env import MissionsEnv
-from swarm_mj.whole_file import whole_file
 
 
 @dataclass(kw_only=True)

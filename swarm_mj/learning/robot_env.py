@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from gymnasium import spaces
 
-from swarm_mj.graphs.graph import Graphs
+from swarm_mj.gnn.graphs import Graphs
 from swarm_mj.learning.env import MissionsEnv, Observation, graph_spaces, largest_team
 from swarm_mj.learning.missions import Group, Outcome, padded
 

@@ -6,10 +6,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from swarm_mj.io.atomic_directory import present_folder, whole_folder
+from swarm_mj.io.atomic_file import whole_file
 from swarm_mj.learning.settings import Training, arm_settings, from_json
 from swarm_mj.mission import Mission
-from swarm_mj.whole_file import whole_file
-from swarm_mj.whole_folder import present_folder, whole_folder
 
 SETTINGS, CHECKPOINT, CURVE = "settings.json", "checkpoint.pt", "curve.csv"
 INIT, POLICY, REPLAYS, TENSORBOARD = "init", "policy", "replays", "tensorboard"

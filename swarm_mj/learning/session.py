@@ -10,8 +10,8 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
-from swarm_mj.flight import fly
-from swarm_mj.gnn import AggregationGnn
+from swarm_mj.gnn.network import AggregationGnn
+from swarm_mj.io.provenance import commit, version
 from swarm_mj.learning import checkpoint
 from swarm_mj.learning.actor_critic import GnnActorCritic
 from swarm_mj.learning.checkpoint import missions_of
@@ -21,8 +21,8 @@ from swarm_mj.learning.run_folder import CHECKPOINT, CURVE, POLICY, REPLAYS, Run
 from swarm_mj.learning.settings import HELD_OUT_SEED
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.policies.stored import save_policy
-from swarm_mj.provenance import commit, version
-from swarm_mj.recorder import Recorder
+from swarm_mj.replay.recorder import Recorder
+from swarm_mj.rollout import fly
 from swarm_mj.swarm import Swarm
 
 OPTIMISER = ("entropy", "explained_variance", "approx_kl", "clip_fraction", "value_loss")

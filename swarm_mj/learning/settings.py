@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args
 
-from swarm_mj.gnn import GnnShape
-from swarm_mj.graphs.graph import FeatureSet
-from swarm_mj.graphs.observers import make_observer
+from swarm_mj.gnn.feature_sets import make_observer
+from swarm_mj.gnn.graphs import FeatureSet
+from swarm_mj.gnn.network import GnnShape
 from swarm_mj.learning.team_env import Reward
 from swarm_mj.mission import Mission
 

@@ -6,10 +6,10 @@ from typing import Literal
 import numpy as np
 from gymnasium import spaces
 
-from swarm_mj.buffers import NO_PARENT
-from swarm_mj.graphs.graph import Graphs
+from swarm_mj.gnn.graphs import Graphs
 from swarm_mj.learning.env import MissionsEnv, Observation, graph_spaces, largest_team
 from swarm_mj.learning.missions import Group, Outcome, padded
+from swarm_mj.protocol.buffers import NO_PARENT
 
 Reward = Literal["aoi", "velocity-variance"]
 

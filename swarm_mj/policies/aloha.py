@@ -7,8 +7,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numba import njit
 
-from swarm_mj.policies.policy import DecentralisedPolicy, LocalViews, check_probability
-from swarm_mj.streams import Stream, uniform
+from swarm_mj.mission.batched_rng import Stream, uniform
+from swarm_mj.policies.policy import DecentralisedPolicy, check_probability
+from swarm_mj.protocol.local_views import LocalViews
 
 
 class Aloha(DecentralisedPolicy):

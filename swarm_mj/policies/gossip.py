@@ -6,8 +6,9 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Int
 
-from swarm_mj.policies.policy import DecentralisedPolicy, LocalViews, check_probability
-from swarm_mj.streams import Stream, uniform
+from swarm_mj.mission.batched_rng import Stream, uniform
+from swarm_mj.policies.policy import DecentralisedPolicy, check_probability
+from swarm_mj.protocol.local_views import LocalViews
 
 
 class InnovationGossip(DecentralisedPolicy):

@@ -7,9 +7,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numba import njit
 
-from swarm_mj.policies.policy import CentralisedPolicy, LocalViews, check_probability
-from swarm_mj.protocol import Bodies
-from swarm_mj.streams import Stream, uniform
+from swarm_mj.mission.batched_rng import Stream, uniform
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.policies.policy import CentralisedPolicy, check_probability
+from swarm_mj.protocol.local_views import LocalViews
 
 ROOT = -1  # the parent of the root
 
@@ -49,7 +50,7 @@ class MinimumSpanningTree(CentralisedPolicy):
         self._stream = Stream(rngs, uniform, (num_robots,))
         self._parent = None
 
-    def recipients(self, views: LocalViews, bodies: Bodies) -> Int[np.ndarray, "B N"]:
+    def recipients(self, views: LocalViews, bodies: RobotStates) -> Int[np.ndarray, "B N"]:
         """The parent, for each robot that draws a transmission."""
         if self._parent is None or self._is_recomputed:
             self._parent = spanning_tree(bodies.position_m)

@@ -2,40 +2,15 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
-from swarm_mj.buffers import Buffers
-from swarm_mj.protocol import Bodies, Phase
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.protocol.local_views import LocalViews
 
 Parameters = Mapping[str, bool | int | float | str]  # what a policy was made with, by name
-
-
-@dataclass(frozen=True, kw_only=True)
-class LocalViews:
-    """What the robots know, one view a robot: `[b, i]` in every array belongs to robot i alone.
-
-    Identities are the index i, the team's size is N; both are granted before the mission (II-C).
-    The buffers are live: they cannot be written, and change with the next window.
-    """
-
-    buffers: Buffers  # robot i's buffer is row [b, i]
-    now: Float[np.ndarray, "B"]  # t on the synchronised clock [windows]
-    phases: tuple[Phase, ...]  # since the last window began: whom robot i addressed and heard
-
-    @property
-    def num_robots(self) -> int:
-        """N, known to everyone before the mission (II-C)."""
-        return self.buffers.timestamp.shape[1]
-
-    @property
-    def silence(self) -> Int[np.ndarray, "B N"]:
-        """The recipients that mean silence: everyone addresses itself."""
-        num_missions, num_robots = self.buffers.timestamp.shape[:2]
-        return np.broadcast_to(np.arange(num_robots), (num_missions, num_robots))
 
 
 class Policy:
@@ -82,7 +57,7 @@ class CentralisedPolicy(Policy, ABC):
     """A policy that is told the truth: everyone's buffer and everyone's true state."""
 
     @abstractmethod
-    def recipients(self, views: LocalViews, bodies: Bodies) -> Int[np.ndarray, "B N"]:
+    def recipients(self, views: LocalViews, bodies: RobotStates) -> Int[np.ndarray, "B N"]:
         """Whom each robot addresses.
 
         Args:

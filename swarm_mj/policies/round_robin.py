@@ -3,8 +3,9 @@
 import numpy as np
 from jaxtyping import Int
 
-from swarm_mj.policies.policy import CentralisedPolicy, LocalViews
-from swarm_mj.protocol import Bodies
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.policies.policy import CentralisedPolicy
+from swarm_mj.protocol.local_views import LocalViews
 
 
 class RoundRobin(CentralisedPolicy):
@@ -13,7 +14,7 @@ class RoundRobin(CentralisedPolicy):
     Centralised: the base station is chosen anew in each window from all true positions.
     """
 
-    def recipients(self, views: LocalViews, bodies: Bodies) -> Int[np.ndarray, "B N"]:
+    def recipients(self, views: LocalViews, bodies: RobotStates) -> Int[np.ndarray, "B N"]:
         """The base, for the one robot whose turn it is."""
         missions = np.arange(len(views.now))
         base = np.argmin(np.sum(bodies.position_m**2, axis=2), axis=1)

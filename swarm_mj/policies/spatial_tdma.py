@@ -10,9 +10,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 from numba import njit
 
-from swarm_mj.policies.policy import DecentralisedPolicy, LocalViews
+from swarm_mj.policies.policy import DecentralisedPolicy
 from swarm_mj.policies.tdma import draw_order, half_windows
-from swarm_mj.radio import MIN_DISTANCE_M
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.radio.free_space import MIN_DISTANCE_M
 
 
 class SpatialTdma(DecentralisedPolicy):

@@ -8,13 +8,13 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
 
-from swarm_mj.gnn import AggregationGnn
-from swarm_mj.graphs.observers import make_observer
+from swarm_mj.gnn.feature_sets import make_observer
+from swarm_mj.gnn.network import AggregationGnn
+from swarm_mj.io.atomic_directory import present_folder, whole_folder
 from swarm_mj.mission import Mission
-from swarm_mj.policies.learned import LearnedPolicy
+from swarm_mj.policies.gnn import LearnedPolicy
 from swarm_mj.policies.model_card import model_card
 from swarm_mj.policies.policy_config import PolicyConfig, from_json, to_json
-from swarm_mj.whole_folder import present_folder, whole_folder
 
 WEIGHTS, CONFIG, CARD = "model.safetensors", "config.json", "README.md"
 CONTENTS = {WEIGHTS, CONFIG, CARD}

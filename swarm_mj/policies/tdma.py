@@ -6,8 +6,9 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Float, Int
 
-from swarm_mj.policies.policy import DecentralisedPolicy, LocalViews
-from swarm_mj.protocol import PHASE
+from swarm_mj.policies.policy import DecentralisedPolicy
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import PHASE
 
 
 class Tdma(DecentralisedPolicy):

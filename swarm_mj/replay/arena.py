@@ -4,9 +4,9 @@ import numpy as np
 import rerun as rr
 
 from swarm_mj.mission import Mission
-from swarm_mj.recorder import Log
 from swarm_mj.replay import palette
 from swarm_mj.replay.links import Links, ends
+from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet, screen
 
 GRID_M = 100.0

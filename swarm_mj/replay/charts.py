@@ -5,10 +5,10 @@ import rerun as rr
 from jaxtyping import Int
 
 from swarm_mj.policies.minimum_spanning_tree import ROOT, spanning_tree
-from swarm_mj.recorder import Log
 from swarm_mj.replay import palette
 from swarm_mj.replay.dendrogram import dendrogram
 from swarm_mj.replay.links import Links
+from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet, screen
 from swarm_mj.replay.tensor_column import tensor_column
 

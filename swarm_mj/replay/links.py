@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from swarm_mj.recorder import Log
+from swarm_mj.replay.recorder import Log
 
 
 @dataclass(frozen=True, kw_only=True)

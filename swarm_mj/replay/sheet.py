@@ -7,9 +7,9 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float, Int
 
-from swarm_mj.recorder import Log
 from swarm_mj.replay.links import Links, ends
 from swarm_mj.replay.palette import Colour
+from swarm_mj.replay.recorder import Log
 
 TIMELINE = "window"
 

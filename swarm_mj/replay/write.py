@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
+from swarm_mj.io.atomic_file import whole_file
 from swarm_mj.mission import Mission
-from swarm_mj.recorder import Log
 from swarm_mj.replay import arena, charts, palette
 from swarm_mj.replay.layout import layout
 from swarm_mj.replay.legend import draw_legend
 from swarm_mj.replay.links import fates
+from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet
-from swarm_mj.whole_file import whole_file
 
 APPLICATION = "swarm_mj"
 

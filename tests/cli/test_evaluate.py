@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from swarm_mj.cli import main
-from swarm_mj.flight import fly, summarise
+from swarm_mj.evaluation.results import COLUMNS, read_results
 from swarm_mj.mission import paper
-from swarm_mj.policies import make_policy
-from swarm_mj.results import COLUMNS, read_results
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.rollout import fly, summarise
 from swarm_mj.swarm import Swarm
 
 SMALL = ("--robots", "5", "--windows", "12", "--range-ratio", "0.5")

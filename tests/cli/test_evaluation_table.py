@@ -6,7 +6,7 @@ from typing import get_args
 import pytest
 
 from swarm_mj.cli.evaluation_table import print_results
-from swarm_mj.results import Result
+from swarm_mj.evaluation.results import Result
 
 
 def some_result(policy, aoi_mean, **overrides):

@@ -7,9 +7,11 @@ from xml.etree import ElementTree
 import pytest
 from PIL import Image
 
-from swarm_mj.results import COLUMNS, write_csv
+from swarm_mj.evaluation.results import COLUMNS, write_csv
 
-SYNTHETIC = runpy.run_path(str(Path(__file__).parent.parent / "figures" / "synthetic.py"))
+SYNTHETIC = runpy.run_path(
+    str(Path(__file__).parent.parent / "evaluation" / "figures" / "synthetic.py")
+)
 
 
 @pytest.fixture

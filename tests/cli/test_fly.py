@@ -10,11 +10,11 @@ import time
 import numpy as np
 import pytest
 
-from swarm_mj.flight import fly, summarise
 from swarm_mj.mission import paper
-from swarm_mj.policies import make_policy
+from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.replay.read import check_replay, windows
+from swarm_mj.rollout import fly, summarise
 from swarm_mj.swarm import Swarm
 
 SHORT = ("--windows", "20", "--robots", "6", "--range-ratio", "0.5")
@@ -29,7 +29,7 @@ def test_the_default_flight_leaves_a_replay_of_the_default_mission(swarm_mj, tmp
     assert done.returncode == 0, done.stderr
     (replay,) = (tmp_path / "replays").iterdir()
     assert f"replay replays/{replay.name}" in done.stdout
-    assert "flocking, gnn, 40 robots" in done.stdout
+    assert "flocking, planner, 40 robots" in done.stdout
     assert len(windows(replay)) == 500
     assert replay.stat().st_size < 5e6
 

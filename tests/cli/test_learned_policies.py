@@ -9,10 +9,10 @@ from tiny_policies import save_tiny
 from swarm_mj.cli import main
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.evaluation.jobs import run_jobs
+from swarm_mj.evaluation.results import read_results
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import paper
 from swarm_mj.replay.read import windows
-from swarm_mj.results import read_results
 
 pytestmark = pytest.mark.usefixtures("runs")
 SMALL = ("--robots", "5", "--windows", "12", "--range-ratio", "0.5")

@@ -3,7 +3,7 @@
 from swarm_mj.cli import make_parser
 from swarm_mj.cli.study_options import study_of
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies import POLICIES
+from swarm_mj.policies.registry import POLICIES
 
 
 def study(*arguments):

@@ -9,9 +9,9 @@ import pytest
 from dm_control.viewer import runtime
 from dm_env import StepType, test_utils
 
-from swarm_mj.buffers import NEVER, NO_PARENT
 from swarm_mj.envs.dm import make_environment
 from swarm_mj.mission import paper
+from swarm_mj.protocol.buffers import NEVER, NO_PARENT
 from swarm_mj.swarm import Swarm
 
 TASKS = ["stationary", "random-walk", "flocking"]

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from swarm_mj.connectivity import ConnectivityFloor
 from swarm_mj.evaluation.batch import Batch, count_ages, fly_batch
+from swarm_mj.evaluation.lower_bound import ConnectivityFloor
 from swarm_mj.evaluation.summary import merge
-from swarm_mj.flight import fly, summarise
 from swarm_mj.mission import paper, reference
-from swarm_mj.placement import is_connected
-from swarm_mj.policies import POLICIES, make_policy
+from swarm_mj.mission.placement import is_connected
+from swarm_mj.policies.registry import POLICIES, make_policy
+from swarm_mj.rollout import fly, summarise
 from swarm_mj.swarm import Swarm
 
 SEEDS = (5, 6, 7)

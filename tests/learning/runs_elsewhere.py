@@ -18,7 +18,7 @@ import torch._dynamo  # noqa: F401 - optimisers import it late, so every child w
 from small_runs import StopAfter, difference, end_of, go_on, run, small_training
 
 from swarm_mj.cli import main
-from swarm_mj.decision import sample
+from swarm_mj.gnn.action_distribution import sample
 from swarm_mj.learning.missions import Group
 from swarm_mj.learning.progress import Progress
 from swarm_mj.learning.run import train

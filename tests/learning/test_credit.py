@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from swarm_mj.learning.credit import credits_of, gain
 from swarm_mj.mission import paper, reference
-from swarm_mj.protocol import window
-from swarm_mj.radio import FreeSpaceRadio
+from swarm_mj.protocol.window import window
+from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.swarm import Swarm
 
 

@@ -8,10 +8,10 @@ import torch
 from small_runs import small_training
 from tiny_policies import tiny_network
 
-from swarm_mj.flight import fly, summarise
 from swarm_mj.learning.held_out import evaluate, held_out_policy
 from swarm_mj.learning.missions import FIRST_TRAINING_SEED
 from swarm_mj.learning.settings import HELD_OUT_SEED
+from swarm_mj.rollout import fly, summarise
 from swarm_mj.swarm import Swarm
 
 NETWORK = tiny_network("extended")

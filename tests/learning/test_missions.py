@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from swarm_mj.buffers import NO_PARENT
 from swarm_mj.learning.missions import FIRST_TRAINING_SEED, Group, make_groups, padded
 from swarm_mj.learning.settings import HELD_OUT_SEED
 from swarm_mj.mission import paper
+from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.swarm import Swarm
 
 MISSION = paper("random-walk", num_robots=5, num_windows=20, range_ratio=0.6)

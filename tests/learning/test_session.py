@@ -8,14 +8,14 @@ import pytest
 from small_runs import StopAfter, go_on, run, small_training
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from swarm_mj.flight import fly, summarise
 from swarm_mj.learning import session
 from swarm_mj.learning.run import train
 from swarm_mj.learning.run_folder import CURVE, POLICY, REPLAYS, TENSORBOARD, Limits
 from swarm_mj.learning.settings import HELD_OUT_SEED
-from swarm_mj.policies import make_policy
+from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.stored import read_policy
 from swarm_mj.replay.read import windows
+from swarm_mj.rollout import fly, summarise
 from swarm_mj.swarm import Swarm
 
 TRAINING = small_training()

@@ -7,8 +7,8 @@ import pytest
 import torch
 from small_runs import small_training
 
-from swarm_mj.gnn import AggregationGnn
-from swarm_mj.graphs.observers import make_observer
+from swarm_mj.gnn.feature_sets import make_observer
+from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.learning.settings import arm_settings, from_json
 from swarm_mj.mission import PRESETS, paper, reference
 

@@ -5,12 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from swarm_mj.buffers import empty_buffers
-from swarm_mj.channel import radio_of
 from swarm_mj.mission import Mission
-from swarm_mj.placement import connected_positions
-from swarm_mj.protocol import PHASE, Bodies, transmit, window
-from swarm_mj.radio import FreeSpaceRadio
+from swarm_mj.mission.placement import connected_positions
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.protocol.window import PHASE, transmit, window
+from swarm_mj.radio.free_space import FreeSpaceRadio
+from swarm_mj.radio.mission_radio import radio_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +33,7 @@ def flooded_team(mission: Mission, seed: int) -> Team:
     rng = np.random.default_rng(seed)
     robots, radio = np.arange(mission.num_robots), radio_of(mission)
     position_m = connected_positions(len(robots), mission.half_side_m, mission.range_m, rng)
-    bodies = Bodies(position_m=position_m[None], velocity_mps=np.zeros((1, len(robots), 2)))
+    bodies = RobotStates(position_m=position_m[None], velocity_mps=np.zeros((1, len(robots), 2)))
     buffers, now = empty_buffers(1, len(robots)), np.zeros(1)
     for _ in range(2 * rng.integers(0, 10)):
         now = now + PHASE
@@ -48,7 +49,7 @@ def after_windows(team: Team, recipients: Any) -> np.ndarray:
     """T after each of some windows in a row, by the protocol [window, robot, subject]."""
     buffers, known = empty_buffers(1, team.num_robots), []
     buffers.timestamp[0] = team.timestamp
-    bodies = Bodies(
+    bodies = RobotStates(
         position_m=team.position_m[None], velocity_mps=np.zeros((1, team.num_robots, 2))
     )
     for w, recipient in enumerate(recipients):
@@ -62,7 +63,7 @@ def knowledge_after(team: Team, choices: np.ndarray) -> np.ndarray:
     shape = (len(choices), team.num_robots)
     buffers = empty_buffers(*shape)
     buffers.timestamp[:] = team.timestamp
-    bodies = Bodies(
+    bodies = RobotStates(
         position_m=np.broadcast_to(team.position_m, (*shape, 2)).copy(),
         velocity_mps=np.zeros((*shape, 2)),
     )

@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_mj.buffers import empty_buffers
-from swarm_mj.policies import Aloha, DecentralisedPolicy, LocalViews
-from swarm_mj.policies.aloha import num_contenders
+from swarm_mj.policies.aloha import Aloha, num_contenders
+from swarm_mj.policies.policy import DecentralisedPolicy
+from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.protocol.local_views import LocalViews
 
 RANGE_M = 250.0
 

@@ -3,8 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from swarm_mj.buffers import empty_buffers
-from swarm_mj.policies import DecentralisedPolicy, InnovationGossip, LocalViews
+from swarm_mj.policies.gossip import InnovationGossip
+from swarm_mj.policies.policy import DecentralisedPolicy
+from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.protocol.local_views import LocalViews
 
 NUM_ROBOTS = 4
 

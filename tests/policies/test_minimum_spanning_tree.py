@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial.distance import cdist
 
-from swarm_mj.buffers import empty_buffers
-from swarm_mj.policies import CentralisedPolicy, LocalViews, MinimumSpanningTree
-from swarm_mj.policies.minimum_spanning_tree import ROOT, spanning_tree
-from swarm_mj.protocol import Bodies
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.policies.minimum_spanning_tree import ROOT, MinimumSpanningTree, spanning_tree
+from swarm_mj.policies.policy import CentralisedPolicy
+from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.protocol.local_views import LocalViews
 
 # On a line, 10 m apart but for a gap, as robots 3, 0, 4, 1, 2: the middle one is robot 4.
 LINE_M = np.array([[10.0, 0.0], [45.0, 0.0], [55.0, 0.0], [0.0, 0.0], [20.0, 0.0]])
@@ -28,7 +29,7 @@ def decided(policy, position_m):
     views = LocalViews(
         buffers=empty_buffers(num_missions, num_robots), now=np.zeros(num_missions), phases=()
     )
-    bodies = Bodies(position_m=position_m, velocity_mps=np.zeros_like(position_m))
+    bodies = RobotStates(position_m=position_m, velocity_mps=np.zeros_like(position_m))
     return policy.recipients(views, bodies)
 
 

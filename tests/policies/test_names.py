@@ -6,8 +6,8 @@ import pytest
 from tiny_policies import save_tiny
 
 from swarm_mj.mission import paper
-from swarm_mj.policies import POLICIES, is_learned, make_policy, normalised
-from swarm_mj.policies.learned import LearnedPolicy
+from swarm_mj.policies.gnn import LearnedPolicy
+from swarm_mj.policies.registry import POLICIES, is_learned, make_policy, normalised
 
 MISSION = paper("stationary", num_robots=5)
 pytestmark = pytest.mark.usefixtures("here")

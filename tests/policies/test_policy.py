@@ -6,23 +6,18 @@ import numpy as np
 import pytest
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies import (
-    POLICIES,
-    Aloha,
-    CentralisedPolicy,
-    DecentralisedPolicy,
-    InnovationGossip,
-    LocalViews,
-    MinimumSpanningTree,
-    Planner,
-    Policy,
-    RandomFlooding,
-    RoundRobin,
-    SpatialTdma,
-    Tdma,
-    make_policy,
-)
+from swarm_mj.policies.aloha import Aloha
+from swarm_mj.policies.gossip import InnovationGossip
+from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
+from swarm_mj.policies.planner.policy import Planner
+from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
+from swarm_mj.policies.random_flooding import RandomFlooding
+from swarm_mj.policies.registry import POLICIES, make_policy
+from swarm_mj.policies.round_robin import RoundRobin
+from swarm_mj.policies.spatial_tdma import SpatialTdma
+from swarm_mj.policies.tdma import Tdma
 from swarm_mj.policies.tuning import tuned_probability
+from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.swarm import Swarm
 
 MISSION = paper("flocking", num_robots=8)

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from swarm_mj.buffers import empty_buffers
-from swarm_mj.policies import DecentralisedPolicy, LocalViews, RandomFlooding
+from swarm_mj.policies.policy import DecentralisedPolicy
+from swarm_mj.policies.random_flooding import RandomFlooding
+from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.protocol.local_views import LocalViews
 
 NUM_ROBOTS = 6
 

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 
-from swarm_mj.buffers import empty_buffers
 from swarm_mj.mission import paper
-from swarm_mj.policies import LocalViews, RoundRobin
-from swarm_mj.protocol import Bodies
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.policies.round_robin import RoundRobin
+from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.swarm import Swarm
 
 # Four robots in the plane [m]; the third is nearest the centre.
@@ -19,7 +20,7 @@ def decided(position_m, window):
         now=np.full(num_missions, float(window)),
         phases=(),
     )
-    bodies = Bodies(position_m=position_m, velocity_mps=np.zeros_like(position_m))
+    bodies = RobotStates(position_m=position_m, velocity_mps=np.zeros_like(position_m))
     return RoundRobin().recipients(views, bodies).tolist()
 
 
@@ -67,7 +68,7 @@ def test_iv_c_nearest_means_the_straight_line():
     """(3, 3) is 4.2 m from the centre by a straight line, (5, 0) is 5 m; along axes 6 and 5."""
     mission = paper("stationary", num_robots=3)
     swarm = Swarm(mission, [0])
-    bodies = Bodies(
+    bodies = RobotStates(
         position_m=np.array([[[5.0, 0.0], [3.0, 3.0], [9.0, 9.0]]]),
         velocity_mps=np.zeros((1, 3, 2)),
     )

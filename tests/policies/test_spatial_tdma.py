@@ -4,11 +4,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.distance import pdist, squareform
 
-from swarm_mj.buffers import empty_buffers
 from swarm_mj.mission import paper
-from swarm_mj.policies import DecentralisedPolicy, LocalViews, SpatialTdma, Tdma, make_policy
-from swarm_mj.protocol import PHASE
-from swarm_mj.radio import FreeSpaceRadio
+from swarm_mj.policies.policy import DecentralisedPolicy
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.policies.spatial_tdma import SpatialTdma
+from swarm_mj.policies.tdma import Tdma
+from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import PHASE
+from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.swarm import Swarm
 
 MISSION = paper("stationary", num_robots=20)

@@ -2,10 +2,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from swarm_mj.buffers import empty_buffers
 from swarm_mj.mission import paper
-from swarm_mj.policies import DecentralisedPolicy, LocalViews, Tdma
-from swarm_mj.protocol import PHASE
+from swarm_mj.policies.policy import DecentralisedPolicy
+from swarm_mj.policies.tdma import Tdma
+from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import PHASE
 from swarm_mj.swarm import Swarm
 
 NUM_ROBOTS = 6

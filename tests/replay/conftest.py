@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from swarm_mj.costs import Packets
-from swarm_mj.flight import fly
 from swarm_mj.mission import Mission, paper
-from swarm_mj.policies import make_policy
-from swarm_mj.recorder import Log, Recorder
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.protocol.costs import Packets
+from swarm_mj.replay.recorder import Log, Recorder
 from swarm_mj.replay.write import write_replay
+from swarm_mj.rollout import fly
 from swarm_mj.swarm import Swarm
 
 

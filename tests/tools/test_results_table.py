@@ -5,9 +5,9 @@ import shutil
 from pathlib import Path
 
 import pytest
+from synthetic import result, sweep
 
-from swarm_mj.results import write_csv
-from tests.figures.synthetic import result, sweep
+from swarm_mj.evaluation.results import write_csv
 
 TOOL = Path(__file__).parent.parent.parent / "tools" / "results_table.py"
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from swarm_mj.flight import fly, summarise
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies import POLICIES, make_policy
+from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.policies.tuning import read_table
+from swarm_mj.rollout import fly, summarise
 from swarm_mj.swarm import Swarm
 
 TOOL = Path(__file__).parent.parent.parent / "tools" / "tune.py"

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from swarm_mj.flight import fly
 from swarm_mj.mission import paper
-from swarm_mj.policies import make_policy
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.rollout import fly
 from swarm_mj.swarm import Swarm
 
 FILE = Path(__file__).parent.parent.parent / "training" / "flocking_converges.py"

@@ -6,12 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from synthetic import result
 
 from swarm_mj.cli import make_parser
 from swarm_mj.cli.study_options import study_of
-from swarm_mj.published import points, published
-from swarm_mj.results import read_results, write_csv
-from tests.figures.synthetic import result
+from swarm_mj.evaluation.published import points, published
+from swarm_mj.evaluation.results import read_results, write_csv
 
 FILE = Path(__file__).parent.parent.parent / "training" / "paper_figures.py"
 NAMES = [

@@ -1,0 +1,131 @@
+"""What the robots do (IV-A): stand still, walk at random, or flock on what they have heard."""
+
+from collections.abc import Sequence
+from typing import Protocol, no_type_check, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+from numba import njit
+
+from swarm_mj.mission import FlockingSet, Mission
+from swarm_mj.mission.batched_rng import Stream, normal
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.protocol.buffers import NEVER, Buffers
+
+
+@runtime_checkable
+class Motion(Protocol):
+    """What the robots' controllers want in the next window."""
+
+    def __call__(self, buffers: Buffers, bodies: RobotStates) -> Float[np.ndarray, "B N 2"]:
+        """The accelerations u [m/s²]; row [b, i] may use buffer and body [b, i] only."""
+        ...
+
+
+def motion_of(mission: Mission, rngs: Sequence[np.random.Generator]) -> Motion:
+    """The motion of a mission's task.
+
+    Args:
+        mission: Its task and bounds.
+        rngs: One generator per mission side by side.
+
+    Returns:
+        The motion.
+    """
+    if mission.task == "stationary":
+        return stand
+    if mission.task == "random-walk":
+        return RandomWalk(mission, rngs)
+    return Flocking(mission)
+
+
+def initial_velocity(mission: Mission, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
+    """Velocities at the start [m/s]: uniform in plus or minus V_max per axis, 0 when stationary."""
+    if mission.task == "stationary":
+        return np.zeros((mission.num_robots, 2))
+    limit = mission.max_velocity_mps
+    return rng.uniform(-limit, limit, size=(mission.num_robots, 2))
+
+
+def stand(buffers: Buffers, bodies: RobotStates) -> Float[np.ndarray, "B N 2"]:  # noqa: ARG001 - a Motion
+    """No acceleration."""
+    return np.zeros_like(bodies.velocity_mps)
+
+
+class RandomWalk:
+    """u ~ N(0, A_max / 3), a standard deviation per axis, clipped to plus or minus A_max (IV-A)."""
+
+    def __init__(self, mission: Mission, rngs: Sequence[np.random.Generator]) -> None:
+        self._limit_mps2 = mission.max_acceleration_mps2
+        self._stream = Stream(rngs, normal, (mission.num_robots, 2))
+
+    def __call__(
+        self,
+        buffers: Buffers,  # noqa: ARG002 - a Motion
+        bodies: RobotStates,  # noqa: ARG002 - a Motion
+    ) -> Float[np.ndarray, "B N 2"]:
+        """The next accelerations [m/s²]."""
+        acceleration = self._stream.next() * (self._limit_mps2 / 3.0)
+        return np.clip(acceleration, -self._limit_mps2, self._limit_mps2)
+
+
+class Flocking:
+    """Velocity consensus by `flocking`, clipped to plus or minus A_max (IV-A)."""
+
+    def __init__(self, mission: Mission) -> None:
+        self._limit_mps2 = mission.max_acceleration_mps2
+        self._flocking_set: FlockingSet = mission.flocking_set
+
+    def __call__(self, buffers: Buffers, bodies: RobotStates) -> Float[np.ndarray, "B N 2"]:
+        """The next accelerations [m/s²]."""
+        acceleration = flocking(buffers, bodies.velocity_mps, self._flocking_set)
+        return np.clip(acceleration, -self._limit_mps2, self._limit_mps2)
+
+
+def flocking(
+    buffers: Buffers, velocity_mps: Float[np.ndarray, "B N 2"], flocking_set: FlockingSet
+) -> Float[np.ndarray, "B N 2"]:
+    """Mean difference of the known velocities to one's own, per second [m/s²] (Eq. 16).
+
+    Args:
+        buffers: What each robot has heard.
+        velocity_mps: Every robot's own velocity [m/s].
+        flocking_set: F: robots with T > T_0 (`heard`, the paper) or, per axis, with a velocity
+            other than 0 in the buffer (`moving`, the authors' code). Oneself is in it; while it is
+            empty the acceleration is 0.
+
+    Returns:
+        The accelerations, not yet clipped.
+    """
+    acceleration = np.empty_like(velocity_mps)
+    _mean_difference(
+        buffers.timestamp,
+        buffers.velocity_mps,
+        velocity_mps,
+        flocking_set == "heard",
+        acceleration,
+    )
+    return acceleration
+
+
+@njit(cache=True)
+@no_type_check
+def _mean_difference(
+    timestamp: Float[np.ndarray, "B N N"],
+    believed_mps: Float[np.ndarray, "B N N 2"],
+    velocity_mps: Float[np.ndarray, "B N 2"],
+    counts_heard: bool,
+    acceleration: Float[np.ndarray, "B N 2"],
+) -> None:
+    num_missions, num_robots = timestamp.shape[:2]
+    for b in range(num_missions):
+        for i in range(num_robots):
+            for axis in range(2):
+                total = 0.0
+                num_counted = 0
+                for j in range(num_robots):
+                    believed = believed_mps[b, i, j, axis]
+                    if (timestamp[b, i, j] > NEVER) if counts_heard else (believed != 0.0):
+                        total += believed - velocity_mps[b, i, axis]
+                        num_counted += 1
+                acceleration[b, i, axis] = total / num_counted if num_counted else 0.0

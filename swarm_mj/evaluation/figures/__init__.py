@@ -1,0 +1,1 @@
+"""The paper's figures (V), drawn from results beside the published curves."""

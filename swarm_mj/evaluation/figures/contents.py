@@ -1,0 +1,136 @@
+"""What the paper's result figures show (V): which missions, swept over what, on which axes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from swarm_mj.evaluation.published import SWEEPS, points
+from swarm_mj.mission import PRESETS, Mission, Task
+
+FLOCK = "fig2"  # a mission's start and end, drawn by `flock`; the others are below
+FORMATS = ("svg", "png", "pdf")
+OPTIONS = {
+    "num_robots": "--robots",
+    "range_ratio": "--range-ratio",
+    "velocity_ratio": "--velocity-ratio",
+}
+# All but the slow lookahead oracle. The planners are drawn under `paper` only: they take as long as
+# all others together.
+DRAWN = (
+    "tdma",  # first: the others are compared to it
+    "random-flooding",
+    "round-robin",
+    "mst",
+    "aloha",
+    "gossip",
+    "spatial-tdma",
+    "planner",
+    "greedy-oracle",
+)
+PAPER_ONLY = ("planner",)
+Scale = Literal["linear", "log"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Panel:
+    """One pair of axes: a cost over the figure's x."""
+
+    cost: str  # aoi or velocity_variance, as results and published points name it
+    label: str  # with the cost's unit
+    scale: Scale = "log"
+
+
+AOI = Panel(cost="aoi", label="age of information [windows]")
+VARIANCE = Panel(cost="velocity_variance", label="velocity variance [m²/s²]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResultFigure:
+    """One of the paper's result figures."""
+
+    name: str  # on the command line
+    published: str  # the same figure among the published points
+    title: str
+    task: Task
+    x_name: str  # a field of the mission, or receptive_field, a policy's own
+    x_label: str  # with its unit
+    x_scale: Scale = "linear"
+    panels: tuple[Panel, ...] = (AOI,)
+
+    @property
+    def xs(self) -> tuple[float, ...]:
+        """The published curves' places on the x axis, ascending."""
+        return tuple(sorted({point.x for point in points() if point.figure == self.published}))
+
+    @property
+    def sweeps_missions(self) -> bool:
+        """Whether x is a number of the mission, so that every policy has a curve over it."""
+        return self.x_name in OPTIONS
+
+    @property
+    def fixed(self) -> tuple[str, ...]:
+        """The numbers of the mission that are the same all over the figure."""
+        return tuple(
+            name
+            for name in OPTIONS
+            if name != self.x_name and name not in SWEEPS[self.task].irrelevant
+        )
+
+    def mission(self, preset: str) -> Mission:
+        """The missions' numbers as a preset has them; x is any."""
+        return PRESETS[preset](self.task)
+
+    def command(self, preset: str) -> str:
+        """The command that makes the figure's results."""
+        return " ".join(["swarm-mj", *self.arguments(preset), "--csv FILE"])
+
+    def arguments(self, preset: str) -> Sequence[str]:
+        """What `swarm-mj` is called with to make the figure's results, but for the file."""
+        drawn = [policy for policy in DRAWN if preset == "paper" or policy not in PAPER_ONLY]
+        command = ["evaluate", "--policy", *drawn, "--task", self.task, "--preset", preset]
+        if self.sweeps_missions:
+            command += [OPTIONS[self.x_name], *(f"{x:g}" for x in self.xs)]
+        return command
+
+
+RESULT_FIGURES = {
+    figure.name: figure
+    for figure in (
+        ResultFigure(
+            name="fig3",
+            published="fig3_receptive_field",
+            title="Receptive field",
+            task="stationary",
+            x_name="receptive_field",
+            x_label="receptive field of the GNN [hops]",
+            panels=(replace(AOI, scale="linear"),),
+        ),
+        ResultFigure(
+            name="fig4",
+            published="fig4_transmit_power",
+            title="Transmit power",
+            task="stationary",
+            x_name="range_ratio",
+            x_label="range ratio: how far a packet reaches in silence [km]",
+            x_scale="log",
+        ),
+        ResultFigure(
+            name="fig5",
+            published="fig5_team_size",
+            title="Team size",
+            task="random-walk",
+            x_name="num_robots",
+            x_label="team size [robots]",
+        ),
+        ResultFigure(
+            name="fig6",
+            published="fig6_flocking",
+            title="Flocking",
+            task="flocking",
+            x_name="velocity_ratio",
+            x_label="velocity ratio: how far a robot gets along an axis [km in 50 s]",
+            panels=(AOI, VARIANCE),
+        ),
+    )
+}
+FIGURES = (FLOCK, *RESULT_FIGURES)

@@ -1,0 +1,186 @@
+"""Draws a result figure: curves with error bars, named at their ends."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
+
+from swarm_mj.evaluation.figures.contents import Panel, ResultFigure, Scale
+from swarm_mj.evaluation.figures.curves import Curve, curves, results_of
+from swarm_mj.evaluation.figures.labels import name_ends
+from swarm_mj.evaluation.figures.style import FAINT, INK, WIDTH_IN, look_of, styled
+from swarm_mj.evaluation.results import Result
+
+TOP_IN, PANEL_IN, GAP_IN, BOTTOM_IN = 0.86, 3.3, 0.35, 0.75
+LEFT, RIGHT, MARGIN = 0.085, 0.8, 0.985  # of the width; the curves' names stand on the right
+FIXED = {
+    "num_robots": "{} robots",
+    "range_ratio": "range ratio {:g}",
+    "velocity_ratio": "velocity ratio {:g}",
+}
+RING = 1.6  # a published marker's size, of ours
+HEADROOM = 0.06  # of the axis, beyond the highest and the lowest curve
+
+SHORT = 7  # of a commit's digits
+
+
+def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
+    """A result figure of the paper, ours and the published curves.
+
+    Args:
+        figure: Which one.
+        results: One or more, of one preset; other regimes are passed over.
+
+    Returns:
+        The drawing.
+
+    Raises:
+        ValueError: The results hold no point of it, or cannot be compared.
+    """
+    found = results_of(figure, results)
+    num_panels = len(figure.panels)
+    height_in = TOP_IN + num_panels * PANEL_IN + (num_panels - 1) * GAP_IN + BOTTOM_IN
+    with styled():
+        drawing = Figure(figsize=(WIDTH_IN, height_in))
+        grid = drawing.subplots(num_panels, sharex=True, squeeze=False)
+        drawing.subplots_adjust(
+            left=LEFT,
+            right=RIGHT,
+            top=1.0 - TOP_IN / height_in,
+            bottom=BOTTOM_IN / height_in,
+            hspace=GAP_IN / PANEL_IN,
+        )
+        for axes, panel in zip(grid[:, 0], figure.panels, strict=True):
+            _fill(axes, figure, panel, curves(figure, panel.cost, found))
+        grid[-1, 0].set_xlabel(figure.x_label)
+        _head(drawing, figure, found[0], height_in)
+        drawing.text(LEFT, 0.12 / height_in, caption(figure, found), fontsize=7, color=FAINT)
+    return drawing
+
+
+def caption(figure: ResultFigure, results: Sequence[Result]) -> str:
+    """Where the numbers come from, with all commits that made some."""
+    result = results[0]
+    last = result.seed + result.episodes - 1
+    commits = list(dict.fromkeys(each.commit[:SHORT] for each in results if each.commit))
+    noun = "commit" if len(commits) == 1 else "commits"
+    code = f"swarm_mj {result.version}" + (f", {noun} {', '.join(commits)}" if commits else "")
+    return (
+        f"{figure.name}, preset {result.preset}: {result.episodes} episodes, seeds {result.seed} "
+        f"to {last}, {result.num_windows} windows each; {code}"
+    )
+
+
+def _fill(axes: Axes, figure: ResultFigure, panel: Panel, its: Sequence[Curve]) -> None:
+    """Draws a panel's curves and names them."""
+    _set_axes(axes, figure, panel, its)
+    for curve in its:
+        draw_one = _draw_level if curve.is_level else _draw_curve
+        draw_one(axes, curve)
+    name_ends(axes, its)
+
+
+def _draw_curve(axes: Axes, curve: Curve) -> None:
+    """A line with error bars; a published marker is a ring around ours where both agree."""
+    look = look_of(curve.method)
+    axes.errorbar(
+        curve.x,
+        curve.mean,
+        yerr=curve.sem,
+        label=_label(curve),
+        color=look.colour,
+        marker=look.marker,
+        markersize=RING * look.size if curve.is_published else look.size,
+        markerfacecolor="white" if curve.is_published else look.colour,
+        linestyle=_line(curve),
+        linewidth=look.width,
+        elinewidth=0.9,
+        capsize=2.0,
+    )
+
+
+def _draw_level(axes: Axes, curve: Curve) -> None:
+    """A line through the axes; ours with a band of its standard error."""
+    look = look_of(curve.method)
+    axes.plot(
+        curve.x,
+        curve.mean,
+        label=_label(curve),
+        color=look.colour,
+        linestyle=_line(curve),
+        linewidth=look.width,
+    )
+    if not curve.is_published:
+        low, high = curve.mean - curve.sem, curve.mean + curve.sem
+        axes.fill_between(curve.x, low, high, color=look.colour, alpha=0.2, linewidth=0.0)
+
+
+def _label(curve: Curve) -> str:
+    label = look_of(curve.method).label
+    return f"{label}, published" if curve.is_published else label
+
+
+def _line(curve: Curve) -> str:
+    return "--" if curve.is_published else "-"
+
+
+def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, its: Sequence[Curve]) -> None:
+    """Scales, limits and ticks, before anything is placed by them."""
+    axes.set_xscale(figure.x_scale)
+    axes.set_yscale(panel.scale)
+    x = np.concatenate([curve.x for curve in its])
+    y = np.concatenate([curve.mean + way * curve.sem for curve in its for way in (-1.0, 0.0, 1.0)])
+    y = y[(y > 0.0) if panel.scale == "log" else np.isfinite(y)]
+    axes.set_xlim(*_widened(x, 0.03, figure.x_scale))
+    axes.set_ylim(*_widened(y, HEADROOM, panel.scale))
+    axes.xaxis.set_major_locator(FixedLocator(np.unique(x).tolist()))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(FuncFormatter(_plain))
+    if panel.scale == "log":
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_minor_locator(NullLocator())
+        axes.yaxis.set_major_formatter(FuncFormatter(_plain))
+    axes.set_title(panel.label, loc="left", color=INK)
+
+
+def _widened(values: Float[np.ndarray, "V"], share: float, scale: Scale) -> tuple[float, float]:
+    """Limits that leave a share of the axis free at either end."""
+    low, high = float(np.min(values)), float(np.max(values))
+    if scale == "log":
+        factor = (high / low) ** share
+        return low / factor, high * factor
+    return low - share * (high - low), high + share * (high - low)
+
+
+def _plain(value: float, _position: int | None = None) -> str:
+    return f"{value:g}"
+
+
+def _head(drawing: Figure, figure: ResultFigure, result: Result, height_in: float) -> None:
+    """The title, what is the same all over the figure, and what solid and dashed mean."""
+    fixed = [FIXED[name].format(getattr(result, name)) for name in figure.fixed]
+    regime = ", ".join([figure.task.replace("-", " "), *fixed])
+    line = 1.0 - 0.28 / height_in
+    drawing.text(LEFT, line, figure.title, fontsize=12, fontweight="bold", va="baseline")
+    drawing.text(MARGIN, line, regime, color=FAINT, va="baseline", ha="right")
+    ours = Line2D([], [], color=FAINT, marker="o", markersize=4.5)
+    published = Line2D(
+        [], [], color=FAINT, marker="o", markersize=4.5 * RING, linestyle="--", linewidth=1.2
+    )
+    published.set_markerfacecolor("white")
+    drawing.legend(
+        handles=[ours, published],
+        labels=["this package, mean ± SEM", "published by the paper's authors, mean ± SEM"],
+        loc="upper left",
+        bbox_to_anchor=(LEFT, 1.0 - 0.4 / height_in),
+        ncols=2,
+        frameon=False,
+        fontsize=8,
+        borderpad=0.0,
+        borderaxespad=0.0,
+        handlelength=2.8,
+    )

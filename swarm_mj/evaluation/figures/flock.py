@@ -1,0 +1,162 @@
+"""Fig. 2: a flock at its start and at its end, by the velocities of its robots."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import MultipleLocator, StrMethodFormatter
+
+from swarm_mj.evaluation.figures.style import FAINT, RAMP, WIDTH_IN, styled
+from swarm_mj.io.provenance import commit, version
+from swarm_mj.mission import PRESETS, Mission
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.protocol.costs import velocity_variance
+from swarm_mj.rollout import fly
+from swarm_mj.swarm import Swarm
+
+HEIGHT_IN = 4.2
+ARROW_SHARE = 0.13  # of a panel's width: the length of its longest arrow
+MARGIN_M = 150.0  # around the robots, for their arrows
+KM = 1000.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Snapshot:
+    """A team at one moment."""
+
+    time_s: float
+    position_m: Float[np.ndarray, "N 2"]
+    velocity_mps: Float[np.ndarray, "N 2"]
+
+    @property
+    def disagreement_mps(self) -> Float[np.ndarray, "N"]:
+        """How far each robot's velocity is from the team's mean."""
+        return np.linalg.norm(self.velocity_mps - np.mean(self.velocity_mps, axis=0), axis=1)
+
+    @property
+    def variance_m2ps2(self) -> float:
+        """The team's velocity variance."""
+        return float(velocity_variance(self.velocity_mps[None])[0])
+
+
+def fly_flock(mission: Mission, policy_name: str, seed: int) -> tuple[Snapshot, Snapshot]:
+    """Flies a mission; its first and its last moment.
+
+    Args:
+        mission: What is flown.
+        policy_name: Who talks to whom, a name among `POLICIES`.
+        seed: The mission's.
+
+    Returns:
+        The team before the first window and after the last.
+
+    Raises:
+        ValueError: The policy is unknown, or the seed out of range.
+    """
+    policy = make_policy(policy_name, mission)
+    swarm = Swarm(mission, [seed])
+    start = _snapshot(swarm)
+    for _ in fly(swarm, policy):
+        pass
+    return start, _snapshot(swarm)
+
+
+def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
+    """Flies the preset's flock and draws its start and its end.
+
+    Args:
+        preset: A key of `PRESETS`.
+        policy_name: As for `fly_flock`.
+        seed: As for `fly_flock`.
+
+    Returns:
+        The drawing: an arrow per robot; its colour is how far the robot's velocity is from the
+        team's mean.
+
+    Raises:
+        ValueError: As `fly_flock`.
+    """
+    mission = PRESETS[preset]("flocking")
+    start, end = fly_flock(mission, policy_name, seed)
+    with styled():
+        drawing = Figure(figsize=(WIDTH_IN, HEIGHT_IN))
+        left, right, bar = drawing.subplots(1, 3, width_ratios=[1.0, 1.0, 0.04])
+        drawing.subplots_adjust(left=0.08, right=0.925, top=0.8, bottom=0.18, wspace=0.12)
+        colours = ScalarMappable(Normalize(0.0, float(np.max(start.disagreement_mps))), RAMP)
+        _draw(left, mission, start, colours)
+        _draw(right, mission, end, colours)
+        _frame((left, right), np.concatenate([start.position_m, end.position_m]))
+        drawing.colorbar(colours, cax=bar, label="distance from the team's mean velocity [m/s]")
+        _write(drawing, mission, policy_name, seed)
+    return drawing
+
+
+def _snapshot(swarm: Swarm) -> Snapshot:
+    return Snapshot(
+        time_s=float(swarm.now[0]) * swarm.mission.window_s,
+        position_m=swarm.bodies.position_m[0],
+        velocity_mps=swarm.bodies.velocity_mps[0],
+    )
+
+
+def _draw(axes: Axes, mission: Mission, team: Snapshot, colours: ScalarMappable) -> None:
+    """One moment: arrows as long as the panel's own scale makes them, which its key tells."""
+    fastest_mps = float(np.max(np.linalg.norm(team.velocity_mps, axis=1)))
+    corner, side = -mission.half_side_m / KM, mission.side_m / KM
+    area = Rectangle((corner, corner), side, side, fill=False, color=FAINT, linewidth=0.6)
+    area.set_linestyle((0, (4, 4)))
+    axes.add_patch(area)
+    x, y = team.position_m.T / KM
+    colour = colours.to_rgba(team.disagreement_mps)
+    axes.scatter(x, y, s=9.0, color=colour, zorder=3)
+    arrows = axes.quiver(
+        x,
+        y,
+        *team.velocity_mps.T,
+        color=colour,
+        scale=fastest_mps / ARROW_SHARE,
+        scale_units="width",
+        width=0.006,
+        zorder=2,
+    )
+    key_mps = float(f"{fastest_mps:.1g}")
+    axes.quiverkey(arrows, 0.8, 1.11, key_mps, f"{key_mps:g} m/s", labelpos="E", color=FAINT)
+    variance = _power(team.variance_m2ps2)
+    axes.set_title(f"after {team.time_s:g} s\nvelocity variance {variance} m²/s²", loc="left")
+    axes.set_xlabel("x [km]")
+
+
+def _power(value: float) -> str:
+    """A number with two digits, and its power of ten as it is written by hand."""
+    digits, _, exponent = f"{value:.2g}".partition("e")
+    return rf"{digits}$\times$10$^{{{int(exponent)}}}$" if exponent else digits
+
+
+def _frame(panels: tuple[Axes, Axes], position_m: Float[np.ndarray, "P 2"]) -> None:
+    """The same square in both panels, around all robots."""
+    low = (np.min(position_m, axis=0) - MARGIN_M) / KM
+    high = (np.max(position_m, axis=0) + MARGIN_M) / KM
+    centre, half = (low + high) / 2.0, float(np.max(high - low)) / 2.0
+    for axes in panels:
+        axes.set_xlim(centre[0] - half, centre[0] + half)
+        axes.set_ylim(centre[1] - half, centre[1] + half)
+        axes.set_aspect("equal")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(MultipleLocator(0.5))
+            axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    panels[0].set_ylabel("y [km]")
+    panels[1].tick_params(labelleft=False)
+
+
+def _write(drawing: Figure, mission: Mission, policy_name: str, seed: int) -> None:
+    """Title and caption."""
+    drawing.text(0.08, 0.93, "A flock at its start and its end", fontsize=12, fontweight="bold")
+    code = f"swarm_mj {version()}" + (f", commit {commit()}" if commit() else "")
+    flown = f"{mission.num_robots} robots, policy {policy_name}, seed {seed}"
+    caption = f"fig2, preset {mission.preset}: {flown}, {mission.num_windows} windows; {code}"
+    drawing.text(0.08, 0.03, caption, fontsize=7, color=FAINT)

@@ -1,0 +1,131 @@
+"""The connectivity floor: the age that no radio goes below, if robots rest while they talk."""
+
+from typing import no_type_check
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numba import njit
+
+from swarm_mj.protocol.buffers import NEVER
+
+
+class ConnectivityFloor:
+    """The age of information if connected robots shared everything at once, in every mission.
+
+    Two robots are neighbours while a lone packet decodes between them. In each window everyone
+    takes over the newest that is known in its connected part of the disk graph, so what is left is
+    what teams that fall apart cannot know.
+    """
+
+    def __init__(self, num_missions: int, num_robots: int, range_m: float) -> None:
+        """Starts before the first window: nobody knows anyone.
+
+        Args:
+            num_missions: B.
+            num_robots: N.
+            range_m: Two robots at most this far apart are neighbours [m].
+        """
+        self._timestamp = np.full((num_missions, num_robots, num_robots), NEVER)
+        self._range_m = range_m
+
+    def next(
+        self,
+        position_m: Float[np.ndarray, "B N 2"],
+        now: Float[np.ndarray, "B"],
+        is_on: Bool[np.ndarray, "B N"] | None = None,
+    ) -> Float[np.ndarray, "B"]:
+        """Shares within connected parts, and says how old what everyone knows then is.
+
+        Args:
+            position_m: True positions, after the robots have moved [m].
+            now: t at the end of the window [windows].
+            is_on: Who shares, and whose pairs count; None is everyone.
+
+        Returns:
+            The mean over all pairs, oneself included, as age of information has it [windows].
+        """
+        age = np.empty(now.shape)
+        everyone = np.ones(position_m.shape[:2], dtype=np.bool_)
+        _share(
+            self._timestamp,
+            position_m,
+            self._range_m,
+            now,
+            everyone if is_on is None else is_on,
+            age,
+        )
+        return age
+
+
+@njit(cache=True)
+@no_type_check
+def _share(
+    timestamp: Float[np.ndarray, "B N N"],
+    position_m: Float[np.ndarray, "B N 2"],
+    range_m: float,
+    now: Float[np.ndarray, "B"],
+    is_on: Bool[np.ndarray, "B N"],
+    age: Float[np.ndarray, "B"],
+) -> None:
+    num_missions, num_robots = position_m.shape[:2]
+    is_met = np.empty(num_robots, dtype=np.bool_)
+    part = np.empty(num_robots, dtype=np.int64)
+    newest = np.empty(num_robots)
+    for b in range(num_missions):
+        is_met[:] = ~is_on[b]  # who is off passes nothing on
+        total = 0.0
+        for i in range(num_robots):
+            if not is_met[i]:
+                num_members = _gather(position_m[b], range_m, i, is_met, part)
+                _pool(timestamp[b], part[:num_members], now[b], newest)
+                total += num_members * newest[is_on[b]].sum()
+        num_on = is_on[b].sum()
+        age[b] = now[b] - total / (num_on * num_on)
+
+
+@njit(cache=True)
+@no_type_check
+def _gather(
+    position_m: Float[np.ndarray, "N 2"],
+    range_m: float,
+    first: int,
+    is_met: Bool[np.ndarray, "N"],
+    part: Int[np.ndarray, "N"],
+) -> int:
+    """Fills `part` with everyone connected to `first`; returns how many."""
+    num_robots = position_m.shape[0]
+    part[0] = first
+    is_met[first] = True
+    num_members = 1
+    num_spread = 0
+    while num_spread < num_members:
+        i = part[num_spread]
+        num_spread += 1
+        for j in range(num_robots):
+            if not is_met[j]:
+                dx = position_m[i, 0] - position_m[j, 0]
+                dy = position_m[i, 1] - position_m[j, 1]
+                if dx * dx + dy * dy <= range_m * range_m:
+                    is_met[j] = True
+                    part[num_members] = j
+                    num_members += 1
+    return num_members
+
+
+@njit(cache=True)
+@no_type_check
+def _pool(
+    timestamp: Float[np.ndarray, "N N"],
+    members: Int[np.ndarray, "M"],
+    now: float,
+    newest: Float[np.ndarray, "N"],
+) -> None:
+    """Gives every member the newest that any of them knows, and `now` of the members."""
+    newest[:] = timestamp[members[0]]
+    for i in members[1:]:
+        for j in range(newest.shape[0]):
+            newest[j] = max(newest[j], timestamp[i, j])
+    for i in members:
+        newest[i] = now
+    for i in members:
+        timestamp[i] = newest

@@ -1,0 +1,180 @@
+"""Results of evaluations as files: one row per policy and regime, as CSV or JSON."""
+
+import csv
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, Field, asdict, dataclass, fields
+from pathlib import Path
+from types import NoneType
+from typing import Any, get_args
+
+from swarm_mj.io.atomic_file import whole_file
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """What one policy cost in one regime, over all missions; None is what does not exist.
+
+    Age of information (AoI, Eq. 10) and ages are in windows, velocity variance (Eq. 17) in m²/s².
+    `_std` is the sample's standard deviation, `_sem` the mean's standard error, `_ci_` the mean's
+    bootstrap interval of 95 %; all are over missions unless a comment says otherwise.
+    """
+
+    policy: str
+    task: str
+    preset: str
+    num_robots: int
+    range_ratio: float
+    velocity_ratio: float
+    boundary: str
+    physics: str
+    num_windows: int
+    switched_off: float = 0.0  # fraction of the robots, half-way; files made before it have none
+    episodes: int
+    seed: int  # of the first mission; the others follow one by one
+    probability: float | None  # of a transmission, for the policies that have one
+
+    aoi_mean: float
+    aoi_std: float | None
+    aoi_sem: float | None
+    aoi_ci_low: float | None
+    aoi_ci_high: float | None
+    aoi_median: float
+    aoi_p95: float
+    aoi_worst: float
+    aoi_steady_mean: float  # second half of the mission
+    aoi_steady_sem: float | None
+    age_p95: float  # over all ordered pairs of two robots and all windows of all missions
+    age_worst: float  # as above
+    aoi_floor_mean: float  # what instant sharing within connected parts would leave
+    aoi_floor_sem: float | None
+
+    velocity_variance_mean: float
+    velocity_variance_std: float | None
+    velocity_variance_sem: float | None
+    velocity_variance_ci_low: float | None
+    velocity_variance_ci_high: float | None
+    velocity_variance_median: float
+
+    delivery_ratio: float | None  # packets delivered to their addressee, of those attempted
+    packets_per_window: float  # attempted
+    hops_mean: float  # depth of the parent trees, over windows and missions
+    complete_window_median: float | None  # over the missions in which everyone heard of everyone
+    complete_share: float  # of these missions
+
+    baseline: str  # differences are this policy's minus the baseline's, on the same missions
+    aoi_difference_mean: float | None
+    aoi_difference_ci_low: float | None
+    aoi_difference_ci_high: float | None
+    velocity_variance_difference_mean: float | None
+    velocity_variance_difference_ci_low: float | None
+    velocity_variance_difference_ci_high: float | None
+
+    published_aoi_mean: float | None  # the paper's value where the regime is one of its own
+    published_aoi_sem: float | None
+    published_velocity_variance_mean: float | None
+    published_velocity_variance_sem: float | None
+
+    version: str
+    commit: str | None
+    config: str  # JSON: every field of the mission, the policy and its parameters
+
+
+COLUMNS = tuple(spec.name for spec in fields(Result))
+NUMBERS = {int: "a whole number", float: "a finite number", str: "a text"}
+WAY_OUT = "make them with `swarm-mj evaluate --csv FILE`"
+
+
+def read_results(path: Path) -> list[Result]:
+    """The rows of a results file that `swarm-mj evaluate --csv` wrote.
+
+    Args:
+        path: The CSV file; columns that no result has are passed over, and those with a default
+            may be missing.
+
+    Returns:
+        One or more results, in the file's order.
+
+    Raises:
+        ValueError: The file is no CSV, lacks columns or rows, or a cell is not what it must be.
+        OSError: The file cannot be read.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            reader = csv.DictReader(file, strict=True)
+            _check_header(path, reader.fieldnames or ())
+            results = [_result(f"{path}, line {reader.line_num}", row) for row in reader]
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise ValueError(f"results {path} are no CSV ({error}); {WAY_OUT}") from error
+    if not results:
+        raise ValueError(f"results {path} have no rows; {WAY_OUT}")
+    return results
+
+
+def write_csv(path: Path, results: Sequence[Result]) -> None:
+    """Writes results as CSV; what does not exist is an empty cell.
+
+    Args:
+        path: The file, replaced if it exists.
+        results: Its rows.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(asdict(result) for result in results)
+
+
+def write_json(
+    path: Path, results: Sequence[Result], missions: Sequence[Mapping[str, Sequence[float]]]
+) -> None:
+    """Writes `{"results": [...]}`; what does not exist is null.
+
+    Args:
+        path: The file, replaced if it exists.
+        results: Its objects.
+        missions: For each result, lists over its missions in the order of their seeds.
+
+    Raises:
+        ValueError: Not as many lists as results.
+        OSError: The file cannot be written.
+    """
+    objects = [
+        asdict(result) | {name: list(values) for name, values in lists.items()}
+        for result, lists in zip(results, missions, strict=True)
+    ]
+    with whole_file(path) as part:
+        text = json.dumps({"results": objects}, indent=2, allow_nan=False)
+        part.write_text(text + "\n", encoding="utf-8")
+
+
+def _check_header(path: Path, header: Sequence[str]) -> None:
+    needed = [spec.name for spec in fields(Result) if spec.default is MISSING]
+    missing = [name for name in needed if name not in header]
+    if missing:
+        raise ValueError(f"results {path} lack the columns {', '.join(missing)}; {WAY_OUT}")
+
+
+def _result(place: str, row: dict[str, Any]) -> Result:
+    """One row; `place` says which, for the message."""
+    if None in row or None in row.values():
+        raise ValueError(f"results {place}: as many cells as columns are needed; {WAY_OUT}")
+    given = (spec for spec in fields(Result) if spec.name in row)
+    return Result(**{spec.name: _value(place, spec, row[spec.name]) for spec in given})
+
+
+def _value(place: str, spec: Field[Any], text: str) -> Any:  # noqa: ANN401 - any field's value
+    """A cell as its field's type."""
+    kinds: tuple[Any, ...] = get_args(spec.type) or (spec.type,)
+    if text == "" and NoneType in kinds:
+        return None
+    try:
+        value = kinds[0](text)
+    except ValueError:
+        value = math.nan
+    if text == "" or (isinstance(value, float) and not math.isfinite(value)):
+        raise ValueError(f"results {place}: {spec.name} must be {NUMBERS[kinds[0]]}, not {text!r}")
+    return value

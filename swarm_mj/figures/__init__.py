@@ -1,1 +1,0 @@
-"""The paper's figures: ours and the published curves in one style, drawn without a display."""

@@ -1,0 +1,1 @@
+"""The Aggregation GNN (III-A): from a buffer to features, and from features to a decision."""

@@ -1,1 +1,0 @@
-"""What one robot's network sees (III-A): its own buffer as a graph."""

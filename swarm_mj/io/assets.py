@@ -1,0 +1,23 @@
+"""Files that the package brings: MJCF and policies."""
+
+from importlib import resources
+from pathlib import Path
+
+
+def asset(name: str) -> Path:
+    """The path of a file in `assets/`, in a checkout or in an installed wheel.
+
+    Args:
+        name: The file's name.
+
+    Returns:
+        Its path.
+
+    Raises:
+        FileNotFoundError: It is in neither place.
+    """
+    package = Path(str(resources.files("swarm_mj")))
+    for folder in (package / "assets", package.parent / "assets"):
+        if (folder / name).is_file():
+            return folder / name
+    raise FileNotFoundError(f"asset {name} is neither in the package nor beside it; reinstall")

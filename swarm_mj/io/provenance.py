@@ -1,0 +1,39 @@
+"""Which code made a number: the package's version and, in a checkout, its commit."""
+
+import hashlib
+import subprocess
+from importlib import metadata
+from pathlib import Path
+
+PACKAGE = ("swarm_mj", "assets", "pyproject.toml")  # what numbers depend on
+
+
+def version() -> str:
+    """The installed package's version."""
+    return metadata.version("swarm_mj")
+
+
+def code_digest() -> str:
+    """A hash of the package's code and data, which tells changes that no commit tells."""
+    package = Path(__file__).resolve().parents[1]
+    digest = hashlib.sha256()
+    for path in sorted([*package.rglob("*.py"), *package.rglob("*.csv")]):
+        digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+def commit() -> str | None:
+    """The checkout's commit, with `+` when the package differs from it; None outside a checkout."""
+    checkout = Path(__file__).resolve().parents[2]
+    if not (checkout / ".git").exists():
+        return None
+    try:
+        head = _git(checkout, "rev-parse", "--short=12", "HEAD")
+        return f"{head}+" if _git(checkout, "status", "--porcelain", "--", *PACKAGE) else head
+    except (OSError, subprocess.CalledProcessError):
+        return None
+
+
+def _git(checkout: Path, *arguments: str) -> str:
+    command = ["git", "-C", str(checkout), *arguments]
+    return subprocess.run(command, capture_output=True, check=True, text=True).stdout.strip()

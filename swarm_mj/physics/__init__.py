@@ -1,0 +1,1 @@
+"""The physics (IV-A): the MJCF scene and the MuJoCo worlds that step it."""

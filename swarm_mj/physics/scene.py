@@ -1,0 +1,105 @@
+"""The scene: the arena and N robots, composed from the MJCF files in `assets/`."""
+
+import math
+
+from mujoco._specs import MjSpec
+
+from swarm_mj.io.assets import asset
+from swarm_mj.mission import MISSION_DISTANCE_M, Mission
+
+CONTACT_STEP_S = 0.01  # longest step of the `contact` physics: ten per window of 100 ms
+ROBOT_RADIUS_M = 0.5  # assets/robot.xml
+ROBOT_MASS_KG = 1.0  # assets/robot.xml
+WALL_THICKNESS_M = 2.0  # half of it, assets/arena.xml
+WALL_HEIGHT_M = 5.0  # half of it, assets/arena.xml
+SQUARES_PER_M = 5.0 / 1000.0  # repeats of the floor's texture, assets/arena.xml
+BEACON_RADIUS_M = 8.0  # assets/robot.xml, for an area of 1 km; larger areas have larger beacons
+CAMERA_HEIGHT_PER_SIDE = 1.3  # sees the whole area at a field of view of 45 degrees
+
+# An overdamped limit that turns v into -v within one Euler step: a = -2 v / h (MuJoCo, solreflimit
+# in the direct form). Tight impedance, or part of the speed is lost.
+ELASTIC_SOLIMP = [0.9999, 0.9999, 0.001, 0.5, 2.0]
+
+
+def timestep_s(mission: Mission) -> float:
+    """MuJoCo's step [s]: the whole window in `exact` physics, 10 ms at most in `contact`."""
+    return mission.window_s / num_substeps(mission)
+
+
+def num_substeps(mission: Mission) -> int:
+    """MuJoCo steps per window.
+
+    In `contact` so many that none is longer than 10 ms, nor long enough to leave the area by more
+    than the robot's radius: a limit acts one step after it was crossed.
+    """
+    if mission.physics == "exact":
+        return 1
+    longest_s = min(CONTACT_STEP_S, ROBOT_RADIUS_M / mission.max_velocity_mps)
+    return math.ceil(mission.window_s / longest_s - 1e-9)
+
+
+def compose(mission: Mission) -> MjSpec:
+    """The arena at the mission's size with its N robots, ready to compile.
+
+    Args:
+        mission: Number of robots, area, bounds and physics.
+
+    Returns:
+        The editable model.
+    """
+    spec = MjSpec.from_file(str(asset("arena.xml")))
+    spec.option.timestep = timestep_s(mission)
+    spec.modelname = f"swarm of {mission.num_robots}"
+    _scale_arena(spec, mission)
+    robot = MjSpec.from_file(str(asset("robot.xml")))
+    _fit_robot(robot, mission)
+    for i in range(mission.num_robots):
+        frame = spec.worldbody.add_frame(pos=[0.0, 0.0, 1.0])
+        spec.attach(robot.copy(), frame=frame, prefix=f"r{i}/")
+    return spec
+
+
+def _scale_arena(spec: MjSpec, mission: Mission) -> None:
+    """Sizes floor, walls, camera and statistics to the area; an open area has no walls."""
+    half = mission.half_side_m
+    spec.stat.extent = mission.side_m
+    spec.geom("floor").size = [half, half, mission.side_m / 20.0]
+    repeats = mission.side_m * SQUARES_PER_M
+    spec.material("floor").texrepeat = [repeats, repeats]
+    spec.camera("top").pos = [0.0, 0.0, CAMERA_HEIGHT_PER_SIDE * mission.side_m]
+    across = half + 2 * WALL_THICKNESS_M
+    for name, x, y in (("east", 1, 0), ("west", -1, 0), ("north", 0, 1), ("south", 0, -1)):
+        wall = spec.geom(f"wall_{name}")
+        if not mission.has_walls:
+            spec.delete(wall)
+            continue
+        centre = half + WALL_THICKNESS_M
+        wall.pos = [x * centre, y * centre, WALL_HEIGHT_M]
+        wall.size = [
+            WALL_THICKNESS_M if x else across,
+            WALL_THICKNESS_M if y else across,
+            WALL_HEIGHT_M,
+        ]
+
+
+def _fit_robot(robot: MjSpec, mission: Mission) -> None:
+    """Sets the robot's beacon, the mission's bounds on it, and in `contact` its elastic walls."""
+    step_s = timestep_s(mission)
+    robot.option.timestep = step_s
+    beacon_m = BEACON_RADIUS_M * max(1.0, mission.side_m / MISSION_DISTANCE_M)
+    robot.geom("beacon").size = [beacon_m, *robot.geom("beacon").size[1:]]
+    force_n = ROBOT_MASS_KG * mission.max_acceleration_mps2
+    for actuator in robot.actuators:
+        actuator.forcerange = [-force_n, force_n]
+        if mission.physics == "exact":
+            actuator.set_to_velocity(kv=ROBOT_MASS_KG / step_s)
+            actuator.ctrlrange = [-mission.max_velocity_mps, mission.max_velocity_mps]
+        else:
+            actuator.set_to_motor()
+            actuator.ctrlrange = [-force_n, force_n]
+    if mission.physics == "contact" and mission.has_walls:
+        for joint in robot.joints:
+            joint.limited = True
+            joint.range = [-mission.half_side_m, mission.half_side_m]
+            joint.solref_limit = [0.0, -2.0 / step_s]
+            joint.solimp_limit = ELASTIC_SOLIMP

@@ -1,0 +1,14 @@
+"""The robots' true states."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotStates:
+    """Where the robots truly are, in all B missions at once."""
+
+    position_m: Float[np.ndarray, "B N 2"]  # p [m]
+    velocity_mps: Float[np.ndarray, "B N 2"]  # v [m/s]

@@ -1,0 +1,192 @@
+"""The robots' dynamics (IV-A, Eq. 15): B worlds stepped side by side by MuJoCo, one window a call.
+
+Positions come from MuJoCo's step; only the mirror at a wall writes them. Two modes:
+
+- `exact`: Eq. 15 to rounding error. Eq. 15 moves p with the velocity before the kick, MuJoCo's
+  Euler method with the velocity after it. So the servo's set point *is* v_t: one step of a window's
+  length makes the velocity v_t and adds v_t dt to p; then v_{t+1} becomes the new set point.
+- `contact`: forces at 10 ms steps, and joint limits that turn the velocity round at a wall.
+"""
+
+from typing import no_type_check
+
+import numpy as np
+from jaxtyping import Float
+from mujoco import batch
+from numba import njit
+
+from swarm_mj.mission import Mission
+from swarm_mj.physics.scene import ROBOT_MASS_KG, compose, num_substeps, timestep_s
+from swarm_mj.physics.state import RobotStates
+
+OPEN, MIRROR, CLIP = 0, 1, 2  # what happens at the boundary
+
+
+class Physics:
+    """B MuJoCo worlds of N robots."""
+
+    def __init__(self, mission: Mission, num_missions: int, *, num_threads: int = 1) -> None:
+        """Compiles the scene and makes the worlds.
+
+        Args:
+            mission: The scene, its bounds and the physics mode.
+            num_missions: B.
+            num_threads: MuJoCo's own; 1 is fastest when the other cores are busy.
+        """
+        self._mission = mission
+        self._model = compose(mission).compile()
+        self._batch = batch.Batch(self._model, num_missions, num_threads)
+        shape = (num_missions, mission.num_robots, 2)
+        self._qpos = self._batch.bind("qpos").reshape(shape)
+        self._qvel = self._batch.bind("qvel").reshape(shape)
+        self._ctrl = self._batch.bind("ctrl").reshape(shape)
+        self._wall = OPEN
+        if mission.has_walls and mission.physics == "exact":
+            self._wall = MIRROR if mission.wall_hit == "mirror" else CLIP
+        self._bodies = RobotStates(position_m=np.zeros(shape), velocity_mps=np.zeros(shape))
+
+    @property
+    def bodies(self) -> RobotStates:
+        """Where the robots are; arrays are not changed by later steps."""
+        return self._bodies
+
+    def place(
+        self, position_m: Float[np.ndarray, "B N 2"], velocity_mps: Float[np.ndarray, "B N 2"]
+    ) -> None:
+        """Starts all worlds anew from these states.
+
+        Args:
+            position_m: p_0 [m].
+            velocity_mps: v_0 [m/s].
+
+        Raises:
+            ValueError: There is not one state per robot, or one is not finite.
+        """
+        self._check_states("position", position_m)
+        self._check_states("velocity", velocity_mps)
+        self._batch.reset()
+        self._qpos[...] = position_m
+        self._qvel[...] = velocity_mps
+        self._ctrl[...] = velocity_mps if self._mission.physics == "exact" else 0.0
+        self._bodies = RobotStates(position_m=position_m.copy(), velocity_mps=velocity_mps.copy())
+
+    def step(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> RobotStates:
+        """Moves all robots through one window (Eq. 15).
+
+        Args:
+            acceleration_mps2: u, clipped to plus or minus A_max [m/s²].
+
+        Returns:
+            The states after the window.
+
+        Raises:
+            ValueError: An acceleration is not finite, or there is not one per robot.
+        """
+        self._check_states("acceleration", acceleration_mps2)
+        if self._mission.physics == "exact":
+            self._step_exact(acceleration_mps2)
+        else:
+            self._step_contact(acceleration_mps2)
+        return self._bodies
+
+    def _check_states(self, what: str, given: np.ndarray) -> None:
+        """Raises ValueError unless there is one finite vector per robot."""
+        expected = self._bodies.position_m.shape
+        if np.shape(given) != expected:
+            raise ValueError(
+                f"{what} must have shape {expected}, missions by robots by axes, "
+                f"not {np.shape(given)}"
+            )
+        first = _first_not_finite(given)
+        if first >= 0:
+            b, i, _ = np.unravel_index(first, expected)
+            raise ValueError(
+                f"{what} must be finite, not ({given[b, i, 0]:g}, {given[b, i, 1]:g}) "
+                f"of robot {i} in mission {b}"
+            )
+
+    def _step_exact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
+        self._batch.step()
+        bodies = _empty_like(self._bodies)
+        _kick(
+            self._qpos,
+            self._qvel,
+            self._ctrl,
+            acceleration_mps2,
+            self._mission.window_s,
+            self._mission.max_acceleration_mps2,
+            self._mission.max_velocity_mps,
+            self._mission.half_side_m,
+            self._wall,
+            bodies.position_m,
+            bodies.velocity_mps,
+        )
+        self._bodies = bodies
+
+    def _step_contact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
+        limit_mps = self._mission.max_velocity_mps
+        limit_mps2 = self._mission.max_acceleration_mps2
+        window_s, step_s = self._mission.window_s, timestep_s(self._mission)
+        # One constant acceleration per window, which ends at the clipped velocity of Eq. 15 ...
+        target_mps = self._qvel + np.clip(acceleration_mps2, -limit_mps2, limit_mps2) * window_s
+        held_mps2 = (np.clip(target_mps, -limit_mps, limit_mps) - self._qvel) / window_s
+        for _ in range(num_substeps(self._mission)):
+            # ... and after a bounce never pushes beyond the bound, from either side.
+            lowest, highest = (-limit_mps - self._qvel) / step_s, (limit_mps - self._qvel) / step_s
+            self._ctrl[...] = ROBOT_MASS_KG * np.clip(held_mps2, lowest, highest)
+            self._batch.step()
+        np.clip(self._qvel, -limit_mps, limit_mps, out=self._qvel)  # rounding of the last step
+        self._bodies = RobotStates(position_m=self._qpos.copy(), velocity_mps=self._qvel.copy())
+
+
+def _empty_like(bodies: RobotStates) -> RobotStates:
+    return RobotStates(
+        position_m=np.empty(bodies.position_m.shape),
+        velocity_mps=np.empty(bodies.velocity_mps.shape),
+    )
+
+
+@njit(cache=True)
+@no_type_check
+def _first_not_finite(
+    states: Float[np.ndarray, "B N 2"],
+) -> int:
+    flat = states.ravel()
+    for n in range(flat.size):
+        if not np.isfinite(flat[n]):
+            return n
+    return -1
+
+
+@njit(cache=True)
+@no_type_check
+def _kick(
+    qpos: Float[np.ndarray, "B N 2"],
+    qvel: Float[np.ndarray, "B N 2"],
+    ctrl: Float[np.ndarray, "B N 2"],
+    acceleration: Float[np.ndarray, "B N 2"],
+    dt_s: float,
+    limit_mps2: float,
+    limit_mps: float,
+    wall_m: float,
+    wall: int,
+    position: Float[np.ndarray, "B N 2"],
+    velocity: Float[np.ndarray, "B N 2"],
+) -> None:
+    """Accelerates, clips, reflects, and copies the states out; qpos has already moved by v dt."""
+    num_missions, num_robots = acceleration.shape[:2]
+    for b in range(num_missions):
+        for i in range(num_robots):
+            for axis in range(2):
+                u = min(max(acceleration[b, i, axis], -limit_mps2), limit_mps2)
+                v = min(max(ctrl[b, i, axis] + u * dt_s, -limit_mps), limit_mps)
+                p = qpos[b, i, axis]
+                while wall != OPEN and abs(p) > wall_m:
+                    edge = wall_m if p > 0 else -wall_m
+                    p = edge if wall == CLIP else 2 * edge - p
+                    v = -v
+                    qpos[b, i, axis] = p
+                    qvel[b, i, axis] = -qvel[b, i, axis]  # the wall's impulse
+                ctrl[b, i, axis] = v
+                position[b, i, axis] = p
+                velocity[b, i, axis] = v

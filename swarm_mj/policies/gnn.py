@@ -1,0 +1,105 @@
+"""A learned policy: every robot's own network on its own buffer's graph (III-A to III-C)."""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int
+
+from swarm_mj.gnn.action_distribution import recipient_logits, sample
+from swarm_mj.gnn.graphs import Observer
+from swarm_mj.gnn.network import AggregationGnn
+from swarm_mj.mission.batched_rng import Stream, uniform
+from swarm_mj.policies.policy import DecentralisedPolicy, Parameters
+from swarm_mj.protocol.local_views import LocalViews
+
+DIGITS = 12  # of a digest: enough to tell policies apart
+
+
+class LearnedPolicy(DecentralisedPolicy):
+    """Addresses whom the network's Boltzmann distribution draws, or its mode.
+
+    The robots' networks are alike, so one batch evaluates all of them. It does so on one thread:
+    small batches are slower on several, and processes share the work of many missions better.
+    """
+
+    def __init__(
+        self,
+        network: AggregationGnn,
+        observer: Observer,
+        *,
+        silence_logit: float = 0.0,
+        is_deterministic: bool = False,
+    ) -> None:
+        """Takes the network as it is, live: later changes of its weights count.
+
+        Args:
+            network: Of one or two numbers per node, as `recipient_logits` takes them, on any
+                device.
+            observer: Makes the graphs it was trained on.
+            silence_logit: Added to silence, but in a robot's own turn.
+            is_deterministic: Take the most probable recipient instead of a draw.
+        """
+        self._network = network
+        self._observer = observer
+        self._silence_logit = silence_logit
+        self._is_deterministic = is_deterministic
+
+    @property
+    def parameters(self) -> Parameters:
+        """How it was made, and a digest that changes with its weights."""
+        return {
+            "receptive_field": self._network.shape.receptive_field,
+            "is_deterministic": self._is_deterministic,
+            "digest": self._digest(),
+        }
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Forgets packets; takes each mission's generator. Arguments as in `Policy.start`."""
+        self._observer.start(len(rngs), num_robots)
+        self._uniform = Stream(rngs, uniform, (num_robots,))
+        self._owner = torch.arange(num_robots).repeat(len(rngs))
+
+    def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
+        """What each robot's own network draws from its own graph."""
+        logits = self._logits(views)
+        shape = views.silence.shape
+        if self._is_deterministic:
+            return logits.argmax(axis=1).reshape(shape)
+        return sample(logits, self._uniform.next().ravel()).reshape(shape)
+
+    def _logits(self, views: LocalViews) -> Float[np.ndarray, "R N"]:
+        """Over the recipients of all robots, mission by mission."""
+        graphs = self._observer.graphs(views)
+        node = torch.from_numpy(graphs.node)
+        parent = torch.from_numpy(graphs.parent.astype(np.int64))
+        may_address = torch.from_numpy(graphs.may_address)
+        has_turn = torch.from_numpy(graphs.has_turn)
+        device = next(self._network.parameters()).device
+        with torch.inference_mode(), _one_thread():
+            output = self._network(node.to(device), parent.to(device)).cpu()
+            logits = recipient_logits(
+                output, self._owner, may_address, self._silence_logit, has_turn
+            )
+        return logits.numpy()
+
+    def _digest(self) -> str:
+        """A hash of all that its decisions follow from."""
+        said = (self._network.shape, self._observer.names, self._silence_logit)
+        digest = hashlib.sha256(repr(said).encode())
+        for name, tensor in sorted(self._network.state_dict().items()):
+            digest.update(name.encode() + b"\0" + tensor.cpu().contiguous().numpy().tobytes())
+        return digest.hexdigest()[:DIGITS]
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Within it, torch starts no threads; the setting is the process's, so it is put back."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)

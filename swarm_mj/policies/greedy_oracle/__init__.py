@@ -1,0 +1,1 @@
+"""The greedy oracles: schedules by someone who knows everything."""

@@ -1,0 +1,85 @@
+"""Greedy oracles: what a scheduler could do that knew everything at every moment.
+
+They are no policies a team could fly, but show where the age of information could go.
+"""
+
+from abc import abstractmethod
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.policies.greedy_oracle.link_scheduler import Links
+from swarm_mj.policies.greedy_oracle.schedule import (
+    greedy_schedule,
+    links_between,
+    lookahead_window,
+)
+from swarm_mj.policies.policy import CentralisedPolicy
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.radio.free_space import FreeSpaceRadio
+
+
+class _Oracle(CentralisedPolicy):
+    """Plans each window of each mission from all true buffers and positions."""
+
+    def __init__(self, radio: FreeSpaceRadio) -> None:
+        """Prepares the policy.
+
+        Args:
+            radio: The mission's channel.
+        """
+        self._radio = radio
+
+    def recipients(self, views: LocalViews, bodies: RobotStates) -> Int[np.ndarray, "B N"]:
+        """The window's schedule; robots move before they talk, which it does not foresee."""
+        windows = [
+            self._window(timestamp, float(now), links_between(self._radio, position_m))
+            for timestamp, now, position_m in zip(
+                views.buffers.timestamp, views.now, bodies.position_m, strict=True
+            )
+        ]
+        return np.stack(windows)
+
+    @abstractmethod
+    def _window(
+        self, timestamp: Float[np.ndarray, "N N"], now: float, links: Links
+    ) -> Int[np.ndarray, "N"]:
+        """One mission's recipients."""
+
+
+class GreedyOracle(_Oracle):
+    """Adds pairs while the age that the window removes grows: myopic, and not optimal.
+
+    Centralised: it is told all buffers and all true positions. It addresses nobody who sends, even
+    where the authors' code would let that robot hear.
+    """
+
+    def _window(
+        self, timestamp: Float[np.ndarray, "N N"], now: float, links: Links
+    ) -> Int[np.ndarray, "N"]:
+        schedule, _ = greedy_schedule(timestamp, now, links, 1, is_squared=False)
+        return schedule[0]
+
+
+class LookaheadOracle(_Oracle):
+    """Follows the best first pairs through greedy windows and takes the branch of least age.
+
+    Centralised, as `GreedyOracle`, which sees only the window it is in: it spends packets on many
+    small refreshments, where a packet that waits for news would carry more. This one weighs rises
+    of T squared and sees what a window leads to.
+    """
+
+    NUM_BRANCHES = 6  # first pairs tried
+    NUM_WINDOWS = 4  # windows each is followed
+
+    def _window(
+        self, timestamp: Float[np.ndarray, "N N"], now: float, links: Links
+    ) -> Int[np.ndarray, "N"]:
+        return lookahead_window(
+            timestamp,
+            now,
+            links,
+            num_branches=self.NUM_BRANCHES,
+            num_windows=self.NUM_WINDOWS,
+        )

@@ -1,0 +1,1 @@
+"""The common-knowledge planner: every robot computes the whole team's schedule."""

@@ -1,0 +1,244 @@
+"""The costs (II-C, IV-A): age of information (Eq. 10), velocity variance (Eq. 17), packets."""
+
+from dataclasses import dataclass
+from typing import no_type_check
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numba import njit
+
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.protocol.buffers import NEVER, Buffers
+from swarm_mj.protocol.window import Phase
+
+
+@dataclass(frozen=True, kw_only=True)
+class Packets:
+    """What became of the packets of one window, or of many, in every mission [packets]."""
+
+    attempted: Int[np.ndarray, "B"]  # sent to a recipient in a transmission phase
+    delivered: Int[np.ndarray, "B"]  # of these, decoded by the recipient
+    overheard: Int[np.ndarray, "B"]  # decoded by a robot it was not meant for, in any phase
+    answered: Int[np.ndarray, "B"]  # responses that the first sender decoded
+
+    @property
+    def lost(self) -> Int[np.ndarray, "B"]:
+        """Attempted, and not decoded by the recipient."""
+        return self.attempted - self.delivered
+
+
+def age_of_information(
+    buffers: Buffers,
+    now: Float[np.ndarray, "B"],
+    is_on: Bool[np.ndarray, "B N"] | None = None,
+) -> tuple[Float[np.ndarray, "B"], Bool[np.ndarray, "B"]]:
+    """Mean over all pairs i, j of t - T^{i,j}, own age included (Eq. 10).
+
+    Args:
+        buffers: What everyone knows.
+        now: t [windows].
+        is_on: Whose pairs count, at least one robot's in each mission; None is everyone's.
+
+    Returns:
+        The age [windows], and whether everyone of these has heard of everyone of these.
+    """
+    age = np.empty(now.shape)
+    is_complete = np.empty(now.shape, dtype=np.bool_)
+    _mean_age(buffers.timestamp, now, is_on, age, is_complete)
+    return age, is_complete
+
+
+def velocity_variance(
+    velocity_mps: Float[np.ndarray, "B N 2"], is_on: Bool[np.ndarray, "B N"] | None = None
+) -> Float[np.ndarray, "B"]:
+    """Mean squared distance of a robot's velocity from the team's mean [m²/s²] (Eq. 17).
+
+    Args:
+        velocity_mps: Every robot's [m/s].
+        is_on: Who makes up the team; None is everyone.
+
+    Returns:
+        The variance, per mission.
+    """
+    variance = np.empty(velocity_mps.shape[0])
+    _variance(velocity_mps, is_on, variance)
+    return variance
+
+
+def count_packets(phases: tuple[Phase, Phase], *, has_response: bool) -> Packets:
+    """Counts what became of one window's packets.
+
+    Args:
+        phases: The window's two phases.
+        has_response: Whether the second phase answers the first (Alg. 1) or is a transmission of
+            its own (flooding).
+
+    Returns:
+        The counts, per mission.
+    """
+    num_missions = phases[0].recipient.shape[0]
+    count = np.zeros((4, num_missions), dtype=np.int64)
+    first, second = phases
+    _count(first.recipient, first.heard, count[0], count[1], count[2])
+    if has_response:
+        _count(second.recipient, second.heard, np.zeros_like(count[0]), count[3], count[2])
+    else:
+        _count(second.recipient, second.heard, count[0], count[1], count[2])
+    return Packets(attempted=count[0], delivered=count[1], overheard=count[2], answered=count[3])
+
+
+def mean_hops(
+    buffers: Buffers, is_on: Bool[np.ndarray, "B N"] | None = None
+) -> Float[np.ndarray, "B"]:
+    """Mean depth of known teammates in the parent trees (II-B), 0 before anyone is known [hops].
+
+    Args:
+        buffers: What everyone knows.
+        is_on: Whose depths in whose trees count, whoever is on the way; None is everyone.
+
+    Returns:
+        The depth, per mission.
+
+    Raises:
+        ValueError: Some parents lead nowhere, or in a circle.
+    """
+    hops = np.empty(buffers.parent.shape[0])
+    counts = np.ones(buffers.shape, dtype=np.bool_) if is_on is None else is_on
+    if not _mean_depth(buffers.timestamp, buffers.parent, counts, hops):
+        raise ValueError("parents of known robots must lead back to the buffer's owner")
+    return hops
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindowCosts:
+    """What one window cost, in every mission."""
+
+    age_windows: Float[np.ndarray, "B"]  # age of information after the window (Eq. 10)
+    is_complete: Bool[np.ndarray, "B"]  # whether everyone has heard of everyone
+    velocity_variance_m2ps2: Float[np.ndarray, "B"]  # Eq. 17
+    packets: Packets
+
+
+def window_costs(
+    buffers: Buffers,
+    bodies: RobotStates,
+    phases: tuple[Phase, Phase],
+    now: Float[np.ndarray, "B"],
+    *,
+    has_response: bool,
+    is_on: Bool[np.ndarray, "B N"] | None = None,
+) -> WindowCosts:
+    """Everything one window cost; arguments as in the functions above."""
+    age, is_complete = age_of_information(buffers, now, is_on)
+    return WindowCosts(
+        age_windows=age,
+        is_complete=is_complete,
+        velocity_variance_m2ps2=velocity_variance(bodies.velocity_mps, is_on),
+        packets=count_packets(phases, has_response=has_response),
+    )
+
+
+# In these, None for `is_on` is compiled apart: without the tests, as fast as if it did not exist.
+# Times are halves of a window, so their sum is exact and adding in any order changes nothing.
+@njit(cache=True, fastmath={"reassoc"})
+@no_type_check
+def _mean_age(
+    timestamp: Float[np.ndarray, "B N N"],
+    now: Float[np.ndarray, "B"],
+    is_on: Bool[np.ndarray, "B N"] | None,
+    age: Float[np.ndarray, "B"],
+    is_complete: Bool[np.ndarray, "B"],
+) -> None:
+    num_missions, num_robots = timestamp.shape[:2]
+    for b in range(num_missions):
+        total = 0.0
+        num_unknown = 0
+        num_on = num_robots if is_on is None else is_on[b].sum()
+        for i in range(num_robots):
+            if is_on is not None and not is_on[b, i]:
+                continue
+            for j in range(num_robots):
+                if is_on is not None and not is_on[b, j]:
+                    continue
+                total += timestamp[b, i, j]
+                num_unknown += timestamp[b, i, j] <= NEVER
+        age[b] = now[b] - total / (num_on * num_on)
+        is_complete[b] = num_unknown == 0
+
+
+@njit(cache=True)
+@no_type_check
+def _variance(
+    velocity_mps: Float[np.ndarray, "B N 2"],
+    is_on: Bool[np.ndarray, "B N"] | None,
+    variance: Float[np.ndarray, "B"],
+) -> None:
+    num_missions, num_robots = velocity_mps.shape[:2]
+    for b in range(num_missions):
+        total = 0.0
+        num_on = num_robots if is_on is None else is_on[b].sum()
+        for axis in range(2):
+            mean = 0.0
+            for i in range(num_robots):
+                if is_on is None or is_on[b, i]:
+                    mean += velocity_mps[b, i, axis] / num_on
+            for i in range(num_robots):
+                if is_on is None or is_on[b, i]:
+                    total += (velocity_mps[b, i, axis] - mean) ** 2
+        variance[b] = total / num_on
+
+
+@njit(cache=True)
+@no_type_check
+def _count(
+    recipient: Int[np.ndarray, "B N"],
+    heard: Int[np.ndarray, "B N"],
+    attempted: Int[np.ndarray, "B"],
+    received: Int[np.ndarray, "B"],
+    overheard: Int[np.ndarray, "B"],
+) -> None:
+    num_missions, num_robots = recipient.shape
+    for b in range(num_missions):
+        for i in range(num_robots):
+            attempted[b] += recipient[b, i] != i
+            sender = heard[b, i]
+            if sender != i:
+                is_meant = recipient[b, sender] == i
+                received[b] += is_meant
+                overheard[b] += not is_meant
+
+
+@njit(cache=True)
+@no_type_check
+def _mean_depth(
+    timestamp: Float[np.ndarray, "B N N"],
+    parent: Int[np.ndarray, "B N N"],
+    is_on: Bool[np.ndarray, "B N"],
+    hops: Float[np.ndarray, "B"],
+) -> bool:
+    """Fills `hops`; returns whether all parents form trees."""
+    num_missions, num_robots = parent.shape[:2]
+    depth = np.empty(num_robots, dtype=np.int64)
+    path = np.empty(num_robots, dtype=np.int64)
+    for b in range(num_missions):
+        total = 0
+        num_known = 0
+        for i in np.nonzero(is_on[b])[0]:
+            depth[:] = -1
+            depth[i] = 0
+            for j in range(num_robots):
+                if timestamp[b, i, j] > NEVER and j != i:
+                    k = j
+                    length = 0
+                    while depth[k] < 0:
+                        path[length] = k
+                        length += 1
+                        k = parent[b, i, k]
+                        if k < 0 or length == num_robots:
+                            return False
+                    for step in range(length - 1, -1, -1):
+                        depth[path[step]] = depth[k] + length - step
+                    total += is_on[b, j] * depth[j]
+                    num_known += is_on[b, j]
+        hops[b] = total / num_known if num_known else 0.0
+    return True

@@ -1,0 +1,33 @@
+"""What a robot may know (II-C, Eq. 9's argument): its own view, and nothing else."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from swarm_mj.protocol.buffers import Buffers
+from swarm_mj.protocol.window import Phase
+
+
+@dataclass(frozen=True, kw_only=True)
+class LocalViews:
+    """What the robots know, one view a robot: `[b, i]` in every array belongs to robot i alone.
+
+    Identities are the index i, the team's size is N; both are granted before the mission (II-C).
+    The buffers are live: they cannot be written, and change with the next window.
+    """
+
+    buffers: Buffers  # robot i's buffer is row [b, i]
+    now: Float[np.ndarray, "B"]  # t on the synchronised clock [windows]
+    phases: tuple[Phase, ...]  # since the last window began: whom robot i addressed and heard
+
+    @property
+    def num_robots(self) -> int:
+        """N, known to everyone before the mission (II-C)."""
+        return self.buffers.timestamp.shape[1]
+
+    @property
+    def silence(self) -> Int[np.ndarray, "B N"]:
+        """The recipients that mean silence: everyone addresses itself."""
+        num_missions, num_robots = self.buffers.timestamp.shape[:2]
+        return np.broadcast_to(np.arange(num_robots), (num_missions, num_robots))

@@ -1,0 +1,1 @@
+"""The radio (II-A): who decodes whom."""

@@ -1,0 +1,92 @@
+"""A flight: a policy on a swarm from the first window to the last, and what it cost."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from swarm_mj.policies.policy import Policy
+from swarm_mj.protocol.costs import WindowCosts, mean_hops
+from swarm_mj.swarm import Swarm
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flown:
+    """One window of a flight, in every mission."""
+
+    costs: WindowCosts
+    hops: Float[np.ndarray, "B"]  # mean depth of the parent trees [hops]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary:
+    """What B missions cost over the windows flown; packets are totals."""
+
+    num_windows: int
+    aoi_mean: Float[np.ndarray, "B"]  # Eq. 10 [windows]
+    velocity_variance_mean: Float[np.ndarray, "B"]  # Eq. 17 [m²/s²]
+    velocity_variance_first: Float[np.ndarray, "B"]  # after the first window [m²/s²]
+    velocity_variance_last: Float[np.ndarray, "B"]  # after the last window [m²/s²]
+    hops_mean: Float[np.ndarray, "B"]  # depth of the parent trees [hops]
+    complete_window: Float[np.ndarray, "B"]  # everyone had first heard of everyone, or nan
+    packets_attempted: Float[np.ndarray, "B"]
+    packets_delivered: Float[np.ndarray, "B"]
+    packets_lost: Float[np.ndarray, "B"]
+    packets_overheard: Float[np.ndarray, "B"]
+    packets_answered: Float[np.ndarray, "B"]
+
+
+def fly(swarm: Swarm, policy: Policy) -> Iterator[Flown]:
+    """Flies the mission, one window at a time, for the caller to watch, record or break off.
+
+    Args:
+        swarm: At the start of its missions.
+        policy: Who addresses whom.
+
+    Yields:
+        What each window cost; the swarm stands at the end of that window.
+
+    Raises:
+        ValueError: The swarm has flown already.
+    """
+    if np.any(swarm.now > 0):
+        raise ValueError(f"the swarm has flown {swarm.now[0]:g} windows already; restart it first")
+    swarm.start(policy)
+    for _ in range(swarm.mission.num_windows):
+        costs = swarm.step(policy)
+        yield Flown(costs=costs, hops=mean_hops(swarm.buffers, swarm.is_on))
+
+
+def summarise(flown: Sequence[Flown]) -> Summary:
+    """The costs of the windows flown.
+
+    Args:
+        flown: One or more windows, in order.
+
+    Returns:
+        Means and totals, per mission.
+
+    Raises:
+        ValueError: No window was flown.
+    """
+    if not flown:
+        raise ValueError("a summary needs at least 1 window flown, not 0")
+    variance = np.stack([window.costs.velocity_variance_m2ps2 for window in flown])
+    is_complete = np.stack([window.costs.is_complete for window in flown])
+    first_complete = np.argmax(is_complete, axis=0) + 1.0
+    packets = [window.costs.packets for window in flown]
+    return Summary(
+        num_windows=len(flown),
+        aoi_mean=np.mean([window.costs.age_windows for window in flown], axis=0),
+        velocity_variance_mean=np.mean(variance, axis=0),
+        velocity_variance_first=variance[0],
+        velocity_variance_last=variance[-1],
+        hops_mean=np.mean([window.hops for window in flown], axis=0),
+        complete_window=np.where(np.any(is_complete, axis=0), first_complete, np.nan),
+        packets_attempted=np.sum([p.attempted for p in packets], axis=0, dtype=float),
+        packets_delivered=np.sum([p.delivered for p in packets], axis=0, dtype=float),
+        packets_lost=np.sum([p.lost for p in packets], axis=0, dtype=float),
+        packets_overheard=np.sum([p.overheard for p in packets], axis=0, dtype=float),
+        packets_answered=np.sum([p.answered for p in packets], axis=0, dtype=float),
+    )

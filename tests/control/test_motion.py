@@ -1,0 +1,207 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from swarm_mj.control.motion import RandomWalk, flocking, initial_velocity, motion_of
+from swarm_mj.mission import paper, reference
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.protocol.buffers import empty_buffers
+
+TASKS = ["stationary", "random-walk", "flocking"]
+FLOCKING_SETS = ["heard", "moving"]
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def generators(num_missions, seed=0):
+    return [np.random.default_rng((seed, b)) for b in range(num_missions)]
+
+
+def overheard_team(seed, num_missions=2, num_robots=5):
+    """Buffers of which some entries are unheard and some velocities are 0, and true velocities."""
+    rng = np.random.default_rng(seed)
+    buffers = empty_buffers(num_missions, num_robots)
+    shape = buffers.timestamp.shape
+    buffers.timestamp[...] = rng.integers(0, 4, size=shape) / 2.0  # 0 is never
+    buffers.velocity_mps[...] = rng.normal(scale=3.0, size=(*shape, 2))
+    buffers.velocity_mps[rng.random((*shape, 2)) < 0.3] = 0.0
+    return buffers, rng.normal(scale=3.0, size=(num_missions, num_robots, 2))
+
+
+def bodies_of(velocity_mps):
+    return RobotStates(position_m=np.zeros_like(velocity_mps), velocity_mps=velocity_mps)
+
+
+def walked(mission, num_missions, num_windows, seed=0):
+    """A random walk's accelerations [window, mission, robot, axis]."""
+    walk = RandomWalk(mission, generators(num_missions, seed))
+    shape = (num_missions, mission.num_robots, 2)
+    buffers = empty_buffers(num_missions, mission.num_robots)
+    return np.stack([walk(buffers, bodies_of(np.zeros(shape))) for _ in range(num_windows)])
+
+
+def test_iv_a_random_walk_is_a_clipped_normal():
+    """u ~ N(0, A_max / 3): a standard deviation; beyond three (P = 0.27 %) it is clipped."""
+    limit = 20.0
+    u = walked(paper("random-walk", num_robots=50), 10, 200).ravel()
+    assert np.abs(u).max() == limit
+    is_clipped = np.abs(u) == limit
+    expected = 2 * stats.norm.sf(3.0)
+    assert abs(is_clipped.mean() - expected) < 5 * math.sqrt(expected / u.size)
+    within = stats.truncnorm(-3.0, 3.0, scale=limit / 3.0)
+    assert stats.kstest(u[~is_clipped], within.cdf).pvalue > 1e-3
+    # With the tails at the limit, 0.2 % of the deviation is lost: 6.65, not 6.67 m/s².
+    assert np.std(u) == pytest.approx(limit / 3.0, rel=0.01)
+
+
+def test_iv_a_random_walk_follows_the_presets_acceleration():
+    u = walked(reference("random-walk", num_robots=50), 10, 50)
+    assert np.abs(u).max() <= 10.0
+    assert np.std(u) == pytest.approx(10.0 / 3.0, rel=0.02)
+
+
+def test_iv_a_random_walk_draws_apart_for_every_robot_axis_and_window():
+    u = walked(paper("random-walk", num_robots=4), 3, 3000).reshape(3000, -1)
+    correlation = np.corrcoef(np.vstack([u[1:].T, u[:-1].T]))  # with itself, one window on, too
+    np.testing.assert_allclose(correlation, np.eye(len(correlation)), atol=5 / math.sqrt(3000))
+
+
+def test_random_walk_of_a_mission_does_not_depend_on_its_neighbours():
+    mission = paper("random-walk", num_robots=4)
+    together = walked(mission, 3, 100)
+    np.testing.assert_array_equal(together[:, :1], walked(mission, 1, 100))
+
+
+def mean_difference(buffers, velocity_mps, counts):
+    """Eq. 16 in words: over those who count, the mean of their velocity less one's own."""
+    num_missions, num_robots = velocity_mps.shape[:2]
+    u = np.zeros_like(velocity_mps)
+    for b in range(num_missions):
+        for i in range(num_robots):
+            for axis in range(2):
+                differences = [
+                    buffers.velocity_mps[b, i, j, axis] - velocity_mps[b, i, axis]
+                    for j in range(num_robots)
+                    if counts(buffers.timestamp[b, i, j], buffers.velocity_mps[b, i, j, axis])
+                ]
+                u[b, i, axis] = math.fsum(differences) / max(len(differences), 1)
+    return u
+
+
+@given(seed=SEEDS)
+def test_eq16_counts_who_was_heard_since_the_start(seed):
+    buffers, velocity_mps = overheard_team(seed)
+    expected = mean_difference(buffers, velocity_mps, lambda timestamp, _: timestamp > 0.0)
+    np.testing.assert_allclose(flocking(buffers, velocity_mps, "heard"), expected, atol=1e-12)
+
+
+@given(seed=SEEDS)
+def test_eq16_reference_counts_who_moves(seed):
+    """The authors' code, per axis: a velocity of exactly 0 does not count."""
+    buffers, velocity_mps = overheard_team(seed)
+    expected = mean_difference(buffers, velocity_mps, lambda _, velocity: velocity != 0.0)
+    np.testing.assert_allclose(flocking(buffers, velocity_mps, "moving"), expected, atol=1e-12)
+
+
+def test_eq16_by_hand():
+    """Robot 0 at (1, 0) m/s knows itself and robot 2 at (4, 3): half the difference, per second."""
+    buffers = empty_buffers(1, 3)
+    buffers.timestamp[0, 0] = [2.0, 0.0, 1.5]
+    buffers.velocity_mps[0, 0] = [[1.0, 0.0], [9.0, 9.0], [4.0, 3.0]]
+    velocity_mps = np.array([[[1.0, 0.0], [9.0, 9.0], [4.0, 3.0]]])
+    u = flocking(buffers, velocity_mps, "heard")
+    np.testing.assert_allclose(u[0], [[1.5, 1.5], [0.0, 0.0], [0.0, 0.0]])
+
+
+@pytest.mark.parametrize("flocking_set", FLOCKING_SETS)
+def test_eq16_who_knows_nobody_keeps_its_velocity(flocking_set):
+    velocity_mps = np.random.default_rng(0).normal(size=(2, 5, 2))
+    u = flocking(empty_buffers(2, 5), velocity_mps, flocking_set)
+    np.testing.assert_array_equal(u, 0.0)
+
+
+@given(seed=SEEDS)
+def test_eq16_unheard_robots_never_matter(seed):
+    buffers, velocity_mps = overheard_team(seed)
+    before = flocking(buffers, velocity_mps, "heard")
+    buffers.velocity_mps[buffers.timestamp == 0.0] += 1e3
+    np.testing.assert_array_equal(flocking(buffers, velocity_mps, "heard"), before)
+
+
+def test_eq16_everyone_heard_has_the_same_weight():
+    """One robot among many nudges the mean by its share only: 1/5 of what it changed."""
+    buffers, velocity_mps = overheard_team(1)
+    buffers.timestamp[...] = 1.0
+    before = flocking(buffers, velocity_mps, "heard")
+    buffers.velocity_mps[1, 2, 4, 0] += 10.0
+    difference = flocking(buffers, velocity_mps, "heard") - before
+    assert difference[1, 2, 0] == pytest.approx(2.0)
+    difference[1, 2, 0] = 0.0
+    np.testing.assert_array_equal(difference, 0.0)
+
+
+@pytest.mark.parametrize("preset", [paper, reference])
+def test_flocking_is_clipped(preset):
+    """A teammate 1 km/s faster wants half that, per second; the robot accelerates at A_max."""
+    mission = preset("flocking", num_robots=2)
+    limit = mission.max_acceleration_mps2
+    buffers = empty_buffers(1, 2)
+    buffers.timestamp[...] = 1.0
+    buffers.velocity_mps[0, :, 1] = [1000.0, -1000.0]
+    buffers.velocity_mps[0, :, 0] = 1e-9
+    u = motion_of(mission, generators(1))(buffers, bodies_of(np.zeros((1, 2, 2))))
+    np.testing.assert_array_equal(u[0], [[limit, -limit]] * 2)
+
+
+@pytest.mark.parametrize(("preset", "counts_unheard"), [(paper, False), (reference, True)])
+def test_flocking_set_is_the_presets(preset, counts_unheard):
+    """A velocity without a timestamp counts in the authors' code only."""
+    buffers = empty_buffers(1, 2)
+    buffers.velocity_mps[...] = 1.0
+    controller = motion_of(preset("flocking", num_robots=2), generators(1))
+    u = controller(buffers, bodies_of(np.zeros((1, 2, 2))))
+    np.testing.assert_array_equal(u, 1.0 if counts_unheard else 0.0)
+
+
+def test_stationary_robots_do_not_accelerate():
+    buffers, velocity_mps = overheard_team(0)
+    stand = motion_of(paper("stationary", num_robots=5), generators(2))
+    np.testing.assert_array_equal(stand(buffers, bodies_of(velocity_mps)), np.zeros((2, 5, 2)))
+
+
+@pytest.mark.parametrize("preset", [paper, reference])
+@pytest.mark.parametrize("task", TASKS)
+def test_iv_a_a_controller_knows_its_own_robot_only(task, preset):
+    """Row 2's acceleration stays when every other row and every other body is another team's."""
+    mission = preset(task, num_robots=5)
+    mine, mine_mps = overheard_team(1)
+    theirs, theirs_mps = overheard_team(2)
+    before = motion_of(mission, generators(2))(mine, bodies_of(mine_mps))
+    for array, other in (
+        (mine.timestamp, theirs.timestamp),
+        (mine.velocity_mps, theirs.velocity_mps),
+        (mine_mps, theirs_mps),
+    ):
+        array[:, [0, 1, 3, 4]] = other[:, [0, 1, 3, 4]]
+    after = motion_of(mission, generators(2))(mine, bodies_of(mine_mps))
+    np.testing.assert_array_equal(before[:, 2], after[:, 2])
+
+
+@pytest.mark.parametrize("task", ["random-walk", "flocking"])
+def test_initial_velocity_is_uniform_per_axis(task):
+    mission = paper(task, num_robots=1000, velocity_ratio=0.15)
+    velocity_mps = initial_velocity(mission, np.random.default_rng(0))
+    assert velocity_mps.shape == (1000, 2)
+    for axis in range(2):
+        drawn = stats.kstest(velocity_mps[:, axis], stats.uniform(-3.0, 6.0).cdf)
+        assert drawn.pvalue > 1e-3
+    assert abs(np.corrcoef(velocity_mps.T)[0, 1]) < 5 / math.sqrt(1000)
+
+
+def test_initial_velocity_of_a_stationary_team_is_zero():
+    mission = paper("stationary", num_robots=7)
+    velocity_mps = initial_velocity(mission, np.random.default_rng(0))
+    np.testing.assert_array_equal(velocity_mps, np.zeros((7, 2)))

@@ -1,0 +1,147 @@
+"""Curves hold the results' numbers and the published ones; what cannot be compared is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import altered, everything, result, sweep
+
+from swarm_mj.evaluation.figures.contents import RESULT_FIGURES
+from swarm_mj.evaluation.figures.curves import curves, preset_of, results_of
+from swarm_mj.evaluation.figures.drawing import caption
+
+FIG3, FIG4, FIG5, FIG6 = RESULT_FIGURES.values()
+
+
+def found(figure, results, cost="aoi"):
+    """Curves by method and source."""
+    its = curves(figure, cost, results_of(figure, results))
+    return {(curve.method, curve.is_published): curve for curve in its}
+
+
+def test_a_curve_holds_its_policys_results_in_the_order_of_x():
+    values = {0.5: (9.0, 0.3), 0.2: (40.0, 2.0), 0.75: (7.0, 0.1)}
+    curve = found(FIG4, sweep("tdma", "range_ratio", values))["tdma", False]
+    np.testing.assert_array_equal(curve.x, [0.2, 0.5, 0.75])
+    np.testing.assert_array_equal(curve.mean, [40.0, 9.0, 7.0])
+    np.testing.assert_array_equal(curve.sem, [2.0, 0.3, 0.1])
+    assert not curve.is_level
+
+
+def test_published_values_sit_at_their_x():
+    """Fig. 4 publishes, of 100 missions at range ratio 0.2, MST 62.8942 with a std of 14.1061."""
+    results = [result("mst")]
+    curve = found(FIG4, results)["mst", True]
+    np.testing.assert_array_equal(curve.x, [0.2, 0.25, 0.5, 0.75, 1.0])
+    assert curve.mean[0] == 62.8942
+    assert curve.sem[0] == pytest.approx(1.41061)
+    gnn = found(FIG4, results)["GNN", True]
+    np.testing.assert_array_equal(gnn.mean, [62.04, 34.79, 12.37, 9.57, 8.57])
+
+
+def test_both_costs_of_a_flock():
+    results = [result("mst", "flocking", velocity_variance_mean=0.2, velocity_variance_sem=0.01)]
+    variance = found(FIG6, results, "velocity_variance")
+    np.testing.assert_array_equal(variance["mst", False].mean, [0.2])
+    assert variance["GNN trained on AoI", True].mean[-1] == 3.0422
+    assert found(FIG6, results)["GNN trained on AoI", True].mean[-1] == 39.609
+
+
+def test_a_baseline_has_no_receptive_field_so_it_is_level():
+    its = found(FIG3, sweep("tdma", "range_ratio", {0.25: (26.0, 0.4), 0.5: (9.0, 0.1)}))
+    for key, mean in {("tdma", False): 26.0, ("mst", True): 42.02}.items():
+        assert its[key].is_level
+        np.testing.assert_array_equal(its[key].x, [0.0, 5.0])
+        np.testing.assert_array_equal(its[key].mean, [mean, mean])
+    assert not its["GNN", True].is_level
+    np.testing.assert_array_equal(its["GNN", True].x, [0, 1, 2, 3, 4, 5])
+
+
+def test_a_policy_with_receptive_fields_has_a_curve_over_them():
+    results = [
+        result("learned", config={"receptive_field": field}, aoi_mean=mean)
+        for field, mean in {3: 20.0, 1: 30.0}.items()
+    ]
+    curve = found(FIG3, results)["learned", False]
+    np.testing.assert_array_equal(curve.x, [1.0, 3.0])
+    np.testing.assert_array_equal(curve.mean, [30.0, 20.0])
+    assert not curve.is_level
+    with pytest.raises(ValueError, match="receptive_field of learned must be a number, not 'wide'"):
+        found(FIG3, [result("learned", config={"receptive_field": "wide"})])
+
+
+def test_other_regimes_are_passed_over():
+    others = [result("mst", "random-walk"), result("mst", num_robots=20)]
+    kept = result("tdma", velocity_ratio=0.5)  # which is nothing to a stationary team
+    assert results_of(FIG4, [*others, kept]) == [kept]
+    assert results_of(FIG5, [*others, kept]) == others[:1]
+
+
+def test_a_single_episode_has_no_error():
+    assert np.isnan(found(FIG4, [result("tdma", aoi_sem=None)])["tdma", False].sem[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "complaint"),
+    [
+        ("episodes", 7, "one episodes, not 4 .tdma at range_ratio 0.25. and 7"),
+        ("seed", 51, "one seed, not 50"),
+        ("version", "1.2.4", r"one version, not 1\.2\.3"),
+        ("num_windows", 250, "num_windows is 500, not 250"),
+        ("boundary", "none", "boundary is reflect, not none"),
+        ("physics", "contact", "physics is exact, not contact"),
+    ],
+)
+def test_mixed_results_are_refused(name, value, complaint):
+    mixed = altered([result("tdma"), result("mst")], **{name: value})
+    with pytest.raises(ValueError, match=complaint) as refused:
+        results_of(FIG4, mixed)
+    assert "swarm-mj evaluate --policy tdma " in str(refused.value)
+    assert " --task stationary " in str(refused.value)
+
+
+def test_missions_that_differ_from_the_preset_in_their_config_alone_are_refused():
+    other = result("mst", wall_hit="mirror")
+    with pytest.raises(ValueError, match="wall_hit is clip, not mirror"):
+        results_of(FIG4, [other])
+    with pytest.raises(ValueError, match=r"switched_off is 0\.0, not 0\.2"):
+        results_of(FIG4, [result("mst", switched_off=0.2)])
+
+
+def test_two_presets_and_unknown_ones_are_refused():
+    with pytest.raises(ValueError, match="presets reference and paper; draw one at a time"):
+        preset_of([*everything("reference"), *everything("paper")])
+    with pytest.raises(ValueError, match="one of paper, reference, not 'mine'"):
+        preset_of([replace(result("mst"), preset="mine")])
+    assert preset_of(everything("paper")) == "paper"
+
+
+def test_two_results_of_the_same_policy_and_regime_are_refused():
+    with pytest.raises(ValueError, match=r"two results of mst at range_ratio 0\.25; keep one"):
+        results_of(FIG4, [result("mst"), result("tdma"), result("mst", aoi_mean=2.0)])
+    with pytest.raises(ValueError, match="fig3 has two results of mst; keep one"):
+        results_of(FIG3, [result("mst"), result("mst")])
+
+
+def test_no_points_names_the_command_that_makes_them():
+    with pytest.raises(ValueError, match="none of the 1 results has task random-walk") as refused:
+        results_of(FIG5, [result("mst")])
+    assert "--task random-walk --preset reference --robots 10 20 40 60 80" in str(refused.value)
+
+
+@pytest.mark.parametrize("config", ["", "[1]", "{"])
+def test_a_config_that_is_no_json_object_is_refused(config):
+    with pytest.raises(ValueError, match="config of mst must be a JSON object"):
+        results_of(FIG4, [replace(result("mst"), config=config)])
+
+
+def test_costs_that_cannot_be_are_refused():
+    with pytest.raises(ValueError, match=r"aoi_mean must be above 0, not 0 \(mst at range_ratio"):
+        found(FIG4, [result("mst", aoi_mean=0.0)])
+
+
+def test_results_of_several_commits_are_drawn_and_all_named():
+    mixed = altered([result("tdma"), result("mst")], commit="def456")
+    assert found(FIG4, mixed)
+    assert "commits abc123, def456" in caption(FIG4, mixed)
+    assert "commit abc123" in caption(FIG4, mixed[:1])

@@ -1,0 +1,162 @@
+"""What is in a figure: the curves' numbers, their errors, labels and names."""
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.text import Text
+from synthetic import everything, result, sweep
+
+from swarm_mj.evaluation.figures.contents import RESULT_FIGURES
+from swarm_mj.evaluation.figures.drawing import draw
+from swarm_mj.evaluation.figures.style import LOOKS
+
+FIG3, FIG4, FIG5, FIG6 = RESULT_FIGURES.values()
+FLOODING = {0.2: (70.0, 3.0), 0.5: (16.0, 0.5), 1.0: (12.0, 0.25)}
+
+
+def bars(axes):
+    """The error bars by label: line, lower and upper ends."""
+    found = {}
+    for container in axes.containers:
+        line, _, (columns,) = container
+        ends = [(low, high) for (_, low), (_, high) in filter(len, columns.get_segments())]
+        found[container.get_label()] = line, *np.reshape(ends, (-1, 2)).T
+    return found
+
+
+def names(axes):
+    return {text.get_text(): text for text in axes.texts}
+
+
+def test_a_curve_has_its_points_and_its_standard_errors():
+    (axes,) = draw(FIG4, sweep("random-flooding", "range_ratio", FLOODING)).axes
+    line, low, high = bars(axes)["random flooding"]
+    np.testing.assert_array_equal(line.get_xdata(), [0.2, 0.5, 1.0])
+    np.testing.assert_array_equal(line.get_ydata(), [70.0, 16.0, 12.0])
+    np.testing.assert_allclose(low, [67.0, 15.5, 11.75])
+    np.testing.assert_allclose(high, [73.0, 16.5, 12.25])
+
+
+def test_the_published_curve_is_dashed_and_hollow_in_the_same_colour():
+    (axes,) = draw(FIG4, sweep("random-flooding", "range_ratio", FLOODING)).axes
+    ours, _, _ = bars(axes)["random flooding"]
+    theirs, low, high = bars(axes)["random flooding, published"]
+    np.testing.assert_array_equal(theirs.get_xdata(), [0.2, 0.25, 0.5, 0.75, 1.0])
+    assert theirs.get_ydata()[0] == 72.633
+    np.testing.assert_allclose((high - low)[0], 2 * 1.53417)  # std 15.3417 of 100 missions
+    assert (theirs.get_linestyle(), ours.get_linestyle()) == ("--", "-")
+    assert theirs.get_markerfacecolor() == "white"
+    assert ours.get_markerfacecolor() == ours.get_color() == theirs.get_color()
+
+
+def test_all_published_curves_are_there_even_where_ours_are_missing():
+    (axes,) = draw(FIG5, [result("tdma", "random-walk")]).axes
+    assert set(bars(axes)) == {
+        "TDMA",
+        "MST, published",
+        "random flooding, published",
+        "round robin, published",
+        "GNN, each size, published",
+        "GNN, from 40, published",
+    }
+
+
+def test_every_method_is_named_once_and_slanted_if_only_the_paper_has_it():
+    (axes,) = draw(FIG4, [result("mst"), result("something-new")]).axes
+    styles = {name: text.get_fontstyle() for name, text in names(axes).items()}
+    assert styles == {
+        "MST": "normal",
+        "something-new": "normal",
+        "random flooding": "italic",
+        "round robin": "italic",
+        "GNN": "italic",
+    }
+
+
+def test_names_point_to_the_ends_of_their_curves():
+    (axes,) = draw(FIG4, sweep("random-flooding", "range_ratio", FLOODING)).axes
+    assert names(axes)["random flooding"].xy == (1.0, 12.0)
+    assert names(axes)["GNN"].xy == (1.0, 8.57)
+
+
+def test_a_level_is_a_line_with_a_band():
+    (axes,) = draw(FIG3, [result("tdma", aoi_mean=26.0, aoi_sem=0.5)]).axes
+    lines = {line.get_label(): line for line in axes.lines}
+    np.testing.assert_array_equal(lines["TDMA"].get_ydata(), [26.0, 26.0])
+    np.testing.assert_array_equal(lines["TDMA"].get_xdata(), [0.0, 5.0])
+    assert lines["MST, published"].get_linestyle() == "--"
+    band = next(c for c in axes.collections if isinstance(c, PolyCollection))
+    height = band.get_paths()[0].vertices[:, 1]
+    assert (height.min(), height.max()) == (25.5, 26.5)
+    np.testing.assert_array_equal(bars(axes)["GNN, published"][0].get_xdata(), range(6))
+
+
+def test_flocking_has_a_panel_for_each_cost():
+    results = [
+        result("mst", "flocking", velocity_variance_mean=0.2, velocity_variance_sem=0.01),
+    ]
+    above, below = draw(FIG6, results).axes
+    assert above.get_title("left") == "age of information [windows]"
+    assert below.get_title("left") == "velocity variance [m²/s²]"
+    assert bars(below)["MST"][0].get_ydata() == [0.2]
+    assert bars(below)["MST, published"][0].get_ydata()[0] == 0.1866
+    assert below.get_xlabel().endswith("[km in 50 s]")
+
+
+@pytest.mark.parametrize("figure", RESULT_FIGURES.values(), ids=lambda figure: figure.name)
+def test_title_regime_and_caption_say_what_is_shown(figure):
+    drawing = draw(figure, everything())
+    texts = [text.get_text() for text in drawing.texts]
+    assert figure.title in texts
+    assert texts[-1] == (
+        f"{figure.name}, preset reference: 4 episodes, seeds 50 to 53, 500 windows each; "
+        "swarm_mj 1.2.3, commit abc123"
+    )
+    (legend,) = drawing.legends
+    assert [text.get_text().split()[0] for text in legend.get_texts()] == ["this", "published"]
+    assert all("SEM" in text.get_text() for text in legend.get_texts())
+    regime = {
+        "fig3": "stationary, 40 robots, range ratio 0.25",
+        "fig4": "stationary, 40 robots",
+        "fig5": "random walk, range ratio 0.25, velocity ratio 0.15",
+        "fig6": "flocking, 40 robots, range ratio 0.25",
+    }
+    assert regime[figure.name] in texts
+
+
+def test_ticks_are_the_published_places_and_all_curves_are_inside():
+    (axes,) = draw(
+        FIG4, sweep("greedy-oracle", "range_ratio", {0.2: (20.0, 0.5), 0.3: (11.0, 0.1)})
+    ).axes
+    np.testing.assert_array_equal(axes.get_xticks(), [0.2, 0.25, 0.3, 0.5, 0.75, 1.0])
+    low, high = axes.get_ylim()
+    assert low < 8.57
+    assert high > 72.633
+
+
+def test_nothing_that_is_written_overlaps_or_leaves_the_page():
+    every = [result(policy, aoi_mean=12.0 + 0.1 * n) for n, policy in enumerate(LOOKS)]
+    drawing = draw(FIG4, every)
+    FigureCanvasAgg(drawing).draw()
+    (axes,) = drawing.axes
+    ticks = [*axes.get_xticklabels(), axes.xaxis.label]
+    written = [*drawing.texts, *axes.texts, *ticks, *drawing.legends[0].get_texts()]
+    heading = next(text for text in axes.findobj(Text) if text.get_text() == axes.get_title("left"))
+    boxes = [Text.get_window_extent(text) for text in [*written, heading] if text.get_text()]
+    for index, box in enumerate(boxes):
+        assert drawing.bbox.x0 <= box.x0 <= box.x1 <= drawing.bbox.x1
+        assert drawing.bbox.y0 <= box.y0 <= box.y1 <= drawing.bbox.y1
+        assert not any(box.overlaps(other) for other in boxes[:index])
+
+
+def test_the_oracle_is_a_thin_black_line():
+    (axes,) = draw(FIG4, sweep("greedy-oracle", "range_ratio", {0.2: (20.0, 0.5)})).axes
+    line, _, _ = bars(axes)["greedy oracle"]
+    others = [
+        other.get_linewidth()
+        for name, (other, _, _) in bars(axes).items()
+        if name != "greedy oracle"
+    ]
+    assert line.get_color() == "#000000"
+    assert line.get_linewidth() < min(others)

@@ -1,0 +1,100 @@
+"""Looks differ from each other for every eye; files are whole, valid and the same every time."""
+
+import colorsys
+from itertools import combinations
+from xml.etree import ElementTree
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from PIL import Image
+from synthetic import everything
+
+from swarm_mj.evaluation.figures.contents import DRAWN, FORMATS, RESULT_FIGURES
+from swarm_mj.evaluation.figures.drawing import draw
+from swarm_mj.evaluation.figures.style import LOOKS, look_of, save, styled
+from swarm_mj.policies.registry import POLICIES
+
+# Linear RGB as it is seen without red or green cones (Viénot, Brettel, Mollon 1999).
+BLINDNESS = {
+    "protan": [[0.11238, 0.88762, 0.0], [0.11238, 0.88762, 0.0], [0.00401, -0.00401, 1.0]],
+    "deutan": [[0.29275, 0.70725, 0.0], [0.29275, 0.70725, 0.0], [-0.02234, 0.02234, 1.0]],
+}
+
+
+def test_every_policy_has_its_own_look():
+    assert set(DRAWN) < set(POLICIES)
+    ours = [LOOKS[name] for name in DRAWN]
+    for part in ("label", "colour", "marker"):
+        assert len({getattr(look, part) for look in ours}) == len(ours)
+
+
+@pytest.mark.parametrize("kind", BLINDNESS)
+def test_colours_stay_apart_for_colour_blind_eyes(kind):
+    seen = {
+        name: np.clip(np.array(BLINDNESS[kind]) @ np.power(to_rgb(look.colour), 2.2), 0, 1) ** 0.45
+        for name, look in LOOKS.items()
+        if not name.startswith("GNN t") and not name.startswith("GNN g")
+    }
+    for (one, a), (other, b) in combinations(seen.items(), 2):
+        assert np.linalg.norm(a - b) > 0.14, (one, other)
+
+
+def test_type_is_darker_than_its_curve_in_the_same_hue():
+    for look in LOOKS.values():
+        hue, lightness, _ = colorsys.rgb_to_hls(*to_rgb(look.colour))
+        ink_hue, ink_lightness, _ = colorsys.rgb_to_hls(*look.ink)
+        assert ink_hue == pytest.approx(hue)
+        assert ink_lightness == pytest.approx(0.7 * lightness)
+
+
+def test_an_unknown_method_goes_under_its_own_name():
+    assert look_of("mine").label == "mine"
+
+
+def test_files_are_whole_and_valid(tmp_path):
+    drawing = draw(RESULT_FIGURES["fig6"], everything())
+    for kind in FORMATS:
+        save(drawing, tmp_path / "new" / f"fig6.{kind}")
+    assert sorted(p.name for p in (tmp_path / "new").iterdir()) == [
+        "fig6.pdf",
+        "fig6.png",
+        "fig6.svg",
+    ]
+    root = ElementTree.parse(tmp_path / "new" / "fig6.svg").getroot()
+    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+    pdf = (tmp_path / "new" / "fig6.pdf").read_bytes()
+    assert pdf.startswith(b"%PDF-")
+    assert b"CreationDate" not in pdf
+    with Image.open(tmp_path / "new" / "fig6.png") as picture:
+        assert picture.size[0] == 1800
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_the_same_figure_is_the_same_file(tmp_path, kind):
+    for name in ("a", "b"):
+        save(draw(RESULT_FIGURES["fig4"], everything()), tmp_path / f"{name}.{kind}")
+    assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
+
+
+def test_a_failure_leaves_the_old_file(tmp_path, monkeypatch):
+    (tmp_path / "fig4.png").write_bytes(b"old")
+    drawing = draw(RESULT_FIGURES["fig4"], everything())
+
+    def half(path, **_options):
+        path.write_bytes(b"half")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(drawing, "savefig", half)
+    with pytest.raises(OSError, match="disk full"):
+        save(drawing, tmp_path / "fig4.png")
+    assert [path.name for path in tmp_path.iterdir()] == ["fig4.png"]
+    assert (tmp_path / "fig4.png").read_bytes() == b"old"
+
+
+def test_the_users_own_settings_are_neither_used_nor_changed():
+    with mpl.rc_context({"font.size": 33.0}):
+        with styled():
+            assert mpl.rcParams["font.size"] == 9.0
+        assert mpl.rcParams["font.size"] == 33.0

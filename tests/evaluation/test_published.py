@@ -1,0 +1,91 @@
+"""The paper's numbers: those printed in its text and figures, and where they apply."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from swarm_mj.evaluation import published as module
+from swarm_mj.evaluation.published import BASELINES, METHODS, points, published
+from swarm_mj.mission import PRESETS, paper, reference
+from swarm_mj.policies.registry import POLICIES
+
+FILE = Path(module.__file__).with_name("published.csv")
+
+
+def test_every_row_of_the_file_is_a_point():
+    with FILE.open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(points())
+    for row, point in zip(rows, points(), strict=True):
+        assert (row["figure"], row["method"], row["x_name"]) == (
+            *(point.figure, point.method, point.x_name),
+        )
+        assert float(row["x"]) == point.x
+        assert float(row["mean"]) == point.mean
+
+
+def test_every_curve_has_its_points():
+    """Three baselines: 2 ends of a line, 5 ranges, 5 sizes, 4 velocities for each of 2 costs."""
+    number = {
+        "fig3_receptive_field": 2,
+        "fig4_transmit_power": 5,
+        "fig5_team_size": 5,
+        "fig6_flocking": 8,
+    }
+    for figure, expected in number.items():
+        for method, policy in METHODS.items():
+            found = [p for p in points() if p.figure == figure and p.method == method]
+            assert len(found) == expected
+            assert {point.policy for point in found} == {policy}
+
+
+def test_baselines_are_policies():
+    assert set(BASELINES) <= set(POLICIES)
+    assert {p.policy for p in points()} == {*BASELINES, None}
+
+
+def test_standard_error_is_a_tenth_of_the_deviation():
+    """100 missions a point."""
+    (point,) = published("mst", reference("stationary")).values()
+    assert (point.mean, point.std) == (43.3069, 9.7449)
+    assert point.sem == pytest.approx(0.97449)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_each_figures_regime_has_its_value(preset):
+    make = PRESETS[preset]
+
+    def means(policy, task, **overrides):
+        return {cost: p.mean for cost, p in published(policy, make(task, **overrides)).items()}
+
+    assert means("round-robin", "stationary", range_ratio=1.0) == {"aoi": 18.0736}
+    assert means("round-robin", "stationary") == {"aoi": 47.2777}
+    assert means("mst", "stationary", velocity_ratio=0.5) == {"aoi": 43.3069}
+    assert means("round-robin", "random-walk", num_robots=10) == {"aoi": 7.1003}
+    assert means("random-flooding", "random-walk") == {"aoi": 50.0638}
+    expected = {"aoi": 46.3437, "velocity_variance": 0.8244}
+    assert means("mst", "flocking", velocity_ratio=0.325) == expected
+
+
+@pytest.mark.parametrize(
+    "mission",
+    [
+        paper("stationary", num_windows=499),
+        paper("stationary", num_robots=41),
+        paper("stationary", range_ratio=0.3),
+        paper("random-walk", range_ratio=0.5),
+        paper("random-walk", velocity_ratio=0.25),
+        paper("random-walk", num_robots=30),
+        paper("flocking", boundary="reflect"),
+        paper("flocking", range_ratio=0.5),
+        paper("flocking", physics="contact"),
+        reference("flocking", velocity_ratio=0.25, sinr_threshold_db=2.0),
+    ],
+)
+def test_other_regimes_have_none(mission):
+    assert published("mst", mission) == {}
+
+
+def test_other_policies_have_none():
+    assert published("GNN", paper("stationary")) == {}

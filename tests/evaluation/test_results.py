@@ -1,0 +1,156 @@
+"""Result files: written and read back as they were, and refused with a reason otherwise."""
+
+import csv
+import json
+import math
+from dataclasses import asdict, fields, replace
+from types import NoneType
+from typing import get_args
+
+import pytest
+
+from swarm_mj.evaluation.results import COLUMNS, Result, read_results, write_csv, write_json
+
+TEXTS = {"policy": "mst", "task": "flocking", "config": '{"a": "b, \\"c\\""}'}
+
+
+def some_result(**overrides):
+    """A number of its own in every field: 1/7, 2/7, ..."""
+    values = {}
+    for position, spec in enumerate(fields(Result), start=1):
+        kinds = get_args(spec.type) or (spec.type,)
+        text = TEXTS.get(spec.name, f"some {spec.name}")
+        values[spec.name] = {str: text, int: position, float: position / 7.0}[kinds[0]]
+    return Result(**values | overrides)
+
+
+OPTIONAL = [spec.name for spec in fields(Result) if NoneType in get_args(spec.type)]
+
+
+def test_a_csv_comes_back_bit_for_bit(tmp_path):
+    results = [
+        some_result(),
+        some_result(policy="a, b\n'c'", aoi_mean=0.1 + 0.2, age_worst=1e-300),
+        some_result(**dict.fromkeys(OPTIONAL)),
+    ]
+    write_csv(tmp_path / "new" / "r.csv", results)
+    assert read_results(tmp_path / "new" / "r.csv") == results
+
+
+def test_columns_stand_in_the_order_of_the_fields(tmp_path):
+    write_csv(tmp_path / "r.csv", [some_result()])
+    header, row = (tmp_path / "r.csv").read_text().splitlines()
+    assert header == ",".join(COLUMNS)
+    assert header.startswith("policy,task,preset,num_robots,range_ratio,velocity_ratio,boundary")
+    assert header.endswith("published_velocity_variance_sem,version,commit,config")
+    assert row.startswith(f"mst,flocking,some preset,4,{5 / 7!r},")
+
+
+def test_json_is_the_same_with_each_missions_costs(tmp_path):
+    results = [some_result(), some_result(commit=None)]
+    missions = [{"episode_aoi": [1.0, 0.1 + 0.2]}, {"episode_aoi": [2.0]}]
+    write_json(tmp_path / "r.json", results, missions)
+    document = json.loads((tmp_path / "r.json").read_text())
+    expected = [asdict(r) | lists for r, lists in zip(results, missions, strict=True)]
+    assert document == {"results": expected}
+    assert list(document["results"][0]) == [*COLUMNS, "episode_aoi"]
+
+
+def test_json_needs_missions_of_every_result(tmp_path):
+    with pytest.raises(ValueError, match="argument 2 is shorter"):
+        write_json(tmp_path / "r.json", [some_result()], [])
+    assert not list(tmp_path.iterdir())
+
+
+def test_columns_that_no_result_has_are_passed_over(tmp_path):
+    rows = [asdict(some_result()) | {"remark": "by hand"}]
+    with (tmp_path / "r.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, ["remark", *reversed(COLUMNS)])
+        writer.writeheader()
+        writer.writerows(rows)
+    assert read_results(tmp_path / "r.csv") == [some_result()]
+
+
+def with_cells(path, **cells):
+    """A file of two rows, the second with other cells."""
+    rows = [asdict(some_result()), asdict(some_result()) | cells]
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+@pytest.mark.parametrize(
+    ("cells", "complaint"),
+    [
+        ({"aoi_mean": "old"}, "line 3: aoi_mean must be a finite number, not 'old'"),
+        ({"aoi_mean": ""}, "line 3: aoi_mean must be a finite number, not ''"),
+        ({"aoi_mean": "nan"}, "aoi_mean must be a finite number, not 'nan'"),
+        ({"aoi_sem": "inf"}, "aoi_sem must be a finite number, not 'inf'"),
+        ({"episodes": "100.0"}, "episodes must be a whole number, not '100.0'"),
+        ({"policy": ""}, "policy must be a text, not ''"),
+    ],
+)
+def test_cells_that_are_not_what_they_must_be(tmp_path, cells, complaint):
+    with_cells(tmp_path / "r.csv", **cells)
+    with pytest.raises(ValueError, match=complaint):
+        read_results(tmp_path / "r.csv")
+
+
+def test_files_from_before_robots_could_be_switched_off_are_read(tmp_path):
+    write_csv(tmp_path / "r.csv", [some_result(switched_off=0.0)])
+    header, row = (tmp_path / "r.csv").read_text().splitlines()
+    place = COLUMNS.index("switched_off")
+    old = [",".join(cells[:place] + cells[place + 1 :]) for cells in [header.split(",")]]
+    cells = row.split(",", place + 1)
+    (tmp_path / "old.csv").write_text("\n".join([*old, ",".join(cells[:place] + cells[-1:])]))
+    assert read_results(tmp_path / "old.csv") == [some_result(switched_off=0.0)]
+    write_csv(tmp_path / "r.csv", [some_result(switched_off=0.2)])
+    assert read_results(tmp_path / "r.csv")[0].switched_off == 0.2
+
+
+def test_missing_columns_are_named(tmp_path):
+    without = [name for name in COLUMNS if name not in ("aoi_sem", "task")]
+    (tmp_path / "r.csv").write_text(",".join(without) + "\n")
+    with pytest.raises(ValueError, match=r"r\.csv lack the columns task, aoi_sem; make them with"):
+        read_results(tmp_path / "r.csv")
+
+
+@pytest.mark.parametrize("cells", [["mst"], [*["1"] * len(COLUMNS), "1"]])
+def test_rows_need_as_many_cells_as_columns(tmp_path, cells):
+    (tmp_path / "r.csv").write_text(",".join(COLUMNS) + "\n" + ",".join(cells) + "\n")
+    with pytest.raises(ValueError, match="line 2: as many cells as columns"):
+        read_results(tmp_path / "r.csv")
+
+
+def test_a_file_without_rows_is_no_result(tmp_path):
+    (tmp_path / "r.csv").write_text(",".join(COLUMNS) + "\n")
+    with pytest.raises(ValueError, match="have no rows"):
+        read_results(tmp_path / "r.csv")
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00\x01", b'policy,"task', b"{}\n"])
+def test_what_is_no_csv_of_results(tmp_path, content):
+    (tmp_path / "r.csv").write_bytes(content)
+    with pytest.raises(ValueError, match="swarm-mj evaluate --csv"):
+        read_results(tmp_path / "r.csv")
+
+
+def test_a_file_that_was_cut_off_is_refused(tmp_path):
+    """Within the last cell, which is in quotes: a cut there leaves as many cells as before."""
+    write_csv(tmp_path / "r.csv", [some_result()])
+    text = (tmp_path / "r.csv").read_text()
+    (tmp_path / "r.csv").write_text(text[:-3])
+    with pytest.raises(ValueError, match=r"no CSV \(unexpected end of data\)"):
+        read_results(tmp_path / "r.csv")
+
+
+def test_a_missing_file_says_so(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        read_results(tmp_path / "none.csv")
+
+
+def test_numbers_that_are_none_are_never_written_to_json(tmp_path):
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        write_json(tmp_path / "r.json", [replace(some_result(), aoi_mean=math.nan)], [{}])
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,106 @@
+"""The paper's and the authors' features by hand on four robots' buffers, and the table of sets."""
+
+import numpy as np
+import pytest
+
+from swarm_mj.gnn.feature_sets import OBSERVERS, make_observer
+from swarm_mj.gnn.graphs import PaperObserver, ReferenceObserver
+from swarm_mj.mission import paper
+from swarm_mj.policies.random_flooding import RandomFlooding
+from swarm_mj.protocol.buffers import NO_PARENT, empty_buffers
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.swarm import Swarm
+
+# 4 robots at 40 per km²: a side of sqrt(0.1) km; 200 windows of 0.1 s: 20 s.
+MISSION = paper("stationary", num_robots=4, num_windows=200)
+SIDE_M, DURATION_S = 316.2277660168, 20.0
+
+
+def views_of_robot_1():
+    """At t = 50, robot 1 heard of robot 0 at t = 20 and never of robots 2 and 3; it addressed 2."""
+    buffers = empty_buffers(1, 4)
+    buffers.timestamp[0, 1, :2] = [20.0, 50.0]
+    buffers.position_m[0, 1, :2] = [[-100.0, 40.0], [60.0, -20.0]]
+    buffers.velocity_mps[0, 1, :2] = [[1.0, -2.0], [0.5, 0.25]]
+    buffers.parent[0, 1, 0] = 3
+    buffers.last_attempt[0, 1, 2] = 30.5
+    return LocalViews(buffers=buffers.read_only(), now=np.array([50.0]), phases=())
+
+
+def started(observer, num_missions=1, num_robots=4):
+    observer.start(num_missions, num_robots)
+    return observer
+
+
+def test_iii_a_the_papers_features_by_hand():
+    graphs = started(PaperObserver(MISSION)).graphs(views_of_robot_1())
+    per_side = 1.0 / SIDE_M
+    moved = DURATION_S / SIDE_M
+    expected = [
+        [0.0, 1.0, 0.1, -100 * per_side, 40 * per_side, 1.0 * moved, -2.0 * moved, 0.0],
+        [1.0, 1.0, 0.25, 60 * per_side, -20 * per_side, 0.5 * moved, 0.25 * moved, 0.0],
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1525],
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    ]
+    np.testing.assert_allclose(graphs.node[1], expected, rtol=1e-6)
+    assert PaperObserver.names[:3] == ("is oneself", "is known", "T")
+
+
+def test_the_codes_features_by_hand():
+    """Constants included: 500 windows, 1000 m; unknown robots stand in the middle since t = 0."""
+    graphs = started(ReferenceObserver(MISSION)).graphs(views_of_robot_1())
+    expected = [
+        [-0.06, 0.0, -0.16, 0.06, 0.0005, -0.00225, -0.1],
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.1],
+        [-0.1, 0.0, -0.06, 0.02, -0.0005, -0.00025, -0.039],
+        [-0.1, 0.0, -0.06, 0.02, -0.0005, -0.00025, -0.1],
+    ]
+    np.testing.assert_allclose(graphs.node[1], expected, rtol=1e-5, atol=1e-9)
+
+
+@pytest.mark.parametrize("features", ["paper", "reference"])
+def test_the_edges_are_the_parents_and_anyone_may_be_addressed(features):
+    graphs = started(make_observer(features, MISSION)).graphs(views_of_robot_1())
+    assert graphs.parent.tolist()[1] == [3, NO_PARENT, NO_PARENT, NO_PARENT]
+    assert np.all(graphs.may_address)
+    assert not np.any(graphs.has_turn)
+
+
+@pytest.mark.parametrize("features", OBSERVERS)
+def test_rows_are_robots_mission_by_mission(features):
+    """Row b N + i is what robot i of mission b sees, as if its mission were alone."""
+    together, talk = Swarm(MISSION, [1, 2, 3]), RandomFlooding(0.3)
+    together.start(talk)
+    observer = started(make_observer(features, MISSION), num_missions=3)
+    alone = started(make_observer(features, MISSION))
+    for window in range(8):
+        graphs, views = observer.graphs(together.views), together.views
+        own = LocalViews(
+            buffers=type(views.buffers)(**{k: v[1:2] for k, v in vars(views.buffers).items()}),
+            now=views.now[1:2],
+            phases=tuple(
+                type(phase)(recipient=phase.recipient[1:2], heard=phase.heard[1:2])
+                for phase in views.phases
+            ),
+        )
+        expected = alone.graphs(own)
+        for name in ("node", "parent", "may_address", "has_turn"):
+            rows = getattr(graphs, name)
+            assert len(rows) == 12
+            np.testing.assert_array_equal(rows[4:8], getattr(expected, name), err_msg=str(window))
+        together.step(talk)
+
+
+@pytest.mark.parametrize("features", OBSERVERS)
+def test_features_are_finite_and_named(features):
+    observer, swarm = make_observer(features, MISSION), Swarm(MISSION, [1])
+    graphs = started(observer).graphs(swarm.views)
+    assert graphs.node.shape == (4, 4, len(observer.names))
+    assert len(set(observer.names)) == len(observer.names)
+    assert np.all(np.isfinite(graphs.node))
+    assert np.all(np.diagonal(graphs.may_address))
+
+
+def test_unknown_features_are_a_clear_error():
+    with pytest.raises(ValueError, match="one of paper, reference, local, extended, not 'all'"):
+        make_observer("all", MISSION)

@@ -1,0 +1,86 @@
+"""Initial positions against exact integer geometry, the graph's Laplacian and networkx."""
+
+import networkx as nx
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarm_mj.mission.placement import connected_positions, is_connected
+
+points = st.lists(st.tuples(st.integers(-9, 9), st.integers(-9, 9)), min_size=1, max_size=12)
+
+
+def disk_graph(position_m, range_m):
+    """An edge wherever two robots are at most this far apart."""
+    graph = nx.Graph()
+    graph.add_nodes_from(range(len(position_m)))
+    for i, (x, y) in enumerate(position_m):
+        for j, (u, v) in enumerate(position_m[:i]):
+            if (x - u) ** 2 + (y - v) ** 2 <= range_m**2:
+                graph.add_edge(i, j)
+    return graph
+
+
+def algebraic_connectivity(graph):
+    """The second smallest eigenvalue of the Laplacian; a lone robot has only one."""
+    laplacian = nx.laplacian_matrix(graph).toarray().astype(float)
+    return np.linalg.eigvalsh(laplacian)[1] if len(graph) > 1 else np.inf
+
+
+# Integers make the boundary case, two robots at exactly the range, exact.
+@given(position_m=points, range_m=st.integers(1, 9))
+@settings(max_examples=200, deadline=None)
+def test_connected_as_the_algebraic_connectivity_says(position_m, range_m):
+    connected = is_connected(np.array(position_m, dtype=float), float(range_m))
+    graph = disk_graph(position_m, range_m)
+    assert connected == nx.is_connected(graph)
+    assert connected == (algebraic_connectivity(graph) > 1e-10)
+
+
+def test_the_range_itself_is_in_range():
+    pair = np.array([[0.0, 0.0], [150.0, 200.0]])
+    assert is_connected(pair, 250.0)
+    assert not is_connected(pair, 249.999)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(("num_robots", "half_side_m"), [(2, 111.8), (10, 250.0), (40, 500.0)])
+def test_positions_are_connected_and_in_the_area(num_robots, half_side_m, seed):
+    position_m = connected_positions(num_robots, half_side_m, 250.0, np.random.default_rng(seed))
+    assert position_m.shape == (num_robots, 2)
+    assert (np.abs(position_m) <= half_side_m).all()
+    assert nx.is_connected(disk_graph(position_m, 250.0))
+
+
+def test_positions_fill_the_area():
+    # Uniform on ±500 m: mean 0, standard deviation 1000 / sqrt(12) = 288.7 m, on either axis.
+    position_m = connected_positions(1000, 500.0, 5000.0, np.random.default_rng(0))
+    assert position_m.mean(axis=0) == pytest.approx([0.0, 0.0], abs=30.0)
+    assert position_m.std(axis=0) == pytest.approx([288.7, 288.7], abs=15.0)
+    assert np.corrcoef(position_m.T)[0, 1] == pytest.approx(0.0, abs=0.1)
+
+
+def test_disconnected_teams_are_redrawn_not_repaired():
+    # Two points in a unit square are closer than d with probability pi d² - 8/3 d³ + d⁴/2, so of
+    # the pairs within 0.2 a share of 0.0288 / 0.1051 = 0.274 lies within 0.1.
+    rng = np.random.default_rng(0)
+    pairs = np.stack([connected_positions(2, 0.5, 0.2, rng) for _ in range(1000)])
+    distance = np.linalg.norm(pairs[:, 0] - pairs[:, 1], axis=-1)
+    assert (distance <= 0.2).all()
+    assert (distance <= 0.1).mean() == pytest.approx(0.274, abs=0.05)
+
+
+def test_the_seed_fixes_the_positions():
+    def draw(seed):
+        return connected_positions(20, 400.0, 250.0, np.random.default_rng(seed))
+
+    assert (draw(7) == draw(7)).all()
+    assert (draw(7) != draw(8)).any()
+
+
+def test_hopeless_density_is_an_error_that_says_what_to_do():
+    with pytest.raises(ValueError, match=r"40 robots with a range of 0.5 m") as refusal:
+        connected_positions(40, 500.0, 0.5, np.random.default_rng(0))
+    assert "1000 m by 1000 m" in str(refusal.value)
+    assert "raise the range ratio or the density" in str(refusal.value)

@@ -1,0 +1,239 @@
+"""Robots that are switched off half-way: who, from when on, and what the others notice of it."""
+
+import numpy as np
+import pytest
+from channels import unreliable
+
+from swarm_mj.envs.dm import make_environment
+from swarm_mj.mission import paper, reference
+from swarm_mj.mission.robot_failures import draw_is_on, first_window_without, num_switched_off
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.policies.registry import POLICIES, make_policy
+from swarm_mj.protocol.buffers import Buffers, empty_buffers
+from swarm_mj.protocol.costs import mean_hops
+from swarm_mj.protocol.window import transmit, window
+from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.rollout import fly
+from swarm_mj.swarm import Swarm, _streams
+
+NUM_WINDOWS, HALF = 21, 10  # of an odd number of windows the first half is the shorter one
+SEEDS = [1, 2, 3]
+# Both kinds of windows under both presets; the reference one notes silence and lets senders listen.
+KINDS = [(preset, name) for preset in (paper, reference) for name in ("mst", "random-flooding")]
+
+
+def small(task="random-walk", preset=paper, switched_off=0.4, **numbers):
+    numbers = {"num_robots": 8, "num_windows": NUM_WINDOWS, "velocity_ratio": 1.0} | numbers
+    return preset(task, switched_off=switched_off, **numbers)
+
+
+def flight(mission, name, probability=0.4):
+    """A swarm, once before its missions and after each window of them."""
+    swarm = Swarm(mission, SEEDS)
+    yield swarm, None
+    for flown in fly(swarm, make_policy(name, mission, probability)):
+        yield swarm, flown
+
+
+def copies(buffers):
+    return {name: array.copy() for name, array in vars(buffers).items()}
+
+
+@pytest.mark.parametrize(
+    ("fraction", "num_robots", "num_off"),
+    [
+        (0.0, 40, 0),
+        (0.2, 40, 8),
+        (0.24, 10, 2),
+        (0.26, 10, 3),
+        (0.001, 40, 1),  # at least one,
+        (0.9, 40, 36),
+        (0.9, 10, 8),  # but two stay on,
+        (0.9, 3, 1),
+        (0.9, 2, 0),  # even of two
+    ],
+)
+def test_how_many(fraction, num_robots, num_off):
+    mission = paper(switched_off=fraction, num_robots=num_robots)
+    assert num_switched_off(mission) == num_off
+    is_on = draw_is_on(mission, [np.random.default_rng(seed) for seed in range(5)])
+    if num_off == 0:
+        assert is_on is None
+    else:
+        assert is_on.shape == (5, num_robots)
+        assert np.sum(~is_on, axis=1).tolist() == [num_off] * 5
+
+
+def test_any_robot_may_be_it_and_the_stream_says_who():
+    mission = small()
+    rngs = [[np.random.default_rng(seed) for seed in range(200)] for _ in range(2)]
+    is_on, again = (draw_is_on(mission, each) for each in rngs)
+    np.testing.assert_array_equal(is_on, again)
+    share_off = np.mean(~is_on, axis=0)  # of 8 robots 3: 0.375, with a standard error of 0.034
+    assert np.all(np.abs(share_off - 0.375) < 0.15)
+
+
+@pytest.mark.parametrize(("num_windows", "first"), [(500, 250), (21, 10), (2, 1), (1, 0)])
+def test_when(num_windows, first):
+    assert first_window_without(paper(num_windows=num_windows)) == first
+
+
+@pytest.mark.parametrize("seed", [0, 7, 2**62])
+def test_placement_motion_and_policy_draw_as_if_nobody_ever_failed(seed):
+    """A mission's first three streams are those of a seed that spawns no more than three."""
+    three = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3)]
+    streams = _streams(seed)
+    assert len(streams) == 4
+    for stream, expected in zip(streams[:3], three, strict=True):
+        assert stream.random(4).tolist() == expected.random(4).tolist()
+    assert streams[3].random() not in [rng.random() for rng in three]
+
+
+@pytest.mark.parametrize(("preset", "name"), KINDS)
+def test_missions_are_the_same_until_half_way(preset, name):
+    missions = small(preset=preset), small(preset=preset, switched_off=0.0)
+    flights = zip(*(flight(mission, name) for mission in missions), strict=True)
+    for window_, ((some, its), (all_, theirs)) in enumerate(flights):
+        is_same = all(
+            np.array_equal(a, b)
+            for a, b in zip(vars(some.buffers).values(), vars(all_.buffers).values(), strict=True)
+        )
+        assert is_same == (window_ <= HALF)
+        np.testing.assert_array_equal(some.bodies.position_m, all_.bodies.position_m)  # walks go on
+        assert all_.is_on is None
+        assert (some.is_on is None) == (window_ <= HALF)
+        if its is not None and window_ <= HALF:
+            np.testing.assert_array_equal(its.costs.age_windows, theirs.costs.age_windows)
+
+
+@pytest.mark.parametrize(("preset", "name"), KINDS)
+def test_who_is_off_learns_nothing_and_is_heard_by_nobody(preset, name):
+    before, num_heard, num_lost = None, 0, 0
+    for window_, (swarm, _) in enumerate(flight(small("flocking", preset), name)):
+        if window_ > HALF:
+            off = ~swarm.is_on
+            assert np.sum(off, axis=1).tolist() == [3, 3, 3]
+            for field, array in copies(swarm.buffers).items():
+                np.testing.assert_array_equal(array[off], before[field][off], err_msg=field)
+            for b, i in zip(*np.nonzero(swarm.is_on), strict=True):
+                assert np.all(swarm.buffers.timestamp[b, i, off[b]] <= HALF)
+                assert swarm.buffers.timestamp[b, i, i] == window_
+            for phase in swarm.phases:
+                oneself = np.broadcast_to(np.arange(8), off.shape)
+                assert np.all(phase.recipient[off] == oneself[off])
+                assert np.all(phase.heard[off] == oneself[off])
+                assert not np.any(np.take_along_axis(off, phase.heard, axis=1) & swarm.is_on)
+                num_heard += np.sum(phase.heard != oneself)
+                num_lost += np.sum(np.take_along_axis(off, phase.recipient, axis=1) & swarm.is_on)
+        before = copies(swarm.buffers)
+    assert num_heard > 20
+    assert num_lost > 0  # nobody was told: some go on addressing them
+
+
+@pytest.mark.parametrize("name", ["mst", "random-flooding"])
+def test_costs_are_those_of_who_is_on(name):
+    """Eq. 10, Eq. 17 and hops of the second half, by plain loops."""
+    for swarm, flown in flight(small("flocking"), name):
+        if swarm.is_on is None:
+            continue
+        for b in range(len(SEEDS)):
+            on = [i for i in range(8) if swarm.is_on[b, i]]
+            timestamp = swarm.buffers.timestamp[b]
+            ages = [swarm.now[b] - timestamp[i, j] for i in on for j in on]
+            assert flown.costs.age_windows[b] == pytest.approx(sum(ages) / len(on) ** 2)
+            assert flown.costs.is_complete[b] == all(timestamp[i, j] > 0 for i in on for j in on)
+            velocity_mps = swarm.bodies.velocity_mps[b, on]
+            variance = sum(np.sum((v - velocity_mps.mean(axis=0)) ** 2) for v in velocity_mps)
+            assert flown.costs.velocity_variance_m2ps2[b] == pytest.approx(variance / len(on))
+        np.testing.assert_array_equal(flown.hops, mean_hops(swarm.buffers, swarm.is_on))
+
+
+@pytest.mark.parametrize("name", POLICIES)
+@pytest.mark.parametrize("preset", [paper, reference])
+def test_every_policy_flies_on(name, preset):
+    *_, (swarm, flown) = flight(small(preset=preset), name, probability=None)
+    assert swarm.now.tolist() == [NUM_WINDOWS] * 3
+    assert np.all(np.isfinite(flown.costs.age_windows))
+
+
+def test_missions_side_by_side_are_the_missions_one_by_one():
+    mission = small()
+    *_, (together, flown) = flight(mission, "mst")
+    for b, seed in enumerate(SEEDS):
+        swarm = Swarm(mission, [seed])
+        *_, last = fly(swarm, make_policy("mst", mission, 0.4))
+        np.testing.assert_array_equal(swarm.is_on[0], together.is_on[b])
+        assert last.costs.age_windows[0] == flown.costs.age_windows[b]
+
+
+def test_a_restart_switches_everyone_on():
+    mission = small()
+    *_, (swarm, flown) = flight(mission, "mst")
+    was_on = swarm.is_on
+    swarm.restart([7, 8, 9])
+    assert swarm.is_on is None
+    swarm.restart(SEEDS)
+    *_, last = fly(swarm, make_policy("mst", mission, 0.4))
+    np.testing.assert_array_equal(swarm.is_on, was_on)
+    np.testing.assert_array_equal(last.costs.age_windows, flown.costs.age_windows)
+
+
+def test_the_reward_of_an_environment_is_of_who_is_on():
+    mission = small("stationary", num_windows=4, num_robots=5)
+    environment = make_environment(mission, seed=1)
+    environment.reset()
+    rewards = [environment.step([1, 1, 2, 3, 4]).reward for _ in range(4)]
+    swarm = Swarm(mission, [1])
+    costs = [swarm.exchange(np.array([[1, 1, 2, 3, 4]])) for _ in range(4)]
+    assert rewards == [-cost.age_windows[0] for cost in costs]
+
+
+def some_team(rng):
+    """Buffers after some windows with everyone on, and what the next ones are made of."""
+    buffers = empty_buffers(2, 7)
+    now = np.zeros(2)
+    for _ in range(4):
+        bodies = some_bodies(rng)
+        window(
+            buffers,
+            bodies,
+            some_recipients(rng),
+            unreliable(int(now[0]), senders_listen=False),
+            now,
+        )
+        now = now + 1.0
+    return buffers, now
+
+
+def some_bodies(rng):
+    position_m, velocity_mps = rng.uniform(-300.0, 300.0, (2, 2, 7, 2))
+    return RobotStates(position_m=position_m, velocity_mps=velocity_mps)
+
+
+def some_recipients(rng):
+    """Half of the robots speak, to anyone."""
+    return np.where(rng.random((2, 7)) < 0.5, np.arange(7), rng.integers(0, 7, (2, 7)))
+
+
+@pytest.mark.parametrize("preset", [paper, reference])
+@pytest.mark.parametrize("talk", [window, transmit])
+def test_alg1_the_others_notice_no_more_than_if_they_had_gone_away(preset, talk):
+    """Far out of range and silent: what the others know of each other is the same."""
+    rng = np.random.default_rng(0)
+    channel = radio_of(preset("stationary"))
+    num_news = 0
+    for _ in range(20):
+        buffers, now = some_team(rng)
+        start, apart = buffers.timestamp.copy(), Buffers(**copies(buffers))
+        is_on = np.tile(np.arange(7) % 3 > 0, (2, 1))
+        is_pair = is_on[:, :, None] & is_on[:, None, :]
+        bodies, recipient = some_bodies(rng), some_recipients(rng)
+        gone_m = np.where(is_on[..., None], bodies.position_m, 1e9 * (1 + np.arange(7))[:, None])
+        gone = RobotStates(position_m=gone_m, velocity_mps=bodies.velocity_mps)
+        talk(buffers, bodies, recipient, channel, now, is_on=is_on)
+        talk(apart, gone, np.where(is_on, recipient, np.arange(7)), channel, now)
+        for field, array in vars(apart).items():
+            found = getattr(buffers, field)[is_pair]
+            np.testing.assert_array_equal(found, array[is_pair], err_msg=field)
+        num_news += np.sum((buffers.timestamp > start)[is_pair & ~np.eye(7, dtype=bool)])
+    assert num_news > 20

@@ -1,0 +1,227 @@
+"""The mission's numbers against the paper's text, hand arithmetic and the table of differences."""
+
+import math
+import runpy
+from dataclasses import FrozenInstanceError, fields
+
+import numpy as np
+import pytest
+
+from swarm_mj.mission import PRESETS, Mission, paper, reference
+from swarm_mj.mission import specification as mission_module
+
+# As users load it: without the type checks that these tests run under, which would answer first.
+Unchecked = runpy.run_path(mission_module.__file__)["Mission"]
+
+QUANTITIES = [spec for spec in fields(Mission) if "low" in spec.metadata]
+CHOICES = [spec for spec in fields(Mission) if "choices" in spec.metadata]
+SUSPECTS = [0, 1, -1, -(10**12), 10**15, math.nan, math.inf, -math.inf]
+TASKS = ["stationary", "random-walk", "flocking"]
+
+
+def beyond(spec):
+    """Values outside a field's range: the usual suspects, and those just past each end."""
+    low, high = spec.metadata["low"], spec.metadata["high"]
+    step = 1 if spec.type is int else 1e-3 * (high - low)
+    suspects = [*SUSPECTS, low - step, high + step]
+    return [
+        spec.type(value) if math.isfinite(value) else value
+        for value in suspects
+        if not low <= value <= high
+    ]
+
+
+REFUSED = [(spec, value) for spec in QUANTITIES for value in beyond(spec)]
+
+
+@pytest.mark.parametrize("preset", [paper, reference])
+def test_the_papers_numbers(preset):
+    mission = preset()
+    assert mission.num_robots == 40
+    assert mission.density_per_km2 == 40.0
+    assert mission.range_ratio == 0.25
+    assert mission.velocity_ratio == 0.15
+    assert mission.window_s == 0.1
+    assert mission.num_windows == 500
+    assert mission.sinr_threshold_db == 1.0
+    assert mission.noise_dbm == -50.0
+    assert mission.frequency_hz == 2.4e9
+    assert mission.switched_off == 0.0
+    # "The team of 40 robots operates in a mission area of 1 km²", "250 meters", "V_max = 3 m/s".
+    assert mission.side_m == pytest.approx(1000.0)
+    assert mission.half_side_m == pytest.approx(500.0)
+    assert mission.range_m == pytest.approx(250.0)
+    assert mission.max_velocity_mps == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("num_robots", "density", "side_m"),
+    # 10 robots need a quarter of 1 km², 90 at 10 per km² need 9 km², 2 need 1/20 km².
+    [(10, 40.0, 500.0), (90, 10.0, 3000.0), (160, 40.0, 2000.0), (2, 40.0, 223.60679775)],
+)
+def test_the_area_keeps_the_density(num_robots, density, side_m):
+    mission = paper(num_robots=num_robots, density_per_km2=density)
+    assert mission.side_m == pytest.approx(side_m)
+    assert mission.half_side_m == pytest.approx(side_m / 2)
+
+
+def test_ratios_mean_one_kilometre_whatever_the_team():
+    small = paper(num_robots=10, range_ratio=0.2, velocity_ratio=0.5, num_windows=7, window_s=0.2)
+    assert small.range_m == pytest.approx(200.0)
+    assert small.max_velocity_mps == pytest.approx(10.0)  # 500 m in 50 s
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_paper_follows_the_text(task):
+    mission = paper(task)
+    assert (mission.preset, mission.task) == ("paper", task)
+    assert mission.max_acceleration_mps2 == 20.0
+    assert mission.wall_hit == "mirror"
+    assert mission.half_duplex == "strict"
+    assert mission.flocking_set == "heard"
+    assert not mission.silence_is_attempt
+    assert not mission.moves_each_transmission
+    assert not mission.tree_recomputed
+    assert not mission.tree_root_transmits
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_reference_follows_the_code(task):
+    mission = reference(task)
+    assert (mission.preset, mission.task) == ("reference", task)
+    assert mission.max_acceleration_mps2 == 10.0
+    assert mission.wall_hit == "clip"
+    assert mission.half_duplex == "eavesdroppers"
+    assert mission.flocking_set == "moving"
+    assert mission.silence_is_attempt
+    assert mission.moves_each_transmission
+    assert mission.tree_recomputed == (task in ("random-walk", "flocking"))  # "for mobile teams"
+    assert mission.tree_root_transmits
+
+
+@pytest.mark.parametrize("preset", [paper, reference])
+def test_only_a_flock_flies_without_walls(preset):
+    assert preset("stationary").has_walls
+    assert preset("random-walk").has_walls
+    assert not preset("flocking").has_walls
+    assert preset("flocking", boundary="reflect").has_walls
+    assert not preset("random-walk", boundary="none").has_walls
+
+
+def test_the_bare_mission_is_the_papers_text_with_walls():
+    assert Mission() == paper("flocking", boundary="reflect")
+
+
+def test_presets_go_by_name():
+    assert PRESETS["paper"]("stationary") == paper("stationary")
+    assert PRESETS["reference"]("stationary") == reference("stationary")
+    assert set(PRESETS) == {"paper", "reference"}
+
+
+@pytest.mark.parametrize("spec", QUANTITIES, ids=lambda spec: spec.name)
+def test_every_quantity_names_its_unit_and_source(spec):
+    assert spec.metadata["label"]
+    assert spec.metadata["unit"]
+    assert spec.metadata["source"]
+    assert spec.metadata["low"] <= spec.default < spec.metadata["high"]
+    assert (spec.metadata["low"] == spec.default) == (spec.name == "switched_off")
+
+
+@pytest.mark.parametrize("spec", QUANTITIES, ids=lambda spec: spec.name)
+@pytest.mark.parametrize("end", ["low", "high"])
+def test_the_ends_of_a_range_are_allowed(spec, end):
+    value = spec.type(spec.metadata[end])
+    assert getattr(Mission(**{spec.name: value}), spec.name) == value
+
+
+@pytest.mark.parametrize(
+    ("spec", "value"), REFUSED, ids=[f"{spec.name}={value:g}" for spec, value in REFUSED]
+)
+def test_values_outside_their_range_are_refused(spec, value):
+    with pytest.raises(ValueError, match=spec.metadata["label"]) as refusal:
+        Unchecked(**{spec.name: value})
+    message = str(refusal.value)
+    allowed, given = message.rsplit("not", 1)
+    assert f"from {spec.metadata['low']:g} to {spec.metadata['high']:g}" in allowed
+    assert spec.metadata["unit"] in allowed
+    assert float(given) == pytest.approx(value, rel=1e-5, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "kind"),
+    [
+        ("num_robots", 2.5, "a whole number from 2 to 1000"),
+        ("num_robots", "40", "a whole number from 2 to 1000"),
+        ("range_ratio", "wide", "a number from 0.01 to 10"),
+        ("silence_is_attempt", "no", "True or False"),
+    ],
+)
+def test_values_of_another_kind_are_refused(field, value, kind):
+    with pytest.raises(ValueError, match=f"must be {kind}.* not {value}"):
+        Unchecked(**{field: value})
+
+
+def test_numpy_s_numbers_are_numbers():
+    mission = Unchecked(num_robots=np.int64(20), range_ratio=np.float32(0.5))
+    assert mission.range_m == 500.0
+
+
+def test_every_range_keeps_out_what_no_mission_can_have():
+    assert {spec.name for spec in QUANTITIES} == {
+        "num_robots",
+        "density_per_km2",
+        "range_ratio",
+        "velocity_ratio",
+        "max_acceleration_mps2",
+        "window_s",
+        "num_windows",
+        "sinr_threshold_db",
+        "noise_dbm",
+        "frequency_hz",
+        "switched_off",
+    }
+    for spec in QUANTITIES:
+        in_decibel = spec.metadata["unit"].startswith("dB")  # these may well be negative
+        may_be_none = spec.name == "switched_off"
+        assert in_decibel or may_be_none or not spec.metadata["low"] <= 0 <= spec.metadata["high"]
+
+
+@pytest.mark.parametrize("spec", CHOICES, ids=lambda spec: spec.name)
+def test_unknown_choices_are_refused(spec):
+    with pytest.raises(ValueError, match=spec.metadata["label"]) as refusal:
+        Unchecked(**{spec.name: "telepathy"})
+    assert "'telepathy'" in str(refusal.value)
+    for choice in spec.metadata["choices"]:
+        assert choice in str(refusal.value)
+        assert getattr(Unchecked(**{spec.name: choice}), spec.name) == choice
+
+
+@pytest.mark.parametrize("preset", [Mission, paper, reference])
+def test_unknown_names_are_refused(preset):
+    with pytest.raises(TypeError, match="num_robotz"):
+        preset(num_robotz=40)
+
+
+OTHER = {
+    "num_robots": 12,
+    "range_ratio": 0.5,
+    "max_acceleration_mps2": 5.0,
+    "wall_hit": "mirror",
+    "half_duplex": "strict",
+    "flocking_set": "heard",
+    "silence_is_attempt": False,
+    "moves_each_transmission": False,
+    "tree_recomputed": True,
+    "tree_root_transmits": False,
+}
+
+
+@pytest.mark.parametrize("preset", [paper, reference])
+@pytest.mark.parametrize("name", OTHER)
+def test_any_field_can_be_overridden(preset, name):
+    assert getattr(preset("stationary", **{name: OTHER[name]}), name) == OTHER[name]
+
+
+def test_a_mission_cannot_change():
+    with pytest.raises(FrozenInstanceError):
+        paper().num_robots = 3

@@ -1,0 +1,210 @@
+import mujoco
+import numpy as np
+import pytest
+
+from swarm_mj.io.assets import asset
+from swarm_mj.mission import Mission, paper
+from swarm_mj.physics.scene import compose, num_substeps, timestep_s
+
+# Half the side of the square in which 40 robots share a square kilometre, by hand [m].
+HALF_SIDE_M = {10: 250.0, 40: 500.0, 90: 750.0}
+MODES = ["exact", "contact"]
+WALLS = ["wall_east", "wall_west", "wall_north", "wall_south"]
+
+
+def compiled(num_robots, physics="exact", boundary="reflect", **numbers):
+    mission = paper(
+        "random-walk", num_robots=num_robots, physics=physics, boundary=boundary, **numbers
+    )
+    return compose(mission).compile()
+
+
+def geom_names(model):
+    return {model.geom(g).name for g in range(model.ngeom)}
+
+
+def test_robot_opens_in_mujoco_alone():
+    model = mujoco.MjModel.from_xml_path(str(asset("robot.xml")))
+    assert (model.nq, model.nv, model.nu) == (2, 2, 2)
+    assert model.body_mass.sum() == 1.0
+
+
+def test_arena_opens_in_mujoco_alone():
+    model = mujoco.MjModel.from_xml_path(str(asset("arena.xml")))
+    assert (model.nq, model.nu) == (0, 0)
+    assert geom_names(model) == {"floor", *WALLS}
+    assert model.ncam == 1
+
+
+def test_robot_file_has_the_papers_numbers():
+    """IV-B: 3 m/s, 20 m/s² and 100 ms stand in robot.xml too, and are `Mission`'s defaults."""
+    model = mujoco.MjModel.from_xml_path(str(asset("robot.xml")))
+    mission = Mission()
+    np.testing.assert_allclose(model.actuator_ctrlrange, [[-3.0, 3.0]] * 2)
+    np.testing.assert_allclose(model.actuator_forcerange, [[-20.0, 20.0]] * 2)
+    assert mission.max_velocity_mps == pytest.approx(model.actuator_ctrlrange[0, 1])
+    assert mission.max_acceleration_mps2 == pytest.approx(model.actuator_forcerange[0, 1])
+    assert mission.window_s == pytest.approx(model.opt.timestep)
+    np.testing.assert_allclose(model.actuator_gainprm[:, 0], 1.0 / 0.1)  # mass over timestep
+
+
+def test_arena_file_has_the_papers_area():
+    """IV-B: 40 robots work in a square kilometre; arena.xml shows it, `Mission` computes it."""
+    model = mujoco.MjModel.from_xml_path(str(asset("arena.xml")))
+    np.testing.assert_allclose(model.geom("floor").size[:2], 500.0)
+    assert Mission().half_side_m == pytest.approx(500.0)
+    assert model.opt.timestep == pytest.approx(Mission().window_s)
+
+
+def test_assets_alone_equal_the_default_scene():
+    """Composing the paper's mission changes no number of the two files."""
+    arena = mujoco.MjModel.from_xml_path(str(asset("arena.xml")))
+    robot = mujoco.MjModel.from_xml_path(str(asset("robot.xml")))
+    model = compiled(40)
+    for name in ("floor", *WALLS):
+        np.testing.assert_allclose(model.geom(name).size, arena.geom(name).size)
+        np.testing.assert_allclose(model.geom(name).pos, arena.geom(name).pos)
+    np.testing.assert_allclose(model.camera("top").pos, arena.camera("top").pos)
+    np.testing.assert_allclose(model.mat_texrepeat[model.material("floor").id], 5.0)
+    assert model.stat.extent == arena.stat.extent
+    for column in ("ctrlrange", "forcerange", "gainprm", "biasprm"):
+        one = getattr(robot, f"actuator_{column}")
+        np.testing.assert_allclose(getattr(model, f"actuator_{column}"), np.tile(one, (40, 1)))
+
+
+def test_unknown_asset_is_a_clear_error():
+    with pytest.raises(FileNotFoundError, match=r"tree\.xml"):
+        asset("tree.xml")
+
+
+@pytest.mark.parametrize("physics", MODES)
+@pytest.mark.parametrize("num_robots", HALF_SIDE_M)
+def test_composed_team_is_n_point_masses_in_the_plane(num_robots, physics):
+    model = compiled(num_robots, physics)
+    assert model.nq == model.nv == model.nu == 2 * num_robots
+    np.testing.assert_array_equal(model.body_mass[1:], 1.0)
+    for i in range(num_robots):
+        for axis, joint in enumerate("xy"):
+            # Physics reads and writes qpos, qvel and ctrl as [robot, axis].
+            assert model.joint(f"r{i}/{joint}").qposadr == 2 * i + axis
+            assert model.joint(f"r{i}/{joint}").dofadr == 2 * i + axis
+            assert model.actuator(f"r{i}/v{joint}").id == 2 * i + axis
+            assert model.actuator(f"r{i}/v{joint}").trnid[0] == model.joint(f"r{i}/{joint}").id
+            np.testing.assert_array_equal(model.joint(f"r{i}/{joint}").axis, np.eye(3)[axis])
+    assert np.all(model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE)
+
+
+@pytest.mark.parametrize("ratio", [0.05, 1.0])
+def test_exact_scene_is_a_bounded_velocity_servo(ratio):
+    """V_max = ratio x 1000 m / 50 s; one window's step; kv = mass / step reaches the set point."""
+    model = compiled(10, velocity_ratio=ratio, max_acceleration_mps2=7.0)
+    limit_mps = ratio * 20.0
+    np.testing.assert_allclose(model.actuator_ctrlrange, [[-limit_mps, limit_mps]] * 20)
+    np.testing.assert_allclose(model.actuator_forcerange, [[-7.0, 7.0]] * 20)
+    np.testing.assert_allclose(model.actuator_gainprm[:, 0], 10.0)
+    np.testing.assert_allclose(model.actuator_biasprm[:, 2], -10.0)
+    assert np.all(model.actuator_ctrllimited)
+    assert np.all(model.actuator_forcelimited)
+    assert model.opt.timestep == pytest.approx(0.1)
+    assert model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER
+    assert not np.any(model.jnt_limited)
+
+
+@pytest.mark.parametrize("num_robots", HALF_SIDE_M)
+def test_contact_scene_is_a_bounded_force_between_limits(num_robots):
+    model = compiled(num_robots, "contact", max_acceleration_mps2=7.0)
+    np.testing.assert_allclose(model.actuator_forcerange, [[-7.0, 7.0]] * 2 * num_robots)
+    np.testing.assert_allclose(model.actuator_gainprm[:, 0], 1.0)
+    np.testing.assert_array_equal(model.actuator_biasprm, 0.0)
+    assert model.opt.timestep == pytest.approx(0.01)
+    assert model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER
+    half_m = HALF_SIDE_M[num_robots]
+    assert np.all(model.jnt_limited)
+    np.testing.assert_allclose(model.jnt_range, [[-half_m, half_m]] * 2 * num_robots)
+
+
+def test_contact_scene_without_boundary_has_no_limits():
+    assert not np.any(compiled(10, "contact", "none").jnt_limited)
+
+
+@pytest.mark.parametrize("physics", MODES)
+def test_nothing_else_acts_on_the_robots(physics):
+    """No gravity, no drag, no robot-robot contact: left alone, a robot keeps its velocity."""
+    model = compiled(2, physics)
+    data = mujoco.MjData(model)
+    data.qvel[:] = [1.0, -2.0, 0.5, 0.25]
+    data.ctrl[:] = data.qvel if physics == "exact" else 0.0
+    for _ in range(100):
+        mujoco.mj_step(model, data)
+    np.testing.assert_allclose(data.qvel, [1.0, -2.0, 0.5, 0.25], rtol=1e-12)
+    np.testing.assert_allclose(data.qpos, data.qvel * data.time, rtol=1e-12)
+    np.testing.assert_allclose(data.body("r0/body").xpos[2], 1.0)
+    assert data.ncon == 0
+
+
+@pytest.mark.parametrize("num_robots", HALF_SIDE_M)
+def test_iv_b_area_grows_with_the_team(num_robots):
+    """At 40 robots per square kilometre: the floor's edges and the walls' inner faces."""
+    model = compiled(num_robots)
+    half_m = HALF_SIDE_M[num_robots]
+    np.testing.assert_allclose(model.geom("floor").size[:2], half_m)
+    for name, axis, sign in zip(WALLS, (0, 0, 1, 1), (1, -1, 1, -1), strict=True):
+        wall = model.geom(name)
+        inner_face_m = sign * wall.pos[axis] - wall.size[axis]
+        assert inner_face_m == pytest.approx(half_m)
+        assert wall.pos[1 - axis] == 0.0
+        assert wall.size[1 - axis] >= half_m + 2 * wall.size[axis] - 1e-9  # the corners are closed
+        assert wall.pos[2] == pytest.approx(wall.size[2])  # it stands on the floor
+    assert model.stat.extent == pytest.approx(2 * half_m)
+    squares = 2 * model.mat_texrepeat[model.material("floor").id]  # two per repeat
+    np.testing.assert_allclose(2 * half_m / squares, 100.0)
+
+
+@pytest.mark.parametrize("physics", MODES)
+def test_open_area_has_no_walls(physics):
+    assert geom_names(compiled(10, physics, "reflect")) >= set(WALLS)
+    assert not geom_names(compiled(10, physics, "none")) & set(WALLS)
+
+
+@pytest.mark.parametrize("physics", MODES)
+@pytest.mark.parametrize("boundary", ["reflect", "none"])
+def test_saved_scene_opens_in_mujoco_alone(tmp_path, physics, boundary):
+    mission = paper(num_robots=7, physics=physics, boundary=boundary)
+    path = tmp_path / "scene.xml"
+    path.write_text(compose(mission).to_xml())
+    saved = mujoco.MjModel.from_xml_path(str(path))
+    model = compose(mission).compile()
+    for column in ("body_mass", "jnt_range", "jnt_solref", "actuator_ctrlrange", "geom_pos"):
+        np.testing.assert_allclose(getattr(saved, column), getattr(model, column), rtol=1e-5)
+    assert saved.opt.timestep == pytest.approx(model.opt.timestep)
+    assert saved.opt.integrator == model.opt.integrator
+
+
+@pytest.mark.parametrize("num_robots", [2, 10, 40, 90, 160])
+def test_camera_sees_the_whole_area(num_robots):
+    """Projects the area's corners, at the robots' height, into the camera's square image."""
+    model = compiled(num_robots)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    half_m = 500.0 * (num_robots / 40.0) ** 0.5
+    to_camera = data.camera("top").xmat.reshape(3, 3).T
+    half_view = np.tan(np.deg2rad(model.camera("top").fovy[0] / 2.0))
+    for x_m, y_m in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        corner_m = np.array([x_m * half_m, y_m * half_m, 1.0])
+        right, up, behind = to_camera @ (corner_m - data.camera("top").xpos)
+        depth_m = -behind  # MuJoCo's cameras look along their negative z axis
+        assert model.vis.map.znear < depth_m / model.stat.extent < model.vis.map.zfar
+        # The image holds the area, and the area fills most of the image, east to the right.
+        assert 0.8 < x_m * right / depth_m / half_view <= 1.0
+        assert 0.8 < y_m * up / depth_m / half_view <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("window_s", "steps"), [(0.1, 10), (0.05, 5), (0.01, 1), (0.014, 2), (0.25, 25), (2.0, 200)]
+)
+def test_steps_fill_the_window(window_s, steps):
+    exact = paper(window_s=window_s)
+    assert (num_substeps(exact), timestep_s(exact)) == (1, window_s)
+    contact = paper(window_s=window_s, physics="contact")
+    assert num_substeps(contact) == steps
+    assert steps * timestep_s(contact) == pytest.approx(window_s)

@@ -1,0 +1,279 @@
+import numpy as np
+import pytest
+
+from swarm_mj.mission import paper, reference
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.physics.worlds import Physics
+
+NUM_MISSIONS, NUM_ROBOTS = 6, 10
+BODY_RADIUS_M = 0.5  # assets/robot.xml
+MODES = ["exact", "contact"]
+RATIOS = [0.05, 0.15, 1.0]  # 1, 3 and 20 m/s
+
+
+def crowded(physics="exact", preset=paper, **numbers):
+    """Ten robots on 100 m by 100 m, so that a flight of 500 windows meets the walls often."""
+    return preset(
+        "random-walk", num_robots=NUM_ROBOTS, density_per_km2=1000.0, physics=physics, **numbers
+    )
+
+
+def drawn(mission, num_windows, seed=0, num_missions=NUM_MISSIONS):
+    """A start inside the area, and accelerations of which some exceed A_max."""
+    rng = np.random.default_rng(seed)
+    shape = (num_missions, mission.num_robots, 2)
+    position_m = rng.uniform(-mission.half_side_m, mission.half_side_m, size=shape)
+    velocity_mps = rng.uniform(-1, 1, size=shape) * mission.max_velocity_mps
+    wanted = rng.normal(scale=mission.max_acceleration_mps2 / 2, size=(num_windows, *shape))
+    return position_m, velocity_mps, wanted
+
+
+def flown(mission, position_m, velocity_mps, wanted):
+    """The states after each window."""
+    physics = Physics(mission, len(position_m))
+    physics.place(position_m, velocity_mps)
+    return [physics.step(u) for u in wanted]
+
+
+def eq15(mission, p, v, u, at_wall):
+    """One window on paper: drift with the old velocity, kick, clip, and then the wall."""
+    p = p + v * 0.1
+    v = v + np.clip(u, -mission.max_acceleration_mps2, mission.max_acceleration_mps2) * 0.1
+    v = np.clip(v, -mission.max_velocity_mps, mission.max_velocity_mps)
+    edge_m = np.copysign(mission.half_side_m, p)
+    is_hit = (np.abs(p) > mission.half_side_m) & (at_wall != "open")
+    bounced = 2 * edge_m - p if at_wall == "mirror" else edge_m
+    return np.where(is_hit, bounced, p), np.where(is_hit, -v, v), is_hit.sum()
+
+
+def worst_deviation(mission, at_wall):
+    """Largest distance from Eq. 15 over 500 windows [m], [m/s], and the walls hit on the way."""
+    p, v, wanted = drawn(mission, 500)
+    bodies = flown(mission, p, v, wanted)
+    off_m = off_mps = num_hits = 0
+    for u, body in zip(wanted, bodies, strict=True):
+        p, v, hits = eq15(mission, p, v, u, at_wall)
+        off_m = max(off_m, np.abs(body.position_m - p).max())
+        off_mps = max(off_mps, np.abs(body.velocity_mps - v).max())
+        num_hits += hits
+    return off_m, off_mps, num_hits
+
+
+def assert_same_states(one, other):
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_array_equal(a.position_m, b.position_m)
+        np.testing.assert_array_equal(a.velocity_mps, b.velocity_mps)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_eq15_exact_with_mirror_walls(ratio):
+    off_m, off_mps, num_hits = worst_deviation(crowded(velocity_ratio=ratio), "mirror")
+    assert num_hits > 50
+    assert off_m < 1e-9
+    assert off_mps < 1e-9
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_eq15_exact_with_the_reference_presets_walls(ratio):
+    """The authors' code puts a robot that crossed the wall onto it, and flips its velocity."""
+    mission = crowded(preset=reference, velocity_ratio=ratio)
+    off_m, off_mps, num_hits = worst_deviation(mission, "clip")
+    assert num_hits > 50
+    assert off_m < 1e-9
+    assert off_mps < 1e-9
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+@pytest.mark.parametrize("preset", [paper, reference])
+def test_eq15_exact_in_the_open(ratio, preset):
+    mission = crowded(preset=preset, velocity_ratio=ratio, boundary="none")
+    off_m, off_mps, _ = worst_deviation(mission, "open")
+    assert off_m < 1e-9
+    assert off_mps < 1e-9
+
+
+def test_eq15_position_moves_with_the_old_velocity():
+    """By hand: (0, 1 m/s) at 10 m/s² for 100 ms is (0.1 m, 2 m/s), then (0.3 m, 3 m/s)."""
+    mission = paper("random-walk", num_robots=2)
+    u = np.full((1, 2, 2), 10.0)
+    first, second = flown(mission, np.zeros((1, 2, 2)), np.ones((1, 2, 2)), [u, u])
+    np.testing.assert_allclose(first.position_m, 0.1, rtol=1e-12)
+    np.testing.assert_allclose(first.velocity_mps, 2.0, rtol=1e-12)
+    np.testing.assert_allclose(second.position_m, 0.3, rtol=1e-12)
+    np.testing.assert_allclose(second.velocity_mps, 3.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_iv_a_wall_mirrors_one_axis(axis, side):
+    """By hand: at 3 m/s, from 0.1 m before a wall at 50 m to 0.2 m before it, on the way back."""
+    p, v = np.zeros((1, NUM_ROBOTS, 2)), np.zeros((1, NUM_ROBOTS, 2))
+    p[..., axis], v[..., axis] = side * 49.9, side * 3.0
+    (body,) = flown(crowded(), p, v, [np.zeros_like(p)])
+    np.testing.assert_allclose(body.position_m[..., axis], side * 49.8, rtol=1e-12)
+    np.testing.assert_allclose(body.velocity_mps[..., axis], side * -3.0, rtol=1e-12)
+    np.testing.assert_array_equal(body.position_m[..., 1 - axis], 0.0)
+    np.testing.assert_array_equal(body.velocity_mps[..., 1 - axis], 0.0)
+
+
+class NoSteps:
+    """Stands in for MuJoCo's worlds and does not step them."""
+
+    def step(self):
+        """Nothing moves."""
+
+
+@pytest.mark.parametrize("physics", MODES)
+def test_position_only_moves_because_mujoco_steps(physics):
+    mission = crowded(physics)
+    p, v, wanted = drawn(mission, 10)
+    worlds = Physics(mission, NUM_MISSIONS)
+    worlds.place(p, v)
+    worlds._batch = NoSteps()
+    for u in wanted:
+        np.testing.assert_array_equal(worlds.step(u).position_m, p)
+    # In `exact` the next set point is still computed; MuJoCo just never gets to follow it.
+    assert np.any(worlds.bodies.velocity_mps != v) == (physics == "exact")
+
+
+@pytest.mark.parametrize("physics", MODES)
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_acceleration_that_is_not_finite_changes_nothing(physics, value):
+    mission = crowded(physics)
+    p, v, wanted = drawn(mission, 6)
+    worlds = Physics(mission, NUM_MISSIONS)
+    worlds.place(p, v)
+    states = [worlds.step(u) for u in wanted[:3]]
+    bad = wanted[3].copy()
+    bad[2, 4, 1] = value
+    with pytest.raises(ValueError, match=rf"finite, not \(.*{value:g}\).*robot 4 in mission 2"):
+        worlds.step(bad)
+    assert worlds.bodies is states[-1]
+    states += [worlds.step(u) for u in wanted[3:]]
+    assert_same_states(states, flown(mission, p, v, wanted))
+
+
+@pytest.mark.parametrize("physics", MODES)
+def test_worlds_are_independent(physics):
+    """Each mission alone flies as it does beside the others, bit by bit."""
+    mission = crowded(physics)
+    p, v, wanted = drawn(mission, 50)
+    together = flown(mission, p, v, wanted)
+    for b in range(0, NUM_MISSIONS, 2):
+        alone = flown(mission, p[b : b + 1], v[b : b + 1], wanted[:, b : b + 1])
+        beside = [
+            RobotStates(position_m=s.position_m[b : b + 1], velocity_mps=s.velocity_mps[b : b + 1])
+            for s in together
+        ]
+        assert_same_states(alone, beside)
+
+
+@pytest.mark.parametrize("physics", MODES)
+def test_threads_change_nothing(physics):
+    mission = crowded(physics)
+    p, v, wanted = drawn(mission, 20)
+    worlds = Physics(mission, NUM_MISSIONS, num_threads=2)
+    worlds.place(p, v)
+    assert_same_states([worlds.step(u) for u in wanted], flown(mission, p, v, wanted))
+
+
+@pytest.mark.parametrize("physics", MODES)
+def test_place_starts_anew(physics):
+    """The second flight of the same worlds is the first one again, bit by bit, from time 0."""
+    mission = crowded(physics)
+    p, v, wanted = drawn(mission, 60)
+    worlds = Physics(mission, NUM_MISSIONS)
+    worlds.place(p, v)
+    first = [worlds.step(u) for u in wanted]
+    worlds.place(p, v)
+    np.testing.assert_array_equal(worlds._batch.bind("time"), 0.0)
+    np.testing.assert_array_equal(worlds.bodies.position_m, p)
+    np.testing.assert_array_equal(worlds.bodies.velocity_mps, v)
+    assert_same_states([worlds.step(u) for u in wanted], first)
+
+
+@pytest.mark.parametrize("physics", MODES)
+def test_bodies_are_not_changed_by_later_steps(physics):
+    mission = crowded(physics)
+    p, v, wanted = drawn(mission, 3)
+    worlds = Physics(mission, NUM_MISSIONS)
+    worlds.place(p, v)
+    states = [worlds.bodies] + [worlds.step(u) for u in wanted[:2]]
+    kept = [(s.position_m.copy(), s.velocity_mps.copy()) for s in states]
+    p[:], v[:] = 0.0, 0.0  # nor by their owner
+    worlds.step(wanted[2])
+    for state, (position_m, velocity_mps) in zip(states, kept, strict=True):
+        np.testing.assert_array_equal(state.position_m, position_m)
+        np.testing.assert_array_equal(state.velocity_mps, velocity_mps)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_contact_conserves_speed_at_a_wall(ratio):
+    """Robots coast into the walls and corners from all sides; every component comes back whole."""
+    mission = crowded("contact", velocity_ratio=ratio)
+    p, v, wanted = drawn(mission, 500)
+    last = v
+    num_turns = 0
+    for body in flown(mission, p, v, np.zeros_like(wanted)):
+        np.testing.assert_allclose(np.abs(body.velocity_mps), np.abs(v), rtol=0.01)
+        num_turns += np.sum(body.velocity_mps * last < 0)
+        last = body.velocity_mps
+    assert num_turns > 10
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_contact_stays_inside_and_within_both_bounds(ratio):
+    mission = crowded("contact", velocity_ratio=ratio)
+    p, v, wanted = drawn(mission, 500)
+    wanted[:250, 0] = 100.0  # one team leans on a corner with all it has, then is dragged off
+    wanted[250:, 0] = -100.0
+    wall_m = 50.0
+    far_m = wall_m - 2 * mission.max_velocity_mps * 0.1  # cannot reach a wall within a window
+    limit_mps = ratio * 20.0
+    before = RobotStates(position_m=p, velocity_mps=v)
+    for body in flown(mission, p, v, wanted):
+        assert np.abs(body.position_m).max() < wall_m + BODY_RADIUS_M
+        assert np.abs(body.velocity_mps).max() <= limit_mps
+        # Nor is it faster within the window, say after a bounce; those are elastic to 1e-5.
+        travelled_m = np.abs(body.position_m - before.position_m)
+        assert travelled_m.max() <= limit_mps * 0.1 * (1 + 1e-4)
+        is_far = np.abs(before.position_m) < far_m
+        kick = np.abs(body.velocity_mps - before.velocity_mps)[is_far] / 0.1
+        assert kick.max(initial=0.0) <= 20.0 * (1 + 1e-9)
+        before = body
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_eq15_contact_deviates_by_the_shape_of_the_window_only(ratio):
+    """Without walls the lag behind Eq. 15 telescopes to T (n+1) / (2n) (v_t - v_0), n = 10.
+
+    A robot's n steps within a window of T move it with the velocity after each step, Eq. 15 with
+    the velocity before the window; the velocities themselves are equal.
+    """
+    mission = crowded("contact", velocity_ratio=ratio, boundary="none")
+    p, v, wanted = drawn(mission, 500)
+    v_0 = v
+    limit_m = 2 * mission.max_velocity_mps * 0.1 * 11 / 20
+    for u, body in zip(wanted, flown(mission, p, v, wanted), strict=True):
+        p, v, _ = eq15(mission, p, v, u, "open")
+        lag_m = body.position_m - p
+        np.testing.assert_allclose(body.velocity_mps, v, atol=1e-9)
+        np.testing.assert_allclose(lag_m, 0.1 * 11 / 20 * (v - v_0), atol=1e-8)
+        assert np.abs(lag_m).max() <= limit_m + 1e-9
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_eq15_contact_deviation_is_bounded_until_the_first_wall(ratio):
+    mission = crowded("contact", velocity_ratio=ratio)
+    p, v, wanted = drawn(mission, 500)
+    limit_m = 2 * mission.max_velocity_mps * 0.1 * 11 / 20
+    # Where neither path can have crossed the wall at 50 m, not even within the window.
+    inside_m = 50.0 - limit_m - mission.max_velocity_mps * 0.1
+    is_untouched = np.abs(p) < inside_m
+    num_compared = 0
+    for u, body in zip(wanted, flown(mission, p, v, wanted), strict=True):
+        p, v, _ = eq15(mission, p, v, u, "mirror")
+        is_untouched &= np.abs(p) < inside_m
+        assert np.abs(body.position_m - p)[is_untouched].max(initial=0.0) <= limit_m + 1e-9
+        num_compared += is_untouched.sum()
+    assert num_compared > 1000

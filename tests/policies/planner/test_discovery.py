@@ -1,0 +1,239 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarm_mj.policies.planner import discovery
+from swarm_mj.policies.planner.discovery import Discovery
+from swarm_mj.protocol.buffers import empty_buffers
+
+seeds = st.integers(0, 2**32 - 1)
+RANGE_M = 100.0
+NUM_ROBOTS = 6
+LATE = 60  # half windows: 5 rounds of 6 windows
+
+
+@pytest.fixture(autouse=True)
+def _numbers(monkeypatch):
+    """What the arithmetic here is about, whatever suits the planner best."""
+    numbers = {
+        "SPEAKERS_PER_REACH": 0.4,
+        "MOST_SPEAKERS": 8,
+        "FAST_ROUNDS": 2,
+        "LATER_SHARE": 0.5,
+        "POLITE": 1.5,
+        "NUM_ROUNDS": 40,
+        "SEEK_AFTER": 5.0,
+        "LATEST_SEEK": 200,
+        "SEEK_EVERY": 5,
+    }
+    for name, value in numbers.items():
+        monkeypatch.setattr(discovery, name, value)
+
+
+def discovery_of(num_robots, num_reaches, seed=0):
+    return Discovery(num_robots, num_reaches, RANGE_M, np.random.default_rng(seed))
+
+
+def order_of(seed):
+    """The order of the search: the first that is drawn."""
+    return np.random.default_rng(seed).permutation(NUM_ROBOTS).tolist()
+
+
+def at_places(position_m, knows):
+    """Buffers at t = 1 in which robot i has heard of itself and of whom it knows."""
+    buffers = empty_buffers(1, len(position_m))
+    for i in range(len(position_m)):
+        for k in {i, *knows.get(i, ())}:
+            buffers.timestamp[0, i, k] = 1.0
+            buffers.position_m[0, i, k] = position_m[k]
+    return buffers
+
+
+def strangers(num_robots):
+    """Robots in one place, none of which has heard of another."""
+    return at_places(np.zeros((num_robots, 2)), {})
+
+
+def round_of_speakers(turns, num_robots, first):
+    """Who speaks, half window by half window, until as many spoke as there are robots."""
+    speakers, half_window = [], first
+    while sum(map(len, speakers)) < num_robots:
+        speaks = turns.speaks(half_window, strangers(num_robots), 0)
+        speakers.append(np.flatnonzero(speaks).tolist())
+        half_window += 1
+    return speakers
+
+
+@given(seed=seeds, num_robots=st.integers(2, 30), num_reaches=st.floats(0.01, 50.0))
+def test_every_robot_speaks_once_a_round(seed, num_robots, num_reaches):
+    """As long as nobody knows anybody."""
+    turns, half_window = discovery_of(num_robots, num_reaches, seed), 0
+    for _ in range(4):
+        speakers = round_of_speakers(turns, num_robots, half_window)
+        assert sorted(i for group in speakers for i in group) == list(range(num_robots))
+        half_window += len(speakers)
+
+
+@pytest.mark.parametrize(
+    ("num_robots", "num_reaches", "at_once", "later"),
+    [
+        (40, 5.1, 2, 1),  # 0.4 of 5.1 is 2.04
+        (40, 7.0, 3, 1),  # 2.8; half of 3 is 1 and a half
+        (40, 18.0, 7, 3),  # 7.2
+        (40, 500.0, 8, 4),  # no more
+        (40, 0.1, 1, 1),  # no less
+        (3, 500.0, 2, 2),  # never all: somebody must listen
+    ],
+)
+def test_how_many_speak_at_once_by_hand(num_robots, num_reaches, at_once, later):
+    turns, half_window = discovery_of(num_robots, num_reaches), 0
+    for count in (at_once, at_once, later, later):
+        speakers = round_of_speakers(turns, num_robots, half_window)
+        assert len(speakers) == math.ceil(num_robots / count)
+        assert {len(group) for group in speakers[:-1]} == {count}
+        half_window += len(speakers)
+
+
+def test_orders_differ_from_round_to_round_and_repeat_after_40():
+    """One of 6 robots at a time: rounds of 6 half windows."""
+    turns = discovery_of(NUM_ROBOTS, 1.0)
+    flown = [round_of_speakers(turns, NUM_ROBOTS, 6 * k) for k in range(41)]
+    assert flown[40] == flown[0]
+    assert len({str(speakers) for speakers in flown[:40]}) > 30
+
+
+def pair_that_speaks(turns):
+    """The first half window in which two speak, and these, the one that comes first first."""
+    for half_window in range(3):
+        pair = np.flatnonzero(turns.speaks(half_window, strangers(NUM_ROBOTS), 0)).tolist()
+        for first, then in (pair, pair[::-1]):
+            knows = at_places(np.zeros((NUM_ROBOTS, 2)), {then: [first]})
+            if not turns.speaks(half_window, knows, 0)[then]:
+                yield half_window, first, then
+
+
+def speaks_apart(turns, half_window, first, then, distance_m, knows):
+    position_m = np.zeros((NUM_ROBOTS, 2))
+    position_m[first] = [0.6 * distance_m, 0.8 * distance_m]
+    speaks = turns.speaks(half_window, at_places(position_m, knows), 0)
+    return bool(speaks[first]), bool(speaks[then])
+
+
+def test_whoever_knows_one_near_it_that_comes_before_is_silent():
+    """Within one and a half ranges, 150 m; the one that comes first speaks whatever it knows."""
+    turns = discovery_of(NUM_ROBOTS, 5.0)
+    pairs = list(pair_that_speaks(turns))
+    assert [half_window for half_window, _, _ in pairs] == [0, 1, 2]
+    for half_window, first, then in pairs:
+        pair = (turns, half_window, first, then)
+        mutual = {first: [then], then: [first]}
+        assert speaks_apart(*pair, 149.0, mutual) == (True, False)
+        assert speaks_apart(*pair, 151.0, mutual) == (True, True)
+        assert speaks_apart(*pair, 149.0, {first: [then]}) == (True, True)
+        bystander = next(i for i in range(NUM_ROBOTS) if i not in (first, then))
+        assert speaks_apart(*pair, 0.0, {then: [bystander]}) == (True, True)
+
+
+@given(seed=seeds)
+def test_eq9_politeness_is_one_s_own_buffer_s(seed):
+    rng = np.random.default_rng(seed)
+    turns, row = discovery_of(NUM_ROBOTS, 12.0, seed), seed % NUM_ROBOTS
+    mine, theirs = (
+        at_places(
+            rng.uniform(-200.0, 200.0, (NUM_ROBOTS, 2)),
+            {i: np.flatnonzero(rng.random(NUM_ROBOTS) < 0.6) for i in range(NUM_ROBOTS)},
+        )
+        for _ in range(2)
+    )
+    for name, array in vars(mine).items():
+        vars(theirs)[name][:, row] = array[:, row]
+    for half_window in range(8):
+        alone, in_company = (turns.speaks(half_window, them, 0)[row] for them in (mine, theirs))
+        assert alone == in_company
+
+
+def fresh(*lost):
+    return ~np.isin(np.arange(NUM_ROBOTS), lost)
+
+
+def test_whose_turn_it_is_by_hand():
+    """Before 5 rounds of 6 windows have passed the discovery's, while robots are unknown; then the
+    search's, while robots are lost, in both halves of every fifth window; else the plan's."""
+    turns = discovery_of(NUM_ROBOTS, 1.0)
+    everyone, some = fresh(), fresh(2)
+    for half_window in range(2 * LATE):
+        is_early, is_fifth = half_window < LATE, half_window % 10 in (0, 1)
+        assert turns.is_discovered(half_window, is_complete=False) == is_early
+        assert turns.is_sought(half_window, some) == (not is_early and is_fifth)
+        assert not turns.is_discovered(half_window, is_complete=True)
+        assert not turns.is_sought(half_window, everyone)
+
+
+@pytest.mark.parametrize(("num_robots", "windows"), [(2, 10), (40, 200), (41, 200), (100, 200)])
+def test_large_teams_do_not_wait_for_5_rounds(num_robots, windows):
+    turns = discovery_of(num_robots, 1.0)
+    assert turns.is_discovered(2 * windows - 1, is_complete=False)
+    assert not turns.is_discovered(2 * windows, is_complete=False)
+
+
+def sought(half_window, lost, heard=None, places_m=None, knows=None, was_lost=None, seed=0):
+    """Who speaks in the search, of robots that lost these and decoded `heard[j]`."""
+    decoded = np.arange(NUM_ROBOTS)
+    for j, i in (heard or {}).items():
+        decoded[j] = i
+    position_m = np.zeros((NUM_ROBOTS, 2)) if places_m is None else places_m
+    buffers = at_places(position_m, knows or {})
+    was_fresh = fresh(*(lost if was_lost is None else was_lost))
+    speaks = discovery_of(NUM_ROBOTS, 1.0, seed).seeks(
+        half_window, fresh(*lost), was_fresh, decoded, buffers, 0
+    )
+    return np.flatnonzero(speaks).tolist()
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_one_of_all_calls_in_order_then_one_of_the_lost(seed):
+    order = order_of(seed)
+    lost = [order[1], order[4]]
+    for turn in range(6, 14):
+        assert sought(10 * turn, lost, seed=seed) == [order[turn % 6]]
+        assert sought(10 * turn + 1, lost, seed=seed) == [lost[turn % 2]]
+
+
+def test_whoever_hears_someone_lost_answers_unless_one_near_comes_before():
+    """A caller is lost: whoever heard it answers, but one that knows an earlier one, fresh, to be
+    within a range of the caller leaves it to that one."""
+    order = order_of(0)
+    caller, early, late, far = (order[k] for k in (5, 1, 2, 3))
+    places_m = np.zeros((NUM_ROBOTS, 2))
+    places_m[early] = [60.0, 80.0 - 1e-6]  # just within 100 m of the caller
+    places_m[far] = [60.0, 81.0]
+    call = {"lost": [caller], "heard": {early: caller, late: caller}, "places_m": places_m}
+
+    def answers(knows, **rest):
+        """But for the lost one, whose turn it is to call again."""
+        return [i for i in sought(LATE + 1, **call | rest, knows=knows) if i != caller]
+
+    assert answers({early: [caller], late: [caller]}) == sorted([early, late])
+    assert answers({early: [caller], late: [caller, early]}) == [early]
+    assert answers({early: range(NUM_ROBOTS), late: [caller]}) == [late]  # to order[0]
+    after = {"heard": {far: caller, late: caller}}
+    assert answers({far: [caller, early], late: [caller]}, **after) == [late]
+    assert answers({far: [caller], late: [caller, far]}, **after) == sorted([far, late])
+    assert answers({early: [caller], late: [caller, early]}, lost=[caller, early]) == sorted(
+        [early, late]
+    )
+
+
+def test_what_was_lost_counts_as_it_was_before_one_heard_of_it():
+    """With the call came a picture in which the caller is fresh: it is answered all the same."""
+    order = order_of(0)
+    caller, listener, other = order[5], order[1], order[3]
+    knows = {listener: [caller]}
+    heard = {listener: caller}
+    assert sought(LATE + 1, [other], heard, knows=knows, was_lost=[caller]) == sorted(
+        [listener, other]
+    )
+    assert sought(LATE + 1, [other], heard, knows=knows, was_lost=[other]) == [other]

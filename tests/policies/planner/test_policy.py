@@ -1,0 +1,251 @@
+import numpy as np
+import pytest
+from channels import to_nobody, unreliable
+from minds import Flight, Witnessed, common_orders
+
+from swarm_mj.mission import paper, reference
+from swarm_mj.policies.planner import discovery, plan
+from swarm_mj.policies.planner import policy as planner
+from swarm_mj.policies.planner.broadcast_scheduler import Foresight
+from swarm_mj.policies.planner.policy import epoch_starts, regular_length
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.rollout import fly
+from swarm_mj.swarm import Swarm
+
+TASKS = ["stationary", "random-walk", "flocking"]
+
+
+@pytest.fixture
+def near_sighted(monkeypatch):
+    """Plans that look no further than the half window in question: seconds less of large teams."""
+    for name, value in vars(plan).copy().items():
+        if isinstance(value, Foresight):
+            monkeypatch.setattr(plan, name, plan.NO_FORESIGHT)
+
+
+def cut_off(mission, robots, windows, *, is_mute=True, is_deaf=True):
+    """The mission's radio, but in these windows no other robot hears these, nor they any other."""
+    radio, is_cut, num_calls = radio_of(mission), np.zeros(mission.num_robots, dtype=bool), 0
+    is_cut[robots] = True
+
+    def channel(position_m, recipient):
+        nonlocal num_calls
+        window, num_calls = num_calls // 2, num_calls + 1
+        heard = radio(position_m, recipient)
+        if window in windows:
+            is_lost = (is_cut[heard] & ~is_cut & is_mute) | (~is_cut[heard] & is_cut & is_deaf)
+            heard = np.where(is_lost, np.arange(mission.num_robots), heard)
+        return heard
+
+    return channel
+
+
+def windows_before(epoch, num_robots):
+    """When an epoch begins, of those that are of regular length from the third on [windows]."""
+    starts = epoch_starts(num_robots)
+    return starts[3] + (epoch - 3) * regular_length(num_robots)
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("preset", [paper, reference])
+def test_eq9_sharing_plans_is_planning_apart(preset, task):
+    """Every robot decides as one that holds its own buffer and the packets it decoded, alone."""
+    flight = Witnessed(preset(task, num_robots=10), 10)
+    flight.fly(windows_before(5, 10) + 2)
+    assert flight.num_taken > 0
+
+
+@pytest.mark.usefixtures("near_sighted")
+@pytest.mark.parametrize("task", TASKS)
+def test_eq9_sharing_is_planning_apart_in_a_team_of_40(task):
+    flight = Witnessed(paper(task, num_robots=40), 40)
+    flight.fly(windows_before(4, 40) + 2)
+    assert flight.num_taken > 0
+
+
+SMALL = paper("stationary", num_robots=6)
+
+
+@pytest.mark.parametrize(
+    ("mission", "seed", "channel"),
+    [
+        (paper("stationary", num_robots=20, range_ratio=0.2), 3, None),
+        (paper("random-walk", num_robots=9, velocity_ratio=1.0), 1, None),
+        (SMALL, 4, unreliable(4, senders_listen=False)),
+        (SMALL, 2, cut_off(SMALL, 2, range(15, 60))),
+        (SMALL, 5, cut_off(SMALL, 4, range(60), is_mute=False)),
+        (SMALL, 6, cut_off(SMALL, 4, range(60), is_deaf=False)),
+        (SMALL, 1, cut_off(SMALL, [2, 5], range(15, 60))),
+        (SMALL, 3, cut_off(SMALL, [2, 5], range(15, 60))),
+    ],
+    ids=["sparse", "fast", "random packets", "cut off", "deaf", "mute", "two", "two more"],
+)
+def test_eq9_sharing_is_planning_apart_where_pictures_differ(mission, seed, channel):
+    """Teams are not complete after the discovery, fall apart, or miss what others know; who is
+    lost is sought, and found."""
+    flight = Witnessed(mission, seed, channel=channel)
+    flight.fly(90 if mission is SMALL else 60)
+    assert flight.num_taken > 0
+
+
+def test_ii_b_packets_carry_pictures_and_nobody_answers():
+    policy = make_policy("planner", SMALL)
+    assert policy.carries_payload
+    assert policy.transmits_twice
+
+
+def test_epochs_by_hand(monkeypatch):
+    """Of 40 robots: a round of 40 windows, two quarters, then halves; but at least 2 and 10."""
+    numbers = {"FIRST_EPOCH": 1.0, "EARLY_EPOCH": 0.25, "EPOCH": 0.5, "SHORTEST_EPOCH": 10}
+    for name, value in numbers.items():
+        monkeypatch.setattr(planner, name, value)
+    assert epoch_starts(40) == (0, 40, 50, 60)
+    assert epoch_starts(12) == (0, 12, 15, 18)
+    assert epoch_starts(2) == (0, 2, 4, 6)
+    assert [regular_length(n) for n in (2, 20, 21, 40, 81)] == [10, 10, 10, 20, 40]
+
+
+def test_nobody_plans_before_the_pictures_of_the_discovery_have_spread():
+    """Its pictures are frozen as it ends, travel for an epoch, and are flown by after it."""
+    flight = Flight(paper("stationary", num_robots=10), 4)
+    _, first_pictures, first_plans, _ = epoch_starts(10)
+    for window in range(first_plans + 3):
+        flight.fly(1)
+        assert (flight.team._upcoming is not None) == (window >= first_pictures)
+        assert bool(flight.team._plans) == (window >= first_plans)
+
+
+def held_plan(flight):
+    """The one plan that all robots fly by, if they hold the same picture."""
+    held = np.unique(flight.team._holds).tolist()
+    return flight.team._plans[held[0]] if len(held) == 1 else None
+
+
+def assert_flies_as_planned(flight, num_epochs):
+    """From an epoch's beginning on all do as one plan says, and it comes true."""
+    length = regular_length(flight.mission.num_robots)
+    for _ in range(num_epochs):
+        spoke = flight.fly(length)
+        held = held_plan(flight)
+        assert held.is_complete
+        np.testing.assert_array_equal(spoke, [held.speaks(h) for h in range(2 * length)])
+        np.testing.assert_array_equal(flight.swarm.buffers.timestamp[0], held.outcome())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_connected_team_at_rest_flies_one_plan_to_the_letter(seed):
+    """Once all 10 robots hold one picture, positions are true and no packet that was counted on is
+    lost: T is what the plan expects, as soon as all that is older is replaced."""
+    flight = Flight(paper("stationary", num_robots=10), seed)
+    flight.fly(windows_before(5, 10))
+    assert_flies_as_planned(flight, 3)
+
+
+@pytest.mark.parametrize("robot", [0, 5])
+def test_a_robot_unheard_in_the_discovery_is_found_later(robot):
+    """Nobody knew it when the first plans were made; in the end all fly by one plan with it."""
+    mission = paper("stationary", num_robots=8)
+    flight = Flight(mission, 3, channel=cut_off(mission, robot, range(35)))
+    others = np.delete(np.arange(8), robot)
+    flight.fly(35)
+    assert not np.any(flight.swarm.buffers.is_known[0, others, robot])
+    assert not any(held.is_complete for held in flight.team._plans.values())
+    flight.fly(windows_before(13, 8) - 35)
+    assert np.all(flight.swarm.buffers.is_known)
+    assert_flies_as_planned(flight, 2)
+
+
+def test_a_robot_lost_late_is_sought_and_found_again():
+    """Robot 2 takes no part for 60 windows: in the end all are fresh to all, and fly one plan."""
+    flight = Flight(SMALL, 2, channel=cut_off(SMALL, 2, range(40, 100)))
+    order, _ = common_orders(2, SMALL)
+    flight.fly(95)
+    assert not held_plan(flight)  # the lost one knows better
+    lacks = [bool(held.is_fresh[2]) for held in flight.team._plans.values()]
+    assert lacks.count(False) >= 1
+    turn = 95 // discovery.SEEK_EVERY
+    for window in range(95, 100):
+        calls, _ = flight.fly(1)
+        if window % discovery.SEEK_EVERY == 0:
+            assert np.flatnonzero(calls).tolist() == [order[turn % 6]]
+    flight.fly(80)
+    assert np.all(held_plan(flight).is_fresh)
+
+
+def test_who_misses_the_best_picture_flies_by_the_best_it_has():
+    """A robot that is deaf since the discovery plans by its own picture, which is another one than
+    its teammates', and speaks when that says so."""
+    mission = paper("random-walk", num_robots=8)
+    deaf, since = 6, epoch_starts(8)[1]
+    channel = cut_off(mission, deaf, range(since, 200), is_mute=False)
+    flight = Witnessed(mission, 2, channel=channel)
+    flight.fly(windows_before(3, 8))
+    num_sent = 0
+    for _ in range(windows_before(5, 8) - windows_before(3, 8)):
+        num_sent += flight.fly(1)[:, deaf].sum()
+        holds = [mind.current.goodness[2] for mind in flight.minds]
+        assert [i for i in range(8) if holds[i] == deaf] == [deaf]
+    assert num_sent >= 3
+
+
+@pytest.mark.parametrize("num_robots", [2, 5])
+def test_robots_that_never_met_do_not_fall_silent(num_robots):
+    """Round after round everyone calls in its turn; later all call in order, now and then."""
+    mission = paper("stationary", num_robots=num_robots)
+    flight = Flight(mission, 7, channel=to_nobody)
+    order, rounds = common_orders(7, mission)
+    turns = [group for groups in rounds for group in groups]
+    late = int(discovery.SEEK_AFTER * num_robots)
+    for h, spoke in enumerate(flight.fly(late)):
+        assert np.flatnonzero(spoke).tolist() == sorted(turns[h % len(turns)])
+    for window in range(late, late + 2 * num_robots * discovery.SEEK_EVERY):
+        turn, is_between = divmod(window, discovery.SEEK_EVERY)
+        first, second = (np.flatnonzero(row).tolist() for row in flight.fly(1))
+        assert first == ([] if is_between else [order[turn % num_robots]])
+        assert second == []
+
+
+def test_a_mission_does_not_depend_on_its_neighbours():
+    mission = paper("random-walk", num_robots=8)
+    three, alone = Swarm(mission, [5, 6, 7]), Swarm(mission, [6])
+    together, apart = make_policy("planner", mission), make_policy("planner", mission)
+    for _ in range(45):
+        three.step(together)
+        alone.step(apart)
+        for ours, its in zip(three.phases, alone.phases, strict=True):
+            np.testing.assert_array_equal(ours.recipient[1:2], its.recipient)
+
+
+def test_a_new_start_forgets_and_the_same_seed_is_the_same_mission():
+    mission = paper("random-walk", num_robots=8, num_windows=45)
+    policy, flights = make_policy("planner", mission), []
+    for seed in (3, 4, 3):
+        swarm = Swarm(mission, [seed])
+        age = [flown.costs.age_windows[0] for flown in fly(swarm, policy)]
+        flights.append((age, swarm.buffers.timestamp.tolist()))
+    assert flights[0] == flights[2]
+    assert flights[0] != flights[1]
+
+
+@pytest.mark.usefixtures("near_sighted")
+def test_eq10_robots_switched_off_do_not_break_it():
+    """Half-way 8 of 40 fall silent, and nobody is told: the others stay younger than by TDMA."""
+    mission = paper("stationary", num_robots=40, num_windows=240, switched_off=0.2)
+    age = {}
+    for name in ("planner", "tdma"):
+        flights = fly(Swarm(mission, [0, 1]), make_policy(name, mission))
+        age[name] = np.array([flown.costs.age_windows for flown in flights])
+    assert np.all(np.isfinite(age["planner"]))
+    assert np.all(np.mean(age["planner"][120:], axis=0) < np.mean(age["tdma"][120:], axis=0))
+
+
+def test_a_team_that_begins_late_counts_its_epochs_from_there():
+    """Another policy flew first: the planner discovers and plans as if the mission began now."""
+    mission = paper("stationary", num_robots=5)
+    swarm = Swarm(mission, [1])
+    tdma, planner = make_policy("tdma", mission), make_policy("planner", mission)
+    for _ in range(60):
+        swarm.step(tdma)
+    ages = [float(swarm.step(planner).age_windows[0]) for _ in range(60)]
+    assert max(ages[-10:]) < 6.0

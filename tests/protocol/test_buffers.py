@@ -1,0 +1,223 @@
+"""The buffers against plain loops over receivers i, senders j and subjects k, and hand examples."""
+
+import copy
+from dataclasses import fields, replace
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarm_mj.protocol.buffers import (
+    NEVER,
+    NO_PARENT,
+    Buffers,
+    empty_buffers,
+    merge,
+    observe_self,
+    record_attempt,
+)
+
+seeds = st.integers(0, 2**32 - 1)
+sizes = st.integers(1, 6)
+NAMES = [spec.name for spec in fields(Buffers)]
+
+
+def some_buffers(rng, num_missions, num_robots):
+    """Arbitrary contents; few different times, so that many are equally old."""
+    shape = (num_missions, num_robots, num_robots)
+    return Buffers(
+        timestamp=rng.integers(0, 5, shape) / 2.0,
+        position_m=rng.normal(size=(*shape, 2)),
+        velocity_mps=rng.normal(size=(*shape, 2)),
+        parent=rng.integers(-1, num_robots, shape).astype(np.int32),
+        last_attempt=rng.integers(0, 5, shape) / 2.0,
+    )
+
+
+def some_heard(rng, num_missions, num_robots):
+    """Anybody decodes anybody, so many senders decode a packet themselves; half hear nobody."""
+    shape = (num_missions, num_robots)
+    deaf = rng.random(shape) < 0.5
+    return np.where(deaf, np.arange(num_robots), rng.integers(0, num_robots, shape))
+
+
+def case(seed, num_missions, num_robots):
+    rng = np.random.default_rng(seed)
+    buffers = some_buffers(rng, num_missions, num_robots)
+    return rng, buffers, some_heard(rng, num_missions, num_robots)
+
+
+def same(a, b, names=NAMES):
+    return all((getattr(a, name) == getattr(b, name)).all() for name in names)
+
+
+def merged_by_loops(before, heard):
+    """Eq. 8 and the parent rule of II-B, one receiver i, its sender j and one subject k a time."""
+    after = copy.deepcopy(before)
+    for b, row in enumerate(heard.tolist()):
+        for i, j in enumerate(row):
+            for k in range(len(row)):
+                if i != j and before.timestamp[b, i, k] < before.timestamp[b, j, k]:
+                    after.timestamp[b, i, k] = before.timestamp[b, j, k]
+                    after.position_m[b, i, k] = before.position_m[b, j, k]
+                    after.velocity_mps[b, i, k] = before.velocity_mps[b, j, k]
+                    after.parent[b, i, k] = before.parent[b, j, k]
+                    if j == k:  # straight from its subject
+                        after.parent[b, i, k] = i
+    return after
+
+
+def renamed(buffers, old_name):
+    """The same knowledge after robot old_name[n] is called n."""
+    new_name = np.argsort(old_name)
+    values = {name: getattr(buffers, name)[:, old_name][:, :, old_name] for name in NAMES}
+    parent = values["parent"]
+    values["parent"] = np.where(parent == NO_PARENT, NO_PARENT, new_name[parent])
+    return Buffers(**values)
+
+
+def test_empty_buffers_know_nothing():
+    buffers = empty_buffers(2, 3)
+    assert buffers.timestamp.shape == buffers.parent.shape == (2, 3, 3)
+    assert buffers.position_m.shape == buffers.velocity_mps.shape == (2, 3, 3, 2)
+    assert not buffers.is_known.any()
+    assert (buffers.timestamp == 0.0).all()
+    assert (buffers.last_attempt == 0.0).all()
+    assert (buffers.parent == -1).all()
+    assert not buffers.position_m.any()
+    assert not buffers.velocity_mps.any()
+
+
+def test_known_is_after_the_start():
+    buffers = replace(empty_buffers(1, 2), timestamp=np.array([[[0.5, 0.0], [3.0, 7.5]]]))
+    assert buffers.is_known.tolist() == [[[True, False], [True, True]]]
+
+
+@given(seed=seeds, num_missions=st.integers(1, 3), num_robots=sizes)
+@settings(max_examples=50, deadline=None)
+def test_eq5_robots_observe_themselves_and_only_themselves(seed, num_missions, num_robots):
+    rng, buffers, _ = case(seed, num_missions, num_robots)
+    before = copy.deepcopy(buffers)
+    position_m, velocity_mps = rng.normal(size=(2, num_missions, num_robots, 2))
+    now = rng.integers(5, 9, num_missions) / 2.0
+    observe_self(buffers, position_m, velocity_mps, now)
+    for b in range(num_missions):
+        for i in range(num_robots):
+            before.timestamp[b, i, i] = now[b]
+            before.position_m[b, i, i] = position_m[b, i]
+            before.velocity_mps[b, i, i] = velocity_mps[b, i]
+    assert same(buffers, before)
+
+
+@given(seed=seeds, num_missions=st.integers(1, 3), num_robots=sizes)
+@settings(max_examples=50, deadline=None)
+def test_eq7_attempts_are_noted_for_the_recipient_alone(seed, num_missions, num_robots):
+    rng, buffers, _ = case(seed, num_missions, num_robots)
+    before = copy.deepcopy(buffers)
+    recipient = some_heard(rng, num_missions, num_robots)
+    now = rng.integers(5, 9, num_missions) / 2.0
+    record_attempt(buffers, recipient, now)
+    for b in range(num_missions):
+        for i, j in enumerate(recipient[b]):
+            if j != i:
+                before.last_attempt[b, i, j] = now[b]
+    assert same(buffers, before)
+
+
+def test_eq7_silence_is_an_attempt_only_in_the_code():
+    recipient, now = np.array([[1, 1, 2]]), np.array([2.5])
+    text, code = empty_buffers(1, 3), empty_buffers(1, 3)
+    record_attempt(text, recipient, now)
+    record_attempt(code, recipient, now, silence_is_attempt=True)
+    assert text.last_attempt[0].tolist() == [[0, 2.5, 0], [0, 0, 0], [0, 0, 0]]
+    assert code.last_attempt[0].tolist() == [[0, 2.5, 0], [0, 2.5, 0], [0, 0, 2.5]]
+
+
+@given(seed=seeds, num_missions=st.integers(1, 3), num_robots=sizes)
+@settings(max_examples=200, deadline=None)
+def test_eq8_merges_as_by_loops(seed, num_missions, num_robots):
+    _, buffers, heard = case(seed, num_missions, num_robots)
+    expected = merged_by_loops(buffers, heard)
+    merge(buffers, heard)
+    assert same(buffers, expected)
+
+
+def test_eq8_only_strictly_newer_news_is_taken():
+    # Robot 0 hears robot 1, whose news of robots 2, 3 and 4 is newer, as old, and older.
+    buffers = empty_buffers(1, 5)
+    buffers.timestamp[0, 0, 2:] = [1.0, 2.0, 3.0]
+    buffers.timestamp[0, 1, 2:] = [2.0, 2.0, 2.0]
+    buffers.position_m[0, 1, 2:] = 7.0
+    buffers.velocity_mps[0, 1, 2:] = 8.0
+    buffers.parent[0, 0, 2:] = 0
+    buffers.parent[0, 1, 2:] = 1
+    merge(buffers, np.array([[1, 1, 2, 3, 4]]))
+    assert buffers.timestamp[0, 0].tolist() == [0.0, 0.0, 2.0, 2.0, 3.0]
+    assert buffers.position_m[0, 0, 2:].tolist() == [[7.0, 7.0], [0.0, 0.0], [0.0, 0.0]]
+    assert buffers.velocity_mps[0, 0, 2:].tolist() == [[8.0, 8.0], [0.0, 0.0], [0.0, 0.0]]
+    assert buffers.parent[0, 0].tolist() == [-1, -1, 1, 0, 0]
+
+
+def test_the_parent_is_the_first_robot_the_news_was_passed_to():
+    # Robot 2 tells 1, and then 1 tells 0: robot 2 first passed its news to 1, and 1 its own to 0.
+    buffers = empty_buffers(1, 3)
+    nothing = np.zeros((1, 3, 2))
+    for half, heard in [(1, [0, 2, 2]), (2, [1, 1, 2])]:
+        observe_self(buffers, nothing, nothing, np.array([half / 2]))
+        merge(buffers, np.array([heard]))
+    assert buffers.timestamp[0].tolist() == [[1.0, 1.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]]
+    assert buffers.parent[0].tolist() == [[-1, 0, 1], [-1, -1, 1], [-1, -1, -1]]
+
+
+def test_packets_are_older_than_the_phase_that_carries_them():
+    # 0 hears 1 while 1 hears 2 and 2 hears 3: each gets its neighbour's news and no more.
+    buffers = empty_buffers(1, 4)
+    nothing = np.zeros((1, 4, 2))
+    observe_self(buffers, nothing, nothing, np.array([1.0]))
+    merge(buffers, np.array([[1, 2, 3, 3]]))
+    assert buffers.is_known[0].astype(int).tolist() == [
+        [1, 1, 0, 0],
+        [0, 1, 1, 0],
+        [0, 0, 1, 1],
+        [0, 0, 0, 1],
+    ]
+
+
+@given(seed=seeds, num_robots=sizes)
+@settings(max_examples=50, deadline=None)
+def test_knowledge_changes_only_by_packets_and_never_gets_older(seed, num_robots):
+    _, buffers, heard = case(seed, 2, num_robots)
+    before = copy.deepcopy(buffers)
+    merge(buffers, heard)
+    deaf = heard == np.arange(num_robots)
+    for name in NAMES:
+        assert (getattr(buffers, name)[deaf] == getattr(before, name)[deaf]).all()
+    assert (buffers.timestamp >= before.timestamp).all()
+    assert (buffers.last_attempt == before.last_attempt).all()  # L is never shared
+
+
+@given(seed=seeds, num_robots=sizes)
+@settings(max_examples=50, deadline=None)
+def test_renaming_the_robots_renames_what_they_know(seed, num_robots):
+    rng, buffers, heard = case(seed, 2, num_robots)
+    old_name = rng.permutation(num_robots)
+    mirror = renamed(buffers, old_name)
+    merge(mirror, np.argsort(old_name)[heard[:, old_name]])
+    merge(buffers, heard)
+    assert same(mirror, renamed(buffers, old_name))
+
+
+@given(seed=seeds, num_robots=sizes)
+@settings(max_examples=50, deadline=None)
+def test_missions_side_by_side_do_not_mix(seed, num_robots):
+    _, buffers, heard = case(seed, 3, num_robots)
+    rows = [Buffers(**{n: getattr(buffers, n)[[b]].copy() for n in NAMES}) for b in range(3)]
+    merge(buffers, heard)
+    for b, row in enumerate(rows):
+        merge(row, heard[[b]])
+        assert all((getattr(buffers, n)[[b]] == getattr(row, n)).all() for n in NAMES)
+
+
+def test_never_is_before_the_first_tick():
+    assert NEVER == 0.0 < 0.5
+    assert NO_PARENT == -1

@@ -1,0 +1,270 @@
+"""The costs against hand arithmetic, numpy, and loops over packets and parents."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from channels import to_the_addressee
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.protocol.costs import (
+    age_of_information,
+    count_packets,
+    mean_hops,
+    velocity_variance,
+    window_costs,
+)
+from swarm_mj.protocol.window import Phase, window
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def some_on(rng, num_missions, num_robots):
+    """Who is on: at least one in each mission, not as many in each."""
+    is_on = rng.random((num_missions, num_robots)) < 0.6
+    is_on[np.arange(num_missions), rng.integers(0, num_robots, num_missions)] = True
+    return is_on
+
+
+def times(timestamp):
+    timestamp = np.array(timestamp, dtype=float)
+    return replace(empty_buffers(*timestamp.shape[:2]), timestamp=timestamp)
+
+
+def some_phase(rng, num_missions, num_robots):
+    """Who addressed whom, and whose packet everyone decoded: some sender's, or nobody's."""
+    shape = (num_missions, num_robots)
+    oneself = np.broadcast_to(np.arange(num_robots), shape)
+    recipient = np.where(rng.random(shape) < 0.4, oneself, rng.integers(0, num_robots, shape))
+    heard = oneself.copy()
+    for b, row in enumerate(recipient):
+        senders = [i for i in range(num_robots) if row[i] != i]
+        for j in range(num_robots):
+            others = [i for i in senders if i != j]
+            if others and rng.random() < 0.7:
+                heard[b, j] = rng.choice(others)
+    return Phase(recipient=recipient, heard=heard)
+
+
+def fates(phase, b):
+    """(sent, arrived, overheard) of one phase of mission b, packet by packet."""
+    recipient, heard = phase.recipient[b].tolist(), phase.heard[b].tolist()
+    sent = arrived = overheard = 0
+    for i, addressee in enumerate(recipient):
+        if addressee == i:
+            continue
+        sent += 1
+        for j, sender in enumerate(heard):
+            if j != i and sender == i:
+                arrived += j == addressee
+                overheard += j != addressee
+    return sent, arrived, overheard
+
+
+def some_trees(rng, num_missions, num_robots):
+    """Buffers in which every robot knows some teammates over a random tree."""
+    buffers = empty_buffers(num_missions, num_robots)
+    for b in range(num_missions):
+        for i in range(num_robots):
+            known = [i]
+            buffers.timestamp[b, i, i] = 1.0
+            others = [j for j in rng.permutation(num_robots) if j != i]
+            for j in others[: rng.integers(0, num_robots)]:
+                buffers.parent[b, i, j] = rng.choice(known)
+                buffers.timestamp[b, i, j] = 0.5
+                known.append(j)
+    return buffers
+
+
+def depth(parent, i, j):
+    """Steps from j up to i."""
+    return 0 if j == i else 1 + depth(parent, i, parent[j])
+
+
+def test_eq10_by_hand():
+    # At t = 4 the ages are 0, 1, 2.5 and 0, whose mean is 3.5 / 4; at t = 6 they are 2 more.
+    buffers = times([[[4.0, 3.0], [1.5, 4.0]]] * 2)
+    age, is_complete = age_of_information(buffers, np.array([4.0, 6.0]))
+    assert age.tolist() == [0.875, 2.875]
+    assert is_complete.tolist() == [True, True]
+
+
+def test_eq10_the_unknown_are_as_old_as_the_mission():
+    age, is_complete = age_of_information(times([[[8.0, 0.0], [0.0, 8.0]]]), np.array([8.0]))
+    assert age.tolist() == [4.0]
+    assert is_complete.tolist() == [False]
+
+
+@given(seed=seeds, num_missions=st.integers(1, 4), num_robots=st.integers(1, 9))
+@settings(max_examples=50, deadline=None)
+def test_eq10_as_numpy_takes_means(seed, num_missions, num_robots):
+    rng = np.random.default_rng(seed)
+    timestamp = rng.integers(0, 40, (num_missions, num_robots, num_robots)) / 2.0
+    now = rng.integers(20, 30, num_missions).astype(float)
+    age, is_complete = age_of_information(times(timestamp), now)
+    assert age == pytest.approx((now[:, None, None] - timestamp).mean(axis=(1, 2)))
+    assert (is_complete == (timestamp.min(axis=(1, 2)) > 0)).all()
+
+
+@given(seed=seeds, num_missions=st.integers(1, 4), num_robots=st.integers(1, 9))
+@settings(max_examples=50, deadline=None)
+def test_eq10_eq17_of_those_that_are_on_by_plain_loops(seed, num_missions, num_robots):
+    rng = np.random.default_rng(seed)
+    timestamp = rng.integers(0, 40, (num_missions, num_robots, num_robots)) / 2.0
+    now = rng.integers(20, 30, num_missions).astype(float)
+    velocity = rng.normal(size=(num_missions, num_robots, 2))
+    is_on = some_on(rng, num_missions, num_robots)
+    age, is_complete = age_of_information(times(timestamp), now, is_on)
+    variance = velocity_variance(velocity, is_on)
+    for b in range(num_missions):
+        on = [i for i in range(num_robots) if is_on[b, i]]
+        known = [timestamp[b, i, j] for i in on for j in on]
+        assert age[b] == pytest.approx(sum(now[b] - t for t in known) / len(known))
+        assert is_complete[b] == all(t > 0 for t in known)
+        mean = sum(velocity[b, i] for i in on) / len(on)
+        squares = [np.sum((velocity[b, i] - mean) ** 2) for i in on]
+        assert variance[b] == pytest.approx(sum(squares) / len(on), abs=1e-12)
+
+
+@given(seed=seeds, num_missions=st.integers(1, 4), num_robots=st.integers(1, 9))
+@settings(max_examples=50, deadline=None)
+def test_with_everyone_on_costs_are_the_same_bit_for_bit(seed, num_missions, num_robots):
+    rng = np.random.default_rng(seed)
+    buffers, now = some_trees(rng, num_missions, num_robots), rng.integers(1, 9, num_missions) / 2.0
+    position_m, velocity_mps = rng.normal(size=(2, num_missions, num_robots, 2))
+    bodies = RobotStates(position_m=position_m, velocity_mps=velocity_mps)
+    phases = some_phase(rng, num_missions, num_robots), some_phase(rng, num_missions, num_robots)
+    everyone = np.ones((num_missions, num_robots), dtype=bool)
+    some, all_ = (
+        window_costs(buffers, bodies, phases, now, has_response=True, is_on=is_on)
+        for is_on in (everyone, None)
+    )
+    assert some.age_windows.tolist() == all_.age_windows.tolist()
+    assert some.is_complete.tolist() == all_.is_complete.tolist()
+    assert some.velocity_variance_m2ps2.tolist() == all_.velocity_variance_m2ps2.tolist()
+    assert mean_hops(buffers, everyone).tolist() == mean_hops(buffers).tolist()
+
+
+def test_everyone_knows_everyone_first_in_the_third_window():
+    # 1 asks 0 and both know each other; 2 asks 1 and learns all; 0 asks 1 and learns of 2.
+    buffers, nothing = empty_buffers(1, 3), np.zeros((1, 3, 2))
+    bodies = RobotStates(position_m=nothing, velocity_mps=nothing)
+    completeness, ages = [], []
+    for t, recipient in enumerate([[0, 0, 2], [0, 1, 1], [1, 1, 2]]):
+        now = np.array([float(t)])
+        phases = window(buffers, bodies, np.array([recipient]), to_the_addressee, now)
+        costs = window_costs(buffers, bodies, phases, now + 1, has_response=True)
+        completeness.append(costs.is_complete.item())
+        ages.append(costs.age_windows.item())
+    assert completeness == [False, False, True]
+    # After the first: 0 has 1 since 0.5 and not 2, 1 has 0 since 1, 2 has nobody: T sums to 4.5.
+    # After the second: own 6; 0: 0.5; 1: 1 and 1.5; 2: 1 and 2: 12.
+    # After the third: own 9; 0: 3 and 1.5; 1: 2.5 and 1.5; 2: 1 and 2: 20.5.
+    assert ages == pytest.approx([1 - 4.5 / 9, 2 - 12 / 9, 3 - 20.5 / 9])
+
+
+def test_eq17_by_hand():
+    # Mean velocity (2, 1); squared distances from it 2, 2, 0 and 0.
+    velocity = np.array([[[3.0, 2.0], [1.0, 0.0], [2.0, 1.0], [2.0, 1.0]]])
+    assert velocity_variance(velocity).tolist() == [1.0]
+    # One axis still, the other ±3: 9.
+    assert velocity_variance(np.array([[[3.0, 5.0], [-3.0, 5.0]]])).tolist() == [9.0]
+
+
+@given(seed=seeds, num_missions=st.integers(1, 4), num_robots=st.integers(1, 9))
+@settings(max_examples=50, deadline=None)
+def test_eq17_as_numpy_takes_variances(seed, num_missions, num_robots):
+    rng = np.random.default_rng(seed)
+    velocity = rng.normal(scale=3.0, size=(num_missions, num_robots, 2))
+    variance = velocity_variance(velocity)
+    assert variance == pytest.approx(velocity.var(axis=1).sum(axis=-1))
+    # A common velocity changes nothing; units go in squared.
+    assert velocity_variance(velocity + 7.0) == pytest.approx(variance)
+    assert velocity_variance(3.6 * velocity) == pytest.approx(3.6**2 * variance)
+
+
+def test_packets_by_hand():
+    # 0 asks 1, which decodes it, as does 2; 3 asks 4 in vain. Then 1 answers 0, and 4 overhears.
+    first = Phase(recipient=np.array([[1, 1, 2, 4, 4]]), heard=np.array([[0, 0, 0, 3, 4]]))
+    second = Phase(recipient=np.array([[0, 0, 2, 3, 4]]), heard=np.array([[1, 1, 2, 3, 1]]))
+    packets = count_packets((first, second), has_response=True)
+    assert (packets.attempted.item(), packets.delivered.item(), packets.lost.item()) == (2, 1, 1)
+    assert (packets.overheard.item(), packets.answered.item()) == (2, 1)
+    # The same phases as two transmissions of flooding: three packets, two delivered.
+    packets = count_packets((first, second), has_response=False)
+    assert (packets.attempted.item(), packets.delivered.item(), packets.lost.item()) == (3, 2, 1)
+    assert (packets.overheard.item(), packets.answered.item()) == (2, 0)
+
+
+@given(seed=seeds, num_missions=st.integers(1, 4), num_robots=st.integers(1, 8))
+@settings(max_examples=100, deadline=None)
+def test_packets_as_by_loops(seed, num_missions, num_robots):
+    rng = np.random.default_rng(seed)
+    first, second = (some_phase(rng, num_missions, num_robots) for _ in range(2))
+    asked = count_packets((first, second), has_response=True)
+    flooded = count_packets((first, second), has_response=False)
+    for b in range(num_missions):
+        sent, arrived, overheard = fates(first, b)
+        sent2, arrived2, overheard2 = fates(second, b)
+        assert (asked.attempted[b], asked.delivered[b], asked.answered[b]) == (
+            sent,
+            arrived,
+            arrived2,
+        )
+        assert (flooded.attempted[b], flooded.delivered[b], flooded.answered[b]) == (
+            sent + sent2,
+            arrived + arrived2,
+            0,
+        )
+        assert asked.overheard[b] == flooded.overheard[b] == overheard + overheard2
+        assert asked.attempted[b] == asked.delivered[b] + asked.lost[b]
+        assert flooded.attempted[b] == flooded.delivered[b] + flooded.lost[b]
+
+
+def test_fig1_robot_0_is_one_and_a_half_hops_from_its_team():
+    # Fig. 1: 1 and 3 point at 0, 2 and 4 point at 3; the others know nobody here.
+    buffers = empty_buffers(1, 5)
+    buffers.timestamp[0, 0] = [4, 2, 2, 4, 3]
+    buffers.parent[0, 0] = [-1, 0, 3, 0, 3]
+    assert mean_hops(buffers).tolist() == [(1 + 2 + 1 + 2) / 4]
+
+
+def test_hops_are_none_before_anyone_is_known():
+    assert mean_hops(empty_buffers(2, 3)).tolist() == [0.0, 0.0]
+
+
+@given(seed=seeds, num_missions=st.integers(1, 3), num_robots=st.integers(1, 8))
+@settings(max_examples=100, deadline=None)
+def test_hops_as_by_walking_up_the_tree(seed, num_missions, num_robots):
+    buffers = some_trees(np.random.default_rng(seed), num_missions, num_robots)
+    everyone = np.ones((num_missions, num_robots), dtype=bool)
+    for is_on in (None, some_on(np.random.default_rng(seed), num_missions, num_robots)):
+        hops, counts = mean_hops(buffers, is_on), everyone if is_on is None else is_on
+        for b in range(num_missions):
+            depths = [
+                depth(buffers.parent[b, i], i, j)  # over anyone
+                for i in range(num_robots)
+                for j in range(num_robots)
+                if buffers.timestamp[b, i, j] > 0 and j != i and counts[b, i] and counts[b, j]
+            ]
+            assert hops[b] == pytest.approx(sum(depths) / len(depths) if depths else 0.0)
+
+
+def test_a_windows_costs_are_each_of_them():
+    rng = np.random.default_rng(0)
+    buffers, now = some_trees(rng, 3, 5), np.array([1.0, 2.0, 7.0])
+    position_m, velocity_mps = rng.normal(size=(2, 3, 5, 2))
+    bodies = RobotStates(position_m=position_m, velocity_mps=velocity_mps)
+    phases = some_phase(rng, 3, 5), some_phase(rng, 3, 5)
+    for has_response in (True, False):
+        costs = window_costs(buffers, bodies, phases, now, has_response=has_response)
+        age, is_complete = age_of_information(buffers, now)
+        packets = count_packets(phases, has_response=has_response)
+        assert (costs.age_windows == age).all()
+        assert (costs.is_complete == is_complete).all()
+        assert (costs.velocity_variance_m2ps2 == velocity_variance(bodies.velocity_mps)).all()
+        assert (costs.packets.attempted == packets.attempted).all()
+        assert (costs.packets.answered == packets.answered).all()

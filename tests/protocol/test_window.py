@@ -1,0 +1,297 @@
+"""The protocol against Fig. 1, hand examples, and Alg. 1 played with dictionaries."""
+
+import copy
+import runpy
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from channels import to_nobody, to_the_addressee, unreliable
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.protocol import buffers
+from swarm_mj.protocol.buffers import empty_buffers, merge, observe_self, record_attempt
+from swarm_mj.protocol.window import Phase, respondents, transmit, window
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def at(position_m, velocity_mps):
+    return RobotStates(position_m=position_m, velocity_mps=velocity_mps)
+
+
+def standing(num_robots, num_missions=1):
+    nothing = np.zeros((num_missions, num_robots, 2))
+    return at(nothing, nothing)
+
+
+def some_mission(seed, num_windows, num_robots, num_missions):
+    """RobotStates and recipients of every window; about half the robots stay silent."""
+    rng = np.random.default_rng(seed)
+    bodies, recipients = [], []
+    for _ in range(num_windows):
+        bodies.append(at(*rng.normal(size=(2, num_missions, num_robots, 2))))
+        anybody = rng.integers(0, num_robots, (num_missions, num_robots))
+        silent = rng.random((num_missions, num_robots)) < 0.5
+        recipients.append(np.where(silent, np.arange(num_robots), anybody))
+    return bodies, recipients
+
+
+def play(num_windows, num_robots, num_missions, seed, *, senders_listen):
+    """Runs windows; yields the buffers before and after, the phases, and the start of each."""
+    bodies, recipients = some_mission(seed, num_windows, num_robots, num_missions)
+    channel = unreliable(seed, senders_listen=senders_listen)
+    buffers = empty_buffers(num_missions, num_robots)
+    now = np.zeros(num_missions)
+    for body, recipient in zip(bodies, recipients, strict=True):
+        before = copy.deepcopy(buffers)
+        phases = window(buffers, body, recipient, channel, now)
+        yield SimpleNamespace(before=before, after=buffers, phases=phases, now=now)
+        now = now + 1
+
+
+class Robot:
+    """One robot of Alg. 1, its tables as dictionaries: T, M, P and L of Fig. 1."""
+
+    def __init__(self, name):
+        self.name = name
+        self.news = {}  # of whom -> (T, M, P)
+        self.last_attempt = {}
+
+    def observe(self, state, t):
+        self.news[self.name] = (t, state, None)
+
+    def take(self, sender_name, packet):
+        for k, (t, state, parent) in packet.items():
+            if k not in self.news or self.news[k][0] < t:
+                self.news[k] = (t, state, self.name if k == sender_name else parent)
+
+
+def speak(robots, addressed, heard):
+    """All packets are written, then everyone reads the one it decoded."""
+    packets = {i: dict(robots[i].news) for i in addressed}
+    for j, i in heard.items():
+        robots[j].take(i, packets[i])
+
+
+def alg1(robots, states, addressed, channel, t):
+    """One communication window, after the listing of Alg. 1 with Δt of half a window."""
+    t += 0.5
+    for robot in robots:
+        robot.observe(states[robot.name], t)
+    for i, j in addressed.items():
+        robots[i].last_attempt[j] = t
+    heard = channel(addressed)
+    speak(robots, addressed, heard)
+    t += 0.5
+    for robot in robots:
+        robot.observe(states[robot.name], t)
+    answers = {j: i for j, i in heard.items() if addressed[i] == j}
+    speak(robots, answers, channel(answers))
+    return answers
+
+
+def as_dict_channel(channel, num_robots):
+    """The same channel for {sender: recipient}, returning {receiver: sender}."""
+
+    def dict_channel(addressed):
+        recipient = np.array([[addressed.get(i, i) for i in range(num_robots)]])
+        heard = channel(None, recipient)[0].tolist()
+        return {j: i for j, i in enumerate(heard) if i != j}
+
+    return dict_channel
+
+
+def assert_same_knowledge(robots, buffers):
+    for i, robot in enumerate(robots):
+        for k in range(len(robots)):
+            t, state, parent = robot.news.get(k, (0.0, (0.0, 0.0, 0.0, 0.0), None))
+            assert buffers.timestamp[0, i, k] == t
+            assert (*buffers.position_m[0, i, k], *buffers.velocity_mps[0, i, k]) == state
+            assert buffers.parent[0, i, k] == (-1 if parent is None else parent)
+            assert buffers.last_attempt[0, i, k] == robot.last_attempt.get(k, 0.0)
+
+
+def test_fig1_four_rounds_give_robot_0_the_papers_table():
+    rounds = [{0: 4, 2: 1}, {1: 0, 2: 3}, {0: 1, 4: 3}, {3: 0}]
+    buffers, bodies = empty_buffers(1, 5), standing(5)
+    for t, packets in enumerate(rounds, start=1):
+        now = np.array([float(t)])
+        recipient = np.array([[packets.get(i, i) for i in range(5)]])
+        observe_self(buffers, bodies.position_m, bodies.velocity_mps, now)
+        record_attempt(buffers, recipient, now)
+        merge(buffers, to_the_addressee(None, recipient))
+    assert buffers.timestamp[0, 0].tolist() == [4, 2, 2, 4, 3]
+    assert buffers.parent[0, 0].tolist() == [-1, 0, 3, 0, 3]
+    assert buffers.last_attempt[0, 0].tolist() == [0, 3, 0, 0, 1]
+
+
+@given(seed=seeds, num_robots=st.integers(2, 6), senders_listen=st.booleans())
+@settings(max_examples=100, deadline=None)
+def test_alg1_windows_as_played_with_dictionaries(seed, num_robots, senders_listen):
+    num_windows = 8
+    bodies, recipients = some_mission(seed, num_windows, num_robots, 1)
+    channel = unreliable(seed, senders_listen=senders_listen)
+    twin = as_dict_channel(unreliable(seed, senders_listen=senders_listen), num_robots)
+    buffers, robots = empty_buffers(1, num_robots), [Robot(i) for i in range(num_robots)]
+    for t in range(num_windows):
+        body, recipient = bodies[t], recipients[t]
+        _, response = window(buffers, body, recipient, channel, np.array([float(t)]))
+        states = np.concatenate([body.position_m[0], body.velocity_mps[0]], axis=1).tolist()
+        states = dict(enumerate(map(tuple, states)))
+        addressed = {i: j for i, j in enumerate(recipient[0].tolist()) if i != j}
+        answers = alg1(robots, states, addressed, twin, float(t))
+        assert response.recipient[0].tolist() == [answers.get(j, j) for j in range(num_robots)]
+        assert_same_knowledge(robots, buffers)
+
+
+@given(seed=seeds, senders_listen=st.booleans())
+@settings(max_examples=30, deadline=None)
+def test_alg1_only_addressed_recipients_respond(seed, senders_listen):
+    for step in play(10, 5, 2, seed, senders_listen=senders_listen):
+        first, second = step.phases
+        for b in range(2):
+            for j in range(5):
+                sender = first.heard[b, j]
+                was_asked = sender != j and first.recipient[b, sender] == j
+                assert second.recipient[b, j] == (sender if was_asked else j)
+
+
+def test_alg1_respondents_by_hand():
+    # 0 asks 1; 2 overhears it and stays silent; 3 asks 4, which decodes nothing; 5 is alone.
+    phase = Phase(recipient=np.array([[1, 1, 2, 4, 4, 5]]), heard=np.array([[0, 0, 0, 3, 4, 5]]))
+    assert respondents(phase).tolist() == [[0, 0, 2, 3, 4, 5]]
+
+
+def test_alg1_a_window_by_hand():
+    # 0 asks 1, which answers: half a window apart, both times with the sender's own time.
+    buffers = empty_buffers(1, 3)
+    window(buffers, standing(3), np.array([[1, 1, 2]]), to_the_addressee, np.array([6.0]))
+    assert buffers.timestamp[0].tolist() == [[7.0, 7.0, 0.0], [6.5, 7.0, 0.0], [0.0, 0.0, 7.0]]
+    assert buffers.parent[0].tolist() == [[-1, 0, -1], [1, -1, -1], [-1, -1, -1]]
+    assert buffers.last_attempt[0].tolist() == [[0.0, 6.5, 0.0], [0.0] * 3, [0.0] * 3]
+
+
+def test_alg1_silence_counts_as_attempt_when_told_so():
+    buffers = empty_buffers(1, 2)
+    recipient, now = np.array([[1, 1]]), np.array([0.0])
+    window(buffers, standing(2), recipient, to_nobody, now, silence_is_attempt=True)
+    assert buffers.last_attempt[0].tolist() == [[0.0, 0.5], [0.0, 0.5]]
+    transmit(buffers, standing(2), recipient, to_nobody, now + 3, silence_is_attempt=True)
+    assert buffers.last_attempt[0].tolist() == [[0.0, 3.0], [0.0, 3.0]]
+
+
+def test_flooding_transmits_twice_and_nobody_answers():
+    # Both halves of a window: 0 tells 1, then 1 passes it on to 2.
+    buffers = empty_buffers(1, 3)
+    for half, recipient in [(0.5, [1, 1, 2]), (1.0, [0, 2, 2])]:
+        phase = transmit(
+            buffers, standing(3), np.array([recipient]), to_the_addressee, np.array([half])
+        )
+        assert phase.recipient.tolist() == [recipient]
+    assert phase.heard.tolist() == [[0, 1, 1]]
+    assert buffers.timestamp[0].tolist() == [[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.5, 1.0, 1.0]]
+    assert buffers.parent[0].tolist() == [[-1, -1, -1], [1, -1, -1], [1, 2, -1]]
+    assert buffers.last_attempt[0].tolist() == [[0.0, 0.5, 0.0], [0.0, 0.0, 1.0], [0.0] * 3]
+
+
+@given(seed=seeds, senders_listen=st.booleans())
+@settings(max_examples=30, deadline=None)
+def test_the_clock_moves_by_halves_and_nothing_is_from_the_future(seed, senders_listen):
+    for step in play(10, 5, 2, seed, senders_listen=senders_listen):
+        end = (step.now + 1)[:, None, None]
+        age = end - step.after.timestamp
+        assert (age >= 0).all()
+        assert (2 * age % 1 == 0).all()
+        assert (np.diagonal(age, axis1=1, axis2=2) == 0).all()
+        assert (step.after.timestamp >= step.before.timestamp).all()
+        # Attempts are made in the first half of a window only: responses are none (Eq. 7).
+        since_attempt = end - step.after.last_attempt
+        is_new = step.after.last_attempt != step.before.last_attempt
+        assert (since_attempt[is_new] == 0.5).all()
+
+
+@given(seed=seeds, senders_listen=st.booleans())
+@settings(max_examples=50, deadline=None)
+def test_parents_form_a_tree_rooted_at_oneself(seed, senders_listen):
+    for step in play(12, 6, 2, seed, senders_listen=senders_listen):
+        parent, is_known = step.after.parent, step.after.is_known
+        for b, i, j in np.argwhere(is_known):
+            chain = [j]
+            while chain[-1] != i:
+                chain.append(parent[b, i, chain[-1]])
+                assert is_known[b, i, chain[-1]]
+                assert len(chain) <= 6, f"a cycle: {chain}"
+        assert (parent[~is_known] == -1).all()
+        assert (np.diagonal(parent, axis1=1, axis2=2) == -1).all()
+
+
+def test_the_channel_is_an_argument():
+    recipient, now = np.array([[1, 2, 0]]), np.array([0.0])
+    deaf, all_ears = empty_buffers(1, 3), empty_buffers(1, 3)
+    window(deaf, standing(3), recipient, to_nobody, now)
+    window(all_ears, standing(3), recipient, to_the_addressee, now)
+    assert deaf.is_known[0].tolist() == np.eye(3, dtype=bool).tolist()
+    assert all_ears.is_known.all()
+
+
+def test_the_channel_gets_the_true_positions_and_everyones_recipients():
+    asked = []
+
+    def channel(position_m, recipient):
+        asked.append((position_m.copy(), recipient.copy()))
+        return to_the_addressee(position_m, recipient)
+
+    bodies, recipients = some_mission(0, 1, 4, 2)
+    first, second = window(empty_buffers(2, 4), bodies[0], recipients[0], channel, np.zeros(2))
+    assert len(asked) == 2
+    for (position_m, recipient), phase in zip(asked, (first, second), strict=True):
+        assert (position_m == bodies[0].position_m).all()
+        assert (recipient == phase.recipient).all()
+        assert (phase.heard == to_the_addressee(None, recipient)).all()
+    assert (asked[0][1] == recipients[0]).all()
+
+
+@pytest.mark.parametrize("start", [[0.0, 0.0], [0.0, 41.0]])
+def test_missions_have_clocks_of_their_own(start):
+    buffers = empty_buffers(2, 2)
+    recipient = np.array([[1, 1], [0, 0]])
+    window(buffers, standing(2, 2), recipient, to_the_addressee, np.array(start))
+    a, b = start
+    assert buffers.timestamp[0].tolist() == [[a + 1, a + 1], [a + 0.5, a + 1]]
+    assert buffers.timestamp[1].tolist() == [[b + 1, b + 0.5], [b + 1, b + 1]]
+
+
+@pytest.mark.parametrize("nobody", [-1, 3])
+@pytest.mark.parametrize(("b", "i"), [(0, 0), (0, 2), (1, 1)])
+def test_recipients_who_are_no_robots_are_refused_before_anything_happens(b, i, nobody):
+    buffers = empty_buffers(2, 3)
+    recipient = np.array([[0, 1, 2], [2, 1, 0]])
+    recipient[b, i] = nobody
+    for send in (window, transmit):
+        with pytest.raises(ValueError, match=f"recipient of robot {i} in mission {b}") as refusal:
+            send(buffers, standing(3, 2), recipient, to_nobody, np.zeros(2))
+        assert f"from 0 to 2, not {nobody}" in str(refusal.value)
+    assert not buffers.is_known.any()
+    assert not buffers.last_attempt.any()
+
+
+def test_a_channel_that_names_no_robot_is_refused():
+    def off_by_one(_position_m, recipient):
+        return recipient + 1
+
+    with pytest.raises(ValueError, match=r"sender heard of robot 2 in mission 0 .* not 3"):
+        window(empty_buffers(1, 3), standing(3), np.array([[0, 1, 2]]), off_by_one, np.zeros(1))
+
+
+@pytest.mark.parametrize("kind", [float, bool])
+def test_robots_are_named_by_integers(kind):
+    # As users load it: without the type checks that these tests run under.
+    check_robots = runpy.run_path(buffers.__file__)["check_robots"]
+    with pytest.raises(
+        ValueError, match=f"recipient must be integers from 0 to 1, not {kind.__name__}"
+    ):
+        check_robots("recipient", np.array([[0, 1]], dtype=kind), (1, 2))
+    check_robots("recipient", np.array([[0, 1]]), (1, 2))

@@ -1,0 +1,295 @@
+"""The radio against hand numbers, inverse squares and loops over senders, receivers, interferers.
+
+The paper's radio: 2.4 GHz, noise -50 dBm, threshold 1 dB, and 39.013 dBm for a range of 250 m.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarm_mj.radio.free_space import (
+    MIN_DISTANCE_M,
+    Channel,
+    FreeSpaceRadio,
+    channel_gain,
+    from_db,
+    is_received,
+    path_loss_db,
+    sinr,
+    transmit_power_dbm,
+)
+
+RANGE_M = 250.0
+POWER_DBM = 39.013025
+seeds = st.integers(0, 2**32 - 1)
+
+
+def radio(*, range_m=RANGE_M, threshold_db=1.0, eavesdroppers=False):
+    power_dbm = transmit_power_dbm(range_m, 2.4e9, -50.0, threshold_db)
+    return FreeSpaceRadio(
+        power_mw=10 ** (power_dbm / 10),
+        noise_mw=1e-5,
+        threshold=10 ** (threshold_db / 10),
+        frequency_hz=2.4e9,
+        recipient_hears_while_sending=eavesdroppers,
+    )
+
+
+def scene(seed, num_robots, *, num_missions=1):
+    """Robots at random places, of whom about half address a neighbour or anybody."""
+    rng = np.random.default_rng(seed)
+    position_m = rng.uniform(-400.0, 400.0, (num_missions, num_robots, 2))
+    apart_m = np.linalg.norm(position_m[:, :, None] - position_m[:, None], axis=-1)
+    nearest = np.argsort(apart_m)[..., 1]  # after oneself
+    anybody = rng.integers(0, num_robots, nearest.shape)
+    chance = rng.random(nearest.shape)
+    choices = [np.arange(num_robots), nearest]
+    return position_m, np.select([chance < 0.5, chance < 0.8], choices, anybody)
+
+
+def alone(channel, position_m, recipient):
+    """Whom each robot of a single mission decodes."""
+    heard = channel(np.array([position_m], dtype=float), np.array([recipient]))
+    return heard[0].tolist()
+
+
+def received_mw(power_dbm, a, b):
+    """Eqs. 1 and 2 as the paper prints them."""
+    loss_db = 20 * math.log10(math.dist(a, b)) + 20 * math.log10(2.4e9) - 147.55
+    return 10 ** (power_dbm / 10) * 10 ** (-loss_db / 10)
+
+
+def packets_above_threshold(position_m, recipient, eavesdroppers, power_dbm, threshold_db):
+    """Every (i, j) whose packet clears the threshold, by loops over i, j and the interferers k."""
+    robots = range(len(recipient))
+    senders = [i for i in robots if recipient[i] != i]
+    clear = set()
+    for i in senders:
+        for j in robots:
+            if j == i:
+                continue
+            # Eq. 3 sums over a sending receiver too, from distance 0: it drowns everything. The
+            # authors' code lets it hear what is addressed to it.
+            if j in senders and not (eavesdroppers and recipient[i] == j):
+                continue
+            interference = 0.0
+            for k in senders:
+                if k not in (i, j):
+                    interference += received_mw(power_dbm, position_m[k], position_m[j])
+            signal = received_mw(power_dbm, position_m[i], position_m[j])
+            ratio_db = 10 * math.log10(signal / (1e-5 + interference))
+            if ratio_db >= threshold_db:
+                clear.add((i, j))
+    return clear
+
+
+def test_eq1_path_loss_by_hand():
+    # 20 log10(250) = 47.958800, 20 log10(2.4e9) = 187.604225.
+    assert path_loss_db(250.0, 2.4e9) == pytest.approx(47.958800 + 187.604225 - 147.55)
+    assert path_loss_db(250.0, 2.4e9) == pytest.approx(88.013025)
+    assert path_loss_db(1.0, 1.0) == -147.55
+
+
+@given(distance_m=st.floats(1e-3, 1e5), frequency_hz=st.floats(1e6, 1e12))
+@settings(max_examples=50, deadline=None)
+def test_eq1_path_loss_is_friis_free_space(distance_m, frequency_hz):
+    friis_db = 20 * math.log10(4 * math.pi * distance_m * frequency_hz / 299_792_458.0)
+    # The paper rounds -147.5522 dB to -147.55 dB.
+    assert path_loss_db(distance_m, frequency_hz) == pytest.approx(friis_db, abs=0.0025)
+
+
+@pytest.mark.parametrize(
+    ("loss_db", "gain"),
+    [(0.0, 1.0), (10.0, 0.1), (30.0, 1e-3), (3.010299957, 0.5), (-20.0, 100.0)],
+)
+def test_eq2_gain_by_hand(loss_db, gain):
+    assert channel_gain(loss_db) == pytest.approx(gain)
+
+
+@given(distance_m=st.floats(0.1, 1e4), factor=st.floats(0.1, 10.0))
+@settings(max_examples=50, deadline=None)
+def test_eq2_gain_falls_with_the_square_of_the_distance(distance_m, factor):
+    near, far = (channel_gain(path_loss_db(d, 2.4e9)) for d in (distance_m, factor * distance_m))
+    assert near / far == pytest.approx(factor**2)
+
+
+def test_powers_by_hand():
+    assert from_db(-50.0) == pytest.approx(1e-5)
+    assert from_db(30.0) == pytest.approx(1000.0)  # 30 dBm is 1 W
+    assert from_db(1.0) == pytest.approx(1.258925)
+    assert transmit_power_dbm(250.0, 2.4e9, -50.0, 1.0) == pytest.approx(POWER_DBM)
+    assert transmit_power_dbm(500.0, 2.4e9, -50.0, 1.0) == pytest.approx(POWER_DBM + 6.020600)
+    assert transmit_power_dbm(250.0, 2.4e9, -47.0, 4.0) == pytest.approx(POWER_DBM + 6.0)
+
+
+def test_eq3_sinr_by_hand():
+    assert sinr(6.0, 1.0, 2.0) == 2.0
+    assert sinr(6.0, 0.0, 2.0) == 3.0
+    assert sinr(6.0, 6.0, 0.0) == 1.0
+
+
+def test_eq4_the_threshold_itself_is_enough():
+    assert is_received(1.25, 1.25)
+    assert not is_received(np.nextafter(1.25, 0.0), 1.25)
+
+
+def test_power_at_a_metre_is_eqs_1_and_2():
+    # 39.013025 dBm - (187.604225 - 147.55) dB = -1.0412 dBm.
+    assert radio().received_at_1_m_mw == pytest.approx(10**-0.10412)
+
+
+@pytest.mark.parametrize("range_m", [1.0, 250.0, 8000.0])
+@pytest.mark.parametrize("threshold_db", [-20.0, 1.0, 30.0])
+@pytest.mark.parametrize("angle", [0.0, 1.0, 4.0])
+def test_the_range_is_exact_in_silence(range_m, threshold_db, angle):
+    channel = radio(range_m=range_m, threshold_db=threshold_db)
+    towards = np.array([math.cos(angle), math.sin(angle)])
+    start = np.array([3.0, -2.0])
+    for distance_m, decoded in [(range_m * (1 - 1e-9), 0), (range_m * (1 + 1e-9), 1)]:
+        assert alone(channel, [start, start + distance_m * towards], [1, 1]) == [0, decoded]
+
+
+def test_eq3_interference_by_hand():
+    # Robots 0 and 3 send, robot 1 listens between them. A sender at 250 m is 1.2589 times the
+    # noise, so the noise is worth one at 250 m · sqrt(1.2589) = 280.5 m, and robot 0 decodes at
+    # 1/d² = 1.2589 · (1/300² + 1/280.5²) or more, which is up to d = 182.6 m.
+    def decoded(d):
+        return alone(radio(), [[0, 0], [d, 0], [d, 2000], [d + 300, 0]], [2, 1, 2, 2])[1]
+
+    assert decoded(182.5) == 0
+    assert decoded(182.7) == 1
+
+
+@given(seed=seeds, num_robots=st.integers(2, 8), eavesdroppers=st.booleans())
+@settings(max_examples=200, deadline=None)
+def test_eq4_decoded_as_by_loops(seed, num_robots, eavesdroppers):
+    position_m, recipient = scene(seed, num_robots)
+    clear = packets_above_threshold(position_m[0], recipient[0], eavesdroppers, POWER_DBM, 1.0)
+    for j in range(num_robots):
+        # Above 0 dB two packets cannot both be stronger than each other.
+        assert len([i for i, receiver in clear if receiver == j]) <= 1
+    heard = radio(eavesdroppers=eavesdroppers)(position_m, recipient)[0]
+    assert {(i, j) for j, i in enumerate(heard) if i != j} == clear
+
+
+@given(seed=seeds, num_robots=st.integers(2, 8))
+@settings(max_examples=100, deadline=None)
+def test_below_0_db_the_nearest_packet_that_clears_the_threshold_wins(seed, num_robots):
+    position_m, recipient = scene(seed, num_robots)
+    power_dbm = POWER_DBM - 11.0  # as far at a threshold of -10 dB
+    clear = packets_above_threshold(position_m[0], recipient[0], False, power_dbm, -10.0)
+    nearest = {}
+    for i, j in clear:
+        rival = nearest.get(j, i)
+        nearest[j] = min(i, rival, key=lambda k: math.dist(position_m[0, k], position_m[0, j]))
+    heard = radio(threshold_db=-10.0)(position_m, recipient)[0]
+    assert {j: i for j, i in enumerate(heard) if i != j} == nearest
+
+
+def test_several_packets_can_clear_a_threshold_below_0_db():
+    position_m, recipient = [[0, 0], [100, 0], [210, 0]], [1, 1, 1]
+    both = packets_above_threshold(position_m, recipient, False, POWER_DBM - 11.0, -10.0)
+    assert both == {(0, 1), (2, 1)}
+    assert alone(radio(threshold_db=-10.0), position_m, recipient) == [0, 0, 2]
+
+
+@given(seed=seeds, num_robots=st.integers(2, 10))
+@settings(max_examples=50, deadline=None)
+def test_a_transmitter_hears_nothing(seed, num_robots):
+    position_m, recipient = scene(seed, num_robots)
+    heard = radio()(position_m, recipient)[0]
+    for j in range(num_robots):
+        assert heard[j] == j or recipient[0, j] == j
+
+
+def test_the_codes_rule_lets_a_sending_recipient_hear():
+    position_m = [[0, 0], [200, 0], [100, 100]]
+    each_other = [1, 0, 2]
+    # At 200 m both clear the threshold over the noise, so neither's own signal interferes; the
+    # eavesdropper in the middle hears both at once, and so nothing.
+    assert alone(radio(eavesdroppers=True), position_m, each_other) == [1, 0, 2]
+    assert alone(radio(eavesdroppers=False), position_m, each_other) == [0, 1, 2]
+
+
+def test_the_codes_rule_keeps_a_sending_eavesdropper_deaf():
+    # 0 sends to 1; 2, right beside it, is no recipient of 0 and sends to 3 itself.
+    position_m = [[0, 0], [100, 0], [-10, 0], [-200, 0]]
+    assert alone(radio(eavesdroppers=True), position_m, [1, 1, 2, 3]) == [0, 0, 0, 0]
+    assert alone(radio(eavesdroppers=True), position_m, [1, 1, 3, 3])[2] == 2
+
+
+def test_silence_is_heard_by_nobody():
+    position_m, _ = scene(0, 6)
+    for eavesdroppers in (False, True):
+        silent = np.arange(6)[None]
+        assert (radio(eavesdroppers=eavesdroppers)(position_m, silent) == silent).all()
+
+
+def test_coincident_robots_stay_finite():
+    here, away = [5.0, 5.0], [200.0, 5.0]
+    assert alone(radio(), [here, here], [1, 1]) == [0, 0]
+    # Closer than the least distance counts as that far, so equal powers: 0 dB, nobody decodes.
+    near = [5.0 + MIN_DISTANCE_M / 2, 5.0]
+    assert alone(radio(), [here, here, here, away], [1, 1, 1, 3])[1] == 1
+    assert alone(radio(), [here, here, near, away], [1, 1, 1, 3])[1] == 1
+    assert alone(radio(), [here, here, away], [1, 1, 1])[1] == 0
+    assert alone(radio(eavesdroppers=True), [here, here], [1, 0]) == [1, 0]
+
+
+@given(seed=seeds, num_robots=st.integers(2, 10), eavesdroppers=st.booleans())
+@settings(max_examples=50, deadline=None)
+def test_renaming_the_robots_renames_what_they_hear(seed, num_robots, eavesdroppers):
+    channel = radio(eavesdroppers=eavesdroppers)
+    position_m, recipient = scene(seed, num_robots)
+    old_name = np.random.default_rng(seed).permutation(num_robots)
+    new_name = np.argsort(old_name)
+    heard = channel(position_m, recipient)
+    renamed = channel(position_m[:, old_name], new_name[recipient[:, old_name]])
+    assert (renamed == new_name[heard[:, old_name]]).all()
+
+
+@given(seed=seeds, eavesdroppers=st.booleans())
+@settings(max_examples=50, deadline=None)
+def test_missions_side_by_side_do_not_hear_each_other(seed, eavesdroppers):
+    channel = radio(eavesdroppers=eavesdroppers)
+    position_m, recipient = scene(seed, 7, num_missions=4)
+    heard = channel(position_m, recipient)
+    for b in range(4):
+        assert (heard[[b]] == channel(position_m[[b]], recipient[[b]])).all()
+
+
+def test_the_random_scenes_hold_what_matters():
+    # Of 100 scenes, many have packets that decode, that collide, that others overhear, and that
+    # a recipient decodes while it sends itself.
+    decoded = collided = overheard = both_ways = 0
+    for seed in range(100):
+        position_m, recipient = scene(seed, 3 + seed % 6)
+        heard = radio(eavesdroppers=True)(position_m, recipient)[0]
+        for i, j in enumerate(recipient[0]):
+            decoded += j != i and heard[j] == i
+            collided += j != i and heard[j] != i
+            both_ways += j != i and heard[j] == i and recipient[0, j] != j
+        overheard += sum(i != j and recipient[0, i] != j for j, i in enumerate(heard))
+    assert min(decoded, collided, overheard, both_ways) >= 20
+
+
+def test_the_radio_is_a_channel():
+    assert isinstance(radio(), Channel)
+
+
+def test_below_0_db_a_sender_hears_the_strongest_packet_meant_for_it():
+    """Robot 1 sends; robot 2 is nearer to it but speaks to robot 3, robot 0 speaks to robot 1."""
+    position_m = np.array([[[0.0, 0.0], [110.0, 0.0], [210.0, 0.0], [320.0, 0.0]]])
+    recipient = np.array([[1, 0, 3, 3]])
+    channel = FreeSpaceRadio(
+        power_mw=1.0,
+        noise_mw=1e-15,
+        threshold=0.1,
+        frequency_hz=2.4e9,
+        recipient_hears_while_sending=True,
+    )
+    # Signal 1 / 110^2 over interference 1 / 100^2 is 0.83, above the threshold of 0.1.
+    assert channel(position_m, recipient)[0, 1] == 0

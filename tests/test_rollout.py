@@ -1,0 +1,112 @@
+import itertools
+
+import numpy as np
+import pytest
+
+from swarm_mj.mission import paper
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.protocol.costs import Packets, WindowCosts, mean_hops
+from swarm_mj.rollout import Flown, fly, summarise
+from swarm_mj.swarm import Swarm
+
+
+def flown_by_hand(age, variance, is_complete, hops, packets):
+    """One window of two missions; packets: attempted, delivered, overheard, answered."""
+    counts = (np.array(count, dtype=np.int64) for count in packets)
+    costs = WindowCosts(
+        age_windows=np.array(age),
+        is_complete=np.array(is_complete),
+        velocity_variance_m2ps2=np.array(variance),
+        packets=Packets(
+            **dict(zip(("attempted", "delivered", "overheard", "answered"), counts, strict=True))
+        ),
+    )
+    return Flown(costs=costs, hops=np.array(hops))
+
+
+THREE_WINDOWS = [
+    flown_by_hand(
+        [1.0, 0.5], [9.0, 4.0], [False, False], [0.0, 1.0], ([3, 1], [1, 0], [2, 0], [1, 0])
+    ),
+    flown_by_hand(
+        [2.0, 1.0], [6.0, 5.0], [True, False], [1.5, 1.0], ([2, 2], [2, 1], [0, 4], [0, 1])
+    ),
+    flown_by_hand(
+        [6.0, 3.0], [0.0, 6.0], [True, False], [3.0, 1.0], ([0, 1], [0, 1], [0, 0], [0, 1])
+    ),
+]
+
+
+def test_summary_by_hand():
+    """Two missions over three windows: means of the costs, totals of the packets."""
+    summary = summarise(THREE_WINDOWS)
+    assert summary.num_windows == 3
+    np.testing.assert_allclose(summary.aoi_mean, [3.0, 1.5])
+    np.testing.assert_allclose(summary.velocity_variance_mean, [5.0, 5.0])
+    np.testing.assert_allclose(summary.velocity_variance_first, [9.0, 4.0])
+    np.testing.assert_allclose(summary.velocity_variance_last, [0.0, 6.0])
+    np.testing.assert_allclose(summary.hops_mean, [1.5, 1.0])
+    np.testing.assert_allclose(summary.packets_attempted, [5.0, 4.0])
+    np.testing.assert_allclose(summary.packets_delivered, [3.0, 2.0])
+    np.testing.assert_allclose(summary.packets_lost, [2.0, 2.0])
+    np.testing.assert_allclose(summary.packets_overheard, [2.0, 4.0])
+    np.testing.assert_allclose(summary.packets_answered, [1.0, 2.0])
+
+
+@pytest.mark.parametrize(
+    ("first", "expected"), [(0, [2.0, np.nan]), (1, [1.0, np.nan]), (2, [1.0, np.nan])]
+)
+def test_complete_window_is_the_first_or_none(first, expected):
+    """Counted from 1 at the first window given; the second mission never completes."""
+    summary = summarise(THREE_WINDOWS[first:])
+    np.testing.assert_array_equal(summary.complete_window, expected)
+
+
+def test_summary_of_one_window_is_that_window():
+    summary = summarise(THREE_WINDOWS[1:2])
+    assert summary.num_windows == 1
+    np.testing.assert_allclose(summary.aoi_mean, [2.0, 1.0])
+    np.testing.assert_allclose(summary.velocity_variance_first, summary.velocity_variance_last)
+
+
+def test_summary_of_no_windows_is_a_clear_error():
+    with pytest.raises(ValueError, match="at least 1 window"):
+        summarise([])
+
+
+def small_flight(num_windows=12):
+    mission = paper("flocking", num_robots=8, num_windows=num_windows)
+    return Swarm(mission, [3, 4]), make_policy("mst", mission, 0.3)
+
+
+def test_flight_is_the_missions_windows_step_by_step():
+    """The costs are those of the swarm stepped by hand, and the hops those of its buffers."""
+    swarm, policy = small_flight()
+    by_hand = Swarm(swarm.mission, [3, 4])
+    rival = make_policy("mst", swarm.mission, 0.3)
+    by_hand.start(rival)
+    num_flown = 0
+    for window in fly(swarm, policy):
+        costs = by_hand.step(rival)
+        num_flown += 1
+        np.testing.assert_array_equal(swarm.now, num_flown)
+        np.testing.assert_array_equal(window.costs.age_windows, costs.age_windows)
+        np.testing.assert_array_equal(window.hops, mean_hops(by_hand.buffers))
+    assert num_flown == 12
+
+
+def test_flight_can_be_broken_off():
+    swarm, policy = small_flight()
+    assert len(list(itertools.islice(fly(swarm, policy), 5))) == 5
+    np.testing.assert_array_equal(swarm.now, 5.0)
+
+
+def test_windows_of_a_flight_keep_their_costs():
+    """What a window cost does not change while the flight goes on."""
+    swarm, policy = small_flight()
+    ages, flown = [], []
+    for window in fly(swarm, policy):
+        ages.append(window.costs.age_windows.copy())
+        flown.append(window)
+    np.testing.assert_array_equal([window.costs.age_windows for window in flown], ages)
+    np.testing.assert_allclose(summarise(flown).aoi_mean, np.mean(ages, axis=0))
