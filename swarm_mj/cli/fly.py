@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import math
 import os
 import shlex
 import time
@@ -13,8 +12,8 @@ from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
+from swarm_mj.cli.flight_table import flight_numbers, flight_table
 from swarm_mj.cli.interrupt import deferred_interrupt
 from swarm_mj.cli.options import add_mission_options, mission_of, new_parser, this_command
 from swarm_mj.cli.outputs import check_writable
@@ -26,7 +25,7 @@ from swarm_mj.policies.registry import POLICIES, is_learned, make_policy, normal
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import view_command
-from swarm_mj.rollout import Flown, Summary, fly, summarise
+from swarm_mj.rollout import Flown, fly, summarise
 from swarm_mj.swarm import Swarm
 
 DONE, INTERRUPTED = 0, 130
@@ -213,7 +212,7 @@ def _write(
     if json_:
         document = {
             "config": config,
-            **_numbers(summarise(flight.flown)),
+            **flight_numbers(summarise(flight.flown)),
             "wall_seconds": flight.wall_s,
             "interrupted": flight.was_interrupted,
             "replay": str(path) if path else None,
@@ -225,49 +224,6 @@ def _write(
 def _print(options: argparse.Namespace, flight: _Flight, path: Path | None) -> None:
     """Prints the table and how to open the replay."""
     console = Console(highlight=False, soft_wrap=True, markup=False)
-    console.print(_table(options, summarise(flight.flown), flight.wall_s))
+    console.print(flight_table(options, summarise(flight.flown), flight.wall_s))
     if path:
         console.print(f"Open the replay:  {this_command()} replay {shlex.quote(str(path))}")
-
-
-def _numbers(summary: Summary) -> dict[str, Any]:
-    """The summary of the one mission flown; what never happened is None."""
-    numbers: dict[str, Any] = {}
-    for name, value in asdict(summary).items():
-        number = value if isinstance(value, int) else float(value[0])
-        is_count = name.startswith("packets_") or name == "complete_window"
-        if math.isnan(number):
-            number = None
-        numbers[name] = int(number) if is_count and number is not None else number
-    return numbers
-
-
-def _table(options: argparse.Namespace, summary: Summary, wall_s: float) -> Table:
-    numbers = _numbers(summary)
-    team = f"{options.robots} robots"
-    if options.switched_off:
-        team += f", {options.switched_off:.0%} of them off half-way"
-    table = Table(
-        title=f"{options.task}, {options.policy}, {team}, seed {options.seed}",
-        title_justify="left",
-        show_header=False,
-    )
-    complete = numbers["complete_window"]
-    rows = {
-        "age of information, mean": f"{numbers['aoi_mean']:.2f} windows",
-        "velocity variance, mean": f"{numbers['velocity_variance_mean']:.4f} m²/s²",
-        "velocity variance, first to last": (
-            f"{numbers['velocity_variance_first']:.4f} to "
-            f"{numbers['velocity_variance_last']:.4f} m²/s²"
-        ),
-        "packets attempted": f"{numbers['packets_attempted']}",
-        "  delivered, lost": f"{numbers['packets_delivered']}, {numbers['packets_lost']}",
-        "  answered": f"{numbers['packets_answered']}",
-        "  overheard by others": f"{numbers['packets_overheard']}",
-        "hops in the parent trees, mean": f"{numbers['hops_mean']:.2f}",
-        "everyone had heard of everyone": f"window {complete}" if complete else "never",
-        "windows flown": f"{summary.num_windows} in {wall_s:.2f} s",
-    }
-    for name, value in rows.items():
-        table.add_row(name, value)
-    return table
