@@ -20,7 +20,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from swarm_mj.io.atomic_file import whole_file
+from swarm_mj.io.atomic_file import atomic_write
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.registry import make_policy
@@ -145,7 +145,7 @@ def _row(search: Search, probability: float, aoi: np.ndarray, seeds: Sequence[in
 
 def write_table(rows: Sequence[Tuned], path: Path) -> None:
     """Writes the table whole, or not at all."""
-    with whole_file(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+    with atomic_write(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, [field.name for field in fields(Tuned)], lineterminator="\n")
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)

@@ -17,7 +17,7 @@ from swarm_mj.cli.flight_table import flight_numbers, flight_table
 from swarm_mj.cli.interrupt import deferred_interrupt
 from swarm_mj.cli.options import add_mission_options, mission_of, new_parser, this_command
 from swarm_mj.cli.outputs import check_writable
-from swarm_mj.io.atomic_file import whole_file
+from swarm_mj.io.atomic_file import atomic_write
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
@@ -217,7 +217,7 @@ def _write(
             "interrupted": flight.was_interrupted,
             "replay": str(path) if path else None,
         }
-        with whole_file(json_) as part:
+        with atomic_write(json_) as part:
             part.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from swarm_mj.io.atomic_file import part_of
+from swarm_mj.io.atomic_file import temp_path
 
 
 def check_writable(path: Path, what: str, *, must_be_new: bool = False) -> None:
@@ -24,7 +24,7 @@ def check_writable(path: Path, what: str, *, must_be_new: bool = False) -> None:
         if must_be_new and path.exists():
             raise ValueError(f"{what} {path} exists; name another, or replace it with --force")
         folder = next(parent for parent in path.absolute().parents if parent.exists())
-        probe = part_of(folder / path.name)
+        probe = temp_path(folder / path.name)
         probe.touch()
         probe.unlink()
     except OSError as error:

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from swarm_mj.cli.options import add_mission_options, mission_of, new_parser, this_command
 from swarm_mj.cli.outputs import check_writable
-from swarm_mj.io.atomic_file import whole_file
+from swarm_mj.io.atomic_file import atomic_write
 from swarm_mj.physics.scene import compose
 
 
@@ -28,7 +28,7 @@ def run(options: argparse.Namespace) -> int:
     check_writable(options.out, "scene", must_be_new=not options.force)
     spec = compose(mission)
     spec.compile()
-    with whole_file(options.out) as part:
+    with atomic_write(options.out) as part:
         part.write_text(spec.to_xml(), encoding="utf-8")
     console = Console(highlight=False, soft_wrap=True, markup=False)
     side = f"{mission.side_m:.0f} m"

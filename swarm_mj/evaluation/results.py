@@ -9,7 +9,7 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, get_args
 
-from swarm_mj.io.atomic_file import whole_file
+from swarm_mj.io.atomic_file import atomic_write
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +122,7 @@ def write_csv(path: Path, results: Sequence[Result]) -> None:
     Raises:
         OSError: The file cannot be written.
     """
-    with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+    with atomic_write(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
         writer.writerows(asdict(result) for result in results)
@@ -146,7 +146,7 @@ def write_json(
         asdict(result) | {name: list(values) for name, values in lists.items()}
         for result, lists in zip(results, missions, strict=True)
     ]
-    with whole_file(path) as part:
+    with atomic_write(path) as part:
         text = json.dumps({"results": objects}, indent=2, allow_nan=False)
         part.write_text(text + "\n", encoding="utf-8")
 

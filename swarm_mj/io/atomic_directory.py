@@ -5,11 +5,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from swarm_mj.io.atomic_file import part_of
+from swarm_mj.io.atomic_file import temp_path
 
 
 @contextmanager
-def whole_folder(path: Path) -> Iterator[Path]:
+def atomic_directory(path: Path) -> Iterator[Path]:
     """Within it, fill the folder it yields; it then replaces `path`, or is gone if that failed.
 
     No folder takes another's place in one step, so the old one first steps aside. Whoever is killed
@@ -26,7 +26,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
     """
     target = path.resolve()  # of a link, the folder it leads to is replaced, not the link
     target.parent.mkdir(parents=True, exist_ok=True)
-    part = part_of(target)
+    part = temp_path(target)
     shutil.rmtree(part, ignore_errors=True)  # of a killed process that had this one's number
     part.mkdir()
     try:

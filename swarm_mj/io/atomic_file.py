@@ -6,13 +6,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 
-def part_of(path: Path) -> Path:
+def temp_path(path: Path) -> Path:
     """Where this process writes a file until it is whole: hidden, in the same folder."""
     return path.with_name(f".{path.name}.{os.getpid()}.part")
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
+def atomic_write(path: Path) -> Iterator[Path]:
     """Within it, write the path it yields; it then replaces `path`, or is gone if that failed.
 
     Args:
@@ -26,7 +26,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     """
     target = path.resolve()  # of a link, the file it leads to is replaced, not the link
     target.parent.mkdir(parents=True, exist_ok=True)
-    part = part_of(target)
+    part = temp_path(target)
     try:
         yield part
         part.replace(target)

@@ -15,7 +15,7 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
-from swarm_mj.io.atomic_file import whole_file
+from swarm_mj.io.atomic_file import atomic_write
 from swarm_mj.learning import progress as progresses
 from swarm_mj.learning.env import MissionsEnv
 from swarm_mj.learning.missions import Course
@@ -66,7 +66,7 @@ def save(
     }
     content = io.BytesIO()
     torch.save(state, content)
-    with whole_file(path) as part:
+    with atomic_write(path) as part:
         part.write_bytes(content.getbuffer())
 
 

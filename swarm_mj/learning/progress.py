@@ -5,7 +5,7 @@ import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from swarm_mj.io.atomic_file import whole_file
+from swarm_mj.io.atomic_file import atomic_write
 from swarm_mj.learning.env import MissionsEnv
 
 
@@ -84,7 +84,7 @@ def write_curve(path: Path, curve: list[dict[str, float]]) -> None:
         OSError: The file cannot be written.
     """
     names = list(dict.fromkeys(name for row in curve for name in row))
-    with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+    with atomic_write(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, names)
         writer.writeheader()
         writer.writerows(curve)

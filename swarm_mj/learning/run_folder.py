@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.io.atomic_directory import present_folder, whole_folder
-from swarm_mj.io.atomic_file import whole_file
+from swarm_mj.io.atomic_directory import atomic_directory, present_folder
+from swarm_mj.io.atomic_file import atomic_write
 from swarm_mj.learning.settings import Training, arm_settings, from_json
 from swarm_mj.mission import Mission
 
@@ -52,7 +52,7 @@ def write_run(folder: Path, run: Run) -> None:
         "init": None if run.init is None else str(run.init.resolve()),
     }
     folder.mkdir(parents=True, exist_ok=True)
-    with whole_file(folder / SETTINGS) as part:
+    with atomic_write(folder / SETTINGS) as part:
         part.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 
@@ -98,7 +98,7 @@ def own_init(folder: Path, init: Path) -> Path:
     """
     own = folder / INIT
     if not own.exists():
-        with whole_folder(own) as part:
+        with atomic_directory(own) as part:
             shutil.copytree(present_folder(init), part, dirs_exist_ok=True)
     return own
 

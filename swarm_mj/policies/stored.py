@@ -10,7 +10,7 @@ from torch import Tensor
 
 from swarm_mj.gnn.feature_sets import make_observer
 from swarm_mj.gnn.network import AggregationGnn
-from swarm_mj.io.atomic_directory import present_folder, whole_folder
+from swarm_mj.io.atomic_directory import atomic_directory, present_folder
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn import LearnedPolicy
 from swarm_mj.policies.model_card import model_card
@@ -50,7 +50,7 @@ def save_policy(
     for name in MAX_BYTES:
         _check_size(name, len(contents[name]))
     _check_replaceable(folder)
-    with whole_folder(folder) as part:
+    with atomic_directory(folder) as part:
         for name, content in contents.items():
             (part / name).write_bytes(content)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from swarm_mj.io.atomic_file import whole_file
+from swarm_mj.io.atomic_file import atomic_write
 from swarm_mj.mission import Mission
 from swarm_mj.replay import arena, charts, palette
 from swarm_mj.replay.layout import layout
@@ -30,7 +30,7 @@ def write_replay(log: Log, mission: Mission, config: dict[str, object], path: Pa
         OSError: The file cannot be written.
     """
     try:
-        with whole_file(path) as part:
+        with atomic_write(path) as part:
             _write(log, mission, config, part, name=path.stem)
     except RuntimeError as error:  # rerun's, when its writer fails
         raise OSError(f"replay {path} could not be written: {error}") from error

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from swarm_mj.io.atomic_directory import present_folder, whole_folder
+from swarm_mj.io.atomic_directory import atomic_directory, present_folder
 
 
 def write(path, text):
-    with whole_folder(path) as part:
+    with atomic_directory(path) as part:
         for name in ("a", "b"):
             (part / name).write_text(text)
 
@@ -27,7 +27,7 @@ def content(path):
 
 def test_a_folder_appears_when_it_is_whole(tmp_path):
     path = tmp_path / "runs" / "x"
-    with whole_folder(path) as part:
+    with atomic_directory(path) as part:
         (part / "a").write_text("text")
         assert not path.exists()
     assert (path / "a").read_text() == "text"
@@ -47,7 +47,7 @@ def test_a_failure_leaves_the_old_folder_and_nothing_else(tmp_path, failure):
     write(tmp_path / "x", "old")
 
     def write_half():
-        with whole_folder(tmp_path / "x") as part:
+        with atomic_directory(tmp_path / "x") as part:
             (part / "a").write_text("ne")
             raise failure
 

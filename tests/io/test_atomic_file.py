@@ -2,12 +2,12 @@
 
 import pytest
 
-from swarm_mj.io.atomic_file import whole_file
+from swarm_mj.io.atomic_file import atomic_write
 
 
 def test_a_file_appears_when_it_is_whole(tmp_path):
     path = tmp_path / "a" / "b.txt"
-    with whole_file(path) as part:
+    with atomic_write(path) as part:
         part.write_text("text")
         assert not path.exists()
     assert path.read_text() == "text"
@@ -20,7 +20,7 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path, failure):
     path.write_text("old")
 
     def write_half():
-        with whole_file(path) as part:
+        with atomic_write(path) as part:
             part.write_text("ne")
             raise failure
 
@@ -34,7 +34,7 @@ def test_a_link_stays_and_its_file_is_replaced(tmp_path):
     (tmp_path / "real").write_text("old")
     link = tmp_path / "link"
     link.symlink_to(tmp_path / "real")
-    with whole_file(link) as part:
+    with atomic_write(link) as part:
         part.write_text("new")
     assert link.is_symlink()
     assert (tmp_path / "real").read_text() == "new"

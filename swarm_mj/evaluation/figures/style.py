@@ -13,7 +13,7 @@ import matplotlib.style
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from swarm_mj.io.atomic_file import whole_file
+from swarm_mj.io.atomic_file import atomic_write
 
 WIDTH_IN = 7.5  # shown at 900 pixels, a point of type is 1.7 pixels
 DPI = 240
@@ -106,5 +106,5 @@ def save(figure: Figure, path: Path) -> None:
         OSError: The file cannot be written.
     """
     kind = path.suffix.removeprefix(".")
-    with styled(), whole_file(path) as part:
+    with styled(), atomic_write(path) as part:
         figure.savefig(part, format=kind, metadata=UNDATED.get(kind))
