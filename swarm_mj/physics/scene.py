@@ -6,6 +6,7 @@ from mujoco._specs import MjSpec
 
 from swarm_mj.io.assets import asset
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
+from swarm_mj.physics.state import RobotStates
 
 CONTACT_STEP_S = 0.01  # longest step of the `contact` physics: ten per window of 100 ms
 ROBOT_RADIUS_M = 0.5  # assets/robot.xml
@@ -38,14 +39,17 @@ def num_substeps(mission: Mission) -> int:
     return math.ceil(mission.window_s / longest_s - 1e-9)
 
 
-def compose(mission: Mission) -> MjSpec:
+def compose(mission: Mission, start: RobotStates | None = None) -> MjSpec:
     """The arena at the mission's size with its N robots, ready to compile.
 
     Args:
         mission: Number of robots, area, bounds and physics.
+        start: Where the robots of the first mission stand and how fast they are when a viewer
+            opens the model, for a file that is to be looked at. Without it, all stand at the
+            origin until `Physics.place` puts them elsewhere.
 
     Returns:
-        The editable model.
+        The editable model; with a start, also its keyframe `start`.
     """
     spec = MjSpec.from_file(str(asset("arena.xml")))
     spec.option.timestep = timestep_s(mission)
@@ -56,7 +60,23 @@ def compose(mission: Mission) -> MjSpec:
     for i in range(mission.num_robots):
         frame = spec.worldbody.add_frame(pos=[0.0, 0.0, 1.0])
         spec.attach(robot.copy(), frame=frame, prefix=f"r{i}/")
+    if start is not None:
+        _place_robots(spec, mission, start)
     return spec
+
+
+def _place_robots(spec: MjSpec, mission: Mission, start: RobotStates) -> None:
+    """Puts the robots at their start: as the model's own pose, and with velocities as a keyframe.
+
+    A viewer opens a model in its own pose and loads a keyframe only when told to.
+    """
+    position_m, velocity_mps = start.position_m[0], start.velocity_mps[0]
+    for i, (x, y) in enumerate(position_m.tolist()):
+        spec.body(f"r{i}/body").pos = [x, y, 0.0]
+        spec.joint(f"r{i}/x").ref, spec.joint(f"r{i}/y").ref = x, y
+    key = spec.add_key(name="start", qpos=position_m.ravel(), qvel=velocity_mps.ravel())
+    if mission.physics == "exact":  # whose servos are told velocities
+        key.ctrl = velocity_mps.ravel()
 
 
 def _scale_arena(spec: MjSpec, mission: Mission) -> None:

@@ -1,7 +1,11 @@
 """The other commands as processes: scene, replay, bench, help."""
 
 import mujoco
+import numpy as np
 import pytest
+
+from swarm_mj.mission import paper
+from swarm_mj.swarm import Swarm
 
 
 def test_scene_writes_a_model_that_mujoco_opens(swarm_mj, tmp_path):
@@ -10,6 +14,18 @@ def test_scene_writes_a_model_that_mujoco_opens(swarm_mj, tmp_path):
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))
     assert model.nq == model.nv == model.nu == 80
     assert "40 robots" in done.stdout
+
+
+@pytest.mark.parametrize("seed", [1, 5])
+def test_scene_shows_the_start_that_fly_has(swarm_mj, tmp_path, seed):
+    done = swarm_mj("scene", "--task", "random-walk", "--seed", seed, "--out", "scene.xml")
+    assert done.returncode == 0, done.stderr
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))
+    data = mujoco.MjData(model)
+    flown = Swarm(paper("random-walk"), [seed]).bodies
+    for start in (data.qpos.copy(), model.key_qpos[0]):  # as opened, and as the keyframe has it
+        np.testing.assert_allclose(start.reshape(40, 2), flown.position_m[0], atol=1e-3)
+    np.testing.assert_allclose(model.key_qvel[0].reshape(40, 2), flown.velocity_mps[0], atol=1e-5)
 
 
 def test_scene_does_not_replace_a_file_unasked(swarm_mj, tmp_path):

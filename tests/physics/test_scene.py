@@ -5,6 +5,7 @@ import pytest
 from swarm_mj.io.assets import asset
 from swarm_mj.mission import Mission, paper
 from swarm_mj.physics.scene import compose, num_substeps, timestep_s
+from swarm_mj.physics.state import RobotStates
 
 # Half the side of the square in which 40 robots share a square kilometre, by hand [m].
 HALF_SIDE_M = {10: 250.0, 40: 500.0, 90: 750.0}
@@ -178,6 +179,30 @@ def test_saved_scene_opens_in_mujoco_alone(tmp_path, physics, boundary):
         np.testing.assert_allclose(getattr(saved, column), getattr(model, column), rtol=1e-5)
     assert saved.opt.timestep == pytest.approx(model.opt.timestep)
     assert saved.opt.integrator == model.opt.integrator
+
+
+@pytest.mark.parametrize("physics", MODES)
+def test_a_viewer_opens_on_the_start_and_its_keyframe_flies_on(tmp_path, physics):
+    """One window after the keyframe, every robot is where its velocity took it in 100 ms."""
+    mission = paper("random-walk", num_robots=3, physics=physics)
+    start = RobotStates(
+        position_m=np.array([[[-120.5, 30.0], [0.0, 110.25], [99.0, -1.5]]]),
+        velocity_mps=np.array([[[1.5, -2.0], [0.0, 0.5], [-3.0, 0.0]]]),
+    )
+    path = tmp_path / "scene.xml"
+    path.write_text(compose(mission, start).to_xml())
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    for i in range(3):
+        np.testing.assert_allclose(data.body(f"r{i}/body").xpos[:2], start.position_m[0, i])
+    np.testing.assert_allclose(data.qpos.reshape(3, 2), start.position_m[0])
+    assert model.key(0).name == "start"
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    np.testing.assert_allclose(data.qpos.reshape(3, 2), start.position_m[0])
+    mujoco.mj_step(model, data, num_substeps(mission))
+    moved_m = start.position_m[0] + 0.1 * start.velocity_mps[0]
+    np.testing.assert_allclose(data.qpos.reshape(3, 2), moved_m)
 
 
 @pytest.mark.parametrize("num_robots", [2, 10, 40, 90, 160])
