@@ -21,7 +21,11 @@ class Flown:
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
-    """What B missions cost over the windows flown; packets are totals."""
+    """What B missions cost over the windows flown; packets are totals.
+
+    Packets of policies that address are delivered or lost, broadcasts are heard or not; what does
+    not apply is nan.
+    """
 
     num_windows: int
     aoi_mean: Float[np.ndarray, "B"]  # Eq. 10 [windows]
@@ -30,11 +34,14 @@ class Summary:
     velocity_variance_last: Float[np.ndarray, "B"]  # after the last window [m²/s²]
     hops_mean: Float[np.ndarray, "B"]  # depth of the parent trees [hops]
     complete_window: Float[np.ndarray, "B"]  # everyone had first heard of everyone, or nan
-    packets_attempted: Float[np.ndarray, "B"]
+    packets_sent: Float[np.ndarray, "B"]  # requests or broadcasts
+    packets_attempted: Float[np.ndarray, "B"]  # requests
     packets_delivered: Float[np.ndarray, "B"]
     packets_lost: Float[np.ndarray, "B"]
     packets_overheard: Float[np.ndarray, "B"]
     packets_answered: Float[np.ndarray, "B"]
+    packets_heard: Float[np.ndarray, "B"]  # broadcasts that at least one robot decoded
+    hearers_per_packet: Float[np.ndarray, "B"]  # robots that decoded a broadcast; nan if none flew
 
 
 def fly(swarm: Swarm, policy: Policy) -> Iterator[Flown]:
@@ -75,7 +82,12 @@ def summarise(flown: Sequence[Flown]) -> Summary:
     variance = np.stack([window.costs.velocity_variance_m2ps2 for window in flown])
     is_complete = np.stack([window.costs.is_complete for window in flown])
     first_complete = np.argmax(is_complete, axis=0) + 1.0
-    packets = [window.costs.packets for window in flown]
+    packets = {
+        name: np.sum([getattr(window.costs.packets, name) for window in flown], axis=0)
+        for name in ("sent", "attempted", "delivered", "lost", "overheard", "answered", "heard")
+    }
+    receptions = np.sum([window.costs.packets.receptions for window in flown], axis=0)
+    num_sent = np.where(packets["sent"] > 0, packets["sent"], np.nan)
     return Summary(
         num_windows=len(flown),
         aoi_mean=np.mean([window.costs.age_windows for window in flown], axis=0),
@@ -84,9 +96,6 @@ def summarise(flown: Sequence[Flown]) -> Summary:
         velocity_variance_last=variance[-1],
         hops_mean=np.mean([window.hops for window in flown], axis=0),
         complete_window=np.where(np.any(is_complete, axis=0), first_complete, np.nan),
-        packets_attempted=np.sum([p.attempted for p in packets], axis=0, dtype=float),
-        packets_delivered=np.sum([p.delivered for p in packets], axis=0, dtype=float),
-        packets_lost=np.sum([p.lost for p in packets], axis=0, dtype=float),
-        packets_overheard=np.sum([p.overheard for p in packets], axis=0, dtype=float),
-        packets_answered=np.sum([p.answered for p in packets], axis=0, dtype=float),
+        **{f"packets_{name}": count for name, count in packets.items()},
+        hearers_per_packet=receptions / num_sent,
     )

@@ -1,4 +1,5 @@
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,17 +10,24 @@ from swarm_mj.protocol.costs import Packets, WindowCosts, mean_hops
 from swarm_mj.rollout import Flown, fly, summarise
 from swarm_mj.swarm import Swarm
 
+ADDRESSED = ("attempted", "delivered", "overheard", "answered")
+BROADCAST = ("sent", "heard", "receptions")
+
+
+def packets_of(**counts):
+    """Counts of one kind of packets in two missions; those of the other kind are nan."""
+    nothing = {name: [np.nan, np.nan] for name in (*ADDRESSED, *BROADCAST)}
+    return Packets(**{name: np.array(count) for name, count in (nothing | counts).items()})
+
 
 def flown_by_hand(age, variance, is_complete, hops, packets):
     """One window of two missions; packets: attempted, delivered, overheard, answered."""
-    counts = (np.array(count, dtype=np.int64) for count in packets)
+    counts = {name: np.array(count, float) for name, count in zip(ADDRESSED, packets, strict=True)}
     costs = WindowCosts(
         age_windows=np.array(age),
         is_complete=np.array(is_complete),
         velocity_variance_m2ps2=np.array(variance),
-        packets=Packets(
-            **dict(zip(("attempted", "delivered", "overheard", "answered"), counts, strict=True))
-        ),
+        packets=packets_of(sent=counts["attempted"], **counts),
     )
     return Flown(costs=costs, hops=np.array(hops))
 
@@ -46,11 +54,33 @@ def test_summary_by_hand():
     np.testing.assert_allclose(summary.velocity_variance_first, [9.0, 4.0])
     np.testing.assert_allclose(summary.velocity_variance_last, [0.0, 6.0])
     np.testing.assert_allclose(summary.hops_mean, [1.5, 1.0])
+    np.testing.assert_allclose(summary.packets_sent, [5.0, 4.0])
     np.testing.assert_allclose(summary.packets_attempted, [5.0, 4.0])
     np.testing.assert_allclose(summary.packets_delivered, [3.0, 2.0])
     np.testing.assert_allclose(summary.packets_lost, [2.0, 2.0])
     np.testing.assert_allclose(summary.packets_overheard, [2.0, 4.0])
     np.testing.assert_allclose(summary.packets_answered, [1.0, 2.0])
+    assert np.isnan([summary.packets_heard, summary.hearers_per_packet]).all()
+
+
+def test_broadcasts_are_summed_up_by_hand():
+    """7 of 10 packets are heard, by 15 robots; in the second mission none is sent."""
+    counts = [([6.0, 0.0], [4.0, 0.0], [12.0, 0.0]), ([4.0, 0.0], [3.0, 0.0], [3.0, 0.0])]
+    flown = [
+        replace(
+            window,
+            costs=replace(
+                window.costs, packets=packets_of(**dict(zip(BROADCAST, count, strict=True)))
+            ),
+        )
+        for window, count in zip(THREE_WINDOWS[:2], counts, strict=True)
+    ]
+    summary = summarise(flown)
+    np.testing.assert_array_equal(summary.packets_sent, [10.0, 0.0])
+    np.testing.assert_array_equal(summary.packets_heard, [7.0, 0.0])
+    np.testing.assert_array_equal(summary.hearers_per_packet, [1.5, np.nan])
+    for name in (*ADDRESSED, "lost"):
+        assert np.isnan(getattr(summary, f"packets_{name}")).all()
 
 
 @pytest.mark.parametrize(

@@ -293,8 +293,8 @@ def test_iv_c_flooding_by_hand():
     np.testing.assert_array_equal(swarm.buffers.timestamp[0], timestamp)
     assert swarm.buffers.last_attempt[0, 0, 1] == 0.5
     assert swarm.buffers.last_attempt[0, 1, 2] == 1.0
-    assert costs.packets.attempted == costs.packets.delivered == 2
-    assert costs.packets.answered == 0
+    assert costs.packets.sent == costs.packets.heard == 2
+    assert costs.packets.receptions == 7 + 7
 
 
 @pytest.mark.parametrize(("preset", "own_attempt"), [(paper, 0.0), (reference, 0.5)])

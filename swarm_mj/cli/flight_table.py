@@ -22,6 +22,21 @@ def flight_numbers(summary: Summary) -> dict[str, Any]:
     return numbers
 
 
+def _fates(numbers: dict[str, Any]) -> dict[str, str]:
+    """What became of the packets: broadcasts are heard or not, addressed ones delivered or lost."""
+    if numbers["packets_attempted"] is None:
+        hearers = numbers["hearers_per_packet"]
+        return {
+            "  heard by somebody": f"{numbers['packets_heard']}",
+            "  robots that heard a packet, mean": "-" if hearers is None else f"{hearers:.2f}",
+        }
+    return {
+        "  delivered, lost": f"{numbers['packets_delivered']}, {numbers['packets_lost']}",
+        "  answered": f"{numbers['packets_answered']}",
+        "  overheard by others": f"{numbers['packets_overheard']}",
+    }
+
+
 def flight_table(options: argparse.Namespace, summary: Summary, wall_s: float) -> Table:
     """What the flight cost, as a table for the terminal."""
     numbers = flight_numbers(summary)
@@ -41,10 +56,8 @@ def flight_table(options: argparse.Namespace, summary: Summary, wall_s: float) -
             f"{numbers['velocity_variance_first']:.4f} to "
             f"{numbers['velocity_variance_last']:.4f} m²/s²"
         ),
-        "packets attempted": f"{numbers['packets_attempted']}",
-        "  delivered, lost": f"{numbers['packets_delivered']}, {numbers['packets_lost']}",
-        "  answered": f"{numbers['packets_answered']}",
-        "  overheard by others": f"{numbers['packets_overheard']}",
+        "packets sent": f"{numbers['packets_sent']}",
+        **_fates(numbers),
         "hops in the parent trees, mean": f"{numbers['hops_mean']:.2f}",
         "everyone had heard of everyone": f"window {complete}" if complete else "never",
         "windows flown": f"{summary.num_windows} in {wall_s:.2f} s",

@@ -15,6 +15,8 @@ from swarm_mj.protocol.window import PHASE
 from swarm_mj.rollout import Flown, fly
 from swarm_mj.swarm import Swarm
 
+PACKETS = ("sent", "delivered", "heard", "receptions")  # the counts that are kept
+
 
 @dataclass(frozen=True, kw_only=True)
 class Batch:
@@ -38,8 +40,10 @@ class BatchCosts:
     velocity_variance: list[float]  # Eq. 17, mean over windows [m²/s²]
     hops: list[float]  # depth of the parent trees, mean over windows
     complete_window: list[int | None]  # everyone had first heard of everyone
-    packets_attempted: list[int]
-    packets_delivered: list[int]
+    packets_sent: list[int]  # requests or broadcasts
+    packets_delivered: list[int | None]  # requests that their addressee decoded; None: broadcasts
+    packets_heard: list[int | None]  # broadcasts that somebody decoded; None: addressed packets
+    receptions: list[int | None]  # times that a robot decoded a broadcast; None: as above
     ages: list[int]  # of all missions: how often a robot's knowledge of another had each age,
     # in half windows, from 0 to the mission's length
 
@@ -85,7 +89,7 @@ class Tally:
         self._aoi, self._steady, self._floor_age, self._variance, self._hops = np.zeros(
             (5, num_missions)
         )
-        self._attempted, self._delivered = np.zeros((2, num_missions), dtype=np.int64)
+        self._packets = {name: np.zeros(num_missions) for name in PACKETS}
         self._complete = np.full(num_missions, np.inf)
         self._ages = np.zeros(round(mission.num_windows / PHASE) + 1, dtype=np.int64)
 
@@ -98,8 +102,8 @@ class Tally:
         self._floor_age += self._floor.next(swarm.bodies.position_m, swarm.now, swarm.is_on)
         self._variance += costs.velocity_variance_m2ps2
         self._hops += flown.hops
-        self._attempted += costs.packets.attempted
-        self._delivered += costs.packets.delivered
+        for name, count in self._packets.items():
+            count += getattr(costs.packets, name)
         complete = np.where(costs.is_complete, swarm.now, np.inf)
         np.minimum(self._complete, complete, out=self._complete)
         count_ages(swarm.buffers.timestamp, swarm.now, self._ages, swarm.is_on)
@@ -113,11 +117,18 @@ class Tally:
             aoi_floor=(self._floor_age / num_windows).tolist(),
             velocity_variance=(self._variance / num_windows).tolist(),
             hops=(self._hops / num_windows).tolist(),
-            complete_window=[int(t) if np.isfinite(t) else None for t in self._complete],
-            packets_attempted=self._attempted.tolist(),
-            packets_delivered=self._delivered.tolist(),
+            complete_window=_whole(self._complete),
+            packets_sent=self._packets["sent"].astype(int).tolist(),
+            packets_delivered=_whole(self._packets["delivered"]),
+            packets_heard=_whole(self._packets["heard"]),
+            receptions=_whole(self._packets["receptions"]),
             ages=self._ages.tolist(),
         )
+
+
+def _whole(counts: Float[np.ndarray, "B"]) -> list[int | None]:
+    """Whole numbers; what never happened, or does not apply, is None."""
+    return [int(count) if np.isfinite(count) else None for count in counts]
 
 
 def count_ages(

@@ -34,6 +34,7 @@ class Result:
     episodes: int
     seed: int  # of the first mission; the others follow one by one
     probability: float | None  # of a transmission, for the policies that have one
+    payload: str | None = None  # what packets carry beyond T, M and P (II-B); "none" or its name
 
     aoi_mean: float
     aoi_std: float | None
@@ -57,8 +58,10 @@ class Result:
     velocity_variance_ci_high: float | None
     velocity_variance_median: float
 
-    delivery_ratio: float | None  # packets delivered to their addressee, of those attempted
-    packets_per_window: float  # attempted
+    packets_per_window: float  # requests or broadcasts, no responses
+    delivery_ratio: float | None  # of requests: decoded by their addressee
+    heard_ratio: float | None = None  # of broadcasts: decoded by at least one robot
+    hearers_per_packet: float | None = None  # robots that decoded a broadcast, on average
     hops_mean: float  # depth of the parent trees, over windows and missions
     complete_window_median: float | None  # over the missions in which everyone heard of everyone
     complete_share: float  # of these missions

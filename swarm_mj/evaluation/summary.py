@@ -61,9 +61,8 @@ def summarise(
                 **_regime(study, policy, regime),
                 **_aoi(own),
                 **_spread("velocity_variance", spread(np.array(own.velocity_variance))),
-                **_talk(
-                    own, regime, is_broadcast=study.make_policy(policy, regime).transmits_twice
-                ),
+                **_packets(own, regime),
+                **_completeness(own),
                 **_differences(own, merged[regime, study.compared_to]),
                 **_published(policy, regime),
                 version=made_by["version"],
@@ -100,6 +99,7 @@ def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
         "episodes": study.episodes,
         "seed": study.seed,
         "probability": parameters.get("probability"),
+        "payload": study.make_policy(policy, regime).payload,
     }
 
 
@@ -133,15 +133,29 @@ def _interval(name: str, interval: Interval) -> dict[str, Any]:
     return {f"{name}_ci_low": interval.low, f"{name}_ci_high": interval.high}
 
 
-def _talk(costs: BatchCosts, regime: Mission, *, is_broadcast: bool) -> dict[str, Any]:
-    """Packets, hops, and when everyone knew everyone; a broadcast is for nobody in particular."""
-    attempted, delivered = sum(costs.packets_attempted), sum(costs.packets_delivered)
+def _packets(costs: BatchCosts, regime: Mission) -> dict[str, Any]:
+    """How many were sent, and what became of them."""
+    sent = sum(costs.packets_sent)
+    return {
+        "packets_per_window": sent / (len(costs.aoi) * regime.num_windows),
+        "delivery_ratio": _per_packet(costs.packets_delivered, sent),
+        "heard_ratio": _per_packet(costs.packets_heard, sent),
+        "hearers_per_packet": _per_packet(costs.receptions, sent),
+    }
+
+
+def _per_packet(counts: Sequence[int | None], sent: int) -> float | None:
+    """A count over the packets sent; None if it does not apply to them, or none was sent."""
+    applicable = [count for count in counts if count is not None]
+    return sum(applicable) / sent if applicable and sent else None
+
+
+def _completeness(costs: BatchCosts) -> dict[str, Any]:
+    """Hops, and when everyone had heard of everyone."""
     complete = [window for window in costs.complete_window if window is not None]
     episodes = len(costs.aoi)
     median = np.median(complete + [np.inf] * (episodes - len(complete)))
     return {
-        "delivery_ratio": delivered / attempted if attempted and not is_broadcast else None,
-        "packets_per_window": attempted / (episodes * regime.num_windows),
         "hops_mean": float(np.mean(costs.hops)),
         "complete_window_median": float(median) if np.isfinite(median) else None,
         "complete_share": len(complete) / episodes,

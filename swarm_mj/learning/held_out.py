@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from swarm_mj.evaluation.statistics import standard_error
 from swarm_mj.gnn.feature_sets import make_observer
@@ -39,8 +39,8 @@ class _Flown:
 
     age_windows: Float[np.ndarray, "windows B"]
     velocity_variance_m2ps2: Float[np.ndarray, "windows B"]
-    attempted: Int[np.ndarray, "windows B"]
-    delivered: Int[np.ndarray, "windows B"]
+    attempted: Float[np.ndarray, "windows B"]
+    delivered: Float[np.ndarray, "windows B"]
 
 
 def held_out_policy(training: Training, network: AggregationGnn, mission: Mission) -> LearnedPolicy:

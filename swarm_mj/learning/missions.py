@@ -38,8 +38,8 @@ class Outcome:
     credit: Float[np.ndarray, "B N"]  # ages removed by each robot [windows]; 0 unless asked for
     age_windows: Float[np.ndarray, "B"]  # Eq. 10 [windows]
     velocity_variance_m2ps2: Float[np.ndarray, "B"]  # Eq. 17 [m²/s²]
-    attempted: Int[np.ndarray, "B"]  # packets
-    delivered: Int[np.ndarray, "B"]
+    attempted: Float[np.ndarray, "B"]  # packets
+    delivered: Float[np.ndarray, "B"]
     graphs: Graphs  # what the robots see next; of new missions if these ended
     last_graphs: Graphs | None  # what they saw at the end, if the missions ended here
     is_cut: bool  # whether they ended before the mission did, to stagger the groups

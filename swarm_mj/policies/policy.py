@@ -20,9 +20,9 @@ class Policy:
     moves_each_transmission: ClassVar[bool] = False  # where the mission's field of that name is set
 
     @property
-    def carries_payload(self) -> bool:
-        """Whether packets carry more than T, M and P (II-B); the paper's bandwidth has no limit."""
-        return False
+    def payload(self) -> str:
+        """What packets carry beyond T, M and P (II-B); "none" is what the paper's carry."""
+        return "none"
 
     @property
     def parameters(self) -> Parameters:

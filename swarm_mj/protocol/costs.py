@@ -14,15 +14,24 @@ from swarm_mj.protocol.window import Phase
 
 @dataclass(frozen=True, kw_only=True)
 class Packets:
-    """What became of the packets of one window, or of many, in every mission [packets]."""
+    """What became of one window's packets in every mission [packets].
 
-    attempted: Int[np.ndarray, "B"]  # sent to a recipient in a transmission phase
-    delivered: Int[np.ndarray, "B"]  # of these, decoded by the recipient
-    overheard: Int[np.ndarray, "B"]  # decoded by a robot it was not meant for, in any phase
-    answered: Int[np.ndarray, "B"]  # responses that the first sender decoded
+    Addressed packets (Alg. 1) are delivered or lost. A broadcast (IV-C) has no addressee: it is
+    heard or not. Counts of the other kind are nan.
+    """
+
+    sent: Float[np.ndarray, "B"]  # requests or broadcasts, no responses
+
+    attempted: Float[np.ndarray, "B"]  # requests, each to one recipient
+    delivered: Float[np.ndarray, "B"]  # of these, decoded by the recipient
+    overheard: Float[np.ndarray, "B"]  # receptions of requests and responses meant for another
+    answered: Float[np.ndarray, "B"]  # responses that the first sender decoded
+
+    heard: Float[np.ndarray, "B"]  # broadcasts that at least one robot decoded
+    receptions: Float[np.ndarray, "B"]  # times that a robot decoded a broadcast
 
     @property
-    def lost(self) -> Int[np.ndarray, "B"]:
+    def lost(self) -> Float[np.ndarray, "B"]:
         """Attempted, and not decoded by the recipient."""
         return self.attempted - self.delivered
 
@@ -70,21 +79,40 @@ def count_packets(phases: tuple[Phase, Phase], *, has_response: bool) -> Packets
 
     Args:
         phases: The window's two phases.
-        has_response: Whether the second phase answers the first (Alg. 1) or is a transmission of
-            its own (flooding).
+        has_response: Whether the second phase answers the first (Alg. 1), or both are broadcasts
+            (IV-C).
 
     Returns:
         The counts, per mission.
     """
-    num_missions = phases[0].recipient.shape[0]
-    count = np.zeros((4, num_missions), dtype=np.int64)
     first, second = phases
-    _count(first.recipient, first.heard, count[0], count[1], count[2])
+    num_missions = first.recipient.shape[0]
+    none = np.full(num_missions, np.nan)
     if has_response:
-        _count(second.recipient, second.heard, np.zeros_like(count[0]), count[3], count[2])
-    else:
-        _count(second.recipient, second.heard, count[0], count[1], count[2])
-    return Packets(attempted=count[0], delivered=count[1], overheard=count[2], answered=count[3])
+        sent, delivered, overheard, responses, answered = np.zeros((5, num_missions))
+        _count_addressed(first.recipient, first.heard, sent, delivered, overheard)
+        _count_addressed(second.recipient, second.heard, responses, answered, overheard)
+        return Packets(
+            sent=sent,
+            attempted=sent,
+            delivered=delivered,
+            overheard=overheard,
+            answered=answered,
+            heard=none,
+            receptions=none,
+        )
+    sent, heard, receptions = np.zeros((3, num_missions))
+    for phase in phases:
+        _count_broadcasts(phase.recipient, phase.heard, sent, heard, receptions)
+    return Packets(
+        sent=sent,
+        attempted=none,
+        delivered=none,
+        overheard=none,
+        answered=none,
+        heard=heard,
+        receptions=receptions,
+    )
 
 
 def mean_hops(
@@ -190,22 +218,46 @@ def _variance(
 
 @njit(cache=True)
 @no_type_check
-def _count(
+def _count_addressed(
     recipient: Int[np.ndarray, "B N"],
     heard: Int[np.ndarray, "B N"],
-    attempted: Int[np.ndarray, "B"],
-    received: Int[np.ndarray, "B"],
-    overheard: Int[np.ndarray, "B"],
+    sent: Float[np.ndarray, "B"],
+    received: Float[np.ndarray, "B"],
+    overheard: Float[np.ndarray, "B"],
 ) -> None:
+    """Adds a phase's packets to the counts; whoever addresses itself sends nothing."""
     num_missions, num_robots = recipient.shape
     for b in range(num_missions):
         for i in range(num_robots):
-            attempted[b] += recipient[b, i] != i
+            sent[b] += recipient[b, i] != i
             sender = heard[b, i]
             if sender != i:
                 is_meant = recipient[b, sender] == i
                 received[b] += is_meant
                 overheard[b] += not is_meant
+
+
+@njit(cache=True)
+@no_type_check
+def _count_broadcasts(
+    recipient: Int[np.ndarray, "B N"],
+    heard: Int[np.ndarray, "B N"],
+    sent: Float[np.ndarray, "B"],
+    received: Float[np.ndarray, "B"],
+    receptions: Float[np.ndarray, "B"],
+) -> None:
+    """Adds a phase's packets to the counts; whoever addresses itself sends nothing."""
+    num_missions, num_robots = recipient.shape
+    is_heard = np.empty(num_robots, dtype=np.bool_)
+    for b in range(num_missions):
+        is_heard[:] = False
+        for i in range(num_robots):
+            sent[b] += recipient[b, i] != i
+            sender = heard[b, i]
+            if sender != i:
+                receptions[b] += 1
+                is_heard[sender] = True
+        received[b] += is_heard.sum()
 
 
 @njit(cache=True)

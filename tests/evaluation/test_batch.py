@@ -40,8 +40,14 @@ def test_costs_are_those_of_the_flight(policy, switched_off):
     np.testing.assert_allclose(costs.aoi, summary.aoi_mean)
     np.testing.assert_allclose(costs.velocity_variance, summary.velocity_variance_mean)
     np.testing.assert_allclose(costs.hops, summary.hops_mean)
-    np.testing.assert_array_equal(costs.packets_attempted, summary.packets_attempted)
-    np.testing.assert_array_equal(costs.packets_delivered, summary.packets_delivered)
+    np.testing.assert_array_equal(costs.packets_sent, summary.packets_sent)
+    receptions = summary.hearers_per_packet * summary.packets_sent
+    for counted, expected in (
+        (costs.packets_delivered, summary.packets_delivered),
+        (costs.packets_heard, summary.packets_heard),
+        (costs.receptions, receptions),
+    ):
+        np.testing.assert_allclose(np.array(counted, dtype=float), expected)  # None is nan
     expected = [None if np.isnan(t) else t for t in summary.complete_window]
     assert costs.complete_window == expected
     steady = [window.costs.age_windows for window in flown[15:]]  # the later 16 of 31

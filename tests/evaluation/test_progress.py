@@ -18,8 +18,10 @@ def some_costs(number):
         velocity_variance=[1e22, 5e-324],
         hops=[1.0, 2.0],
         complete_window=[None, 7],
-        packets_attempted=[1, 2],
-        packets_delivered=[0, 2],
+        packets_sent=[1, 2],
+        packets_delivered=[0, None],
+        packets_heard=[None, 2],
+        receptions=[None, 5],
         ages=[0, 3, 2**40],
     )
 

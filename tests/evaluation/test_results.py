@@ -97,6 +97,16 @@ def test_cells_that_are_not_what_they_must_be(tmp_path, cells, complaint):
         read_results(tmp_path / "r.csv")
 
 
+def test_files_from_before_broadcasts_were_counted_are_read(tmp_path):
+    new = ("payload", "heard_ratio", "hearers_per_packet")
+    old = {name: cell for name, cell in asdict(some_result()).items() if name not in new}
+    with (tmp_path / "old.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, old)
+        writer.writeheader()
+        writer.writerow(old)
+    assert read_results(tmp_path / "old.csv") == [some_result(**dict.fromkeys(new))]
+
+
 def test_files_from_before_robots_could_be_switched_off_are_read(tmp_path):
     write_csv(tmp_path / "r.csv", [some_result(switched_off=0.0)])
     header, row = (tmp_path / "r.csv").read_text().splitlines()

@@ -32,8 +32,10 @@ def costs(aoi, **overrides):
         "velocity_variance": [age / 10.0 for age in aoi],
         "hops": [1.0] * n,
         "complete_window": [None] * n,
-        "packets_attempted": [1000] * n,
+        "packets_sent": [1000] * n,
         "packets_delivered": [250] * n,
+        "packets_heard": [None] * n,
+        "receptions": [None] * n,
         "ages": [1000] + [0] * 1000,
     }
     return BatchCosts(**(made_up | overrides))
@@ -54,11 +56,12 @@ MST = [
     costs([43.0], complete_window=[40], hops=[4.0], ages=[5] + [0] * 9 + [5] + [0] * 990),
 ]
 ROUND_ROBIN = [
-    costs([41.0, 48.0], packets_attempted=[0, 0], packets_delivered=[0, 0]),
-    costs([49.0], packets_attempted=[0], packets_delivered=[0]),
+    costs([41.0, 48.0], packets_sent=[0, 0], packets_delivered=[0, 0]),
+    costs([49.0], packets_sent=[0], packets_delivered=[0]),
 ]
 
 
+SILENT = costs([1.0], packets_sent=[0], packets_delivered=[None], packets_heard=[0], receptions=[0])
 MADE_BY = {"version": "1.2.3", "commit": "abc"}
 
 
@@ -106,7 +109,25 @@ def test_talk_by_hand():
     assert mst.hops_mean == 3.0
     assert (mst.complete_window_median, mst.complete_share) == (40.0, pytest.approx(2 / 3))
     assert (round_robin.delivery_ratio, round_robin.packets_per_window) == (None, 0.0)
+    assert [mst.heard_ratio, mst.hearers_per_packet, mst.payload] == [None, None, "none"]
     assert (round_robin.complete_window_median, round_robin.complete_share) == (None, 0.0)
+
+
+def test_broadcasts_by_hand():
+    """1500 packets, 600 of them heard, 2400 times; nothing is delivered to anyone."""
+    broadcast = costs(
+        [40.0, 46.0, 43.0],
+        packets_sent=[1000, 200, 300],
+        packets_delivered=[None] * 3,
+        packets_heard=[500, 0, 100],
+        receptions=[1000, 0, 1400],
+    )
+    study = Study(policies=("planner",), regimes=(STATIONARY,), episodes=3, seed=5)
+    (planner,) = (each.result for each in summarise(study, {0: broadcast, 1: SILENT}, MADE_BY))
+    assert planner.packets_per_window == pytest.approx(1500 / (4 * 500))
+    assert (planner.heard_ratio, planner.hearers_per_packet) == (0.4, 1.6)
+    assert planner.delivery_ratio is None
+    assert planner.payload == "snapshots"
 
 
 def test_differences_are_paired():

@@ -157,7 +157,7 @@ def test_what_is_seen_is_normalised_by_the_mission_flown(tmp_path):
 def test_it_is_decentralised_and_says_what_it_is():
     policy = learned()
     assert isinstance(policy, DecentralisedPolicy)
-    assert not policy.carries_payload
+    assert policy.payload == "none"
     assert not policy.transmits_twice
     assert policy.parameters["receptive_field"] == 1
     assert policy.parameters["is_deterministic"] is False

@@ -24,8 +24,8 @@ MISSION = paper("flocking", num_robots=8)
 CENTRALISED = ["round-robin", "mst", "greedy-oracle", "oracle-lookahead"]
 DECENTRALISED = [name for name in POLICIES if name not in CENTRALISED]
 # What robots learn from their packets' payload is in no view: test_planner.py holds them to Eq. 9.
-CARRIES_PAYLOAD = ["planner"]
-VIEWED = [name for name in DECENTRALISED if name not in CARRIES_PAYLOAD]
+PAYLOAD = {"planner": "snapshots"}  # what packets carry beyond T, M and P
+VIEWED = [name for name in DECENTRALISED if name not in PAYLOAD]
 ROW = 3  # the robot whose knowledge the law keeps
 
 
@@ -78,7 +78,7 @@ def test_eq9_a_decentralised_robot_decides_on_its_own_view(name, preset):
 
 @pytest.mark.parametrize("name", POLICIES)
 def test_ii_b_policies_say_whether_packets_carry_more_than_the_buffer(name):
-    assert make_policy(name, MISSION).carries_payload == (name in CARRIES_PAYLOAD)
+    assert make_policy(name, MISSION).payload == PAYLOAD.get(name, "none")
 
 
 @pytest.mark.parametrize("name", DECENTRALISED)

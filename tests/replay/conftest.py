@@ -24,7 +24,7 @@ class Recorded:
 
     def counted(self, fate: str) -> np.ndarray:
         """How many packets of a fate each window had, by the costs."""
-        return np.array([int(getattr(packets, fate)[0]) for packets in self.packets])
+        return np.array([getattr(packets, fate)[0] for packets in self.packets])
 
 
 def record(policy_name, probability, **overrides):

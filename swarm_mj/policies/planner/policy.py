@@ -89,9 +89,9 @@ class Planner(DecentralisedPolicy):
         return self._scorer.parameters
 
     @property
-    def carries_payload(self) -> bool:
-        """Packets carry pictures."""
-        return True
+    def payload(self) -> str:
+        """Packets carry pictures of the team, taken at an earlier time."""
+        return "snapshots"
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draws each mission's speaking orders and forgets; arguments as in `Policy.start`."""

@@ -91,7 +91,7 @@ def test_eq9_sharing_is_planning_apart_where_pictures_differ(mission, seed, chan
 
 def test_ii_b_packets_carry_pictures_and_nobody_answers():
     policy = make_policy("planner", SMALL)
-    assert policy.carries_payload
+    assert policy.payload == "snapshots"
     assert policy.transmits_twice
 
 
