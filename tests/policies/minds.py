@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.greedy_oracle.schedule import links_between
 from swarm_mj.policies.planner import discovery, plan
 from swarm_mj.policies.planner import policy as planner
 from swarm_mj.policies.planner import snapshots as pictures
@@ -18,6 +17,7 @@ from swarm_mj.policies.planner.broadcast_scheduler import schedule
 from swarm_mj.policies.planner.weights import RuleOfThumb, Scorer
 from swarm_mj.policies.policy import DecentralisedPolicy
 from swarm_mj.policies.registry import make_policy
+from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.swarm import Swarm
 

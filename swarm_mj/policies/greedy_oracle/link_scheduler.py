@@ -18,21 +18,14 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 from numba import njit
 
+from swarm_mj.radio.links import Links
+
 HALVES = 2  # of a window: the unit of time in here
 LOGISTIC = 1.702  # 1 / (1 + exp(-1.702 z)) is within 0.01 of the normal distribution function
 CERTAIN = 2.5  # standard deviations beyond which a packet decodes for certain, or never
 NOBODY = -1
 NO_PAIR = (NOBODY, NOBODY)
 NOT_A_PAIR = -1.0  # in place of a gain, which is never negative
-
-
-class Links(NamedTuple):
-    """What a scheduler believes about the radio between any two robots."""
-
-    received_mw: Float[np.ndarray, "N N"]  # power of i at j; 0 where none is counted on [mW]
-    sharpness: Float[np.ndarray, "N N"]  # distance over its standard deviation, inf if known [1]
-    noise_mw: float
-    threshold: float  # least SINR that decodes, linear [1]
 
 
 class _Air(NamedTuple):
@@ -282,7 +275,7 @@ def _listen(
     """Fills `phase` with what the silent robots decode, when `also` sends too, or `NOBODY`."""
     num_robots = is_silent.shape[0]
     heard, chance = phase.heard, phase.chance
-    received_mw, sharpness = links.received_mw, links.sharpness
+    received_mw, distance_over_std = links.received_mw, links.distance_over_std
     total_mw, strongest_mw, strongest = air.total_mw, air.strongest_mw, air.strongest
     for j in range(num_robots):
         heard[j], chance[j] = j, 0.0
@@ -298,7 +291,7 @@ def _listen(
                     total_mw[j] + added_mw,
                     links.noise_mw,
                     links.threshold,
-                    sharpness[sender, j],
+                    distance_over_std[sender, j],
                 )
                 heard[j] = sender if chance[j] > 0.0 else j
 
@@ -306,7 +299,11 @@ def _listen(
 @njit(cache=True)
 @no_type_check
 def _chance(
-    strongest_mw: float, total_mw: float, noise_mw: float, threshold: float, sharpness: float
+    strongest_mw: float,
+    total_mw: float,
+    noise_mw: float,
+    threshold: float,
+    distance_over_std: float,
 ) -> float:
     """How probably the strongest packet at a receiver decodes (Eqs. 3-4).
 
@@ -314,9 +311,9 @@ def _chance(
     threshold), so a packet over a believed d comes through if the true distance is below that.
     """
     ratio = strongest_mw / (noise_mw + (total_mw - strongest_mw)) / threshold
-    if sharpness == np.inf:
+    if distance_over_std == np.inf:
         return 1.0 if ratio >= 1.0 else 0.0
-    deviations = (math.sqrt(ratio) - 1.0) * sharpness
+    deviations = (math.sqrt(ratio) - 1.0) * distance_over_std
     if abs(deviations) > CERTAIN:
         return 1.0 if deviations > 0.0 else 0.0
     return 1.0 / (1.0 + math.exp(-LOGISTIC * deviations))

@@ -9,15 +9,14 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.policies.greedy_oracle.link_scheduler import Links
 from swarm_mj.policies.greedy_oracle.schedule import (
     greedy_schedule,
-    links_between,
     lookahead_window,
 )
 from swarm_mj.policies.policy import CentralisedPolicy
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import FreeSpaceRadio
+from swarm_mj.radio.links import Links, links_between
 
 
 class _Oracle(CentralisedPolicy):

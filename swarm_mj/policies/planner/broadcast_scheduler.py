@@ -6,12 +6,11 @@ below 1 lets robots far apart speak at the same time, each heard by those near i
 that moment, but news then travels on many ways at once. Looking ahead, several first speakers are
 followed for a few half windows, and the one that leaves the team youngest is taken.
 
-A packet that raises T^{j,k} (Eq. 8) by r, where the age before was a, is worth
-r (linear + squared r + aged a), with weights for every receiver j and subject k. Where positions
-are only believed, a packet decodes with a probability, and timestamps are expected ones. Index
-order: `i` sends, `j` receives. Times are in half windows, float32, which keeps them exact for 8
-million windows. All kernels are in this one file, because numba's cache does not see changes in
-another.
+A packet that raises T^{j,k} (Eq. 8) by r is worth r² times a weight of receiver j and subject k.
+Where positions are only believed, a packet decodes with a probability, and timestamps are expected
+ones. Index order: `i` sends, `j` receives. Times are in half windows, float32, which keeps them
+exact for 8 million windows. All kernels are in this one file, because numba's cache does not see
+changes in another.
 """
 
 from typing import NamedTuple, no_type_check
@@ -20,19 +19,17 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 from numba import njit
 
-from swarm_mj.policies.greedy_oracle.link_scheduler import Links
+from swarm_mj.radio.links import Links
 
 LOGISTIC = 1.702  # 1 / (1 + exp(-1.702 z)) is within 0.01 of the normal distribution function
 CERTAIN = 2.5  # standard deviations beyond which a packet decodes for certain, or never
 NOBODY = -1
 
 
-class Worth(NamedTuple):
+class Weights(NamedTuple):
     """What it is worth that a receiver (row) hears of a subject (column)."""
 
-    linear: Float32[np.ndarray, "N N"]  # times the rise r
-    squared: Float32[np.ndarray, "N N"]  # times r²
-    aged: Float32[np.ndarray, "N N"]  # times r and the age before
+    squared_rise: Float32[np.ndarray, "N N"]  # times the square of what T rises by
     least_share: float  # of a half window's worth that must remain when a speaker is added
 
 
@@ -57,7 +54,7 @@ def schedule(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
     links: Links,
-    worth: Worth,
+    weights: Weights,
     foresight: Foresight,
     is_free: Bool[np.ndarray, "P"],
     speaks: Bool[np.ndarray, "P N"],
@@ -68,7 +65,7 @@ def schedule(
         timestamp: T, written in place [half windows].
         now: t before the first half window [half windows].
         links: The radio; the robots stand still.
-        worth: What news is worth.
+        weights: What news is worth.
         foresight: How far to look ahead.
         is_free: Which half windows the schedule may fill; in the others nobody speaks.
         speaks: Who speaks in each.
@@ -82,8 +79,8 @@ def schedule(
         if is_free[p]:
             first = NOBODY
             if foresight.branches > 1:
-                first = _best_first(timestamp, now, links, reach, worth, foresight, is_free[p:])
-            _choose(timestamp, now, links, reach, worth, first, speaks[p])
+                first = _best_first(timestamp, now, links, reach, weights, foresight, is_free[p:])
+            _choose(timestamp, links, reach, weights, first, speaks[p])
             _advance(timestamp, links, speaks[p], after)
             timestamp[:] = after
 
@@ -122,17 +119,17 @@ def _best_first(
     now: float,
     links: Links,
     reach: Bool[np.ndarray, "N N"],
-    worth: Worth,
+    weights: Weights,
     foresight: Foresight,
     is_free: Bool[np.ndarray, "P"],
 ) -> int:
     """The first speaker whose branch knows most, summed over its half windows; `NOBODY`: none."""
-    alone = _worth_alone(timestamp, now, links, reach, worth)
+    alone = _worth_alone(timestamp, links, reach, weights)
     best, most_known = NOBODY, -np.inf
     for first in np.argsort(-alone, kind="mergesort")[: foresight.branches]:
         if alone[first] > 0.0:
             num_ahead = min(foresight.half_windows, len(is_free))
-            known = _follow(timestamp, now, links, reach, worth, first, is_free[:num_ahead])
+            known = _follow(timestamp, now, links, reach, weights, first, is_free[:num_ahead])
             if known > most_known:
                 best, most_known = first, known
     return best
@@ -145,7 +142,7 @@ def _follow(
     now: float,
     links: Links,
     reach: Bool[np.ndarray, "N N"],
-    worth: Worth,
+    weights: Weights,
     first: int,
     is_free: Bool[np.ndarray, "P"],
 ) -> float:
@@ -158,7 +155,7 @@ def _follow(
             now += 1.0
             _observe_self(before, now)
         if is_free[p]:
-            _choose(before, now, links, reach, worth, first if p == 0 else NOBODY, speaks)
+            _choose(before, links, reach, weights, first if p == 0 else NOBODY, speaks)
             _advance(before, links, speaks, after)
             before, after = after, before
         known += float(before.sum())
@@ -169,16 +166,15 @@ def _follow(
 @no_type_check
 def _choose(
     timestamp: Float32[np.ndarray, "N N"],
-    now: float,
     links: Links,
     reach: Bool[np.ndarray, "N N"],
-    worth: Worth,
+    weights: Weights,
     first: int,
     speaks: Bool[np.ndarray, "N"],
 ) -> None:
     """Fills `speaks` with a half window's speakers, a given first one before all others."""
     num_robots = timestamp.shape[0]
-    gain = _gains(timestamp, now, reach, worth)
+    gain = _gains(timestamp, reach, weights)
     has_news = _has_news(gain)
     air = _silent_air(num_robots)
     speaks[:] = False
@@ -187,7 +183,7 @@ def _choose(
         value = _value(links, gain, air, speaks, first)
         _speak(links, air, speaks, first)
     while True:
-        best, best_value = NOBODY, value * worth.least_share
+        best, best_value = NOBODY, value * weights.least_share
         for i in range(num_robots):
             if not speaks[i] and has_news[i]:
                 with_i = _value(links, gain, air, speaks, i)
@@ -215,14 +211,13 @@ def _has_news(gain: Float[np.ndarray, "N N"]) -> Bool[np.ndarray, "N"]:
 @no_type_check
 def _worth_alone(
     timestamp: Float32[np.ndarray, "N N"],
-    now: float,
     links: Links,
     reach: Bool[np.ndarray, "N N"],
-    worth: Worth,
+    weights: Weights,
 ) -> Float[np.ndarray, "N"]:
     """What a half window is worth in which i alone speaks."""
     num_robots = timestamp.shape[0]
-    gain = _gains(timestamp, now, reach, worth)
+    gain = _gains(timestamp, reach, weights)
     air = _silent_air(num_robots)
     nobody = np.zeros(num_robots, dtype=np.bool_)
     alone = np.empty(num_robots)
@@ -241,7 +236,7 @@ def _value(
     also: int,
 ) -> float:
     """What the half window is worth when this robot speaks beside those in the air."""
-    received_mw, sharpness = links.received_mw, links.sharpness
+    received_mw, distance_over_std = links.received_mw, links.distance_over_std
     noise_mw, threshold = links.noise_mw, links.threshold
     total_mw, strongest_mw, strongest = air.total_mw, air.strongest_mw, air.strongest
     value = 0.0
@@ -254,19 +249,19 @@ def _value(
             if signal_mw > 0.0 and gain[sender, j] != 0.0:
                 noise = noise_mw + (total_mw[j] + added_mw - signal_mw)
                 value += gain[sender, j] * _chance(
-                    signal_mw, noise, threshold, sharpness[sender, j]
+                    signal_mw, noise, threshold, distance_over_std[sender, j]
                 )
     return value
 
 
 @njit(cache=True)
 @no_type_check
-def _chance(signal_mw: float, noise_mw: float, threshold: float, sharpness: float) -> float:
+def _chance(signal_mw: float, noise_mw: float, threshold: float, distance_over_std: float) -> float:
     """How probably a packet over a believed distance decodes; see `greedy._chance`."""
     ratio = signal_mw / noise_mw / threshold
-    if sharpness == np.inf:
+    if distance_over_std == np.inf:
         return 1.0 if ratio >= 1.0 else 0.0
-    deviations = (np.sqrt(ratio) - 1.0) * sharpness
+    deviations = (np.sqrt(ratio) - 1.0) * distance_over_std
     if abs(deviations) > CERTAIN:
         return 1.0 if deviations > 0.0 else 0.0
     return 1.0 / (1.0 + np.exp(-LOGISTIC * deviations))
@@ -282,7 +277,9 @@ def _reach(links: Links) -> Bool[np.ndarray, "N N"]:
         for j in range(num_robots):
             signal_mw = links.received_mw[i, j]
             if signal_mw > 0.0:
-                chance = _chance(signal_mw, links.noise_mw, links.threshold, links.sharpness[i, j])
+                chance = _chance(
+                    signal_mw, links.noise_mw, links.threshold, links.distance_over_std[i, j]
+                )
                 reach[i, j] = chance > 0.0
     return reach
 
@@ -332,8 +329,8 @@ def _advance(
         signal_mw = air.strongest_mw[j]
         if not speaks[j] and signal_mw > 0.0:
             noise_mw = links.noise_mw + (air.total_mw[j] - signal_mw)
-            sharpness = links.sharpness[sender, j]
-            chance = np.float32(_chance(signal_mw, noise_mw, links.threshold, sharpness))
+            distance_over_std = links.distance_over_std[sender, j]
+            chance = np.float32(_chance(signal_mw, noise_mw, links.threshold, distance_over_std))
         for k in range(num_robots):
             rise = max(timestamp[sender, k] - timestamp[j, k], np.float32(0.0))
             after[j, k] = timestamp[j, k] + chance * rise
@@ -342,10 +339,7 @@ def _advance(
 @njit(cache=True)
 @no_type_check
 def _gains(
-    timestamp: Float32[np.ndarray, "N N"],
-    now: float,
-    reach: Bool[np.ndarray, "N N"],
-    worth: Worth,
+    timestamp: Float32[np.ndarray, "N N"], reach: Bool[np.ndarray, "N N"], weights: Weights
 ) -> Float[np.ndarray, "N N"]:
     """What it is worth that j decodes i; 0 where it cannot."""
     num_robots = timestamp.shape[0]
@@ -353,14 +347,7 @@ def _gains(
     for i in range(num_robots):
         for j in range(num_robots):
             if reach[i, j]:
-                gains[i, j] = _gain(
-                    timestamp[i],
-                    timestamp[j],
-                    np.float32(now),
-                    worth.linear[j],
-                    worth.squared[j],
-                    worth.aged[j],
-                )
+                gains[i, j] = _gain(timestamp[i], timestamp[j], weights.squared_rise[j])
     return gains
 
 
@@ -371,14 +358,18 @@ def _gains(
 def _gain(
     newer: Float32[np.ndarray, "N"],
     older: Float32[np.ndarray, "N"],
-    now: float,
-    linear: Float32[np.ndarray, "N"],
-    squared: Float32[np.ndarray, "N"],
-    aged: Float32[np.ndarray, "N"],
+    weight: Float32[np.ndarray, "N"],
 ) -> float:
     """The worth of raising T from one row to another, summed over subjects."""
     total = np.float32(0.0)
     for k in range(older.shape[0]):
         rise = max(newer[k] - older[k], np.float32(0.0))
-        total += rise * (linear[k] + squared[k] * rise + aged[k] * (now - older[k]))
+        total += _weighed(rise, weight[k])
     return float(total)
+
+
+@njit(cache=True, fastmath=False)  # said here, for it is the caller's otherwise
+@no_type_check
+def _weighed(rise: float, weight: float) -> float:
+    """A squared rise times its weight, multiplied in this order, whatever that of the sum is."""
+    return rise * (weight * rise)

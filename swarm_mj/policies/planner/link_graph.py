@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float
 from numba import njit
 
-from swarm_mj.policies.greedy_oracle.link_scheduler import Links
 from swarm_mj.policies.planner.broadcast_scheduler import CERTAIN, LOGISTIC
+from swarm_mj.radio.links import Links
 
 LEAST_CHANCE = 0.05  # links that decode more rarely count as none
 OUT_OF_REACH = np.inf  # instead of a number of hops
@@ -26,10 +26,10 @@ class LinkGraph:
     distance: Float[np.ndarray, "N N"]  # of i and j, in ranges [1]
     hops: Float[np.ndarray, "N N"]  # expected transmissions from i to j, or `OUT_OF_REACH`
     downstream: Float[np.ndarray, "N N"]  # whom k's news reach through i by a shortest way, i too
-    doubt: float  # mean standard deviation of the distance of linked robots, over that distance [1]
+    relative_std: float  # of the distance of linked robots, in the mean [1]
 
     @property
-    def is_whole(self) -> bool:
+    def has_no_isolated_node(self) -> bool:
         """Whether everyone has a link."""
         return bool(np.all(np.any(self.chance >= LEAST_CHANCE, axis=1)))
 
@@ -49,7 +49,9 @@ def link_graph(links: Links) -> LinkGraph:
         distance=distance,
         hops=hops,
         downstream=_downstream(hops, SLACK),
-        doubt=float(np.sum(chance / links.sharpness) / max(np.sum(chance), LEAST_CHANCE)),
+        relative_std=float(
+            np.sum(chance / links.distance_over_std) / max(np.sum(chance), LEAST_CHANCE)
+        ),
     )
 
 
@@ -57,10 +59,10 @@ def _lone_chances(links: Links) -> tuple[Float[np.ndarray, "N N"], Float[np.ndar
     """Chances without interference, and distances in ranges; nobody hears itself."""
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = np.sqrt(links.noise_mw * links.threshold / links.received_mw)
-        deviations = (1.0 / distance - 1.0) * links.sharpness
+        deviations = (1.0 / distance - 1.0) * links.distance_over_std
     deviations = np.where(np.isnan(deviations), 0.0, deviations)  # a known distance of one range
     chance = 1.0 / (1.0 + np.exp(-LOGISTIC * np.clip(deviations, -CERTAIN, CERTAIN)))
-    is_certain = np.isinf(links.sharpness) | (np.abs(deviations) > CERTAIN)
+    is_certain = np.isinf(links.distance_over_std) | (np.abs(deviations) > CERTAIN)
     chance = np.where(is_certain, (distance <= 1.0).astype(float), chance)
     chance[links.received_mw <= 0.0] = 0.0
     return chance, distance

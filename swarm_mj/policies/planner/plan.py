@@ -4,11 +4,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from swarm_mj.policies.greedy_oracle.link_scheduler import HALVES
-from swarm_mj.policies.greedy_oracle.schedule import links_between
 from swarm_mj.policies.planner.broadcast_scheduler import Foresight, schedule
 from swarm_mj.policies.planner.snapshots import Pictures
 from swarm_mj.policies.planner.weights import Scorer
 from swarm_mj.radio.free_space import FreeSpaceRadio
+from swarm_mj.radio.links import links_between
 
 # Looking ahead takes time that grows with N³, so larger teams do not. Where nobody moves, plans
 # come true as they are, and looking further ahead is worth it.

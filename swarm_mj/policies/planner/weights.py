@@ -4,10 +4,10 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from swarm_mj.policies.greedy_oracle.link_scheduler import Links
-from swarm_mj.policies.planner.broadcast_scheduler import Worth
+from swarm_mj.policies.planner.broadcast_scheduler import Weights
 from swarm_mj.policies.planner.link_graph import link_graph
 from swarm_mj.policies.policy import Parameters
+from swarm_mj.radio.links import Links
 
 # Chosen in trials on 8 stationary missions of 10 and 40 robots at range ratios from 0.2 to 1, and
 # on 20 walking ones.
@@ -26,7 +26,7 @@ class Scorer(Protocol):
         """What it was made with, by name."""
         ...
 
-    def __call__(self, links: Links) -> Worth:
+    def __call__(self, links: Links) -> Weights:
         """What a schedule is to weigh by."""
         ...
 
@@ -45,12 +45,12 @@ class RuleOfThumb:
         """It has none."""
         return {}
 
-    def __call__(self, links: Links) -> Worth:
+    def __call__(self, links: Links) -> Weights:
         """The rule's weights."""
         graph = link_graph(links)
         weight = np.maximum(graph.downstream, 1.0) ** DOWNSTREAM_EXPONENT
         weight *= np.clip(graph.hops, 1.0, len(weight)) ** HOPS_EXPONENT
-        nothing = np.zeros(weight.shape, dtype=np.float32)
         share = SHARE_ALONE + SHARE_PER_LINK * graph.linked_share
-        share += SHARE_PER_DOUBT * graph.doubt + (0.0 if graph.is_whole else SHARE_LACKING)
-        return Worth(nothing, weight.astype(np.float32), nothing, min(share, MOST_SHARE))
+        share += SHARE_PER_DOUBT * graph.relative_std
+        share += 0.0 if graph.has_no_isolated_node else SHARE_LACKING
+        return Weights(weight.astype(np.float32), min(share, MOST_SHARE))

@@ -16,7 +16,7 @@ from swarm_mj.policies.greedy_oracle.link_scheduler import (
     first_pairs,
     schedule,
 )
-from swarm_mj.policies.greedy_oracle.schedule import links_between
+from swarm_mj.radio.links import links_between
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -142,28 +142,30 @@ def test_a_schedule_is_worth_the_sum_of_all_times_after_each_window(seed, num_wi
         np.testing.assert_array_equal(timestamp, 2 * real[-1])
 
 
-def one_way(ratio, sharpness):
+def one_way(ratio, distance_over_std):
     """Robot 1 hears robot 0 at `ratio` times the threshold, robot 0 hears nothing."""
     return Links(
         np.array([[0.0, 3.0 * ratio], [0.0, 0.0]]),
-        np.full((2, 2), sharpness),
+        np.full((2, 2), distance_over_std),
         1.5,
         2.0,
     )
 
 
-def chance(ratio, sharpness):
+def chance(ratio, distance_over_std):
     """Robot 0 at t = 0 speaks, and has only its own time, one half, to tell."""
-    return first_pairs(np.zeros((2, 2), np.float32), 0.0, one_way(ratio, sharpness), False)[0, 1]
+    return first_pairs(np.zeros((2, 2), np.float32), 0.0, one_way(ratio, distance_over_std), False)[
+        0, 1
+    ]
 
 
 def test_a_believed_link_decodes_as_the_normal_distribution_says():
-    """The reach is d sqrt(ratio) for a distance d known up to d / sharpness."""
-    for sharpness in (0.8, 4.0, 30.0):
+    """The reach is d sqrt(ratio) for a distance d known up to d / distance_over_std."""
+    for distance_over_std in (0.8, 4.0, 30.0):
         for z in np.linspace(-CERTAIN, CERTAIN, 81)[1:-1]:
-            if z / sharpness > -1.0:
-                ratio = (1.0 + z / sharpness) ** 2
-                assert chance(ratio, sharpness) == pytest.approx(norm.cdf(z), abs=0.0096)
+            if z / distance_over_std > -1.0:
+                ratio = (1.0 + z / distance_over_std) ** 2
+                assert chance(ratio, distance_over_std) == pytest.approx(norm.cdf(z), abs=0.0096)
 
 
 def test_chance_is_a_half_at_the_range_and_monotone():
@@ -174,7 +176,9 @@ def test_chance_is_a_half_at_the_range_and_monotone():
 
 def test_chance_becomes_a_step_as_the_spread_vanishes():
     for ratio, certain in [(0.99, 0.0), (1.01, 1.0)]:
-        distance_to_half = [abs(chance(ratio, sharpness) - 0.5) for sharpness in (1, 50, 400)]
+        distance_to_half = [
+            abs(chance(ratio, distance_over_std) - 0.5) for distance_over_std in (1, 50, 400)
+        ]
         assert distance_to_half == sorted(distance_to_half)
         assert chance(ratio, 1e4) == chance(ratio, math.inf) == certain
     assert chance(1.0, math.inf) == 1.0
@@ -217,7 +221,7 @@ def heard_with_chance(links, senders, listeners):
             continue
         i = max(powers, key=lambda sender: powers[sender])
         ratio = powers[i] / (links.noise_mw + sum(powers.values()) - powers[i]) / links.threshold
-        z = (math.sqrt(ratio) - 1.0) * links.sharpness[i, j]
+        z = (math.sqrt(ratio) - 1.0) * links.distance_over_std[i, j]
         p = 1.0 / (1.0 + math.exp(-1.702 * z)) if abs(z) <= 2.5 else float(z > 0.0)
         heard.append((i, p) if p > 0.0 else (j, 0.0))
     return heard

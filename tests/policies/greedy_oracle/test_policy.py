@@ -9,11 +9,12 @@ from standing_teams import after_windows, flooded_team, knowledge_after, single_
 from swarm_mj.mission import paper, reference
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle, LookaheadOracle
-from swarm_mj.policies.greedy_oracle.schedule import links_between, lookahead_window
+from swarm_mj.policies.greedy_oracle.schedule import lookahead_window
 from swarm_mj.policies.policy import CentralisedPolicy
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.rollout import fly, summarise
 from swarm_mj.swarm import Swarm

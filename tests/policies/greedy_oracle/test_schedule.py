@@ -11,12 +11,9 @@ from standing_teams import Team, after_windows, flooded_team
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.greedy_oracle.link_scheduler import first_pairs, schedule
-from swarm_mj.policies.greedy_oracle.schedule import (
-    greedy_schedule,
-    links_between,
-    lookahead_window,
-)
+from swarm_mj.policies.greedy_oracle.schedule import greedy_schedule, lookahead_window
 from swarm_mj.radio.free_space import MIN_DISTANCE_M
+from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
 
 seeds = st.integers(0, 2**32 - 1)
@@ -88,7 +85,7 @@ def test_eq2_links_carry_what_free_space_leaves(seed):
     np.fill_diagonal(is_near, False)
     np.testing.assert_array_equal(links.received_mw / links.noise_mw >= links.threshold, is_near)
     np.testing.assert_array_equal(np.diag(links.received_mw), 0.0)
-    assert np.all(links.sharpness == math.inf)
+    assert np.all(links.distance_over_std == math.inf)
 
 
 def test_robots_in_one_place_have_finite_links():
@@ -96,17 +93,17 @@ def test_robots_in_one_place_have_finite_links():
     others = ~np.eye(3, dtype=bool)
     expected_mw = RADIO.received_at_1_m_mw / MIN_DISTANCE_M**2
     assert links.received_mw[others] == pytest.approx(expected_mw)
-    assert links.sharpness[others] == pytest.approx(MIN_DISTANCE_M / math.sqrt(8.0))
+    assert links.distance_over_std[others] == pytest.approx(MIN_DISTANCE_M / math.sqrt(8.0))
 
 
 def test_spreads_of_both_ends_add_up_by_hand():
     """Robots 0 and 1 are 50 m apart and believed within 6 and 8 m: 10 m together, a fifth."""
     position_m = np.array([[0.0, 0.0], [30.0, 40.0], [0.0, 100.0]])
     links = links_between(RADIO, position_m, np.array([6.0, 8.0, 0.0]))
-    assert links.sharpness[0, 1] == links.sharpness[1, 0] == pytest.approx(5.0)
-    assert links.sharpness[0, 2] == pytest.approx(100.0 / 6.0)
+    assert links.distance_over_std[0, 1] == links.distance_over_std[1, 0] == pytest.approx(5.0)
+    assert links.distance_over_std[0, 2] == pytest.approx(100.0 / 6.0)
     known = links_between(RADIO, position_m, np.array([6.0, 0.0, 0.0]))
-    assert known.sharpness[1, 2] == math.inf
+    assert known.distance_over_std[1, 2] == math.inf
 
 
 @pytest.mark.parametrize("spread_m", [[3.0, 4.0], [30.0, 40.0], [0.0, 60.0]])

@@ -10,11 +10,10 @@ from standing_teams import flooded_team
 
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.policies.greedy_oracle.link_scheduler import Links
-from swarm_mj.policies.greedy_oracle.schedule import links_between
-from swarm_mj.policies.planner.broadcast_scheduler import CERTAIN, Foresight, Worth, fly, schedule
+from swarm_mj.policies.planner.broadcast_scheduler import CERTAIN, Foresight, Weights, fly, schedule
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.window import PHASE, transmit
+from swarm_mj.radio.links import Links, links_between
 from swarm_mj.radio.mission_radio import radio_of
 
 seeds = st.integers(0, 2**32 - 1)
@@ -30,19 +29,19 @@ def sparse_team(num_robots, seed):
     return flooded_team(paper("stationary", num_robots=num_robots, range_ratio=ratio), seed)
 
 
-def whole_worth(num_robots, seed, least_share=0.9):
+def whole_weights(num_robots, seed, least_share=0.9):
     """Whole numbers add up exactly in any order; some are below zero, as learned ones may be."""
     rng = np.random.default_rng([seed, 1])
-    weights = rng.integers(-1, 4, (3, num_robots, num_robots)).astype(np.float32)
-    return Worth(*weights, least_share)
+    weight = rng.integers(-1, 4, (num_robots, num_robots)).astype(np.float32)
+    return Weights(weight, least_share)
 
 
-def scheduled(team, links, worth, is_free, foresight=GREED):
+def scheduled(team, links, weights, is_free, foresight=GREED):
     """Who speaks in each half window, and T after the last [half windows]."""
     timestamp = (2 * team.timestamp).astype(np.float32)
     speaks = np.ones((len(is_free), team.num_robots), dtype=bool)
     ahead = np.append(is_free, np.ones(foresight.half_windows, dtype=bool))
-    schedule(timestamp, 2.0 * team.now, links, worth, foresight, ahead, speaks)
+    schedule(timestamp, 2.0 * team.now, links, weights, foresight, ahead, speaks)
     return speaks, timestamp
 
 
@@ -69,44 +68,43 @@ def received(links, speakers, j):
     sender = max(power_mw, key=power_mw.__getitem__)
     others_mw = sum(power for i, power in power_mw.items() if i != sender)
     ratio = power_mw[sender] / (links.noise_mw + others_mw) / links.threshold
-    sharpness = float(links.sharpness[sender, j])
-    if power_mw[sender] == 0.0 or math.isinf(sharpness):
+    distance_over_std = float(links.distance_over_std[sender, j])
+    if power_mw[sender] == 0.0 or math.isinf(distance_over_std):
         return sender, float(power_mw[sender] > 0.0 and ratio >= 1.0)
-    deviations = (math.sqrt(ratio) - 1.0) * sharpness
+    deviations = (math.sqrt(ratio) - 1.0) * distance_over_std
     if abs(deviations) > CERTAIN:
         return sender, float(deviations > 0.0)
     return sender, 1.0 / (1.0 + math.exp(-1.702 * deviations))
 
 
-def worth_of(known, now, links, worth, speakers, receivers=None):
-    """The worth of a half window: the sum over receivers and subjects of r (w + w' r + w'' a)."""
+def worth_of(known, links, weights, speakers, receivers=None):
+    """The worth of a half window: the sum over receivers and subjects of w r²."""
     total, subjects = 0.0, range(len(known))
     for j in subjects if receivers is None else receivers:
         sender, chance = received(links, speakers, j)
         for k in subjects if chance else ():
             r = max(known[sender][k] - known[j][k], 0.0)
-            weight = worth.linear[j, k] + worth.squared[j, k] * r
-            total += chance * r * float(weight + worth.aged[j, k] * (now - known[j][k]))
+            total += chance * r**2 * float(weights.squared_rise[j, k])
     return total
 
 
-def choices(known, now, links, worth, first=(), tolerance=0.0):
+def choices(known, links, weights, first=(), tolerance=0.0):
     """The speakers by greed; several answers where candidates are as good up to a tolerance."""
     speakers = list(first)
-    value = worth_of(known, now, links, worth, speakers)
+    value = worth_of(known, links, weights, speakers)
     robots = range(len(known))
     has_news = {
-        i for i in robots if any(worth_of(known, now, links, worth, [i], [j]) > 0.0 for j in robots)
+        i for i in robots if any(worth_of(known, links, weights, [i], [j]) > 0.0 for j in robots)
     }
     others = [i for i in robots if i in has_news and i not in speakers]
-    values = {i: worth_of(known, now, links, worth, [*speakers, i]) for i in others}
-    enough = {i: v for i, v in values.items() if v > value * worth.least_share - tolerance}
+    values = {i: worth_of(known, links, weights, [*speakers, i]) for i in others}
+    enough = {i: v for i, v in values.items() if v > value * weights.least_share - tolerance}
     best = max(enough.values(), default=-math.inf)
-    ends = not enough or best <= value * worth.least_share + tolerance
+    ends = not enough or best <= value * weights.least_share + tolerance
     answers = [sorted(speakers)] if ends else []
     good = [i for i, v in enough.items() if v >= best - tolerance]
     for i in good if tolerance else good[:1]:
-        answers += choices(known, now, links, worth, [*speakers, i], tolerance)
+        answers += choices(known, links, weights, [*speakers, i], tolerance)
     return answers
 
 
@@ -122,13 +120,13 @@ def as_loops_see(timestamp, now):
 @settings(max_examples=60)
 def test_speakers_are_added_while_the_share_remains(seed, num_robots, share):
     """Half window by half window, from what the real radio made of the ones before."""
-    team, worth = sparse_team(num_robots, seed), whole_worth(num_robots, seed, share)
+    team, weights = sparse_team(num_robots, seed), whole_weights(num_robots, seed, share)
     links = links_between(team.radio, team.position_m)
-    speaks, _ = scheduled(team, links, worth, np.ones(4, dtype=bool))
+    speaks, _ = scheduled(team, links, weights, np.ones(4, dtype=bool))
     before = [team.timestamp, *really(team, speaks)[:-1]]
     for p, (row, timestamp) in enumerate(zip(speaks, before, strict=True)):
         now = 2.0 * team.now + p + 1
-        (speakers,) = choices(as_loops_see(timestamp, now), now, links, worth)
+        (speakers,) = choices(as_loops_see(timestamp, now), links, weights)
         assert np.flatnonzero(row).tolist() == speakers
 
 
@@ -138,13 +136,13 @@ def test_doubtful_packets_count_by_their_chance(seed, num_robots, share):
     team = sparse_team(num_robots, seed)
     rng = np.random.default_rng(seed)
     links = links_between(team.radio, team.position_m, rng.uniform(0.0, 40.0, num_robots))
-    worth = Worth(*rng.uniform(0.0, 2.0, (3, num_robots, num_robots)).astype(np.float32), share)
-    speaks, after = scheduled(team, links, worth, np.ones(1, dtype=bool))
+    weights = Weights(rng.uniform(0.0, 2.0, (num_robots, num_robots)).astype(np.float32), share)
+    speaks, after = scheduled(team, links, weights, np.ones(1, dtype=bool))
     now = 2.0 * team.now + 1.0
     known = as_loops_see(team.timestamp, now)
-    scale = worth_of(known, now, links, worth, [0]) + 1.0
+    scale = worth_of(known, links, weights, [0]) + 1.0
     speakers = np.flatnonzero(speaks[0]).tolist()
-    assert speakers in choices(known, now, links, worth, tolerance=1e-4 * scale)
+    assert speakers in choices(known, links, weights, tolerance=1e-4 * scale)
     for j in range(num_robots):
         sender, chance = received(links, speakers, j)
         news = known[j] if sender is None else known[sender]
@@ -159,10 +157,10 @@ def test_eq8_expected_times_are_the_real_ones(seed, num_robots, share, branches)
 
     Nobody speaks in half windows that are not free.
     """
-    team, worth = sparse_team(num_robots, seed), whole_worth(num_robots, seed, share)
+    team, weights = sparse_team(num_robots, seed), whole_weights(num_robots, seed, share)
     links = links_between(team.radio, team.position_m)
     is_free = np.random.default_rng(seed).random(9) < 0.7
-    speaks, after = scheduled(team, links, worth, is_free, Foresight(branches, 3))
+    speaks, after = scheduled(team, links, weights, is_free, Foresight(branches, 3))
     assert not np.any(speaks[~is_free])
     np.testing.assert_array_equal(after, 2 * really(team, speaks)[-1])
 
@@ -181,19 +179,19 @@ def test_eq10_a_flight_s_age_is_the_mean_over_its_half_windows(seed, num_robots)
     np.testing.assert_array_equal(timestamp, real[-1])
 
 
-def best_branch(team, links, worth, foresight, is_free):
+def best_branch(team, links, weights, foresight, is_free):
     """The speakers of a half window, by trying the best first ones to the end."""
     now = 2.0 * team.now + 1.0
     known = as_loops_see(team.timestamp, now)
-    alone = [worth_of(known, now, links, worth, [i]) for i in range(team.num_robots)]
+    alone = [worth_of(known, links, weights, [i]) for i in range(team.num_robots)]
     best, most_known = None, -math.inf
     for first in sorted(range(team.num_robots), key=lambda i: -alone[i])[: foresight.branches]:
         if alone[first] > 0.0:
-            rows = [choices(known, now, links, worth, [first])[0]]
+            rows = [choices(known, links, weights, [first])[0]]
             for p in range(1, foresight.half_windows):
                 before = really(team, [np.isin(range(team.num_robots), row) for row in rows])[-1]
                 seen = as_loops_see(before, now + p)
-                rows += choices(seen, now + p, links, worth) if is_free[p] else [[]]
+                rows += choices(seen, links, weights) if is_free[p] else [[]]
             after = really(team, [np.isin(range(team.num_robots), row) for row in rows])
             if after.sum() > most_known:
                 best, most_known = rows[0], after.sum()
@@ -205,12 +203,12 @@ def best_branch(team, links, worth, foresight, is_free):
 def test_the_branch_that_knows_most_is_taken(seed, branches, half_windows):
     """Over its half windows, those among them in which nobody may speak included."""
     team, foresight = sparse_team(5, seed), Foresight(branches, half_windows)
-    worth = whole_worth(5, seed)._replace(linear=np.ones((5, 5), np.float32))
+    weights = whole_weights(5, seed)
     links = links_between(team.radio, team.position_m)
     is_free = np.array([True, *(np.random.default_rng(seed).random(half_windows - 1) < 0.6)])
     timestamp, speaks = (2 * team.timestamp).astype(np.float32), np.zeros((1, 5), dtype=bool)
-    schedule(timestamp, 2.0 * team.now, links, worth, foresight, is_free, speaks)
-    expected = best_branch(team, links, worth, foresight, is_free)
+    schedule(timestamp, 2.0 * team.now, links, weights, foresight, is_free, speaks)
+    expected = best_branch(team, links, weights, foresight, is_free)
     if expected is not None:
         assert np.flatnonzero(speaks[0]).tolist() == expected
 
@@ -219,15 +217,15 @@ def test_the_branch_that_knows_most_is_taken(seed, branches, half_windows):
 @settings(max_examples=25)
 def test_more_branches_never_know_less_over_their_horizon(seed, half_windows):
     team = sparse_team(8, seed)
-    worth = Worth(*np.ones((3, 8, 8), np.float32), 0.9)
+    weights = Weights(np.ones((8, 8), np.float32), 0.9)
     links, free = links_between(team.radio, team.position_m), np.ones(half_windows, dtype=bool)
     known = []
     for branches in (1, 2, 6, 100):
         timestamp, now = (2 * team.timestamp).astype(np.float32), 2.0 * team.now
         speaks = np.zeros((half_windows, 8), dtype=bool)
         foresight = Foresight(branches, half_windows)
-        schedule(timestamp, now, links, worth, foresight, free, speaks[:1])
-        schedule(timestamp, now + 1.0, links, worth, GREED, free[1:], speaks[1:])
+        schedule(timestamp, now, links, weights, foresight, free, speaks[:1])
+        schedule(timestamp, now + 1.0, links, weights, GREED, free[1:], speaks[1:])
         known.append(really(team, speaks).sum())
     assert known == sorted(known)
 
@@ -236,10 +234,9 @@ def test_more_branches_never_know_less_over_their_horizon(seed, half_windows):
 def test_robots_far_apart_speak_at_once_and_neighbours_do_not(share):
     """Two pairs, 5 km apart, of which both members have their own time to tell."""
     position_m = np.array([[0.0, 0.0], [100.0, 0.0], [5000.0, 0.0], [5100.0, 0.0]])
-    weight, speaks = np.zeros((4, 4), np.float32), np.zeros((1, 4), dtype=bool)
-    worth = Worth(weight + 1.0, weight, weight, share)
+    weights, speaks = Weights(np.ones((4, 4), np.float32), share), np.zeros((1, 4), dtype=bool)
     links = links_between(RADIO, position_m)
-    schedule(np.zeros((4, 4), np.float32), 0.0, links, worth, GREED, np.ones(1, bool), speaks)
+    schedule(np.zeros((4, 4), np.float32), 0.0, links, weights, GREED, np.ones(1, bool), speaks)
     assert speaks[0].tolist() == [True, False, True, False]
 
 
@@ -268,11 +265,11 @@ def test_chances_are_those_of_the_radio_at_random_places(
 @given(seed=seeds, num_robots=sizes)
 def test_who_is_unknown_neither_tells_nor_learns(seed, num_robots):
     """The others may pass on what they know of it; that becomes no newer."""
-    team, worth = sparse_team(num_robots, seed), whole_worth(num_robots, seed)
+    team, weights = sparse_team(num_robots, seed), whole_weights(num_robots, seed)
     unknown = seed % num_robots
     others = np.delete(np.arange(num_robots), unknown)
     links = links_between(team.radio, team.position_m, is_known=np.arange(num_robots) != unknown)
-    _, after = scheduled(team, links, worth, np.ones(6, dtype=bool))
+    _, after = scheduled(team, links, weights, np.ones(6, dtype=bool))
     before = 2 * team.timestamp
     assert np.max(after[others, unknown]) == np.max(before[others, unknown])
     np.testing.assert_array_equal(after[unknown, others], before[unknown, others])
@@ -283,17 +280,17 @@ def test_who_is_unknown_is_not_told_to_speak(share):
     """Robot 3 hears nobody and is heard by nobody, as far as is known."""
     position_m = np.array([[0.0, 0.0], [200.0, 0.0], [400.0, 0.0], [200.0, 100.0]])
     links = links_between(RADIO, position_m, is_known=np.array([True, True, True, False]))
-    worth = Worth(*np.ones((3, 4, 4), np.float32), share)
+    weights = Weights(np.ones((4, 4), np.float32), share)
     speaks = np.zeros((6, 4), dtype=bool)
-    schedule(np.zeros((4, 4), np.float32), 0.0, links, worth, GREED, np.ones(6, bool), speaks)
+    schedule(np.zeros((4, 4), np.float32), 0.0, links, weights, GREED, np.ones(6, bool), speaks)
     assert np.all(np.any(speaks[:, :3], axis=1))
     assert not np.any(speaks[:, 3])
 
 
 def test_who_is_alone_in_the_world_says_nothing():
-    worth = Worth(*np.ones((3, 2, 2), np.float32), 0.5)
+    weights = Weights(np.ones((2, 2), np.float32), 0.5)
     links = Links(np.zeros((2, 2)), np.full((2, 2), math.inf), 1.0, 1.0)
     timestamp, speaks = np.zeros((2, 2), np.float32), np.ones((3, 2), dtype=bool)
-    schedule(timestamp, 0.0, links, worth, Foresight(2, 2), np.ones(3, bool), speaks)
+    schedule(timestamp, 0.0, links, weights, Foresight(2, 2), np.ones(3, bool), speaks)
     assert not np.any(speaks)
     assert timestamp.tolist() == [[3.0, 0.0], [0.0, 3.0]]

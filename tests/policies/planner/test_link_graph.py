@@ -11,8 +11,8 @@ from scipy.stats import norm
 from standing_teams import flooded_team
 
 from swarm_mj.mission import paper
-from swarm_mj.policies.greedy_oracle.schedule import links_between
 from swarm_mj.policies.planner.link_graph import LEAST_CHANCE, OUT_OF_REACH, SLACK, link_graph
+from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
 
 seeds = st.integers(0, 2**32 - 1)
@@ -57,7 +57,7 @@ def test_certain_links_are_those_in_range(seed, num_robots):
             assert graph.chance[i, j] == float(i != j and apart_m <= range_m)
             if i != j:
                 assert graph.distance[i, j] == pytest.approx(apart_m / range_m)
-    assert graph.doubt == 0.0
+    assert graph.relative_std == 0.0
 
 
 @pytest.mark.parametrize("spread_m", [[30.0, 40.0], [0.0, 20.0]])
@@ -132,7 +132,7 @@ def test_links_that_decode_rarely_are_no_way():
         graph = link_graph(links_between(RADIO, position_m, np.array([20.0, 0.0])))
         assert graph.chance[0, 1] > 0.0
         assert (graph.hops[0, 1] < OUT_OF_REACH) == is_link
-        assert graph.is_whole == is_link
+        assert graph.has_no_isolated_node == is_link
 
 
 def test_the_team_in_numbers_by_hand():
@@ -142,12 +142,12 @@ def test_the_team_in_numbers_by_hand():
     """
     position_m = np.array([[0.0, 0.0], [30.0, 40.0], [50.0, 0.0], [FAR_M, 0.0]])
     graph = link_graph(links_between(RADIO, position_m, np.array([3.0, 4.0, 4.0, 4.0])))
-    assert not graph.is_whole
+    assert not graph.has_no_isolated_node
     assert graph.linked_share == 1.0
     apart = math.dist([30.0, 40.0], [50.0, 0.0])
-    assert graph.doubt == pytest.approx((0.1 + 0.1 + math.sqrt(32.0) / apart) / 3)
+    assert graph.relative_std == pytest.approx((0.1 + 0.1 + math.sqrt(32.0) / apart) / 3)
     near = link_graph(links_between(RADIO, position_m[:3] * [6.0, 0.0]))
-    assert near.is_whole  # at 0, 180 and 300 m
+    assert near.has_no_isolated_node  # at 0, 180 and 300 m
     assert near.linked_share == pytest.approx(2 / 3)
 
 
@@ -155,6 +155,6 @@ def test_the_team_in_numbers_by_hand():
 def test_who_has_no_links_at_all(num_robots):
     position_m = FAR_M * np.arange(2.0 * num_robots).reshape(num_robots, 2)
     graph = link_graph(links_between(RADIO, position_m, np.full(num_robots, 5.0)))
-    assert not graph.is_whole
-    assert graph.linked_share == graph.doubt == 0.0
+    assert not graph.has_no_isolated_node
+    assert graph.linked_share == graph.relative_std == 0.0
     assert graph.downstream.tolist() == np.eye(num_robots).tolist()

@@ -8,13 +8,13 @@ from standing_teams import flooded_team
 
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.policies.greedy_oracle.schedule import links_between
 from swarm_mj.policies.planner import plan
 from swarm_mj.policies.planner.plan import Plan, foresight_of
 from swarm_mj.policies.planner.snapshots import Pictures, freeze
 from swarm_mj.policies.planner.weights import RuleOfThumb
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.window import transmit
+from swarm_mj.radio.links import links_between
 
 seeds = st.integers(0, 2**32 - 1)
 few = settings(max_examples=20)

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from standing_teams import flooded_team
 
 from swarm_mj.mission import paper
-from swarm_mj.policies.greedy_oracle.schedule import links_between
 from swarm_mj.policies.planner.link_graph import OUT_OF_REACH, link_graph
 from swarm_mj.policies.planner.weights import RuleOfThumb, Scorer
+from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
 
 seeds = st.integers(0, 2**32 - 1)
@@ -39,19 +39,17 @@ def test_the_rule_is_a_scorer_without_parameters():
 def test_a_row_of_three_by_hand():
     """Robot 0's news reach robot 2 through robot 1, two hops on; two of three pairs are linked."""
     worth = RULE(line(0.0, 200.0, 400.0))
-    assert worth.squared[1, 0] == pytest.approx(2.0**0.6)
-    assert worth.squared[2, 0] == pytest.approx(2.0**-0.3)
-    assert worth.squared[0, 1] == pytest.approx(1.0)
+    assert worth.squared_rise[1, 0] == pytest.approx(2.0**0.6)
+    assert worth.squared_rise[2, 0] == pytest.approx(2.0**-0.3)
+    assert worth.squared_rise[0, 1] == pytest.approx(1.0)
     assert worth.least_share == pytest.approx(0.95 - 0.3 * 2 / 3)
-    assert not np.any(worth.linear)
-    assert not np.any(worth.aged)
 
 
 @given(seed=seeds, num_robots=st.integers(3, 9))
 def test_who_has_more_behind_it_and_is_as_far_is_worth_more(seed, num_robots):
     """And who is farther with as many behind it is worth less."""
     links = team_links(num_robots, seed)
-    squared, graph = RULE(links).squared, link_graph(links)
+    squared, graph = RULE(links).squared_rise, link_graph(links)
     for k in range(num_robots):
         told = [j for j in range(num_robots) if j != k and graph.hops[j, k] < OUT_OF_REACH]
         for a in told:
@@ -85,14 +83,14 @@ def test_robots_under_other_names_are_worth_the_same(seed, num_robots, is_certai
     named = np.random.default_rng(seed).permutation(num_robots)
     renamed = links._replace(
         received_mw=links.received_mw[np.ix_(named, named)],
-        sharpness=links.sharpness[np.ix_(named, named)],
+        distance_over_std=links.distance_over_std[np.ix_(named, named)],
     )
-    expected = RULE(links).squared[np.ix_(named, named)]
-    np.testing.assert_allclose(RULE(renamed).squared, expected, rtol=1e-6)
+    expected = RULE(links).squared_rise[np.ix_(named, named)]
+    np.testing.assert_allclose(RULE(renamed).squared_rise, expected, rtol=1e-6)
     assert RULE(renamed).least_share == pytest.approx(RULE(links).least_share)
 
 
 def test_teams_without_links_have_finite_worth():
     worth = RULE(line(0.0, 5000.0, spread_m=3.0))
-    assert np.all(np.isfinite(worth.squared))
+    assert np.all(np.isfinite(worth.squared_rise))
     assert worth.least_share == 1.05
