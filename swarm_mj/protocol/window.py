@@ -15,7 +15,9 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import Buffers, merge, observe_self, record_attempt
 from swarm_mj.radio.free_space import Channel
 
-PHASE = 0.5  # Delta t: each of a window's two phases takes half of it [windows]
+SLOTS_PER_WINDOW = 2  # a transmission takes one, and so do its responses
+SLOT_WINDOWS = 1.0 / SLOTS_PER_WINDOW  # Delta t: what a slot lasts [windows]
+PHASE = SLOT_WINDOWS
 
 
 @dataclass(frozen=True, kw_only=True)
