@@ -1,4 +1,4 @@
-"""The package as a wheel, installed elsewhere: it brings its scene along, and flies."""
+"""The package as a wheel, installed elsewhere: it brings its assets along, and flies."""
 
 import os
 import subprocess
@@ -48,3 +48,9 @@ def test_it_flies(installed, tmp_path):
     done = run(installed, tmp_path, "-m", "swarm_mj", "fly", "--windows", "10")
     assert done.returncode == 0, done.stderr
     assert len(list((tmp_path / "replays").glob("*.rrd"))) == 1
+
+
+def test_it_flies_the_shipped_network(installed, tmp_path):
+    command = ("fly", "--policy", "gnn", "--robots", "5", "--windows", "10", "--no-record")
+    done = run(installed, tmp_path, "-m", "swarm_mj", *command)
+    assert done.returncode == 0, done.stderr

@@ -140,9 +140,9 @@ def _evaluation_table(timing: EvaluationTiming) -> Table:
     table.add_column(justify="right")
     table.add_row(f"{', '.join(BASELINES)}; {timing.num_jobs} jobs, s", f"{timing.baselines_s:.1f}")
     table.add_row("  one window, in plain mj_steps", f"{timing.window_in_mj_steps:.2f} x")
-    table.add_row("oracle, one episode, s", f"{timing.oracle_s:.2f}")
+    table.add_row("greedy-oracle, one episode, s", f"{timing.oracle_s:.2f}")
     for size, plan_ms in timing.plan_ms.items():
-        table.add_row(f"gnn, one robot's plan of an epoch, {size} robots, ms", f"{plan_ms:.1f}")
+        table.add_row(f"planner, one robot's plan of an epoch, {size} robots, ms", f"{plan_ms:.1f}")
         each_ms = plan_ms / (2 * regular_length(size))
         table.add_row("  for each half window, ms", f"{each_ms:.2f}")
     table.add_row("  of 40 robots at range ratio 1, ms", f"{timing.dense_plan_ms:.1f}")

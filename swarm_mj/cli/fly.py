@@ -21,7 +21,7 @@ from swarm_mj.io.atomic_file import atomic_write
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
-from swarm_mj.policies.registry import POLICIES, is_learned, make_policy, normalised
+from swarm_mj.policies.registry import POLICIES, is_directory, make_policy, normalised
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import view_command
@@ -143,7 +143,7 @@ def _fresh_name(options: argparse.Namespace) -> Path:
 
 def _short(policy: str) -> str:
     """A policy's name without the path: `x` of runs/x/policy."""
-    if not is_learned(policy):
+    if not is_directory(policy):
         return policy
     path = Path(policy).resolve()
     return path.parent.name if path.name == "policy" else path.name

@@ -5,10 +5,10 @@ from pathlib import Path
 
 
 def asset(name: str) -> Path:
-    """The path of a file in `assets/`, in a checkout or in an installed wheel.
+    """The path of a file or folder in `assets/`, in a checkout or in an installed wheel.
 
     Args:
-        name: The file's name.
+        name: Its name, or path inside `assets/`.
 
     Returns:
         Its path.
@@ -18,6 +18,6 @@ def asset(name: str) -> Path:
     """
     package = Path(str(resources.files("swarm_mj")))
     for folder in (package / "assets", package.parent / "assets"):
-        if (folder / name).is_file():
+        if (folder / name).exists():
             return folder / name
     raise FileNotFoundError(f"asset {name} is neither in the package nor beside it; reinstall")

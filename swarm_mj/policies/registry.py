@@ -1,12 +1,13 @@
 """The one table of policies by their names on the command line.
 
-A learned policy has no name but that of the directory that holds it.
+A learned policy has no name but that of the directory that holds it, except the shipped one, `gnn`.
 """
 
 import os
 from collections.abc import Callable
 from pathlib import Path
 
+from swarm_mj.io.assets import asset
 from swarm_mj.mission import Mission
 from swarm_mj.policies.aloha import Aloha
 from swarm_mj.policies.gossip import InnovationGossip
@@ -80,7 +81,7 @@ def _oracle_lookahead(mission: Mission, probability: float | None) -> Policy:
     return LookaheadOracle(radio_of(mission))
 
 
-POLICIES: dict[str, Callable[[Mission, float | None], Policy]] = {
+RULES: dict[str, Callable[[Mission, float | None], Policy]] = {
     "random-flooding": _random_flooding,
     "round-robin": _round_robin,
     "mst": _mst,
@@ -92,19 +93,26 @@ POLICIES: dict[str, Callable[[Mission, float | None], Policy]] = {
     "greedy-oracle": _oracle,
     "oracle-lookahead": _oracle_lookahead,
 }
+SHIPPED = "gnn"  # the learned policy that comes with the package, in assets/policies/
+POLICIES = (*RULES, SHIPPED)
 
 
 def is_learned(name: str) -> bool:
+    """Whether a policy is a trained network: the shipped one, or one in a directory."""
+    return name == SHIPPED or is_directory(name)
+
+
+def is_directory(name: str) -> bool:
     """Whether a policy's name is that of a directory: it has a separator, or there is one."""
     return name not in POLICIES and (_is_path(name) or os.path.isdir(name))
 
 
 def normalised(name: str) -> str:
     """A policy's name as typed, but a directory's without what does not change where it leads."""
-    if not is_learned(name):
+    if not is_directory(name):
         return name
     plain = os.path.normpath(name)
-    return plain if is_learned(plain) else os.path.join(os.curdir, plain)
+    return plain if is_directory(plain) else os.path.join(os.curdir, plain)
 
 
 def make_policy(
@@ -117,7 +125,7 @@ def make_policy(
     """A policy by its name on the command line.
 
     Args:
-        name: A key of `POLICIES`, or a directory with a learned policy.
+        name: One of `POLICIES`, or a directory with a learned policy.
         mission: Whose preset says how the baseline behaves where paper and code differ, and whose
             numbers normalise what a learned policy sees.
         probability: Of transmission, for the policies that have one; None is the one tuned for
@@ -137,15 +145,16 @@ def make_policy(
         _refuse(probability, name)
         from swarm_mj.policies.stored import load_policy  # torch takes its time to import
 
-        return load_policy(Path(name), mission, is_deterministic=is_deterministic)
-    if name not in POLICIES:
+        folder = asset(f"policies/{SHIPPED}") if name == SHIPPED else Path(name)
+        return load_policy(folder, mission, is_deterministic=is_deterministic)
+    if name not in RULES:
         raise ValueError(
             f"policy must be one of {', '.join(POLICIES)}, or a directory with a learned policy, "
             f"not {name!r}"
         )
     if is_deterministic:
         raise ValueError(f"{name} draws from no network's distribution; leave --deterministic out")
-    return POLICIES[name](mission, probability)
+    return RULES[name](mission, probability)
 
 
 def _is_path(name: str) -> bool:

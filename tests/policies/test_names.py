@@ -5,9 +5,10 @@ import os
 import pytest
 from tiny_policies import save_tiny
 
+from swarm_mj.io.assets import asset
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn import LearnedPolicy
-from swarm_mj.policies.registry import POLICIES, is_learned, make_policy, normalised
+from swarm_mj.policies.registry import POLICIES, is_directory, is_learned, make_policy, normalised
 
 MISSION = paper("stationary", num_robots=5)
 pytestmark = pytest.mark.usefixtures("here")
@@ -27,12 +28,13 @@ def here(tmp_path, monkeypatch):
 )
 def test_a_directory_is_a_learned_policy(tmp_path, name):
     for typed in (name, normalised(name), str(tmp_path / name)):
+        assert is_directory(typed)
         assert is_learned(typed)
         assert isinstance(make_policy(typed, MISSION), LearnedPolicy)
 
 
 def test_a_name_is_a_name_whatever_lies_about():
-    assert not any(map(is_learned, POLICIES))
+    assert not any(map(is_directory, POLICIES))
     assert make_policy("mst", MISSION).parameters["probability"] > 0.0
     assert [normalised(name) for name in POLICIES] == list(POLICIES)
 
@@ -72,8 +74,21 @@ def test_a_learned_policy_has_no_probability():
 
 
 def test_only_a_learned_policy_is_made_deterministic():
-    policy = make_policy("mine", MISSION, is_deterministic=True)
-    assert policy.parameters["is_deterministic"] is True
+    for name in ("mine", "gnn"):
+        policy = make_policy(name, MISSION, is_deterministic=True)
+        assert policy.parameters["is_deterministic"] is True
     for name in POLICIES:
-        with pytest.raises(ValueError, match=f"{name} draws from no network"):
-            make_policy(name, MISSION, is_deterministic=True)
+        if name != "gnn":
+            with pytest.raises(ValueError, match=f"{name} draws from no network"):
+                make_policy(name, MISSION, is_deterministic=True)
+
+
+def test_the_shipped_policy_is_the_network_in_assets(tmp_path):
+    save_tiny(tmp_path / "gnn", "paper")  # a folder of the same name is another policy
+    shipped = make_policy("gnn", MISSION)
+    assert is_learned("gnn")
+    assert shipped.parameters == make_policy(str(asset("policies/gnn")), MISSION).parameters
+    assert shipped.parameters != make_policy("./gnn", MISSION).parameters
+    assert shipped.payload == "none"
+    with pytest.raises(ValueError, match="gnn takes no transmission probability; leave out"):
+        make_policy("gnn", MISSION, 0.1)

@@ -25,6 +25,7 @@ DRAWN = (
     "gossip",
     "spatial-tdma",
     "planner",
+    "gnn",
     "greedy-oracle",
 )
 PAPER_ONLY = ("planner",)
