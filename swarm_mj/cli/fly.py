@@ -21,7 +21,14 @@ from swarm_mj.io.atomic_file import atomic_write
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
-from swarm_mj.policies.registry import POLICIES, is_directory, make_policy, normalised
+from swarm_mj.policies.registry import (
+    PAYLOADS,
+    POLICIES,
+    is_directory,
+    make_policy,
+    normalised,
+    with_payload,
+)
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import view_command
@@ -70,6 +77,12 @@ def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no publi
         action="store_true",
         help="a learned policy takes the most probable recipient instead of a draw",
     )
+    parser.add_argument(
+        "--payload",
+        default=PAYLOADS[0],
+        help="what the planner's packets carry beyond the buffers T, M and P: "
+        f"{', '.join(PAYLOADS)}",
+    )
     parser.add_argument("--seed", type=int, default=1, help="the same seed is the same mission")
     add_mission_options(parser)
     group = parser.add_argument_group("output")
@@ -92,6 +105,7 @@ def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no publi
 
 def run(options: argparse.Namespace) -> int:
     """Runs the command; returns its exit code."""
+    (options.policy,) = with_payload([options.policy], options.payload)
     mission = mission_of(options)
     policy = _make_policy(options, mission)
     path = _check_outputs(options)
@@ -144,7 +158,7 @@ def _fresh_name(options: argparse.Namespace) -> Path:
 def _short(policy: str) -> str:
     """A policy's name without the path: `x` of runs/x/policy."""
     if not is_directory(policy):
-        return policy
+        return policy.replace(" --", "-").replace(" ", "-")
     path = Path(policy).resolve()
     return path.parent.name if path.name == "policy" else path.name
 

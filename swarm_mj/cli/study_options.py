@@ -9,7 +9,7 @@ from swarm_mj.cli.options import DEFAULTS, listed
 from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import PRESETS, Boundary, Mission, PhysicsMode, Task
-from swarm_mj.policies.registry import POLICIES, normalised
+from swarm_mj.policies.registry import PAYLOADS, POLICIES, normalised, with_payload
 
 DEFAULT_POLICIES = ("planner", *BASELINES)
 
@@ -34,6 +34,11 @@ def add_study_options(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="learned policies take the most probable recipient instead of a draw",
     )
+    parser.add_argument(
+        "--payload",
+        default=PAYLOADS[0],
+        help=f"what the planner's packets carry beyond the buffers T, M and P: {listed(PAYLOADS)}",
+    )
     parser.add_argument("--episodes", type=int, default=100, help="missions per regime")
     parser.add_argument(
         "--seed", type=int, default=1000, help="of the first mission; the others follow one by one"
@@ -55,17 +60,19 @@ def study_of(options: argparse.Namespace) -> Study:
     policies = _several(options, "--policy")
     if "all" in policies:
         policies = [name for name in [*policies, *POLICIES] if name != "all"]
-    baseline = options.baseline
+    policies = list(dict.fromkeys(map(normalised, policies)))
+    flown = dict(zip(policies, with_payload(policies, options.payload), strict=True))
+    baseline = options.baseline and normalised(options.baseline)
     axes = ("--preset", "--task", "--robots", "--velocity-ratio", "--range-ratio", "--switched-off")
     regimes = product(*(_several(options, axis) for axis in axes))
     return Study(
-        policies=tuple(dict.fromkeys(map(normalised, policies))),
+        policies=tuple(dict.fromkeys(flown.values())),
         regimes=tuple(_mission(options, *regime) for regime in regimes),
         episodes=options.episodes,
         seed=options.seed,
         probability=options.probability,
         is_deterministic=options.deterministic,
-        baseline=None if baseline is None else normalised(baseline),
+        baseline=flown.get(baseline, baseline),
     )
 
 

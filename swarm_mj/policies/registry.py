@@ -4,7 +4,7 @@ A learned policy has no name but that of the directory that holds it, except the
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from swarm_mj.io.assets import asset
@@ -15,6 +15,7 @@ from swarm_mj.policies.greedy_oracle.policy import GreedyOracle, LookaheadOracle
 from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.weights import RuleOfThumb
+from swarm_mj.policies.planner.without_payload import PlannerWithoutPayload
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.round_robin import RoundRobin
@@ -55,7 +56,7 @@ def _tdma(mission: Mission, probability: float | None) -> Policy:  # noqa: ARG00
     return Tdma()
 
 
-def _spatial_tdma(mission: Mission, probability: float | None) -> Policy:
+def _spatial_tdma(mission: Mission, probability: float | None) -> SpatialTdma:
     _refuse(probability, "spatial-tdma")
     return SpatialTdma(range_m=mission.range_m, threshold=from_db(mission.sinr_threshold_db))
 
@@ -71,6 +72,11 @@ def _planner(mission: Mission, probability: float | None) -> Policy:
     )
 
 
+def _planner_without_payload(mission: Mission, probability: float | None) -> Policy:
+    _refuse(probability, WITHOUT_PAYLOAD)
+    return PlannerWithoutPayload(radio_of(mission), _spatial_tdma(mission, None))
+
+
 def _oracle(mission: Mission, probability: float | None) -> Policy:
     _refuse(probability, "greedy-oracle")
     return GreedyOracle(radio_of(mission))
@@ -81,6 +87,8 @@ def _oracle_lookahead(mission: Mission, probability: float | None) -> Policy:
     return LookaheadOracle(radio_of(mission))
 
 
+WITHOUT_PAYLOAD = "planner --payload none"  # packets carry T, M and P alone
+PAYLOADS = ("snapshots", "none")
 RULES: dict[str, Callable[[Mission, float | None], Policy]] = {
     "random-flooding": _random_flooding,
     "round-robin": _round_robin,
@@ -90,6 +98,7 @@ RULES: dict[str, Callable[[Mission, float | None], Policy]] = {
     "tdma": _tdma,
     "spatial-tdma": _spatial_tdma,
     "planner": _planner,
+    WITHOUT_PAYLOAD: _planner_without_payload,
     "greedy-oracle": _oracle,
     "oracle-lookahead": _oracle_lookahead,
 }
@@ -113,6 +122,24 @@ def normalised(name: str) -> str:
         return name
     plain = os.path.normpath(name)
     return plain if is_directory(plain) else os.path.join(os.curdir, plain)
+
+
+def with_payload(names: Sequence[str], payload: str) -> list[str]:
+    """Names of policies whose packets carry this beyond T, M and P, where they can carry anything.
+
+    Raises:
+        ValueError: No such payload, or no policy that can go without.
+    """
+    if payload not in PAYLOADS:
+        raise ValueError(f"payload must be one of {', '.join(PAYLOADS)}, not {payload!r}")
+    if payload == "snapshots":
+        return list(names)
+    if not {"planner", WITHOUT_PAYLOAD} & set(names):
+        raise ValueError(
+            f"payload must be that of policy planner, but packets of {', '.join(names)} carry "
+            "none; leave out --payload"
+        )
+    return [WITHOUT_PAYLOAD if name == "planner" else name for name in names]
 
 
 def make_policy(

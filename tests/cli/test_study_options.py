@@ -54,3 +54,12 @@ def test_an_unknown_task_is_refused(swarm_mj):
     done = swarm_mj("evaluate", "--task", "stationary", "swim")
     assert done.returncode == 2
     assert "task must be one of stationary, random-walk, flocking, not 'swim'" in done.stderr
+
+
+def test_the_planner_flies_without_payload_under_a_name_of_its_own():
+    alone = "planner --payload none"
+    named = study("--policy", "tdma", "planner", "--payload", "none", "--baseline", "planner")
+    assert named.policies == ("tdma", alone)
+    assert named.compared_to == alone
+    assert study("--policy", "planner", alone).policies == ("planner", alone)
+    assert study("--payload", "none").policies[0] == alone

@@ -8,7 +8,14 @@ from tiny_policies import save_tiny
 from swarm_mj.io.assets import asset
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn import LearnedPolicy
-from swarm_mj.policies.registry import POLICIES, is_directory, is_learned, make_policy, normalised
+from swarm_mj.policies.registry import (
+    POLICIES,
+    is_directory,
+    is_learned,
+    make_policy,
+    normalised,
+    with_payload,
+)
 
 MISSION = paper("stationary", num_robots=5)
 pytestmark = pytest.mark.usefixtures("here")
@@ -92,3 +99,14 @@ def test_the_shipped_policy_is_the_network_in_assets(tmp_path):
     assert shipped.payload == "none"
     with pytest.raises(ValueError, match="gnn takes no transmission probability; leave out"):
         make_policy("gnn", MISSION, 0.1)
+
+
+def test_ii_b_the_planner_can_go_without_payload():
+    """A name typed with the option is the name of a policy of its own; others carry nothing."""
+    assert with_payload(["tdma", "planner"], "none") == ["tdma", "planner --payload none"]
+    assert with_payload(["planner --payload none"], "none") == ["planner --payload none"]
+    assert with_payload(["tdma"], "snapshots") == ["tdma"]
+    with pytest.raises(ValueError, match="packets of tdma, mst carry none; leave out --payload"):
+        with_payload(["tdma", "mst"], "none")
+    with pytest.raises(ValueError, match="payload must be one of snapshots, none, not 'all'"):
+        with_payload(["planner"], "all")

@@ -10,6 +10,7 @@ from swarm_mj.policies.aloha import Aloha
 from swarm_mj.policies.gossip import InnovationGossip
 from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
 from swarm_mj.policies.planner.policy import Planner
+from swarm_mj.policies.planner.without_payload import PlannerWithoutPayload
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.registry import POLICIES, make_policy
@@ -170,6 +171,7 @@ def test_alg1_silence_is_addressing_oneself():
         ("tdma", Tdma, None),
         ("spatial-tdma", SpatialTdma, None),
         ("planner", Planner, None),
+        ("planner --payload none", PlannerWithoutPayload, None),
     ],
 )
 def test_policies_by_name(name, kind, probability):
@@ -177,6 +179,7 @@ def test_policies_by_name(name, kind, probability):
     assert type(make_policy(name, MISSION, probability)) is kind
 
 
+SCHEDULES = ["round-robin", "tdma", "spatial-tdma", "planner", "planner --payload none"]
 TUNED = ["random-flooding", "mst", "aloha", "gossip"]
 
 
@@ -237,7 +240,7 @@ def test_probability_is_tuned_by_default_and_named(name, preset):
     assert make_policy(name, mission, 0.17).parameters == {"probability": 0.17}
 
 
-@pytest.mark.parametrize("name", ["round-robin", "tdma", "spatial-tdma", "planner"])
+@pytest.mark.parametrize("name", SCHEDULES)
 def test_a_schedule_has_no_probability(name):
     assert make_policy(name, MISSION).parameters == {}
     with pytest.raises(ValueError, match=f"{name} takes no transmission probability"):

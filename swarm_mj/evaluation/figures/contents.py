@@ -1,5 +1,6 @@
 """What the paper's result figures show (V): which missions, swept over what, on which axes."""
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -25,10 +26,11 @@ DRAWN = (
     "gossip",
     "spatial-tdma",
     "planner",
+    "planner --payload none",
     "gnn",
     "greedy-oracle",
 )
-PAPER_ONLY = ("planner",)
+PAPER_ONLY = ("planner", "planner --payload none")
 Scale = Literal["linear", "log"]
 
 
@@ -83,7 +85,7 @@ class ResultFigure:
 
     def command(self, preset: str) -> str:
         """The command that makes the figure's results."""
-        return " ".join(["swarm-mj", *self.arguments(preset), "--csv FILE"])
+        return shlex.join(["swarm-mj", *self.arguments(preset), "--csv", "FILE"])
 
     def arguments(self, preset: str) -> Sequence[str]:
         """What `swarm-mj` is called with to make the figure's results, but for the file."""

@@ -74,6 +74,7 @@ LOOKS = {
     "tdma": Look(label="TDMA", colour="#0072b2", marker="D", size=4.0),
     "spatial-tdma": Look(label="spatial TDMA", colour="#332288", marker="h", size=5.5),
     "planner": Look(label="planner", colour="#80391e", marker="d"),
+    "planner --payload none": Look(label="planner, no payload", colour="#a6d854", marker="<"),
     "gnn": Look(label="gnn (T, M, P only)", colour="#d55e00", marker="*", size=8.0),
     "greedy-oracle": Look(label="greedy oracle", colour="#000000", marker=".", size=5.0, width=0.8),
     "GNN": Look(label="GNN", colour="#cc79a7", marker="X"),

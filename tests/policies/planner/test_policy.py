@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from channels import to_nobody, unreliable
-from minds import Flight, Witnessed, common_orders
+from decentralised_reference import Flight, Witnessed, common_orders
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.planner import discovery, plan

@@ -287,3 +287,54 @@ class Witnessed(Flight):
     @property
     def num_taken(self):
         return sum(mind.took_over for mind in self.minds)
+
+
+class PlannedApart(DecentralisedPolicy):
+    """A flight of the planner without payload, in which each robot is also asked apart.
+
+    A robot is a function of its own buffer, its identity and the clock: at rest, if it has heard of
+    everyone, it works the schedule out from the mission's first slot, in one go; else it does what
+    spatial TDMA has it do, which its own tests hold to Eq. 9.
+    """
+
+    transmits_twice = True
+
+    def __init__(self, mission, seed, *, channel=None):
+        self.policy = make_policy("planner --payload none", mission)
+        self.turns = make_policy("spatial-tdma", mission)
+        self.mission = mission
+        self.swarm = Swarm(mission, [seed], channel=channel)
+        self.num_planned = 0
+
+    def start(self, num_robots, rngs):
+        self.turns.start(num_robots, copy.deepcopy(rngs))
+        self.policy.start(num_robots, rngs)
+
+    def recipients(self, views):
+        recipient = self.policy.recipients(views)
+        in_turn = self.turns.recipients(views) != views.silence
+        slot = round(2 * float(views.now[0]))
+        for i in range(views.num_robots):
+            seen, position_m, velocity_mps = rows(views.buffers, i)
+            transmits = bool(in_turn[0, i])
+            if all(seen > 0.0) and not velocity_mps.any():
+                transmits = bool(self.planned(position_m, slot)[i])
+                self.num_planned += 1
+            assert (recipient[0, i] != i) == transmits, (slot, i)
+        return recipient
+
+    def planned(self, position_m, slot):
+        """Who transmits in this slot, planned from the mission's first one."""
+        num_robots = len(position_m)
+        links = links_between(radio_of(self.mission), position_m)
+        foresight = plan.foresight_of(num_robots, is_certain=True)
+        is_free = np.ones(slot + 1 + foresight.half_windows, dtype=bool)
+        transmits = np.zeros((slot + 1, num_robots), dtype=bool)
+        nothing = np.zeros((num_robots, num_robots), dtype=np.float32)
+        schedule(nothing, 0.0, links, RuleOfThumb()(links), foresight, is_free, transmits)
+        return transmits[slot]
+
+    def fly(self, num_windows):
+        """Flies on."""
+        for _ in range(num_windows):
+            self.swarm.step(self)
