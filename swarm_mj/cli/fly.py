@@ -171,7 +171,7 @@ def _compile_ahead(options: argparse.Namespace, mission: Mission) -> None:
 
 
 def _recorder(options: argparse.Namespace, swarm: Swarm, policy: Policy) -> Recorder:
-    return Recorder(swarm, observer=options.observer, has_response=not policy.transmits_twice)
+    return Recorder(swarm, ego=options.observer, is_broadcast=policy.transmits_twice)
 
 
 def _fly(swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Console) -> _Flight:

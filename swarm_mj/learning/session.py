@@ -219,7 +219,7 @@ class Session(BaseCallback):
         mission = held_out_missions(training)[0]
         swarm = Swarm(mission, [HELD_OUT_SEED])
         policy = held_out_policy(training, acting_network(self._ppo), mission)
-        recorder = Recorder(swarm, observer=0, has_response=True)
+        recorder = Recorder(swarm)
         for flown in fly(swarm, policy):
             recorder.add(flown)
         path = self._folder / REPLAYS / f"decisions-{decisions:09d}.rrd"

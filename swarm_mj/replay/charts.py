@@ -1,4 +1,4 @@
-"""Beside the map: the observer's tree, the age matrix, the plots and the radio's state lanes."""
+"""Beside the map: the ego robot's tree, the age matrix, the plots and the radio's state lanes."""
 
 import numpy as np
 import rerun as rr
@@ -7,29 +7,29 @@ from jaxtyping import Int
 from swarm_mj.policies.minimum_spanning_tree import ROOT, spanning_tree
 from swarm_mj.replay import palette
 from swarm_mj.replay.dendrogram import dendrogram
-from swarm_mj.replay.links import Links
+from swarm_mj.replay.links import Links, broadcast_counts, transmitters
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet, screen
 from swarm_mj.replay.tensor_column import tensor_column
 
-TREE_WIDTH, TREE_HEIGHT = 400.0, 400.0  # of the tree's view, in its own units
+TREE_WIDTH, TREE_HEIGHT = 600.0, 400.0  # of the tree's view, in its own units
 RATE_WINDOWS = 10  # packets are counted over the last second
 
 
 def draw_tree(sheet: Sheet, full_scale: float) -> None:
-    """The observer's parent tree as a dendrogram, nodes in the colour of their age."""
+    """The ego robot's parent tree as a dendrogram, nodes in the colour of their age."""
     log = sheet.log
-    place = dendrogram(log.parent, log.is_known, log.observer)
+    place = dendrogram(log.parent, log.is_known, log.ego)
     max_hops = max(4.0, float(np.nanmax(place[..., 0])))
     place *= (TREE_WIDTH / max_hops, TREE_HEIGHT)
     _draw_hop_lines(sheet, int(max_hops))
-    colours = palette.age_colours(log.observer_age, full_scale, log.is_known)
-    colours[:, log.observer] = palette.OBSERVER
+    colours = palette.age_colours(log.ego_age, full_scale, log.is_known)
+    colours[:, log.ego] = palette.EGO
     shown = log.is_known.copy()
-    shown[:, log.observer] = True
+    shown[:, log.ego] = True
     sheet.fixed("tree/nodes", rr.Points2D.from_fields(radii=screen(4.5), draw_order=2.0))
     sheet.points("tree/nodes", place[shown], colours[shown], np.sum(shown, axis=1))
-    row, child = np.nonzero(log.is_known & (np.arange(log.parent.shape[1]) != log.observer))
+    row, child = np.nonzero(log.is_known & (np.arange(log.parent.shape[1]) != log.ego))
     sheet.line_style("tree/edges", palette.TREE, 0.8, 1.0)
     per_window = np.bincount(row, minlength=len(log.window))
     sheet.lines("tree/edges", place[row, log.parent[row, child]], place[row, child], per_window)
@@ -45,7 +45,7 @@ def draw_age_matrix(sheet: Sheet, full_scale: float) -> None:
     ages = np.minimum(log.age[:, order][:, :, order], full_scale).astype(np.float16)
     # Reversed, so that bright is fresh as on the map.
     sheet.fixed("ages", rr.Tensor.from_fields(value_range=[full_scale, 0.0]))
-    sheet.timed("ages", tensor_column(ages, ("owner", "about")), log.age_window)
+    sheet.timed("ages", tensor_column(ages, ("robot", "about robot")), log.age_window)
 
 
 def draw_plots(sheet: Sheet, packets: dict[str, Links]) -> None:
@@ -61,18 +61,24 @@ def draw_plots(sheet: Sheet, packets: dict[str, Links]) -> None:
         "plots/age/mean", rr.Measurements.columns(values=log.age_mean, variances=log.age_std**2)
     )
     _plot(sheet, "plots/age/worst", "worst pair", palette.WORST_AGE, log.age_max)
-    own_mean = np.mean(log.observer_age, axis=1)
-    _plot(sheet, "plots/age/observer", f"r{log.observer}, mean", palette.OBSERVER_AGE, own_mean)
-    _plot(
-        sheet,
-        "plots/flock/variance",
-        "velocity variance",
-        palette.VARIANCE,
-        log.velocity_variance_m2ps2,
-    )
-    for fate in ("delivered", "lost", "overheard", "answered"):
-        colour = getattr(palette, fate.upper())
-        _plot(sheet, f"plots/radio/{fate}", fate, colour, rate(packets[fate].per_window))
+    own_mean = np.mean(log.ego_age, axis=1)
+    _plot(sheet, "plots/age/ego", f"r{log.ego}, mean", palette.EGO, own_mean)
+    if log.has_motion:
+        variance = log.velocity_variance_m2ps2
+        _plot(sheet, "plots/flock/variance", "velocity variance", palette.VARIANCE, variance)
+    for name, (colour, per_window) in packet_counts(log, packets).items():
+        _plot(sheet, f"plots/radio/{name}", name, colour, rate(per_window))
+
+
+def packet_counts(
+    log: Log, packets: dict[str, Links]
+) -> dict[str, tuple[palette.Colour, Int[np.ndarray, "T"]]]:
+    """What is plotted of the packets: the curves' names and colours, and counts per window."""
+    if log.is_broadcast:
+        sent, heard = broadcast_counts(log)
+        return {"sent": (palette.SENT, sent), "heard": (palette.BROADCAST, heard)}
+    fates = ("delivered", "lost", "overheard", "answered")
+    return {fate: (getattr(palette, fate.upper()), packets[fate].per_window) for fate in fates}
 
 
 def draw_states(sheet: Sheet) -> None:
@@ -104,24 +110,18 @@ def radio_states(log: Log) -> tuple[np.ndarray, list[palette.Colour], Int[np.nda
         The states' names, their colours, and each robot's state as an index into both; sending
         goes before answering, answering before hearing.
     """
-    names = np.array(["silent", "overhears", "answers", "is lost", "delivers"])
-    colours = [
-        palette.BACKGROUND,
-        palette.OVERHEARD,
-        palette.ANSWERED,
-        palette.LOST,
-        palette.DELIVERED,
-    ]
     robots = np.arange(log.recipient.shape[2])
     state = np.where(np.any(log.heard != robots, axis=1), 1, 0)
-    receiver_heard = np.take_along_axis(log.heard, log.recipient, axis=2)
-    is_sent, is_decoded = log.recipient != robots, receiver_heard == robots
-    num_requests = 1 if log.has_response else 2
-    if log.has_response:
-        state[is_sent[:, 1]] = 2
-    state[np.any(is_sent[:, :num_requests], axis=1)] = 3
-    state[np.any(is_sent[:, :num_requests] & is_decoded[:, :num_requests], axis=1)] = 4
-    return names, colours, state
+    if log.is_broadcast:
+        state[transmitters(log)] = 2
+        names, colours = ["silent", "hears", "transmits"], [palette.RANGE, palette.BROADCAST]
+        return np.array(names), [palette.BACKGROUND, *colours], state
+    names = np.array(["silent", "overhears", "answers", "is lost", "delivers"])
+    colours = [palette.OVERHEARD, palette.ANSWERED, palette.LOST, palette.DELIVERED]
+    is_delivered = np.take_along_axis(log.heard, log.recipient, axis=2)[:, 0] == robots
+    state[log.recipient[:, 1] != robots] = 2
+    state[transmitters(log)] = np.where(is_delivered, 4, 3)[transmitters(log)]
+    return names, [palette.BACKGROUND, *colours], state
 
 
 def rate(per_window: Int[np.ndarray, "T"]) -> np.ndarray:

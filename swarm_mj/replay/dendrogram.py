@@ -1,4 +1,4 @@
-"""The observer's parent tree (II-B) as a drawing: hops to the right, leaves one below the other."""
+"""The ego robot's parent tree (II-B) as a drawing: hops to the right, leaves below each other."""
 
 from typing import no_type_check
 
@@ -15,7 +15,7 @@ def dendrogram(
     Args:
         parent: P of the root's buffer.
         is_known: Whether the root has heard of the robot.
-        root: The observer.
+        root: The ego robot.
 
     Returns:
         Places (x, y).

@@ -1,43 +1,41 @@
 """The replay's layout: which view shows what, stored in the file as rerun's blueprint."""
 
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import rerun.blueprint as rrb
 
-from swarm_mj.replay import palette
-from swarm_mj.replay.charts import TREE_HEIGHT, TREE_WIDTH
+from swarm_mj.replay import legend, palette
+from swarm_mj.replay.arena import square_m
+from swarm_mj.replay.charts import TREE_HEIGHT, TREE_WIDTH, packet_counts, rate
+from swarm_mj.replay.frame import Frame
+from swarm_mj.replay.links import Links
+from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import TIMELINE
 
 WINDOWS_PER_SECOND = 30.0  # three times as fast as the mission
+# Curves that would dwarf the others; the viewer can show them.
+HIDDEN = {"age": "worst", "radio": "overheard"}
+MARGIN = 1.06  # of the map, around what it must show
 
 
-def layout(observer: int, reach_m: float, top_age: float, *, has_flock: bool) -> rrb.Blueprint:
+def layout(log: Log, frame: Frame, packets: dict[str, Links]) -> rrb.Blueprint:
     """The blueprint of a replay.
 
     Args:
-        observer: The robot whose knowledge is shown.
-        reach_m: Half the width of the map, which is centred on the origin [m].
-        top_age: Where the plot of ages ends [windows].
-        has_flock: Whether robots move, so that their velocities are worth a plot.
+        log: What is shown.
+        frame: The part of the ground that the map shows.
+        packets: Its packets by their fate.
 
     Returns:
         Two tabs: the mission, and the radio of every robot.
     """
-    plots = [_plot("age", "Age of information [windows]", "LeftTop", hidden="worst", top=top_age)]
-    if has_flock:
-        plots.append(_plot("flock", "Velocity variance [m²/s²]", "RightTop"))
+    charts = _charts(log, packets)
     mission = rrb.Horizontal(
-        rrb.Vertical(
-            _arena(observer, reach_m),
-            _plot("radio", "Packets in the last second", "LeftTop", hidden="overheard"),
-            row_shares=[11, 3],
-        ),
-        rrb.Vertical(
-            rrb.Horizontal(_tree(observer), _ages()),
-            *plots,
-            row_shares=[5] + [3] * len(plots),
-        ),
-        column_shares=[10, 11],
+        rrb.Vertical(_map(frame), _legend(), row_shares=[9, 2]),
+        rrb.Vertical(*charts, row_shares=[4, *[3] * (len(charts) - 1)]),
+        column_shares=[11, 10],
         name="Mission",
     )
     radio = rrb.Horizontal(
@@ -56,23 +54,55 @@ def layout(observer: int, reach_m: float, top_age: float, *, has_flock: bool) ->
     )
 
 
-def _arena(observer: int, reach_m: float) -> rrb.Spatial2DView:
+def _map(frame: Frame) -> rrb.Spatial2DView:
+    reach = MARGIN * frame.reach_m
+    follows = ", follows the team" if frame.moves else ""
     return rrb.Spatial2DView(
         origin="/",
         contents=["/arena/**"],
-        name=f"Arena · colour: age of what r{observer} knows · rings: where it believes the others",
+        name=f"Map, squares of {square_m(frame):g} m{follows}",
         background=palette.BACKGROUND,
-        # The view's y is down, the map's up.
+        visual_bounds=rrb.VisualBounds2D(x_range=[-reach, reach], y_range=[-reach, reach]),
+    )
+
+
+def _legend() -> rrb.Spatial2DView:
+    return rrb.Spatial2DView(
+        origin="/legend",
+        name="Legend",
+        titlebar=False,
+        background=palette.BACKGROUND,
         visual_bounds=rrb.VisualBounds2D(
-            x_range=[-1.04 * reach_m, 1.04 * reach_m], y_range=[-1.03 * reach_m, 1.27 * reach_m]
+            x_range=[0.0, legend.WIDTH], y_range=[-3.5, legend.HEIGHT]
         ),
     )
 
 
-def _tree(observer: int) -> rrb.Spatial2DView:
+def _charts(log: Log, packets: dict[str, Links]) -> list[rrb.View | rrb.Container]:
+    """The ego robot's tree and the ages of all pairs; below them the plots."""
+    ego = f"r{log.ego}"
+    ages = [log.age_mean + log.age_std, np.mean(log.ego_age, axis=1)]
+    radio = "Packets per second: " + (
+        "sent (grey), heard by anyone (blue)"
+        if log.is_broadcast
+        else "delivered (green), lost (orange), answered (blue)"
+    )
+    counts = packet_counts(log, packets)
+    rates = [rate(of) for name, (_, of) in counts.items() if name != HIDDEN["radio"]]
+    charts: list[rrb.View | rrb.Container] = [
+        rrb.Horizontal(_tree(ego), _ages()),
+        _plot("age", f"Age of information [windows]: team ± std (green), {ego} (white)", ages),
+        _plot("radio", radio, rates),
+    ]
+    if log.has_motion:
+        charts.append(_plot("flock", "Velocity variance [m²/s²]", [log.velocity_variance_m2ps2]))
+    return charts
+
+
+def _tree(ego: str) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(
         origin="/tree",
-        name=f"Parent tree of r{observer} · a line is a hop",
+        name=f"Tree of {ego}, in hops",
         background=palette.BACKGROUND,
         visual_bounds=rrb.VisualBounds2D(
             x_range=[-0.05 * TREE_WIDTH, 1.05 * TREE_WIDTH],
@@ -84,23 +114,23 @@ def _tree(observer: int) -> rrb.Spatial2DView:
 def _ages() -> rrb.TensorView:
     return rrb.TensorView(
         origin="/ages",
-        name="Age of what row knows about column",
+        name="Age of information, all pairs",
         scalar_mapping=rrb.TensorScalarMapping(colormap="Viridis", mag_filter="Nearest"),
-        view_fit="FillKeepAspectRatio",
+        view_fit="Fill",
     )
 
 
-def _plot(
-    entity: str, name: str, corner: str, hidden: str | None = None, top: float | None = None
-) -> rrb.TimeSeriesView:
-    overrides: dict[Any, Any] = {}
-    if hidden:
-        overrides[f"/plots/{entity}/{hidden}"] = rrb.EntityBehavior(visible=False)
+def _plot(entity: str, name: str, shown: Sequence[np.ndarray]) -> rrb.TimeSeriesView:
+    """A plot without a legend, which would cover curves: its name says what they are."""
+    hidden: dict[Any, Any] = {}
+    if entity in HIDDEN:
+        hidden[f"/plots/{entity}/{HIDDEN[entity]}"] = rrb.EntityBehavior(visible=False)
+    top = palette.nice_top(max(float(np.max(values)) for values in shown))
     return rrb.TimeSeriesView(
-        overrides=overrides,
-        axis_y=None if top is None else rrb.ScalarAxis(range=(0.0, top)),
+        overrides=hidden,
+        axis_y=rrb.ScalarAxis(range=(0.0, 1.06 * top)),  # so that both ends have numbers
         origin=f"/plots/{entity}",
         name=name,
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.auto(corner)),
-        background=rrb.archetypes.PlotBackground(color=palette.BACKGROUND, show_grid=True),
+        plot_legend=rrb.PlotLegend(visible=False),
+        background=rrb.archetypes.PlotBackground(color=palette.PLOT, show_grid=False),
     )

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from swarm_mj.replay.recorder import Log
 
@@ -24,10 +24,11 @@ class Links:
 
 
 def fates(log: Log) -> dict[str, Links]:
-    """Every packet by its fate: delivered, lost, overheard, answered, unanswered.
+    """Every packet by its fate.
 
-    `lost` and `unanswered` packets end at the robot they were meant for, which did not decode them;
-    a packet that k other robots overheard is k links.
+    Addressed packets are delivered, lost, overheard, answered or unanswered. `lost` and
+    `unanswered` ones end at the robot they were meant for, which did not decode them; a packet that
+    k other robots overheard is k links. Broadcasts have no addressee: `heard` leads to each hearer.
 
     Args:
         log: The flight.
@@ -35,26 +36,45 @@ def fates(log: Log) -> dict[str, Links]:
     Returns:
         The links of each fate.
     """
-    row, phase, sender = np.nonzero(log.recipient != np.arange(log.recipient.shape[2]))
+    row, phase, hearer = np.nonzero(log.heard != np.arange(log.heard.shape[2]))
+    speaker = log.heard[row, phase, hearer]
+    received = (row, speaker, hearer)
+    if log.is_broadcast:
+        return {"heard": _links(log, received, np.ones(len(row), dtype=bool))}
+    is_overheard = log.recipient[row, phase, speaker] != hearer
+    row, phase, sender = np.nonzero(_is_sent(log))
     receiver = log.recipient[row, phase, sender]
     is_decoded = log.heard[row, phase, receiver] == sender
-    is_request = (phase == 0) | (not log.has_response)
-    sent = (row, sender, receiver)
-    hearer_row, hearer_phase, hearer = np.nonzero(log.heard != np.arange(log.heard.shape[2]))
-    heard_from = log.heard[hearer_row, hearer_phase, hearer]
-    is_overheard = log.recipient[hearer_row, hearer_phase, heard_from] != hearer
+    sent, is_request = (row, sender, receiver), phase == 0
     return {
         "delivered": _links(log, sent, is_request & is_decoded),
         "lost": _links(log, sent, is_request & ~is_decoded),
-        "overheard": _links(log, (hearer_row, heard_from, hearer), is_overheard),
+        "overheard": _links(log, received, is_overheard),
         "answered": _links(log, sent, ~is_request & is_decoded),
         "unanswered": _links(log, sent, ~is_request & ~is_decoded),
     }
 
 
+def transmitters(log: Log) -> Bool[np.ndarray, "T N"]:
+    """Who sent a request, or a broadcast in either phase."""
+    return np.any(_is_sent(log)[:, : 2 if log.is_broadcast else 1], axis=1)
+
+
+def broadcast_counts(log: Log) -> tuple[Int[np.ndarray, "T"], Int[np.ndarray, "T"]]:
+    """How many broadcasts were sent in each window, and how many of them somebody decoded."""
+    row, phase, hearer = np.nonzero(log.heard != np.arange(log.heard.shape[2]))
+    is_heard = np.zeros(log.heard.shape, dtype=bool)
+    is_heard[row, phase, log.heard[row, phase, hearer]] = True
+    return np.sum(_is_sent(log), axis=(1, 2)), np.sum(is_heard, axis=(1, 2))
+
+
 def ends(log: Log, links: Links) -> tuple[Float[np.ndarray, "L 2"], Float[np.ndarray, "L 2"]]:
     """Where the senders and the receivers are [m]."""
     return log.position_m[links.row, links.sender], log.position_m[links.row, links.receiver]
+
+
+def _is_sent(log: Log) -> Bool[np.ndarray, "T 2 N"]:
+    return log.recipient != np.arange(log.recipient.shape[2])
 
 
 def _links(log: Log, sent: tuple[np.ndarray, ...], chosen: np.ndarray) -> Links:

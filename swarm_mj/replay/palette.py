@@ -12,25 +12,29 @@ from jaxtyping import Bool, Float, UInt8
 Colour: TypeAlias = tuple[int, int, int]
 
 BACKGROUND: Colour = (13, 16, 22)
+PLOT: Colour = (48, 54, 67)  # both a light and a dark time cursor are seen on it
 GRID: Colour = (30, 36, 46)
 WALL: Colour = (112, 122, 138)
-TEXT: Colour = (196, 203, 214)
+OUTLINE: Colour = (44, 52, 66)
+RANGE: Colour = (44, 55, 74)
+TEXT: Colour = (255, 255, 255)
 TRAIL: Colour = (50, 60, 76)
 BELIEF: Colour = (104, 118, 144)
-TREE: Colour = (92, 104, 126)
-OBSERVER: Colour = (255, 255, 255)
+TREE: Colour = (78, 90, 112)
+EGO: Colour = (255, 255, 255)
 UNKNOWN: Colour = (84, 86, 94)
 SWITCHED_OFF: Colour = (46, 48, 54)
 HEADING: Colour = (205, 210, 220)
 
 DELIVERED: Colour = (0, 205, 145)
+BROADCAST: Colour = (86, 180, 233)
+SENT: Colour = (196, 203, 214)
 LOST: Colour = (240, 98, 42)
 OVERHEARD: Colour = (204, 121, 167)
 ANSWERED: Colour = (86, 180, 233)
 
 MEAN_AGE: Colour = (53, 183, 121)
-WORST_AGE: Colour = (125, 135, 152)
-OBSERVER_AGE: Colour = (253, 231, 37)
+WORST_AGE: Colour = (150, 158, 172)
 VARIANCE: Colour = (240, 200, 80)
 
 # Nine equal steps of viridis (van der Walt and Smith, 2015, CC0), stale to fresh.
@@ -48,6 +52,7 @@ _VIRIDIS = np.array(
     ],
     dtype=float,
 )
+ROUND = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 10.0)
 _STALEST = 0.10  # the darkest end of viridis would vanish on the background
 
 
@@ -78,7 +83,13 @@ def age_colours(
 
 
 def nice_scale(age_windows: Float[np.ndarray, "..."]) -> float:
-    """A round number of windows that three ages in four lie below."""
-    target = max(1.0, float(np.percentile(age_windows, 75)))
-    decade = 10.0 ** np.floor(np.log10(target))
-    return float(next(step * decade for step in (1.0, 2.0, 5.0, 10.0) if step * decade >= target))
+    """A round number of windows that 19 ages in 20 lie below."""
+    return nice_top(max(1.0, float(np.percentile(age_windows, 95))))
+
+
+def nice_top(value: float) -> float:
+    """The next round number, 1 for nothing; axes that end there have numbers at both ends."""
+    if value <= 0.0:
+        return 1.0
+    decade = 10.0 ** np.floor(np.log10(value))
+    return float(next(step * decade for step in ROUND if step * decade >= value))

@@ -18,22 +18,22 @@ AGE_BYTES = 4  # float32
 class Log:
     """T windows of one mission of N robots, each at its end; packets flew during it.
 
-    Ages are those of the whole team; what is believed, and the parents, are one robot's: the
-    observer's.
+    Ages are those of the whole team; what is believed, and the parents, are one robot's: the ego
+    robot's.
     """
 
-    observer: int
+    ego: int
     window: Int[np.ndarray, "T"]  # 1 is the mission's first window
     position_m: Float[np.ndarray, "T N 2"]  # p [m]
     velocity_mps: Float[np.ndarray, "T N 2"]  # v [m/s]
     recipient: Int[np.ndarray, "T 2 N"]  # S^i in both phases; itself: silent
     is_on: Bool[np.ndarray, "T N"]  # whether a robot was switched on
     heard: Int[np.ndarray, "T 2 N"]  # whom robot j decoded in both phases; itself: nobody
-    has_response: bool  # whether the second phase answers the first
-    is_known: Bool[np.ndarray, "T N"]  # whether the observer has heard of j
-    believed_m: Float[np.ndarray, "T N 2"]  # M: where j was, as the observer knows it [m]
-    observer_age: Float[np.ndarray, "T N"]  # t - T^{observer,j} [windows]
-    parent: Int[np.ndarray, "T N"]  # P^{observer,j}
+    is_broadcast: bool  # packets have no addressee; otherwise the second phase answers the first
+    is_known: Bool[np.ndarray, "T N"]  # whether the ego robot has heard of j
+    believed_m: Float[np.ndarray, "T N 2"]  # M: where j was, as the ego robot knows it [m]
+    ego_age: Float[np.ndarray, "T N"]  # t - T^{ego,j} [windows]
+    parent: Int[np.ndarray, "T N"]  # P^{ego,j}
     age_window: Int[np.ndarray, "K"]  # the windows of the age matrix, every stride-th
     age: Float[np.ndarray, "K N N"]  # t - T^{i,j} [windows]
     age_mean: Float[np.ndarray, "T"]  # Eq. 10 [windows]
@@ -41,29 +41,34 @@ class Log:
     age_max: Float[np.ndarray, "T"]  # the worst pair's [windows]
     velocity_variance_m2ps2: Float[np.ndarray, "T"]  # Eq. 17
 
+    @property
+    def has_motion(self) -> bool:
+        """Whether any robot moves."""
+        return bool(np.any(self.velocity_mps))
+
 
 class Recorder:
     """Copies what a replay shows from the swarm's first mission, window by window."""
 
-    def __init__(self, swarm: Swarm, *, observer: int = 0, has_response: bool = True) -> None:
+    def __init__(self, swarm: Swarm, *, ego: int = 0, is_broadcast: bool = False) -> None:
         """Prepares the record.
 
         Args:
             swarm: Whose mission 0 is recorded.
-            observer: The robot whose knowledge is shown.
-            has_response: Whether windows are those of Alg. 1, with responses, or flooding's.
+            ego: The robot whose knowledge is shown.
+            is_broadcast: Whether windows are two broadcasts (IV-C) instead of those of Alg. 1.
 
         Raises:
             ValueError: There is no such robot.
         """
         num_robots = swarm.mission.num_robots
-        if not 0 <= observer < num_robots:
-            raise ValueError(f"observer must be from 0 to {num_robots - 1}, not {observer}")
+        if not 0 <= ego < num_robots:
+            raise ValueError(f"observer must be from 0 to {num_robots - 1}, not {ego}")
         matrices_bytes = AGE_BYTES * num_robots**2 * swarm.mission.num_windows
         self._stride = max(1, int(np.ceil(matrices_bytes / MAX_AGE_MATRIX_BYTES)))
         self._swarm = swarm
-        self._observer = observer
-        self._has_response = has_response
+        self._ego = ego
+        self._is_broadcast = is_broadcast
         self._rows: list[dict[str, np.ndarray | float]] = []
         self._age: list[np.ndarray] = []
 
@@ -79,7 +84,7 @@ class Recorder:
         num_robots = len(age)
         is_on = np.ones(num_robots, bool) if self._swarm.is_on is None else self._swarm.is_on[0]
         others = age[is_on[:, None] & is_on & ~np.eye(num_robots, dtype=bool)]
-        own = self._observer
+        own = self._ego
         if len(self._rows) % self._stride == 0:
             self._age.append(age.astype(np.float32))
         self._rows.append(
@@ -91,7 +96,7 @@ class Recorder:
                 "is_on": is_on.copy(),
                 "is_known": buffers.is_known[0, own].copy(),
                 "believed_m": buffers.position_m[0, own].copy(),
-                "observer_age": age[own].copy(),  # a view would keep the whole matrix
+                "ego_age": age[own].copy(),  # a view would keep the whole matrix
                 "parent": buffers.parent[0, own].copy(),
                 "age_mean": float(flown.costs.age_windows[0]),
                 "age_std": float(np.std(others)),
@@ -115,9 +120,9 @@ class Recorder:
         window = np.arange(1, len(self._rows) + 1)
         age_window = window[:: self._stride]
         return Log(
-            observer=self._observer,
+            ego=self._ego,
             window=window,
-            has_response=self._has_response,
+            is_broadcast=self._is_broadcast,
             age_window=age_window,
             # An interrupt between the two appends of `add` leaves one matrix too many.
             age=np.stack(self._age[: len(age_window)]),

@@ -7,6 +7,7 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float, Int
 
+from swarm_mj.replay.frame import Frame
 from swarm_mj.replay.links import Links, ends
 from swarm_mj.replay.palette import Colour
 from swarm_mj.replay.recorder import Log
@@ -22,10 +23,13 @@ def screen(points: float) -> float:
 class Sheet:
     """Draws fixed and timed things; a timed entity shows the last window's row."""
 
-    def __init__(self, recording: rr.RecordingStream, log: Log, window_s: float) -> None:
+    def __init__(
+        self, recording: rr.RecordingStream, log: Log, frame: Frame, window_s: float
+    ) -> None:
         self._recording = recording
         self._window_s = window_s
         self.log = log
+        self.frame = frame
 
     def fixed(self, path: str, *archetypes: Any) -> None:  # noqa: ANN401 - any rerun archetype
         """Draws something that never changes. It would hide the same component drawn in time."""

@@ -2,15 +2,15 @@
 
 from pathlib import Path
 
-import numpy as np
 import rerun as rr
 
 from swarm_mj.io.atomic_file import atomic_write
 from swarm_mj.mission import Mission
 from swarm_mj.replay import arena, charts, palette
+from swarm_mj.replay.frame import frame
 from swarm_mj.replay.layout import layout
 from swarm_mj.replay.legend import draw_legend
-from swarm_mj.replay.links import fates
+from swarm_mj.replay.links import Links, fates
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet
 
@@ -39,42 +39,36 @@ def write_replay(log: Log, mission: Mission, config: dict[str, object], path: Pa
 def _write(log: Log, mission: Mission, config: dict[str, object], path: Path, *, name: str) -> None:
     path.touch()  # rerun reports a folder that cannot be written in its own log only
     rr.set_strict_mode(True)  # bad data raises; otherwise a column is silently missing
-    reach_m = reach(log, mission)
-    top_age = 1.05 * float(np.max(log.age_mean + log.age_std))
-    blueprint = layout(log.observer, reach_m, top_age, has_flock=bool(np.any(log.velocity_mps)))
+    packets = fates(log)
+    shown = frame(log, mission.half_side_m)
     with rr.RecordingStream(APPLICATION, send_properties=False) as recording:
-        recording.save(path, default_blueprint=blueprint)
+        recording.save(path, default_blueprint=layout(log, shown, packets))
         recording.set_log_tick_enabled(False)
         recording.set_log_time_enabled(False)
         recording.send_recording_name(name)
         recording.send_property("mission", rr.AnyValues(drop_untyped_nones=True, **config))
-        draw(Sheet(recording, log, mission.window_s), mission, reach_m)
+        draw(Sheet(recording, log, shown, mission.window_s), mission, packets)
         lines = [f"- **{key}**: {value}" for key, value in config.items()]
         about = "\n".join([f"# {name}", *lines])
         recording.log("about", rr.TextDocument(about, media_type="text/markdown"), static=True)
 
 
-def reach(log: Log, mission: Mission) -> float:
-    """Half the width of a map that holds the area and everywhere the robots went [m]."""
-    return max(mission.half_side_m, float(np.max(np.abs(log.position_m))))
-
-
-def draw(sheet: Sheet, mission: Mission, reach_m: float) -> None:
+def draw(sheet: Sheet, mission: Mission, packets: dict[str, Links]) -> None:
     """Draws every layer of a replay.
 
     Args:
         sheet: Where to draw, and what.
         mission: Its numbers.
-        reach_m: Half the width of the map, which is centred on the origin [m].
+        packets: Its packets by their fate.
     """
     full_scale = palette.nice_scale(sheet.log.age)
-    packets = fates(sheet.log)
     arena.draw_area(sheet, mission)
     arena.draw_robots(sheet, full_scale)
-    arena.draw_beliefs(sheet)
+    if sheet.log.has_motion:
+        arena.draw_beliefs(sheet)
     arena.draw_tree_on_map(sheet)
     arena.draw_radio(sheet, packets, mission.range_m)
-    draw_legend(sheet, full_scale, reach_m)
+    draw_legend(sheet, full_scale)
     charts.draw_tree(sheet, full_scale)
     charts.draw_age_matrix(sheet, full_scale)
     charts.draw_plots(sheet, packets)

@@ -214,7 +214,7 @@ def test_threads_and_gradients_are_left_as_they_were():
 
 def test_a_flight_is_recorded():
     swarm, policy = Swarm(MISSION, [1]), learned()
-    recorder = Recorder(swarm, observer=2, has_response=not policy.transmits_twice)
+    recorder = Recorder(swarm, ego=2, is_broadcast=policy.transmits_twice)
     for window in fly(swarm, policy):
         recorder.add(window)
     assert len(recorder.log().recipient) == MISSION.num_windows

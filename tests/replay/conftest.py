@@ -27,12 +27,12 @@ class Recorded:
         return np.array([getattr(packets, fate)[0] for packets in self.packets])
 
 
-def record(policy_name, probability, **overrides):
+def record(policy_name, probability, *, task="flocking", **overrides):
     settings = {"num_robots": 12, "num_windows": 30, "boundary": "reflect"} | overrides
-    mission = paper("flocking", **settings)
+    mission = paper(task, **settings)
     swarm = Swarm(mission, [5])
     policy = make_policy(policy_name, mission, probability)
-    recorder = Recorder(swarm, observer=4, has_response=not policy.transmits_twice)
+    recorder = Recorder(swarm, ego=4, is_broadcast=policy.transmits_twice)
     packets = []
     for window in fly(swarm, policy):
         recorder.add(window)
@@ -53,6 +53,12 @@ def flooded():
 
 
 @pytest.fixture(scope="session")
+def still():
+    """A team at rest."""
+    return record("mst", 0.3, task="stationary")
+
+
+@pytest.fixture(scope="session")
 def failing():
     """Of 12 robots 3 are switched off after 15 of 30 windows."""
     return record("mst", 0.3, switched_off=0.25)
@@ -62,4 +68,18 @@ def failing():
 def replay(two_way, tmp_path_factory):
     path = tmp_path_factory.mktemp("replays") / "mission.rrd"
     write_replay(two_way.log, two_way.mission, {"seed": 5, "policy": "mst", "ratio": 0.25}, path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def flood_replay(flooded, tmp_path_factory):
+    path = tmp_path_factory.mktemp("replays") / "flood.rrd"
+    write_replay(flooded.log, flooded.mission, {"seed": 5}, path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def still_replay(still, tmp_path_factory):
+    path = tmp_path_factory.mktemp("replays") / "still.rrd"
+    write_replay(still.log, still.mission, {"seed": 5}, path)
     return path

@@ -32,7 +32,7 @@ def static(path, entity, component):
         for chunk in RrdReader(path).stream().filter(content=entity)
         if chunk.is_static and component in chunk.to_record_batch().schema.names
     )
-    return np.array(value.flatten().flatten().to_pylist()).ravel()
+    return np.array(value.to_pylist()).ravel()
 
 
 def rows_of_strips(path, entity):

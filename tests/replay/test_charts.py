@@ -4,7 +4,10 @@ import numpy as np
 from reading import column, rows_of_strips
 
 from swarm_mj.policies.minimum_spanning_tree import spanning_tree
-from swarm_mj.replay.charts import radio_states, rate, walk
+from swarm_mj.replay.charts import packet_counts, radio_states, rate, walk
+from swarm_mj.replay.links import fates
+
+FATES = ["delivered", "lost", "overheard", "answered"]
 
 
 def test_a_walk_visits_everyone_once_and_children_after_parents(two_way):
@@ -40,23 +43,32 @@ def test_states_follow_a_plain_reading_of_the_log(two_way):
             assert names[state[t, i]] == expected
 
 
-def test_a_flooding_robot_delivers_if_either_packet_does(flooded):
+def test_a_broadcasting_robot_transmits_hears_or_is_silent(flooded):
     log = flooded.log
-    names, _, state = radio_states(log)
-    robots = np.arange(log.recipient.shape[2])
-    for t, i in np.argwhere(np.any(log.recipient != robots, axis=1)):
-        sent = [(p, log.recipient[t, p, i]) for p in (0, 1) if log.recipient[t, p, i] != i]
-        got = any(log.heard[t, p, to] == i for p, to in sent)
-        assert names[state[t, i]] == ("delivers" if got else "is lost")
+    names, colours, state = radio_states(log)
+    assert len(names) == len(colours) == 3
+    for t, i in np.ndindex(len(log.window), 12):
+        expected = "hears" if np.any(log.heard[t, :, i] != i) else "silent"
+        if np.any(log.recipient[t, :, i] != i):
+            expected = "transmits"
+        assert names[state[t, i]] == expected
+
+
+def test_the_packet_plot_counts_as_the_costs_do(two_way, flooded):
+    for recorded, curves in ((two_way, FATES), (flooded, ["sent", "heard"])):
+        counts = packet_counts(recorded.log, fates(recorded.log))
+        assert list(counts) == list(curves)
+        for name, (_, per_window) in counts.items():
+            np.testing.assert_array_equal(per_window, recorded.counted(name))
 
 
 def test_rows_of_the_matrix_own_and_columns_are_owned(replay, two_way):
-    """The observer's row, wherever the walk put it, is what the observer knows."""
+    """The ego robot's row, wherever the walk put it, is what the ego robot knows."""
     tensors = column(replay, "/ages", "Tensor:data").flatten().to_pylist()
     shown = np.array(tensors[-1]["buffer"]).reshape(12, 12)
     full_scale = shown.max()
-    own = np.sort(np.minimum(two_way.log.observer_age[-1], full_scale)).astype(np.float16)
-    about = np.minimum(two_way.log.age[-1, :, two_way.log.observer], full_scale)
+    own = np.sort(np.minimum(two_way.log.ego_age[-1], full_scale)).astype(np.float16)
+    about = np.minimum(two_way.log.age[-1, :, two_way.log.ego], full_scale)
     assert any(np.array_equal(np.sort(row), own) for row in shown)
     assert any(np.array_equal(np.sort(owned), np.sort(about)) for owned in shown.T)
     assert not any(np.array_equal(np.sort(row), np.sort(about)) for row in shown)
@@ -82,7 +94,7 @@ def test_plots_are_the_costs(replay, two_way):
 
 def test_the_tree_s_lines_join_nodes_a_hop_apart(replay, two_way):
     strips = rows_of_strips(replay, "/tree/edges")
-    known = two_way.log.is_known & (np.arange(12) != two_way.log.observer)
+    known = two_way.log.is_known & (np.arange(12) != two_way.log.ego)
     assert len(strips) == np.sum(known)
     hop = np.unique(np.round(strips[:, 1, 0] - strips[:, 0, 0], 3))
     assert len(hop) == 1

@@ -24,11 +24,11 @@ def test_a_lone_observer_stands_in_the_middle():
 
 def test_depth_is_the_number_of_hops_to_the_observer(two_way):
     log = two_way.log
-    place = dendrogram(log.parent, log.is_known, log.observer)
+    place = dendrogram(log.parent, log.is_known, log.ego)
     for t in range(len(log.window)):
         for j in np.flatnonzero(log.is_known[t]):
             hops, at = 0, j
-            while at != log.observer:
+            while at != log.ego:
                 at = log.parent[t, at]
                 hops += 1
             assert place[t, j, 0] == hops
@@ -36,6 +36,6 @@ def test_depth_is_the_number_of_hops_to_the_observer(two_way):
 
 def test_no_two_robots_share_a_place(two_way):
     log = two_way.log
-    place = dendrogram(log.parent, log.is_known, log.observer)[-1]
+    place = dendrogram(log.parent, log.is_known, log.ego)[-1]
     known = place[~np.isnan(place[:, 0])]
     assert len(np.unique(known, axis=0)) == len(known) == np.sum(log.is_known[-1])

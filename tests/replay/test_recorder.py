@@ -11,12 +11,12 @@ from swarm_mj.rollout import fly
 from swarm_mj.swarm import Swarm
 
 
-def flown_log(num_windows=12, observer=2, num_robots=8):
+def flown_log(num_windows=12, ego=2, num_robots=8):
     """A short flight's log, and what the test itself saw of every window."""
     mission = paper("random-walk", num_robots=num_robots, num_windows=num_windows)
     swarm = Swarm(mission, [3])
     policy = make_policy("mst", mission, 0.4)
-    record = Recorder(swarm, observer=observer)
+    record = Recorder(swarm, ego=ego)
     seen = []
     for window in fly(swarm, policy):
         record.add(window)
@@ -34,7 +34,7 @@ def test_ages_are_those_of_the_buffers():
     log, seen = flown_log()
     ages = np.array([age for _, age in seen])
     np.testing.assert_array_equal(log.age, ages)
-    np.testing.assert_array_equal(log.observer_age, ages[:, 2])
+    np.testing.assert_array_equal(log.ego_age, ages[:, 2])
     np.testing.assert_allclose(log.age_mean, ages.mean(axis=(1, 2)), rtol=1e-12)
     others = ages[:, ~np.eye(8, dtype=bool)]
     np.testing.assert_allclose(log.age_std, others.std(axis=1), rtol=1e-12)
@@ -61,7 +61,7 @@ def test_statistics_are_of_the_robots_that_are_on():
 def test_a_log_is_the_swarm_s_state_field_by_field():
     mission = paper("flocking", num_robots=6, num_windows=8)
     swarm = Swarm(mission, [2])
-    record = Recorder(swarm, observer=3)
+    record = Recorder(swarm, ego=3)
     seen = {"velocity_mps": [], "believed_m": [], "parent": [], "is_known": [], "heard": []}
     variance = []
     for window in fly(swarm, make_policy("mst", mission, 0.5)):
@@ -89,7 +89,7 @@ def test_what_is_kept_does_not_keep_what_is_not():
 
 def test_an_unknown_robot_is_as_old_as_the_mission():
     log, _ = flown_log()
-    first = log.observer_age[0]
+    first = log.ego_age[0]
     assert set(first[~log.is_known[0]]) == {1.0}
     assert first[2] == 0.0
 
@@ -121,11 +121,11 @@ def test_an_interrupt_inside_add_leaves_a_whole_log(monkeypatch):
     assert len(log.window) == len(log.age_window) == len(log.age) == len(log.position_m) == 1
 
 
-@pytest.mark.parametrize("observer", [-1, 8])
-def test_an_observer_must_exist(observer):
+@pytest.mark.parametrize("ego", [-1, 8])
+def test_an_ego_robot_must_exist(ego):
     swarm = Swarm(paper("stationary", num_robots=8), [0])
-    with pytest.raises(ValueError, match=f"observer must be from 0 to 7, not {observer}"):
-        Recorder(swarm, observer=observer)
+    with pytest.raises(ValueError, match=f"observer must be from 0 to 7, not {ego}"):
+        Recorder(swarm, ego=ego)
 
 
 def test_nothing_flown_is_no_log():

@@ -2,20 +2,18 @@
 
 import subprocess
 import sys
-from dataclasses import replace
 
-import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
 from swarm_mj.replay.read import check_replay, windows
-from swarm_mj.replay.write import reach, write_replay
+from swarm_mj.replay.write import write_replay
 
 ENTITIES = {
     "/arena/robots",
     "/arena/heading",
     "/arena/trail",
-    "/arena/observer",
+    "/arena/ego",
     "/arena/area/walls",
     "/arena/belief/ring",
     "/arena/belief/error",
@@ -26,12 +24,12 @@ ENTITIES = {
     "/arena/radio/unanswered",
     "/arena/radio/overheard",
     "/arena/radio/range",
-    "/arena/legend/ramp",
+    "/legend/ramp",
     "/tree/nodes",
     "/tree/edges",
     "/ages",
     "/plots/age/mean",
-    "/plots/age/observer",
+    "/plots/age/ego",
     "/plots/flock/variance",
     "/plots/radio/delivered",
     "/state/r000",
@@ -81,14 +79,25 @@ def test_a_failure_while_writing_leaves_nothing(two_way, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_flooded_stationary_flight_can_be_drawn_too(flooded, tmp_path):
-    path = tmp_path / "flood.rrd"
-    write_replay(flooded.log, flooded.mission, {"seed": 5}, path)
-    assert len(windows(path)) == 30
+def entities(path):
+    """What a replay shows."""
+    return {chunk.entity_path for chunk in RrdReader(path).stream()}
 
 
-def test_the_map_holds_the_area_and_robots_outside_it(two_way):
-    log, mission = two_way.log, two_way.mission
-    assert reach(log, mission) == mission.half_side_m
-    far = replace(log, position_m=log.position_m + np.array([5e3, 0.0]))
-    assert reach(far, mission) == pytest.approx(5e3 + log.position_m[..., 0].max())
+def test_a_broadcast_has_no_arrow_and_no_verdict(flood_replay):
+    found = {path for path in entities(flood_replay) if "radio" in path and "legend" not in path}
+    assert found == {
+        "/arena/radio/heard",
+        "/arena/radio/range",
+        "/arena/radio/transmitter",
+        "/plots/radio/heard",
+        "/plots/radio/sent",
+    }
+    assert len(windows(flood_replay)) == 30
+
+
+def test_a_team_at_rest_has_no_velocities(still_replay):
+    found = entities(still_replay)
+    assert not found & {"/arena/heading", "/arena/trail", "/arena/belief/ring"}
+    assert not any(path.startswith("/plots/flock") for path in found)
+    assert {"/plots/age/mean", "/arena/tree", "/arena/radio/delivered"} <= found
