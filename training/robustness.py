@@ -36,7 +36,7 @@ WITHOUT_ORACLE = ("switched-off", "switched-off-walking", "team-sizes")
 class Settings:
     """What is flown, and on which missions."""
 
-    policies: tuple[str, ...] = ("tdma", "planner")
+    policies: tuple[str, ...] = ("tdma", "planner", "gnn")
     first_seed: int = 2000
 
 

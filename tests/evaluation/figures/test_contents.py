@@ -34,7 +34,7 @@ def test_the_command_named_evaluates_the_drawn_policies_in_the_figures_regimes(f
     assert program == "swarm-mj"
     left_out = {"oracle-lookahead"}
     if preset == "reference":
-        left_out |= {"planner", "planner --payload none"}
+        left_out |= {"planner", "planner --payload none", "gnn"}
     assert set(study.policies) == set(POLICIES) - left_out
     assert study.compared_to == "tdma"
     assert {regime.preset for regime in study.regimes} == {preset}
