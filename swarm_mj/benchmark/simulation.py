@@ -20,8 +20,8 @@ from swarm_mj.mission import Mission, paper
 from swarm_mj.physics.scene import compose
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.policy import regular_length
-from swarm_mj.policies.planner.snapshots import freeze
-from swarm_mj.policies.planner.weights import RuleOfThumb
+from swarm_mj.policies.planner.settings import PlannerSettings
+from swarm_mj.policies.planner.snapshots import take_snapshots
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.round_robin import RoundRobin
 from swarm_mj.protocol.costs import mean_hops, window_costs
@@ -150,14 +150,14 @@ def _planning(mission: Mission) -> Callable[[], object]:
     """One robot's plan for an epoch, from what it knows after four rounds of TDMA."""
     swarm = Swarm(mission, [0])
     tdma = make_policy("tdma", mission)
-    num_windows = regular_length(mission.num_robots)
+    num_windows = regular_length(mission.num_robots, PlannerSettings().epochs)
     for _ in range(2 * mission.num_robots):
         swarm.step(tdma)
     buffers, now = swarm.buffers, float(swarm.now[0])
-    radio, scorer = radio_of(mission), RuleOfThumb()
+    radio, settings = radio_of(mission), PlannerSettings()
 
     def plan() -> object:
-        pictures = freeze(
+        snapshots = take_snapshots(
             buffers.position_m[0],
             buffers.velocity_mps[0],
             buffers.timestamp[0],
@@ -165,11 +165,11 @@ def _planning(mission: Mission) -> Callable[[], object]:
             now,
             mission.window_s,
             num_windows / 2.0,
-            num_windows * 10.0,
+            replace(settings.snapshots, fresh_rounds=10.0),
         )
         is_free = np.ones(2 * num_windows, dtype=bool)
         timestamp = buffers.timestamp[0]
-        return Plan(radio, scorer, pictures, 0, timestamp, now, is_free).outcome()
+        return Plan(radio, settings, snapshots, 0, timestamp, now, is_free).outcome()
 
     return plan
 

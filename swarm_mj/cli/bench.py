@@ -17,6 +17,7 @@ from swarm_mj.benchmark.simulation import (
 from swarm_mj.cli.options import new_parser
 from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.policies.planner.policy import regular_length
+from swarm_mj.policies.planner.settings import PlannerSettings
 
 if TYPE_CHECKING:
     from swarm_mj.benchmark.learning import LearningTiming
@@ -143,7 +144,7 @@ def _evaluation_table(timing: EvaluationTiming) -> Table:
     table.add_row("greedy-oracle, one episode, s", f"{timing.oracle_s:.2f}")
     for size, plan_ms in timing.plan_ms.items():
         table.add_row(f"planner, one robot's plan of an epoch, {size} robots, ms", f"{plan_ms:.1f}")
-        each_ms = plan_ms / (2 * regular_length(size))
+        each_ms = plan_ms / (2 * regular_length(size, PlannerSettings().epochs))
         table.add_row("  for each half window, ms", f"{each_ms:.2f}")
     table.add_row("  of 40 robots at range ratio 1, ms", f"{timing.dense_plan_ms:.1f}")
     table.add_row("plain mj_step, µs", f"{timing.mj_step_us:.2f}")

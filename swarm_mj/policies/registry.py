@@ -14,7 +14,7 @@ from swarm_mj.policies.gossip import InnovationGossip
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle, LookaheadOracle
 from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
 from swarm_mj.policies.planner.policy import Planner
-from swarm_mj.policies.planner.weights import RuleOfThumb
+from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.without_payload import PlannerWithoutPayload
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.random_flooding import RandomFlooding
@@ -65,7 +65,7 @@ def _planner(mission: Mission, probability: float | None) -> Policy:
     _refuse(probability, "planner")
     return Planner(
         radio_of(mission),
-        RuleOfThumb(),
+        PlannerSettings(),
         window_s=mission.window_s,
         range_m=mission.range_m,
         side_m=mission.side_m,
@@ -74,7 +74,7 @@ def _planner(mission: Mission, probability: float | None) -> Policy:
 
 def _planner_without_payload(mission: Mission, probability: float | None) -> Policy:
     _refuse(probability, WITHOUT_PAYLOAD)
-    return PlannerWithoutPayload(radio_of(mission), _spatial_tdma(mission, None))
+    return PlannerWithoutPayload(radio_of(mission), PlannerSettings(), _spatial_tdma(mission, None))
 
 
 def _oracle(mission: Mission, probability: float | None) -> Policy:

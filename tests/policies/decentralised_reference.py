@@ -10,26 +10,28 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.planner import discovery, plan
-from swarm_mj.policies.planner import policy as planner
-from swarm_mj.policies.planner import snapshots as pictures
 from swarm_mj.policies.planner.broadcast_scheduler import schedule
-from swarm_mj.policies.planner.weights import RuleOfThumb, Scorer
+from swarm_mj.policies.planner.plan import foresight_of
+from swarm_mj.policies.planner.policy import Planner
+from swarm_mj.policies.planner.settings import PlannerSettings
+from swarm_mj.policies.planner.weights import heuristic_weights
 from swarm_mj.policies.policy import DecentralisedPolicy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.swarm import Swarm
 
+SETTINGS = PlannerSettings()
+
 
 @dataclass(kw_only=True)
-class Picture:
+class Snapshot:
     """One robot's belief, as it travels in a packet."""
 
     is_known: np.ndarray  # [subject]
     is_fresh: np.ndarray  # [subject]
     position_m: np.ndarray  # [subject, axis]
-    spread_m: np.ndarray  # [subject]
+    position_std_m: np.ndarray  # [subject]
     seen: np.ndarray  # T of its maker [subject]
     before: np.ndarray  # T of everyone at the start of the epoch it is for, as its maker expects
     goodness: tuple[int, float, int]  # the less the better
@@ -39,21 +41,23 @@ class Picture:
         return all(self.is_known.tolist())
 
 
-def common_orders(seed, mission):
+def common_orders(seed, mission, settings=SETTINGS.discovery):
     """The order of the search and the groups of the discovery, in a round each [round, group].
 
-    Of those that reach over the area a share speaks at once, and fewer after the first rounds; one
-    at least, and never all.
+    Of those that reach over the area a share transmits at once, and fewer after the first rounds;
+    one at least, and never all.
     """
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[2])
     num_robots = mission.num_robots
     order = rng.permutation(num_robots).tolist()
     reaches = mission.side_m**2 / (math.pi * mission.range_m**2)
-    at_once = max(1, min(discovery.MOST_SPEAKERS, round(discovery.SPEAKERS_PER_REACH * reaches)))
-    later = max(1, math.floor(at_once * discovery.LATER_SHARE))
+    at_once = max(
+        1, min(settings.max_transmitters, round(settings.transmitters_per_reach * reaches))
+    )
+    later = max(1, math.floor(at_once * settings.later_share))
     rounds = []
-    for k in range(discovery.NUM_ROUNDS):
-        count = min(at_once if k < discovery.FAST_ROUNDS else later, num_robots - 1)
+    for k in range(settings.num_rounds):
+        count = min(at_once if k < settings.num_fast_rounds else later, num_robots - 1)
         robots = rng.permutation(num_robots).tolist()
         rounds.append([robots[first : first + count] for first in range(0, num_robots, count)])
     return order, rounds
@@ -65,28 +69,29 @@ class Mind:
 
     me: int
     mission: Mission
-    scorer: Scorer
+    settings: PlannerSettings
     order: list[int]
     groups: list[list[int]]
     epoch: int = -1
     begins: int = 0  # when the next epoch does [windows]
-    current: Picture | None = None
-    upcoming: Picture | None = None
-    flown: Picture | None = None  # what it flew by in the half window before
+    current: Snapshot | None = None
+    upcoming: Snapshot | None = None
+    flown: Snapshot | None = None  # what it flew by in the slot before
     heard: int | None = None  # whom it decoded then
-    took_over: int = 0  # how often it found a better picture amid an epoch
-    schedule: list[bool] = field(default_factory=list)  # whether it speaks, by half windows
+    took_over: int = 0  # how often it found a better snapshot amid an epoch
+    schedule: list[bool] = field(default_factory=list)  # whether it transmits, by slots
     after: np.ndarray | None = None  # T that its plan leads to
 
     def length(self, epoch):
         """The discovery, two early ones, then all others [windows]."""
+        epochs = self.settings.epochs
         if epoch >= 3:
-            return max(planner.SHORTEST_EPOCH, round(planner.EPOCH * len(self.order)))
-        rounds = planner.FIRST_EPOCH if epoch == 0 else planner.EARLY_EPOCH
+            return max(epochs.min_regular_windows, round(epochs.regular_rounds * len(self.order)))
+        rounds = epochs.first_rounds if epoch == 0 else epochs.early_rounds
         return max(2, round(rounds * len(self.order)))
 
     def hear(self, sender, packet):
-        """One half window: whom it decoded, if anybody, and what came beside T, M and P."""
+        """One slot: whom it decoded, if anybody, and what came beside T, M and P."""
         self.heard = sender
         current, upcoming = packet or (None, None)
         if current is not None and current.goodness < self.current.goodness:
@@ -95,22 +100,22 @@ class Mind:
         if upcoming is not None and upcoming.goodness < self.upcoming.goodness:
             self.upcoming = upcoming
 
-    def speaks(self, row, half_window):
-        """Whether it does in the half window that begins now."""
-        if half_window == 2 * self.begins:
-            self.begin(row, half_window // 2)
+    def transmits(self, row, slot):
+        """Whether it does in the slot that begins now."""
+        if slot == 2 * self.begins:
+            self.begin(row, slot // 2)
         flown, self.flown = self.flown, self.current
-        if self.current is None or self.calls(half_window):
-            return self.has_its_turn(row, half_window)
-        if self.seeks(half_window):
-            turn = half_window // 2 // discovery.SEEK_EVERY
-            if half_window % 2 == 0:
+        if self.current is None or self.calls(slot):
+            return self.has_its_turn(row, slot)
+        if self.seeks(slot):
+            turn = slot // 2 // self.settings.search.every_windows
+            if slot % 2 == 0:
                 return self.order[turn % len(self.order)] == self.me
             return self.answers(row, turn, flown)
-        return self.schedule[half_window - 2 * (self.begins - self.length(self.epoch))]
+        return self.schedule[slot - 2 * (self.begins - self.length(self.epoch))]
 
     def begin(self, row, now):
-        """The best picture it holds becomes the one it flies by; it freezes its own for later."""
+        """The best snapshot it holds becomes the one it flies by; it takes its own for later."""
         self.epoch += 1
         self.begins += self.length(self.epoch)
         self.current, self.upcoming = self.upcoming, None
@@ -118,79 +123,85 @@ class Mind:
             self.plan()
         if self.epoch >= 1:
             ahead = self.length(self.epoch) + self.length(self.epoch + 1) / 2
-            self.upcoming = self.picture(row, now, ahead)
+            self.upcoming = self.snapshot(row, now, ahead)
 
-    def picture(self, row, now, windows_ahead):
+    def snapshot(self, row, now, windows_ahead):
         """Frozen from its own buffer row: T, positions and velocities of everyone it heard of."""
         seen, position_m, velocity_mps = row
         num_robots, window_s = len(seen), self.mission.window_s
         known = [k for k in range(num_robots) if seen[k] > 0.0]
         age = [float(now - seen[k]) if k in known else 0.0 for k in range(num_robots)]
-        oldest = max(planner.FRESH * num_robots, 2 * planner.SHORTEST_EPOCH)
+        believes = self.settings.snapshots
+        oldest = max(believes.fresh_rounds * num_robots, believes.min_fresh_windows)
         fresh = [k for k in known if age[k] <= oldest]
         mean_mps = np.sum(velocity_mps[known], axis=0) / len(known)
         off = sum(np.sum((velocity_mps[k] - mean_mps) ** 2) for k in known)
         ahead = np.array(age) + windows_ahead
-        moves_s = np.minimum(ahead, pictures.FORESIGHT) * window_s
+        moves_s = np.minimum(ahead, believes.steady_windows) * window_s
         robots, empty = np.arange(num_robots), np.zeros((num_robots, num_robots))
         is_divided = len(known) == num_robots and off == 0.0 and len(fresh) < 0.75 * num_robots
-        return Picture(
+        return Snapshot(
             is_known=np.isin(robots, known),
             is_fresh=np.isin(robots, known if is_divided else fresh),
             position_m=position_m + velocity_mps * moves_s[:, None],
-            spread_m=pictures.SPREAD * np.sqrt(off / len(known)) * window_s * ahead,
+            position_std_m=believes.std_per_distance * np.sqrt(off / len(known)) * window_s * ahead,
             seen=seen,
             before=empty if self.after is None else self.after,
             goodness=(-len(fresh), sum(age[k] for k in fresh) / len(fresh), self.me),
         )
 
     def plan(self):
-        """The epoch as its picture has it, from the beginning, in one go."""
+        """The epoch as its snapshot has it, from the beginning, in one go."""
         held, length = self.current, self.length(self.epoch)
         begun = self.begins - length
         unheard = begun - np.array(held.seen)
-        is_near = unheard <= plan.GONE * max(20, len(unheard))
+        is_near = unheard <= self.settings.schedule.gone_rounds * max(20, len(unheard))
         is_there = held.is_known & (is_near | held.is_fresh)
-        links = links_between(radio_of(self.mission), held.position_m, held.spread_m, is_there)
-        rests = not held.spread_m.any()
-        known = held.before * (not (rests and self.epoch % planner.FORGET_EVERY == 0))
+        links = links_between(
+            radio_of(self.mission), held.position_m, held.position_std_m, is_there
+        )
+        rests = not held.position_std_m.any()
+        known = held.before * (not (rests and self.epoch % self.settings.epochs.forget_every == 0))
         for k in np.flatnonzero(~held.is_fresh):
             known[k] = np.minimum(known[k], held.seen[k])
             known[:, k] = np.minimum(known[:, k], held.seen[k])
-        foresight = plan.foresight_of(len(known), is_certain=not held.spread_m.any())
+        foresight = foresight_of(len(known), is_certain=rests, settings=self.settings.schedule)
         is_free = [
             not (self.calls(h) or self.seeks(h)) for h in range(2 * begun, 2 * self.begins)
         ] + [True] * foresight.half_windows
         halves = (2 * known).astype(np.float32)
-        speaks = np.zeros((2 * length, len(known)), dtype=bool)
-        worth = self.scorer(links)
-        schedule(halves, 2.0 * begun, links, worth, foresight, np.array(is_free), speaks)
-        self.schedule, self.after = speaks[:, self.me].tolist(), halves.astype(float) / 2
+        transmits = np.zeros((2 * length, len(known)), dtype=bool)
+        weights = heuristic_weights(links, self.settings.weights)
+        schedule(halves, 2.0 * begun, links, weights, foresight, np.array(is_free), transmits)
+        self.schedule, self.after = transmits[:, self.me].tolist(), halves.astype(float) / 2
 
-    def calls(self, half_window):
-        """Whether the discovery goes on, by its picture."""
-        return not self.current.is_complete and not self.is_late(half_window)
+    def calls(self, slot):
+        """Whether the discovery goes on, by its snapshot."""
+        return not self.current.is_complete and not self.is_late(slot)
 
-    def seeks(self, half_window):
-        """Whether the lost are sought, by its picture: now and then."""
+    def seeks(self, slot):
+        """Whether the lost are sought, by its snapshot: now and then."""
         is_lacking = not all(self.current.is_fresh.tolist())
         return (
-            self.is_late(half_window)
+            self.is_late(slot)
             and is_lacking
-            and half_window // 2 % discovery.SEEK_EVERY == 0
+            and slot // 2 % self.settings.search.every_windows == 0
         )
 
-    def is_late(self, half_window):
+    def is_late(self, slot):
         """After some rounds, or many windows."""
-        rounds = discovery.SEEK_AFTER * len(self.order)
-        return half_window >= 2 * min(rounds, discovery.LATEST_SEEK)
+        rounds = self.settings.search.start_rounds * len(self.order)
+        return slot >= 2 * min(rounds, self.settings.search.latest_start_windows)
 
-    def has_its_turn(self, row, half_window):
+    def has_its_turn(self, row, slot):
         """Whether it is one of the group, and knows nobody near who comes before."""
-        group = self.groups[half_window % len(self.groups)]
+        group = self.groups[slot % len(self.groups)]
         if self.me not in group:
             return False
-        here_m, reach_m = row[1][self.me], discovery.POLITE * self.mission.range_m
+        here_m, reach_m = (
+            row[1][self.me],
+            self.settings.discovery.polite_ranges * self.mission.range_m,
+        )
         return not any(is_near(row, k, here_m, reach_m) for k in group[: group.index(self.me)])
 
     def answers(self, row, turn, flown):
@@ -219,17 +230,28 @@ def rows(buffers, i):
     return [array[0, i].copy() for array in arrays]
 
 
+def planner_of(mission, settings):
+    """The planner of a mission with other numbers."""
+    return Planner(
+        radio_of(mission),
+        settings,
+        window_s=mission.window_s,
+        range_m=mission.range_m,
+        side_m=mission.side_m,
+    )
+
+
 class Flight(DecentralisedPolicy):
     """A planner that flies one mission, and notes what it decides."""
 
     transmits_twice = True
 
-    def __init__(self, mission, seed, *, channel=None):
-        self.scorer = RuleOfThumb()
+    def __init__(self, mission, seed, *, channel=None, settings=SETTINGS):
+        self.settings = settings
         self.mission, self.seed = mission, seed
-        self.planner = make_policy("planner", mission)
+        self.planner = planner_of(mission, settings)
         self.swarm = Swarm(mission, [seed], channel=channel)
-        self.spoke = []  # [half window][robot]
+        self.transmitted = []  # [slot][robot]
 
     @property
     def team(self):
@@ -240,14 +262,14 @@ class Flight(DecentralisedPolicy):
 
     def recipients(self, views):
         recipient = self.planner.recipients(views)
-        self.spoke.append((recipient != views.silence)[0])
+        self.transmitted.append((recipient != views.silence)[0])
         return recipient
 
     def fly(self, num_windows):
-        """Flies on, and returns who spoke in each of these half windows."""
+        """Flies on, and returns who transmitted in each of these slots."""
         for _ in range(num_windows):
             self.swarm.step(self)
-        return np.array(self.spoke[len(self.spoke) - 2 * num_windows :])
+        return np.array(self.transmitted[len(self.transmitted) - 2 * num_windows :])
 
 
 class Witnessed(Flight):
@@ -258,7 +280,7 @@ class Witnessed(Flight):
         order, rounds = common_orders(seed, mission)
         groups = [group for groups in rounds for group in groups]
         self.minds = [
-            Mind(me=i, mission=mission, scorer=self.scorer, order=order, groups=groups)
+            Mind(me=i, mission=mission, settings=self.settings, order=order, groups=groups)
             for i in range(mission.num_robots)
         ]
 
@@ -266,15 +288,15 @@ class Witnessed(Flight):
         recipient = super().recipients(views)
         if views.phases:
             self.converse(views.phases[-1].heard[0].tolist())
-        half_window = round(2 * float(views.now[0]))
+        slot = round(2 * float(views.now[0]))
         for mind in self.minds:
-            speaks = mind.speaks(rows(views.buffers, mind.me), half_window)
-            expected = (mind.me + 1) % len(self.minds) if speaks else mind.me
-            assert recipient[0, mind.me] == expected, (half_window, mind.me)
+            transmits = mind.transmits(rows(views.buffers, mind.me), slot)
+            expected = (mind.me + 1) % len(self.minds) if transmits else mind.me
+            assert recipient[0, mind.me] == expected, (slot, mind.me)
         return recipient
 
     def converse(self, heard):
-        """One half window: all packets are written, then everyone reads the one it decoded."""
+        """One slot: all packets are written, then everyone reads the one it decoded."""
         packets = {
             i: copy.deepcopy((self.minds[i].current, self.minds[i].upcoming)) for i in set(heard)
         }
@@ -327,11 +349,19 @@ class PlannedApart(DecentralisedPolicy):
         """Who transmits in this slot, planned from the mission's first one."""
         num_robots = len(position_m)
         links = links_between(radio_of(self.mission), position_m)
-        foresight = plan.foresight_of(num_robots, is_certain=True)
+        foresight = foresight_of(num_robots, is_certain=True, settings=SETTINGS.schedule)
         is_free = np.ones(slot + 1 + foresight.half_windows, dtype=bool)
         transmits = np.zeros((slot + 1, num_robots), dtype=bool)
         nothing = np.zeros((num_robots, num_robots), dtype=np.float32)
-        schedule(nothing, 0.0, links, RuleOfThumb()(links), foresight, is_free, transmits)
+        schedule(
+            nothing,
+            0.0,
+            links,
+            heuristic_weights(links, SETTINGS.weights),
+            foresight,
+            is_free,
+            transmits,
+        )
         return transmits[slot]
 
     def fly(self, num_windows):

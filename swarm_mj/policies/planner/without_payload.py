@@ -17,8 +17,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.policies.planner.broadcast_scheduler import schedule
-from swarm_mj.policies.planner.plan import CHUNK, foresight_of
-from swarm_mj.policies.planner.weights import RuleOfThumb
+from swarm_mj.policies.planner.plan import foresight_of
+from swarm_mj.policies.planner.settings import PlannerSettings
+from swarm_mj.policies.planner.weights import heuristic_weights
 from swarm_mj.policies.policy import DecentralisedPolicy
 from swarm_mj.policies.spatial_tdma import SpatialTdma
 from swarm_mj.policies.tdma import half_windows
@@ -37,14 +38,18 @@ class PlannerWithoutPayload(DecentralisedPolicy):
 
     transmits_twice: ClassVar[bool] = True
 
-    def __init__(self, radio: FreeSpaceRadio, turns: SpatialTdma) -> None:
+    def __init__(
+        self, radio: FreeSpaceRadio, settings: PlannerSettings, turns: SpatialTdma
+    ) -> None:
         """Prepares the policy.
 
         Args:
             radio: The mission's channel.
+            settings: Of the planner, for its schedules and weights.
             turns: What robots follow that cannot plan.
         """
         self._radio = radio
+        self._settings = settings
         self._turns = turns
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
@@ -69,7 +74,7 @@ class PlannerWithoutPayload(DecentralisedPolicy):
         """The plan that follows from these positions; robots that hold the same share it."""
         key = position_m.tobytes()
         if key not in self._plans[b]:
-            self._plans[b][key] = _StandingPlan(self._radio, position_m)
+            self._plans[b][key] = _StandingPlan(self._radio, self._settings, position_m)
         return self._plans[b][key]
 
 
@@ -79,25 +84,31 @@ class _StandingPlan:
     It is worked out as far as somebody asks for.
     """
 
-    def __init__(self, radio: FreeSpaceRadio, position_m: Float[np.ndarray, "N 2"]) -> None:
+    def __init__(
+        self,
+        radio: FreeSpaceRadio,
+        settings: PlannerSettings,
+        position_m: Float[np.ndarray, "N 2"],
+    ) -> None:
         num_robots = len(position_m)
         self._links = links_between(radio, position_m)
-        self._weights = RuleOfThumb()(self._links)
-        self._foresight = foresight_of(num_robots, is_certain=True)
+        self._weights = heuristic_weights(self._links, settings.weights)
+        self._foresight = foresight_of(num_robots, is_certain=True, settings=settings.schedule)
+        self._chunk_slots = settings.schedule.chunk_slots
         self._timestamp = np.full((num_robots, num_robots), NEVER, dtype=np.float32)
         self._transmits = []  # by slots
 
     def transmits(self, slot: int) -> Bool[np.ndarray, "N"]:
         """Who transmits in a slot, counted from the beginning of the mission."""
         while len(self._transmits) <= slot:
-            transmits = np.empty((CHUNK, len(self._timestamp)), dtype=bool)
+            transmits = np.empty((self._chunk_slots, len(self._timestamp)), dtype=bool)
             schedule(
                 self._timestamp,
                 float(len(self._transmits)),
                 self._links,
                 self._weights,
                 self._foresight,
-                np.ones(CHUNK + self._foresight.half_windows, dtype=bool),
+                np.ones(self._chunk_slots + self._foresight.half_windows, dtype=bool),
                 transmits,
             )
             self._transmits.extend(transmits)

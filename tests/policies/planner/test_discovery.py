@@ -5,36 +5,36 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_mj.policies.planner import discovery
 from swarm_mj.policies.planner.discovery import Discovery
+from swarm_mj.policies.planner.settings import (
+    DiscoverySettings,
+    PlannerSettings,
+    SearchSettings,
+)
 from swarm_mj.protocol.buffers import empty_buffers
 
 seeds = st.integers(0, 2**32 - 1)
 RANGE_M = 100.0
 NUM_ROBOTS = 6
-LATE = 60  # half windows: 5 rounds of 6 windows
+LATE = 60  # slots: 5 rounds of 6 windows
 
 
-@pytest.fixture(autouse=True)
-def _numbers(monkeypatch):
-    """What the arithmetic here is about, whatever suits the planner best."""
-    numbers = {
-        "SPEAKERS_PER_REACH": 0.4,
-        "MOST_SPEAKERS": 8,
-        "FAST_ROUNDS": 2,
-        "LATER_SHARE": 0.5,
-        "POLITE": 1.5,
-        "NUM_ROUNDS": 40,
-        "SEEK_AFTER": 5.0,
-        "LATEST_SEEK": 200,
-        "SEEK_EVERY": 5,
-    }
-    for name, value in numbers.items():
-        monkeypatch.setattr(discovery, name, value)
+# What the arithmetic here is about, whatever suits the planner best.
+SETTINGS = PlannerSettings(
+    discovery=DiscoverySettings(
+        transmitters_per_reach=0.4,
+        max_transmitters=8,
+        num_fast_rounds=2,
+        later_share=0.5,
+        polite_ranges=1.5,
+        num_rounds=40,
+    ),
+    search=SearchSettings(start_rounds=5.0, latest_start_windows=200, every_windows=5),
+)
 
 
 def discovery_of(num_robots, num_reaches, seed=0):
-    return Discovery(num_robots, num_reaches, RANGE_M, np.random.default_rng(seed))
+    return Discovery(num_robots, num_reaches, RANGE_M, SETTINGS, np.random.default_rng(seed))
 
 
 def order_of(seed):
@@ -57,24 +57,24 @@ def strangers(num_robots):
     return at_places(np.zeros((num_robots, 2)), {})
 
 
-def round_of_speakers(turns, num_robots, first):
-    """Who speaks, half window by half window, until as many spoke as there are robots."""
-    speakers, half_window = [], first
-    while sum(map(len, speakers)) < num_robots:
-        speaks = turns.speaks(half_window, strangers(num_robots), 0)
-        speakers.append(np.flatnonzero(speaks).tolist())
-        half_window += 1
-    return speakers
+def round_of_transmitters(turns, num_robots, first):
+    """Who transmits, slot by slot, until as many spoke as there are robots."""
+    transmitters, slot = [], first
+    while sum(map(len, transmitters)) < num_robots:
+        transmits = turns.transmits(slot, strangers(num_robots), 0)
+        transmitters.append(np.flatnonzero(transmits).tolist())
+        slot += 1
+    return transmitters
 
 
 @given(seed=seeds, num_robots=st.integers(2, 30), num_reaches=st.floats(0.01, 50.0))
-def test_every_robot_speaks_once_a_round(seed, num_robots, num_reaches):
+def test_every_robot_transmits_once_a_round(seed, num_robots, num_reaches):
     """As long as nobody knows anybody."""
-    turns, half_window = discovery_of(num_robots, num_reaches, seed), 0
+    turns, slot = discovery_of(num_robots, num_reaches, seed), 0
     for _ in range(4):
-        speakers = round_of_speakers(turns, num_robots, half_window)
-        assert sorted(i for group in speakers for i in group) == list(range(num_robots))
-        half_window += len(speakers)
+        transmitters = round_of_transmitters(turns, num_robots, slot)
+        assert sorted(i for group in transmitters for i in group) == list(range(num_robots))
+        slot += len(transmitters)
 
 
 @pytest.mark.parametrize(
@@ -89,52 +89,52 @@ def test_every_robot_speaks_once_a_round(seed, num_robots, num_reaches):
     ],
 )
 def test_how_many_speak_at_once_by_hand(num_robots, num_reaches, at_once, later):
-    turns, half_window = discovery_of(num_robots, num_reaches), 0
+    turns, slot = discovery_of(num_robots, num_reaches), 0
     for count in (at_once, at_once, later, later):
-        speakers = round_of_speakers(turns, num_robots, half_window)
-        assert len(speakers) == math.ceil(num_robots / count)
-        assert {len(group) for group in speakers[:-1]} == {count}
-        half_window += len(speakers)
+        transmitters = round_of_transmitters(turns, num_robots, slot)
+        assert len(transmitters) == math.ceil(num_robots / count)
+        assert {len(group) for group in transmitters[:-1]} == {count}
+        slot += len(transmitters)
 
 
 def test_orders_differ_from_round_to_round_and_repeat_after_40():
-    """One of 6 robots at a time: rounds of 6 half windows."""
+    """One of 6 robots at a time: rounds of 6 slots."""
     turns = discovery_of(NUM_ROBOTS, 1.0)
-    flown = [round_of_speakers(turns, NUM_ROBOTS, 6 * k) for k in range(41)]
+    flown = [round_of_transmitters(turns, NUM_ROBOTS, 6 * k) for k in range(41)]
     assert flown[40] == flown[0]
-    assert len({str(speakers) for speakers in flown[:40]}) > 30
+    assert len({str(transmitters) for transmitters in flown[:40]}) > 30
 
 
-def pair_that_speaks(turns):
-    """The first half window in which two speak, and these, the one that comes first first."""
-    for half_window in range(3):
-        pair = np.flatnonzero(turns.speaks(half_window, strangers(NUM_ROBOTS), 0)).tolist()
+def pair_that_transmits(turns):
+    """The first slot in which two transmit, and these, the one that comes first first."""
+    for slot in range(3):
+        pair = np.flatnonzero(turns.transmits(slot, strangers(NUM_ROBOTS), 0)).tolist()
         for first, then in (pair, pair[::-1]):
             knows = at_places(np.zeros((NUM_ROBOTS, 2)), {then: [first]})
-            if not turns.speaks(half_window, knows, 0)[then]:
-                yield half_window, first, then
+            if not turns.transmits(slot, knows, 0)[then]:
+                yield slot, first, then
 
 
-def speaks_apart(turns, half_window, first, then, distance_m, knows):
+def transmit_apart(turns, slot, first, then, distance_m, knows):
     position_m = np.zeros((NUM_ROBOTS, 2))
     position_m[first] = [0.6 * distance_m, 0.8 * distance_m]
-    speaks = turns.speaks(half_window, at_places(position_m, knows), 0)
-    return bool(speaks[first]), bool(speaks[then])
+    transmits = turns.transmits(slot, at_places(position_m, knows), 0)
+    return bool(transmits[first]), bool(transmits[then])
 
 
 def test_whoever_knows_one_near_it_that_comes_before_is_silent():
-    """Within one and a half ranges, 150 m; the one that comes first speaks whatever it knows."""
+    """Within one and a half ranges, 150 m; the one that comes first transmits whatever it knows."""
     turns = discovery_of(NUM_ROBOTS, 5.0)
-    pairs = list(pair_that_speaks(turns))
-    assert [half_window for half_window, _, _ in pairs] == [0, 1, 2]
-    for half_window, first, then in pairs:
-        pair = (turns, half_window, first, then)
+    pairs = list(pair_that_transmits(turns))
+    assert [slot for slot, _, _ in pairs] == [0, 1, 2]
+    for slot, first, then in pairs:
+        pair = (turns, slot, first, then)
         mutual = {first: [then], then: [first]}
-        assert speaks_apart(*pair, 149.0, mutual) == (True, False)
-        assert speaks_apart(*pair, 151.0, mutual) == (True, True)
-        assert speaks_apart(*pair, 149.0, {first: [then]}) == (True, True)
+        assert transmit_apart(*pair, 149.0, mutual) == (True, False)
+        assert transmit_apart(*pair, 151.0, mutual) == (True, True)
+        assert transmit_apart(*pair, 149.0, {first: [then]}) == (True, True)
         bystander = next(i for i in range(NUM_ROBOTS) if i not in (first, then))
-        assert speaks_apart(*pair, 0.0, {then: [bystander]}) == (True, True)
+        assert transmit_apart(*pair, 0.0, {then: [bystander]}) == (True, True)
 
 
 @given(seed=seeds)
@@ -150,8 +150,8 @@ def test_eq9_politeness_is_one_s_own_buffer_s(seed):
     )
     for name, array in vars(mine).items():
         vars(theirs)[name][:, row] = array[:, row]
-    for half_window in range(8):
-        alone, in_company = (turns.speaks(half_window, them, 0)[row] for them in (mine, theirs))
+    for slot in range(8):
+        alone, in_company = (turns.transmits(slot, them, 0)[row] for them in (mine, theirs))
         assert alone == in_company
 
 
@@ -161,15 +161,15 @@ def fresh(*lost):
 
 def test_whose_turn_it_is_by_hand():
     """Before 5 rounds of 6 windows have passed the discovery's, while robots are unknown; then the
-    search's, while robots are lost, in both halves of every fifth window; else the plan's."""
+    search's, while robots are lost, in both slots of every fifth window; else the plan's."""
     turns = discovery_of(NUM_ROBOTS, 1.0)
     everyone, some = fresh(), fresh(2)
-    for half_window in range(2 * LATE):
-        is_early, is_fifth = half_window < LATE, half_window % 10 in (0, 1)
-        assert turns.is_discovered(half_window, is_complete=False) == is_early
-        assert turns.is_sought(half_window, some) == (not is_early and is_fifth)
-        assert not turns.is_discovered(half_window, is_complete=True)
-        assert not turns.is_sought(half_window, everyone)
+    for slot in range(2 * LATE):
+        is_early, is_fifth = slot < LATE, slot % 10 in (0, 1)
+        assert turns.is_discovered(slot, is_complete=False) == is_early
+        assert turns.is_sought(slot, some) == (not is_early and is_fifth)
+        assert not turns.is_discovered(slot, is_complete=True)
+        assert not turns.is_sought(slot, everyone)
 
 
 @pytest.mark.parametrize(("num_robots", "windows"), [(2, 10), (40, 200), (41, 200), (100, 200)])
@@ -179,18 +179,18 @@ def test_large_teams_do_not_wait_for_5_rounds(num_robots, windows):
     assert not turns.is_discovered(2 * windows, is_complete=False)
 
 
-def sought(half_window, lost, heard=None, places_m=None, knows=None, was_lost=None, seed=0):
-    """Who speaks in the search, of robots that lost these and decoded `heard[j]`."""
+def sought(slot, lost, heard=None, places_m=None, knows=None, was_missing=None, seed=0):
+    """Who transmits in the search, of robots that lost these and decoded `heard[j]`."""
     decoded = np.arange(NUM_ROBOTS)
     for j, i in (heard or {}).items():
         decoded[j] = i
     position_m = np.zeros((NUM_ROBOTS, 2)) if places_m is None else places_m
     buffers = at_places(position_m, knows or {})
-    was_fresh = fresh(*(lost if was_lost is None else was_lost))
-    speaks = discovery_of(NUM_ROBOTS, 1.0, seed).seeks(
-        half_window, fresh(*lost), was_fresh, decoded, buffers, 0
+    was_fresh = fresh(*(lost if was_missing is None else was_missing))
+    transmits = discovery_of(NUM_ROBOTS, 1.0, seed).seeks(
+        slot, fresh(*lost), was_fresh, decoded, buffers, 0
     )
-    return np.flatnonzero(speaks).tolist()
+    return np.flatnonzero(transmits).tolist()
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -203,8 +203,8 @@ def test_one_of_all_calls_in_order_then_one_of_the_lost(seed):
 
 
 def test_whoever_hears_someone_lost_answers_unless_one_near_comes_before():
-    """A caller is lost: whoever heard it answers, but one that knows an earlier one, fresh, to be
-    within a range of the caller leaves it to that one."""
+    """A caller is missing: whoever heard it answers, but one that knows an earlier one, fresh, to
+    be within a range of the caller leaves it to that one."""
     order = order_of(0)
     caller, early, late, far = (order[k] for k in (5, 1, 2, 3))
     places_m = np.zeros((NUM_ROBOTS, 2))
@@ -213,7 +213,7 @@ def test_whoever_hears_someone_lost_answers_unless_one_near_comes_before():
     call = {"lost": [caller], "heard": {early: caller, late: caller}, "places_m": places_m}
 
     def answers(knows, **rest):
-        """But for the lost one, whose turn it is to call again."""
+        """But for the missing one, whose turn it is to call again."""
         return [i for i in sought(LATE + 1, **call | rest, knows=knows) if i != caller]
 
     assert answers({early: [caller], late: [caller]}) == sorted([early, late])
@@ -227,13 +227,13 @@ def test_whoever_hears_someone_lost_answers_unless_one_near_comes_before():
     )
 
 
-def test_what_was_lost_counts_as_it_was_before_one_heard_of_it():
-    """With the call came a picture in which the caller is fresh: it is answered all the same."""
+def test_what_was_missing_counts_as_it_was_before_one_heard_of_it():
+    """With the call came a snapshot in which the caller is fresh: it is answered all the same."""
     order = order_of(0)
     caller, listener, other = order[5], order[1], order[3]
     knows = {listener: [caller]}
     heard = {listener: caller}
-    assert sought(LATE + 1, [other], heard, knows=knows, was_lost=[caller]) == sorted(
+    assert sought(LATE + 1, [other], heard, knows=knows, was_missing=[caller]) == sorted(
         [listener, other]
     )
-    assert sought(LATE + 1, [other], heard, knows=knows, was_lost=[other]) == [other]
+    assert sought(LATE + 1, [other], heard, knows=knows, was_missing=[other]) == [other]

@@ -1,13 +1,11 @@
 import numpy as np
 import pytest
 from channels import to_nobody, unreliable
-from decentralised_reference import Flight, Witnessed, common_orders
+from decentralised_reference import SETTINGS, Flight, Witnessed, common_orders, planner_of
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies.planner import discovery, plan
-from swarm_mj.policies.planner import policy as planner
-from swarm_mj.policies.planner.broadcast_scheduler import Foresight
 from swarm_mj.policies.planner.policy import epoch_starts, regular_length
+from swarm_mj.policies.planner.settings import EpochSettings, PlannerSettings, ScheduleSettings
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.rollout import fly
@@ -16,12 +14,17 @@ from swarm_mj.swarm import Swarm
 TASKS = ["stationary", "random-walk", "flocking"]
 
 
-@pytest.fixture
-def near_sighted(monkeypatch):
-    """Plans that look no further than the half window in question: seconds less of large teams."""
-    for name, value in vars(plan).copy().items():
-        if isinstance(value, Foresight):
-            monkeypatch.setattr(plan, name, plan.NO_FORESIGHT)
+# Plans that look no further than the slot in question: seconds less of large teams.
+NEAR_SIGHTED = PlannerSettings(schedule=ScheduleSettings(max_foresight_robots=0))
+SEEK_EVERY = SETTINGS.search.every_windows
+
+
+def first_epochs(num_robots):
+    return epoch_starts(num_robots, SETTINGS.epochs)
+
+
+def length_of(num_robots):
+    return regular_length(num_robots, SETTINGS.epochs)
 
 
 def cut_off(mission, robots, windows, *, is_mute=True, is_deaf=True):
@@ -43,8 +46,8 @@ def cut_off(mission, robots, windows, *, is_mute=True, is_deaf=True):
 
 def windows_before(epoch, num_robots):
     """When an epoch begins, of those that are of regular length from the third on [windows]."""
-    starts = epoch_starts(num_robots)
-    return starts[3] + (epoch - 3) * regular_length(num_robots)
+    starts = first_epochs(num_robots)
+    return starts[3] + (epoch - 3) * length_of(num_robots)
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -56,10 +59,9 @@ def test_eq9_sharing_plans_is_planning_apart(preset, task):
     assert flight.num_taken > 0
 
 
-@pytest.mark.usefixtures("near_sighted")
 @pytest.mark.parametrize("task", TASKS)
 def test_eq9_sharing_is_planning_apart_in_a_team_of_40(task):
-    flight = Witnessed(paper(task, num_robots=40), 40)
+    flight = Witnessed(paper(task, num_robots=40), 40, settings=NEAR_SIGHTED)
     flight.fly(windows_before(4, 40) + 2)
     assert flight.num_taken > 0
 
@@ -81,7 +83,7 @@ SMALL = paper("stationary", num_robots=6)
     ],
     ids=["sparse", "fast", "random packets", "cut off", "deaf", "mute", "two", "two more"],
 )
-def test_eq9_sharing_is_planning_apart_where_pictures_differ(mission, seed, channel):
+def test_eq9_sharing_is_planning_apart_where_snapshots_differ(mission, seed, channel):
     """Teams are not complete after the discovery, fall apart, or miss what others know; who is
     lost is sought, and found."""
     flight = Witnessed(mission, seed, channel=channel)
@@ -89,53 +91,57 @@ def test_eq9_sharing_is_planning_apart_where_pictures_differ(mission, seed, chan
     assert flight.num_taken > 0
 
 
-def test_ii_b_packets_carry_pictures_and_nobody_answers():
+def test_ii_b_packets_carry_snapshots_and_nobody_answers():
     policy = make_policy("planner", SMALL)
     assert policy.payload == "snapshots"
     assert policy.transmits_twice
 
 
-def test_epochs_by_hand(monkeypatch):
+def test_epochs_by_hand():
     """Of 40 robots: a round of 40 windows, two quarters, then halves; but at least 2 and 10."""
-    numbers = {"FIRST_EPOCH": 1.0, "EARLY_EPOCH": 0.25, "EPOCH": 0.5, "SHORTEST_EPOCH": 10}
-    for name, value in numbers.items():
-        monkeypatch.setattr(planner, name, value)
-    assert epoch_starts(40) == (0, 40, 50, 60)
-    assert epoch_starts(12) == (0, 12, 15, 18)
-    assert epoch_starts(2) == (0, 2, 4, 6)
-    assert [regular_length(n) for n in (2, 20, 21, 40, 81)] == [10, 10, 10, 20, 40]
+    epochs = EpochSettings(
+        first_rounds=1.0,
+        early_rounds=0.25,
+        regular_rounds=0.5,
+        min_regular_windows=10,
+        min_early_windows=2,
+    )
+    assert epoch_starts(40, epochs) == (0, 40, 50, 60)
+    assert epoch_starts(12, epochs) == (0, 12, 15, 18)
+    assert epoch_starts(2, epochs) == (0, 2, 4, 6)
+    assert [regular_length(n, epochs) for n in (2, 20, 21, 40, 81)] == [10, 10, 10, 20, 40]
 
 
-def test_nobody_plans_before_the_pictures_of_the_discovery_have_spread():
-    """Its pictures are frozen as it ends, travel for an epoch, and are flown by after it."""
+def test_nobody_plans_before_the_snapshots_of_the_discovery_have_spread():
+    """Its snapshots are frozen as it ends, travel for an epoch, and are flown by after it."""
     flight = Flight(paper("stationary", num_robots=10), 4)
-    _, first_pictures, first_plans, _ = epoch_starts(10)
+    _, first_snapshots, first_plans, _ = first_epochs(10)
     for window in range(first_plans + 3):
         flight.fly(1)
-        assert (flight.team._upcoming is not None) == (window >= first_pictures)
+        assert (flight.team._upcoming is not None) == (window >= first_snapshots)
         assert bool(flight.team._plans) == (window >= first_plans)
 
 
 def held_plan(flight):
-    """The one plan that all robots fly by, if they hold the same picture."""
+    """The one plan that all robots fly by, if they hold the same snapshot."""
     held = np.unique(flight.team._holds).tolist()
     return flight.team._plans[held[0]] if len(held) == 1 else None
 
 
 def assert_flies_as_planned(flight, num_epochs):
     """From an epoch's beginning on all do as one plan says, and it comes true."""
-    length = regular_length(flight.mission.num_robots)
+    length = length_of(flight.mission.num_robots)
     for _ in range(num_epochs):
-        spoke = flight.fly(length)
+        transmitted = flight.fly(length)
         held = held_plan(flight)
         assert held.is_complete
-        np.testing.assert_array_equal(spoke, [held.speaks(h) for h in range(2 * length)])
+        np.testing.assert_array_equal(transmitted, [held.transmits(h) for h in range(2 * length)])
         np.testing.assert_array_equal(flight.swarm.buffers.timestamp[0], held.outcome())
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_connected_team_at_rest_flies_one_plan_to_the_letter(seed):
-    """Once all 10 robots hold one picture, positions are true and no packet that was counted on is
+    """Once all 10 robots hold one snapshot, positions are true and no packet that was counted on is
     lost: T is what the plan expects, as soon as all that is older is replaced."""
     flight = Flight(paper("stationary", num_robots=10), seed)
     flight.fly(windows_before(5, 10))
@@ -164,20 +170,20 @@ def test_a_robot_lost_late_is_sought_and_found_again():
     assert not held_plan(flight)  # the lost one knows better
     lacks = [bool(held.is_fresh[2]) for held in flight.team._plans.values()]
     assert lacks.count(False) >= 1
-    turn = 95 // discovery.SEEK_EVERY
+    turn = 95 // SEEK_EVERY
     for window in range(95, 100):
         calls, _ = flight.fly(1)
-        if window % discovery.SEEK_EVERY == 0:
+        if window % SEEK_EVERY == 0:
             assert np.flatnonzero(calls).tolist() == [order[turn % 6]]
     flight.fly(80)
     assert np.all(held_plan(flight).is_fresh)
 
 
-def test_who_misses_the_best_picture_flies_by_the_best_it_has():
-    """A robot that is deaf since the discovery plans by its own picture, which is another one than
-    its teammates', and speaks when that says so."""
+def test_who_misses_the_best_snapshot_flies_by_the_best_it_has():
+    """A robot that is deaf since the discovery plans by its own snapshot, which is another one than
+    its teammates', and transmits when that says so."""
     mission = paper("random-walk", num_robots=8)
-    deaf, since = 6, epoch_starts(8)[1]
+    deaf, since = 6, first_epochs(8)[1]
     channel = cut_off(mission, deaf, range(since, 200), is_mute=False)
     flight = Witnessed(mission, 2, channel=channel)
     flight.fly(windows_before(3, 8))
@@ -196,11 +202,11 @@ def test_robots_that_never_met_do_not_fall_silent(num_robots):
     flight = Flight(mission, 7, channel=to_nobody)
     order, rounds = common_orders(7, mission)
     turns = [group for groups in rounds for group in groups]
-    late = int(discovery.SEEK_AFTER * num_robots)
-    for h, spoke in enumerate(flight.fly(late)):
-        assert np.flatnonzero(spoke).tolist() == sorted(turns[h % len(turns)])
-    for window in range(late, late + 2 * num_robots * discovery.SEEK_EVERY):
-        turn, is_between = divmod(window, discovery.SEEK_EVERY)
+    late = int(SETTINGS.search.start_rounds * num_robots)
+    for h, transmitted in enumerate(flight.fly(late)):
+        assert np.flatnonzero(transmitted).tolist() == sorted(turns[h % len(turns)])
+    for window in range(late, late + 2 * num_robots * SEEK_EVERY):
+        turn, is_between = divmod(window, SEEK_EVERY)
         first, second = (np.flatnonzero(row).tolist() for row in flight.fly(1))
         assert first == ([] if is_between else [order[turn % num_robots]])
         assert second == []
@@ -228,13 +234,13 @@ def test_a_new_start_forgets_and_the_same_seed_is_the_same_mission():
     assert flights[0] != flights[1]
 
 
-@pytest.mark.usefixtures("near_sighted")
 def test_eq10_robots_switched_off_do_not_break_it():
     """Half-way 8 of 40 fall silent, and nobody is told: the others stay younger than by TDMA."""
     mission = paper("stationary", num_robots=40, num_windows=240, switched_off=0.2)
     age = {}
-    for name in ("planner", "tdma"):
-        flights = fly(Swarm(mission, [0, 1]), make_policy(name, mission))
+    policies = {"planner": planner_of(mission, NEAR_SIGHTED), "tdma": make_policy("tdma", mission)}
+    for name, policy in policies.items():
+        flights = fly(Swarm(mission, [0, 1]), policy)
         age[name] = np.array([flown.costs.age_windows for flown in flights])
     assert np.all(np.isfinite(age["planner"]))
     assert np.all(np.mean(age["planner"][120:], axis=0) < np.mean(age["tdma"][120:], axis=0))

@@ -7,22 +7,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_mj.policies.planner import snapshots as numbers
-from swarm_mj.policies.planner.snapshots import Pictures, freeze
+from swarm_mj.policies.planner.settings import SnapshotSettings
+from swarm_mj.policies.planner.snapshots import Snapshots, take_snapshots
 
 seeds = st.integers(0, 2**32 - 1)
 NOW = 20.0
 
 
-@pytest.fixture(autouse=True)
-def _numbers(monkeypatch):
+def believing(fresh_windows):
     """What the arithmetic here is about, whatever suits the planner best."""
-    monkeypatch.setattr(numbers, "FORESIGHT", 15.0)
-    monkeypatch.setattr(numbers, "SPREAD", 0.45)
+    return SnapshotSettings(
+        fresh_rounds=0.0,
+        min_fresh_windows=fresh_windows,
+        steady_windows=15.0,
+        std_per_distance=0.45,
+        least_fresh_share=0.75,
+    )
 
 
-def frozen_by_hand(fresh_windows=20.0):
-    """Three robots at t = 20, pictures for 8 windows of 0.1 s ahead.
+def taken_by_hand(fresh_windows=20.0):
+    """Three robots at t = 20, snapshots for 8 windows of 0.1 s ahead.
 
     Robot 0 has heard of 1 at t = 14, robot 2 of 0 at t = 16, robot 1 of 0 at t = 8 and 2 at t = 18.
     What they have not heard of must not count, whatever is written there.
@@ -42,45 +46,52 @@ def frozen_by_hand(fresh_windows=20.0):
             [[0.0, 5.0], [90.0, 90.0], [0.0, 5.0]],
         ]
     )
-    return freeze(
-        position_m, velocity_mps, timestamp, timestamp > 0.0, NOW, 0.1, 8.0, fresh_windows
+    return take_snapshots(
+        position_m,
+        velocity_mps,
+        timestamp,
+        timestamp > 0.0,
+        NOW,
+        0.1,
+        8.0,
+        believing(fresh_windows),
     )
 
 
 def test_positions_go_on_with_their_velocity_by_hand():
     """For their age and 8 windows more, but 15 windows at most.
 
-    Robot 0's own: 0.8 s. Robot 1 is 6 windows old: 1.4 s. In robot 1's picture robot 0 is 12 old:
+    Robot 0's own: 0.8 s. Robot 1 is 6 windows old: 1.4 s. In robot 1's snapshot robot 0 is 12 old:
     20 windows, of which 1.5 s count.
     """
-    position_m = frozen_by_hand().position_m
+    position_m = taken_by_hand().position_m
     np.testing.assert_allclose(position_m[0, :2], [[0.8, 0.0], [104.2, 55.6]])
     np.testing.assert_allclose(position_m[1], [[13.0, 23.0], [31.6, 41.6], [52.0, 59.0]])
     np.testing.assert_allclose(position_m[2, [0, 2]], [[1.0, 8.0], [3.0, 8.0]])
 
 
-def test_spreads_grow_with_all_of_the_age_by_hand():
+def test_deviations_grow_with_all_of_the_age_by_hand():
     """Robot 0: velocities (1, 0) and (3, 4) are sqrt(5) m/s off their mean (2, 2) each. Robot 1:
     (0, 1), (0, 1), (0, -2) off the mean (2, 1): variance 6 / 3. Robot 2's are equal.
 
     0.45 of sqrt(5) m/s over 0.8 and 1.4 s; of sqrt(2) m/s over 2.0, 0.8 and 1.0 s.
     """
-    spread_m = frozen_by_hand().spread_m
+    position_std_m = taken_by_hand().position_std_m
     off_m = 0.45 * math.sqrt(5.0)
-    np.testing.assert_allclose(spread_m[0, :2], [0.8 * off_m, 1.4 * off_m])
+    np.testing.assert_allclose(position_std_m[0, :2], [0.8 * off_m, 1.4 * off_m])
     off_m = 0.45 * math.sqrt(2.0)
-    np.testing.assert_allclose(spread_m[1], [2.0 * off_m, 0.8 * off_m, 1.0 * off_m])
-    np.testing.assert_array_equal(spread_m[2, [0, 2]], 0.0)
+    np.testing.assert_allclose(position_std_m[1], [2.0 * off_m, 0.8 * off_m, 1.0 * off_m])
+    np.testing.assert_array_equal(position_std_m[2, [0, 2]], 0.0)
 
 
-def test_pictures_rank_by_number_fresh_then_age_by_hand():
+def test_snapshots_rank_by_number_fresh_then_age_by_hand():
     """Robot 1 knows all; robots 0 and 2 two each, 3 and 2 windows old in the mean."""
-    pictures = frozen_by_hand()
-    assert pictures.rank.tolist() == [2, 0, 1]
+    snapshots = taken_by_hand()
+    assert snapshots.rank.tolist() == [2, 0, 1]
     np.testing.assert_array_equal(
-        pictures.is_known, [[True, True, False], [True, True, True], [True, False, True]]
+        snapshots.is_known, [[True, True, False], [True, True, True], [True, False, True]]
     )
-    np.testing.assert_array_equal(pictures.is_fresh, pictures.is_known)
+    np.testing.assert_array_equal(snapshots.is_fresh, snapshots.is_known)
 
 
 @pytest.mark.parametrize(
@@ -94,36 +105,42 @@ def test_pictures_rank_by_number_fresh_then_age_by_hand():
 )
 def test_who_was_not_heard_of_for_long_does_not_count(fresh_windows, rank, num_fresh):
     """It stays known, and is believed to be somewhere, but neither it nor its age counts."""
-    pictures = frozen_by_hand(fresh_windows)
-    assert np.sum(pictures.is_fresh, axis=1).tolist() == num_fresh
-    assert pictures.rank.tolist() == rank
-    np.testing.assert_array_equal(pictures.is_known, frozen_by_hand().is_known)
-    np.testing.assert_array_equal(pictures.position_m, frozen_by_hand().position_m)
+    snapshots = taken_by_hand(fresh_windows)
+    assert np.sum(snapshots.is_fresh, axis=1).tolist() == num_fresh
+    assert snapshots.rank.tolist() == rank
+    np.testing.assert_array_equal(snapshots.is_known, taken_by_hand().is_known)
+    np.testing.assert_array_equal(snapshots.position_m, taken_by_hand().position_m)
 
 
 def test_who_does_not_even_observe_itself_ranks_last():
     """Robot 0 was switched off at t = 5 and knows all, as of then."""
     timestamp = np.array([[5.0, 5.0, 5.0], [5.0, 20.0, 18.0], [5.0, 16.0, 20.0]])
     nothing, moving = np.zeros((3, 3, 2)), np.eye(3)[..., None] * np.ones(2)
-    pictures = freeze(nothing, moving, timestamp, timestamp > 0.0, NOW, 0.1, 5.0, 10.0)
-    assert pictures.rank.tolist() == [2, 0, 1]
-    assert np.sum(pictures.is_fresh, axis=1).tolist() == [0, 2, 2]
+    snapshots = take_snapshots(
+        nothing, moving, timestamp, timestamp > 0.0, NOW, 0.1, 5.0, believing(10.0)
+    )
+    assert snapshots.rank.tolist() == [2, 0, 1]
+    assert np.sum(snapshots.is_fresh, axis=1).tolist() == [0, 2, 2]
 
 
 def test_where_nobody_moves_and_many_are_stale_all_count_as_fresh():
     """Two of three are fresh, fewer than three quarters: the team is divided, nobody is lost."""
     timestamp = np.array([[20.0, 5.0, 18.0], [5.0, 20.0, 18.0], [19.0, 16.0, 20.0]])
     nothing = np.zeros((3, 3, 2))
-    pictures = freeze(nothing, nothing, timestamp, timestamp > 0.0, NOW, 0.1, 5.0, 10.0)
-    assert np.all(pictures.is_fresh)
-    assert pictures.rank.tolist() == [1, 2, 0]  # which still counts who is
+    snapshots = take_snapshots(
+        nothing, nothing, timestamp, timestamp > 0.0, NOW, 0.1, 5.0, believing(10.0)
+    )
+    assert np.all(snapshots.is_fresh)
+    assert snapshots.rank.tolist() == [1, 2, 0]  # which still counts who is
 
 
-def test_pictures_as_good_rank_by_identity():
+def test_snapshots_as_good_rank_by_identity():
     timestamp = np.array([[20.0, 14.0], [14.0, 20.0]])
     nothing = np.zeros((2, 2, 2))
-    frozen = freeze(nothing, nothing, timestamp, timestamp > 0.0, NOW, 0.1, 5.0, 20.0)
-    assert frozen.rank.tolist() == [0, 1]
+    taken = take_snapshots(
+        nothing, nothing, timestamp, timestamp > 0.0, NOW, 0.1, 5.0, believing(20.0)
+    )
+    assert taken.rank.tolist() == [0, 1]
 
 
 def random_memory(seed, num_robots):
@@ -137,8 +154,8 @@ def random_memory(seed, num_robots):
     return position_m, velocity_mps, timestamp, timestamp > 0.0
 
 
-def frozen(memory, fresh_windows=9.0):
-    return freeze(*memory, NOW, 0.1, 15.0, fresh_windows)
+def taken(memory, fresh_windows=9.0):
+    return take_snapshots(*memory, NOW, 0.1, 15.0, believing(fresh_windows))
 
 
 @given(seed=seeds, num_robots=st.integers(2, 8))
@@ -148,27 +165,27 @@ def test_ranks_order_the_triples(seed, num_robots):
     for i in range(num_robots):
         ages = [NOW - t for t in memory[2][i].tolist() if t > 0.0 and NOW - t <= 9.0]
         triples.append((-len(ages), sum(ages) / len(ages), i))
-    assert [triples[i] for i in np.argsort(frozen(memory).rank)] == sorted(triples)
+    assert [triples[i] for i in np.argsort(taken(memory).rank)] == sorted(triples)
 
 
 @given(seed=seeds, num_robots=st.integers(2, 8))
-def test_eq9_a_picture_is_its_owner_s_memory_alone(seed, num_robots):
+def test_eq9_a_snapshot_is_its_owner_s_memory_alone(seed, num_robots):
     mine, theirs = random_memory(seed, num_robots), random_memory(seed + 1, num_robots)
     row = seed % num_robots
     mixed = [array.copy() for array in theirs]
     for array, own in zip(mixed, mine, strict=True):
         array[row] = own[row]
-    for name in ("is_known", "is_fresh", "position_m", "spread_m", "timestamp"):
+    for name in ("is_known", "is_fresh", "position_m", "position_std_m", "timestamp"):
         np.testing.assert_array_equal(
-            getattr(frozen(mixed), name)[row], getattr(frozen(mine), name)[row]
+            getattr(taken(mixed), name)[row], getattr(taken(mine), name)[row]
         )
 
 
-def test_a_picture_does_not_change_with_the_buffer():
+def test_a_snapshot_does_not_change_with_the_buffer():
     memory = random_memory(3, 5)
-    pictures = frozen(memory)
-    before = copy.deepcopy(pictures)
+    snapshots = taken(memory)
+    before = copy.deepcopy(snapshots)
     for array in memory:
         array[:] = 0
-    for field in fields(Pictures):
-        np.testing.assert_array_equal(getattr(pictures, field.name), getattr(before, field.name))
+    for field in fields(Snapshots):
+        np.testing.assert_array_equal(getattr(snapshots, field.name), getattr(before, field.name))

@@ -1,0 +1,102 @@
+"""All numbers of the planner that were chosen by trial: their units, meanings and origins.
+
+Unless a group says otherwise, a value is the best of a few that were tried on 20 missions with
+seeds from 1000, mostly of 40 robots, at rest and walking (`training/RESULTS.md`). A round is N
+windows, where N is the size of the team.
+"""
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpochSettings:
+    """How long the epochs are; every snapshot serves one of them."""
+
+    first_rounds: float = 1.0  # before the first snapshots are taken [rounds]
+    early_rounds: float = 0.25  # each of the two epochs after it [rounds]
+    regular_rounds: float = 0.5  # all others; a snapshot must reach the whole team [rounds]
+    min_regular_windows: int = 10  # shortest regular epoch [windows]
+    min_early_windows: int = 2  # shortest of the others [windows]
+    forget_every: int = 5  # after so many, teams at rest plan from nothing, so that all agree again
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscoverySettings:
+    """Who transmits while robots have yet to hear of each other."""
+
+    transmitters_per_reach: float = 0.4  # at once, per area that a lone packet covers [1]
+    max_transmitters: int = 8  # at once
+    num_fast_rounds: int = 1  # times that everyone transmits beside so many others
+    later_share: float = 0.5  # of these transmit at once from then on [1]
+    polite_ranges: float = 1.5  # a transmitter nearer than that comes first [ranges]
+    num_rounds: int = 40  # times that everyone transmits, after which the orders repeat
+
+
+@dataclass(frozen=True, kw_only=True)
+class SearchSettings:
+    """When robots that were not heard of for long are looked for."""
+
+    start_rounds: float = 5.0  # when the discovery ends and the search begins [rounds]
+    latest_start_windows: int = 200  # when it begins at the latest [windows]
+    every_windows: int = 5  # how often, while robots are missing [windows]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SnapshotSettings:
+    """What a robot makes of its buffer."""
+
+    fresh_rounds: float = 1.0  # a robot not heard of for longer is missing [rounds]
+    min_fresh_windows: float = 20.0  # but never earlier [windows]
+    steady_windows: float = 15.0  # for which a robot is expected to keep its velocity [windows]
+    std_per_distance: float = 0.45  # of the distance that robots drift apart: how far beliefs err
+    # At rest, a team of which fewer are fresh is not scattered but flies by plans that differ.
+    least_fresh_share: float = 0.75
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScheduleSettings:
+    """How plans are computed from a snapshot.
+
+    Looking ahead takes a time that grows with N³, so large teams do not. Where nobody moves, plans
+    come true as they are, and looking further ahead pays.
+    """
+
+    rest_branches: int = 6  # first transmitters that are tried where nobody moves
+    rest_slots: int = 6  # for which each of these is followed
+    moving_branches: int = 4  # the same where robots move
+    moving_slots: int = 4
+    max_foresight_robots: int = 50  # largest team that looks ahead
+    gone_rounds: float = 3.0  # a robot not heard of for longer is planned without [rounds]
+    min_round_windows: int = 20  # in which that round is counted for small teams [windows]
+    chunk_slots: int = 10  # planned at a time; any number gives the same plan
+
+
+@dataclass(frozen=True, kw_only=True)
+class WeightSettings:
+    """The heuristic that says what news is worth to whom.
+
+    Chosen on 8 missions at rest, of 10 and 40 robots at range ratios from 0.2 to 1, and on 20
+    walking ones.
+    """
+
+    downstream_exponent: float = 0.6  # of the number of robots that a receiver passes news on to
+    hops_exponent: float = -0.3  # of the number of hops that the news has come
+    share_unlinked: float = (
+        0.95  # least share of a slot's worth that another transmitter must leave
+    )
+    share_per_link: float = -0.3  # added to it, times the share of all pairs that are linked
+    share_per_std: float = 3.0  # added, times the relative standard deviation of distances
+    share_isolated: float = 0.1  # added, if a robot has no link
+    max_share: float = 1.05  # and no more than this
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannerSettings:
+    """Everything about the planner that was tuned."""
+
+    epochs: EpochSettings = field(default_factory=EpochSettings)
+    discovery: DiscoverySettings = field(default_factory=DiscoverySettings)
+    search: SearchSettings = field(default_factory=SearchSettings)
+    snapshots: SnapshotSettings = field(default_factory=SnapshotSettings)
+    schedule: ScheduleSettings = field(default_factory=ScheduleSettings)
+    weights: WeightSettings = field(default_factory=WeightSettings)
