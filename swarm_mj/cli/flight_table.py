@@ -1,17 +1,21 @@
 """The numbers of one flight: for the terminal and for `--json`."""
 
-import argparse
 import math
 from dataclasses import asdict
 from typing import Any
 
 from rich.table import Table
 
+from swarm_mj.mission import Mission
+from swarm_mj.policies.policy import CentralisedPolicy, Policy
 from swarm_mj.rollout import Summary
 
+AGREED = 0.01  # of the first window's velocity variance: a flock with less has agreed
+AGE = "age of information: how old a robot's news of another is, over all pairs"
 
-def flight_numbers(summary: Summary) -> dict[str, Any]:
-    """The summary of the one mission flown; what never happened is None."""
+
+def flight_numbers(policy: Policy, summary: Summary) -> dict[str, Any]:
+    """The summary of the one mission flown, and what flew it; what does not exist is None."""
     numbers: dict[str, Any] = {}
     for name, value in asdict(summary).items():
         number = value if isinstance(value, int) else float(value[0])
@@ -19,49 +23,101 @@ def flight_numbers(summary: Summary) -> dict[str, Any]:
         if math.isnan(number):
             number = None
         numbers[name] = int(number) if is_count and number is not None else number
-    return numbers
-
-
-def _fates(numbers: dict[str, Any]) -> dict[str, str]:
-    """What became of the packets: broadcasts are heard or not, addressed ones delivered or lost."""
-    if numbers["packets_attempted"] is None:
-        hearers = numbers["hearers_per_packet"]
-        return {
-            "  heard by somebody": f"{numbers['packets_heard']}",
-            "  robots that heard a packet, mean": "-" if hearers is None else f"{hearers:.2f}",
-        }
-    return {
-        "  delivered, lost": f"{numbers['packets_delivered']}, {numbers['packets_lost']}",
-        "  answered": f"{numbers['packets_answered']}",
-        "  overheard by others": f"{numbers['packets_overheard']}",
+    first, last = numbers["velocity_variance_first"], numbers["velocity_variance_last"]
+    return numbers | {
+        "velocity_variance_left": last / first if first > 0.0 else None,
+        "payload": policy.payload,
+        "is_centralised": isinstance(policy, CentralisedPolicy),
     }
 
 
-def flight_table(options: argparse.Namespace, summary: Summary, wall_s: float) -> Table:
-    """What the flight cost, as a table for the terminal."""
-    numbers = flight_numbers(summary)
-    team = f"{options.robots} robots"
-    if options.switched_off:
-        team += f", {options.switched_off:.0%} of them off half-way"
+def flight_table(
+    mission: Mission, policy: Policy, summary: Summary, wall_s: float, *, title: str
+) -> Table:
+    """What the flight cost, as a table for the terminal.
+
+    Args:
+        mission: What was flown.
+        policy: Who talked to whom.
+        summary: Its costs.
+        wall_s: How long it took here [s].
+        title: The table's.
+
+    Returns:
+        At most 14 rows.
+    """
+    numbers = flight_numbers(policy, summary)
     table = Table(
-        title=f"{options.task}, {options.policy}, {team}, seed {options.seed}",
-        title_justify="left",
-        show_header=False,
+        title=title, title_justify="left", caption=AGE, caption_justify="left", show_header=False
     )
-    complete = numbers["complete_window"]
     rows = {
-        "age of information, mean": f"{numbers['aoi_mean']:.2f} windows",
-        "velocity variance, mean": f"{numbers['velocity_variance_mean']:.4f} m²/s²",
-        "velocity variance, first to last": (
-            f"{numbers['velocity_variance_first']:.4f} to "
-            f"{numbers['velocity_variance_last']:.4f} m²/s²"
-        ),
-        "packets sent": f"{numbers['packets_sent']}",
-        **_fates(numbers),
-        "hops in the parent trees, mean": f"{numbers['hops_mean']:.2f}",
-        "everyone had heard of everyone": f"window {complete}" if complete else "never",
-        "windows flown": f"{summary.num_windows} in {wall_s:.2f} s",
+        f"windows of {mission.window_s:g} s flown": f"{summary.num_windows} in {wall_s:.2f} s",
+        "age of information, mean": _windows(numbers["aoi_mean"], mission, 2),
+        "everyone had heard of everyone": _windows(numbers["complete_window"], mission, 0, "after"),
+        "radio hops that news travelled, mean": f"{numbers['hops_mean']:.2f}",
+        **_packets(numbers),
+        "packets carry": _payload(numbers["payload"]),
+        "who decides": _decider(is_centralised=numbers["is_centralised"]),
+        **({} if mission.task == "stationary" else _velocities(mission, numbers)),
     }
     for name, value in rows.items():
         table.add_row(name, value)
     return table
+
+
+def _windows(value: float | int | None, mission: Mission, digits: int, word: str = "") -> str:
+    """A time in windows and in seconds, or that it never came."""
+    if value is None:
+        return "never"
+    return f"{word} {value:.{digits}f} windows ({value * mission.window_s:.2g} s)".strip()
+
+
+def _packets(numbers: dict[str, Any]) -> dict[str, str]:
+    """What became of them: broadcasts are heard or not, addressed packets delivered or lost."""
+    sent, per_window = numbers["packets_sent"], numbers["packets_sent"] / numbers["num_windows"]
+    total = f"{sent} ({per_window:.1f} a window)"
+    if numbers["packets_attempted"] is None:
+        hearers = numbers["hearers_per_packet"]
+        return {
+            "packets broadcast": total,
+            "  heard by at least one robot": _share(numbers["packets_heard"], sent),
+            "  robots that heard a packet, mean": "-" if hearers is None else f"{hearers:.2f}",
+        }
+    return {
+        "packets sent, each to one robot": total,
+        "  delivered": _share(numbers["packets_delivered"], sent),
+        "  lost": _share(numbers["packets_lost"], sent),
+        "  answered, and the answer heard": _share(numbers["packets_answered"], sent),
+        "  overheard by other robots": f"{numbers['packets_overheard']} times",
+    }
+
+
+def _share(count: int, of: int) -> str:
+    return f"{count} ({count / of:.0%})" if of else f"{count}"
+
+
+def _payload(payload: str) -> str:
+    """What packets carry; T, M and P are the paper's names for what a robot knows (II-B)."""
+    states = "known states (T, M, P)"
+    return states if payload == "none" else f"{states} and {payload}"
+
+
+def _decider(*, is_centralised: bool) -> str:
+    if is_centralised:
+        return "a centre that is told where all are"
+    return "each robot, by what it has heard"
+
+
+def _velocities(mission: Mission, numbers: dict[str, Any]) -> dict[str, str]:
+    """Velocity variances; of a flock also whether it agreed on a velocity."""
+    first, last = numbers["velocity_variance_first"], numbers["velocity_variance_last"]
+    rows = {
+        "velocity variance, mean": f"{numbers['velocity_variance_mean']:.4f} m²/s²",
+        "  first to last window": f"{first:.4f} to {last:.4f} m²/s²",
+    }
+    left = numbers["velocity_variance_left"]
+    if mission.task == "flocking" and left is not None:
+        share = f"{left:.1%}" if left >= 0.001 else "under 0.1%"
+        verdict = "yes" if left < AGREED else "no"
+        rows["  flock agreed on one velocity"] = f"{verdict}, {share} of the variance left"
+    return rows

@@ -43,6 +43,7 @@ REPLAYS = Path("replays")
 class _Flight:
     """A flight as the command line saw it."""
 
+    policy: Policy
     flown: list[Flown]
     recorder: Recorder | None
     was_interrupted: bool
@@ -117,7 +118,7 @@ def run(options: argparse.Namespace) -> int:
     flight = _fly(swarm, policy, recorder, console)
     with deferred_interrupt(), console.status("Writing ..."):
         _write(_config(options, mission, policy), mission, flight, path, options.json)
-    _print(options, flight, path)
+    _print(options, mission, flight, path)
     if flight.was_interrupted:
         console.print(f"Interrupted after {len(flight.flown)} of {mission.num_windows} windows.")
         return INTERRUPTED
@@ -198,7 +199,13 @@ def _fly(swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Conso
                 break
         was_interrupted = is_interrupted() and len(flown) < swarm.mission.num_windows
     wall_s = time.perf_counter() - start_s
-    return _Flight(flown=flown, recorder=recorder, was_interrupted=was_interrupted, wall_s=wall_s)
+    return _Flight(
+        policy=policy,
+        flown=flown,
+        recorder=recorder,
+        was_interrupted=was_interrupted,
+        wall_s=wall_s,
+    )
 
 
 def _config(options: argparse.Namespace, mission: Mission, policy: Policy) -> dict[str, Any]:
@@ -226,7 +233,7 @@ def _write(
     if json_:
         document = {
             "config": config,
-            **flight_numbers(summarise(flight.flown)),
+            **flight_numbers(flight.policy, summarise(flight.flown)),
             "wall_seconds": flight.wall_s,
             "interrupted": flight.was_interrupted,
             "replay": str(path) if path else None,
@@ -235,9 +242,16 @@ def _write(
             part.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 
-def _print(options: argparse.Namespace, flight: _Flight, path: Path | None) -> None:
+def _print(
+    options: argparse.Namespace, mission: Mission, flight: _Flight, path: Path | None
+) -> None:
     """Prints the table and how to open the replay."""
     console = Console(highlight=False, soft_wrap=True, markup=False)
-    console.print(flight_table(options, summarise(flight.flown), flight.wall_s))
+    team = f"{mission.num_robots} robots"
+    if mission.switched_off:
+        team += f", {mission.switched_off:.0%} of them off half-way"
+    title = f"{mission.task}, {options.policy}, {team}, seed {options.seed}"
+    summary = summarise(flight.flown)
+    console.print(flight_table(mission, flight.policy, summary, flight.wall_s, title=title))
     if path:
         console.print(f"Open the replay:  {this_command()} replay {shlex.quote(str(path))}")
