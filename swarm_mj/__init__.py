@@ -16,9 +16,9 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     II-C    Eq. 10  age of information       protocol.costs.age_of_information
     III-B   Alg. 1  the protocol's window    protocol.window.window
     III-A           a buffer as a graph      gnn.graphs.Graphs
-    III-A   Eq. 11  GN block                 gnn.block.gn_block
-    III-A   Eq. 12  mean aggregation         gnn.edges.EdgeSet.add_mean_
-    III-A   Eq. 13  non-linear updates       gnn.block.Core
+    III-A   Eq. 11  GN block                 gnn.network.gn_block
+    III-A   Eq. 12  mean aggregation         gnn.network.mean_aggregation
+    III-A   Eq. 13  non-linear updates       gnn.network.Core
     III-A   Eq. 14  Aggregation GNN          gnn.network.AggregationGnn
     III-C           decisions                gnn.action_distribution.recipient_logits
     III-C           PPO                      learning.run.make_model

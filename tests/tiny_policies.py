@@ -2,8 +2,9 @@
 
 import torch
 
+from swarm_mj.gnn.fast import FastAggregationGnn
 from swarm_mj.gnn.feature_sets import make_observer
-from swarm_mj.gnn.network import AggregationGnn, GnnShape
+from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.policies.stored import save_policy
@@ -19,7 +20,7 @@ def tiny_network(features="extended", seed=1, **shape):
     its = {"num_features": len(names), "latent": 6, "depth": 2, "receptive_field": 1} | shape
     with torch.random.fork_rng():
         torch.manual_seed(seed)
-        return AggregationGnn(GnnShape(**its))
+        return FastAggregationGnn(GnnShape(**its))
 
 
 def tiny_config(network, features="extended", **overrides):

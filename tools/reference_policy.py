@@ -18,7 +18,8 @@ import torch
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.evaluation.jobs import run_jobs
 from swarm_mj.evaluation.study import Study
-from swarm_mj.gnn.network import AggregationGnn, GnnShape
+from swarm_mj.gnn.network import AggregationGnn
+from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.io.provenance import version
 from swarm_mj.mission import reference
 from swarm_mj.policies.policy_config import PolicyConfig

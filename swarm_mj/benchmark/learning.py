@@ -10,9 +10,10 @@ from jaxtyping import Int
 from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_mj.benchmark.simulation import microseconds
+from swarm_mj.gnn.fast import FastAggregationGnn
 from swarm_mj.gnn.feature_sets import make_observer
 from swarm_mj.gnn.graphs import Graphs, PaperObserver
-from swarm_mj.gnn.network import AggregationGnn, GnnShape
+from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.learning.run import make_model
 from swarm_mj.learning.settings import arm_settings
 from swarm_mj.mission import Mission, paper
@@ -82,7 +83,7 @@ def bench_learning(
 
 
 def _network_timing(mission: Mission, num_missions: int, seconds: float) -> NetworkTiming:
-    network = AggregationGnn(SHAPE)
+    network = FastAggregationGnn(SHAPE)
     node, parent = _tensors(_graphs(mission, "paper", num_missions))
     layer = torch.nn.Linear(SHAPE.latent, SHAPE.latent)
     rows = torch.randn(node.shape[0] * node.shape[1], SHAPE.latent)
@@ -101,7 +102,7 @@ def _network_timing(mission: Mission, num_missions: int, seconds: float) -> Netw
 
 def _own_decision_us(mission: Mission, shape: GnnShape, features: str, seconds: float) -> float:
     """One robot's network on its own graph [µs]."""
-    network = AggregationGnn(shape)
+    network = FastAggregationGnn(shape)
     node, parent = (rows[:1] for rows in _tensors(_graphs(mission, features, 1)))
     return microseconds(_inferring(lambda: network(node, parent)), seconds / 2)
 

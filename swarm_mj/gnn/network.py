@@ -1,100 +1,123 @@
 """The Aggregation GNN (III-A, Eqs. 11-14): nodes and their parents in, numbers for each node out.
 
-Multilayer perceptrons are its parameters; what they make of a graph is computed in fewer steps.
-Linear maps commute with the choice of an edge's ends and with the mean over edges, so they are
-applied to nodes first, and a layer on a concatenation is a sum of layers. Two linear layers with
-nothing between them are one: the last of each perceptron is composed with the first of all those
-behind it. Input edges are encoded once, as they are all alike. The numbers are the plain network's
-up to rounding.
+This is the definition. `gnn.fast` computes the same numbers in fewer steps.
 """
 
-import itertools
-from dataclasses import dataclass
-from typing import get_args
+from typing import NamedTuple
 
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
-from swarm_mj.gnn.block import Core, NodeParts
-from swarm_mj.gnn.edges import Edges, EdgeSet, is_upward
-from swarm_mj.gnn.layers import Layer, affine, compose, cut, layers_of
-from swarm_mj.gnn.stages import Decoder, LinearStages, NonLinearStages
-
-NODES_AT_ONCE = 6400  # on a CPU: with more the caches spill, with fewer every step starts in vain
+from swarm_mj.gnn.shape import Edges, GnnShape
 
 
-@dataclass(frozen=True, kw_only=True)
-class GnnShape:
-    """What an Aggregation GNN is made of.
+class EdgeSet(NamedTuple):
+    """All edges of R graphs of N nodes each; node k of graph r is row r N + k."""
 
-    Raises:
-        ValueError: A number is out of its range, or the edges have no such name.
-    """
+    receiver: Int[Tensor, "e"]
+    sender: Int[Tensor, "e"]
+    feature: Float[Tensor, "e 1"]  # their direction where there are two: 1 from parent to child
 
-    num_features: int  # F: numbers per node
-    num_outputs: int = 1  # O: numbers per node that come out
-    latent: int = 64  # width of every layer
-    depth: int = 3  # layers of every perceptron, with a ReLU after all but the last
-    receptive_field: int = 5  # K: how often the one shared GN block is applied
-    is_linear: bool = False  # GN(v) = A v with the mean-normalised adjacency A
-    edges: Edges = "paper"  # paper: parents hear children; reference: children hear parents
 
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("num_features", 1, 1024),
-            ("num_outputs", 1, 1024),
-            ("latent", 1, 1024),
-            ("depth", 1, 8),
-            ("receptive_field", 0, 16),
-        ):
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ValueError(f"{name} must be from {low} to {high}, not {value}")
-        if self.edges not in get_args(Edges):
-            names = ", ".join(get_args(Edges))
-            raise ValueError(f"edges must be one of {names}, not {self.edges!r}")
+def edges_of(parent: Int[Tensor, "R N"], edges: Edges, dtype: torch.dtype) -> EdgeSet:
+    """The edges between children and parents; a node whose parent is -1 has none."""
+    graph, child = (parent >= 0).nonzero(as_tuple=True)
+    first = graph * parent.shape[1]
+    below, above = first + child, first + parent[graph, child]
+    zero = torch.zeros(len(child), 1, dtype=dtype, device=parent.device)
+    if edges == "both":
+        ends = torch.cat([above, below]), torch.cat([below, above])
+        return EdgeSet(*ends, torch.cat([zero, zero + 1]))
+    return EdgeSet(above, below, zero) if edges == "paper" else EdgeSet(below, above, zero)
+
+
+class Perceptron(nn.ModuleList):
+    """Linear layers of equal width, with a ReLU after all but the last."""
+
+    def __init__(self, num_inputs: int, shape: GnnShape) -> None:
+        widths = [num_inputs, *[shape.latent] * shape.depth]
+        super().__init__(map(nn.Linear, widths[:-1], widths[1:]))
 
     @property
-    def has_core(self) -> bool:
-        """Whether there is a GN block with something to learn."""
-        return self.receptive_field > 0 and not self.is_linear
+    def layers(self) -> list[nn.Linear]:
+        """First to last."""
+        return [layer for layer in self if isinstance(layer, nn.Linear)]
+
+    def forward(self, x: Float[Tensor, "n In"]) -> Float[Tensor, "n C"]:
+        """Applies the layers."""
+        *hidden, last = self.layers
+        for layer in hidden:
+            x = torch.relu(layer(x))
+        return last(x)
 
 
 class Perceptrons(nn.Module):
-    """A multilayer perceptron for nodes and, where edges take part, one for edges."""
+    """A perceptron for nodes and, where edges take part, one for edges."""
 
-    def __init__(self, node: nn.ModuleList, edge: nn.ModuleList | None = None) -> None:
+    def __init__(self, node: Perceptron, edge: Perceptron | None = None) -> None:
         super().__init__()
         self.node = node
         if edge is not None:
             self.edge = edge
 
 
-class AggregationGnn(nn.Module):
-    """Encodes, applies the GN block K times, decodes each stage, maps all linearly (Eq. 14).
+class Core(Perceptrons):
+    """The non-linear updates, NN_e and NN_v (Eq. 13)."""
 
-    Its parameters are the plain network's: perceptrons `encoder.node`, `encoder.edge`, `core.node`,
-    `core.edge` and `decoder.node`, their layers numbered, and the layer `output`. NN_e takes
-    [edge, receiver, sender] in this order, NN_v takes [mean, node].
-    """
+    def update_edge(self, edge: Tensor, receiver: Tensor, sender: Tensor) -> Tensor:
+        """NN_e([e, v_r, v_s]), one row per edge."""
+        return self.edge(torch.cat([edge, receiver, sender], dim=1))
+
+    def update_node(self, mean: Tensor, node: Tensor) -> Tensor:
+        """NN_v([mean of e', v]), one row per node."""
+        return self.node(torch.cat([mean, node], dim=1))
+
+
+class LinearCore(nn.Module):
+    """The linear updates: edges copy their senders, nodes keep the mean, so GN(v) = A v."""
+
+    def update_edge(self, edge: Tensor, receiver: Tensor, sender: Tensor) -> Tensor:  # noqa: ARG002
+        """The sender."""
+        return sender
+
+    def update_node(self, mean: Tensor, node: Tensor) -> Tensor:  # noqa: ARG002
+        """The mean."""
+        return mean
+
+
+def mean_aggregation(
+    edge: Float[Tensor, "e C"], receiver: Int[Tensor, "e"], num_nodes: int
+) -> Float[Tensor, "n C"]:
+    """For each node, the mean over the edges it receives, 0 without any (Eq. 12)."""
+    count = edge.new_zeros(num_nodes).index_add(0, receiver, edge.new_ones(len(edge)))
+    total = edge.new_zeros(num_nodes, edge.shape[1]).index_add(0, receiver, edge)
+    return total / count.clamp(min=1)[:, None]
+
+
+def gn_block(
+    core: Core | LinearCore, node: Float[Tensor, "n C"], edge: Float[Tensor, "e _"], edges: EdgeSet
+) -> tuple[Float[Tensor, "n C"], Float[Tensor, "e C"]]:
+    """Updates all edges by their ends, and all nodes by the mean of their edges (Eq. 11)."""
+    edge = core.update_edge(edge, node[edges.receiver], node[edges.sender])
+    mean = mean_aggregation(edge, edges.receiver, len(node))
+    return core.update_node(mean, node), edge
+
+
+class AggregationGnn(nn.Module):
+    """Encodes, applies the GN block K times, decodes each stage, maps all linearly (Eq. 14)."""
 
     def __init__(self, shape: GnnShape) -> None:
-        """Draws the parameters from PyTorch's own generator.
-
-        Args:
-            shape: What the network is made of.
-        """
+        """Draws the parameters from PyTorch's own generator."""
         super().__init__()
         self.shape = shape
         width = shape.latent
-        self.encoder = Perceptrons(
-            _perceptron(shape.num_features, shape),
-            _perceptron(1, shape) if shape.has_core else None,
-        )
+        self.encoder = Perceptrons(Perceptron(shape.num_features, shape))
+        self.core: Core | LinearCore = LinearCore()
         if shape.has_core:
-            self.core = Perceptrons(_perceptron(2 * width, shape), _perceptron(3 * width, shape))
-        self.decoder = Perceptrons(_perceptron(width, shape))
+            self.encoder.edge = Perceptron(1, shape)
+            self.core = Core(Perceptron(2 * width, shape), Perceptron(3 * width, shape))
+        self.decoder = Perceptrons(Perceptron(width, shape))
         self.output = nn.Linear((shape.receptive_field + 1) * width, shape.num_outputs)
 
     def forward(
@@ -115,89 +138,12 @@ class AggregationGnn(nn.Module):
         Raises:
             ValueError: Features of another number than the network's, or a parent that is no node.
         """
-        self._check(node, parent)
-        if not parent.numel():
-            return node.new_zeros(*parent.shape, self.shape.num_outputs)
-        stages = self._stages() if self.shape.has_core else self._linear_stages()
-        decode = self._decoder()
-        num_chunks = -(-parent.numel() // NODES_AT_ONCE) if node.device.type == "cpu" else 1
-        chunks = zip(node.chunk(num_chunks), parent.chunk(num_chunks), strict=True)
-        numbers = [
-            decode(stages(features.flatten(0, 1), EdgeSet(theirs, self.shape.edges, features)))
-            for features, theirs in chunks
-        ]
-        return torch.cat(numbers).view(*parent.shape, -1)
-
-    def _check(self, node: Tensor, parent: Tensor) -> None:
-        """Raises ValueError on what would give numbers without a meaning."""
-        num_features, num_nodes = node.shape[-1], parent.shape[-1]
-        if num_features != self.shape.num_features:
-            raise ValueError(
-                f"nodes must have the {self.shape.num_features} features that the network was "
-                f"made for, not {num_features}"
-            )
-        if parent.numel() and (highest := int(parent.max())) >= num_nodes:
-            raise ValueError(
-                f"a parent must be one of its graph's nodes, 0 to {num_nodes - 1}, or -1 for "
-                f"none, not {highest}"
-            )
-
-    def _stages(self) -> NonLinearStages:
-        *encoder, encoded = layers_of(self.encoder.node)
-        first_edge, edge_hidden, last_edge = cut(layers_of(self.core.edge))
-        first_node, node_hidden, last_node = cut(layers_of(self.core.node))
-        of_edge, of_receiver, of_sender = first_edge.weight.chunk(3, dim=1)
-        of_mean, of_node = first_node.weight.chunk(2, dim=1)
-        no_bias = torch.zeros_like(first_edge.bias)
-        parts = NodeParts(
-            decoder=layers_of(self.decoder.node)[0],
-            node=Layer(of_node, first_node.bias),
-            receiver=Layer(of_receiver, first_edge.bias),
-            sender=Layer(of_sender, no_bias),
-        )
-        core = Core(
-            encoded_edge=self._encoded_edges() @ of_edge.T,
-            edge=compose(Layer(of_edge, no_bias), last_edge),
-            mean=compose(Layer(of_mean, no_bias), last_edge),
-            edge_hidden=edge_hidden,
-            node_hidden=node_hidden,
-            has_relu=self.shape.depth > 1,
-        )
-        later = [parts.after(last_node)] * self.shape.receptive_field
-        return NonLinearStages(encoder=encoder, parts=[parts.after(encoded), *later], core=core)
-
-    def _linear_stages(self) -> LinearStages:
-        *encoder, encoded = layers_of(self.encoder.node)
-        decoder, *_ = layers_of(self.decoder.node)
-        return LinearStages(
-            encoder=encoder,
-            encoded=encoded,
-            decoder=decoder,
-            decoder_of_encoded=compose(decoder, encoded),
-            num_blocks=self.shape.receptive_field,
-            has_relu=self.shape.depth > 1,
-        )
-
-    def _decoder(self) -> Decoder:
-        _, hidden, last = cut(layers_of(self.decoder.node))
-        of_stages = self.output.weight.unflatten(1, (-1, self.shape.latent))
-        weight, bias = of_stages.transpose(0, 1), self.output.bias
-        if last is not None:
-            bias = bias + of_stages.sum(1) @ last.bias
-            weight = weight @ last.weight
-        return Decoder(hidden=hidden, weight=weight, bias=bias)
-
-    def _encoded_edges(self) -> Float[Tensor, "D C"]:
-        """The encoded input edges, one of each direction; its number is their one feature."""
-        directions = range(len(is_upward(self.shape.edges)))
-        x = self.output.bias.new_tensor([[direction] for direction in directions])
-        *hidden, last = layers_of(self.encoder.edge)
-        for layer in hidden:
-            x = affine(x, layer, has_relu=True)
-        return affine(x, last)
-
-
-def _perceptron(num_inputs: int, shape: GnnShape) -> nn.ModuleList:
-    """Linear layers of equal width; a ReLU is to follow all but the last."""
-    widths = [num_inputs, *[shape.latent] * shape.depth]
-    return nn.ModuleList(nn.Linear(low, high) for low, high in itertools.pairwise(widths))
+        self.shape.check(node, parent)
+        edges = edges_of(parent, self.shape.edges, node.dtype)
+        v = self.encoder.node(node.flatten(0, 1))
+        e = self.encoder.edge(edges.feature) if self.shape.has_core else edges.feature
+        stages = [self.decoder.node(v)]
+        for _ in range(self.shape.receptive_field):
+            v, e = gn_block(self.core, v, e, edges)
+            stages.append(self.decoder.node(v))
+        return self.output(torch.cat(stages, dim=1)).view(*parent.shape, self.shape.num_outputs)

@@ -11,7 +11,9 @@ from stable_baselines3.common.type_aliases import PyTorchObs, Schedule
 from torch import Tensor
 
 from swarm_mj.gnn.action_distribution import recipient_logits
-from swarm_mj.gnn.network import AggregationGnn, GnnShape
+from swarm_mj.gnn.fast import FastAggregationGnn
+from swarm_mj.gnn.network import AggregationGnn
+from swarm_mj.gnn.shape import GnnShape
 
 
 class GnnActorCritic(ActorCriticPolicy):
@@ -39,11 +41,11 @@ class GnnActorCritic(ActorCriticPolicy):
 
     def _build(self, lr_schedule: Schedule) -> None:
         extra = 1 if self._shares_trunk else 0
-        self.network = AggregationGnn(
+        self.network = FastAggregationGnn(
             replace(self._shape, num_outputs=self._shape.num_outputs + extra)
         )
         if not self._shares_trunk:
-            self.value_network = AggregationGnn(replace(self._shape, num_outputs=1))
+            self.value_network = FastAggregationGnn(replace(self._shape, num_outputs=1))
         self.optimizer = torch.optim.Adam(
             self.parameters(), lr=lr_schedule(1.0), **self.optimizer_kwargs
         )
@@ -51,7 +53,7 @@ class GnnActorCritic(ActorCriticPolicy):
     def acting_network(self) -> AggregationGnn:
         """A copy of the network that acts, without what values."""
         with torch.device("meta"):  # draws no random numbers
-            network = AggregationGnn(self._shape)
+            network = FastAggregationGnn(self._shape)
         weights = {name: t.detach().cpu().clone() for name, t in self.network.state_dict().items()}
         for name in ("output.weight", "output.bias"):
             weights[name] = weights[name][: self._shape.num_outputs].clone()

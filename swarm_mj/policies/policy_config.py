@@ -8,7 +8,7 @@ from types import NoneType
 from typing import Any, get_args
 
 from swarm_mj.gnn.feature_sets import make_observer
-from swarm_mj.gnn.network import GnnShape
+from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.mission import Mission
 
 FORMAT = "swarm_mj policy"

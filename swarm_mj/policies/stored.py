@@ -8,6 +8,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
 
+from swarm_mj.gnn.fast import FastAggregationGnn
 from swarm_mj.gnn.feature_sets import make_observer
 from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.io.atomic_directory import atomic_directory, present_folder
@@ -133,7 +134,7 @@ def _network(config: PolicyConfig, data: bytes) -> AggregationGnn:
 def _empty(config: PolicyConfig) -> AggregationGnn:
     """The network without weights: it takes no memory, and draws no random numbers."""
     with torch.device("meta"):
-        return AggregationGnn(config.network)
+        return FastAggregationGnn(config.network)
 
 
 def _check_tensors(tensors: Mapping[str, Tensor], network: AggregationGnn) -> None:
