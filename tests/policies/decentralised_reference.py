@@ -326,7 +326,7 @@ class PlannedApart(DecentralisedPolicy):
         self.turns = make_policy("spatial-tdma", mission)
         self.mission = mission
         self.swarm = Swarm(mission, [seed], channel=channel)
-        self.num_planned = 0
+        self.plans = {}  # of each robot that has made one
 
     def start(self, num_robots, rngs):
         self.turns.start(num_robots, copy.deepcopy(rngs))
@@ -340,29 +340,21 @@ class PlannedApart(DecentralisedPolicy):
             seen, position_m, velocity_mps = rows(views.buffers, i)
             transmits = bool(in_turn[0, i])
             if all(seen > 0.0) and not velocity_mps.any():
-                transmits = bool(self.planned(position_m, slot)[i])
-                self.num_planned += 1
+                if i not in self.plans:
+                    self.plans[i] = self.planned(position_m)
+                transmits = bool(self.plans[i][slot, i])
             assert (recipient[0, i] != i) == transmits, (slot, i)
         return recipient
 
-    def planned(self, position_m, slot):
-        """Who transmits in this slot, planned from the mission's first one."""
-        num_robots = len(position_m)
-        links = links_between(radio_of(self.mission), position_m)
-        foresight = foresight_of(num_robots, is_certain=True, settings=SETTINGS.schedule)
-        is_free = np.ones(slot + 1 + foresight.half_windows, dtype=bool)
-        transmits = np.zeros((slot + 1, num_robots), dtype=bool)
+    def planned(self, position_m):
+        """Who transmits in each of the mission's first 120 slots, planned in one go."""
+        num_robots, links = len(position_m), links_between(radio_of(self.mission), position_m)
+        transmits = np.zeros((120, num_robots), dtype=bool)
         nothing = np.zeros((num_robots, num_robots), dtype=np.float32)
-        schedule(
-            nothing,
-            0.0,
-            links,
-            heuristic_weights(links, SETTINGS.weights),
-            foresight,
-            is_free,
-            transmits,
-        )
-        return transmits[slot]
+        weights = heuristic_weights(links, SETTINGS.weights)
+        foresight = foresight_of(num_robots, is_certain=True, settings=SETTINGS.schedule)
+        schedule(nothing, 0.0, links, weights, foresight, np.ones(200, dtype=bool), transmits)
+        return transmits
 
     def fly(self, num_windows):
         """Flies on."""
