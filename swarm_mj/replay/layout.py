@@ -33,7 +33,7 @@ def layout(log: Log, frame: Frame, packets: dict[str, Links]) -> rrb.Blueprint:
     """
     charts = _charts(log, packets)
     mission = rrb.Horizontal(
-        rrb.Vertical(_map(frame), _legend(), row_shares=[9, 2]),
+        rrb.Vertical(_map(frame), _legend(), row_shares=[4, 1]),
         rrb.Vertical(*charts, row_shares=[4, *[3] * (len(charts) - 1)]),
         column_shares=[11, 10],
         name="Mission",

@@ -14,9 +14,9 @@ from swarm_mj.replay.palette import Colour
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet, screen
 
-WIDTH, HEIGHT = 100.0, 12.0  # of the view, in units of its own, y down
+WIDTH, HEIGHT = 100.0, 13.5  # of the view, in units of its own, y down
 LEFT, RAMP = 4.0, 31.0  # where the ramp of ages begins, and how long it is
-COLUMN, ROW = 14.5, 7.2  # from one sample to the next, to the right of the ramp
+COLUMN, ROW = 14.2, 8.4  # from one sample to the next, to the right of the ramp
 SAMPLE = 5.0  # the length of a sample
 BELOW = 2.6  # from a sample to its text
 NUM_SHADES = 60
@@ -80,7 +80,7 @@ def _draw_ramp(sheet: Sheet, full_scale: float) -> None:
     places = [(LEFT + share * RAMP, BELOW) for share in (0.0, 0.5, 0.95)]
     _write(sheet, "legend/ages", texts, places)
     about = f"age of what r{sheet.log.ego} knows"
-    _write(sheet, "legend/about_ages", [about], [(LEFT + 0.5 * RAMP, ROW + BELOW)])
+    _write(sheet, "legend/about_ages", [about], [(LEFT + 0.5 * RAMP, ROW)])
 
 
 def _line(colour: Colour, width: float) -> Sample:
