@@ -15,6 +15,7 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     II-C    Eq. 9   local policy             policies.policy.DecentralisedPolicy
     II-C    Eq. 10  age of information       protocol.costs.age_of_information
     III-B   Alg. 1  the protocol's window    protocol.window.window
+    IV-C            two broadcasts instead   protocol.window.DoubleBroadcast
     III-A           a buffer as a graph      gnn.graphs.Graphs
     III-A   Eq. 11  GN block                 gnn.network.gn_block
     III-A   Eq. 12  mean aggregation         gnn.network.mean_aggregation
@@ -31,10 +32,10 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     IV-C            round robin              policies.round_robin.RoundRobin
     IV-C            minimum spanning tree    policies.minimum_spanning_tree.MinimumSpanningTree
 
-Around the paper: `scene` (MJCF), `swarm` (B missions side by side), `switch_off` (robots that
-fail), `flight` (a policy from the first window to the last), more `policies` than the paper's, more
-`graphs` and ways of `learning`, `evaluation`, `statistics`, `connectivity`, `results` and
-`published` (where policies stand),
-`figures` (V: Figs. 2 to 6, and learning curves), `recorder` and `replay` (what is seen), `envs`
-(other libraries' faces), `bench` and `bench_learning` (speed), `cli` (the command line).
+Around the paper: `scene` (MJCF), `swarm` (B missions side by side), `robot_failures` (robots that
+fail half-way), `rollout` (a policy from the first window to the last), more `policies` than the
+paper's, more `graphs` and ways of `learning`, `evaluation`, `statistics`, `connectivity`,
+`results` and `published` (where policies stand), `figures` (V: Figs. 2 to 6, and learning curves),
+`recorder` and `replay` (what is seen), `envs` (other libraries' faces), `benchmark`
+(speed), `cli` (the command line).
 """

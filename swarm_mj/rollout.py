@@ -62,7 +62,7 @@ def fly(swarm: Swarm, policy: Policy) -> Iterator[Flown]:
     swarm.start(policy)
     for _ in range(swarm.mission.num_windows):
         costs = swarm.step(policy)
-        yield Flown(costs=costs, hops=mean_hops(swarm.buffers, swarm.is_on))
+        yield Flown(costs=costs, hops=mean_hops(swarm.buffers, swarm.states.is_active))
 
 
 def summarise(flown: Sequence[Flown]) -> Summary:

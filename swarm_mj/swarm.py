@@ -1,22 +1,22 @@
 """The swarm: B missions side by side, window by window: motion, physics, radio, buffers, costs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from numbers import Integral
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Int
 
 from swarm_mj.control.motion import initial_velocity, motion_of
 from swarm_mj.mission import Mission
 from swarm_mj.mission.placement import connected_positions
-from swarm_mj.mission.robot_failures import draw_is_on, first_window_without
+from swarm_mj.mission.robot_failures import draw_survivors, failure_window
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.protocol.buffers import Buffers, check_robots, empty_buffers, observe_self
 from swarm_mj.protocol.costs import WindowCosts, window_costs
 from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.protocol.window import PHASE, Phase, transmit, window
+from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, RequestResponse, WindowProtocol
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.radio.mission_radio import radio_of
 
@@ -75,19 +75,18 @@ class Swarm:
         self._physics.place(np.stack(position_m), np.stack(velocity_mps))
         self._motion = motion_of(mission, motion)
         self._policy_rngs = policy
-        self._stays_on = draw_is_on(mission, outage)
-        self.is_on: Bool[np.ndarray, "B N"] | None = None  # in the last window; None: everyone
+        self._survivors = draw_survivors(mission, outage)
         self.now = np.zeros(len(seeds))  # t [windows]
         self.buffers: Buffers = empty_buffers(len(seeds), mission.num_robots)
-        observe_self(self.buffers, self.bodies.position_m, self.bodies.velocity_mps, self.now)
+        observe_self(self.buffers, self.states, self.now)
         self.phases: tuple[Phase, ...] = ()
         self._read_only = self.buffers.read_only()
         self._started: Policy | None = None
 
     @property
-    def bodies(self) -> RobotStates:
-        """Where the robots truly are."""
-        return self._physics.bodies
+    def states(self) -> RobotStates:
+        """Where the robots truly are, and who is active."""
+        return self._physics.states
 
     @property
     def views(self) -> LocalViews:
@@ -110,20 +109,18 @@ class Swarm:
         if policy is not self._started:
             self.start(policy)
         if isinstance(policy, CentralisedPolicy):
-            return policy.recipients(self.views, self.bodies)
+            return policy.recipients(self.views, self.states)
         if isinstance(policy, DecentralisedPolicy):
             return policy.recipients(self.views)
         raise TypeError("a policy must be a DecentralisedPolicy or a CentralisedPolicy")
 
-    def move(self) -> None:
+    def move(self) -> RobotStates:
         """Moves the robots through one window, by their motion and the physics."""
-        self._physics.step(self._motion(self.buffers, self.bodies))
+        return self._physics.step(self._motion(self.buffers, self.states))
 
     def step(self, policy: Policy) -> WindowCosts:
         """One window: the policy decides, the robots move, then they talk."""
-        if policy.transmits_twice:
-            return self._flood(policy)
-        return self.exchange(self.decide(policy))
+        return self._play(policy.window(self.mission), lambda: self.decide(policy))
 
     def exchange(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
         """One window of Alg. 1 with these recipients, after the robots have moved.
@@ -137,60 +134,34 @@ class Swarm:
         Raises:
             ValueError: A recipient is no robot, or there is not one per robot; nothing has moved.
         """
-        check_robots("recipient", recipient, self.buffers.shape)
-        self._switch_off()
-        self.move()
-        phases = window(
-            self.buffers,
-            self.bodies,
-            recipient,
-            self.channel,
-            self.now,
-            silence_is_attempt=self.mission.silence_is_attempt,
-            is_on=self.is_on,
-        )
-        self.phases = phases
-        self.now = self.now + 2 * PHASE
-        return self._costs(phases, has_response=True)
+        request_response = RequestResponse(silence_is_attempt=self.mission.silence_is_attempt)
+        return self._play(request_response, lambda: recipient)
 
-    def _flood(self, policy: Policy) -> WindowCosts:
-        """One window of two transmissions, each decided on what was known before it (IV-C)."""
-        self._switch_off()
-        phases: list[Phase] = []
-        moves_twice = policy.moves_each_transmission and self.mission.moves_each_transmission
-        for half in (1, 2):
-            recipient = self.decide(policy)
-            check_robots("recipient", recipient, self.buffers.shape)
-            if half == 1 or moves_twice:
-                self.move()
-            self.now = self.now + PHASE
-            phase = transmit(
-                self.buffers,
-                self.bodies,
-                recipient,
-                self.channel,
-                self.now,
-                silence_is_attempt=self.mission.silence_is_attempt,
-                is_on=self.is_on,
-            )
-            phases.append(phase)
-            self.phases = tuple(phases)
-        return self._costs((phases[0], phases[1]), has_response=False)
+    def _play(
+        self, window: WindowProtocol, decide: Callable[[], Int[np.ndarray, "B N"]]
+    ) -> WindowCosts:
+        """One window of this protocol."""
+        start, shape = self.now, self.buffers.shape
 
-    def _costs(self, phases: tuple[Phase, Phase], *, has_response: bool) -> WindowCosts:
+        def decide_after(phases: tuple[Phase, ...]) -> Int[np.ndarray, "B N"]:
+            if phases:
+                self.phases, self.now = phases, start + len(phases) * SLOT_WINDOWS
+            recipient = decide()
+            check_robots("recipient", recipient, shape, may_broadcast=window.is_broadcast)
+            return recipient
+
+        self._fail()
+        self.phases = window(self.buffers, decide_after, self.move, self.channel, start)
+        self.now = start + 1.0
         return window_costs(
-            self.buffers,
-            self.bodies,
-            phases,
-            self.now,
-            has_response=has_response,
-            is_on=self.is_on,
+            self.buffers, self.states, self.phases, self.now, is_broadcast=window.is_broadcast
         )
 
-    def _switch_off(self) -> None:
-        """Before a window: switches off, half-way, whoever is to be."""
-        if self.now[0] >= first_window_without(self.mission):
-            self.is_on = self._stays_on
+    def _fail(self) -> None:
+        """Half-way through the mission, the robots that are to fail do."""
+        is_half_way = self.now[0] >= failure_window(self.mission)
+        if is_half_way and self._survivors is not None and self.states.is_active is None:
+            self._physics.deactivate(self._survivors)
 
 
 def _check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:

@@ -18,6 +18,16 @@ def to_the_addressee(position_m, recipient):
     return heard
 
 
+def to_everyone(_position_m, recipient):
+    """All others decode the one sender, and nobody if there are several or none."""
+    heard = to_nobody(_position_m, recipient)
+    for b, row in enumerate(recipient):
+        senders = [i for i, j in enumerate(row) if j != i]
+        if len(senders) == 1:
+            heard[b] = senders[0]
+    return heard
+
+
 def unreliable(seed, *, senders_listen):
     """Everyone decodes some sender or nobody, never the same way twice."""
     rng = np.random.default_rng(seed)

@@ -15,18 +15,18 @@ BASELINES = ["random-flooding", "round-robin", "mst"]
 
 def spread_mps(swarm):
     """Standard deviation of the velocities about the team's mean, per mission and axis [m/s]."""
-    return np.std(swarm.bodies.velocity_mps, axis=1)
+    return np.std(swarm.states.velocity_mps, axis=1)
 
 
 def stay_silent(swarm):
-    num_missions, num_robots = swarm.bodies.velocity_mps.shape[:2]
+    num_missions, num_robots = swarm.states.velocity_mps.shape[:2]
     return np.broadcast_to(np.arange(num_robots), (num_missions, num_robots)).copy()
 
 
 def tell_everyone_the_truth(swarm):
     """Perfect communication: no channel serves all receivers at once, so the test plays it."""
     swarm.buffers.timestamp[...] = 0.5 + swarm.now[:, None, None]
-    swarm.buffers.velocity_mps[...] = swarm.bodies.velocity_mps[:, None]
+    swarm.buffers.velocity_mps[...] = swarm.states.velocity_mps[:, None]
 
 
 @pytest.mark.parametrize("preset", [paper, reference])
@@ -38,14 +38,14 @@ def test_eq16_perfect_knowledge_shrinks_the_spread_by_a_tenth_a_window(preset, p
     2 V_max = 6 m/s, so A_max never does either.
     """
     swarm = Swarm(preset("flocking", physics=physics, num_robots=20), [1, 2], channel=to_nobody)
-    start_mps, mean_mps = spread_mps(swarm), np.mean(swarm.bodies.velocity_mps, axis=1)
+    start_mps, mean_mps = spread_mps(swarm), np.mean(swarm.states.velocity_mps, axis=1)
     for k in range(1, NUM_WINDOWS + 1):
         tell_everyone_the_truth(swarm)
         costs = swarm.exchange(stay_silent(swarm))
         np.testing.assert_allclose(spread_mps(swarm), 0.9**k * start_mps, rtol=1e-9)
         variance = np.sum(start_mps**2, axis=1) * 0.81**k
         np.testing.assert_allclose(costs.velocity_variance_m2ps2, variance, rtol=1e-9)
-    np.testing.assert_allclose(np.mean(swarm.bodies.velocity_mps, axis=1), mean_mps, atol=1e-12)
+    np.testing.assert_allclose(np.mean(swarm.states.velocity_mps, axis=1), mean_mps, atol=1e-12)
 
 
 @pytest.mark.parametrize("preset", [paper, reference])
@@ -55,9 +55,9 @@ def test_flock_that_hears_nothing_never_converges(name, preset, physics):
     """Every robot keeps the velocity that it started with, however much it transmits."""
     mission = preset("flocking", physics=physics, num_robots=10, num_windows=50)
     swarm = Swarm(mission, [1, 2], channel=to_nobody)
-    start_mps = swarm.bodies.velocity_mps
+    start_mps = swarm.states.velocity_mps
     summary = summarise(list(fly(swarm, make_policy(name, mission))))
-    np.testing.assert_allclose(swarm.bodies.velocity_mps, start_mps, rtol=1e-12)
+    np.testing.assert_allclose(swarm.states.velocity_mps, start_mps, rtol=1e-12)
     variance = np.sum(np.var(start_mps, axis=1), axis=1)
     np.testing.assert_allclose(summary.velocity_variance_last, variance, rtol=1e-12)
     assert np.all(summary.packets_attempted > 0)

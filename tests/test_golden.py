@@ -27,7 +27,7 @@ TEAMS = {
 recorded_teams = pytest.mark.parametrize("name", TEAMS)
 
 
-def bodies(recording, row):
+def states(recording, row):
     state = recording["pos_vel"][row]
     return RobotStates(position_m=state[None, :, :2].copy(), velocity_mps=state[None, :, 2:].copy())
 
@@ -44,13 +44,13 @@ def replayed(name):
     recording, mission = load(name), TEAMS[name]
     channel = radio_of(mission)
     buffers = empty_buffers(1, mission.num_robots)
-    now, start = np.zeros(1), bodies(recording, 0)
-    observe_self(buffers, start.position_m, start.velocity_mps, now)
+    now, start = np.zeros(1), states(recording, 0)
+    observe_self(buffers, start, now)
     ages, checkpoints = [], []
     for w, recipient in enumerate(recording["recipient"].astype(np.int64)):
         window(
             buffers,
-            bodies(recording, w + 1),
+            states(recording, w + 1),
             recipient[None],
             channel,
             now,

@@ -20,15 +20,15 @@ from swarm_mj.swarm import Swarm
 NUM_ROBOTS, NUM_WINDOWS = 9, 6
 
 
-def talked(mission, bodies, recipients):
+def talked(mission, states, recipients):
     """Buffers, the last window's costs, hops and accelerations after some windows."""
     buffers, channel = empty_buffers(1, NUM_ROBOTS), radio_of(mission)
     for now, recipient in enumerate(recipients):
-        phases = window(buffers, bodies, recipient[None], channel, np.array([float(now)]))
+        phases = window(buffers, states, recipient[None], channel, np.array([float(now)]))
     costs = window_costs(
-        buffers, bodies, phases, np.array([float(len(recipients))]), has_response=True
+        buffers, states, phases, np.array([float(len(recipients))]), is_broadcast=False
     )
-    wanted = flocking(buffers, bodies.velocity_mps, mission.flocking_set)
+    wanted = flocking(buffers, states.velocity_mps, mission.flocking_set)
     return buffers, costs, mean_hops(buffers), wanted
 
 
@@ -38,7 +38,7 @@ def test_renaming_the_robots_renames_everything(preset, seed):
     """Robot i of the renamed team is robot name[i] of the other one."""
     rng = np.random.default_rng(seed)
     mission = preset("flocking", num_robots=NUM_ROBOTS)
-    bodies = RobotStates(
+    states = RobotStates(
         position_m=rng.uniform(-200.0, 200.0, (1, NUM_ROBOTS, 2)),
         velocity_mps=rng.uniform(-3.0, 3.0, (1, NUM_ROBOTS, 2)),
     )
@@ -48,10 +48,10 @@ def test_renaming_the_robots_renames_everything(preset, seed):
     name = rng.permutation(NUM_ROBOTS)
     new_name = np.argsort(name)
     renamed_bodies = RobotStates(
-        position_m=bodies.position_m[:, name], velocity_mps=bodies.velocity_mps[:, name]
+        position_m=states.position_m[:, name], velocity_mps=states.velocity_mps[:, name]
     )
 
-    buffers, costs, hops, wanted = talked(mission, bodies, recipients)
+    buffers, costs, hops, wanted = talked(mission, states, recipients)
     renamed, same_costs, same_hops, renamed_wanted = talked(
         mission, renamed_bodies, new_name[recipients[:, name]]
     )
@@ -88,9 +88,9 @@ def test_renaming_the_robots_renames_their_motion(physics):
     other.place(position_m[:, name], velocity_mps[:, name])
     for _ in range(100):
         acceleration = rng.normal(0.0, 7.0, (1, NUM_ROBOTS, 2))
-        bodies, renamed = one.step(acceleration), other.step(acceleration[:, name])
-    np.testing.assert_allclose(renamed.position_m, bodies.position_m[:, name], atol=1e-9)
-    np.testing.assert_allclose(renamed.velocity_mps, bodies.velocity_mps[:, name], atol=1e-9)
+        states, renamed = one.step(acceleration), other.step(acceleration[:, name])
+    np.testing.assert_allclose(renamed.position_m, states.position_m[:, name], atol=1e-9)
+    np.testing.assert_allclose(renamed.velocity_mps, states.velocity_mps[:, name], atol=1e-9)
 
 
 @given(seed=st.integers(0, 2**32 - 1))

@@ -76,11 +76,15 @@ def imports(path):
         "mission/placement",
         "mission/batched_rng",
         "radio/free_space",
-        "protocol/buffers",
+        "physics/state",
     ],
 )
 def test_the_innermost_rooms_know_no_other(name):
     assert list(imports(PACKAGE / f"{name}.py")) == []
+
+
+def test_the_buffers_know_the_robots_states_only():
+    assert list(imports(PACKAGE / "protocol" / "buffers.py")) == ["physics.state"]
 
 
 def test_the_library_knows_neither_training_nor_tools():

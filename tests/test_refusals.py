@@ -25,10 +25,10 @@ def small(**overrides):
 @pytest.mark.parametrize("shape", [(1, 5), (2, 50), (2, 4), (3, 5)])
 def test_recipients_of_another_shape_are_refused_before_anyone_moves(shape):
     swarm = Swarm(small(), [1, 2])
-    before = swarm.bodies.position_m.copy()
+    before = swarm.states.position_m.copy()
     with pytest.raises(ValueError, match=r"recipient must have shape \(2, 5\)"):
         swarm.exchange(np.zeros(shape, dtype=np.int64))
-    np.testing.assert_array_equal(swarm.bodies.position_m, before)
+    np.testing.assert_array_equal(swarm.states.position_m, before)
 
 
 @pytest.mark.parametrize("robot", [-1, 5, 10**8])
@@ -40,8 +40,15 @@ def test_robots_that_do_not_exist_are_refused(robot):
         swarm.exchange(recipient)
     with pytest.raises(ValueError, match=complaint):
         merge(empty_buffers(2, 5), recipient)
+
+
+@pytest.mark.parametrize("robot", [-2, 5, 10**8])
+def test_addressees_that_do_not_exist_are_refused(robot):
+    """Of a broadcast, too, for which -1 stands for everyone."""
+    recipient = np.array([[-1, 1, robot, 3, 4]])
+    complaint = f"of robot 2 in mission 0 must be from 0 to 4, not {robot}"
     with pytest.raises(ValueError, match=complaint):
-        record_attempt(empty_buffers(2, 5), recipient, NOW)
+        record_attempt(empty_buffers(1, 5), recipient, np.array([1.0]))
 
 
 def test_a_channel_of_another_shape_is_refused():
@@ -126,11 +133,11 @@ def test_the_mirror_folds_as_often_as_needed(velocity_ratio):
     speed = mission.max_velocity_mps
     worlds = Physics(mission, 1)
     worlds.place(np.zeros((1, 2, 2)), np.full((1, 2, 2), speed))
-    bodies = worlds.step(np.zeros((1, 2, 2)))
+    states = worlds.step(np.zeros((1, 2, 2)))
     phase = (speed * 10.0 + half) % (4.0 * half)
     expected = phase - half if phase <= 2.0 * half else 3.0 * half - phase
-    np.testing.assert_allclose(bodies.position_m, expected, atol=1e-9)
-    assert np.all(np.abs(bodies.velocity_mps) == speed)
+    np.testing.assert_allclose(states.position_m, expected, atol=1e-9)
+    assert np.all(np.abs(states.velocity_mps) == speed)
 
 
 @pytest.mark.parametrize(("velocity_ratio", "window_s"), [(5.0, 0.1), (5.0, 0.014), (2.5, 0.014)])
@@ -142,6 +149,6 @@ def test_fast_robots_leave_the_area_by_no_more_than_their_radius(velocity_ratio,
     worlds.place(rng.uniform(-limit, limit, (4, 5, 2)), rng.choice([-speed, speed], size=(4, 5, 2)))
     worst = 0.0
     for _ in range(int(8.0 * limit / speed / window_s)):
-        bodies = worlds.step(rng.normal(0.0, 20.0, (4, 5, 2)))
-        worst = max(worst, float(np.max(np.abs(bodies.position_m))))
+        states = worlds.step(rng.normal(0.0, 20.0, (4, 5, 2)))
+        worst = max(worst, float(np.max(np.abs(states.position_m))))
     assert limit < worst <= limit + 0.5

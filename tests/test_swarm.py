@@ -1,4 +1,5 @@
 import itertools
+from functools import partial
 
 import numpy as np
 import pytest
@@ -7,7 +8,7 @@ from channels import to_nobody
 from swarm_mj.control.motion import initial_velocity
 from swarm_mj.mission import paper, reference
 from swarm_mj.mission.placement import is_connected
-from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy
+from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy, DecentralisedPolicy
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.policies.round_robin import RoundRobin
@@ -35,7 +36,7 @@ def course(swarm, policy, num_windows=NUM_WINDOWS):
     seen = []
     for _ in range(num_windows):
         costs = swarm.step(policy)
-        seen += [swarm.bodies.position_m, swarm.bodies.velocity_mps, swarm.now]
+        seen += [swarm.states.position_m, swarm.states.velocity_mps, swarm.now]
         seen += [array.copy() for array in vars(swarm.buffers).values()]
         seen += [array for phase in swarm.phases for array in vars(phase).values()]
         seen += [costs.age_windows, costs.is_complete, costs.velocity_variance_m2ps2]
@@ -72,8 +73,8 @@ def test_missions_side_by_side_are_the_missions_one_by_one(name, task, preset, p
 
 def test_missions_side_by_side_differ():
     swarm = Swarm(small(), [1, 2, 1])
-    np.testing.assert_array_equal(swarm.bodies.position_m[0], swarm.bodies.position_m[2])
-    assert not np.any(swarm.bodies.position_m[0] == swarm.bodies.position_m[1])
+    np.testing.assert_array_equal(swarm.states.position_m[0], swarm.states.position_m[2])
+    assert not np.any(swarm.states.position_m[0] == swarm.states.position_m[1])
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -88,12 +89,12 @@ def test_every_policy_meets_the_same_missions(preset, physics):
     paths = []
     for name in POLICIES:
         swarm, policy = Swarm(mission, [1, 2]), make_policy(name, mission)
-        moves = 2 if mission.moves_each_transmission and policy.moves_each_transmission else 1
+        moves = 2 if mission.moves_each_transmission and name == "random-flooding" else 1
         swarm.start(policy)
-        path = [swarm.bodies.position_m]
+        path = [swarm.states.position_m]
         for _ in range(12 // moves):
             swarm.step(policy)
-            path.append(swarm.bodies.position_m)
+            path.append(swarm.states.position_m)
         paths.append({k * moves: position_m for k, position_m in enumerate(path)})
     for path in paths[1:]:
         for window in path.keys() & paths[0].keys():
@@ -121,11 +122,11 @@ def test_policy_draws_apart_from_placement_and_motion():
         "random-walk", num_robots=2, range_ratio=10.0, velocity_ratio=5.0, boundary="none"
     )
     swarm, policy = Swarm(mission, list(range(num_missions))), Silent()
-    placed, start_mps = swarm.bodies.position_m[:, 0, 0], swarm.bodies.velocity_mps
+    placed, start_mps = swarm.states.position_m[:, 0, 0], swarm.states.velocity_mps
     swarm.start(policy)
     by_policy = [rng.random() for rng in policy.rngs]
     swarm.move()
-    walked = (swarm.bodies.velocity_mps - start_mps)[:, 0, 0]
+    walked = (swarm.states.velocity_mps - start_mps)[:, 0, 0]
     swarm.restart(list(range(num_missions)))
     swarm.start(policy)
     by_policy_normal = [rng.standard_normal() for rng in policy.rngs]
@@ -136,12 +137,12 @@ def test_policy_draws_apart_from_placement_and_motion():
 def test_iv_b_start_is_connected_inside_and_known_to_nobody_else():
     mission = small("random-walk")
     swarm = Swarm(mission, list(range(10)))
-    for position_m in swarm.bodies.position_m:
+    for position_m in swarm.states.position_m:
         assert is_connected(position_m, 250.0)
         assert np.abs(position_m).max() <= 500.0 * (8 / 40) ** 0.5
     buffers, own = swarm.buffers, np.arange(8)
-    np.testing.assert_array_equal(buffers.position_m[:, own, own], swarm.bodies.position_m)
-    np.testing.assert_array_equal(buffers.velocity_mps[:, own, own], swarm.bodies.velocity_mps)
+    np.testing.assert_array_equal(buffers.position_m[:, own, own], swarm.states.position_m)
+    np.testing.assert_array_equal(buffers.velocity_mps[:, own, own], swarm.states.velocity_mps)
     is_other = ~np.eye(8, dtype=bool)
     assert not np.any(buffers.position_m[:, is_other])
     assert not np.any(buffers.is_known[:, is_other])
@@ -155,9 +156,9 @@ class Witness(CentralisedPolicy):
     def __init__(self):
         self.shown = []
 
-    def recipients(self, views, bodies):
+    def recipients(self, views, states):
         own = np.arange(views.num_robots)
-        self.shown.append((bodies.position_m, views.buffers.position_m[:, own, own], views.now))
+        self.shown.append((states.position_m, views.buffers.position_m[:, own, own], views.now))
         return views.silence.copy()
 
 
@@ -166,23 +167,20 @@ def test_policy_decides_before_the_robots_move(preset):
     """In window w it sees the states at the end of window w - 1, and so do the robots."""
     swarm, witness = Swarm(small("random-walk", preset), [1, 2]), Witness()
     swarm.start(witness)
-    ends_m = [swarm.bodies.position_m]
+    ends_m = [swarm.states.position_m]
     for window in range(5):
         swarm.step(witness)
         shown_m, believed_m, now = witness.shown[window]
         np.testing.assert_array_equal(shown_m, ends_m[window])
         np.testing.assert_array_equal(believed_m, ends_m[window])
         np.testing.assert_array_equal(now, window)
-        ends_m.append(swarm.bodies.position_m)
+        ends_m.append(swarm.states.position_m)
         assert np.all(ends_m[window] != ends_m[window + 1])
     own = np.arange(8)
     np.testing.assert_array_equal(swarm.buffers.position_m[:, own, own], ends_m[-1])
 
 
-class SilentTwice(Silent):
-    """Nobody ever transmits, twice per window."""
-
-    transmits_twice = moves_each_transmission = True
+SilentTwice = partial(RandomFlooding, 0.0)  # nobody ever transmits, twice per window
 
 
 @pytest.mark.parametrize("physics", MODES)
@@ -198,10 +196,10 @@ class SilentTwice(Silent):
 def test_iv_b_flooding_moves_twice_in_the_reference_preset_only(physics, preset, policy, moves):
     """A flock that hears nothing coasts: 10 windows of 0.1 s at v, or 20 of them."""
     swarm = Swarm(small(preset=preset, physics=physics), [1, 2])
-    start = swarm.bodies
+    start = swarm.states
     for _ in range(10):
         swarm.step(policy())
-    travelled_m = swarm.bodies.position_m - start.position_m
+    travelled_m = swarm.states.position_m - start.position_m
     np.testing.assert_allclose(travelled_m, moves * 1.0 * start.velocity_mps, rtol=1e-9)
     np.testing.assert_array_equal(swarm.now, 10.0)
 
@@ -216,10 +214,14 @@ class Script(DecentralisedPolicy):
         return next(self._recipients)
 
 
-class ScriptTwice(Script):
-    """Reads two decisions per window."""
+class ScriptTwice(BroadcastPolicy):
+    """Reads off a list who transmits, twice per window."""
 
-    transmits_twice = True
+    def __init__(self, transmitters):
+        self._transmitters = iter(transmitters)
+
+    def transmits(self, views):
+        return views.silence == next(self._transmitters)
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -234,7 +236,7 @@ def test_exchange_is_a_window_of_a_policy_that_chose_these_recipients(preset):
         np.testing.assert_array_equal(by_hand.age_windows, by_policy.age_windows)
         np.testing.assert_array_equal(given.phases[0].recipient, recipient)
         assert_same(vars(given.buffers).values(), vars(chosen.buffers).values())
-        np.testing.assert_array_equal(given.bodies.position_m, chosen.bodies.position_m)
+        np.testing.assert_array_equal(given.states.position_m, chosen.states.position_m)
 
 
 @pytest.mark.parametrize("physics", MODES)
@@ -247,7 +249,7 @@ def test_iv_a_a_flock_can_be_walled_in(physics):
         reached_m = [0.0]
         for _ in range(300):
             swarm.step(policy)
-            reached_m.append(np.abs(swarm.bodies.position_m).max())
+            reached_m.append(np.abs(swarm.states.position_m).max())
         farthest_m[boundary] = max(reached_m)
     half_side_m = 500.0 * (8 / 40) ** 0.5
     assert farthest_m["reflect"] <= half_side_m + 0.5  # the radius of a body
@@ -272,7 +274,7 @@ def test_alg1_exchange_by_hand():
     timestamp[1:, 0] = 0.5  # everyone decoded robot 0's packet,
     timestamp[[0, *range(2, 8)], 1] = 1.0  # and robot 1's answer
     np.testing.assert_array_equal(swarm.buffers.timestamp[0], timestamp)
-    np.testing.assert_array_equal(swarm.buffers.position_m[0, 0, 1], swarm.bodies.position_m[0, 1])
+    np.testing.assert_array_equal(swarm.buffers.position_m[0, 0, 1], swarm.states.position_m[0, 1])
     assert swarm.buffers.last_attempt[0, 0, 1] == 0.5
     assert np.count_nonzero(swarm.buffers.last_attempt) == 1
     assert costs.packets.attempted == costs.packets.delivered == costs.packets.answered == 1
@@ -284,15 +286,12 @@ def test_iv_c_flooding_by_hand():
     """Robot 0 sends, then robot 1: the second packet passes the first one's news on, unanswered."""
     mission = small("random-walk", range_ratio=10.0)
     swarm = Swarm(mission, [1])
-    first, second = silence_of(1, 8), silence_of(1, 8)
-    first[0, 0], second[0, 1] = 1, 2
-    costs = swarm.step(ScriptTwice([first, second]))
+    costs = swarm.step(ScriptTwice([0, 1]))
     timestamp = np.diag(np.full(8, 1.0))
     timestamp[1:, 0] = 0.5
     timestamp[[0, *range(2, 8)], 1] = 1.0
     np.testing.assert_array_equal(swarm.buffers.timestamp[0], timestamp)
-    assert swarm.buffers.last_attempt[0, 0, 1] == 0.5
-    assert swarm.buffers.last_attempt[0, 1, 2] == 1.0
+    assert not np.any(swarm.buffers.last_attempt)  # a broadcast has no addressee
     assert costs.packets.sent == costs.packets.heard == 2
     assert costs.packets.receptions == 7 + 7
 
@@ -361,10 +360,10 @@ def test_eq16_a_robot_does_not_react_to_one_it_has_not_heard(preset, monkeypatch
     for start_of in (initial_velocity, with_a_slower_robot_7):
         monkeypatch.setattr("swarm_mj.swarm.initial_velocity", start_of)
         swarm = Swarm(small(preset=preset), [1, 2], channel=all_but_7_hear_0)
-        start_mps = swarm.bodies.velocity_mps
+        start_mps = swarm.states.velocity_mps
         for _ in range(NUM_WINDOWS):
             swarm.exchange(silence_of(2, 8))
-        ends.append(swarm.bodies.velocity_mps)
+        ends.append(swarm.states.velocity_mps)
     assert np.all(start_mps[:, 1:7] != ends[0][:, 1:7])  # they did react to robot 0
     np.testing.assert_array_equal(ends[0][:, :7], ends[1][:, :7])
     assert np.all(ends[0][:, 7] != ends[1][:, 7])
@@ -400,11 +399,11 @@ def test_eq5_eq8_what_a_robot_knows_was_true_when_observed(name, task):
     mission = small(task)
     swarm, policy = Swarm(mission, [1, 2]), make_policy(name, mission)
     swarm.start(policy)
-    path_m, path_mps = [swarm.bodies.position_m], [swarm.bodies.velocity_mps]
+    path_m, path_mps = [swarm.states.position_m], [swarm.states.velocity_mps]
     for _ in range(60):
         swarm.step(policy)
-        path_m.append(swarm.bodies.position_m)
-        path_mps.append(swarm.bodies.velocity_mps)
+        path_m.append(swarm.states.position_m)
+        path_mps.append(swarm.states.velocity_mps)
     observed_in = np.ceil(swarm.buffers.timestamp).astype(int)  # both phases of window w end it
     checked = 0
     for b, i, j in zip(*np.nonzero(swarm.buffers.is_known), strict=True):
@@ -425,24 +424,22 @@ def test_costs_are_of_the_end_of_the_window(policy):
     for b in range(2):
         ages = [swarm.now[b] - t for row in swarm.buffers.timestamp[b] for t in row]
         assert costs.age_windows[b] == pytest.approx(sum(ages) / 64)
-        velocity_mps = swarm.bodies.velocity_mps[b]
+        velocity_mps = swarm.states.velocity_mps[b]
         spread = [np.sum((v - velocity_mps.mean(axis=0)) ** 2) for v in velocity_mps]
         assert costs.velocity_variance_m2ps2[b] == pytest.approx(sum(spread) / 8)
 
 
-class Watchful(DecentralisedPolicy):
-    """Floods at random, and keeps what it saw of its own age and of the last phases."""
-
-    transmits_twice = True
+class Watchful(BroadcastPolicy):
+    """Everyone transmits, and keeps what it saw of its own age and of the last phases."""
 
     def __init__(self):
         self.own_age, self.num_phases = [], []
 
-    def recipients(self, views):
+    def transmits(self, views):
         robots = np.arange(views.num_robots)
         self.own_age.append(views.now[:, None] - views.buffers.timestamp[:, robots, robots])
         self.num_phases.append(len(views.phases))
-        return (views.silence + 1) % views.num_robots
+        return np.ones_like(views.silence, dtype=bool)
 
 
 def test_the_clock_and_the_last_phase_are_current_at_each_half_of_flooding():

@@ -86,15 +86,15 @@ def bench(num_missions: int, *, num_threads: int = 1, seconds: float = 2.0) -> T
     policy = RoundRobin()
     swarm.start(policy)
     recipient = swarm.decide(policy)
-    phases = window(swarm.buffers, swarm.bodies, recipient, swarm.channel, swarm.now)
+    phases = window(swarm.buffers, swarm.states, recipient, swarm.channel, swarm.now)
     parts = {
         "decide": lambda: swarm.decide(policy),
         "move": swarm.move,
         "radio and buffers": _talk(swarm, recipient),
         "costs": lambda: window_costs(
-            swarm.buffers, swarm.bodies, phases, swarm.now, has_response=True
+            swarm.buffers, swarm.states, phases, swarm.now, is_broadcast=False
         ),
-        "radio alone": lambda: swarm.channel(swarm.bodies.position_m, recipient),
+        "radio alone": lambda: swarm.channel(swarm.states.position_m, recipient),
         "hops (flights only)": lambda: mean_hops(swarm.buffers),
     }
     whole_us = microseconds(lambda: swarm.step(policy), seconds)
@@ -179,7 +179,7 @@ def _talk(swarm: Swarm, recipient: Int[np.ndarray, "B N"]) -> Callable[[], objec
     now = swarm.now.copy()
 
     def talk() -> None:
-        window(swarm.buffers, swarm.bodies, recipient, swarm.channel, now)
+        window(swarm.buffers, swarm.states, recipient, swarm.channel, now)
         now[:] += 1.0
 
     return talk

@@ -172,7 +172,9 @@ def _compile_ahead(options: argparse.Namespace, mission: Mission) -> None:
 
 
 def _recorder(options: argparse.Namespace, swarm: Swarm, policy: Policy) -> Recorder:
-    return Recorder(swarm, ego=options.observer, is_broadcast=policy.transmits_twice)
+    return Recorder(
+        swarm, ego=options.observer, is_broadcast=policy.window(swarm.mission).is_broadcast
+    )
 
 
 def _fly(swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Console) -> _Flight:

@@ -28,7 +28,7 @@ def run(options: argparse.Namespace) -> int:
     """Runs the command; returns its exit code."""
     mission = mission_of(options)
     check_writable(options.out, "scene", must_be_new=not options.force)
-    spec = compose(mission, start=Swarm(mission, [options.seed]).bodies)
+    spec = compose(mission, start=Swarm(mission, [options.seed]).states)
     spec.compile()
     with atomic_write(options.out) as part:
         part.write_text(spec.to_xml(), encoding="utf-8")

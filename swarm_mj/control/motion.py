@@ -17,7 +17,7 @@ from swarm_mj.protocol.buffers import NEVER, Buffers
 class Motion(Protocol):
     """What the robots' controllers want in the next window."""
 
-    def __call__(self, buffers: Buffers, bodies: RobotStates) -> Float[np.ndarray, "B N 2"]:
+    def __call__(self, buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N 2"]:
         """The accelerations u [m/s²]; row [b, i] may use buffer and body [b, i] only."""
         ...
 
@@ -47,9 +47,9 @@ def initial_velocity(mission: Mission, rng: np.random.Generator) -> Float[np.nda
     return rng.uniform(-limit, limit, size=(mission.num_robots, 2))
 
 
-def stand(buffers: Buffers, bodies: RobotStates) -> Float[np.ndarray, "B N 2"]:  # noqa: ARG001 - a Motion
+def stand(buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N 2"]:  # noqa: ARG001 - a Motion
     """No acceleration."""
-    return np.zeros_like(bodies.velocity_mps)
+    return np.zeros_like(states.velocity_mps)
 
 
 class RandomWalk:
@@ -62,7 +62,7 @@ class RandomWalk:
     def __call__(
         self,
         buffers: Buffers,  # noqa: ARG002 - a Motion
-        bodies: RobotStates,  # noqa: ARG002 - a Motion
+        states: RobotStates,  # noqa: ARG002 - a Motion
     ) -> Float[np.ndarray, "B N 2"]:
         """The next accelerations [m/s²]."""
         acceleration = self._stream.next() * (self._limit_mps2 / 3.0)
@@ -76,9 +76,9 @@ class Flocking:
         self._limit_mps2 = mission.max_acceleration_mps2
         self._flocking_set: FlockingSet = mission.flocking_set
 
-    def __call__(self, buffers: Buffers, bodies: RobotStates) -> Float[np.ndarray, "B N 2"]:
+    def __call__(self, buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N 2"]:
         """The next accelerations [m/s²]."""
-        acceleration = flocking(buffers, bodies.velocity_mps, self._flocking_set)
+        acceleration = flocking(buffers, states.velocity_mps, self._flocking_set)
         return np.clip(acceleration, -self._limit_mps2, self._limit_mps2)
 
 

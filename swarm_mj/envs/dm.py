@@ -80,11 +80,11 @@ class SwarmPhysics(mujoco.Physics):
 
     def _show(self) -> None:
         """Copies the robots' states and the time to where dm_control looks for them."""
-        mission, bodies = self.swarm.mission, self.swarm.bodies
+        mission, states = self.swarm.mission, self.swarm.states
         self.data.time = self.swarm.now[0] * mission.window_s
-        self.data.qpos[:] = bodies.position_m.ravel()
-        self.data.qvel[:] = bodies.velocity_mps.ravel()
-        self.data.ctrl[:] = bodies.velocity_mps.ravel() if mission.physics == "exact" else 0.0
+        self.data.qpos[:] = states.position_m.ravel()
+        self.data.qvel[:] = states.velocity_mps.ravel()
+        self.data.ctrl[:] = states.velocity_mps.ravel() if mission.physics == "exact" else 0.0
         self.forward()
 
 
@@ -136,7 +136,7 @@ class SwarmTask(_Task):
     def get_reward(self, physics: SwarmPhysics) -> float:
         """Minus the age of information after the window (cost of Eq. 10) [windows]."""
         swarm = physics.swarm
-        age, _ = age_of_information(swarm.buffers, swarm.now, swarm.is_on)
+        age, _ = age_of_information(swarm.buffers, swarm.now, swarm.states.is_active)
         return -float(age[0])
 
     def get_termination(self, physics: SwarmPhysics) -> float | None:

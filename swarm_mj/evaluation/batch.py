@@ -11,7 +11,7 @@ from swarm_mj.evaluation.lower_bound import ConnectivityFloor
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.protocol.window import PHASE
+from swarm_mj.protocol.window import SLOT_WINDOWS
 from swarm_mj.rollout import Flown, fly
 from swarm_mj.swarm import Swarm
 
@@ -91,7 +91,7 @@ class Tally:
         )
         self._packets = {name: np.zeros(num_missions) for name in PACKETS}
         self._complete = np.full(num_missions, np.inf)
-        self._ages = np.zeros(round(mission.num_windows / PHASE) + 1, dtype=np.int64)
+        self._ages = np.zeros(round(mission.num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
 
     def add(self, flown: Flown) -> None:
         """Adds a window; the swarm stands at its end."""
@@ -99,14 +99,16 @@ class Tally:
         self._aoi += costs.age_windows
         if swarm.now[0] > swarm.mission.num_windows - self._num_steady:
             self._steady += costs.age_windows
-        self._floor_age += self._floor.next(swarm.bodies.position_m, swarm.now, swarm.is_on)
+        self._floor_age += self._floor.next(
+            swarm.states.position_m, swarm.now, swarm.states.is_active
+        )
         self._variance += costs.velocity_variance_m2ps2
         self._hops += flown.hops
         for name, count in self._packets.items():
             count += getattr(costs.packets, name)
         complete = np.where(costs.is_complete, swarm.now, np.inf)
         np.minimum(self._complete, complete, out=self._complete)
-        count_ages(swarm.buffers.timestamp, swarm.now, self._ages, swarm.is_on)
+        count_ages(swarm.buffers.timestamp, swarm.now, self._ages, swarm.states.is_active)
 
     def costs(self) -> BatchCosts:
         """What the missions cost, all windows of them flown."""
@@ -135,7 +137,7 @@ def count_ages(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
     counts: Int[np.ndarray, "bins"],
-    is_on: Bool[np.ndarray, "B N"] | None = None,
+    is_active: Bool[np.ndarray, "B N"] | None = None,
 ) -> None:
     """Counts how old what each robot knows of each other robot is.
 
@@ -143,9 +145,9 @@ def count_ages(
         timestamp: T [windows].
         now: t [windows].
         counts: By age in half windows; added to in place.
-        is_on: Whose pairs count; None is everyone's.
+        is_active: Whose pairs count; None is everyone's.
     """
-    _count_ages(timestamp, now, PHASE, is_on, counts)
+    _count_ages(timestamp, now, SLOT_WINDOWS, is_active, counts)
 
 
 @njit(cache=True)
@@ -154,15 +156,15 @@ def _count_ages(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
     phase: float,
-    is_on: Bool[np.ndarray, "B N"] | None,
+    is_active: Bool[np.ndarray, "B N"] | None,
     counts: Int[np.ndarray, "bins"],
 ) -> None:
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
-            if is_on is not None and not is_on[b, i]:
+            if is_active is not None and not is_active[b, i]:
                 continue
             for j in range(num_robots):
-                if is_on is None or is_on[b, j]:
+                if is_active is None or is_active[b, j]:
                     counts[int((now[b] - timestamp[b, i, j]) / phase)] += 1
             counts[int((now[b] - timestamp[b, i, i]) / phase)] -= 1

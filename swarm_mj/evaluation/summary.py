@@ -20,7 +20,7 @@ from swarm_mj.evaluation.statistics import (
 from swarm_mj.evaluation.statistics import standard_error as sem
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
-from swarm_mj.protocol.window import PHASE
+from swarm_mj.protocol.window import SLOT_WINDOWS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,8 +112,8 @@ def _aoi(costs: BatchCosts) -> dict[str, Any]:
         "aoi_worst": aoi.worst,
         "aoi_steady_mean": float(np.mean(steady)),
         "aoi_steady_sem": sem(steady),
-        "age_p95": PHASE * quantile_of_counts(ages, 0.95),
-        "age_worst": PHASE * quantile_of_counts(ages, 1.0),
+        "age_p95": SLOT_WINDOWS * quantile_of_counts(ages, 0.95),
+        "age_worst": SLOT_WINDOWS * quantile_of_counts(ages, 1.0),
         "aoi_floor_mean": float(np.mean(floor)),
         "aoi_floor_sem": sem(floor),
     }

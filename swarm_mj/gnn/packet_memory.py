@@ -11,7 +11,7 @@ from numba import njit
 
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.protocol.window import PHASE
+from swarm_mj.protocol.window import SLOT_WINDOWS
 
 
 class Memory:
@@ -45,7 +45,7 @@ class Memory:
         """
         if views.phases:
             transmission, response = views.phases
-            for phase, time in ((transmission, views.now - PHASE), (response, views.now)):
+            for phase, time in ((transmission, views.now - SLOT_WINDOWS), (response, views.now)):
                 _take_in(
                     phase.recipient,
                     phase.heard,

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numba import njit
 
-from swarm_mj.protocol.window import PHASE, Phase, respondents
+from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, respondents
 from swarm_mj.radio.free_space import Channel
 
 
@@ -71,7 +71,7 @@ def gain(
     answered = respondents(Phase(recipient=recipient, heard=heard))
     heard_answer = channel(position_m, answered)
     gained = np.empty(len(mission))
-    _replay(timestamp, mission, heard, heard_answer, now, PHASE, gained)
+    _replay(timestamp, mission, heard, heard_answer, now, SLOT_WINDOWS, gained)
     return gained
 
 

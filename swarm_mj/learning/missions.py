@@ -87,7 +87,7 @@ class Group:
         costs = swarm.exchange(recipient)
         credit = np.zeros(recipient.shape)
         if with_credit:
-            credit = credits_of(before, swarm.bodies.position_m, recipient, swarm.channel, now)
+            credit = credits_of(before, swarm.states.position_m, recipient, swarm.channel, now)
         self._recipients.append(recipient.astype(np.int16))
         graphs, last_graphs = self._observer.graphs(swarm.views), None
         is_cut = self._last_window < self.mission.num_windows

@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 
 @dataclass(frozen=True, kw_only=True)
 class RobotStates:
-    """Where the robots truly are, in all B missions at once."""
+    """Where the robots truly are and who is active, in all B missions at once."""
 
     position_m: Float[np.ndarray, "B N 2"]  # p [m]
     velocity_mps: Float[np.ndarray, "B N 2"]  # v [m/s]
+    is_active: Bool[np.ndarray, "B N"] | None = None  # who observes and talks; None: everyone

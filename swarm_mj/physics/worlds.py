@@ -8,10 +8,11 @@ Positions come from MuJoCo's step; only the mirror at a wall writes them. Two mo
 - `contact`: forces at 10 ms steps, and joint limits that turn the velocity round at a wall.
 """
 
+from dataclasses import replace
 from typing import no_type_check
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from mujoco import batch
 from numba import njit
 
@@ -43,12 +44,12 @@ class Physics:
         self._wall = OPEN
         if mission.has_walls and mission.physics == "exact":
             self._wall = MIRROR if mission.wall_hit == "mirror" else CLIP
-        self._bodies = RobotStates(position_m=np.zeros(shape), velocity_mps=np.zeros(shape))
+        self._states = RobotStates(position_m=np.zeros(shape), velocity_mps=np.zeros(shape))
 
     @property
-    def bodies(self) -> RobotStates:
+    def states(self) -> RobotStates:
         """Where the robots are; arrays are not changed by later steps."""
-        return self._bodies
+        return self._states
 
     def place(
         self, position_m: Float[np.ndarray, "B N 2"], velocity_mps: Float[np.ndarray, "B N 2"]
@@ -62,13 +63,17 @@ class Physics:
         Raises:
             ValueError: There is not one state per robot, or one is not finite.
         """
-        self._check_states("position", position_m)
-        self._check_states("velocity", velocity_mps)
+        self._check_vectors("position", position_m)
+        self._check_vectors("velocity", velocity_mps)
         self._batch.reset()
         self._qpos[...] = position_m
         self._qvel[...] = velocity_mps
         self._ctrl[...] = velocity_mps if self._mission.physics == "exact" else 0.0
-        self._bodies = RobotStates(position_m=position_m.copy(), velocity_mps=velocity_mps.copy())
+        self._states = RobotStates(position_m=position_m.copy(), velocity_mps=velocity_mps.copy())
+
+    def deactivate(self, is_active: Bool[np.ndarray, "B N"]) -> None:
+        """From now on only these robots are active; the others stand or move as before."""
+        self._states = replace(self._states, is_active=is_active)
 
     def step(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> RobotStates:
         """Moves all robots through one window (Eq. 15).
@@ -82,16 +87,16 @@ class Physics:
         Raises:
             ValueError: An acceleration is not finite, or there is not one per robot.
         """
-        self._check_states("acceleration", acceleration_mps2)
+        self._check_vectors("acceleration", acceleration_mps2)
         if self._mission.physics == "exact":
             self._step_exact(acceleration_mps2)
         else:
             self._step_contact(acceleration_mps2)
-        return self._bodies
+        return self._states
 
-    def _check_states(self, what: str, given: np.ndarray) -> None:
+    def _check_vectors(self, what: str, given: np.ndarray) -> None:
         """Raises ValueError unless there is one finite vector per robot."""
-        expected = self._bodies.position_m.shape
+        expected = self._states.position_m.shape
         if np.shape(given) != expected:
             raise ValueError(
                 f"{what} must have shape {expected}, missions by robots by axes, "
@@ -107,7 +112,7 @@ class Physics:
 
     def _step_exact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
         self._batch.step()
-        bodies = _empty_like(self._bodies)
+        states = _empty_like(self._states)
         _kick(
             self._qpos,
             self._qvel,
@@ -118,10 +123,10 @@ class Physics:
             self._mission.max_velocity_mps,
             self._mission.half_side_m,
             self._wall,
-            bodies.position_m,
-            bodies.velocity_mps,
+            states.position_m,
+            states.velocity_mps,
         )
-        self._bodies = bodies
+        self._states = states
 
     def _step_contact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
         limit_mps = self._mission.max_velocity_mps
@@ -136,13 +141,16 @@ class Physics:
             self._ctrl[...] = ROBOT_MASS_KG * np.clip(held_mps2, lowest, highest)
             self._batch.step()
         np.clip(self._qvel, -limit_mps, limit_mps, out=self._qvel)  # rounding of the last step
-        self._bodies = RobotStates(position_m=self._qpos.copy(), velocity_mps=self._qvel.copy())
+        self._states = replace(
+            self._states, position_m=self._qpos.copy(), velocity_mps=self._qvel.copy()
+        )
 
 
-def _empty_like(bodies: RobotStates) -> RobotStates:
+def _empty_like(states: RobotStates) -> RobotStates:
     return RobotStates(
-        position_m=np.empty(bodies.position_m.shape),
-        velocity_mps=np.empty(bodies.velocity_mps.shape),
+        position_m=np.empty(states.position_m.shape),
+        velocity_mps=np.empty(states.velocity_mps.shape),
+        is_active=states.is_active,
     )
 
 

@@ -1,38 +1,35 @@
 """Slotted ALOHA broadcast (Abramson 1970; Roberts 1975)."""
 
 from collections.abc import Sequence
-from typing import ClassVar, no_type_check
+from typing import no_type_check
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 from numba import njit
 
 from swarm_mj.mission.batched_rng import Stream, uniform
-from swarm_mj.policies.policy import DecentralisedPolicy, check_probability
+from swarm_mj.policies.policy import BroadcastPolicy, check_probability
 from swarm_mj.protocol.local_views import LocalViews
 
 
-class Aloha(DecentralisedPolicy):
+class Aloha(BroadcastPolicy):
     """Every robot broadcasts now and then, as often as its neighbourhood bears, unanswered.
 
     In slotted ALOHA what counts is the load that all n stations offer together, so each of them
-    sends less the more there are. Here a slot is half a window, a neighbourhood's robots are its
-    stations, and `probability` is that anyone of them broadcasts in a slot: each does so with
-    1 - (1 - p)^(1/n). A robot takes for n the size of the team times the share of the robots it
-    knows that it believes in range; the whole team, then, until it has heard of anyone.
+    sends less the more there are. Here a neighbourhood's robots are its stations, and `probability`
+    is that anyone of them broadcasts in a slot: each does so with 1 - (1 - p)^(1/n). A robot takes
+    for n the size of the team times the share of the robots it knows that it believes in range; the
+    whole team, then, until it has heard of anyone.
 
     The difference to random flooding is this n: flooding has one probability for everyone and
-    knows nothing. The packet is addressed to the next identity, which stands for nobody in
-    particular. Uses the robot's own buffer, the identities, the team's size and the range.
+    knows nothing. Uses the robot's own buffer, the team's size and the range.
     """
-
-    transmits_twice: ClassVar[bool] = True
 
     def __init__(self, probability: float, *, range_m: float) -> None:
         """Prepares the policy.
 
         Args:
-            probability: That anyone of a neighbourhood broadcasts in a half window.
+            probability: That anyone of a neighbourhood broadcasts in a slot.
             range_m: Distance at which a lone transmission just decodes [m].
 
         Raises:
@@ -50,12 +47,11 @@ class Aloha(DecentralisedPolicy):
         """Gives every robot its own stream of numbers; arguments as in `Policy.start`."""
         self._stream = Stream(rngs, uniform, (num_robots,))
 
-    def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """The next identity, for each robot that draws a broadcast."""
+    def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
+        """Each robot that draws a broadcast."""
         everyone_silent = 1.0 - self._probability
         chance = 1.0 - everyone_silent ** (1.0 / num_contenders(views, self._range_m))
-        anyone = (views.silence + 1) % views.num_robots
-        return np.where(self._stream.next() < chance, anyone, views.silence)
+        return self._stream.next() < chance
 
 
 def num_contenders(views: LocalViews, range_m: float) -> Float[np.ndarray, "B N"]:

@@ -1,34 +1,31 @@
 """Innovation gossip: whoever has news talks (rumour mongering, Demers et al. 1987, on the air)."""
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool
 
 from swarm_mj.mission.batched_rng import Stream, uniform
-from swarm_mj.policies.policy import DecentralisedPolicy, check_probability
+from swarm_mj.policies.policy import BroadcastPolicy, check_probability
 from swarm_mj.protocol.local_views import LocalViews
 
 
-class InnovationGossip(DecentralisedPolicy):
+class InnovationGossip(BroadcastPolicy):
     """Every robot broadcasts the more likely the more is new to tell, twice a window, unanswered.
 
     What is new is how much its knowledge has become fresher since its own last broadcast: the rise
     of T^{i,j}, its own included, averaged over the team [windows]. A robot broadcasts with p times
     that, and at most with certainty. So robots that hear much pass it on soon, and one that hears
-    nothing still tells where it is now and then. The packet is addressed to the next identity,
-    which stands for nobody in particular: two unanswered broadcasts a window cost less age than one
-    that a neighbour answers. Uses the robot's own buffer, and what it remembers of it.
+    nothing still tells where it is now and then. Nobody answers: two unanswered broadcasts a window
+    cost less age than one packet that a neighbour answers. Uses the robot's own buffer, and what it
+    remembers of it.
     """
-
-    transmits_twice: ClassVar[bool] = True
 
     def __init__(self, probability: float) -> None:
         """Prepares the policy.
 
         Args:
-            probability: Of a broadcast in a half window, for each window of news.
+            probability: Of a broadcast in a slot, for each window of news.
 
         Raises:
             ValueError: The probability is not in [0, 1].
@@ -45,9 +42,9 @@ class InnovationGossip(DecentralisedPolicy):
         self._stream = Stream(rngs, uniform, (num_robots,))
         self._told = np.zeros((len(rngs), num_robots))  # mean T at the last broadcast [windows]
 
-    def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """The next identity, for each robot that draws a broadcast; it remembers what it told."""
+    def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
+        """Each robot that draws a broadcast; it remembers what it told."""
         knows = np.mean(views.buffers.timestamp, axis=2)  # T never falls, so means tell its rise
         is_telling = self._stream.next() < self._probability * (knows - self._told)
         self._told = np.where(is_telling, knows, self._told)
-        return np.where(is_telling, (views.silence + 1) % views.num_robots, views.silence)
+        return is_telling

@@ -50,10 +50,10 @@ class MinimumSpanningTree(CentralisedPolicy):
         self._stream = Stream(rngs, uniform, (num_robots,))
         self._parent = None
 
-    def recipients(self, views: LocalViews, bodies: RobotStates) -> Int[np.ndarray, "B N"]:
+    def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """The parent, for each robot that draws a transmission."""
         if self._parent is None or self._is_recomputed:
-            self._parent = spanning_tree(bodies.position_m)
+            self._parent = spanning_tree(states.position_m)
         rootless = np.int64(views.num_robots - 1) if self._root_transmits else views.silence
         parent = np.where(self._parent == ROOT, rootless, self._parent)
         return np.where(self._stream.next() < self._probability, parent, views.silence)

@@ -2,22 +2,25 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 
+from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
+from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import DoubleBroadcast, RequestResponse, WindowProtocol
 
 Parameters = Mapping[str, bool | int | float | str]  # what a policy was made with, by name
 
 
 class Policy:
-    """Chooses whom every robot addresses in the next window; itself is silence."""
+    """Chooses whom every robot addresses next, and what a window looks like."""
 
-    transmits_twice: ClassVar[bool] = False  # flooding's window: two transmissions, no responses
-    moves_each_transmission: ClassVar[bool] = False  # where the mission's field of that name is set
+    def window(self, mission: Mission) -> WindowProtocol:
+        """What the robots do in a window: by Alg. 1 they request, and respond."""
+        return RequestResponse(silence_is_attempt=mission.silence_is_attempt)
 
     @property
     def payload(self) -> str:
@@ -53,16 +56,42 @@ class DecentralisedPolicy(Policy, ABC):
         """
 
 
+class BroadcastPolicy(DecentralisedPolicy):
+    """A decentralised policy whose packets are for everyone who hears them (IV-C)."""
+
+    def window(self, mission: Mission) -> WindowProtocol:
+        """What the robots do in a window: they broadcast twice, unanswered."""
+        return DoubleBroadcast(
+            silence_is_attempt=mission.silence_is_attempt,
+            needs_addressees=mission.half_duplex == "eavesdroppers",
+        )
+
+    @abstractmethod
+    def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
+        """Who broadcasts in the next slot; [b, i] may depend on view [b, i] only.
+
+        Args:
+            views: All robots' views, side by side.
+
+        Returns:
+            Whether each robot does.
+        """
+
+    def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
+        """`BROADCAST` for whoever transmits; the others address themselves, which is silence."""
+        return np.where(self.transmits(views), BROADCAST, views.silence)
+
+
 class CentralisedPolicy(Policy, ABC):
     """A policy that is told the truth: everyone's buffer and everyone's true state."""
 
     @abstractmethod
-    def recipients(self, views: LocalViews, bodies: RobotStates) -> Int[np.ndarray, "B N"]:
+    def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """Whom each robot addresses.
 
         Args:
             views: All robots' views.
-            bodies: All robots' true states.
+            states: All robots' true states.
 
         Returns:
             The recipients; itself is silence.

@@ -1,36 +1,45 @@
 """Random flooding (IV-C; Tseng et al., The broadcast storm problem, 2002)."""
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 
+from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform
-from swarm_mj.policies.policy import DecentralisedPolicy, check_probability
+from swarm_mj.policies.policy import BroadcastPolicy, check_probability
 from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import DoubleBroadcast, WindowProtocol
 
 
-class RandomFlooding(DecentralisedPolicy):
+class RandomFlooding(BroadcastPolicy):
     """Every robot rebroadcasts with probability p, twice per window, unanswered (IV-C).
 
-    The packet is addressed to a robot drawn from the whole team, as in the authors' code. Uses no
-    information but the team's size.
+    As in the authors' code a robot that transmits draws an addressee from the whole team, and is
+    silent if it draws itself: so it transmits with p (N - 1) / N. The addressee matters only under
+    their half-duplex rule, by which whoever is addressed hears while it sends: only there packets
+    name it. Uses no information but the team's size.
     """
 
-    transmits_twice: ClassVar[bool] = True
-    moves_each_transmission: ClassVar[bool] = True  # the authors' other policies move once
-
-    def __init__(self, probability: float) -> None:
+    def __init__(self, probability: float, *, names_addressee: bool = False) -> None:
         """Prepares the policy.
 
         Args:
-            probability: Of a robot's transmission, in each half window.
+            probability: Of a draw, in each slot.
+            names_addressee: Whether packets say whom they are for, as in the authors' code.
 
         Raises:
             ValueError: The probability is not in [0, 1].
         """
         self._probability = check_probability(probability)
+        self._names_addressee = names_addressee
+
+    def window(self, mission: Mission) -> WindowProtocol:
+        """What the robots do: they broadcast twice, and in the authors' code also move twice."""
+        return DoubleBroadcast(
+            silence_is_attempt=mission.silence_is_attempt,
+            moves_each_slot=mission.moves_each_transmission,
+        )
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -41,8 +50,16 @@ class RandomFlooding(DecentralisedPolicy):
         """Gives every robot its own stream of numbers; arguments as in `Policy.start`."""
         self._stream = Stream(rngs, uniform, (2, num_robots))
 
+    def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
+        """Each robot that draws a transmission, to a teammate."""
+        return self._drawn(views) != views.silence
+
     def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """Whom each robot addresses in the next half window."""
+        """As of any broadcast, or the addressees, where packets name them."""
+        return self._drawn(views) if self._names_addressee else super().recipients(views)
+
+    def _drawn(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
+        """Each robot's addressee; itself: it does not transmit."""
         drawn = self._stream.next()
         anyone = (drawn[:, 1] * views.num_robots).astype(np.int64)
         return np.where(drawn[:, 0] < self._probability, anyone, views.silence)

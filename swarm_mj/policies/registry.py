@@ -27,7 +27,10 @@ from swarm_mj.radio.mission_radio import radio_of
 
 
 def _random_flooding(mission: Mission, probability: float | None) -> Policy:
-    return RandomFlooding(_or_tuned(probability, "random-flooding", mission))
+    return RandomFlooding(
+        _or_tuned(probability, "random-flooding", mission),
+        names_addressee=mission.half_duplex == "eavesdroppers",
+    )
 
 
 def _round_robin(mission: Mission, probability: float | None) -> Policy:  # noqa: ARG001

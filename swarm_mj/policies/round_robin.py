@@ -14,10 +14,10 @@ class RoundRobin(CentralisedPolicy):
     Centralised: the base station is chosen anew in each window from all true positions.
     """
 
-    def recipients(self, views: LocalViews, bodies: RobotStates) -> Int[np.ndarray, "B N"]:
+    def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """The base, for the one robot whose turn it is."""
         missions = np.arange(len(views.now))
-        base = np.argmin(np.sum(bodies.position_m**2, axis=2), axis=1)
+        base = np.argmin(np.sum(states.position_m**2, axis=2), axis=1)
         turn = views.now.astype(np.int64) % (views.num_robots - 1)
         turn += turn >= base
         recipient = views.silence.copy()

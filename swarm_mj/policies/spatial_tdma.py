@@ -4,22 +4,22 @@ Each robot reckons whom its teammates would decode, from where it believes them 
 """
 
 from collections.abc import Sequence
-from typing import ClassVar, no_type_check
+from typing import no_type_check
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 from numba import njit
 
-from swarm_mj.policies.policy import DecentralisedPolicy
-from swarm_mj.policies.tdma import draw_order, half_windows
+from swarm_mj.policies.policy import BroadcastPolicy
+from swarm_mj.policies.tdma import draw_order, slot_of
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import MIN_DISTANCE_M
 
 
-class SpatialTdma(DecentralisedPolicy):
+class SpatialTdma(BroadcastPolicy):
     """TDMA in which robots far enough from the one whose turn it is broadcast beside it.
 
-    The common rule: in each half window the owner of the turn broadcasts, as in `Tdma`. Beginning
+    The common rule: in each slot the owner of the turn broadcasts, as in `Tdma`. Beginning
     half a round away in the order, one robot after the other joins if by Eqs. 1-4 nobody who
     decodes a packet so far would lose it, the robot itself included, and somebody would gain one.
 
@@ -28,8 +28,6 @@ class SpatialTdma(DecentralisedPolicy):
     as `Tdma` does, and no robot that joins overlooks a listener of the owner's. Uses the robot's
     own buffer, identity, the team's size, the order, the clock and the radio's range and threshold.
     """
-
-    transmits_twice: ClassVar[bool] = True
 
     def __init__(self, *, range_m: float, threshold: float) -> None:
         """Prepares the policy.
@@ -45,19 +43,19 @@ class SpatialTdma(DecentralisedPolicy):
         """Draws every mission's order; arguments as in `Policy.start`."""
         self._order = draw_order(num_robots, rngs)
 
-    def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """The next identity, for each robot whose turn it is or that may join."""
+    def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
+        """Each robot whose turn it is or that may join."""
         is_oneself = np.eye(views.num_robots, dtype=np.bool_)
         is_sending = np.all(views.buffers.is_known | is_oneself, axis=2)
         _apply_rule(
             views.buffers.position_m,
             self._order,
-            half_windows(views.now),
+            slot_of(views.now),
             self._range_m,
             self._threshold,
             is_sending,
         )
-        return np.where(is_sending, (views.silence + 1) % views.num_robots, views.silence)
+        return is_sending
 
 
 @njit(cache=True)

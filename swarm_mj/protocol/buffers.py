@@ -11,7 +11,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numba import njit
 
+from swarm_mj.physics.state import RobotStates
+
 NO_PARENT = -1  # of oneself, and of a teammate never heard of
+BROADCAST = -1  # the recipient of a packet for everyone who hears it
 NEVER = 0.0  # T_0 and L_0: the clock's first tick is half a window, so 0 is before everything
 
 
@@ -56,30 +59,22 @@ def empty_buffers(num_missions: int, num_robots: int) -> Buffers:
     )
 
 
-def observe_self(
-    buffers: Buffers,
-    position_m: Float[np.ndarray, "B N 2"],
-    velocity_mps: Float[np.ndarray, "B N 2"],
-    now: Float[np.ndarray, "B"],
-    is_on: Bool[np.ndarray, "B N"] | None = None,
-) -> None:
-    """Writes every robot's own state and the time into its own buffer (Eq. 5).
+def observe_self(buffers: Buffers, states: RobotStates, now: Float[np.ndarray, "B"]) -> None:
+    """Writes every active robot's own state and the time into its own buffer (Eq. 5).
 
     Args:
         buffers: Written in place.
-        position_m: True positions [m].
-        velocity_mps: True velocities [m/s].
+        states: True states.
         now: t [windows].
-        is_on: Who observes; None is everyone.
     """
     _write_own(
         buffers.timestamp,
         buffers.position_m,
         buffers.velocity_mps,
-        position_m,
-        velocity_mps,
+        states.position_m,
+        states.velocity_mps,
         now,
-        is_on,
+        states.is_active,
     )
 
 
@@ -87,24 +82,24 @@ def record_attempt(
     buffers: Buffers,
     recipient: Int[np.ndarray, "B N"],
     now: Float[np.ndarray, "B"],
+    is_active: Bool[np.ndarray, "B N"] | None = None,
     *,
     silence_is_attempt: bool = False,
-    is_on: Bool[np.ndarray, "B N"] | None = None,
 ) -> None:
     """Notes when each robot last addressed its recipient (Eq. 7).
 
     Args:
         buffers: Written in place.
-        recipient: Whom each robot addresses; itself is silence.
+        recipient: Whom each robot addresses; itself is silence, and `BROADCAST` is nobody.
         now: t [windows].
+        is_active: Who notes anything; None is everyone.
         silence_is_attempt: Whether a silent robot notes having addressed itself.
-        is_on: Who notes anything; None is everyone.
 
     Raises:
         ValueError: A recipient is no robot, or there is not one per robot.
     """
-    check_robots("recipient", recipient, buffers.shape)
-    _write_attempt(buffers.last_attempt, recipient, now, silence_is_attempt, is_on)
+    check_robots("recipient", recipient, buffers.shape, may_broadcast=True)
+    _write_attempt(buffers.last_attempt, recipient, now, silence_is_attempt, is_active)
 
 
 def merge(buffers: Buffers, heard: Int[np.ndarray, "B N"]) -> None:
@@ -124,13 +119,16 @@ def merge(buffers: Buffers, heard: Int[np.ndarray, "B N"]) -> None:
     _merge_newer(buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent, heard)
 
 
-def check_robots(what: str, robots: np.ndarray, shape: tuple[int, int]) -> None:
+def check_robots(
+    what: str, robots: np.ndarray, shape: tuple[int, int], *, may_broadcast: bool = False
+) -> None:
     """Passes if there is one robot chosen per robot: the compiled loops here trust that.
 
     Args:
         what: What was chosen, for the message.
         robots: The choices.
         shape: B missions of N robots.
+        may_broadcast: Whether `BROADCAST` is a choice too.
 
     Raises:
         ValueError: There are more or fewer choices, or one is no integer from 0 to N - 1.
@@ -140,7 +138,7 @@ def check_robots(what: str, robots: np.ndarray, shape: tuple[int, int]) -> None:
         raise ValueError(f"{what} must have shape {shape}, missions by robots, not {given}")
     if robots.dtype.kind not in "iu":
         raise ValueError(f"{what} must be integers from 0 to {shape[1] - 1}, not {robots.dtype}")
-    first = _first_out_of_range(robots)
+    first = _first_out_of_range(robots, BROADCAST if may_broadcast else 0)
     if first >= 0:
         b, i = divmod(first, shape[1])
         raise ValueError(
@@ -151,11 +149,11 @@ def check_robots(what: str, robots: np.ndarray, shape: tuple[int, int]) -> None:
 
 @njit(cache=True)
 @no_type_check
-def _first_out_of_range(robots: Int[np.ndarray, "B N"]) -> int:
+def _first_out_of_range(robots: Int[np.ndarray, "B N"], lowest: int) -> int:
     num_missions, num_robots = robots.shape
     for b in range(num_missions):
         for i in range(num_robots):
-            if not 0 <= robots[b, i] < num_robots:
+            if not lowest <= robots[b, i] < num_robots:
                 return b * num_robots + i
     return -1
 
@@ -169,12 +167,14 @@ def _write_own(
     position_m: Float[np.ndarray, "B N 2"],
     velocity_mps: Float[np.ndarray, "B N 2"],
     now: Float[np.ndarray, "B"],
-    is_on: Bool[np.ndarray, "B N"] | None,
+    is_active: Bool[np.ndarray, "B N"] | None,
 ) -> None:
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
-            if is_on is not None and not is_on[b, i]:  # None is compiled apart, without the test
+            if (
+                is_active is not None and not is_active[b, i]
+            ):  # None is compiled apart, without the test
                 continue
             timestamp[b, i, i] = now[b]
             for axis in range(2):
@@ -189,15 +189,16 @@ def _write_attempt(
     recipient: Int[np.ndarray, "B N"],
     now: Float[np.ndarray, "B"],
     silence_is_attempt: bool,
-    is_on: Bool[np.ndarray, "B N"] | None,
+    is_active: Bool[np.ndarray, "B N"] | None,
 ) -> None:
     num_missions, num_robots = recipient.shape
     for b in range(num_missions):
         for i in range(num_robots):
-            if is_on is not None and not is_on[b, i]:
+            if is_active is not None and not is_active[b, i]:
                 continue
-            if silence_is_attempt or recipient[b, i] != i:
-                last_attempt[b, i, recipient[b, i]] = now[b]
+            j = recipient[b, i]
+            if j != BROADCAST and (silence_is_attempt or j != i):
+                last_attempt[b, i, j] = now[b]
 
 
 @njit(cache=True)

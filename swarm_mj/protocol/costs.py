@@ -39,48 +39,47 @@ class Packets:
 def age_of_information(
     buffers: Buffers,
     now: Float[np.ndarray, "B"],
-    is_on: Bool[np.ndarray, "B N"] | None = None,
+    is_active: Bool[np.ndarray, "B N"] | None = None,
 ) -> tuple[Float[np.ndarray, "B"], Bool[np.ndarray, "B"]]:
     """Mean over all pairs i, j of t - T^{i,j}, own age included (Eq. 10).
 
     Args:
         buffers: What everyone knows.
         now: t [windows].
-        is_on: Whose pairs count, at least one robot's in each mission; None is everyone's.
+        is_active: Whose pairs count, at least one robot's in each mission; None is everyone's.
 
     Returns:
         The age [windows], and whether everyone of these has heard of everyone of these.
     """
     age = np.empty(now.shape)
     is_complete = np.empty(now.shape, dtype=np.bool_)
-    _mean_age(buffers.timestamp, now, is_on, age, is_complete)
+    _mean_age(buffers.timestamp, now, is_active, age, is_complete)
     return age, is_complete
 
 
 def velocity_variance(
-    velocity_mps: Float[np.ndarray, "B N 2"], is_on: Bool[np.ndarray, "B N"] | None = None
+    velocity_mps: Float[np.ndarray, "B N 2"], is_active: Bool[np.ndarray, "B N"] | None = None
 ) -> Float[np.ndarray, "B"]:
     """Mean squared distance of a robot's velocity from the team's mean [m²/s²] (Eq. 17).
 
     Args:
         velocity_mps: Every robot's [m/s].
-        is_on: Who makes up the team; None is everyone.
+        is_active: Who makes up the team; None is everyone.
 
     Returns:
         The variance, per mission.
     """
     variance = np.empty(velocity_mps.shape[0])
-    _variance(velocity_mps, is_on, variance)
+    _variance(velocity_mps, is_active, variance)
     return variance
 
 
-def count_packets(phases: tuple[Phase, Phase], *, has_response: bool) -> Packets:
+def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets:
     """Counts what became of one window's packets.
 
     Args:
         phases: The window's two phases.
-        has_response: Whether the second phase answers the first (Alg. 1), or both are broadcasts
-            (IV-C).
+        is_broadcast: Whether both are broadcasts (IV-C), or the second answers the first (Alg. 1).
 
     Returns:
         The counts, per mission.
@@ -88,41 +87,41 @@ def count_packets(phases: tuple[Phase, Phase], *, has_response: bool) -> Packets
     first, second = phases
     num_missions = first.recipient.shape[0]
     none = np.full(num_missions, np.nan)
-    if has_response:
-        sent, delivered, overheard, responses, answered = np.zeros((5, num_missions))
-        _count_addressed(first.recipient, first.heard, sent, delivered, overheard)
-        _count_addressed(second.recipient, second.heard, responses, answered, overheard)
+    if is_broadcast:
+        sent, heard, receptions = np.zeros((3, num_missions))
+        for phase in phases:
+            _count_broadcasts(phase.recipient, phase.heard, sent, heard, receptions)
         return Packets(
             sent=sent,
-            attempted=sent,
-            delivered=delivered,
-            overheard=overheard,
-            answered=answered,
-            heard=none,
-            receptions=none,
+            attempted=none,
+            delivered=none,
+            overheard=none,
+            answered=none,
+            heard=heard,
+            receptions=receptions,
         )
-    sent, heard, receptions = np.zeros((3, num_missions))
-    for phase in phases:
-        _count_broadcasts(phase.recipient, phase.heard, sent, heard, receptions)
+    sent, delivered, overheard, responses, answered = np.zeros((5, num_missions))
+    _count_addressed(first.recipient, first.heard, sent, delivered, overheard)
+    _count_addressed(second.recipient, second.heard, responses, answered, overheard)
     return Packets(
         sent=sent,
-        attempted=none,
-        delivered=none,
-        overheard=none,
-        answered=none,
-        heard=heard,
-        receptions=receptions,
+        attempted=sent,
+        delivered=delivered,
+        overheard=overheard,
+        answered=answered,
+        heard=none,
+        receptions=none,
     )
 
 
 def mean_hops(
-    buffers: Buffers, is_on: Bool[np.ndarray, "B N"] | None = None
+    buffers: Buffers, is_active: Bool[np.ndarray, "B N"] | None = None
 ) -> Float[np.ndarray, "B"]:
     """Mean depth of known teammates in the parent trees (II-B), 0 before anyone is known [hops].
 
     Args:
         buffers: What everyone knows.
-        is_on: Whose depths in whose trees count, whoever is on the way; None is everyone.
+        is_active: Whose depths in whose trees count, whoever is on the way; None is everyone.
 
     Returns:
         The depth, per mission.
@@ -131,7 +130,7 @@ def mean_hops(
         ValueError: Some parents lead nowhere, or in a circle.
     """
     hops = np.empty(buffers.parent.shape[0])
-    counts = np.ones(buffers.shape, dtype=np.bool_) if is_on is None else is_on
+    counts = np.ones(buffers.shape, dtype=np.bool_) if is_active is None else is_active
     if not _mean_depth(buffers.timestamp, buffers.parent, counts, hops):
         raise ValueError("parents of known robots must lead back to the buffer's owner")
     return hops
@@ -149,31 +148,30 @@ class WindowCosts:
 
 def window_costs(
     buffers: Buffers,
-    bodies: RobotStates,
+    states: RobotStates,
     phases: tuple[Phase, Phase],
     now: Float[np.ndarray, "B"],
     *,
-    has_response: bool,
-    is_on: Bool[np.ndarray, "B N"] | None = None,
+    is_broadcast: bool,
 ) -> WindowCosts:
-    """Everything one window cost; arguments as in the functions above."""
-    age, is_complete = age_of_information(buffers, now, is_on)
+    """Everything one window cost the active robots; arguments as in the functions above."""
+    age, is_complete = age_of_information(buffers, now, states.is_active)
     return WindowCosts(
         age_windows=age,
         is_complete=is_complete,
-        velocity_variance_m2ps2=velocity_variance(bodies.velocity_mps, is_on),
-        packets=count_packets(phases, has_response=has_response),
+        velocity_variance_m2ps2=velocity_variance(states.velocity_mps, states.is_active),
+        packets=count_packets(phases, is_broadcast=is_broadcast),
     )
 
 
-# In these, None for `is_on` is compiled apart: without the tests, as fast as if it did not exist.
+# In these, None for `is_active` is compiled apart: without the tests, and as fast as without them.
 # Times are halves of a window, so their sum is exact and adding in any order changes nothing.
 @njit(cache=True, fastmath={"reassoc"})
 @no_type_check
 def _mean_age(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
-    is_on: Bool[np.ndarray, "B N"] | None,
+    is_active: Bool[np.ndarray, "B N"] | None,
     age: Float[np.ndarray, "B"],
     is_complete: Bool[np.ndarray, "B"],
 ) -> None:
@@ -181,16 +179,16 @@ def _mean_age(
     for b in range(num_missions):
         total = 0.0
         num_unknown = 0
-        num_on = num_robots if is_on is None else is_on[b].sum()
+        num_active = num_robots if is_active is None else is_active[b].sum()
         for i in range(num_robots):
-            if is_on is not None and not is_on[b, i]:
+            if is_active is not None and not is_active[b, i]:
                 continue
             for j in range(num_robots):
-                if is_on is not None and not is_on[b, j]:
+                if is_active is not None and not is_active[b, j]:
                     continue
                 total += timestamp[b, i, j]
                 num_unknown += timestamp[b, i, j] <= NEVER
-        age[b] = now[b] - total / (num_on * num_on)
+        age[b] = now[b] - total / (num_active * num_active)
         is_complete[b] = num_unknown == 0
 
 
@@ -198,22 +196,22 @@ def _mean_age(
 @no_type_check
 def _variance(
     velocity_mps: Float[np.ndarray, "B N 2"],
-    is_on: Bool[np.ndarray, "B N"] | None,
+    is_active: Bool[np.ndarray, "B N"] | None,
     variance: Float[np.ndarray, "B"],
 ) -> None:
     num_missions, num_robots = velocity_mps.shape[:2]
     for b in range(num_missions):
         total = 0.0
-        num_on = num_robots if is_on is None else is_on[b].sum()
+        num_active = num_robots if is_active is None else is_active[b].sum()
         for axis in range(2):
             mean = 0.0
             for i in range(num_robots):
-                if is_on is None or is_on[b, i]:
-                    mean += velocity_mps[b, i, axis] / num_on
+                if is_active is None or is_active[b, i]:
+                    mean += velocity_mps[b, i, axis] / num_active
             for i in range(num_robots):
-                if is_on is None or is_on[b, i]:
+                if is_active is None or is_active[b, i]:
                     total += (velocity_mps[b, i, axis] - mean) ** 2
-        variance[b] = total / num_on
+        variance[b] = total / num_active
 
 
 @njit(cache=True)
@@ -265,7 +263,7 @@ def _count_broadcasts(
 def _mean_depth(
     timestamp: Float[np.ndarray, "B N N"],
     parent: Int[np.ndarray, "B N N"],
-    is_on: Bool[np.ndarray, "B N"],
+    is_active: Bool[np.ndarray, "B N"],
     hops: Float[np.ndarray, "B"],
 ) -> bool:
     """Fills `hops`; returns whether all parents form trees."""
@@ -275,7 +273,7 @@ def _mean_depth(
     for b in range(num_missions):
         total = 0
         num_known = 0
-        for i in np.nonzero(is_on[b])[0]:
+        for i in np.nonzero(is_active[b])[0]:
             depth[:] = -1
             depth[i] = 0
             for j in range(num_robots):
@@ -290,7 +288,7 @@ def _mean_depth(
                             return False
                     for step in range(length - 1, -1, -1):
                         depth[path[step]] = depth[k] + length - step
-                    total += is_on[b, j] * depth[j]
-                    num_known += is_on[b, j]
+                    total += is_active[b, j] * depth[j]
+                    num_known += is_active[b, j]
         hops[b] = total / num_known if num_known else 0.0
     return True

@@ -19,7 +19,7 @@ class LocalViews:
 
     buffers: Buffers  # robot i's buffer is row [b, i]
     now: Float[np.ndarray, "B"]  # t on the synchronised clock [windows]
-    phases: tuple[Phase, ...]  # since the last window began: whom robot i addressed and heard
+    phases: tuple[Phase, ...]  # of this window, or else the last: whom robot i addressed and heard
 
     @property
     def num_robots(self) -> int:

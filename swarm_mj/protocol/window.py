@@ -1,57 +1,160 @@
-"""The protocol (III-B, Alg. 1): one communication window over any channel, f of Eq. 6.
+"""The window (III-B, Alg. 1; IV-C): how robots share what they know, over any channel (Eq. 6).
 
-Two phases of half a window each: a transmission and its responses, or, for flooding, two
-transmissions that nobody answers (IV-C). Index order: `[b, i]` is robot `i` of mission `b`.
+A window has two slots. In Alg. 1 they hold a transmission phase and a response phase. In IV-C both
+are broadcasts that nobody answers. Index order: `[b, i]` is robot `i` of mission `b`.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import no_type_check
+from typing import ClassVar, Protocol, no_type_check, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numba import njit
 
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.protocol.buffers import Buffers, merge, observe_self, record_attempt
+from swarm_mj.protocol.buffers import BROADCAST, Buffers, merge, observe_self, record_attempt
 from swarm_mj.radio.free_space import Channel
 
 SLOTS_PER_WINDOW = 2  # a transmission takes one, and so do its responses
 SLOT_WINDOWS = 1.0 / SLOTS_PER_WINDOW  # Delta t: what a slot lasts [windows]
-PHASE = SLOT_WINDOWS
 
 
 @dataclass(frozen=True, kw_only=True)
 class Phase:
-    """Who addressed whom in half a window, and whose packet everyone decoded."""
+    """Who addressed whom in one slot, and whose packet everyone decoded."""
 
-    recipient: Int[np.ndarray, "B N"]  # S^i: whom each robot addressed; itself: it was silent
+    recipient: Int[np.ndarray, "B N"]  # S^i: whom i addressed, or BROADCAST; itself: it was silent
     heard: Int[np.ndarray, "B N"]  # i with j in R^i: whom robot j decoded; itself: nobody
+
+
+# Whom each robot addresses next, given the phases of this window so far.
+Decide = Callable[[tuple[Phase, ...]], Int[np.ndarray, "B N"]]
+Move = Callable[[], RobotStates]  # through one window; returns where the robots then are
+
+
+@runtime_checkable
+class WindowProtocol(Protocol):
+    """What the robots do in a window; a policy chooses one."""
+
+    is_broadcast: ClassVar[bool]  # whether packets are for everyone who hears them
+
+    def __call__(
+        self,
+        buffers: Buffers,
+        decide: Decide,
+        move: Move,
+        channel: Channel,
+        now: Float[np.ndarray, "B"],
+    ) -> tuple[Phase, Phase]:
+        """Plays one window.
+
+        Args:
+            buffers: Written in place.
+            decide: Whom each robot addresses in the next slot; itself is silence.
+            move: Moves the robots.
+            channel: Who decodes whom (Eq. 6).
+            now: t at the start of the window [windows].
+
+        Returns:
+            The phases of the window's two slots.
+        """
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class RequestResponse:
+    """A window of Alg. 1: robots that were addressed answer.
+
+    There is one difference: Alg. 1 evaluates the policy after the robots' self-observation; here
+    it decides before the robots move, as in the authors' code.
+    """
+
+    is_broadcast: ClassVar[bool] = False
+    silence_is_attempt: bool = False  # whether a silent robot notes having addressed itself (Eq. 7)
+
+    def __call__(
+        self,
+        buffers: Buffers,
+        decide: Decide,
+        move: Move,
+        channel: Channel,
+        now: Float[np.ndarray, "B"],
+    ) -> tuple[Phase, Phase]:
+        """Plays one window; arguments as in `WindowProtocol`."""
+        recipient = decide(())
+        return window(
+            buffers, move(), recipient, channel, now, silence_is_attempt=self.silence_is_attempt
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class DoubleBroadcast:
+    """A window of two broadcasts that nobody answers, each decided on what is known (IV-C).
+
+    By the authors' half-duplex rule whoever is addressed hears while it sends, so there a broadcast
+    needs an addressee: the next identity, unless the policy names one.
+    """
+
+    is_broadcast: ClassVar[bool] = True
+    silence_is_attempt: bool = False  # whether a silent robot notes having addressed itself (Eq. 7)
+    needs_addressees: bool = False  # whether the half-duplex rule is the authors'
+    moves_each_slot: bool = False  # whether robots move before the second broadcast too
+
+    def __call__(
+        self,
+        buffers: Buffers,
+        decide: Decide,
+        move: Move,
+        channel: Channel,
+        now: Float[np.ndarray, "B"],
+    ) -> tuple[Phase, Phase]:
+        """Plays one window; arguments as in `WindowProtocol`."""
+        recipient = decide(())
+        states = move()
+        first = self._transmit(buffers, states, recipient, channel, now + SLOT_WINDOWS)
+
+        recipient = decide((first,))
+        if self.moves_each_slot:
+            states = move()
+        second = self._transmit(buffers, states, recipient, channel, now + 2 * SLOT_WINDOWS)
+        return first, second
+
+    def _transmit(
+        self,
+        buffers: Buffers,
+        states: RobotStates,
+        recipient: Int[np.ndarray, "B N"],
+        channel: Channel,
+        now: Float[np.ndarray, "B"],
+    ) -> Phase:
+        if self.needs_addressees:
+            num_robots = recipient.shape[1]
+            next_identity = (np.arange(num_robots) + 1) % num_robots
+            recipient = np.where(recipient == BROADCAST, next_identity, recipient)
+        return transmit(
+            buffers, states, recipient, channel, now, silence_is_attempt=self.silence_is_attempt
+        )
 
 
 def window(
     buffers: Buffers,
-    bodies: RobotStates,
+    states: RobotStates,
     recipient: Int[np.ndarray, "B N"],
     channel: Channel,
     now: Float[np.ndarray, "B"],
     *,
     silence_is_attempt: bool = False,
-    is_on: Bool[np.ndarray, "B N"] | None = None,
 ) -> tuple[Phase, Phase]:
     """One communication window: a transmission phase, then a response phase (Alg. 1).
 
-    There is one difference: Alg. 1 evaluates the policy after the robots' self-observation; here
-    `recipient` was decided at the end of the previous window, before the robots moved, as in the
-    authors' code.
-
     Args:
         buffers: Written in place.
-        bodies: True states, fixed during the window.
+        states: True states, fixed during the window; inactive robots take no part.
         recipient: Whom each robot addresses; itself is silence.
         channel: Who decodes whom (Eq. 6).
         now: t at the start of the window [windows].
         silence_is_attempt: Whether silence counts as addressing oneself (Eq. 7).
-        is_on: Who takes part; the others neither send, decode nor observe. None is everyone.
 
     Returns:
         The transmission and the response phase.
@@ -59,41 +162,35 @@ def window(
     Raises:
         ValueError: A recipient, or a sender that the channel names, is no robot.
     """
-    transmission = transmit(
-        buffers,
-        bodies,
-        recipient,
-        channel,
-        now + PHASE,
-        silence_is_attempt=silence_is_attempt,
-        is_on=is_on,
-    )
+    now = now + SLOT_WINDOWS
+    observe_self(buffers, states, now)
+    record_attempt(buffers, recipient, now, states.is_active, silence_is_attempt=silence_is_attempt)
+    transmission = _send(buffers, states, recipient, channel)
 
-    observe_self(buffers, bodies.position_m, bodies.velocity_mps, now + 2 * PHASE, is_on)
-    response = _send(buffers, bodies, respondents(transmission), channel, is_on)
+    now = now + SLOT_WINDOWS
+    observe_self(buffers, states, now)
+    response = _send(buffers, states, respondents(transmission), channel)
     return transmission, response
 
 
 def transmit(
     buffers: Buffers,
-    bodies: RobotStates,
+    states: RobotStates,
     recipient: Int[np.ndarray, "B N"],
     channel: Channel,
     now: Float[np.ndarray, "B"],
     *,
     silence_is_attempt: bool = False,
-    is_on: Bool[np.ndarray, "B N"] | None = None,
 ) -> Phase:
-    """One transmission phase: the first half of Alg. 1, and each half of flooding's window.
+    """One slot of transmissions that nobody answers (IV-C).
 
     Args:
         buffers: Written in place.
-        bodies: True states.
-        recipient: Whom each robot addresses; itself is silence.
+        states: True states; inactive robots take no part.
+        recipient: BROADCAST for whoever transmits, or whom it addresses; itself is silence.
         channel: Who decodes whom (Eq. 6).
-        now: t of this phase [windows].
+        now: t of this slot [windows].
         silence_is_attempt: Whether silence counts as addressing oneself (Eq. 7).
-        is_on: Who takes part; the others neither send, decode nor observe. None is everyone.
 
     Returns:
         The phase.
@@ -101,9 +198,9 @@ def transmit(
     Raises:
         ValueError: A recipient, or a sender that the channel names, is no robot.
     """
-    observe_self(buffers, bodies.position_m, bodies.velocity_mps, now, is_on)
-    record_attempt(buffers, recipient, now, silence_is_attempt=silence_is_attempt, is_on=is_on)
-    return _send(buffers, bodies, recipient, channel, is_on)
+    observe_self(buffers, states, now)
+    record_attempt(buffers, recipient, now, states.is_active, silence_is_attempt=silence_is_attempt)
+    return _send(buffers, states, recipient, channel)
 
 
 def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
@@ -114,26 +211,22 @@ def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
 
 
 def _send(
-    buffers: Buffers,
-    bodies: RobotStates,
-    recipient: Int[np.ndarray, "B N"],
-    channel: Channel,
-    is_on: Bool[np.ndarray, "B N"] | None,
+    buffers: Buffers, states: RobotStates, recipient: Int[np.ndarray, "B N"], channel: Channel
 ) -> Phase:
-    """Everyone's packet through the channel and, decoded, into the buffers."""
-    sent_to = _or_oneself(recipient, is_on)
-    heard = _or_oneself(channel(bodies.position_m, sent_to), is_on)
+    """Sends everyone's packet through the channel (Eq. 6) and merges what was decoded."""
+    sent_to = _of_active(states.is_active, recipient)
+    heard = _of_active(states.is_active, channel(states.position_m, sent_to))
     merge(buffers, heard)
     return Phase(recipient=sent_to.copy(), heard=heard)
 
 
-def _or_oneself(
-    robots: Int[np.ndarray, "B N"], is_on: Bool[np.ndarray, "B N"] | None
+def _of_active(
+    is_active: Bool[np.ndarray, "B N"] | None, robots: Int[np.ndarray, "B N"]
 ) -> Int[np.ndarray, "B N"]:
-    """One robot per robot, and of those that are off themselves: silence, or nobody heard."""
-    if is_on is None:
+    """One robot per robot, but inactive ones get themselves: silence, or nobody heard."""
+    if is_active is None:
         return robots
-    return np.where(is_on, robots, np.arange(is_on.shape[1], dtype=robots.dtype))
+    return np.where(is_active, robots, np.arange(is_active.shape[1], dtype=robots.dtype))
 
 
 @njit(cache=True)

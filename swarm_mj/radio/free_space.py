@@ -27,7 +27,7 @@ class Channel(Protocol):
 
         Args:
             position_m: Positions [m].
-            recipient: Whom each robot addresses; itself is silence.
+            recipient: Whom each robot addresses, or -1 for everyone; itself is silence.
 
         Returns:
             The sender that each robot decodes; itself is nobody.
@@ -98,7 +98,7 @@ class FreeSpaceRadio:
 
         Args:
             position_m: Positions [m].
-            recipient: Whom each robot addresses; itself is silence.
+            recipient: Whom each robot addresses, or -1 for everyone; itself is silence.
 
         Returns:
             The sender that each robot decodes; itself is nobody.

@@ -79,18 +79,22 @@ class Recorder:
 
     def add(self, flown: Flown) -> None:
         """Records the window that was just flown."""
-        buffers, bodies, phases = self._swarm.buffers, self._swarm.bodies, self._swarm.phases
+        buffers, states, phases = self._swarm.buffers, self._swarm.states, self._swarm.phases
         age = self._swarm.now[0] - buffers.timestamp[0]
         num_robots = len(age)
-        is_on = np.ones(num_robots, bool) if self._swarm.is_on is None else self._swarm.is_on[0]
+        is_on = (
+            np.ones(num_robots, bool)
+            if self._swarm.states.is_active is None
+            else self._swarm.states.is_active[0]
+        )
         others = age[is_on[:, None] & is_on & ~np.eye(num_robots, dtype=bool)]
         own = self._ego
         if len(self._rows) % self._stride == 0:
             self._age.append(age.astype(np.float32))
         self._rows.append(
             {
-                "position_m": bodies.position_m[0].copy(),
-                "velocity_mps": bodies.velocity_mps[0].copy(),
+                "position_m": states.position_m[0].copy(),
+                "velocity_mps": states.velocity_mps[0].copy(),
                 "recipient": np.stack([phase.recipient[0] for phase in phases]),
                 "heard": np.stack([phase.heard[0] for phase in phases]),
                 "is_on": is_on.copy(),

@@ -22,7 +22,7 @@ def test_scene_shows_the_start_that_fly_has(swarm_mj, tmp_path, seed):
     assert done.returncode == 0, done.stderr
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))
     data = mujoco.MjData(model)
-    flown = Swarm(paper("random-walk"), [seed]).bodies
+    flown = Swarm(paper("random-walk"), [seed]).states
     for start in (data.qpos.copy(), model.key_qpos[0]):  # as opened, and as the keyframe has it
         np.testing.assert_allclose(start.reshape(40, 2), flown.position_m[0], atol=1e-3)
     np.testing.assert_allclose(model.key_qvel[0].reshape(40, 2), flown.velocity_mps[0], atol=1e-5)

@@ -51,7 +51,7 @@ def test_equals_the_swarm_flown_by_hand(task, physics):
         for name in BUFFERS:
             np.testing.assert_array_equal(step.observation[name], getattr(swarm.buffers, name)[0])
         np.testing.assert_array_equal(
-            environment.physics.swarm.bodies.position_m, swarm.bodies.position_m
+            environment.physics.swarm.states.position_m, swarm.states.position_m
         )
         assert step.observation["now"] == swarm.now[0]
         assert step.reward == -costs.age_windows[0]
@@ -82,8 +82,8 @@ def test_dm_controls_physics_shows_the_swarm(physics):
             environment.step(recipient)
         assert shown.time() == pytest.approx(0.1 * window)
         for i in range(6):
-            x_m, y_m = swarm.bodies.position_m[0, i]
-            vx_mps, vy_mps = swarm.bodies.velocity_mps[0, i]
+            x_m, y_m = swarm.states.position_m[0, i]
+            vx_mps, vy_mps = swarm.states.velocity_mps[0, i]
             assert shown.named.data.qpos[[f"r{i}/x", f"r{i}/y"]].tolist() == [x_m, y_m]
             assert shown.named.data.qvel[[f"r{i}/x", f"r{i}/y"]].tolist() == [vx_mps, vy_mps]
             assert shown.named.data.xpos[f"r{i}/body"].tolist() == [x_m, y_m, 1.0]

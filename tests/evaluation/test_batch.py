@@ -8,6 +8,7 @@ from swarm_mj.evaluation.lower_bound import ConnectivityFloor
 from swarm_mj.evaluation.summary import merge
 from swarm_mj.mission import paper, reference
 from swarm_mj.mission.placement import is_connected
+from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.rollout import fly, summarise
 from swarm_mj.swarm import Swarm
@@ -33,8 +34,12 @@ def test_costs_are_those_of_the_flight(policy, switched_off):
     for window in fly(swarm, make_policy(policy, mission, 0.3)):
         flown.append(window)
         age = swarm.now[:, None, None] - swarm.buffers.timestamp
-        is_on = np.ones((3, 6), dtype=bool) if swarm.is_on is None else swarm.is_on
-        is_pair = is_on[:, :, None] & is_on[:, None, :] & ~np.eye(6, dtype=bool)
+        is_active = (
+            np.ones((3, 6), dtype=bool)
+            if swarm.states.is_active is None
+            else swarm.states.is_active
+        )
+        is_pair = is_active[:, :, None] & is_active[:, None, :] & ~np.eye(6, dtype=bool)
         ages.extend(age[is_pair].tolist())
     summary = summarise(flown)
     np.testing.assert_allclose(costs.aoi, summary.aoi_mean)
@@ -61,7 +66,7 @@ def test_the_floor_is_the_age_that_falling_apart_leaves():
     fast = small(velocity_ratio=2.0)
     swarm, fell_apart = Swarm(fast, SEEDS), np.zeros(3, dtype=bool)
     for _ in fly(swarm, make_policy("mst", fast)):
-        fell_apart |= [not is_connected(p, fast.range_m) for p in swarm.bodies.position_m]
+        fell_apart |= [not is_connected(p, fast.range_m) for p in swarm.states.position_m]
     floor = np.array(fly_batch(batch(fast)).aoi_floor)
     np.testing.assert_array_equal(floor > 0.0, fell_apart)
     assert fell_apart.any()
@@ -71,7 +76,7 @@ def test_the_floor_is_that_of_the_robots_that_are_on():
     mission = small("stationary", num_robots=12, switched_off=0.6)
     swarm, by_hand = Swarm(mission, SEEDS), ConnectivityFloor(3, 12, mission.range_m)
     floors = [
-        by_hand.next(swarm.bodies.position_m, swarm.now, swarm.is_on)
+        by_hand.next(swarm.states.position_m, swarm.now, swarm.states.is_active)
         for _ in fly(swarm, make_policy("mst", mission))
     ]
     floor = fly_batch(batch(mission)).aoi_floor
@@ -96,9 +101,9 @@ def courses(task, make=paper):
     for name in POLICIES:
         policy = make_policy(name, mission)
         swarm = Swarm(mission, SEEDS)
-        start = swarm.bodies.position_m.copy()
+        start = swarm.states.position_m.copy()
         list(fly(swarm, policy))
-        yield policy, start, swarm.bodies
+        yield policy, start, swarm.states
 
 
 @pytest.mark.parametrize("task", ["stationary", "random-walk", "flocking"])
@@ -110,7 +115,7 @@ def test_every_policy_meets_the_same_teams(task):
 
 
 def test_every_policy_meets_the_same_random_walks():
-    ends = [bodies for _, _, bodies in courses("random-walk")]
+    ends = [states for _, _, states in courses("random-walk")]
     for end in ends[1:]:
         np.testing.assert_array_equal(end.position_m, ends[0].position_m)
         np.testing.assert_array_equal(end.velocity_mps, ends[0].velocity_mps)
@@ -119,9 +124,9 @@ def test_every_policy_meets_the_same_random_walks():
 def test_the_codes_random_walks_are_the_same_but_for_flooding():
     """There, flooding's robots move twice a window."""
     ends = [
-        bodies.position_m
-        for policy, _, bodies in courses("random-walk", reference)
-        if not policy.transmits_twice
+        states.position_m
+        for policy, _, states in courses("random-walk", reference)
+        if not isinstance(policy, BroadcastPolicy)
     ]
     for end in ends[1:]:
         np.testing.assert_array_equal(end, ends[0])

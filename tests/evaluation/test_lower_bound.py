@@ -92,6 +92,6 @@ def _assert_above_the_floor(name, mission):
     floor = ConnectivityFloor(3, 8, mission.range_m)
     floors = []
     for flown in fly(swarm, make_policy(name, mission)):
-        floors.append(floor.next(swarm.bodies.position_m, swarm.now, swarm.is_on))
+        floors.append(floor.next(swarm.states.position_m, swarm.now, swarm.states.is_active))
         assert np.all(flown.costs.age_windows >= floors[-1] - 1e-9)
     assert (np.max(floors) > 0.0) == (mission.task != "stationary")

@@ -24,7 +24,7 @@ def random_recipients(rng, shape, share):
 def total_after(swarm, buffers, recipient, now):
     """The sum of a mission's T after a window, by the public protocol, on a copy."""
     replayed = copy.deepcopy(buffers)
-    window(replayed, swarm.bodies, recipient, swarm.channel, now)
+    window(replayed, swarm.states, recipient, swarm.channel, now)
     return replayed.timestamp.sum(axis=(1, 2))
 
 
@@ -55,7 +55,7 @@ def test_credits_are_those_of_a_replay_without_each_robot(seed, preset, task, sh
         buffers, now = copy.deepcopy(swarm.buffers), swarm.now
         recipient = random_recipients(rng, shape, share)
         swarm.exchange(recipient)
-    found = credits_of(buffers.timestamp, swarm.bodies.position_m, recipient, swarm.channel, now)
+    found = credits_of(buffers.timestamp, swarm.states.position_m, recipient, swarm.channel, now)
     expected = credits_by_replay(swarm, buffers, recipient, now)
     np.testing.assert_allclose(found, expected, atol=1e-9)
     assert np.all(found[recipient == np.arange(num_robots)] == 0.0)
@@ -64,8 +64,8 @@ def test_credits_are_those_of_a_replay_without_each_robot(seed, preset, task, sh
 def standing(position_m):
     """One mission's robots at rest, and what the lone radio of the tests reaches: 100 m."""
     channel = FreeSpaceRadio(power_mw=1.0, noise_mw=1e-9, threshold=1.26, frequency_hz=2.4e9)
-    bodies = np.array([position_m], dtype=float)
-    return bodies, channel
+    states = np.array([position_m], dtype=float)
+    return states, channel
 
 
 def test_who_destroys_a_packet_pays_for_it():
@@ -101,7 +101,7 @@ def test_missions_side_by_side_do_not_mix():
         before, now = swarm.buffers.timestamp.copy(), swarm.now
         recipient = random_recipients(rng, (3, 6), 0.4)
         swarm.exchange(recipient)
-    position_m = swarm.bodies.position_m
+    position_m = swarm.states.position_m
     together = credits_of(before, position_m, recipient, swarm.channel, now)
     for b in range(3):
         rows = slice(b, b + 1)
@@ -113,7 +113,7 @@ def test_missions_side_by_side_do_not_mix():
 
 def test_nothing_given_is_changed():
     swarm = Swarm(paper("stationary", num_robots=5, range_ratio=0.5), [1])
-    given_ = (swarm.buffers.timestamp, swarm.bodies.position_m, np.array([[1, 2, 2, 2, 3]]))
+    given_ = (swarm.buffers.timestamp, swarm.states.position_m, np.array([[1, 2, 2, 2, 3]]))
     before = copy.deepcopy(given_)
     credits_of(*given_, swarm.channel, swarm.now)
     for after, as_it_was in zip(given_, before, strict=True):

@@ -149,7 +149,7 @@ def test_eq17_the_other_reward_is_the_velocity_variance():
         _, reward, _, _ = env.step(drawn(env, rng))
         by_hand = []
         for group in env.groups:
-            for velocity in group._swarm.bodies.velocity_mps:
+            for velocity in group._swarm.states.velocity_mps:
                 mean = [sum(v[axis] for v in velocity) / len(velocity) for axis in range(2)]
                 squares = [(v[0] - mean[0]) ** 2 + (v[1] - mean[1]) ** 2 for v in velocity]
                 by_hand.append(-sum(squares) / len(velocity))

@@ -1,12 +1,14 @@
 """Robots that are switched off half-way: who, from when on, and what the others notice of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from channels import unreliable
 
 from swarm_mj.envs.dm import make_environment
 from swarm_mj.mission import paper, reference
-from swarm_mj.mission.robot_failures import draw_is_on, first_window_without, num_switched_off
+from swarm_mj.mission.robot_failures import draw_survivors, failure_window, num_failures
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.buffers import Buffers, empty_buffers
@@ -55,27 +57,27 @@ def copies(buffers):
 )
 def test_how_many(fraction, num_robots, num_off):
     mission = paper(switched_off=fraction, num_robots=num_robots)
-    assert num_switched_off(mission) == num_off
-    is_on = draw_is_on(mission, [np.random.default_rng(seed) for seed in range(5)])
+    assert num_failures(mission) == num_off
+    is_active = draw_survivors(mission, [np.random.default_rng(seed) for seed in range(5)])
     if num_off == 0:
-        assert is_on is None
+        assert is_active is None
     else:
-        assert is_on.shape == (5, num_robots)
-        assert np.sum(~is_on, axis=1).tolist() == [num_off] * 5
+        assert is_active.shape == (5, num_robots)
+        assert np.sum(~is_active, axis=1).tolist() == [num_off] * 5
 
 
 def test_any_robot_may_be_it_and_the_stream_says_who():
     mission = small()
     rngs = [[np.random.default_rng(seed) for seed in range(200)] for _ in range(2)]
-    is_on, again = (draw_is_on(mission, each) for each in rngs)
-    np.testing.assert_array_equal(is_on, again)
-    share_off = np.mean(~is_on, axis=0)  # of 8 robots 3: 0.375, with a standard error of 0.034
+    is_active, again = (draw_survivors(mission, each) for each in rngs)
+    np.testing.assert_array_equal(is_active, again)
+    share_off = np.mean(~is_active, axis=0)  # of 8 robots 3: 0.375, with a standard error of 0.034
     assert np.all(np.abs(share_off - 0.375) < 0.15)
 
 
 @pytest.mark.parametrize(("num_windows", "first"), [(500, 250), (21, 10), (2, 1), (1, 0)])
 def test_when(num_windows, first):
-    assert first_window_without(paper(num_windows=num_windows)) == first
+    assert failure_window(paper(num_windows=num_windows)) == first
 
 
 @pytest.mark.parametrize("seed", [0, 7, 2**62])
@@ -99,9 +101,9 @@ def test_missions_are_the_same_until_half_way(preset, name):
             for a, b in zip(vars(some.buffers).values(), vars(all_.buffers).values(), strict=True)
         )
         assert is_same == (window_ <= HALF)
-        np.testing.assert_array_equal(some.bodies.position_m, all_.bodies.position_m)  # walks go on
-        assert all_.is_on is None
-        assert (some.is_on is None) == (window_ <= HALF)
+        np.testing.assert_array_equal(some.states.position_m, all_.states.position_m)  # walks go on
+        assert all_.states.is_active is None
+        assert (some.states.is_active is None) == (window_ <= HALF)
         if its is not None and window_ <= HALF:
             np.testing.assert_array_equal(its.costs.age_windows, theirs.costs.age_windows)
 
@@ -111,41 +113,45 @@ def test_who_is_off_learns_nothing_and_is_heard_by_nobody(preset, name):
     before, num_heard, num_lost = None, 0, 0
     for window_, (swarm, _) in enumerate(flight(small("flocking", preset), name)):
         if window_ > HALF:
-            off = ~swarm.is_on
+            off = ~swarm.states.is_active
             assert np.sum(off, axis=1).tolist() == [3, 3, 3]
             for field, array in copies(swarm.buffers).items():
                 np.testing.assert_array_equal(array[off], before[field][off], err_msg=field)
-            for b, i in zip(*np.nonzero(swarm.is_on), strict=True):
+            for b, i in zip(*np.nonzero(swarm.states.is_active), strict=True):
                 assert np.all(swarm.buffers.timestamp[b, i, off[b]] <= HALF)
                 assert swarm.buffers.timestamp[b, i, i] == window_
             for phase in swarm.phases:
                 oneself = np.broadcast_to(np.arange(8), off.shape)
                 assert np.all(phase.recipient[off] == oneself[off])
                 assert np.all(phase.heard[off] == oneself[off])
-                assert not np.any(np.take_along_axis(off, phase.heard, axis=1) & swarm.is_on)
+                assert not np.any(
+                    np.take_along_axis(off, phase.heard, axis=1) & swarm.states.is_active
+                )
                 num_heard += np.sum(phase.heard != oneself)
-                num_lost += np.sum(np.take_along_axis(off, phase.recipient, axis=1) & swarm.is_on)
+                num_lost += np.sum(
+                    np.take_along_axis(off, phase.recipient, axis=1) & swarm.states.is_active
+                )
         before = copies(swarm.buffers)
     assert num_heard > 20
     assert num_lost > 0  # nobody was told: some go on addressing them
 
 
 @pytest.mark.parametrize("name", ["mst", "random-flooding"])
-def test_costs_are_those_of_who_is_on(name):
+def test_costs_are_those_of_who_is_active(name):
     """Eq. 10, Eq. 17 and hops of the second half, by plain loops."""
     for swarm, flown in flight(small("flocking"), name):
-        if swarm.is_on is None:
+        if swarm.states.is_active is None:
             continue
         for b in range(len(SEEDS)):
-            on = [i for i in range(8) if swarm.is_on[b, i]]
+            on = [i for i in range(8) if swarm.states.is_active[b, i]]
             timestamp = swarm.buffers.timestamp[b]
             ages = [swarm.now[b] - timestamp[i, j] for i in on for j in on]
             assert flown.costs.age_windows[b] == pytest.approx(sum(ages) / len(on) ** 2)
             assert flown.costs.is_complete[b] == all(timestamp[i, j] > 0 for i in on for j in on)
-            velocity_mps = swarm.bodies.velocity_mps[b, on]
+            velocity_mps = swarm.states.velocity_mps[b, on]
             variance = sum(np.sum((v - velocity_mps.mean(axis=0)) ** 2) for v in velocity_mps)
             assert flown.costs.velocity_variance_m2ps2[b] == pytest.approx(variance / len(on))
-        np.testing.assert_array_equal(flown.hops, mean_hops(swarm.buffers, swarm.is_on))
+        np.testing.assert_array_equal(flown.hops, mean_hops(swarm.buffers, swarm.states.is_active))
 
 
 @pytest.mark.parametrize("name", POLICIES)
@@ -162,23 +168,23 @@ def test_missions_side_by_side_are_the_missions_one_by_one():
     for b, seed in enumerate(SEEDS):
         swarm = Swarm(mission, [seed])
         *_, last = fly(swarm, make_policy("mst", mission, 0.4))
-        np.testing.assert_array_equal(swarm.is_on[0], together.is_on[b])
+        np.testing.assert_array_equal(swarm.states.is_active[0], together.states.is_active[b])
         assert last.costs.age_windows[0] == flown.costs.age_windows[b]
 
 
 def test_a_restart_switches_everyone_on():
     mission = small()
     *_, (swarm, flown) = flight(mission, "mst")
-    was_on = swarm.is_on
+    was_on = swarm.states.is_active
     swarm.restart([7, 8, 9])
-    assert swarm.is_on is None
+    assert swarm.states.is_active is None
     swarm.restart(SEEDS)
     *_, last = fly(swarm, make_policy("mst", mission, 0.4))
-    np.testing.assert_array_equal(swarm.is_on, was_on)
+    np.testing.assert_array_equal(swarm.states.is_active, was_on)
     np.testing.assert_array_equal(last.costs.age_windows, flown.costs.age_windows)
 
 
-def test_the_reward_of_an_environment_is_of_who_is_on():
+def test_the_reward_of_an_environment_is_of_who_is_active():
     mission = small("stationary", num_windows=4, num_robots=5)
     environment = make_environment(mission, seed=1)
     environment.reset()
@@ -193,10 +199,10 @@ def some_team(rng):
     buffers = empty_buffers(2, 7)
     now = np.zeros(2)
     for _ in range(4):
-        bodies = some_bodies(rng)
+        states = some_states(rng)
         window(
             buffers,
-            bodies,
+            states,
             some_recipients(rng),
             unreliable(int(now[0]), senders_listen=False),
             now,
@@ -205,7 +211,7 @@ def some_team(rng):
     return buffers, now
 
 
-def some_bodies(rng):
+def some_states(rng):
     position_m, velocity_mps = rng.uniform(-300.0, 300.0, (2, 2, 7, 2))
     return RobotStates(position_m=position_m, velocity_mps=velocity_mps)
 
@@ -225,13 +231,15 @@ def test_alg1_the_others_notice_no_more_than_if_they_had_gone_away(preset, talk)
     for _ in range(20):
         buffers, now = some_team(rng)
         start, apart = buffers.timestamp.copy(), Buffers(**copies(buffers))
-        is_on = np.tile(np.arange(7) % 3 > 0, (2, 1))
-        is_pair = is_on[:, :, None] & is_on[:, None, :]
-        bodies, recipient = some_bodies(rng), some_recipients(rng)
-        gone_m = np.where(is_on[..., None], bodies.position_m, 1e9 * (1 + np.arange(7))[:, None])
-        gone = RobotStates(position_m=gone_m, velocity_mps=bodies.velocity_mps)
-        talk(buffers, bodies, recipient, channel, now, is_on=is_on)
-        talk(apart, gone, np.where(is_on, recipient, np.arange(7)), channel, now)
+        is_active = np.tile(np.arange(7) % 3 > 0, (2, 1))
+        is_pair = is_active[:, :, None] & is_active[:, None, :]
+        states, recipient = some_states(rng), some_recipients(rng)
+        gone_m = np.where(
+            is_active[..., None], states.position_m, 1e9 * (1 + np.arange(7))[:, None]
+        )
+        gone = RobotStates(position_m=gone_m, velocity_mps=states.velocity_mps)
+        talk(buffers, replace(states, is_active=is_active), recipient, channel, now)
+        talk(apart, gone, np.where(is_active, recipient, np.arange(7)), channel, now)
         for field, array in vars(apart).items():
             found = getattr(buffers, field)[is_pair]
             np.testing.assert_array_equal(found, array[is_pair], err_msg=field)

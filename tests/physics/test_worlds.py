@@ -49,9 +49,9 @@ def eq15(mission, p, v, u, at_wall):
 def worst_deviation(mission, at_wall):
     """Largest distance from Eq. 15 over 500 windows [m], [m/s], and the walls hit on the way."""
     p, v, wanted = drawn(mission, 500)
-    bodies = flown(mission, p, v, wanted)
+    states = flown(mission, p, v, wanted)
     off_m = off_mps = num_hits = 0
-    for u, body in zip(wanted, bodies, strict=True):
+    for u, body in zip(wanted, states, strict=True):
         p, v, hits = eq15(mission, p, v, u, at_wall)
         off_m = max(off_m, np.abs(body.position_m - p).max())
         off_mps = max(off_mps, np.abs(body.velocity_mps - v).max())
@@ -133,7 +133,7 @@ def test_position_only_moves_because_mujoco_steps(physics):
     for u in wanted:
         np.testing.assert_array_equal(worlds.step(u).position_m, p)
     # In `exact` the next set point is still computed; MuJoCo just never gets to follow it.
-    assert np.any(worlds.bodies.velocity_mps != v) == (physics == "exact")
+    assert np.any(worlds.states.velocity_mps != v) == (physics == "exact")
 
 
 @pytest.mark.parametrize("physics", MODES)
@@ -148,7 +148,7 @@ def test_acceleration_that_is_not_finite_changes_nothing(physics, value):
     bad[2, 4, 1] = value
     with pytest.raises(ValueError, match=rf"finite, not \(.*{value:g}\).*robot 4 in mission 2"):
         worlds.step(bad)
-    assert worlds.bodies is states[-1]
+    assert worlds.states is states[-1]
     states += [worlds.step(u) for u in wanted[3:]]
     assert_same_states(states, flown(mission, p, v, wanted))
 
@@ -187,8 +187,8 @@ def test_place_starts_anew(physics):
     first = [worlds.step(u) for u in wanted]
     worlds.place(p, v)
     np.testing.assert_array_equal(worlds._batch.bind("time"), 0.0)
-    np.testing.assert_array_equal(worlds.bodies.position_m, p)
-    np.testing.assert_array_equal(worlds.bodies.velocity_mps, v)
+    np.testing.assert_array_equal(worlds.states.position_m, p)
+    np.testing.assert_array_equal(worlds.states.velocity_mps, v)
     assert_same_states([worlds.step(u) for u in wanted], first)
 
 
@@ -198,7 +198,7 @@ def test_bodies_are_not_changed_by_later_steps(physics):
     p, v, wanted = drawn(mission, 3)
     worlds = Physics(mission, NUM_MISSIONS)
     worlds.place(p, v)
-    states = [worlds.bodies] + [worlds.step(u) for u in wanted[:2]]
+    states = [worlds.states] + [worlds.step(u) for u in wanted[:2]]
     kept = [(s.position_m.copy(), s.velocity_mps.copy()) for s in states]
     p[:], v[:] = 0.0, 0.0  # nor by their owner
     worlds.step(wanted[2])

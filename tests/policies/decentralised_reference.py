@@ -15,7 +15,7 @@ from swarm_mj.policies.planner.plan import foresight_of
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.weights import heuristic_weights
-from swarm_mj.policies.policy import DecentralisedPolicy
+from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
@@ -241,10 +241,8 @@ def planner_of(mission, settings):
     )
 
 
-class Flight(DecentralisedPolicy):
+class Flight(BroadcastPolicy):
     """A planner that flies one mission, and notes what it decides."""
-
-    transmits_twice = True
 
     def __init__(self, mission, seed, *, channel=None, settings=SETTINGS):
         self.settings = settings
@@ -260,10 +258,10 @@ class Flight(DecentralisedPolicy):
     def start(self, num_robots, rngs):
         self.planner.start(num_robots, rngs)
 
-    def recipients(self, views):
-        recipient = self.planner.recipients(views)
-        self.transmitted.append((recipient != views.silence)[0])
-        return recipient
+    def transmits(self, views):
+        transmits = self.planner.transmits(views)
+        self.transmitted.append(transmits[0])
+        return transmits
 
     def fly(self, num_windows):
         """Flies on, and returns who transmitted in each of these slots."""
@@ -284,16 +282,15 @@ class Witnessed(Flight):
             for i in range(mission.num_robots)
         ]
 
-    def recipients(self, views):
-        recipient = super().recipients(views)
+    def transmits(self, views):
+        transmits = super().transmits(views)
         if views.phases:
             self.converse(views.phases[-1].heard[0].tolist())
         slot = round(2 * float(views.now[0]))
         for mind in self.minds:
-            transmits = mind.transmits(rows(views.buffers, mind.me), slot)
-            expected = (mind.me + 1) % len(self.minds) if transmits else mind.me
-            assert recipient[0, mind.me] == expected, (slot, mind.me)
-        return recipient
+            expected = mind.transmits(rows(views.buffers, mind.me), slot)
+            assert transmits[0, mind.me] == expected, (slot, mind.me)
+        return transmits
 
     def converse(self, heard):
         """One slot: all packets are written, then everyone reads the one it decoded."""
@@ -311,15 +308,13 @@ class Witnessed(Flight):
         return sum(mind.took_over for mind in self.minds)
 
 
-class PlannedApart(DecentralisedPolicy):
+class PlannedApart(BroadcastPolicy):
     """A flight of the planner without payload, in which each robot is also asked apart.
 
     A robot is a function of its own buffer, its identity and the clock: at rest, if it has heard of
     everyone, it works the schedule out from the mission's first slot, in one go; else it does what
     spatial TDMA has it do, which its own tests hold to Eq. 9.
     """
-
-    transmits_twice = True
 
     def __init__(self, mission, seed, *, channel=None):
         self.policy = make_policy("planner --payload none", mission)
@@ -332,9 +327,9 @@ class PlannedApart(DecentralisedPolicy):
         self.turns.start(num_robots, copy.deepcopy(rngs))
         self.policy.start(num_robots, rngs)
 
-    def recipients(self, views):
-        recipient = self.policy.recipients(views)
-        in_turn = self.turns.recipients(views) != views.silence
+    def transmits(self, views):
+        decided = self.policy.transmits(views)
+        in_turn = self.turns.transmits(views)
         slot = round(2 * float(views.now[0]))
         for i in range(views.num_robots):
             seen, position_m, velocity_mps = rows(views.buffers, i)
@@ -343,8 +338,8 @@ class PlannedApart(DecentralisedPolicy):
                 if i not in self.plans:
                     self.plans[i] = self.planned(position_m)
                 transmits = bool(self.plans[i][slot, i])
-            assert (recipient[0, i] != i) == transmits, (slot, i)
-        return recipient
+            assert decided[0, i] == transmits, (slot, i)
+        return decided
 
     def planned(self, position_m):
         """Who transmits in each of the mission's first 120 slots, planned in one go."""

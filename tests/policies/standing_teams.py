@@ -9,7 +9,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.placement import connected_positions
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.protocol.window import PHASE, transmit, window
+from swarm_mj.protocol.window import SLOT_WINDOWS, transmit, window
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import radio_of
 
@@ -33,13 +33,13 @@ def flooded_team(mission: Mission, seed: int) -> Team:
     rng = np.random.default_rng(seed)
     robots, radio = np.arange(mission.num_robots), radio_of(mission)
     position_m = connected_positions(len(robots), mission.half_side_m, mission.range_m, rng)
-    bodies = RobotStates(position_m=position_m[None], velocity_mps=np.zeros((1, len(robots), 2)))
+    states = RobotStates(position_m=position_m[None], velocity_mps=np.zeros((1, len(robots), 2)))
     buffers, now = empty_buffers(1, len(robots)), np.zeros(1)
     for _ in range(2 * rng.integers(0, 10)):
-        now = now + PHASE
+        now = now + SLOT_WINDOWS
         speaks = rng.random(len(robots)) < 0.2
         anyone = rng.integers(0, len(robots), len(robots))
-        transmit(buffers, bodies, np.where(speaks, anyone, robots)[None], radio, now)
+        transmit(buffers, states, np.where(speaks, anyone, robots)[None], radio, now)
     return Team(
         radio=radio, position_m=position_m, timestamp=buffers.timestamp[0], now=float(now[0])
     )
@@ -49,11 +49,11 @@ def after_windows(team: Team, recipients: Any) -> np.ndarray:
     """T after each of some windows in a row, by the protocol [window, robot, subject]."""
     buffers, known = empty_buffers(1, team.num_robots), []
     buffers.timestamp[0] = team.timestamp
-    bodies = RobotStates(
+    states = RobotStates(
         position_m=team.position_m[None], velocity_mps=np.zeros((1, team.num_robots, 2))
     )
     for w, recipient in enumerate(recipients):
-        window(buffers, bodies, np.array([recipient]), team.radio, np.array([team.now + w]))
+        window(buffers, states, np.array([recipient]), team.radio, np.array([team.now + w]))
         known.append(buffers.timestamp[0].copy())
     return np.array(known)
 
@@ -63,11 +63,11 @@ def knowledge_after(team: Team, choices: np.ndarray) -> np.ndarray:
     shape = (len(choices), team.num_robots)
     buffers = empty_buffers(*shape)
     buffers.timestamp[:] = team.timestamp
-    bodies = RobotStates(
+    states = RobotStates(
         position_m=np.broadcast_to(team.position_m, (*shape, 2)).copy(),
         velocity_mps=np.zeros((*shape, 2)),
     )
-    window(buffers, bodies, choices, team.radio, np.full(len(choices), team.now))
+    window(buffers, states, choices, team.radio, np.full(len(choices), team.now))
     return np.sum(buffers.timestamp, axis=(1, 2))
 
 

@@ -158,7 +158,7 @@ def test_it_is_decentralised_and_says_what_it_is():
     policy = learned()
     assert isinstance(policy, DecentralisedPolicy)
     assert policy.payload == "none"
-    assert not policy.transmits_twice
+    assert not policy.window(paper()).is_broadcast
     assert policy.parameters["receptive_field"] == 1
     assert policy.parameters["is_deterministic"] is False
     assert learned(is_deterministic=True).parameters["is_deterministic"] is True
@@ -214,7 +214,7 @@ def test_threads_and_gradients_are_left_as_they_were():
 
 def test_a_flight_is_recorded():
     swarm, policy = Swarm(MISSION, [1]), learned()
-    recorder = Recorder(swarm, ego=2, is_broadcast=policy.transmits_twice)
+    recorder = Recorder(swarm, ego=2, is_broadcast=policy.window(swarm.mission).is_broadcast)
     for window in fly(swarm, policy):
         recorder.add(window)
     assert len(recorder.log().recipient) == MISSION.num_windows

@@ -10,7 +10,7 @@ from scipy.spatial.distance import cdist
 
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.minimum_spanning_tree import ROOT, MinimumSpanningTree, spanning_tree
-from swarm_mj.policies.policy import CentralisedPolicy
+from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
 
@@ -29,8 +29,8 @@ def decided(policy, position_m):
     views = LocalViews(
         buffers=empty_buffers(num_missions, num_robots), now=np.zeros(num_missions), phases=()
     )
-    bodies = RobotStates(position_m=position_m, velocity_mps=np.zeros_like(position_m))
-    return policy.recipients(views, bodies)
+    states = RobotStates(position_m=position_m, velocity_mps=np.zeros_like(position_m))
+    return policy.recipients(views, states)
 
 
 def started(num_robots, probability=1.0, num_missions=1, **options):
@@ -139,7 +139,7 @@ def test_iv_c_frequency_is_the_probability(probability):
 
 def test_iv_c_is_centralised():
     assert issubclass(MinimumSpanningTree, CentralisedPolicy)
-    assert not MinimumSpanningTree.transmits_twice
+    assert not issubclass(MinimumSpanningTree, BroadcastPolicy)
 
 
 @pytest.mark.parametrize("probability", [-0.01, 1.01, math.nan])

@@ -84,13 +84,13 @@ def test_ii_b_policies_say_whether_packets_carry_more_than_the_buffer(name):
 
 @pytest.mark.parametrize("name", DECENTRALISED)
 def test_eq9_a_decentralised_policy_is_not_told_the_truth(name):
-    """Its type has no bodies, and where the robots truly are does not change what it decides."""
+    """Its type has no states, and where the robots truly are does not change what it decides."""
     policy = make_policy(name, MISSION)
     assert list(inspect.signature(policy.recipients).parameters) == ["views"]
     decisions = []
     for scale in (1.0, 0.5):
         swarm = Swarm(MISSION, [1, 2])
-        swarm._physics.place(scale * swarm.bodies.position_m, scale * swarm.bodies.velocity_mps)
+        swarm._physics.place(scale * swarm.states.position_m, scale * swarm.states.velocity_mps)
         swarm.start(policy)
         decisions.append(swarm.decide(policy))
     np.testing.assert_array_equal(*decisions)
@@ -216,7 +216,7 @@ def test_iv_c_tree_is_the_presets(mission, is_recomputed, root_transmits):
         by_hand.start(8, generators(1))
         for _ in range(2):
             np.testing.assert_array_equal(swarm.decide(named), swarm.decide(by_hand))
-            swarm._physics.place(swarm.bodies.position_m[:, ::-1], swarm.bodies.velocity_mps)
+            swarm._physics.place(swarm.states.position_m[:, ::-1], swarm.states.velocity_mps)
 
 
 def test_unknown_policy_is_a_clear_error():

@@ -4,22 +4,25 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from swarm_mj.policies.policy import DecentralisedPolicy
+from swarm_mj.mission import paper, reference
+from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.random_flooding import RandomFlooding
-from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.protocol.buffers import BROADCAST, empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.swarm import Swarm
 
 NUM_ROBOTS = 6
 
 
-def decided(probability, num_windows, num_missions=2, num_robots=NUM_ROBOTS):
-    """Whom everyone addresses [half window, mission, robot]."""
-    policy = RandomFlooding(probability)
+def decided(probability, num_slots, num_missions=2, num_robots=NUM_ROBOTS, *, named=True):
+    """Whom everyone addresses [slot, mission, robot]."""
+    policy = RandomFlooding(probability, names_addressee=named)
     policy.start(num_robots, [np.random.default_rng((7, b)) for b in range(num_missions)])
     views = LocalViews(
         buffers=empty_buffers(num_missions, num_robots), now=np.zeros(num_missions), phases=()
     )
-    return np.stack([policy.recipients(views) for _ in range(num_windows)])
+    return np.stack([policy.recipients(views) for _ in range(num_slots)])
 
 
 def is_sending(recipient):
@@ -27,8 +30,7 @@ def is_sending(recipient):
 
 
 def test_iv_c_two_transmissions_a_window_on_local_knowledge():
-    assert RandomFlooding.transmits_twice
-    assert issubclass(RandomFlooding, DecentralisedPolicy)
+    assert issubclass(RandomFlooding, BroadcastPolicy)
 
 
 def test_iv_c_probability_0_is_silence():
@@ -67,6 +69,27 @@ def test_iv_c_robots_missions_and_half_windows_draw_apart():
     sending = is_sending(decided(0.5, 3000)).reshape(3000, -1)
     correlation = np.corrcoef(np.vstack([sending[1:].T, sending[:-1].T]))
     np.testing.assert_allclose(correlation, np.eye(len(correlation)), atol=5 / math.sqrt(3000))
+
+
+def test_iv_c_a_packet_is_a_broadcast_unless_the_rule_is_the_authors():
+    """The same robots transmit, whether packets name whom they are for or not."""
+    named, broadcast = decided(0.5, 100), decided(0.5, 100, named=False)
+    silence = np.broadcast_to(np.arange(NUM_ROBOTS), named.shape)
+    np.testing.assert_array_equal(broadcast, np.where(is_sending(named), BROADCAST, silence))
+
+
+@pytest.mark.parametrize(("preset", "is_named"), [(paper, False), (reference, True)])
+def test_packets_name_their_addressees_in_the_reference_preset_only(preset, is_named):
+    """Where a robot that is addressed hears while it sends, and L is noted (Eq. 7)."""
+    swarm = Swarm(preset("stationary", num_robots=6), [1])
+    policy = make_policy("random-flooding", swarm.mission, 0.9)
+    num_packets = 0
+    for _ in range(20):
+        num_packets += swarm.step(policy).packets.sent[0]
+        recipient = np.stack([phase.recipient for phase in swarm.phases])
+        assert np.any(recipient == BROADCAST) != is_named
+    assert np.any(swarm.buffers.last_attempt) == is_named
+    assert num_packets > 100
 
 
 def test_mission_does_not_depend_on_its_neighbours():

@@ -20,8 +20,8 @@ def decided(position_m, window):
         now=np.full(num_missions, float(window)),
         phases=(),
     )
-    bodies = RobotStates(position_m=position_m, velocity_mps=np.zeros_like(position_m))
-    return RoundRobin().recipients(views, bodies).tolist()
+    states = RobotStates(position_m=position_m, velocity_mps=np.zeros_like(position_m))
+    return RoundRobin().recipients(views, states).tolist()
 
 
 def test_iv_c_schedule_by_hand():
@@ -68,9 +68,9 @@ def test_iv_c_nearest_means_the_straight_line():
     """(3, 3) is 4.2 m from the centre by a straight line, (5, 0) is 5 m; along axes 6 and 5."""
     mission = paper("stationary", num_robots=3)
     swarm = Swarm(mission, [0])
-    bodies = RobotStates(
+    states = RobotStates(
         position_m=np.array([[[5.0, 0.0], [3.0, 3.0], [9.0, 9.0]]]),
         velocity_mps=np.zeros((1, 3, 2)),
     )
-    recipient = RoundRobin().recipients(swarm.views, bodies)
+    recipient = RoundRobin().recipients(swarm.views, states)
     np.testing.assert_array_equal(recipient, [[1, 1, 2]])

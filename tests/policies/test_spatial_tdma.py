@@ -5,13 +5,13 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import pdist, squareform
 
 from swarm_mj.mission import paper
-from swarm_mj.policies.policy import DecentralisedPolicy
+from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.spatial_tdma import SpatialTdma
 from swarm_mj.policies.tdma import Tdma
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.protocol.window import PHASE
+from swarm_mj.protocol.window import SLOT_WINDOWS
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.swarm import Swarm
 
@@ -24,12 +24,12 @@ def views_of(position_m, is_known, half=0):
     buffers = empty_buffers(1, num_robots)
     buffers.position_m[:] = position_m
     buffers.timestamp[:] = is_known
-    return LocalViews(buffers=buffers, now=np.array([half * PHASE]), phases=())
+    return LocalViews(buffers=buffers, now=np.array([half * SLOT_WINDOWS]), phases=())
 
 
 def senders(policy, views):
     """Who broadcasts in the one mission."""
-    return set(np.flatnonzero(policy.recipients(views)[0] != views.silence[0]).tolist())
+    return set(np.flatnonzero(policy.transmits(views)[0]).tolist())
 
 
 def on_a_line(x_m, half, threshold=1.0):
@@ -42,8 +42,7 @@ def on_a_line(x_m, half, threshold=1.0):
 
 
 def test_two_transmissions_a_window_on_local_knowledge():
-    assert SpatialTdma.transmits_twice
-    assert issubclass(SpatialTdma, DecentralisedPolicy)
+    assert issubclass(SpatialTdma, BroadcastPolicy)
 
 
 def test_two_pairs_far_apart_speak_at_once_by_hand():
@@ -163,7 +162,7 @@ def test_who_knows_nobody_does_as_tdma_does():
     spatial, plain = SpatialTdma(range_m=250.0, threshold=1.25), Tdma()
     for policy in (spatial, plain):
         policy.start(20, [np.random.default_rng(4)])
-    position_m = Swarm(MISSION, [1]).bodies.position_m[0]
+    position_m = Swarm(MISSION, [1]).states.position_m[0]
     for half in range(45):
         views = views_of(position_m, np.eye(20), half)
         assert senders(spatial, views) == senders(plain, views)
@@ -176,7 +175,7 @@ def test_a_team_at_rest_loses_nothing_and_gains_by_joining(seed):
     under plain TDMA in the same order, and in the end it is younger."""
     swarms = Swarm(MISSION, [seed]), Swarm(MISSION, [seed])
     spatial, plain = make_policy("spatial-tdma", MISSION), Tdma()
-    distance_m = squareform(pdist(swarms[0].bodies.position_m[0]))
+    distance_m = squareform(pdist(swarms[0].states.position_m[0]))
     is_near = (distance_m <= MISSION.range_m) & ~np.eye(20, dtype=bool)
     for window in range(150):
         swarms[0].step(spatial)

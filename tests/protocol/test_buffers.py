@@ -7,6 +7,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import (
     NEVER,
     NO_PARENT,
@@ -100,7 +101,7 @@ def test_eq5_robots_observe_themselves_and_only_themselves(seed, num_missions, n
     before = copy.deepcopy(buffers)
     position_m, velocity_mps = rng.normal(size=(2, num_missions, num_robots, 2))
     now = rng.integers(5, 9, num_missions) / 2.0
-    observe_self(buffers, position_m, velocity_mps, now)
+    observe_self(buffers, RobotStates(position_m=position_m, velocity_mps=velocity_mps), now)
     for b in range(num_missions):
         for i in range(num_robots):
             before.timestamp[b, i, i] = now[b]
@@ -161,9 +162,9 @@ def test_eq8_only_strictly_newer_news_is_taken():
 def test_the_parent_is_the_first_robot_the_news_was_passed_to():
     # Robot 2 tells 1, and then 1 tells 0: robot 2 first passed its news to 1, and 1 its own to 0.
     buffers = empty_buffers(1, 3)
-    nothing = np.zeros((1, 3, 2))
+    nothing = RobotStates(position_m=np.zeros((1, 3, 2)), velocity_mps=np.zeros((1, 3, 2)))
     for half, heard in [(1, [0, 2, 2]), (2, [1, 1, 2])]:
-        observe_self(buffers, nothing, nothing, np.array([half / 2]))
+        observe_self(buffers, nothing, np.array([half / 2]))
         merge(buffers, np.array([heard]))
     assert buffers.timestamp[0].tolist() == [[1.0, 1.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]]
     assert buffers.parent[0].tolist() == [[-1, 0, 1], [-1, -1, 1], [-1, -1, -1]]
@@ -172,8 +173,8 @@ def test_the_parent_is_the_first_robot_the_news_was_passed_to():
 def test_packets_are_older_than_the_phase_that_carries_them():
     # 0 hears 1 while 1 hears 2 and 2 hears 3: each gets its neighbour's news and no more.
     buffers = empty_buffers(1, 4)
-    nothing = np.zeros((1, 4, 2))
-    observe_self(buffers, nothing, nothing, np.array([1.0]))
+    nothing = RobotStates(position_m=np.zeros((1, 4, 2)), velocity_mps=np.zeros((1, 4, 2)))
+    observe_self(buffers, nothing, np.array([1.0]))
     merge(buffers, np.array([[1, 2, 3, 3]]))
     assert buffers.is_known[0].astype(int).tolist() == [
         [1, 1, 0, 0],

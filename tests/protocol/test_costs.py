@@ -22,11 +22,11 @@ from swarm_mj.protocol.window import Phase, window
 seeds = st.integers(0, 2**32 - 1)
 
 
-def some_on(rng, num_missions, num_robots):
+def some_active(rng, num_missions, num_robots):
     """Who is on: at least one in each mission, not as many in each."""
-    is_on = rng.random((num_missions, num_robots)) < 0.6
-    is_on[np.arange(num_missions), rng.integers(0, num_robots, num_missions)] = True
-    return is_on
+    is_active = rng.random((num_missions, num_robots)) < 0.6
+    is_active[np.arange(num_missions), rng.integers(0, num_robots, num_missions)] = True
+    return is_active
 
 
 def times(timestamp):
@@ -124,11 +124,11 @@ def test_eq10_eq17_of_those_that_are_on_by_plain_loops(seed, num_missions, num_r
     timestamp = rng.integers(0, 40, (num_missions, num_robots, num_robots)) / 2.0
     now = rng.integers(20, 30, num_missions).astype(float)
     velocity = rng.normal(size=(num_missions, num_robots, 2))
-    is_on = some_on(rng, num_missions, num_robots)
-    age, is_complete = age_of_information(times(timestamp), now, is_on)
-    variance = velocity_variance(velocity, is_on)
+    is_active = some_active(rng, num_missions, num_robots)
+    age, is_complete = age_of_information(times(timestamp), now, is_active)
+    variance = velocity_variance(velocity, is_active)
     for b in range(num_missions):
-        on = [i for i in range(num_robots) if is_on[b, i]]
+        on = [i for i in range(num_robots) if is_active[b, i]]
         known = [timestamp[b, i, j] for i in on for j in on]
         assert age[b] == pytest.approx(sum(now[b] - t for t in known) / len(known))
         assert is_complete[b] == all(t > 0 for t in known)
@@ -143,12 +143,12 @@ def test_with_everyone_on_costs_are_the_same_bit_for_bit(seed, num_missions, num
     rng = np.random.default_rng(seed)
     buffers, now = some_trees(rng, num_missions, num_robots), rng.integers(1, 9, num_missions) / 2.0
     position_m, velocity_mps = rng.normal(size=(2, num_missions, num_robots, 2))
-    bodies = RobotStates(position_m=position_m, velocity_mps=velocity_mps)
+    states = RobotStates(position_m=position_m, velocity_mps=velocity_mps)
     phases = some_phase(rng, num_missions, num_robots), some_phase(rng, num_missions, num_robots)
     everyone = np.ones((num_missions, num_robots), dtype=bool)
     some, all_ = (
-        window_costs(buffers, bodies, phases, now, has_response=True, is_on=is_on)
-        for is_on in (everyone, None)
+        window_costs(buffers, replace(states, is_active=is_active), phases, now, is_broadcast=False)
+        for is_active in (everyone, None)
     )
     assert some.age_windows.tolist() == all_.age_windows.tolist()
     assert some.is_complete.tolist() == all_.is_complete.tolist()
@@ -159,12 +159,12 @@ def test_with_everyone_on_costs_are_the_same_bit_for_bit(seed, num_missions, num
 def test_everyone_knows_everyone_first_in_the_third_window():
     # 1 asks 0 and both know each other; 2 asks 1 and learns all; 0 asks 1 and learns of 2.
     buffers, nothing = empty_buffers(1, 3), np.zeros((1, 3, 2))
-    bodies = RobotStates(position_m=nothing, velocity_mps=nothing)
+    states = RobotStates(position_m=nothing, velocity_mps=nothing)
     completeness, ages = [], []
     for t, recipient in enumerate([[0, 0, 2], [0, 1, 1], [1, 1, 2]]):
         now = np.array([float(t)])
-        phases = window(buffers, bodies, np.array([recipient]), to_the_addressee, now)
-        costs = window_costs(buffers, bodies, phases, now + 1, has_response=True)
+        phases = window(buffers, states, np.array([recipient]), to_the_addressee, now)
+        costs = window_costs(buffers, states, phases, now + 1, is_broadcast=False)
         completeness.append(costs.is_complete.item())
         ages.append(costs.age_windows.item())
     assert completeness == [False, False, True]
@@ -198,7 +198,7 @@ def test_packets_by_hand():
     # 0 asks 1, which decodes it, as does 2; 3 asks 4 in vain. Then 1 answers 0, and 4 overhears.
     first = Phase(recipient=np.array([[1, 1, 2, 4, 4]]), heard=np.array([[0, 0, 0, 3, 4]]))
     second = Phase(recipient=np.array([[0, 0, 2, 3, 4]]), heard=np.array([[1, 1, 2, 3, 1]]))
-    packets = count_packets((first, second), has_response=True)
+    packets = count_packets((first, second), is_broadcast=False)
     assert (packets.attempted.item(), packets.delivered.item(), packets.lost.item()) == (2, 1, 1)
     assert (packets.overheard.item(), packets.answered.item()) == (2, 1)
     assert packets.sent.item() == 2
@@ -209,7 +209,7 @@ def test_broadcasts_by_hand():
     # 0's is heard by 1 and 2, 3's by nobody; then 1's is heard by 0 and 4.
     first = Phase(recipient=np.array([[1, 1, 2, 4, 4]]), heard=np.array([[0, 0, 0, 3, 4]]))
     second = Phase(recipient=np.array([[0, 0, 2, 3, 4]]), heard=np.array([[1, 1, 2, 3, 1]]))
-    packets = count_packets((first, second), has_response=False)
+    packets = count_packets((first, second), is_broadcast=True)
     assert (packets.sent.item(), packets.heard.item(), packets.receptions.item()) == (3, 2, 4)
     addressed = ("attempted", "delivered", "lost", "overheard", "answered")
     assert np.isnan([getattr(packets, name) for name in addressed]).all()
@@ -220,8 +220,8 @@ def test_broadcasts_by_hand():
 def test_packets_as_by_loops(seed, num_missions, num_robots):
     rng = np.random.default_rng(seed)
     first, second = (some_phase(rng, num_missions, num_robots) for _ in range(2))
-    asked = count_packets((first, second), has_response=True)
-    flooded = count_packets((first, second), has_response=False)
+    asked = count_packets((first, second), is_broadcast=False)
+    flooded = count_packets((first, second), is_broadcast=True)
     for b in range(num_missions):
         flooded_by_loops = np.add(broadcasts(first, b), broadcasts(second, b)).tolist()
         sent, arrived, overheard = fates(first, b)
@@ -254,8 +254,8 @@ def test_hops_are_none_before_anyone_is_known():
 def test_hops_as_by_walking_up_the_tree(seed, num_missions, num_robots):
     buffers = some_trees(np.random.default_rng(seed), num_missions, num_robots)
     everyone = np.ones((num_missions, num_robots), dtype=bool)
-    for is_on in (None, some_on(np.random.default_rng(seed), num_missions, num_robots)):
-        hops, counts = mean_hops(buffers, is_on), everyone if is_on is None else is_on
+    for is_active in (None, some_active(np.random.default_rng(seed), num_missions, num_robots)):
+        hops, counts = mean_hops(buffers, is_active), everyone if is_active is None else is_active
         for b in range(num_missions):
             depths = [
                 depth(buffers.parent[b, i], i, j)  # over anyone
@@ -270,14 +270,14 @@ def test_a_windows_costs_are_each_of_them():
     rng = np.random.default_rng(0)
     buffers, now = some_trees(rng, 3, 5), np.array([1.0, 2.0, 7.0])
     position_m, velocity_mps = rng.normal(size=(2, 3, 5, 2))
-    bodies = RobotStates(position_m=position_m, velocity_mps=velocity_mps)
+    states = RobotStates(position_m=position_m, velocity_mps=velocity_mps)
     phases = some_phase(rng, 3, 5), some_phase(rng, 3, 5)
-    for has_response in (True, False):
-        costs = window_costs(buffers, bodies, phases, now, has_response=has_response)
+    for is_broadcast in (True, False):
+        costs = window_costs(buffers, states, phases, now, is_broadcast=is_broadcast)
         age, is_complete = age_of_information(buffers, now)
-        packets = count_packets(phases, has_response=has_response)
+        packets = count_packets(phases, is_broadcast=is_broadcast)
         assert (costs.age_windows == age).all()
         assert (costs.is_complete == is_complete).all()
-        assert (costs.velocity_variance_m2ps2 == velocity_variance(bodies.velocity_mps)).all()
+        assert (costs.velocity_variance_m2ps2 == velocity_variance(states.velocity_mps)).all()
         for name, count in vars(packets).items():
             np.testing.assert_array_equal(getattr(costs.packets, name), count)

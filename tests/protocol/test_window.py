@@ -2,18 +2,26 @@
 
 import copy
 import runpy
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from channels import to_nobody, to_the_addressee, unreliable
+from channels import to_everyone, to_nobody, to_the_addressee, unreliable
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol import buffers
-from swarm_mj.protocol.buffers import empty_buffers, merge, observe_self, record_attempt
-from swarm_mj.protocol.window import Phase, respondents, transmit, window
+from swarm_mj.protocol.buffers import BROADCAST, empty_buffers, merge, observe_self, record_attempt
+from swarm_mj.protocol.window import (
+    DoubleBroadcast,
+    Phase,
+    RequestResponse,
+    respondents,
+    transmit,
+    window,
+)
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -30,22 +38,22 @@ def standing(num_robots, num_missions=1):
 def some_mission(seed, num_windows, num_robots, num_missions):
     """RobotStates and recipients of every window; about half the robots stay silent."""
     rng = np.random.default_rng(seed)
-    bodies, recipients = [], []
+    states, recipients = [], []
     for _ in range(num_windows):
-        bodies.append(at(*rng.normal(size=(2, num_missions, num_robots, 2))))
+        states.append(at(*rng.normal(size=(2, num_missions, num_robots, 2))))
         anybody = rng.integers(0, num_robots, (num_missions, num_robots))
         silent = rng.random((num_missions, num_robots)) < 0.5
         recipients.append(np.where(silent, np.arange(num_robots), anybody))
-    return bodies, recipients
+    return states, recipients
 
 
 def play(num_windows, num_robots, num_missions, seed, *, senders_listen):
     """Runs windows; yields the buffers before and after, the phases, and the start of each."""
-    bodies, recipients = some_mission(seed, num_windows, num_robots, num_missions)
+    states, recipients = some_mission(seed, num_windows, num_robots, num_missions)
     channel = unreliable(seed, senders_listen=senders_listen)
     buffers = empty_buffers(num_missions, num_robots)
     now = np.zeros(num_missions)
-    for body, recipient in zip(bodies, recipients, strict=True):
+    for body, recipient in zip(states, recipients, strict=True):
         before = copy.deepcopy(buffers)
         phases = window(buffers, body, recipient, channel, now)
         yield SimpleNamespace(before=before, after=buffers, phases=phases, now=now)
@@ -116,11 +124,11 @@ def assert_same_knowledge(robots, buffers):
 
 def test_fig1_four_rounds_give_robot_0_the_papers_table():
     rounds = [{0: 4, 2: 1}, {1: 0, 2: 3}, {0: 1, 4: 3}, {3: 0}]
-    buffers, bodies = empty_buffers(1, 5), standing(5)
+    buffers, states = empty_buffers(1, 5), standing(5)
     for t, packets in enumerate(rounds, start=1):
         now = np.array([float(t)])
         recipient = np.array([[packets.get(i, i) for i in range(5)]])
-        observe_self(buffers, bodies.position_m, bodies.velocity_mps, now)
+        observe_self(buffers, states, now)
         record_attempt(buffers, recipient, now)
         merge(buffers, to_the_addressee(None, recipient))
     assert buffers.timestamp[0, 0].tolist() == [4, 2, 2, 4, 3]
@@ -132,12 +140,12 @@ def test_fig1_four_rounds_give_robot_0_the_papers_table():
 @settings(max_examples=100, deadline=None)
 def test_alg1_windows_as_played_with_dictionaries(seed, num_robots, senders_listen):
     num_windows = 8
-    bodies, recipients = some_mission(seed, num_windows, num_robots, 1)
+    course, recipients = some_mission(seed, num_windows, num_robots, 1)
     channel = unreliable(seed, senders_listen=senders_listen)
     twin = as_dict_channel(unreliable(seed, senders_listen=senders_listen), num_robots)
     buffers, robots = empty_buffers(1, num_robots), [Robot(i) for i in range(num_robots)]
     for t in range(num_windows):
-        body, recipient = bodies[t], recipients[t]
+        body, recipient = course[t], recipients[t]
         _, response = window(buffers, body, recipient, channel, np.array([float(t)]))
         states = np.concatenate([body.position_m[0], body.velocity_mps[0]], axis=1).tolist()
         states = dict(enumerate(map(tuple, states)))
@@ -181,6 +189,69 @@ def test_alg1_silence_counts_as_attempt_when_told_so():
     assert buffers.last_attempt[0].tolist() == [[0.0, 0.5], [0.0, 0.5]]
     transmit(buffers, standing(2), recipient, to_nobody, now + 3, silence_is_attempt=True)
     assert buffers.last_attempt[0].tolist() == [[0.0, 3.0], [0.0, 3.0]]
+
+
+def play_once(protocol, buffers, recipients, num_robots):
+    """One window from t = 0, in which a robot's x is how often it has moved."""
+    moves, asked = [], []
+
+    def move():
+        moves.append(len(asked))  # how many decisions came before
+        position_m = np.zeros((1, num_robots, 2))
+        position_m[..., 0] = len(moves)
+        return at(position_m, np.zeros((1, num_robots, 2)))
+
+    def decide(phases):
+        asked.append(phases)
+        return np.array([recipients[len(asked) - 1]])
+
+    phases = protocol(buffers, decide, move, to_everyone, np.zeros(1))
+    return phases, asked, moves
+
+
+def test_alg1_robots_decide_once_then_move_and_whoever_was_addressed_answers():
+    buffers = empty_buffers(1, 3)
+    phases, asked, moves = play_once(RequestResponse(), buffers, [[1, 1, 2]], 3)
+    assert not RequestResponse.is_broadcast
+    assert (asked, moves) == ([()], [1])
+    assert [phase.recipient[0].tolist() for phase in phases] == [[1, 1, 2], [0, 0, 2]]
+    assert buffers.position_m[0, 2, :, 0].tolist() == [1.0, 1.0, 1.0]
+
+
+@pytest.mark.parametrize(("moves_each_slot", "moved_after"), [(False, [1]), (True, [1, 2])])
+def test_iv_c_robots_decide_before_each_broadcast_and_nobody_answers(moves_each_slot, moved_after):
+    buffers = empty_buffers(1, 3)
+    protocol = DoubleBroadcast(moves_each_slot=moves_each_slot)
+    recipients = [[BROADCAST, 1, 2], [0, BROADCAST, 2]]
+    phases, asked, moves = play_once(protocol, buffers, recipients, 3)
+    assert DoubleBroadcast.is_broadcast
+    assert asked == [(), phases[:1]]  # the second decision knows the first slot
+    assert moves == moved_after
+    assert [phase.recipient[0].tolist() for phase in phases] == recipients
+    assert buffers.timestamp[0].tolist() == [[1.0, 1.0, 0.0], [0.5, 1.0, 0.0], [0.5, 1.0, 1.0]]
+    assert not np.any(buffers.last_attempt)  # a broadcast addresses nobody
+    where_1_was = 2.0 if moves_each_slot else 1.0
+    assert buffers.position_m[0, 2, :2, 0].tolist() == [1.0, where_1_was]
+
+
+def test_by_the_authors_half_duplex_rule_a_broadcast_needs_an_addressee():
+    """The next identity, but where the policy names one."""
+    protocol = DoubleBroadcast(needs_addressees=True)
+    recipients = [[BROADCAST, 1, BROADCAST], [2, 1, 2]]
+    phases, *_ = play_once(protocol, empty_buffers(1, 3), recipients, 3)
+    assert [phase.recipient[0].tolist() for phase in phases] == [[1, 1, 0], [2, 1, 2]]
+
+
+def test_inactive_robots_neither_send_nor_decode_nor_observe():
+    """Robot 2 would answer 0, and 1 decodes 0 alone."""
+    buffers = empty_buffers(1, 3)
+    states = replace(standing(3), is_active=np.array([[True, True, False]]))
+    request, response = window(buffers, states, np.array([[2, 1, 1]]), to_everyone, np.zeros(1))
+    assert request.recipient.tolist() == [[2, 1, 2]]
+    assert request.heard.tolist() == [[0, 0, 2]]
+    assert response.recipient.tolist() == [[0, 1, 2]]
+    assert buffers.timestamp[0].tolist() == [[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.0, 0.0, 0.0]]
+    assert buffers.last_attempt[0].tolist() == [[0.0, 0.0, 0.5], [0.0] * 3, [0.0] * 3]
 
 
 def test_flooding_transmits_twice_and_nobody_answers():
@@ -244,11 +315,11 @@ def test_the_channel_gets_the_true_positions_and_everyones_recipients():
         asked.append((position_m.copy(), recipient.copy()))
         return to_the_addressee(position_m, recipient)
 
-    bodies, recipients = some_mission(0, 1, 4, 2)
-    first, second = window(empty_buffers(2, 4), bodies[0], recipients[0], channel, np.zeros(2))
+    states, recipients = some_mission(0, 1, 4, 2)
+    first, second = window(empty_buffers(2, 4), states[0], recipients[0], channel, np.zeros(2))
     assert len(asked) == 2
     for (position_m, recipient), phase in zip(asked, (first, second), strict=True):
-        assert (position_m == bodies[0].position_m).all()
+        assert (position_m == states[0].position_m).all()
         assert (recipient == phase.recipient).all()
         assert (phase.heard == to_the_addressee(None, recipient)).all()
     assert (asked[0][1] == recipients[0]).all()
@@ -264,7 +335,7 @@ def test_missions_have_clocks_of_their_own(start):
     assert buffers.timestamp[1].tolist() == [[b + 1, b + 0.5], [b + 1, b + 1]]
 
 
-@pytest.mark.parametrize("nobody", [-1, 3])
+@pytest.mark.parametrize("nobody", [-2, 3])
 @pytest.mark.parametrize(("b", "i"), [(0, 0), (0, 2), (1, 1)])
 def test_recipients_who_are_no_robots_are_refused_before_anything_happens(b, i, nobody):
     buffers = empty_buffers(2, 3)

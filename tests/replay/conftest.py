@@ -32,7 +32,7 @@ def record(policy_name, probability, *, task="flocking", **overrides):
     mission = paper(task, **settings)
     swarm = Swarm(mission, [5])
     policy = make_policy(policy_name, mission, probability)
-    recorder = Recorder(swarm, ego=4, is_broadcast=policy.transmits_twice)
+    recorder = Recorder(swarm, ego=4, is_broadcast=policy.window(mission).is_broadcast)
     packets = []
     for window in fly(swarm, policy):
         recorder.add(window)

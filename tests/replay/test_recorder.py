@@ -20,7 +20,7 @@ def flown_log(num_windows=12, ego=2, num_robots=8):
     seen = []
     for window in fly(swarm, policy):
         record.add(window)
-        seen.append((swarm.bodies.position_m[0].copy(), swarm.now[0] - swarm.buffers.timestamp[0]))
+        seen.append((swarm.states.position_m[0].copy(), swarm.now[0] - swarm.buffers.timestamp[0]))
     return record.log(), seen
 
 
@@ -48,12 +48,12 @@ def test_statistics_are_of_the_robots_that_are_on():
     ages = []
     for window in fly(swarm, make_policy("mst", mission, 0.4)):
         record.add(window)
-        on = [i for i in range(7) if swarm.is_on is None or swarm.is_on[0, i]]
+        on = [i for i in range(7) if swarm.states.is_active is None or swarm.states.is_active[0, i]]
         timestamp = swarm.buffers.timestamp[0]
         ages.append([swarm.now[0] - timestamp[i, j] for i in on for j in on if i != j])
     log = record.log()
     assert np.sum(log.is_on, axis=1).tolist() == [7] * 4 + [5] * 5
-    np.testing.assert_array_equal(log.is_on[-1], swarm.is_on[0])
+    np.testing.assert_array_equal(log.is_on[-1], swarm.states.is_active[0])
     np.testing.assert_allclose(log.age_std, [np.std(its) for its in ages])
     np.testing.assert_allclose(log.age_max, [np.max(its) for its in ages])
 
@@ -66,12 +66,12 @@ def test_a_log_is_the_swarm_s_state_field_by_field():
     variance = []
     for window in fly(swarm, make_policy("mst", mission, 0.5)):
         record.add(window)
-        seen["velocity_mps"].append(swarm.bodies.velocity_mps[0].copy())
+        seen["velocity_mps"].append(swarm.states.velocity_mps[0].copy())
         seen["believed_m"].append(swarm.buffers.position_m[0, 3].copy())
         seen["parent"].append(swarm.buffers.parent[0, 3].copy())
         seen["is_known"].append(swarm.buffers.timestamp[0, 3] > 0)
         seen["heard"].append([swarm.phases[0].heard[0], swarm.phases[1].heard[0]])
-        variance.append(swarm.bodies.velocity_mps[0].var(axis=0).sum())
+        variance.append(swarm.states.velocity_mps[0].var(axis=0).sum())
     log = record.log()
     for field, rows in seen.items():
         np.testing.assert_array_equal(getattr(log, field), rows, err_msg=field)

@@ -28,7 +28,7 @@ def test_the_share_left_is_last_over_first_variance():
 
     swarm = Swarm(mission, [3, 4])
     spread = [
-        swarm.bodies.velocity_mps.var(axis=1).sum(axis=1)
+        swarm.states.velocity_mps.var(axis=1).sum(axis=1)
         for _ in fly(swarm, make_policy("round-robin", mission))
     ]
     np.testing.assert_allclose(left, spread[-1] / spread[0], rtol=1e-9)

@@ -99,8 +99,8 @@ def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
 def _snapshot(swarm: Swarm) -> Snapshot:
     return Snapshot(
         time_s=float(swarm.now[0]) * swarm.mission.window_s,
-        position_m=swarm.bodies.position_m[0],
-        velocity_mps=swarm.bodies.velocity_mps[0],
+        position_m=swarm.states.position_m[0],
+        velocity_mps=swarm.states.velocity_mps[0],
     )
 
 

@@ -30,12 +30,12 @@ class _Oracle(CentralisedPolicy):
         """
         self._radio = radio
 
-    def recipients(self, views: LocalViews, bodies: RobotStates) -> Int[np.ndarray, "B N"]:
+    def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """The window's schedule; robots move before they talk, which it does not foresee."""
         windows = [
             self._window(timestamp, float(now), links_between(self._radio, position_m))
             for timestamp, now, position_m in zip(
-                views.buffers.timestamp, views.now, bodies.position_m, strict=True
+                views.buffers.timestamp, views.now, states.position_m, strict=True
             )
         ]
         return np.stack(windows)

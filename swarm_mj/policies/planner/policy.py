@@ -27,7 +27,6 @@ robots, 29 to 56 kB for 80, and 169 to 331 kB for 200, depending on the precisio
 
 import math
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Int
@@ -36,21 +35,19 @@ from swarm_mj.policies.planner.discovery import Discovery
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.settings import EpochSettings, PlannerSettings
 from swarm_mj.policies.planner.snapshots import Snapshots, take_snapshots
-from swarm_mj.policies.policy import DecentralisedPolicy
+from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.protocol.buffers import NEVER, Buffers
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW
 from swarm_mj.radio.free_space import FreeSpaceRadio
 
 
-class Planner(DecentralisedPolicy):
+class Planner(BroadcastPolicy):
     """Every robot plans for the whole team from a snapshot that its teammates hold too.
 
     Uses the robot's own buffer, the snapshots in the packets that it decoded, its identity, the
     team's size and area, the clock, the radio's numbers and common orders of turns.
     """
-
-    transmits_twice: ClassVar[bool] = True
 
     def __init__(
         self,
@@ -93,10 +90,9 @@ class Planner(DecentralisedPolicy):
             for rng in rngs
         ]
 
-    def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """The next identity, for whoever transmits; who is addressed changes nothing."""
-        transmits = np.stack([team.transmits(views, b) for b, team in enumerate(self._teams)])
-        return np.where(transmits, (views.silence + 1) % views.num_robots, views.silence)
+    def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
+        """Whoever transmits by its plan, or by the discovery."""
+        return np.stack([team.transmits(views, b) for b, team in enumerate(self._teams)])
 
 
 class _Team:

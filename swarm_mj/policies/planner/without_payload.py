@@ -11,32 +11,29 @@ would jam each other. Such a team goes on with spatial TDMA, whose rule bears sm
 """
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from swarm_mj.policies.planner.broadcast_scheduler import schedule
 from swarm_mj.policies.planner.plan import foresight_of
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.weights import heuristic_weights
-from swarm_mj.policies.policy import DecentralisedPolicy
+from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.spatial_tdma import SpatialTdma
-from swarm_mj.policies.tdma import half_windows
+from swarm_mj.policies.tdma import slot_of
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.links import links_between
 
 
-class PlannerWithoutPayload(DecentralisedPolicy):
+class PlannerWithoutPayload(BroadcastPolicy):
     """Every robot that knows where everyone rests plans for the whole team; others take turns.
 
     Uses the robot's own buffer, its identity, the team's size, the clock, the radio's numbers and a
     common order of turns.
     """
-
-    transmits_twice: ClassVar[bool] = True
 
     def __init__(
         self, radio: FreeSpaceRadio, settings: PlannerSettings, turns: SpatialTdma
@@ -58,17 +55,17 @@ class PlannerWithoutPayload(DecentralisedPolicy):
         self._plans: list[dict[bytes, _StandingPlan]] = [{} for _ in rngs]
         self._first = None  # each mission's slot in which the first decision was asked for
 
-    def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """The next identity, for whoever transmits; who is addressed changes nothing."""
-        buffers, slot = views.buffers, half_windows(views.now)
+    def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
+        """Whoever does by the schedule it knows, or in its turn."""
+        buffers, slot = views.buffers, slot_of(views.now)
         if self._first is None:
             self._first = slot
-        transmits = self._turns.recipients(views) != views.silence
+        transmits = self._turns.transmits(views)
         can_plan = np.all(buffers.is_known, axis=2) & ~np.any(buffers.velocity_mps, axis=(2, 3))
         for b, i in np.argwhere(can_plan).tolist():
             plan = self._plan(b, buffers.position_m[b, i])
             transmits[b, i] = plan.transmits(int(slot[b] - self._first[b]))[i]
-        return np.where(transmits, (views.silence + 1) % views.num_robots, views.silence)
+        return transmits
 
     def _plan(self, b: int, position_m: Float[np.ndarray, "N 2"]) -> "_StandingPlan":
         """The plan that follows from these positions; robots that hold the same share it."""

@@ -16,12 +16,12 @@ MISSION = paper("flocking", num_robots=6, num_windows=20, range_ratio=1.0)
 def test_start_and_end_are_the_swarms():
     start, end = fly_flock(MISSION, "round-robin", 5)
     swarm = Swarm(MISSION, [5])
-    np.testing.assert_array_equal(start.position_m, swarm.bodies.position_m[0])
-    np.testing.assert_array_equal(start.velocity_mps, swarm.bodies.velocity_mps[0])
+    np.testing.assert_array_equal(start.position_m, swarm.states.position_m[0])
+    np.testing.assert_array_equal(start.velocity_mps, swarm.states.velocity_mps[0])
     for _ in fly(swarm, make_policy("round-robin", MISSION)):
         pass
-    np.testing.assert_array_equal(end.position_m, swarm.bodies.position_m[0])
-    np.testing.assert_array_equal(end.velocity_mps, swarm.bodies.velocity_mps[0])
+    np.testing.assert_array_equal(end.position_m, swarm.states.position_m[0])
+    np.testing.assert_array_equal(end.velocity_mps, swarm.states.velocity_mps[0])
     assert (start.time_s, end.time_s) == (0.0, 2.0)  # 20 windows of 100 ms
 
 
@@ -39,8 +39,8 @@ def test_arrows_stand_at_the_robots_and_point_where_they_go():
     arrows = [
         next(c for c in axes.collections if isinstance(c, Quiver)) for axes in drawing.axes[:2]
     ]
-    np.testing.assert_allclose(arrows[0].get_offsets(), swarm.bodies.position_m[0] / 1000.0)
-    velocity = swarm.bodies.velocity_mps[0]
+    np.testing.assert_allclose(arrows[0].get_offsets(), swarm.states.position_m[0] / 1000.0)
+    velocity = swarm.states.velocity_mps[0]
     np.testing.assert_array_equal(np.stack([arrows[0].U, arrows[0].V], axis=1), velocity)
     assert np.ptp(arrows[1].U) < 0.1 * np.ptp(arrows[0].U)  # by then they agree
 

@@ -10,7 +10,7 @@ from swarm_mj.mission import paper, reference
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle, LookaheadOracle
 from swarm_mj.policies.greedy_oracle.schedule import lookahead_window
-from swarm_mj.policies.policy import CentralisedPolicy
+from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
@@ -39,7 +39,7 @@ def decided(policy, team):
 @pytest.mark.parametrize("kind", [GreedyOracle, LookaheadOracle])
 def test_is_told_everything_and_waits_for_answers(kind):
     assert issubclass(kind, CentralisedPolicy)
-    assert not kind.transmits_twice
+    assert not issubclass(kind, BroadcastPolicy)
 
 
 @pytest.mark.parametrize("preset", [paper, reference])

@@ -12,7 +12,7 @@ from swarm_mj.mission import paper
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.planner.broadcast_scheduler import CERTAIN, Foresight, Weights, fly, schedule
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.protocol.window import PHASE, transmit
+from swarm_mj.protocol.window import SLOT_WINDOWS, transmit
 from swarm_mj.radio.links import Links, links_between
 from swarm_mj.radio.mission_radio import radio_of
 
@@ -50,12 +50,12 @@ def really(team, speaks):
     buffers, after = empty_buffers(1, team.num_robots), []
     buffers.timestamp[0] = team.timestamp
     velocity_mps = np.zeros((1, team.num_robots, 2))
-    bodies = RobotStates(position_m=team.position_m[None], velocity_mps=velocity_mps)
+    states = RobotStates(position_m=team.position_m[None], velocity_mps=velocity_mps)
     robots = np.arange(team.num_robots)
     for p, row in enumerate(speaks):
         recipient = np.where(row, (robots + 1) % team.num_robots, robots)[None]
-        now = np.array([team.now + (p + 1) * PHASE])
-        transmit(buffers, bodies, recipient, team.radio, now)
+        now = np.array([team.now + (p + 1) * SLOT_WINDOWS])
+        transmit(buffers, states, recipient, team.radio, now)
         after.append(buffers.timestamp[0].copy())
     return np.array(after)
 

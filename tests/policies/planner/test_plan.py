@@ -131,14 +131,14 @@ def test_alg1_a_true_snapshot_leads_where_the_plan_says(seed, num_robots):
     planned = plan_of(team, true_snapshots(team))
     buffers, now = empty_buffers(1, num_robots), np.array([team.now])
     buffers.timestamp[0] = team.timestamp
-    bodies = RobotStates(
+    states = RobotStates(
         position_m=team.position_m[None], velocity_mps=np.zeros((1, num_robots, 2))
     )
     robots = np.arange(num_robots)
     for transmits in all_transmitters(planned):
         now = now + 0.5
         recipient = np.where(transmits, (robots + 1) % num_robots, robots)
-        transmit(buffers, bodies, recipient[None], team.radio, now)
+        transmit(buffers, states, recipient[None], team.radio, now)
     np.testing.assert_array_equal(planned.outcome(), buffers.timestamp[0])
     assert planned.is_complete
 

@@ -94,7 +94,7 @@ def test_eq9_sharing_is_planning_apart_where_snapshots_differ(mission, seed, cha
 def test_ii_b_packets_carry_snapshots_and_nobody_answers():
     policy = make_policy("planner", SMALL)
     assert policy.payload == "snapshots"
-    assert policy.transmits_twice
+    assert policy.window(SMALL).is_broadcast
 
 
 def test_epochs_by_hand():
