@@ -3,7 +3,7 @@
 import torch
 
 from swarm_mj.gnn.fast import FastAggregationGnn
-from swarm_mj.gnn.feature_sets import make_observer
+from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy_config import PolicyConfig
@@ -16,7 +16,7 @@ FEATURES = ("paper", "reference", "local", "extended")
 
 def tiny_network(features="extended", seed=1, **shape):
     """A network over these features; its weights depend on the seed only."""
-    names = make_observer(features, Mission()).names
+    names = make_extractor(features, Mission()).names
     its = {"num_features": len(names), "latent": 6, "depth": 2, "receptive_field": 1} | shape
     with torch.random.fork_rng():
         torch.manual_seed(seed)

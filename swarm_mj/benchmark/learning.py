@@ -11,8 +11,8 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_mj.benchmark.simulation import microseconds
 from swarm_mj.gnn.fast import FastAggregationGnn
-from swarm_mj.gnn.feature_sets import make_observer
-from swarm_mj.gnn.graphs import Graphs, PaperObserver
+from swarm_mj.gnn.feature_sets import make_extractor
+from swarm_mj.gnn.graphs import Graphs, PaperFeatures
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.learning.run import make_model
 from swarm_mj.learning.settings import arm_settings
@@ -22,7 +22,7 @@ from swarm_mj.swarm import Swarm
 
 NUM_ROBOTS = 40
 WARM_UP_WINDOWS = 100  # after which most robots know most others
-SHAPE = GnnShape(num_features=len(PaperObserver.names))  # the paper's
+SHAPE = GnnShape(num_features=len(PaperFeatures.names))  # the paper's
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,12 +153,12 @@ class _Clock(BaseCallback):
 def _graphs(mission: Mission, features: str, num_missions: int) -> Graphs:
     """What teams see that have talked for a while."""
     swarm, policy = Swarm(mission, range(num_missions)), RoundRobin()
-    observer = make_observer(features, mission)
-    observer.start(num_missions, mission.num_robots)
-    graphs = observer.graphs(swarm.views)
+    extractor = make_extractor(features, mission)
+    extractor.start(num_missions, mission.num_robots)
+    graphs = extractor.graphs(swarm.views)
     for _ in range(WARM_UP_WINDOWS):
         swarm.step(policy)
-        graphs = observer.graphs(swarm.views)
+        graphs = extractor.graphs(swarm.views)
     return graphs
 
 

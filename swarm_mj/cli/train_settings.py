@@ -200,9 +200,9 @@ def _changed(training: "Training", options: argparse.Namespace) -> "Training":
 
 
 def _num_features(features: str) -> int:
-    from swarm_mj.gnn.feature_sets import make_observer
+    from swarm_mj.gnn.feature_sets import make_extractor
 
-    return len(make_observer(features, DEFAULTS).names)
+    return len(make_extractor(features, DEFAULTS).names)
 
 
 def _check(training: "Training") -> None:

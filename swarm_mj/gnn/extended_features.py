@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import ClassVar, no_type_check
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32
+from jaxtyping import Bool, Float, Float32, Shaped
 from numba import njit
 
 from swarm_mj.gnn.graphs import Graphs
@@ -20,7 +20,6 @@ from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import from_db
 
-TURN_RADII = (1.5, 2.0, 3.0)  # [ranges]
 ADDRESS_RANGES = 1.2  # a teammate believed farther away is not worth addressing [ranges]
 LONG_WINDOWS = 500.0  # ages count by their logarithm, up to 1 at this one [windows]
 FAR_RANGES = 4.0  # distances count up to here [ranges]
@@ -28,42 +27,44 @@ CROWD = 10.0  # neighbours that count as 1
 TEAM = 40.0  # robots that count as 1
 
 
-class ExtendedObserver:
-    """Features for learning in minutes; see `names`.
+# What a node tells, by its field in `NODE`, in the network's order. A node of the robot itself
+# carries what concerns all of its neighbours.
+FEATURES = {
+    "is_oneself": "is oneself",
+    "is_known": "is known",
+    "timestamp_age": "age of T",
+    "distance": "distance",
+    "is_near": "is in range",
+    "heard_age": "age of last packet heard",  # of oneself: since it last spoke first
+    "attempt_age": "age of last attempt",
+    "addressed_age": "age of last being addressed",
+    "news": "news to it, by its last packet",  # of oneself: to all in range together
+    "unsaid_news": "news to it, if it heard what was said last",  # as above
+    "turn_rank": "rank of its turn",
+    "has_turn_1_5": "has a turn, 1.5 ranges apart",
+    "has_turn_2": "has a turn, 2 ranges apart",
+    "has_turn_3": "has a turn, 3 ranges apart",
+    "has_joined": "has a turn, by interference",
+    "neighbours": "neighbours",
+    "known_share": "share of the team known",
+    "team_size": "size of the team",
+}
+TURN_RANGES = {"has_turn_1_5": 1.5, "has_turn_2": 2.0, "has_turn_3": 3.0}  # [ranges]
+NODE = np.dtype([(field, np.float32) for field in FEATURES])
 
-    A node of the robot itself carries what concerns all of its neighbours: the sums of what is news
-    to them, and when it last spoke.
-    """
 
-    names: ClassVar[tuple[str, ...]] = (
-        "is oneself",
-        "is known",
-        "age of T",
-        "distance",
-        "is in range",
-        "age of last packet heard",  # of oneself: spoken first
-        "age of last attempt",
-        "age of last being addressed",
-        "news to it, by its last packet",  # of oneself: to all in range together
-        "news to it, if it heard what was said last",  # as above
-        "rank of its turn",
-        "has a turn, 1.5 ranges apart",
-        "has a turn, 2 ranges apart",
-        "has a turn, 3 ranges apart",
-        "has a turn, by interference",
-        "neighbours",
-        "share of the team known",
-        "size of the team",
-    )
+class ExtendedFeatures:
+    """Features for learning in minutes; see `FEATURES`."""
+
+    names: ClassVar[tuple[str, ...]] = tuple(FEATURES.values())
 
     def __init__(self, mission: Mission) -> None:
         """Takes the radio's range and threshold from the mission."""
         self._range_m = mission.range_m
         self._threshold = from_db(mission.sinr_threshold_db)
-        self._radius_m = mission.range_m * np.array(TURN_RADII)
 
     def start(self, num_missions: int, num_robots: int) -> None:
-        """Forgets the packets of earlier missions; arguments as in `Observer.start`."""
+        """Forgets the packets of earlier missions; arguments as in `FeatureExtractor.start`."""
         self._memory = Memory(num_missions, num_robots)
 
     def graphs(self, views: LocalViews) -> Graphs:
@@ -71,10 +72,8 @@ class ExtendedObserver:
         self._memory.update(views)
         buffers, memory = views.buffers, self._memory
         num_missions, num_robots = buffers.shape
-        node = np.empty(
-            (num_missions, num_robots, num_robots, len(ExtendedObserver.names)), dtype=np.float32
-        )
-        may_address = np.empty((num_missions, num_robots, num_robots), dtype=np.bool_)
+        node = np.empty((num_missions, num_robots, num_robots), dtype=NODE)
+        may_address = np.empty(node.shape, dtype=np.bool_)
         _fill(
             buffers.timestamp,
             buffers.position_m,
@@ -89,37 +88,37 @@ class ExtendedObserver:
             node,
             may_address,
         )
-        has_joined = node[..., 14]  # by the rule of spatial TDMA
-        is_known = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
-        write_turns(buffers.position_m, is_known, views.now, self._radius_m, node[..., 11:14])
-        write_joined(
-            buffers.position_m,
-            is_known,
-            views.now.astype(np.int64),
-            self._range_m,
-            self._threshold,
-            has_joined,
-        )
+        self._write_turns(views, node)
         rows = (num_missions * num_robots, num_robots)
         return Graphs(
-            node=node.reshape(*rows, len(ExtendedObserver.names)),
+            node=node.view(np.float32).reshape(*rows, len(FEATURES)),
             parent=buffers.parent.reshape(rows),
             may_address=may_address.reshape(rows),
-            has_turn=np.diagonal(has_joined, axis1=1, axis2=2).reshape(-1) > 0.0,
+            has_turn=np.diagonal(node["has_joined"], axis1=1, axis2=2).reshape(-1) > 0.0,
         )
 
+    def _write_turns(self, views: LocalViews, node: Shaped[np.ndarray, "B N N"]) -> None:
+        """Whose turn it is, by distance and by the rule of spatial TDMA."""
+        believed_m = views.buffers.position_m
+        is_known = views.buffers.is_known | np.eye(views.num_robots, dtype=np.bool_)
+        for field, ranges in TURN_RANGES.items():
+            radius_m = np.array([ranges * self._range_m])
+            write_turns(believed_m, is_known, views.now, radius_m, node[field][..., None])
+        now = views.now.astype(np.int64)
+        write_joined(believed_m, is_known, now, self._range_m, self._threshold, node["has_joined"])
 
-class LocalObserver(ExtendedObserver):
+
+class LocalFeatures(ExtendedFeatures):
     """The extended features without whose turn it is: nothing that a common order grants."""
 
     names: ClassVar[tuple[str, ...]] = tuple(
-        name for name in ExtendedObserver.names if "turn" not in name
+        name for name in ExtendedFeatures.names if "turn" not in name
     )
 
     def graphs(self, views: LocalViews) -> Graphs:
         """What every robot's network sees now; must see every window."""
         seen = super().graphs(views)
-        is_kept = np.array([name in self.names for name in ExtendedObserver.names])
+        is_kept = np.array([name in self.names for name in ExtendedFeatures.names])
         return replace(seen, node=seen.node[:, :, is_kept], has_turn=np.zeros_like(seen.has_turn))
 
 
@@ -168,7 +167,7 @@ def _fill(
     neighbour: Float32[np.ndarray, "B N N N"],
     said: Float32[np.ndarray, "B N N"],
     range_m: float,
-    node: Float32[np.ndarray, "B N N F"],
+    node: Shaped[np.ndarray, "B N N"],
     may_address: Bool[np.ndarray, "B N N"],
 ) -> None:
     num_missions, num_robots = now.shape[0], timestamp.shape[1]
@@ -199,7 +198,7 @@ def _fill_teammates(
     neighbour: Float32[np.ndarray, "B N N N"],
     said: Float32[np.ndarray, "B N N"],
     range_m: float,
-    node: Float32[np.ndarray, "N F"],
+    node: Shaped[np.ndarray, "N"],
     may_address: Bool[np.ndarray, "N"],
 ) -> None:
     """The features of every teammate that concern it alone."""
@@ -211,35 +210,36 @@ def _fill_teammates(
         dy = position_m[b, i, k, 1] - position_m[b, i, i, 1]
         ranges = math.sqrt(dx * dx + dy * dy) / range_m
         is_near = is_known[k] and k != i and ranges <= 1.0
-        node[k, 0] = k == i
-        node[k, 1] = is_known[k]
-        node[k, 2] = _log_age(now, timestamp[b, i, k])
-        node[k, 3] = min(ranges, FAR_RANGES) / FAR_RANGES if is_known[k] else 0.0
-        node[k, 4] = is_near
-        node[k, 5] = _log_age(now, heard[b, i, k])
-        node[k, 6] = _log_age(now, last_attempt[b, i, k])
-        node[k, 7] = _log_age(now, addressed_by[b, i, k])
-        node[k, 8], node[k, 9] = 0.0, 0.0
+        node[k].is_oneself = k == i
+        node[k].is_known = is_known[k]
+        node[k].timestamp_age = _log_age(now, timestamp[b, i, k])
+        node[k].distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known[k] else 0.0
+        node[k].is_near = is_near
+        node[k].heard_age = _log_age(now, heard[b, i, k])
+        node[k].attempt_age = _log_age(now, last_attempt[b, i, k])
+        node[k].addressed_age = _log_age(now, addressed_by[b, i, k])
+        node[k].news, node[k].unsaid_news = 0.0, 0.0
         if is_near:
-            node[k, 8], node[k, 9] = _news(own, neighbour[b, i, k], said[b, i])
-        node[k, 10] = ((k - int(now)) % num_robots) / num_robots
-        node[k, 15] = _count_near(position_m[b, i], is_known, k, range_m) / CROWD
-        node[k, 16] = known_share
-        node[k, 17] = num_robots / TEAM
+            node[k].news, node[k].unsaid_news = _news(own, neighbour[b, i, k], said[b, i])
+        node[k].turn_rank = ((k - int(now)) % num_robots) / num_robots
+        node[k].neighbours = _count_near(position_m[b, i], is_known, k, range_m) / CROWD
+        node[k].known_share = known_share
+        node[k].team_size = num_robots / TEAM
         may_address[k] = not is_known[k] or ranges <= ADDRESS_RANGES
 
 
 @njit(cache=True)
 @no_type_check
-def _fill_oneself(i: int, spoken_log_age: float, node: Float32[np.ndarray, "N F"]) -> None:
+def _fill_oneself(i: int, spoken_log_age: float, node: Shaped[np.ndarray, "N"]) -> None:
     """What concerns all neighbours together; the news of each then goes to its logarithm."""
-    total_8, total_9 = 0.0, 0.0
+    news, unsaid_news = 0.0, 0.0
     for k in range(node.shape[0]):
-        total_8 += node[k, 8]
-        total_9 += node[k, 9]
-        node[k, 8], node[k, 9] = _log_news(node[k, 8]), _log_news(node[k, 9])
-    node[i, 5] = spoken_log_age
-    node[i, 8], node[i, 9] = _log_news(total_8), _log_news(total_9)
+        news += node[k].news
+        unsaid_news += node[k].unsaid_news
+        node[k].news = _log_news(node[k].news)
+        node[k].unsaid_news = _log_news(node[k].unsaid_news)
+    node[i].heard_age = spoken_log_age
+    node[i].news, node[i].unsaid_news = _log_news(news), _log_news(unsaid_news)
 
 
 @njit(cache=True)

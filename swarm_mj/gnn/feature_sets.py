@@ -2,31 +2,31 @@
 
 from collections.abc import Callable
 
-from swarm_mj.gnn.extended_features import ExtendedObserver, LocalObserver
-from swarm_mj.gnn.graphs import Observer, PaperObserver, ReferenceObserver
+from swarm_mj.gnn.extended_features import ExtendedFeatures, LocalFeatures
+from swarm_mj.gnn.graphs import FeatureExtractor, PaperFeatures, ReferenceFeatures
 from swarm_mj.mission import Mission
 
-OBSERVERS: dict[str, Callable[[Mission], Observer]] = {
-    "paper": PaperObserver,
-    "reference": ReferenceObserver,
-    "local": LocalObserver,
-    "extended": ExtendedObserver,
+FEATURE_SETS: dict[str, Callable[[Mission], FeatureExtractor]] = {
+    "paper": PaperFeatures,
+    "reference": ReferenceFeatures,
+    "local": LocalFeatures,
+    "extended": ExtendedFeatures,
 }
 
 
-def make_observer(features: str, mission: Mission) -> Observer:
-    """An observer by the name of its feature set.
+def make_extractor(features: str, mission: Mission) -> FeatureExtractor:
+    """An extractor by the name of its feature set.
 
     Args:
-        features: A key of `OBSERVERS`.
+        features: A key of `FEATURE_SETS`.
         mission: Whose area, duration and range normalise the features.
 
     Returns:
-        The observer; it is to be started.
+        The extractor; it is to be started.
 
     Raises:
         ValueError: Unknown name.
     """
-    if features not in OBSERVERS:
-        raise ValueError(f"features must be one of {', '.join(OBSERVERS)}, not {features!r}")
-    return OBSERVERS[features](mission)
+    if features not in FEATURE_SETS:
+        raise ValueError(f"features must be one of {', '.join(FEATURE_SETS)}, not {features!r}")
+    return FEATURE_SETS[features](mission)

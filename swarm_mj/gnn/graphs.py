@@ -4,11 +4,12 @@ Index order: `[r, k]` is what the robot of row `r` knows about robot `k`; row `b
 of mission `b`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal, Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, Float32, Int
+from jaxtyping import Bool, Float, Float32, Int
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 from swarm_mj.protocol.buffers import Buffers
@@ -29,7 +30,7 @@ class Graphs:
 
 
 @runtime_checkable
-class Observer(Protocol):
+class FeatureExtractor(Protocol):
     """Makes graphs of local views; one that remembers packets must see every window."""
 
     names: ClassVar[tuple[str, ...]]  # of the features, in order; there are F
@@ -55,7 +56,7 @@ class Observer(Protocol):
         ...
 
 
-class PaperObserver:
+class PaperFeatures:
     """The paper's features: T, M and L, by the mission's area and duration.
 
     There is one difference: an explicit flag tells what was never heard of from what was observed
@@ -73,23 +74,28 @@ class PaperObserver:
         self._duration_s = mission.num_windows * mission.window_s
 
     def start(self, num_missions: int, num_robots: int) -> None:
-        """Nothing is remembered; arguments as in `Observer.start`."""
+        """Nothing is remembered; arguments as in `FeatureExtractor.start`."""
 
     def graphs(self, views: LocalViews) -> Graphs:
         """The buffers as they are; positions from the area's middle, velocities per mission."""
         buffers = views.buffers
-        num_missions, num_robots = buffers.shape
-        node = np.empty((num_missions, num_robots, num_robots, len(self.names)), dtype=np.float32)
-        node[..., 0] = np.eye(num_robots)
-        node[..., 1] = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
-        node[..., 2] = buffers.timestamp / self._num_windows
-        node[..., 3:5] = buffers.position_m / self._side_m
-        node[..., 5:7] = buffers.velocity_mps * (self._duration_s / self._side_m)
-        node[..., 7] = buffers.last_attempt / self._num_windows
-        return everyone_addressable(node, buffers)
+        is_oneself = np.eye(buffers.shape[1], dtype=np.bool_)
+        position = np.moveaxis(buffers.position_m / self._side_m, -1, 0)
+        velocity = np.moveaxis(buffers.velocity_mps * (self._duration_s / self._side_m), -1, 0)
+        features = {
+            "is oneself": is_oneself,
+            "is known": buffers.is_known | is_oneself,
+            "T": buffers.timestamp / self._num_windows,
+            "p_x": position[0],
+            "p_y": position[1],
+            "v_x": velocity[0],
+            "v_y": velocity[1],
+            "L": buffers.last_attempt / self._num_windows,
+        }
+        return everyone_addressable([features[name] for name in self.names], buffers)
 
 
-class ReferenceObserver:
+class ReferenceFeatures:
     """The seven features of the authors' code, constants included.
 
     Ages are negative; positions and velocities are relative to the robot's own, also of robots
@@ -104,30 +110,42 @@ class ReferenceObserver:
         """Takes nothing from the mission."""
 
     def start(self, num_missions: int, num_robots: int) -> None:
-        """Nothing is remembered; arguments as in `Observer.start`."""
+        """Nothing is remembered; arguments as in `FeatureExtractor.start`."""
 
     def graphs(self, views: LocalViews) -> Graphs:
         """The buffers as the authors' code shows them to its network."""
-        buffers = views.buffers
-        num_missions, num_robots = buffers.shape
-        now = views.now[:, None, None]
-        oneself = np.arange(num_robots)
-        own_position_m = buffers.position_m[:, oneself, oneself][:, :, None]
-        own_velocity_mps = buffers.velocity_mps[:, oneself, oneself][:, :, None]
-        node = np.zeros((num_missions, num_robots, num_robots, len(self.names)), dtype=np.float32)
-        node[..., 0] = (buffers.timestamp - now) / REFERENCE_WINDOWS
-        node[..., 2:4] = (buffers.position_m - own_position_m) / MISSION_DISTANCE_M
-        node[..., 4:6] = (buffers.velocity_mps - own_velocity_mps) / MISSION_DISTANCE_M
-        node[..., 6] = (buffers.last_attempt - now) / REFERENCE_WINDOWS
-        return everyone_addressable(node, buffers)
+        buffers, now = views.buffers, views.now[:, None, None]
+        position = _from_own(buffers.position_m) / MISSION_DISTANCE_M
+        velocity = _from_own(buffers.velocity_mps) / MISSION_DISTANCE_M
+        features = {
+            "T - t": (buffers.timestamp - now) / REFERENCE_WINDOWS,
+            "zero": np.zeros(buffers.timestamp.shape),
+            "p_x relative": position[0],
+            "p_y relative": position[1],
+            "v_x relative": velocity[0],
+            "v_y relative": velocity[1],
+            "L - t": (buffers.last_attempt - now) / REFERENCE_WINDOWS,
+        }
+        return everyone_addressable([features[name] for name in self.names], buffers)
 
 
-def everyone_addressable(node: Float32[np.ndarray, "B N N F"], buffers: Buffers) -> Graphs:
-    """Graphs in which every robot may be addressed."""
-    num_missions, num_robots, _, num_features = node.shape
+def _from_own(
+    vectors: Float[np.ndarray, "B N N axis"],
+) -> Float[np.ndarray, "axis B N N"]:
+    """Each robot's vectors minus its own, axis by axis."""
+    own = np.diagonal(vectors, axis1=1, axis2=2).swapaxes(1, 2)
+    return np.moveaxis(vectors - own[:, :, None], -1, 0)
+
+
+def everyone_addressable(features: Sequence[np.ndarray], buffers: Buffers) -> Graphs:
+    """Graphs with these features, in order, in which every robot may be addressed."""
+    num_missions, num_robots = buffers.shape
     rows = (num_missions * num_robots, num_robots)
+    node = np.empty((*buffers.timestamp.shape, len(features)), dtype=np.float32)
+    for k, values in enumerate(features):
+        node[..., k] = values
     return Graphs(
-        node=node.reshape(*rows, num_features),
+        node=node.reshape(*rows, len(features)),
         parent=buffers.parent.reshape(rows),
         may_address=np.ones(rows, dtype=np.bool_),
         has_turn=np.zeros(rows[0], dtype=np.bool_),

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.evaluation.statistics import standard_error
-from swarm_mj.gnn.feature_sets import make_observer
+from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.learning.settings import HELD_OUT_SEED, Training
 from swarm_mj.mission import Mission
@@ -45,8 +45,8 @@ class _Flown:
 
 def held_out_policy(training: Training, network: AggregationGnn, mission: Mission) -> LearnedPolicy:
     """The policy under training, as it flies."""
-    observer = make_observer(training.features, mission)
-    return LearnedPolicy(network, observer, silence_logit=training.silence_logit)
+    extractor = make_extractor(training.features, mission)
+    return LearnedPolicy(network, extractor, silence_logit=training.silence_logit)
 
 
 def held_out_missions(training: Training) -> list[Mission]:

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from swarm_mj.gnn.feature_sets import make_observer
-from swarm_mj.gnn.graphs import Graphs, Observer
+from swarm_mj.gnn.feature_sets import make_extractor
+from swarm_mj.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.learning.credit import credits_of
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.buffers import NO_PARENT
@@ -69,7 +69,7 @@ class Group:
         self.mission = mission
         self._rng = rng
         self.num_missions = num_missions
-        self._observer: Observer = make_observer(features, mission)
+        self._extractor: FeatureExtractor = make_extractor(features, mission)
         self._last_window = first_windows
         self._seeds = self._draw_seeds()
         self._swarm = Swarm(mission, self._seeds)
@@ -89,7 +89,7 @@ class Group:
         if with_credit:
             credit = credits_of(before, swarm.states.position_m, recipient, swarm.channel, now)
         self._recipients.append(recipient.astype(np.int16))
-        graphs, last_graphs = self._observer.graphs(swarm.views), None
+        graphs, last_graphs = self._extractor.graphs(swarm.views), None
         is_cut = self._last_window < self.mission.num_windows
         if swarm.now[0] >= self._last_window:
             last_graphs = graphs
@@ -122,14 +122,14 @@ class Group:
         for recipient in course.recipients:
             self._swarm.exchange(recipient.astype(np.int64))
             self._recipients.append(recipient)
-            graphs = self._observer.graphs(self._swarm.views)
+            graphs = self._extractor.graphs(self._swarm.views)
         return graphs
 
     def _begin(self) -> Graphs:
         """What the robots see at the start of new missions."""
         self._recipients: list[Int[np.ndarray, "B N"]] = []
-        self._observer.start(self.num_missions, self.mission.num_robots)
-        self.first_graphs = self._observer.graphs(self._swarm.views)
+        self._extractor.start(self.num_missions, self.mission.num_robots)
+        self.first_graphs = self._extractor.graphs(self._swarm.views)
         return self.first_graphs
 
     def _draw_seeds(self) -> list[int]:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args
 
-from swarm_mj.gnn.feature_sets import make_observer
+from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.graphs import FeatureSet
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.learning.team_env import Reward
@@ -197,7 +197,7 @@ def _team_settings(mission: Mission, robots: tuple[int, ...], seed: int) -> Trai
 
 
 def _num_features(features: str) -> int:
-    return len(make_observer(features, Mission()).names)
+    return len(make_extractor(features, Mission()).names)
 
 
 def from_json(given: dict[str, Any]) -> Training:

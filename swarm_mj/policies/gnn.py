@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Float, Int
 
 from swarm_mj.gnn.action_distribution import recipient_logits, sample
-from swarm_mj.gnn.graphs import Observer
+from swarm_mj.gnn.graphs import FeatureExtractor
 from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.policy import DecentralisedPolicy, Parameters
@@ -28,7 +28,7 @@ class LearnedPolicy(DecentralisedPolicy):
     def __init__(
         self,
         network: AggregationGnn,
-        observer: Observer,
+        extractor: FeatureExtractor,
         *,
         silence_logit: float = 0.0,
         is_deterministic: bool = False,
@@ -38,12 +38,12 @@ class LearnedPolicy(DecentralisedPolicy):
         Args:
             network: Of one or two numbers per node, as `recipient_logits` takes them, on any
                 device.
-            observer: Makes the graphs it was trained on.
+            extractor: Makes the graphs it was trained on.
             silence_logit: Added to silence, but in a robot's own turn.
             is_deterministic: Take the most probable recipient instead of a draw.
         """
         self._network = network
-        self._observer = observer
+        self._extractor = extractor
         self._silence_logit = silence_logit
         self._is_deterministic = is_deterministic
 
@@ -58,7 +58,7 @@ class LearnedPolicy(DecentralisedPolicy):
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Forgets packets; takes each mission's generator. Arguments as in `Policy.start`."""
-        self._observer.start(len(rngs), num_robots)
+        self._extractor.start(len(rngs), num_robots)
         self._uniform = Stream(rngs, uniform, (num_robots,))
         self._owner = torch.arange(num_robots).repeat(len(rngs))
 
@@ -72,7 +72,7 @@ class LearnedPolicy(DecentralisedPolicy):
 
     def _logits(self, views: LocalViews) -> Float[np.ndarray, "R N"]:
         """Over the recipients of all robots, mission by mission."""
-        graphs = self._observer.graphs(views)
+        graphs = self._extractor.graphs(views)
         node = torch.from_numpy(graphs.node)
         parent = torch.from_numpy(graphs.parent.astype(np.int64))
         may_address = torch.from_numpy(graphs.may_address)
@@ -87,7 +87,7 @@ class LearnedPolicy(DecentralisedPolicy):
 
     def _digest(self) -> str:
         """A hash of all that its decisions follow from."""
-        said = (self._network.shape, self._observer.names, self._silence_logit)
+        said = (self._network.shape, self._extractor.names, self._silence_logit)
         digest = hashlib.sha256(repr(said).encode())
         for name, tensor in sorted(self._network.state_dict().items()):
             digest.update(name.encode() + b"\0" + tensor.cpu().contiguous().numpy().tobytes())

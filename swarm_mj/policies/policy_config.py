@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from types import NoneType
 from typing import Any, get_args
 
-from swarm_mj.gnn.feature_sets import make_observer
+from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.mission import Mission
 
@@ -47,7 +47,7 @@ class PolicyConfig:
     """
 
     network: GnnShape
-    features: str  # the name of a feature set, see `make_observer`
+    features: str  # the name of a feature set, see `make_extractor`
     silence_logit: float = 0.0  # added to silence, but in a robot's own turn
     training: dict[str, Any]  # JSON: the settings, the seed, the budget spent, the command
     evaluation: dict[str, Any]  # JSON: what it cost on which missions
@@ -55,7 +55,7 @@ class PolicyConfig:
     version: str  # as above
 
     def __post_init__(self) -> None:
-        num_features = len(make_observer(self.features, Mission()).names)
+        num_features = len(make_extractor(self.features, Mission()).names)
         if self.network.num_features != num_features:
             raise ValueError(
                 f"network.num_features is {self.network.num_features}, but the {self.features} "

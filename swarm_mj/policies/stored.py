@@ -9,7 +9,7 @@ from safetensors.torch import load, save
 from torch import Tensor
 
 from swarm_mj.gnn.fast import FastAggregationGnn
-from swarm_mj.gnn.feature_sets import make_observer
+from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.io.atomic_directory import atomic_directory, present_folder
 from swarm_mj.mission import Mission
@@ -74,7 +74,7 @@ def load_policy(folder: Path, mission: Mission, *, is_deterministic: bool = Fals
     network, config = read_policy(folder)
     return LearnedPolicy(
         network,
-        make_observer(config.features, mission),
+        make_extractor(config.features, mission),
         silence_logit=config.silence_logit,
         is_deterministic=is_deterministic,
     )

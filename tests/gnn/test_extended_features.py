@@ -1,12 +1,13 @@
-"""Every extended feature by hand, on teams of a few robots; times are in windows."""
+"""Every extended feature by hand, on teams of a few robots, and laws; times are in windows."""
 
 import copy
 import math
 
+import mixed_missions
 import numpy as np
 import pytest
 
-from swarm_mj.gnn.extended_features import ExtendedObserver
+from swarm_mj.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.mission import paper
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
@@ -36,12 +37,12 @@ def buffers_of_robot_1(now):
 
 def seen(views, mission=MISSION, robot=OBSERVER):
     """The features of each teammate by name, and whom it may address, after these views."""
-    observer = ExtendedObserver(mission)
-    observer.start(1, views[0].num_robots)
+    extractor = ExtendedFeatures(mission)
+    extractor.start(1, views[0].num_robots)
     for view in views:
-        graphs = observer.graphs(view)
+        graphs = extractor.graphs(view)
     values = graphs.node[robot].T
-    return dict(zip(observer.names, values, strict=True)), graphs.may_address[robot]
+    return dict(zip(extractor.names, values, strict=True)), graphs.may_address[robot]
 
 
 def silent_views(now=10.0):
@@ -112,9 +113,9 @@ def check_turns(found, *apart_1_5_2_3, by_interference):
 
 def has_turn(view):
     """Whether each robot has a turn by its own beliefs."""
-    observer = ExtendedObserver(MISSION)
-    observer.start(1, 4)
-    return observer.graphs(view).has_turn.tolist()
+    extractor = ExtendedFeatures(MISSION)
+    extractor.start(1, 4)
+    return extractor.graphs(view).has_turn.tolist()
 
 
 @pytest.mark.parametrize(
@@ -238,12 +239,79 @@ def test_news_to_those_in_range():
 
 
 def test_a_start_forgets_what_was_heard():
-    observer = ExtendedObserver(MISSION)
-    observer.start(1, 4)
+    extractor = ExtendedFeatures(MISSION)
+    extractor.start(1, 4)
     for view in views_of_a_talk():
-        observer.graphs(view)
-    observer.start(1, 4)
-    node = observer.graphs(silent_views()[0]).node
-    fresh = ExtendedObserver(MISSION)
+        extractor.graphs(view)
+    extractor.start(1, 4)
+    node = extractor.graphs(silent_views()[0]).node
+    fresh = ExtendedFeatures(MISSION)
     fresh.start(1, 4)
     np.testing.assert_array_equal(node, fresh.graphs(silent_views()[0]).node)
+
+
+def test_every_feature_is_in_range_and_all_named_here_are_all():
+    swarm_views = mixed_missions.flown(5)
+    extractor = ExtendedFeatures(mixed_missions.MISSION)
+    extractor.start(len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS)
+    for view in swarm_views:
+        node = extractor.graphs(view).node
+        assert node.shape == (
+            len(mixed_missions.SEEDS) * mixed_missions.NUM_ROBOTS,
+            mixed_missions.NUM_ROBOTS,
+            len(extractor.names),
+        )
+        assert np.all((node >= 0.0) & (node <= 2.0))
+    assert len(extractor.names) == 18
+
+
+@pytest.mark.parametrize("robot", [0, 4])
+def test_eq9_a_graph_rests_on_what_its_robot_can_know(robot):
+    """All but its own buffer and the packets it decodes is another team's."""
+    extractors = [ExtendedFeatures(mixed_missions.MISSION) for _ in range(2)]
+    for extractor in extractors:
+        extractor.start(len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS)
+    rows = [b * mixed_missions.NUM_ROBOTS + robot for b in range(len(mixed_missions.SEEDS))]
+    num_others = 0
+    for pair in zip(*mixed_missions.mixed_views(robot), strict=True):
+        graphs, same = (o.graphs(view) for o, view in zip(extractors, pair, strict=True))
+        for name in ("node", "parent", "may_address", "has_turn"):
+            np.testing.assert_array_equal(getattr(graphs, name)[rows], getattr(same, name)[rows])
+        num_others += np.any(graphs.node != same.node)
+    assert num_others > 50
+
+
+def test_the_local_features_are_the_extended_ones_without_turns():
+    extended, local = (
+        ExtendedFeatures(mixed_missions.MISSION),
+        LocalFeatures(mixed_missions.MISSION),
+    )
+    kept = [k for k, name in enumerate(extended.names) if "turn" not in name]
+    assert local.names == tuple(extended.names[k] for k in kept)
+    assert len(local.names) == 13
+    for extractor in (extended, local):
+        extractor.start(len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS)
+    for view in mixed_missions.flown(6):
+        graphs, fewer = extended.graphs(view), local.graphs(view)
+        np.testing.assert_array_equal(fewer.node, graphs.node[:, :, kept])
+        np.testing.assert_array_equal(fewer.may_address, graphs.may_address)
+        np.testing.assert_array_equal(fewer.parent, graphs.parent)
+        assert not np.any(fewer.has_turn)
+
+
+def test_names_matter_for_turns_only():
+    """A team under other names sees the same, each under its new name, but for whose turn it is."""
+    name = np.random.default_rng(1).permutation(mixed_missions.NUM_ROBOTS)
+    new_name = np.argsort(name)
+    one, other = ExtendedFeatures(mixed_missions.MISSION), ExtendedFeatures(mixed_missions.MISSION)
+    for extractor in (one, other):
+        extractor.start(len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS)
+    is_turn = np.array(["turn" in called for called in one.names])
+    assert is_turn.sum() == 5
+    for view in mixed_missions.flown(6):
+        node = one.graphs(view).node.reshape(
+            len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS, mixed_missions.NUM_ROBOTS, -1
+        )
+        same = other.graphs(mixed_missions.renamed(view, name, new_name)).node.reshape(node.shape)
+        expected = node[:, name][:, :, name]
+        np.testing.assert_allclose(same[..., ~is_turn], expected[..., ~is_turn], atol=1e-6)

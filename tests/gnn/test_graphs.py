@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from swarm_mj.gnn.feature_sets import OBSERVERS, make_observer
-from swarm_mj.gnn.graphs import PaperObserver, ReferenceObserver
+from swarm_mj.gnn.feature_sets import FEATURE_SETS, make_extractor
+from swarm_mj.gnn.graphs import PaperFeatures, ReferenceFeatures
 from swarm_mj.mission import paper
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.protocol.buffers import NO_PARENT, empty_buffers
@@ -27,13 +27,13 @@ def views_of_robot_1():
     return LocalViews(buffers=buffers.read_only(), now=np.array([50.0]), phases=())
 
 
-def started(observer, num_missions=1, num_robots=4):
-    observer.start(num_missions, num_robots)
-    return observer
+def started(extractor, num_missions=1, num_robots=4):
+    extractor.start(num_missions, num_robots)
+    return extractor
 
 
 def test_iii_a_the_papers_features_by_hand():
-    graphs = started(PaperObserver(MISSION)).graphs(views_of_robot_1())
+    graphs = started(PaperFeatures(MISSION)).graphs(views_of_robot_1())
     per_side = 1.0 / SIDE_M
     moved = DURATION_S / SIDE_M
     expected = [
@@ -43,12 +43,12 @@ def test_iii_a_the_papers_features_by_hand():
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     ]
     np.testing.assert_allclose(graphs.node[1], expected, rtol=1e-6)
-    assert PaperObserver.names[:3] == ("is oneself", "is known", "T")
+    assert PaperFeatures.names[:3] == ("is oneself", "is known", "T")
 
 
 def test_the_codes_features_by_hand():
     """Constants included: 500 windows, 1000 m; unknown robots stand in the middle since t = 0."""
-    graphs = started(ReferenceObserver(MISSION)).graphs(views_of_robot_1())
+    graphs = started(ReferenceFeatures(MISSION)).graphs(views_of_robot_1())
     expected = [
         [-0.06, 0.0, -0.16, 0.06, 0.0005, -0.00225, -0.1],
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.1],
@@ -60,21 +60,21 @@ def test_the_codes_features_by_hand():
 
 @pytest.mark.parametrize("features", ["paper", "reference"])
 def test_the_edges_are_the_parents_and_anyone_may_be_addressed(features):
-    graphs = started(make_observer(features, MISSION)).graphs(views_of_robot_1())
+    graphs = started(make_extractor(features, MISSION)).graphs(views_of_robot_1())
     assert graphs.parent.tolist()[1] == [3, NO_PARENT, NO_PARENT, NO_PARENT]
     assert np.all(graphs.may_address)
     assert not np.any(graphs.has_turn)
 
 
-@pytest.mark.parametrize("features", OBSERVERS)
+@pytest.mark.parametrize("features", FEATURE_SETS)
 def test_rows_are_robots_mission_by_mission(features):
     """Row b N + i is what robot i of mission b sees, as if its mission were alone."""
     together, talk = Swarm(MISSION, [1, 2, 3]), RandomFlooding(0.3)
     together.start(talk)
-    observer = started(make_observer(features, MISSION), num_missions=3)
-    alone = started(make_observer(features, MISSION))
+    extractor = started(make_extractor(features, MISSION), num_missions=3)
+    alone = started(make_extractor(features, MISSION))
     for window in range(8):
-        graphs, views = observer.graphs(together.views), together.views
+        graphs, views = extractor.graphs(together.views), together.views
         own = LocalViews(
             buffers=type(views.buffers)(**{k: v[1:2] for k, v in vars(views.buffers).items()}),
             now=views.now[1:2],
@@ -91,16 +91,16 @@ def test_rows_are_robots_mission_by_mission(features):
         together.step(talk)
 
 
-@pytest.mark.parametrize("features", OBSERVERS)
+@pytest.mark.parametrize("features", FEATURE_SETS)
 def test_features_are_finite_and_named(features):
-    observer, swarm = make_observer(features, MISSION), Swarm(MISSION, [1])
-    graphs = started(observer).graphs(swarm.views)
-    assert graphs.node.shape == (4, 4, len(observer.names))
-    assert len(set(observer.names)) == len(observer.names)
+    extractor, swarm = make_extractor(features, MISSION), Swarm(MISSION, [1])
+    graphs = started(extractor).graphs(swarm.views)
+    assert graphs.node.shape == (4, 4, len(extractor.names))
+    assert len(set(extractor.names)) == len(extractor.names)
     assert np.all(np.isfinite(graphs.node))
     assert np.all(np.diagonal(graphs.may_address))
 
 
 def test_unknown_features_are_a_clear_error():
     with pytest.raises(ValueError, match="one of paper, reference, local, extended, not 'all'"):
-        make_observer("all", MISSION)
+        make_extractor("all", MISSION)

@@ -60,9 +60,9 @@ def test_what_is_seen_after_an_end_is_the_new_missions_start():
         outcome = group.step(random_recipients(rng, group), with_credit=False)
     assert outcome.last_graphs is not None
     new = Swarm(MISSION, group.course().seeds)
-    observer = group._observer
-    observer.start(4, 5)
-    expected = observer.graphs(new.views)
+    extractor = group._extractor
+    extractor.start(4, 5)
+    expected = extractor.graphs(new.views)
     np.testing.assert_array_equal(outcome.graphs.node, expected.node)
     np.testing.assert_array_equal(outcome.graphs.parent, expected.parent)
     assert np.any(outcome.last_graphs.node != outcome.graphs.node)

@@ -7,7 +7,7 @@ import pytest
 import torch
 from small_runs import small_training
 
-from swarm_mj.gnn.feature_sets import make_observer
+from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.learning.settings import arm_settings, from_json
 from swarm_mj.mission import PRESETS, paper, reference
@@ -24,7 +24,7 @@ def test_settings_come_back_from_json_as_they_were(arm, preset):
 @pytest.mark.parametrize(("arm", "preset"), ARMS)
 def test_a_network_takes_what_its_features_are(arm, preset):
     training = arm_settings(arm, PRESETS[preset]("random-walk"), (10,))
-    names = make_observer(training.features, training.mission).names
+    names = make_extractor(training.features, training.mission).names
     assert training.network.num_features == len(names)
 
 

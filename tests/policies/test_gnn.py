@@ -8,7 +8,7 @@ from mixed_missions import NUM_ROBOTS, SEEDS, mixed_views
 from tiny_policies import FEATURES, save_tiny, tiny_network
 
 from swarm_mj.gnn.action_distribution import recipient_logits, sample
-from swarm_mj.gnn.feature_sets import make_observer
+from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.gnn import LearnedPolicy
 from swarm_mj.policies.policy import DecentralisedPolicy
@@ -39,9 +39,9 @@ def learned(
         for layer in network.modules():
             if isinstance(layer, torch.nn.Linear):
                 layer.weight *= sharpness
-    observer = make_observer(features, mission)
+    extractor = make_extractor(features, mission)
     return LearnedPolicy(
-        network, observer, silence_logit=silence_logit, is_deterministic=is_deterministic
+        network, extractor, silence_logit=silence_logit, is_deterministic=is_deterministic
     )
 
 
@@ -70,13 +70,13 @@ def logits_of(policy, graphs, silence_logit):
 def test_robots_draw_from_the_networks_logits(features, outputs):
     """The first windows again, put together from the network, the draw and the mission's dice."""
     policy = learned(features, outputs=outputs, silence_logit=0.7)
-    observer, rngs = make_observer(features, MISSION), [np.random.default_rng(b) for b in (5, 6)]
-    observer.start(2, 7)
+    extractor, rngs = make_extractor(features, MISSION), [np.random.default_rng(b) for b in (5, 6)]
+    extractor.start(2, 7)
     policy.start(7, [np.random.default_rng(b) for b in (5, 6)])
     dice = np.stack([rng.random((64, 7)) for rng in rngs])  # [mission, window, robot]
     swarm = Swarm(MISSION, [1, 2])
     for window in range(5):
-        logits = logits_of(policy, observer.graphs(swarm.views), 0.7)
+        logits = logits_of(policy, extractor.graphs(swarm.views), 0.7)
         expected = sample(logits, dice[:, window].ravel()).reshape(2, 7)
         recipient = policy.recipients(swarm.views)
         np.testing.assert_array_equal(recipient, expected)
@@ -87,12 +87,12 @@ def test_robots_draw_from_the_networks_logits(features, outputs):
 def test_the_mode_is_taken_on_request(features):
     """Of two robots that look alike, as those never heard of do, it may be either."""
     policy = learned(features, silence_logit=0.7, is_deterministic=True)
-    observer = make_observer(features, MISSION)
+    extractor = make_extractor(features, MISSION)
     policy.start(7, [np.random.default_rng(b) for b in (5, 6)])
-    observer.start(2, 7)
+    extractor.start(2, 7)
     swarm, rng = Swarm(MISSION, [1, 2]), np.random.default_rng(1)
     for _ in range(30):
-        logits = logits_of(policy, observer.graphs(swarm.views), 0.7)
+        logits = logits_of(policy, extractor.graphs(swarm.views), 0.7)
         recipient = policy.recipients(swarm.views)
         chosen = logits[np.arange(14), recipient.ravel()]
         np.testing.assert_allclose(chosen, logits.max(axis=1), atol=1e-5)
@@ -183,7 +183,7 @@ def test_the_digest_tells_whatever_changes_decisions():
         policy._network.output.bias[0] += 1e-6
     assert policy.parameters["digest"] != before
     edges = [
-        LearnedPolicy(tiny_network(edges=edges), make_observer("extended", MISSION))
+        LearnedPolicy(tiny_network(edges=edges), make_extractor("extended", MISSION))
         for edges in ("paper", "reference")
     ]
     assert edges[0].parameters["digest"] != edges[1].parameters["digest"]
