@@ -1,7 +1,7 @@
 """The card of a stored policy, for whoever finds it: what it is, where it comes from, its costs."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from swarm_mj.policies.policy_config import PolicyConfig
@@ -16,8 +16,8 @@ EDGES = {
 def model_card(config: PolicyConfig) -> str:
     """A README in Markdown that says what the config holds, and nothing else.
 
-    Of `training` and `evaluation` it lists every value, under dotted names; lists of objects become
-    tables, a text named `command` a block.
+    Of `training` and `evaluation` it lists every value, under dotted names; a text named `command`
+    becomes a block.
     """
     training = dict(_flat(config.training))
     task = next((v for k, v in training.items() if _last(k) == "task" and isinstance(v, str)), "")
@@ -55,33 +55,14 @@ def _network(config: PolicyConfig) -> str:
 
 
 def _described(values: Mapping[str, Any]) -> Iterator[str]:
-    """Paragraphs: a list of what is simple, then tables and commands."""
+    """Paragraphs: a list of the values, then the commands among them."""
     if not values:
         yield "Nothing was noted."
-    blocks = {key: value for key, value in values.items() if _is_command(key, value)}
-    tables = {key: value for key, value in values.items() if _is_table(value)}
-    simple = [f"- {k}: {_text(v)}" for k, v in values.items() if k not in blocks | tables]
-    if simple:
-        yield "\n".join(simple)
-    for command in blocks.values():
+    commands = {k: v for k, v in values.items() if _last(k) == "command" and isinstance(v, str)}
+    if listed := [f"- {k}: {_text(v)}" for k, v in values.items() if k not in commands]:
+        yield "\n".join(listed)
+    for command in commands.values():
         yield "    " + _one_line(command)
-    for key, rows in tables.items():
-        yield f"{key}:\n\n{_table(rows)}"
-
-
-def _is_command(key: str, value: Any) -> bool:  # noqa: ANN401 - anything in JSON
-    return _last(key) == "command" and isinstance(value, str)
-
-
-def _is_table(value: Any) -> bool:  # noqa: ANN401 - anything in JSON
-    return isinstance(value, list) and bool(value) and all(isinstance(row, dict) for row in value)
-
-
-def _table(rows: Sequence[Mapping[str, Any]]) -> str:
-    columns = list(dict.fromkeys(key for row in rows for key in row))
-    lines = [columns, ["---"] * len(columns)]
-    lines += [[_text(row[key]) if key in row else "" for key in columns] for row in rows]
-    return "\n".join("| " + " | ".join(map(_cell, line)) + " |" for line in lines)
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -105,7 +86,3 @@ def _text(value: Any) -> str:  # noqa: ANN401 - anything in JSON
 
 def _one_line(text: str) -> str:
     return " ".join(text.split())
-
-
-def _cell(text: str) -> str:
-    return _one_line(text).replace("|", "\\|")

@@ -19,7 +19,8 @@ def test_the_card_of_a_trained_policy():
         },
         evaluation={
             "episodes": 100,
-            "results": [{"robots": 10, "aoi": 7.123456789}, {"robots": 80, "note": "a|b\nc"}],
+            "results": [{"robots": 10, "note": "a|b\nc"}],
+            "by size": {"10": {"aoi": 7.123456789}},
         },
     )
     for line in (
@@ -34,9 +35,8 @@ def test_the_card_of_a_trained_policy():
         "- seed: 3",
         "By swarm_mj 1.2.3, commit abc123.",
         "- episodes: 100",
-        "| robots | aoi | note |",
-        "| 10 | 7.12346 |  |",
-        "| 80 |  | a\\|b c |",
+        '- results: [{"robots": 10, "note": "a|b\\nc"}]',
+        "- by size.10.aoi: 7.12346",
         "Apache-2.0, as swarm_mj.",
     ):
         assert line in written.splitlines()
@@ -48,14 +48,19 @@ def test_what_is_not_known_is_not_said():
     assert "--task TASK" in written
     assert "commit" not in written
     assert "By swarm_mj 1.2.3." in written
-    assert "|" not in written
 
 
 def test_odd_values_stay_on_their_lines():
     """Whatever a value holds, it stays on its line."""
     odd = {"# a": "b\n# c", "empty": {}, "none": None, "rows": [], "flags": [{"x": {"y": [1]}}]}
     written = card(training=odd, evaluation={"command": "x\ny"}).splitlines()
-    for line in ("- # a: b # c", "- empty: {}", "- none: null", "- rows: []", '| {"y": [1]} |'):
+    for line in (
+        "- # a: b # c",
+        "- empty: {}",
+        "- none: null",
+        "- rows: []",
+        '- flags: [{"x": {"y": [1]}}]',
+    ):
         assert line in written
     assert "    x y" in written
     assert sum(line.startswith("#") for line in written) == 5
