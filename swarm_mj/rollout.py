@@ -12,7 +12,7 @@ from swarm_mj.swarm import Swarm
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flown:
+class WindowRecord:
     """One window of a flight, in every mission."""
 
     costs: WindowCosts
@@ -44,7 +44,7 @@ class Summary:
     hearers_per_packet: Float[np.ndarray, "B"]  # robots that decoded a broadcast; nan if none flew
 
 
-def fly(swarm: Swarm, policy: Policy) -> Iterator[Flown]:
+def rollout(swarm: Swarm, policy: Policy) -> Iterator[WindowRecord]:
     """Flies the mission, one window at a time, for the caller to watch, record or break off.
 
     Args:
@@ -62,10 +62,10 @@ def fly(swarm: Swarm, policy: Policy) -> Iterator[Flown]:
     swarm.start(policy)
     for _ in range(swarm.mission.num_windows):
         costs = swarm.step(policy)
-        yield Flown(costs=costs, hops=mean_hops(swarm.buffers, swarm.states.is_active))
+        yield WindowRecord(costs=costs, hops=mean_hops(swarm.buffers, swarm.states.is_active))
 
 
-def summarise(flown: Sequence[Flown]) -> Summary:
+def summarise(flown: Sequence[WindowRecord]) -> Summary:
     """The costs of the windows flown.
 
     Args:

@@ -6,7 +6,7 @@ from channels import to_nobody
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.rollout import fly, summarise
+from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
 NUM_WINDOWS = 100  # in which a spread of 3 m/s shrinks to 0.1 mm/s, far above rounding errors
@@ -56,7 +56,7 @@ def test_flock_that_hears_nothing_never_converges(name, preset, physics):
     mission = preset("flocking", physics=physics, num_robots=10, num_windows=50)
     swarm = Swarm(mission, [1, 2], channel=to_nobody)
     start_mps = swarm.states.velocity_mps
-    summary = summarise(list(fly(swarm, make_policy(name, mission))))
+    summary = summarise(list(rollout(swarm, make_policy(name, mission))))
     np.testing.assert_allclose(swarm.states.velocity_mps, start_mps, rtol=1e-12)
     variance = np.sum(np.var(start_mps, axis=1), axis=1)
     np.testing.assert_allclose(summary.velocity_variance_last, variance, rtol=1e-12)
@@ -75,7 +75,7 @@ def test_fig6_every_baseline_makes_the_flock_converge(name, preset):
     mission = preset("flocking")
     swarm = Swarm(mission, list(range(20)))
     start = np.sum(spread_mps(swarm) ** 2, axis=1)
-    summary = summarise(list(fly(swarm, make_policy(name, mission))))
+    summary = summarise(list(rollout(swarm, make_policy(name, mission))))
     kept = summary.velocity_variance_last / start
     assert kept.max() < 1 / 3
     assert np.median(kept) < 1e-3
@@ -90,7 +90,7 @@ def test_a_flock_between_walls_converges_too(name, physics):
     """
     swarm = Swarm(paper("flocking", physics=physics, boundary="reflect"), list(range(20)))
     start = np.sum(spread_mps(swarm) ** 2, axis=1)
-    summary = summarise(list(fly(swarm, make_policy(name, swarm.mission))))
+    summary = summarise(list(rollout(swarm, make_policy(name, swarm.mission))))
     kept = summary.velocity_variance_last / start
     assert kept.max() < 1 / 3
     assert np.median(kept) < 5e-3

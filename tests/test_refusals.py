@@ -12,7 +12,7 @@ from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.protocol.buffers import empty_buffers, merge, record_attempt
 from swarm_mj.protocol.costs import mean_hops
-from swarm_mj.rollout import fly
+from swarm_mj.rollout import rollout
 from swarm_mj.swarm import Swarm
 
 NOW = np.ones(2)
@@ -103,9 +103,9 @@ def test_a_policy_must_say_what_it_knows():
 
 def test_a_swarm_flies_once():
     swarm = Swarm(small(), [1])
-    list(fly(swarm, RandomFlooding(0.1)))
+    list(rollout(swarm, RandomFlooding(0.1)))
     with pytest.raises(ValueError, match="flown 5 windows already; restart"):
-        next(fly(swarm, RandomFlooding(0.1)))
+        next(rollout(swarm, RandomFlooding(0.1)))
 
 
 def test_a_policy_cannot_write_what_it_sees():

@@ -7,7 +7,7 @@ import pytest
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import Packets, WindowCosts, mean_hops
-from swarm_mj.rollout import Flown, fly, summarise
+from swarm_mj.rollout import WindowRecord, rollout, summarise
 from swarm_mj.swarm import Swarm
 
 ADDRESSED = ("attempted", "delivered", "overheard", "answered")
@@ -29,7 +29,7 @@ def flown_by_hand(age, variance, is_complete, hops, packets):
         velocity_variance_m2ps2=np.array(variance),
         packets=packets_of(sent=counts["attempted"], **counts),
     )
-    return Flown(costs=costs, hops=np.array(hops))
+    return WindowRecord(costs=costs, hops=np.array(hops))
 
 
 THREE_WINDOWS = [
@@ -116,7 +116,7 @@ def test_flight_is_the_missions_windows_step_by_step():
     rival = make_policy("mst", swarm.mission, 0.3)
     by_hand.start(rival)
     num_flown = 0
-    for window in fly(swarm, policy):
+    for window in rollout(swarm, policy):
         costs = by_hand.step(rival)
         num_flown += 1
         np.testing.assert_array_equal(swarm.now, num_flown)
@@ -127,7 +127,7 @@ def test_flight_is_the_missions_windows_step_by_step():
 
 def test_flight_can_be_broken_off():
     swarm, policy = small_flight()
-    assert len(list(itertools.islice(fly(swarm, policy), 5))) == 5
+    assert len(list(itertools.islice(rollout(swarm, policy), 5))) == 5
     np.testing.assert_array_equal(swarm.now, 5.0)
 
 
@@ -135,7 +135,7 @@ def test_windows_of_a_flight_keep_their_costs():
     """What a window cost does not change while the flight goes on."""
     swarm, policy = small_flight()
     ages, flown = [], []
-    for window in fly(swarm, policy):
+    for window in rollout(swarm, policy):
         ages.append(window.costs.age_windows.copy())
         flown.append(window)
     np.testing.assert_array_equal([window.costs.age_windows for window in flown], ages)

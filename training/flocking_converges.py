@@ -20,7 +20,7 @@ from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission, paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.rollout import fly, summarise
+from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
 
@@ -39,7 +39,7 @@ def left_over(settings: Settings, policy_name: str) -> np.ndarray:
     seeds = range(settings.first_seed, settings.first_seed + settings.num_missions)
     swarm = Swarm(settings.mission, seeds)
     policy = make_policy(policy_name, settings.mission)
-    windows = fly(swarm, policy)
+    windows = rollout(swarm, policy)
     total = settings.mission.num_windows
     summary = summarise(list(track(windows, policy_name, total, transient=True)))
     return summary.velocity_variance_last / summary.velocity_variance_first

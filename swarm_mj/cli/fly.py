@@ -32,7 +32,7 @@ from swarm_mj.policies.registry import (
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import view_command
-from swarm_mj.rollout import Flown, fly, summarise
+from swarm_mj.rollout import WindowRecord, rollout, summarise
 from swarm_mj.swarm import Swarm
 
 DONE, INTERRUPTED = 0, 130
@@ -44,7 +44,7 @@ class _Flight:
     """A flight as the command line saw it."""
 
     policy: Policy
-    flown: list[Flown]
+    flown: list[WindowRecord]
     recorder: Recorder | None
     was_interrupted: bool
     wall_s: float
@@ -167,7 +167,7 @@ def _short(policy: str) -> str:
 def _compile_ahead(options: argparse.Namespace, mission: Mission) -> None:
     """Flies such a mission in small, with both its halves, so that compiling is not timed."""
     smallest = replace(mission, num_robots=3, range_ratio=10.0, num_windows=COMPILING_WINDOWS)
-    for _ in fly(Swarm(smallest, [0]), _make_policy(options, smallest)):
+    for _ in rollout(Swarm(smallest, [0]), _make_policy(options, smallest)):
         pass
 
 
@@ -179,7 +179,7 @@ def _recorder(options: argparse.Namespace, swarm: Swarm, policy: Policy) -> Reco
 
 def _fly(swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Console) -> _Flight:
     """Flies with a progress bar; Ctrl-C ends the flight after a whole window."""
-    flown: list[Flown] = []
+    flown: list[WindowRecord] = []
     bar = Progress(
         TextColumn("Flying"),
         BarColumn(),
@@ -192,7 +192,7 @@ def _fly(swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Conso
     start_s = time.perf_counter()
     with deferred_interrupt() as is_interrupted, bar:
         task = bar.add_task("fly", total=swarm.mission.num_windows, age=0.0)
-        for window in fly(swarm, policy):
+        for window in rollout(swarm, policy):
             flown.append(window)
             if recorder:
                 recorder.add(window)

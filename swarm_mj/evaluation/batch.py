@@ -12,7 +12,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.window import SLOT_WINDOWS
-from swarm_mj.rollout import Flown, fly
+from swarm_mj.rollout import WindowRecord, rollout
 from swarm_mj.swarm import Swarm
 
 PACKETS = ("sent", "delivered", "heard", "receptions")  # the counts that are kept
@@ -45,7 +45,7 @@ class BatchCosts:
     packets_heard: list[int | None]  # broadcasts that somebody decoded; None: addressed packets
     receptions: list[int | None]  # times that a robot decoded a broadcast; None: as above
     ages: list[int]  # of all missions: how often a robot's knowledge of another had each age,
-    # in half windows, from 0 to the mission's length
+    # in slots, from 0 to the mission's length
 
 
 def fly_batch(batch: Batch) -> BatchCosts:
@@ -69,7 +69,7 @@ def fly_batch(batch: Batch) -> BatchCosts:
             f"policy {batch.policy} has changed since the evaluation began; evaluate a copy of it"
         )
     tally = Tally(swarm)
-    for flown in fly(swarm, policy):
+    for flown in rollout(swarm, policy):
         tally.add(flown)
     return tally.costs()
 
@@ -93,7 +93,7 @@ class Tally:
         self._complete = np.full(num_missions, np.inf)
         self._ages = np.zeros(round(mission.num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
 
-    def add(self, flown: Flown) -> None:
+    def add(self, flown: WindowRecord) -> None:
         """Adds a window; the swarm stands at its end."""
         swarm, costs = self._swarm, flown.costs
         self._aoi += costs.age_windows
@@ -144,7 +144,7 @@ def count_ages(
     Args:
         timestamp: T [windows].
         now: t [windows].
-        counts: By age in half windows; added to in place.
+        counts: By age in slots; added to in place.
         is_active: Whose pairs count; None is everyone's.
     """
     _count_ages(timestamp, now, SLOT_WINDOWS, is_active, counts)
@@ -155,7 +155,7 @@ def count_ages(
 def _count_ages(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
-    phase: float,
+    slot_windows: float,
     is_active: Bool[np.ndarray, "B N"] | None,
     counts: Int[np.ndarray, "bins"],
 ) -> None:
@@ -166,5 +166,5 @@ def _count_ages(
                 continue
             for j in range(num_robots):
                 if is_active is None or is_active[b, j]:
-                    counts[int((now[b] - timestamp[b, i, j]) / phase)] += 1
-            counts[int((now[b] - timestamp[b, i, i]) / phase)] -= 1
+                    counts[int((now[b] - timestamp[b, i, j]) / slot_windows)] += 1
+            counts[int((now[b] - timestamp[b, i, i]) / slot_windows)] -= 1

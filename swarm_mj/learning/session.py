@@ -22,7 +22,7 @@ from swarm_mj.learning.settings import HELD_OUT_SEED
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.policies.stored import save_policy
 from swarm_mj.replay.recorder import Recorder
-from swarm_mj.rollout import fly
+from swarm_mj.rollout import rollout
 from swarm_mj.swarm import Swarm
 
 OPTIMISER = ("entropy", "explained_variance", "approx_kl", "clip_fraction", "value_loss")
@@ -220,7 +220,7 @@ class Session(BaseCallback):
         swarm = Swarm(mission, [HELD_OUT_SEED])
         policy = held_out_policy(training, acting_network(self._ppo), mission)
         recorder = Recorder(swarm)
-        for flown in fly(swarm, policy):
+        for flown in rollout(swarm, policy):
             recorder.add(flown)
         path = self._folder / REPLAYS / f"decisions-{decisions:09d}.rrd"
         config: dict[str, object] = {

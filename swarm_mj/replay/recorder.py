@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.rollout import Flown
+from swarm_mj.rollout import WindowRecord
 from swarm_mj.swarm import Swarm
 
 MAX_AGE_MATRIX_BYTES = (
@@ -77,7 +77,7 @@ class Recorder:
         """Windows recorded so far."""
         return len(self._rows)
 
-    def add(self, flown: Flown) -> None:
+    def add(self, flown: WindowRecord) -> None:
         """Records the window that was just flown."""
         buffers, states, phases = self._swarm.buffers, self._swarm.states, self._swarm.phases
         age = self._swarm.now[0] - buffers.timestamp[0]

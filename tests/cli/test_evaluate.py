@@ -13,7 +13,7 @@ from swarm_mj.cli import main
 from swarm_mj.evaluation.results import COLUMNS, read_results
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.rollout import fly, summarise
+from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
 SMALL = ("--robots", "5", "--windows", "12", "--range-ratio", "0.5")
@@ -48,7 +48,7 @@ def test_results_are_what_the_library_computes(whole):
     objects = json.loads((whole / "r.json").read_text())["results"]
     mission = paper("flocking", num_robots=5, num_windows=12, range_ratio=0.5)
     for result, row, policy in zip(results, objects, ("mst", "round-robin"), strict=True):
-        flight = fly(Swarm(mission, range(1000, 1030)), make_policy(policy, mission))
+        flight = rollout(Swarm(mission, range(1000, 1030)), make_policy(policy, mission))
         summary = summarise(list(flight))
         np.testing.assert_allclose(row["episode_aoi"], summary.aoi_mean)
         np.testing.assert_allclose(row["episode_velocity_variance"], summary.velocity_variance_mean)
@@ -160,7 +160,7 @@ def test_robots_that_fail_are_another_regime_in_results_and_progress(swarm_mj, t
     for fraction, row in zip((0.0, 0.4), rows, strict=True):
         mission = paper("flocking", num_robots=5, num_windows=12, range_ratio=0.5)
         mission = replace(mission, switched_off=fraction)
-        flight = fly(Swarm(mission, [1000, 1001, 1002]), make_policy("mst", mission))
+        flight = rollout(Swarm(mission, [1000, 1001, 1002]), make_policy("mst", mission))
         np.testing.assert_allclose(row["episode_aoi"], summarise(list(flight)).aoi_mean)
     assert rows[0]["aoi_mean"] != rows[1]["aoi_mean"]
 

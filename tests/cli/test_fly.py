@@ -14,7 +14,7 @@ from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.replay.read import check_replay, windows
-from swarm_mj.rollout import fly, summarise
+from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
 SHORT = ("--windows", "20", "--robots", "6", "--range-ratio", "0.5")
@@ -44,7 +44,7 @@ def test_a_summary_is_what_the_library_computes(swarm_mj, tmp_path):
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     mission = paper("random-walk", num_robots=6, num_windows=20, range_ratio=0.5)
     expected = summarise(
-        list(fly(Swarm(mission, [7]), make_policy("random-flooding", mission, 0.2)))
+        list(rollout(Swarm(mission, [7]), make_policy("random-flooding", mission, 0.2)))
     )
     assert summary["aoi_mean"] == expected.aoi_mean[0]
     assert summary["velocity_variance_mean"] == expected.velocity_variance_mean[0]
@@ -86,7 +86,7 @@ def test_robots_can_be_switched_off(swarm_mj, tmp_path):
     assert "--switched-off" in swarm_mj("fly", "--help").stdout
     summary = json.loads((tmp_path / "a.json").read_text())
     mission = paper("stationary", num_robots=6, num_windows=20, range_ratio=0.5, switched_off=0.5)
-    expected = summarise(list(fly(Swarm(mission, [7]), make_policy("mst", mission, 0.3))))
+    expected = summarise(list(rollout(Swarm(mission, [7]), make_policy("mst", mission, 0.3))))
     assert summary["aoi_mean"] == expected.aoi_mean[0]
     assert summary["config"]["switched_off"] == 0.5
     assert len(windows(tmp_path / "a.rrd")) == 20

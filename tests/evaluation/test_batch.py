@@ -10,7 +10,7 @@ from swarm_mj.mission import paper, reference
 from swarm_mj.mission.placement import is_connected
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.registry import POLICIES, make_policy
-from swarm_mj.rollout import fly, summarise
+from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
 SEEDS = (5, 6, 7)
@@ -31,7 +31,7 @@ def test_costs_are_those_of_the_flight(policy, switched_off):
     costs = fly_batch(batch(mission, policy))
     swarm = Swarm(mission, SEEDS)
     flown, ages = [], []
-    for window in fly(swarm, make_policy(policy, mission, 0.3)):
+    for window in rollout(swarm, make_policy(policy, mission, 0.3)):
         flown.append(window)
         age = swarm.now[:, None, None] - swarm.buffers.timestamp
         is_active = (
@@ -65,7 +65,7 @@ def test_the_floor_is_the_age_that_falling_apart_leaves():
     assert fly_batch(batch(small("stationary"))).aoi_floor == [0.0, 0.0, 0.0]
     fast = small(velocity_ratio=2.0)
     swarm, fell_apart = Swarm(fast, SEEDS), np.zeros(3, dtype=bool)
-    for _ in fly(swarm, make_policy("mst", fast)):
+    for _ in rollout(swarm, make_policy("mst", fast)):
         fell_apart |= [not is_connected(p, fast.range_m) for p in swarm.states.position_m]
     floor = np.array(fly_batch(batch(fast)).aoi_floor)
     np.testing.assert_array_equal(floor > 0.0, fell_apart)
@@ -77,7 +77,7 @@ def test_the_floor_is_that_of_the_robots_that_are_on():
     swarm, by_hand = Swarm(mission, SEEDS), ConnectivityFloor(3, 12, mission.range_m)
     floors = [
         by_hand.next(swarm.states.position_m, swarm.now, swarm.states.is_active)
-        for _ in fly(swarm, make_policy("mst", mission))
+        for _ in rollout(swarm, make_policy("mst", mission))
     ]
     floor = fly_batch(batch(mission)).aoi_floor
     np.testing.assert_allclose(floor, np.mean(floors, axis=0))
@@ -102,7 +102,7 @@ def courses(task, make=paper):
         policy = make_policy(name, mission)
         swarm = Swarm(mission, SEEDS)
         start = swarm.states.position_m.copy()
-        list(fly(swarm, policy))
+        list(rollout(swarm, policy))
         yield policy, start, swarm.states
 
 

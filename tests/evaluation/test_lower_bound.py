@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from swarm_mj.evaluation.lower_bound import ConnectivityFloor
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import POLICIES, make_policy
-from swarm_mj.rollout import fly
+from swarm_mj.rollout import rollout
 from swarm_mj.swarm import Swarm
 
 
@@ -91,7 +91,7 @@ def _assert_above_the_floor(name, mission):
     swarm = Swarm(mission, [1, 2, 3])
     floor = ConnectivityFloor(3, 8, mission.range_m)
     floors = []
-    for flown in fly(swarm, make_policy(name, mission)):
+    for flown in rollout(swarm, make_policy(name, mission)):
         floors.append(floor.next(swarm.states.position_m, swarm.now, swarm.states.is_active))
         assert np.all(flown.costs.age_windows >= floors[-1] - 1e-9)
     assert (np.max(floors) > 0.0) == (mission.task != "stationary")

@@ -11,7 +11,7 @@ from tiny_policies import tiny_network
 from swarm_mj.learning.held_out import evaluate, held_out_policy
 from swarm_mj.learning.missions import FIRST_TRAINING_SEED
 from swarm_mj.learning.settings import HELD_OUT_SEED
-from swarm_mj.rollout import fly, summarise
+from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
 NETWORK = tiny_network("extended")
@@ -21,7 +21,7 @@ def flown(training, size, seed):
     """One held-out mission on its own, by the library's flight."""
     mission = replace(training.mission, num_robots=size)
     swarm = Swarm(mission, [seed])
-    windows = list(fly(swarm, held_out_policy(training, NETWORK, mission)))
+    windows = list(rollout(swarm, held_out_policy(training, NETWORK, mission)))
     return summarise(windows), [float(w.costs.age_windows[0]) for w in windows]
 
 

@@ -15,7 +15,7 @@ from swarm_mj.learning.settings import HELD_OUT_SEED
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.stored import read_policy
 from swarm_mj.replay.read import windows
-from swarm_mj.rollout import fly, summarise
+from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
 TRAINING = small_training()
@@ -97,7 +97,7 @@ def test_the_best_policy_flies_as_it_was_evaluated(whole):
     folder, progress, _ = whole
     seeds = range(HELD_OUT_SEED, HELD_OUT_SEED + TRAINING.held_out)
     policy = make_policy(str(folder / POLICY), TRAINING.mission)
-    summary = summarise(list(fly(Swarm(TRAINING.mission, seeds), policy)))
+    summary = summarise(list(rollout(Swarm(TRAINING.mission, seeds), policy)))
     assert summary.aoi_mean.mean() == pytest.approx(progress.best["aoi"])
 
 

@@ -15,7 +15,7 @@ from swarm_mj.protocol.buffers import Buffers, empty_buffers
 from swarm_mj.protocol.costs import mean_hops
 from swarm_mj.protocol.window import transmit, window
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.rollout import fly
+from swarm_mj.rollout import rollout
 from swarm_mj.swarm import Swarm, _streams
 
 NUM_WINDOWS, HALF = 21, 10  # of an odd number of windows the first half is the shorter one
@@ -33,7 +33,7 @@ def flight(mission, name, probability=0.4):
     """A swarm, once before its missions and after each window of them."""
     swarm = Swarm(mission, SEEDS)
     yield swarm, None
-    for flown in fly(swarm, make_policy(name, mission, probability)):
+    for flown in rollout(swarm, make_policy(name, mission, probability)):
         yield swarm, flown
 
 
@@ -167,7 +167,7 @@ def test_missions_side_by_side_are_the_missions_one_by_one():
     *_, (together, flown) = flight(mission, "mst")
     for b, seed in enumerate(SEEDS):
         swarm = Swarm(mission, [seed])
-        *_, last = fly(swarm, make_policy("mst", mission, 0.4))
+        *_, last = rollout(swarm, make_policy("mst", mission, 0.4))
         np.testing.assert_array_equal(swarm.states.is_active[0], together.states.is_active[b])
         assert last.costs.age_windows[0] == flown.costs.age_windows[b]
 
@@ -179,7 +179,7 @@ def test_a_restart_switches_everyone_on():
     swarm.restart([7, 8, 9])
     assert swarm.states.is_active is None
     swarm.restart(SEEDS)
-    *_, last = fly(swarm, make_policy("mst", mission, 0.4))
+    *_, last = rollout(swarm, make_policy("mst", mission, 0.4))
     np.testing.assert_array_equal(swarm.states.is_active, was_on)
     np.testing.assert_array_equal(last.costs.age_windows, flown.costs.age_windows)
 

@@ -14,7 +14,7 @@ from swarm_mj.policies.gnn import LearnedPolicy
 from swarm_mj.policies.policy import DecentralisedPolicy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay.recorder import Recorder
-from swarm_mj.rollout import fly, summarise
+from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
 MISSION = paper("random-walk", num_robots=7, num_windows=40)
@@ -136,7 +136,7 @@ def test_one_directory_flies_teams_of_any_size(tmp_path, features, preset):
     for num_robots in (2, 10, 40, 80):
         mission = preset("random-walk", num_robots=num_robots, num_windows=12, range_ratio=0.5)
         swarm = Swarm(mission, [1])
-        summary = summarise(list(fly(swarm, make_policy(str(tmp_path / "policy"), mission))))
+        summary = summarise(list(rollout(swarm, make_policy(str(tmp_path / "policy"), mission))))
         assert summary.packets_attempted[0] > 0
         assert np.all(swarm.buffers.timestamp <= 12.0)
 
@@ -215,6 +215,6 @@ def test_threads_and_gradients_are_left_as_they_were():
 def test_a_flight_is_recorded():
     swarm, policy = Swarm(MISSION, [1]), learned()
     recorder = Recorder(swarm, ego=2, is_broadcast=policy.window(swarm.mission).is_broadcast)
-    for window in fly(swarm, policy):
+    for window in rollout(swarm, policy):
         recorder.add(window)
     assert len(recorder.log().recipient) == MISSION.num_windows

@@ -10,7 +10,7 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import Packets
 from swarm_mj.replay.recorder import Log, Recorder
 from swarm_mj.replay.write import write_replay
-from swarm_mj.rollout import fly
+from swarm_mj.rollout import rollout
 from swarm_mj.swarm import Swarm
 
 
@@ -34,7 +34,7 @@ def record(policy_name, probability, *, task="flocking", **overrides):
     policy = make_policy(policy_name, mission, probability)
     recorder = Recorder(swarm, ego=4, is_broadcast=policy.window(mission).is_broadcast)
     packets = []
-    for window in fly(swarm, policy):
+    for window in rollout(swarm, policy):
         recorder.add(window)
         packets.append(window.costs.packets)
     return Recorded(recorder.log(), mission, packets)

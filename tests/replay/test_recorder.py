@@ -7,7 +7,7 @@ from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay import recorder
 from swarm_mj.replay.recorder import Recorder
-from swarm_mj.rollout import fly
+from swarm_mj.rollout import rollout
 from swarm_mj.swarm import Swarm
 
 
@@ -18,7 +18,7 @@ def flown_log(num_windows=12, ego=2, num_robots=8):
     policy = make_policy("mst", mission, 0.4)
     record = Recorder(swarm, ego=ego)
     seen = []
-    for window in fly(swarm, policy):
+    for window in rollout(swarm, policy):
         record.add(window)
         seen.append((swarm.states.position_m[0].copy(), swarm.now[0] - swarm.buffers.timestamp[0]))
     return record.log(), seen
@@ -46,7 +46,7 @@ def test_statistics_are_of_the_robots_that_are_on():
     swarm = Swarm(mission, [3])
     record = Recorder(swarm)
     ages = []
-    for window in fly(swarm, make_policy("mst", mission, 0.4)):
+    for window in rollout(swarm, make_policy("mst", mission, 0.4)):
         record.add(window)
         on = [i for i in range(7) if swarm.states.is_active is None or swarm.states.is_active[0, i]]
         timestamp = swarm.buffers.timestamp[0]
@@ -64,7 +64,7 @@ def test_a_log_is_the_swarm_s_state_field_by_field():
     record = Recorder(swarm, ego=3)
     seen = {"velocity_mps": [], "believed_m": [], "parent": [], "is_known": [], "heard": []}
     variance = []
-    for window in fly(swarm, make_policy("mst", mission, 0.5)):
+    for window in rollout(swarm, make_policy("mst", mission, 0.5)):
         record.add(window)
         seen["velocity_mps"].append(swarm.states.velocity_mps[0].copy())
         seen["believed_m"].append(swarm.buffers.position_m[0, 3].copy())
@@ -82,7 +82,7 @@ def test_what_is_kept_does_not_keep_what_is_not():
     """A row that is a view would hold its whole matrix in memory."""
     swarm = Swarm(paper("stationary", num_robots=6), [0])
     record = Recorder(swarm)
-    record.add(next(fly(swarm, make_policy("round-robin", swarm.mission))))
+    record.add(next(rollout(swarm, make_policy("round-robin", swarm.mission))))
     for name, kept in record._rows[0].items():
         assert not isinstance(kept, np.ndarray) or kept.base is None, name
 
@@ -106,7 +106,7 @@ def test_an_interrupt_inside_add_leaves_a_whole_log(monkeypatch):
     mission = paper("stationary", num_robots=5, num_windows=4)
     swarm = Swarm(mission, [0])
     record = Recorder(swarm)
-    windows = fly(swarm, make_policy("round-robin", mission))
+    windows = rollout(swarm, make_policy("round-robin", mission))
     record.add(next(windows))
 
     def interrupt(*_):

@@ -14,7 +14,7 @@ from scipy import stats
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.policies.tuning import read_table
-from swarm_mj.rollout import fly, summarise
+from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
 TOOL = Path(__file__).parent.parent.parent / "tools" / "tune.py"
@@ -57,7 +57,7 @@ def with_ages(tool, monkeypatch, age_of):
 def test_iv_c_ages_are_those_of_the_flights(tool):
     mission = paper("flocking", num_robots=5, range_ratio=1.0, num_windows=9)
     one = tool.Search(policy="gossip", mission=mission, grid=(0.3,))
-    expected = summarise(list(fly(Swarm(mission, [3, 4]), make_policy("gossip", mission, 0.3))))
+    expected = summarise(list(rollout(Swarm(mission, [3, 4]), make_policy("gossip", mission, 0.3))))
     np.testing.assert_allclose(tool.ages(one, 0.3, [3, 4]), expected.aoi_mean, rtol=1e-12)
 
 

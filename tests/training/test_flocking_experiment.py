@@ -7,7 +7,7 @@ import numpy as np
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.rollout import fly
+from swarm_mj.rollout import rollout
 from swarm_mj.swarm import Swarm
 
 FILE = Path(__file__).parent.parent.parent / "training" / "flocking_converges.py"
@@ -29,7 +29,7 @@ def test_the_share_left_is_last_over_first_variance():
     swarm = Swarm(mission, [3, 4])
     spread = [
         swarm.states.velocity_mps.var(axis=1).sum(axis=1)
-        for _ in fly(swarm, make_policy("round-robin", mission))
+        for _ in rollout(swarm, make_policy("round-robin", mission))
     ]
     np.testing.assert_allclose(left, spread[-1] / spread[0], rtol=1e-9)
     assert np.all(left < 0.01)

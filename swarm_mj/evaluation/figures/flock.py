@@ -16,7 +16,7 @@ from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import velocity_variance
-from swarm_mj.rollout import fly
+from swarm_mj.rollout import rollout
 from swarm_mj.swarm import Swarm
 
 HEIGHT_IN = 4.2
@@ -61,7 +61,7 @@ def fly_flock(mission: Mission, policy_name: str, seed: int) -> tuple[Snapshot, 
     policy = make_policy(policy_name, mission)
     swarm = Swarm(mission, [seed])
     start = _snapshot(swarm)
-    for _ in fly(swarm, policy):
+    for _ in rollout(swarm, policy):
         pass
     return start, _snapshot(swarm)
 

@@ -7,7 +7,7 @@ from matplotlib.quiver import Quiver
 from swarm_mj.evaluation.figures.flock import draw_flock, fly_flock
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.rollout import fly
+from swarm_mj.rollout import rollout
 from swarm_mj.swarm import Swarm
 
 MISSION = paper("flocking", num_robots=6, num_windows=20, range_ratio=1.0)
@@ -18,7 +18,7 @@ def test_start_and_end_are_the_swarms():
     swarm = Swarm(MISSION, [5])
     np.testing.assert_array_equal(start.position_m, swarm.states.position_m[0])
     np.testing.assert_array_equal(start.velocity_mps, swarm.states.velocity_mps[0])
-    for _ in fly(swarm, make_policy("round-robin", MISSION)):
+    for _ in rollout(swarm, make_policy("round-robin", MISSION)):
         pass
     np.testing.assert_array_equal(end.position_m, swarm.states.position_m[0])
     np.testing.assert_array_equal(end.velocity_mps, swarm.states.velocity_mps[0])

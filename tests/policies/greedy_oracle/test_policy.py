@@ -16,7 +16,7 @@ from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.rollout import fly, summarise
+from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
 seeds = st.integers(0, 2**32 - 1)
@@ -126,7 +126,7 @@ def test_lookahead_tries_6_pairs_for_4_windows():
 
 def aoi(name, task):
     mission = paper(task, num_robots=12, num_windows=80)
-    costs = summarise(list(fly(Swarm(mission, range(6)), make_policy(name, mission))))
+    costs = summarise(list(rollout(Swarm(mission, range(6)), make_policy(name, mission))))
     return np.mean(costs.aoi_mean)
 
 

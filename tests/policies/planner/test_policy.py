@@ -8,7 +8,7 @@ from swarm_mj.policies.planner.policy import epoch_starts, regular_length
 from swarm_mj.policies.planner.settings import EpochSettings, PlannerSettings, ScheduleSettings
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.rollout import fly
+from swarm_mj.rollout import rollout
 from swarm_mj.swarm import Swarm
 
 TASKS = ["stationary", "random-walk", "flocking"]
@@ -228,7 +228,7 @@ def test_a_new_start_forgets_and_the_same_seed_is_the_same_mission():
     policy, flights = make_policy("planner", mission), []
     for seed in (3, 4, 3):
         swarm = Swarm(mission, [seed])
-        age = [flown.costs.age_windows[0] for flown in fly(swarm, policy)]
+        age = [flown.costs.age_windows[0] for flown in rollout(swarm, policy)]
         flights.append((age, swarm.buffers.timestamp.tolist()))
     assert flights[0] == flights[2]
     assert flights[0] != flights[1]
@@ -240,7 +240,7 @@ def test_eq10_robots_switched_off_do_not_break_it():
     age = {}
     policies = {"planner": planner_of(mission, NEAR_SIGHTED), "tdma": make_policy("tdma", mission)}
     for name, policy in policies.items():
-        flights = fly(Swarm(mission, [0, 1]), policy)
+        flights = rollout(Swarm(mission, [0, 1]), policy)
         age[name] = np.array([flown.costs.age_windows for flown in flights])
     assert np.all(np.isfinite(age["planner"]))
     assert np.all(np.mean(age["planner"][120:], axis=0) < np.mean(age["tdma"][120:], axis=0))

@@ -79,7 +79,7 @@ def decisions(position_m, velocity_mps, num_slots=20):
     rows = []
     for slot in range(num_slots):
         views = LocalViews(buffers=buffers, now=np.array([slot / 2]), phases=())
-        rows.append((policy.recipients(views) != views.silence)[0])
+        rows.append(policy.transmits(views)[0])
     return np.array(rows)
 
 
