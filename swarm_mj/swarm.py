@@ -1,10 +1,11 @@
 """The swarm: B missions side by side, window by window: motion, physics, radio, buffers, costs."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from numbers import Integral
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 from swarm_mj.control.motion import initial_velocity, motion_of
 from swarm_mj.mission import Mission
@@ -141,21 +142,28 @@ class Swarm:
         self, window: WindowProtocol, decide: Callable[[], Int[np.ndarray, "B N"]]
     ) -> WindowCosts:
         """One window of this protocol."""
-        start, shape = self.now, self.buffers.shape
-
-        def decide_after(phases: tuple[Phase, ...]) -> Int[np.ndarray, "B N"]:
-            if phases:
-                self.phases, self.now = phases, start + len(phases) * SLOT_WINDOWS
-            recipient = decide()
-            check_robots("recipient", recipient, shape, may_broadcast=window.is_broadcast)
-            return recipient
-
+        start = self.now
+        decide_after = partial(self._decide_after, start, decide, window.is_broadcast)
         self._fail()
         self.phases = window(self.buffers, decide_after, self.move, self.channel, start)
         self.now = start + 1.0
         return window_costs(
             self.buffers, self.states, self.phases, self.now, is_broadcast=window.is_broadcast
         )
+
+    def _decide_after(
+        self,
+        start: Float[np.ndarray, "B"],
+        decide: Callable[[], Int[np.ndarray, "B N"]],
+        may_broadcast: bool,
+        phases: tuple[Phase, ...],
+    ) -> Int[np.ndarray, "B N"]:
+        """Whom each robot addresses, after these phases of the window that began at `start`."""
+        if phases:
+            self.phases, self.now = phases, start + len(phases) * SLOT_WINDOWS
+        recipient = decide()
+        check_robots("recipient", recipient, self.buffers.shape, may_broadcast=may_broadcast)
+        return recipient
 
     def _fail(self) -> None:
         """Half-way through the mission, the robots that are to fail do."""
