@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from swarm_mj.control.motion import flocking
 from swarm_mj.mission import paper, reference
+from swarm_mj.mission.geometry import spanning_tree
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import Physics
-from swarm_mj.policies.minimum_spanning_tree import spanning_tree
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.costs import mean_hops, window_costs

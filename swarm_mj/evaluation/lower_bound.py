@@ -1,11 +1,10 @@
 """The connectivity floor: the age that no radio goes below, if robots rest while they talk."""
 
-from typing import no_type_check
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from numba import njit
 
+from swarm_mj.compiled import compiled
+from swarm_mj.mission.geometry import gather_connected
 from swarm_mj.protocol.buffers import NEVER
 
 
@@ -57,8 +56,7 @@ class ConnectivityFloor:
         return age
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _share(
     timestamp: Float[np.ndarray, "B N N"],
     position_m: Float[np.ndarray, "B N 2"],
@@ -76,44 +74,14 @@ def _share(
         total = 0.0
         for i in range(num_robots):
             if not is_met[i]:
-                num_members = _gather(position_m[b], range_m, i, is_met, part)
+                num_members = gather_connected(position_m[b], range_m, i, is_met, part)
                 _pool(timestamp[b], part[:num_members], now[b], newest)
                 total += num_members * newest[is_on[b]].sum()
         num_on = is_on[b].sum()
         age[b] = now[b] - total / (num_on * num_on)
 
 
-@njit(cache=True)
-@no_type_check
-def _gather(
-    position_m: Float[np.ndarray, "N 2"],
-    range_m: float,
-    first: int,
-    is_met: Bool[np.ndarray, "N"],
-    part: Int[np.ndarray, "N"],
-) -> int:
-    """Fills `part` with everyone connected to `first`; returns how many."""
-    num_robots = position_m.shape[0]
-    part[0] = first
-    is_met[first] = True
-    num_members = 1
-    num_spread = 0
-    while num_spread < num_members:
-        i = part[num_spread]
-        num_spread += 1
-        for j in range(num_robots):
-            if not is_met[j]:
-                dx = position_m[i, 0] - position_m[j, 0]
-                dy = position_m[i, 1] - position_m[j, 1]
-                if dx * dx + dy * dy <= range_m * range_m:
-                    is_met[j] = True
-                    part[num_members] = j
-                    num_members += 1
-    return num_members
-
-
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _pool(
     timestamp: Float[np.ndarray, "N N"],
     members: Int[np.ndarray, "M"],

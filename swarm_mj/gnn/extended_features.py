@@ -15,10 +15,10 @@ from swarm_mj.gnn.graphs import Graphs
 from swarm_mj.gnn.packet_memory import Memory
 from swarm_mj.gnn.turns import write_turns
 from swarm_mj.mission import Mission
-from swarm_mj.policies.spatial_tdma import write_joined
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import from_db
+from swarm_mj.radio.spatial_reuse import write_joined
 
 ADDRESS_RANGES = 1.2  # a teammate believed farther away is not worth addressing [ranges]
 LONG_WINDOWS = 500.0  # ages count by their logarithm, up to 1 at this one [windows]

@@ -5,12 +5,11 @@ the same channel and by the same protocol. Its sum has the gradient of the team'
 robot's credit is 0.
 """
 
-from typing import no_type_check
-
 import numpy as np
 from jaxtyping import Float, Int
-from numba import njit
 
+from swarm_mj.compiled import compiled
+from swarm_mj.protocol.timestamps import merge_timestamps, observe_own
 from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, respondents
 from swarm_mj.radio.free_space import Channel
 
@@ -71,49 +70,25 @@ def gain(
     answered = respondents(Phase(recipient=recipient, heard=heard))
     heard_answer = channel(position_m, answered)
     gained = np.empty(len(mission))
-    _replay(timestamp, mission, heard, heard_answer, now, SLOT_WINDOWS, gained)
+    _replay(timestamp, mission, heard, heard_answer, now, gained)
     return gained
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _replay(
     timestamp: Float[np.ndarray, "B N N"],
     mission: Int[np.ndarray, "W"],
     heard: Int[np.ndarray, "W N"],
     heard_answer: Int[np.ndarray, "W N"],
     now: Float[np.ndarray, "W"],
-    phase: float,
     gained: Float[np.ndarray, "W"],
 ) -> None:
-    """Timestamps alone, through the two phases: who merges whose packet."""
-    num_robots = timestamp.shape[1]
+    """Timestamps alone, through the two slots: who merges whose packet."""
     for w in range(mission.shape[0]):
         before = timestamp[mission[w]].copy()
-        for i in range(num_robots):
-            before[i, i] = now[w] + phase
+        observe_own(before, now[w] + SLOT_WINDOWS)
         after = before.copy()
-        gained[w] = _merge(before, heard[w], after)
-        for i in range(num_robots):
-            after[i, i] = now[w] + 2 * phase
+        gained[w] = merge_timestamps(before, heard[w], after)
+        observe_own(after, now[w] + 2 * SLOT_WINDOWS)
         before[...] = after
-        gained[w] += _merge(before, heard_answer[w], after)
-
-
-@njit(cache=True)
-@no_type_check
-def _merge(
-    packet: Float[np.ndarray, "N N"],
-    heard: Int[np.ndarray, "N"],
-    timestamp: Float[np.ndarray, "N N"],
-) -> float:
-    """Newer timestamps win, as in the buffers; returns by how much they rose in sum."""
-    rise = 0.0
-    for i in range(heard.shape[0]):
-        k = heard[i]
-        if k != i:
-            for j in range(heard.shape[0]):
-                if timestamp[i, j] < packet[k, j]:
-                    rise += packet[k, j] - timestamp[i, j]
-                    timestamp[i, j] = packet[k, j]
-    return rise
+        gained[w] += merge_timestamps(before, heard_answer[w], after)

@@ -1,15 +1,16 @@
 """Initial positions (IV-B): uniform in the area, redrawn until the disk graph is connected."""
 
-from typing import no_type_check
-
 import numpy as np
 from jaxtyping import Float
-from numba import njit
+
+from swarm_mj.compiled import compiled
+from swarm_mj.mission.geometry import gather_connected
 
 MAX_DRAWS = 20_000  # the sparsest of the paper's teams (range ratio 0.2) connects in a few hundred
 MAX_ROBOTS_DRAWN = 2_000_000  # bounds the draws of large teams, whose test takes longer
 
 
+@compiled()
 def is_connected(position_m: Float[np.ndarray, "N 2"], range_m: float) -> bool:
     """Whether the disk graph is connected.
 
@@ -22,7 +23,9 @@ def is_connected(position_m: Float[np.ndarray, "N 2"], range_m: float) -> bool:
     Returns:
         Whether every robot reaches every other over neighbours.
     """
-    return bool(_reaches_all(position_m, range_m))
+    num_robots = len(position_m)
+    is_met, members = np.zeros(num_robots, dtype=np.bool_), np.empty(num_robots, dtype=np.int64)
+    return gather_connected(position_m, range_m, 0, is_met, members) == num_robots
 
 
 def connected_positions(
@@ -52,31 +55,3 @@ def connected_positions(
         f"{range_m:g} m are too sparse for an area of {2 * half_side_m:.0f} m by "
         f"{2 * half_side_m:.0f} m; raise the range ratio or the density"
     )
-
-
-@njit(cache=True)
-@no_type_check
-def _reaches_all(
-    position_m: Float[np.ndarray, "N 2"],
-    range_m: float,
-) -> bool:
-    """Floods the disk graph from robot 0."""
-    num_robots = position_m.shape[0]
-    reached = np.zeros(num_robots, dtype=np.bool_)
-    frontier = np.empty(num_robots, dtype=np.int64)
-    reached[0] = True
-    frontier[0] = 0
-    num_reached = 1
-    num_spread = 0
-    while num_spread < num_reached:
-        i = frontier[num_spread]
-        num_spread += 1
-        for j in range(num_robots):
-            if not reached[j]:
-                dx = position_m[i, 0] - position_m[j, 0]
-                dy = position_m[i, 1] - position_m[j, 1]
-                if dx * dx + dy * dy <= range_m * range_m:
-                    reached[j] = True
-                    frontier[num_reached] = j
-                    num_reached += 1
-    return num_reached == num_robots

@@ -5,13 +5,13 @@ are the only ones that write a buffer, and they write it in place.
 """
 
 from dataclasses import dataclass, fields
-from typing import no_type_check
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from numba import njit
 
+from swarm_mj.compiled import compiled
 from swarm_mj.physics.state import RobotStates
+from swarm_mj.protocol.timestamps import is_newer
 
 NO_PARENT = -1  # of oneself, and of a teammate never heard of
 BROADCAST = -1  # the recipient of a packet for everyone who hears it
@@ -147,8 +147,7 @@ def check_robots(
         )
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _first_out_of_range(robots: Int[np.ndarray, "B N"], lowest: int) -> int:
     num_missions, num_robots = robots.shape
     for b in range(num_missions):
@@ -158,8 +157,7 @@ def _first_out_of_range(robots: Int[np.ndarray, "B N"], lowest: int) -> int:
     return -1
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _write_own(
     timestamp: Float[np.ndarray, "B N N"],
     believed_m: Float[np.ndarray, "B N N 2"],
@@ -182,8 +180,7 @@ def _write_own(
                 believed_mps[b, i, i, axis] = velocity_mps[b, i, axis]
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _write_attempt(
     last_attempt: Float[np.ndarray, "B N N"],
     recipient: Int[np.ndarray, "B N"],
@@ -201,8 +198,7 @@ def _write_attempt(
                 last_attempt[b, i, j] = now[b]
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _merge_newer(
     timestamp: Float[np.ndarray, "B N N"],
     position_m: Float[np.ndarray, "B N N 2"],
@@ -227,7 +223,7 @@ def _merge_newer(
             j = heard[b, i]
             if j != i:
                 for k in range(num_robots):
-                    if timestamp[b, i, k] < sent_timestamp[j, k]:
+                    if is_newer(sent_timestamp[j, k], timestamp[b, i, k]):
                         timestamp[b, i, k] = sent_timestamp[j, k]
                         position_m[b, i, k, 0] = sent_position_m[j, k, 0]
                         position_m[b, i, k, 1] = sent_position_m[j, k, 1]

@@ -7,13 +7,14 @@ itself heard nobody: no sentinel is needed.
 
 import math
 from dataclasses import dataclass
-from typing import Protocol, no_type_check, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
-from numba import njit
 
-MIN_DISTANCE_M = 1e-3  # robots closer than this count as this far apart, which keeps gains finite
+from swarm_mj.compiled import compiled
+from swarm_mj.mission.geometry import squared_distance
+from swarm_mj.radio.kernels import is_received, received_power, sinr
 
 
 @runtime_checkable
@@ -55,20 +56,6 @@ def transmit_power_dbm(
 ) -> float:
     """Power whose packets decode exactly up to a range when all others are silent [dBm] (IV-B)."""
     return noise_dbm + threshold_db + path_loss_db(range_m, frequency_hz)
-
-
-@njit(cache=True)
-@no_type_check
-def sinr(signal_mw: float, interference_mw: float, noise_mw: float) -> float:
-    """Signal over interference plus noise, linear [1] (Eq. 3)."""
-    return signal_mw / (noise_mw + interference_mw)
-
-
-@njit(cache=True)
-@no_type_check
-def is_received(signal_to_noise: float, threshold: float) -> bool:
-    """Whether a packet decodes; both ratios linear [1] (Eq. 4)."""
-    return signal_to_noise >= threshold
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,8 +103,7 @@ class FreeSpaceRadio:
         return heard
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _decode_strongest(
     position_m: Float[np.ndarray, "B N 2"],
     recipient: Int[np.ndarray, "B N"],
@@ -131,6 +117,7 @@ def _decode_strongest(
     num_missions, num_robots = recipient.shape
     sender = np.empty(num_robots, dtype=np.int64)
     for b in range(num_missions):
+        place_m = position_m[b]
         num_senders = 0
         for i in range(num_robots):
             if recipient[b, i] != i:
@@ -144,10 +131,8 @@ def _decode_strongest(
             for s in range(num_senders):
                 i = sender[s]
                 if i != j:
-                    dx = position_m[b, i, 0] - position_m[b, j, 0]
-                    dy = position_m[b, i, 1] - position_m[b, j, 1]
-                    squared_m2 = max(dx * dx + dy * dy, MIN_DISTANCE_M * MIN_DISTANCE_M)
-                    received_mw = received_at_1_m_mw / squared_m2
+                    apart_m2 = squared_distance(place_m, i, j)
+                    received_mw = received_power(received_at_1_m_mw, apart_m2)
                     total_mw += received_mw
                     may_hear = is_silent or (hears_while_sending and recipient[b, i] == j)
                     if may_hear and received_mw > strongest_mw:

@@ -1,4 +1,4 @@
-"""What a scheduler believes about the radio between any two robots.
+"""Links as a scheduler believes in them, and what robots hear over them (Eqs. 3-4).
 
 Index order: `i` sends, `j` receives.
 """
@@ -6,9 +6,13 @@ Index order: `i` sends, `j` receives.
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
-from swarm_mj.radio.free_space import MIN_DISTANCE_M, FreeSpaceRadio
+from swarm_mj.compiled import compiled
+from swarm_mj.radio.free_space import FreeSpaceRadio
+from swarm_mj.radio.kernels import MIN_DISTANCE_M, decode_probability, received_power, sinr
+
+NOBODY = -1
 
 
 class Links(NamedTuple):
@@ -18,6 +22,14 @@ class Links(NamedTuple):
     distance_over_std: Float[np.ndarray, "N N"]  # of the belief; inf if the positions are known [1]
     noise_mw: float
     threshold: float  # least SINR that decodes, linear [1]
+
+
+class Air(NamedTuple):
+    """What is in the air at every receiver j."""
+
+    total_mw: Float[np.ndarray, "N"]
+    strongest_mw: Float[np.ndarray, "N"]
+    strongest: Int[np.ndarray, "N"]  # who is received with that power
 
 
 def links_between(
@@ -40,8 +52,7 @@ def links_between(
     """
     apart_m = position_m[:, None] - position_m[None, :]
     distance_m = np.maximum(np.sqrt(np.sum(apart_m**2, axis=2)), MIN_DISTANCE_M)
-    received_mw = radio.received_at_1_m_mw / distance_m**2
-    np.fill_diagonal(received_mw, 0.0)
+    received_mw = _received_powers(radio.received_at_1_m_mw, distance_m)
     if is_known is not None:
         received_mw *= is_known[:, None] & is_known[None, :]
     distance_over_std = np.full_like(distance_m, np.inf)
@@ -49,3 +60,97 @@ def links_between(
         variance_m2 = spread_m[:, None] ** 2 + spread_m[None, :] ** 2
         np.divide(distance_m, np.sqrt(variance_m2), out=distance_over_std, where=variance_m2 > 0.0)
     return Links(received_mw, distance_over_std, radio.noise_mw, radio.threshold)
+
+
+@compiled()
+def _received_powers(
+    at_1_m_mw: float, distance_m: Float[np.ndarray, "N N"]
+) -> Float[np.ndarray, "N N"]:
+    """Power of i at j [mW]; nobody receives itself."""
+    received_mw = np.zeros_like(distance_m)
+    for i in range(len(distance_m)):
+        for j in range(len(distance_m)):
+            if i != j:
+                received_mw[i, j] = received_power(at_1_m_mw, distance_m[i, j] * distance_m[i, j])
+    return received_mw
+
+
+@compiled()
+def silent_air(num_robots: int) -> Air:
+    """The air when nobody transmits."""
+    return Air(np.zeros(num_robots), np.zeros(num_robots), np.zeros(num_robots, dtype=np.int64))
+
+
+@compiled()
+def transmit(links: Links, air: Air, i: int) -> None:
+    """Adds i's packet to the air."""
+    received_mw = links.received_mw
+    total_mw, strongest_mw, strongest = air.total_mw, air.strongest_mw, air.strongest
+    for j in range(received_mw.shape[0]):
+        total_mw[j] += received_mw[i, j]
+        if received_mw[i, j] > strongest_mw[j]:
+            strongest_mw[j], strongest[j] = received_mw[i, j], i
+
+
+@compiled()
+def air_of(links: Links, transmits: Bool[np.ndarray, "N"]) -> Air:
+    """The air when these robots transmit."""
+    air = silent_air(transmits.shape[0])
+    for i in range(transmits.shape[0]):
+        if transmits[i]:
+            transmit(links, air, i)
+    return air
+
+
+@compiled()
+def stronger(i: int, power_i: float, k: int, power_k: float) -> tuple[int, float]:
+    """Whose packet a receiver may decode of two, and its power; of equal ones the second."""
+    return (i, power_i) if power_i > power_k else (k, power_k)
+
+
+@compiled()
+def listen(
+    links: Links,
+    air: Air,
+    also: int,
+    listens: Bool[np.ndarray, "N"],
+    heard: Int[np.ndarray, "N"],
+    probability: Float[np.ndarray, "N"],
+) -> None:
+    """Works out whom robots may decode, by Eqs. 3-4.
+
+    Args:
+        links: The radio.
+        air: What is in the air.
+        also: Who transmits besides, or `NOBODY`.
+        listens: Who listens; nobody does while it transmits.
+        heard: Whom each robot may decode, overwritten; itself is nobody.
+        probability: That it does; overwritten.
+    """
+    received_mw, distance_over_std = links.received_mw, links.distance_over_std
+    total_mw, strongest_mw, strongest = air.total_mw, air.strongest_mw, air.strongest
+    for j in range(listens.shape[0]):
+        heard[j], probability[j] = j, 0.0
+        if listens[j] and j != also:
+            i = j if also == NOBODY else also  # a robot adds nothing to the air at itself
+            added_mw = received_mw[i, j]
+            sender, signal_mw = stronger(i, added_mw, strongest[j], strongest_mw[j])
+            if signal_mw > 0.0:
+                ratio = sinr(signal_mw, total_mw[j] + added_mw - signal_mw, links.noise_mw)
+                over_std = distance_over_std[sender, j]
+                probability[j] = decode_probability(ratio, links.threshold, over_std)
+                heard[j] = sender if probability[j] > 0.0 else j
+
+
+@compiled()
+def lone_probabilities(links: Links) -> Float[np.ndarray, "N N"]:
+    """How probably j decodes i when nobody else transmits."""
+    received_mw, distance_over_std = links.received_mw, links.distance_over_std
+    probability = np.zeros_like(received_mw)
+    for i in range(len(probability)):
+        for j in range(len(probability)):
+            if received_mw[i, j] > 0.0:
+                ratio = sinr(received_mw[i, j], 0.0, links.noise_mw)
+                over_std = distance_over_std[i, j]
+                probability[i, j] = decode_probability(ratio, links.threshold, over_std)
+    return probability

@@ -4,7 +4,7 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Int
 
-from swarm_mj.policies.minimum_spanning_tree import ROOT, spanning_tree
+from swarm_mj.mission.geometry import ROOT, spanning_tree
 from swarm_mj.replay import palette
 from swarm_mj.replay.dendrogram import dendrogram
 from swarm_mj.replay.links import Links, broadcast_counts, transmitters

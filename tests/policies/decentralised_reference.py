@@ -168,7 +168,7 @@ class Mind:
         foresight = foresight_of(len(known), is_certain=rests, settings=self.settings.schedule)
         is_free = [
             not (self.calls(h) or self.seeks(h)) for h in range(2 * begun, 2 * self.begins)
-        ] + [True] * foresight.half_windows
+        ] + [True] * foresight.slots
         halves = (2 * known).astype(np.float32)
         transmits = np.zeros((2 * length, len(known)), dtype=bool)
         weights = heuristic_weights(links, self.settings.weights)

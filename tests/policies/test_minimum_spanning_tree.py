@@ -1,26 +1,16 @@
 import math
 
-import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy.sparse.csgraph import minimum_spanning_tree
-from scipy.spatial.distance import cdist
 
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.policies.minimum_spanning_tree import ROOT, MinimumSpanningTree, spanning_tree
+from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
 from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
 
 # On a line, 10 m apart but for a gap, as robots 3, 0, 4, 1, 2: the middle one is robot 4.
 LINE_M = np.array([[10.0, 0.0], [45.0, 0.0], [55.0, 0.0], [0.0, 0.0], [20.0, 0.0]])
-LINE_PARENT = [4, 4, 1, 0, ROOT]
-
-
-def teams_of(seed, num_robots, num_missions=1):
-    return np.random.default_rng(seed).uniform(-500, 500, size=(num_missions, num_robots, 2))
 
 
 def decided(policy, position_m):
@@ -37,52 +27,6 @@ def started(num_robots, probability=1.0, num_missions=1, **options):
     policy = MinimumSpanningTree(probability, **options)
     policy.start(num_robots, [np.random.default_rng((5, b)) for b in range(num_missions)])
     return policy
-
-
-def graph_of(parent):
-    graph = nx.Graph()
-    graph.add_nodes_from(range(len(parent)))
-    graph.add_edges_from((i, int(j)) for i, j in enumerate(parent) if j != ROOT)
-    return graph
-
-
-def test_iv_c_parents_on_a_line_by_hand():
-    np.testing.assert_array_equal(spanning_tree(LINE_M[None])[0], LINE_PARENT)
-
-
-@given(seed=st.integers(0, 2**32 - 1), num_robots=st.integers(2, 60))
-def test_iv_c_tree_has_the_least_length(seed, num_robots):
-    """One root, N - 1 edges, connected, and as long as scipy's tree."""
-    (position_m,) = teams_of(seed, num_robots)
-    (parent,) = spanning_tree(position_m[None])
-    distance_m = cdist(position_m, position_m)
-    length_m = sum(distance_m[i, j] for i, j in enumerate(parent) if j != ROOT)
-    assert length_m == pytest.approx(minimum_spanning_tree(distance_m).sum(), rel=1e-9)
-    assert np.sum(parent == ROOT) == 1
-    assert nx.is_tree(graph_of(parent))
-
-
-@given(seed=st.integers(0, 2**32 - 1), num_robots=st.integers(2, 60))
-def test_iv_c_root_is_a_centre_of_the_tree(seed, num_robots):
-    """Following parents leads to the root, within no more hops than the tree's radius."""
-    (parent,) = spanning_tree(teams_of(seed, num_robots))
-    radius = nx.radius(graph_of(parent))
-    for robot in range(num_robots):
-        reached, hops = robot, 0
-        while parent[reached] != ROOT:
-            reached, hops = parent[reached], hops + 1
-            assert hops <= radius
-
-
-def test_iv_c_every_mission_has_its_own_tree():
-    teams_m = teams_of(0, 12, num_missions=4)
-    alone = np.concatenate([spanning_tree(teams_m[b : b + 1]) for b in range(4)])
-    np.testing.assert_array_equal(spanning_tree(teams_m), alone)
-
-
-def test_iv_c_robots_at_one_place_still_form_a_tree():
-    (parent,) = spanning_tree(np.zeros((1, 6, 2)))
-    assert nx.is_tree(graph_of(parent))
 
 
 def test_iv_c_root_is_silent_by_default():

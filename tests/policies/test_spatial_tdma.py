@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.distance import pdist, squareform
+from spatial_rule import agreed_senders, radio
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.policy import BroadcastPolicy
@@ -12,7 +13,6 @@ from swarm_mj.policies.tdma import Tdma
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.window import SLOT_WINDOWS
-from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.swarm import Swarm
 
 MISSION = paper("stationary", num_robots=20)
@@ -88,38 +88,6 @@ def test_threshold_counts_by_hand():
     assert on_a_line(near_m, half=0, threshold=1.0) == {0, 2}
     assert on_a_line(near_m, half=0, threshold=3.3) == {0, 2}
     assert on_a_line(near_m, half=0, threshold=4.0) == {0, 3}
-
-
-def agreed_senders(order, turn, position_m, channel):
-    """The rule, with the true radio as judge."""
-    num_robots = len(position_m)
-    silence = np.arange(num_robots)
-
-    def heard_with(chosen):
-        recipient = np.where(np.isin(silence, chosen), (silence + 1) % num_robots, silence)
-        return channel(position_m[None], recipient[None])[0]
-
-    chosen = [order[turn % num_robots]]
-    heard = heard_with(chosen)
-    for place in range(num_robots):
-        k = order[(turn + num_robots // 2 + place) % num_robots]
-        if k not in chosen and heard[k] == k:
-            with_k = heard_with([*chosen, k])
-            is_kept = np.all(with_k[heard != silence] == heard[heard != silence])
-            if is_kept and np.any(with_k != heard):
-                chosen, heard = [*chosen, k], with_k
-    return set(chosen)
-
-
-def radio(range_m, threshold):
-    """Noise 1 mW, and a range exactly as given."""
-    at_1_m = FreeSpaceRadio(power_mw=1.0, noise_mw=1.0, threshold=threshold, frequency_hz=2.4e9)
-    return FreeSpaceRadio(
-        power_mw=threshold * range_m**2 / at_1_m.received_at_1_m_mw,
-        noise_mw=1.0,
-        threshold=threshold,
-        frequency_hz=2.4e9,
-    )
 
 
 @given(

@@ -11,16 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm_mj.radio.free_space import (
-    MIN_DISTANCE_M,
     Channel,
     FreeSpaceRadio,
     channel_gain,
     from_db,
-    is_received,
     path_loss_db,
-    sinr,
     transmit_power_dbm,
 )
+from swarm_mj.radio.kernels import MIN_DISTANCE_M
 
 RANGE_M = 250.0
 POWER_DBM = 39.013025
@@ -123,17 +121,6 @@ def test_powers_by_hand():
     assert transmit_power_dbm(250.0, 2.4e9, -50.0, 1.0) == pytest.approx(POWER_DBM)
     assert transmit_power_dbm(500.0, 2.4e9, -50.0, 1.0) == pytest.approx(POWER_DBM + 6.020600)
     assert transmit_power_dbm(250.0, 2.4e9, -47.0, 4.0) == pytest.approx(POWER_DBM + 6.0)
-
-
-def test_eq3_sinr_by_hand():
-    assert sinr(6.0, 1.0, 2.0) == 2.0
-    assert sinr(6.0, 0.0, 2.0) == 3.0
-    assert sinr(6.0, 6.0, 0.0) == 1.0
-
-
-def test_eq4_the_threshold_itself_is_enough():
-    assert is_received(1.25, 1.25)
-    assert not is_received(np.nextafter(1.25, 0.0), 1.25)
 
 
 def test_power_at_a_metre_is_eqs_1_and_2():

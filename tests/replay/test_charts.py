@@ -3,7 +3,7 @@
 import numpy as np
 from reading import column, rows_of_strips
 
-from swarm_mj.policies.minimum_spanning_tree import spanning_tree
+from swarm_mj.mission.geometry import spanning_tree
 from swarm_mj.replay.charts import packet_counts, radio_states, rate, walk
 from swarm_mj.replay.links import fates
 

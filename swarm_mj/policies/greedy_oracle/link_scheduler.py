@@ -6,45 +6,32 @@ receivers i and subjects k of how much T^{i,k} rises: the fall of the age of inf
 (Eq. 10). Squared rises look further ahead: they prefer what is stalest to many small refreshments.
 
 Where positions are only believed, a packet decodes with a probability, and timestamps are expected
-ones. Index order: `i` sends, `j` receives. Times are in halves of a window, float32, which keeps
-them exact for 8 million windows. All kernels are in this one file, because numba's cache does not
-see changes in another.
+ones. Index order: `i` sends, `j` receives. Times are in slots, float32, which keeps them exact
+for 8 million windows.
 """
 
-import math
-from typing import NamedTuple, no_type_check
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
-from numba import njit
 
-from swarm_mj.radio.links import Links
+from swarm_mj.compiled import compiled
+from swarm_mj.protocol.timestamps import merge_expected, observe_own, rise
+from swarm_mj.protocol.window import SLOTS_PER_WINDOW
+from swarm_mj.radio.links import NOBODY, Links, air_of, listen
 
-HALVES = 2  # of a window: the unit of time in here
-LOGISTIC = 1.702  # 1 / (1 + exp(-1.702 z)) is within 0.01 of the normal distribution function
-CERTAIN = 2.5  # standard deviations beyond which a packet decodes for certain, or never
-NOBODY = -1
 NO_PAIR = (NOBODY, NOBODY)
 NOT_A_PAIR = -1.0  # in place of a gain, which is never negative
 
 
-class _Air(NamedTuple):
-    """What is in the air at every receiver j."""
-
-    total_mw: Float[np.ndarray, "N"]
-    strongest_mw: Float[np.ndarray, "N"]
-    strongest: Int[np.ndarray, "N"]  # who is received with that power
-
-
-class _Phase(NamedTuple):
+class _Slot(NamedTuple):
     """What every receiver j decodes."""
 
     heard: Int[np.ndarray, "N"]  # whom; itself is nobody
-    chance: Float[np.ndarray, "N"]  # with which probability
+    probability: Float[np.ndarray, "N"]  # with which probability
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def schedule(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
@@ -57,8 +44,8 @@ def schedule(
     """Fills `recipient` window by window, and brings `timestamp` to the end of the last.
 
     Args:
-        timestamp: T, written in place [halves].
-        now: t before the first window [halves].
+        timestamp: T, written in place [slots].
+        now: t before the first window [slots].
         links: The radio; the robots stand still.
         is_squared: Whether rises of T count squared.
         first_pair: Who sends to whom in the first window whatever else happens, or `NO_PAIR`.
@@ -66,7 +53,7 @@ def schedule(
         recipient: Whom each robot addresses; itself is silence.
 
     Returns:
-        The sum of all timestamps after each window, over all windows [halves].
+        The sum of all timestamps after each window, over all windows [slots].
     """
     known = 0.0
     for w in range(recipient.shape[0]):
@@ -76,12 +63,11 @@ def schedule(
             _complete(timestamp, now, links, is_squared, NO_PAIR, 0.0, recipient[w])
         _advance(timestamp, now, links, recipient[w])
         known += float(timestamp.sum())
-        now += HALVES
+        now += SLOTS_PER_WINDOW
     return known
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def first_pairs(
     timestamp: Float32[np.ndarray, "N N"], now: float, links: Links, is_squared: bool
 ) -> Float[np.ndarray, "N N"]:
@@ -92,8 +78,7 @@ def first_pairs(
     return _value_pairs(sent, worth, now, links, is_squared, silence)
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _complete(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
@@ -122,8 +107,7 @@ def _complete(
         recipient[i] = r
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _value_pairs(
     sent: Float32[np.ndarray, "N N"],
     worth: Float[np.ndarray, "N N"],
@@ -140,75 +124,67 @@ def _value_pairs(
     num_robots = sent.shape[0]
     is_silent = recipient == np.arange(num_robots)
     is_free = is_silent.copy()
-    air = _silent_air(num_robots)
-    for i in np.flatnonzero(~is_silent):
-        is_free[recipient[i]] = False
-        _transmit(links, air, i)
+    for i in range(num_robots):
+        if not is_silent[i]:
+            is_free[recipient[i]] = False
+    air = air_of(links, ~is_silent)
     value = np.full((num_robots, num_robots), NOT_A_PAIR)
     after = np.empty_like(sent)
-    phase = _deaf_phase(num_robots)
+    slot = _deaf_slot(num_robots)
     for i in range(num_robots):
         if is_free[i]:
-            _listen(links, air, i, is_silent, phase)
+            listen(links, air, i, is_silent, slot.heard, slot.probability)
             gain = 0.0
             for j in range(num_robots):
-                gain += phase.chance[j] * worth[phase.heard[j], j]
-            _merge(sent, phase, now, after)
-            _value_responses(links, i, recipient, is_free, phase, after, is_squared, gain, value[i])
+                gain += slot.probability[j] * worth[slot.heard[j], j]
+            _advance_slot(sent, slot, now, after)
+            _value_responses(links, i, recipient, is_free, slot, after, is_squared, gain, value[i])
     return value
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _value_responses(
     links: Links,
     i: int,
     recipient: Int[np.ndarray, "N"],
     is_free: Bool[np.ndarray, "N"],
-    phase: _Phase,
+    slot: _Slot,
     after: Float32[np.ndarray, "N N"],
     is_squared: bool,
     gain: float,
     value: Float[np.ndarray, "N"],
 ) -> None:
-    """Fills `value[r]`: the gain of the first phase and of the responses if r is i's recipient."""
-    answers, air = _answer(links, phase, recipient)
-    listens = ~answers
-    response = _deaf_phase(recipient.shape[0])
-    heard, chance, phase_chance = response.heard, response.chance, phase.chance
+    """Fills `value[r]`: the gain of the first slot and of the responses if r is i's recipient."""
+    answers = _answers(slot, recipient)
+    air, listens = air_of(links, answers), ~answers
+    response = _deaf_slot(recipient.shape[0])
+    heard, probability, slot_probability = response.heard, response.probability, slot.probability
     has_broadcast = False
     for r in range(recipient.shape[0]):
-        decodes = phase.heard[r] == i
+        decodes = slot.heard[r] == i
         if r != i and is_free[r] and (decodes or not has_broadcast):
             has_broadcast |= not decodes
-            _listen(links, air, r if decodes else NOBODY, listens, response)
+            answerer = r if decodes else NOBODY
+            listen(links, air, answerer, listens, heard, probability)
             total = gain
             for j in range(recipient.shape[0]):
-                if chance[j] > 0.0:
-                    is_sent = phase_chance[heard[j]]
-                    total += chance[j] * is_sent * _gain(after[heard[j]], after[j], is_squared)
+                if probability[j] > 0.0:
+                    is_sent = slot_probability[heard[j]]
+                    total += probability[j] * is_sent * _gain(after[heard[j]], after[j], is_squared)
             value[r] = total
 
 
-@njit(cache=True)
-@no_type_check
-def _answer(
-    links: Links, phase: _Phase, recipient: Int[np.ndarray, "N"]
-) -> tuple[Bool[np.ndarray, "N"], _Air]:
-    """Who answers whom it decoded, being addressed, and what is in the air then."""
-    num_robots = recipient.shape[0]
-    air = _silent_air(num_robots)
-    answers = np.zeros(num_robots, dtype=np.bool_)
-    for j in range(num_robots):
-        sender = phase.heard[j]
-        if sender != j and recipient[sender] == j:
-            answers[j] = True
-            _transmit(links, air, j)
-    return answers, air
+@compiled()
+def _answers(slot: _Slot, recipient: Int[np.ndarray, "N"]) -> Bool[np.ndarray, "N"]:
+    """Who answers: whoever may decode a packet that is meant for it."""
+    answers = np.zeros(recipient.shape[0], dtype=np.bool_)
+    for j in range(recipient.shape[0]):
+        sender = slot.heard[j]
+        answers[j] = sender != j and recipient[sender] == j
+    return answers
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _advance(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
@@ -218,127 +194,43 @@ def _advance(
     """Brings T through a window of Alg. 1, as far as it can be expected."""
     num_robots = timestamp.shape[0]
     is_silent = recipient == np.arange(num_robots)
-    air = _silent_air(num_robots)
-    for i in np.flatnonzero(~is_silent):
-        _transmit(links, air, i)
-    phase = _deaf_phase(num_robots)
-    _listen(links, air, NOBODY, is_silent, phase)
+    slot = _deaf_slot(num_robots)
+    air = air_of(links, ~is_silent)
+    listen(links, air, NOBODY, is_silent, slot.heard, slot.probability)
     after = np.empty_like(timestamp)
-    _merge(_with_own_time(timestamp, now + 1.0), phase, now, after)
-    answers, air = _answer(links, phase, recipient)
-    response = _deaf_phase(num_robots)
-    _listen(links, air, NOBODY, ~answers, response)
+    _advance_slot(_with_own_time(timestamp, now + 1.0), slot, now, after)
+    answers = _answers(slot, recipient)
+    response = _deaf_slot(num_robots)
+    air = air_of(links, answers)
+    listen(links, air, NOBODY, ~answers, response.heard, response.probability)
     for j in range(num_robots):
-        response.chance[j] *= phase.chance[response.heard[j]]
-    _merge(after, response, now, timestamp)
+        response.probability[j] *= slot.probability[response.heard[j]]
+    _advance_slot(after, response, now, timestamp)
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _with_own_time(timestamp: Float32[np.ndarray, "N N"], now: float) -> Float32[np.ndarray, "N N"]:
     """T when everyone has just observed itself (Eq. 5) at this time."""
     observed = timestamp.copy()
-    for i in range(timestamp.shape[0]):
-        observed[i, i] = now
+    observe_own(observed, now)
     return observed
 
 
-@njit(cache=True)
-@no_type_check
-def _silent_air(num_robots: int) -> _Air:
-    return _Air(np.zeros(num_robots), np.zeros(num_robots), np.zeros(num_robots, dtype=np.int64))
-
-
-@njit(cache=True)
-@no_type_check
-def _deaf_phase(num_robots: int) -> _Phase:
-    return _Phase(np.arange(num_robots), np.zeros(num_robots))
-
-
-@njit(cache=True)
-@no_type_check
-def _transmit(links: Links, air: _Air, i: int) -> None:
-    """Adds i's packet to the air."""
-    for j in range(air.total_mw.shape[0]):
-        received_mw = links.received_mw[i, j]
-        air.total_mw[j] += received_mw
-        if received_mw > air.strongest_mw[j]:
-            air.strongest_mw[j] = received_mw
-            air.strongest[j] = i
-
-
-@njit(cache=True)
-@no_type_check
-def _listen(
-    links: Links, air: _Air, also: int, is_silent: Bool[np.ndarray, "N"], phase: _Phase
+@compiled()
+def _advance_slot(
+    sent: Float32[np.ndarray, "N N"], slot: _Slot, now: float, after: Float32[np.ndarray, "N N"]
 ) -> None:
-    """Fills `phase` with what the silent robots decode, when `also` sends too, or `NOBODY`."""
-    num_robots = is_silent.shape[0]
-    heard, chance = phase.heard, phase.chance
-    received_mw, distance_over_std = links.received_mw, links.distance_over_std
-    total_mw, strongest_mw, strongest = air.total_mw, air.strongest_mw, air.strongest
-    for j in range(num_robots):
-        heard[j], chance[j] = j, 0.0
-        if is_silent[j] and j != also:
-            # A robot adds nothing to the air at itself, so it stands for nobody.
-            added_mw = received_mw[j if also == NOBODY else also, j]
-            is_stronger = added_mw > strongest_mw[j]
-            signal_mw = added_mw if is_stronger else strongest_mw[j]
-            sender = also if is_stronger else strongest[j]
-            if signal_mw > 0.0:
-                chance[j] = _chance(
-                    signal_mw,
-                    total_mw[j] + added_mw,
-                    links.noise_mw,
-                    links.threshold,
-                    distance_over_std[sender, j],
-                )
-                heard[j] = sender if chance[j] > 0.0 else j
+    """Fills `after`: T as expected after a slot, own timestamps those of the window's end."""
+    merge_expected(sent, slot.heard, slot.probability, after)
+    observe_own(after, now + SLOTS_PER_WINDOW)
 
 
-@njit(cache=True)
-@no_type_check
-def _chance(
-    strongest_mw: float,
-    total_mw: float,
-    noise_mw: float,
-    threshold: float,
-    distance_over_std: float,
-) -> float:
-    """How probably the strongest packet at a receiver decodes (Eqs. 3-4).
-
-    A lone packet decodes up to some distance; interference shortens it to d sqrt(SINR /
-    threshold), so a packet over a believed d comes through if the true distance is below that.
-    """
-    ratio = strongest_mw / (noise_mw + (total_mw - strongest_mw)) / threshold
-    if distance_over_std == np.inf:
-        return 1.0 if ratio >= 1.0 else 0.0
-    deviations = (math.sqrt(ratio) - 1.0) * distance_over_std
-    if abs(deviations) > CERTAIN:
-        return 1.0 if deviations > 0.0 else 0.0
-    return 1.0 / (1.0 + math.exp(-LOGISTIC * deviations))
+@compiled()
+def _deaf_slot(num_robots: int) -> _Slot:
+    return _Slot(np.arange(num_robots), np.zeros(num_robots))
 
 
-@njit(cache=True, fastmath={"nnan", "nsz"})
-@no_type_check
-def _merge(
-    sent: Float32[np.ndarray, "N N"],
-    phase: _Phase,
-    now: float,
-    merged: Float32[np.ndarray, "N N"],
-) -> None:
-    """Fills `merged`: T as expected after a phase (Eq. 8), own timestamps those of its end."""
-    num_robots = sent.shape[0]
-    for j in range(num_robots):
-        chance = np.float32(phase.chance[j])
-        own, other, row = sent[j], sent[phase.heard[j]], merged[j]
-        for k in range(num_robots):
-            row[k] = own[k] + chance * max(other[k] - own[k], np.float32(0.0))
-        merged[j, j] = now + HALVES
-
-
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _pair_gains(
     sent: Float32[np.ndarray, "N N"], links: Links, is_squared: bool
 ) -> Float[np.ndarray, "N N"]:
@@ -352,10 +244,9 @@ def _pair_gains(
     return gains
 
 
-# Adding in any order lets the compiler use its vectors. Whole halves add up exactly; squares and
-# expected halves to rounding, so robots that plan alike need machines alike.
-@njit(cache=True, fastmath={"reassoc", "nnan", "nsz"})
-@no_type_check
+# Adding in any order lets the compiler use its vectors. Whole slots add up exactly; squares and
+# expected ones to rounding, so robots that plan alike need machines alike.
+@compiled(fastmath={"reassoc", "nnan", "nsz"})
 def _gain(
     newer: Float32[np.ndarray, "N"], older: Float32[np.ndarray, "N"], is_squared: bool
 ) -> float:
@@ -363,9 +254,8 @@ def _gain(
     total = np.float32(0.0)
     if is_squared:
         for k in range(older.shape[0]):
-            rise = max(newer[k] - older[k], np.float32(0.0))
-            total += rise * rise
+            total += rise(newer[k], older[k]) ** 2
     else:
         for k in range(older.shape[0]):
-            total += max(newer[k] - older[k], np.float32(0.0))
+            total += rise(newer[k], older[k])
     return float(total)

@@ -4,11 +4,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from swarm_mj.policies.greedy_oracle.link_scheduler import (
-    HALVES,
     NO_PAIR,
     first_pairs,
     schedule,
 )
+from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 from swarm_mj.radio.links import Links
 
 
@@ -32,10 +32,10 @@ def greedy_schedule(
     Returns:
         The recipients, itself is silence; and T after the last window, as expected [windows].
     """
-    halves = (HALVES * timestamp).astype(np.float32)
+    slots = (SLOTS_PER_WINDOW * timestamp).astype(np.float32)
     recipient = np.empty((num_windows, len(timestamp)), dtype=np.int64)
-    schedule(halves, HALVES * now, links, is_squared, NO_PAIR, 0.0, recipient)
-    return recipient, halves.astype(np.float64) / HALVES
+    schedule(slots, SLOTS_PER_WINDOW * now, links, is_squared, NO_PAIR, 0.0, recipient)
+    return recipient, slots.astype(np.float64) / SLOTS_PER_WINDOW
 
 
 def lookahead_window(
@@ -61,15 +61,15 @@ def lookahead_window(
     Returns:
         The recipients; itself is silence.
     """
-    halves = (HALVES * timestamp).astype(np.float32)
-    gain = first_pairs(halves, HALVES * now, links, True).ravel()
+    slots = (SLOTS_PER_WINDOW * timestamp).astype(np.float32)
+    gain = first_pairs(slots, SLOTS_PER_WINDOW * now, links, True).ravel()
     best, most_known = np.arange(len(timestamp)), -np.inf
     for pair in np.argsort(-gain, kind="stable")[:num_branches].tolist():
         if gain[pair] > 0.0:
             branch = np.empty((num_windows, len(timestamp)), dtype=np.int64)
             first = divmod(pair, len(timestamp))
             known = schedule(
-                halves.copy(), HALVES * now, links, True, first, float(gain[pair]), branch
+                slots.copy(), SLOTS_PER_WINDOW * now, links, True, first, float(gain[pair]), branch
             )
             if known > most_known:
                 best, most_known = branch[0], known

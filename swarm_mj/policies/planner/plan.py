@@ -65,7 +65,7 @@ class Plan:
         self._now = SLOTS_PER_WINDOW * now
         expected = _corrected(timestamp, snapshots, owner)
         self._timestamp = (SLOTS_PER_WINDOW * expected).astype(np.float32)  # [slots]
-        ahead = np.ones(self._foresight.half_windows, dtype=bool)
+        ahead = np.ones(self._foresight.slots, dtype=bool)
         self._is_free = np.concatenate([is_free, ahead])
         self._transmits = np.zeros((len(is_free), num_robots), dtype=bool)
         self._num_planned = 0

@@ -105,7 +105,7 @@ class _StandingPlan:
                 self._links,
                 self._weights,
                 self._foresight,
-                np.ones(self._chunk_slots + self._foresight.half_windows, dtype=bool),
+                np.ones(self._chunk_slots + self._foresight.slots, dtype=bool),
                 transmits,
             )
             self._transmits.extend(transmits)

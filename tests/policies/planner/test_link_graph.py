@@ -11,7 +11,7 @@ from scipy.stats import norm
 from standing_teams import flooded_team
 
 from swarm_mj.mission import paper
-from swarm_mj.policies.planner.link_graph import LEAST_CHANCE, OUT_OF_REACH, SLACK, link_graph
+from swarm_mj.policies.planner.link_graph import LEAST_PROBABILITY, OUT_OF_REACH, SLACK, link_graph
 from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
 
@@ -40,9 +40,9 @@ def believed(num_robots, seed):
 def as_networkx(graph):
     """The links that count, each as long as packets must be sent until one decodes."""
     plain = nx.Graph()
-    plain.add_nodes_from(range(len(graph.chance)))
-    for i, j in zip(*np.nonzero(np.triu(graph.chance >= LEAST_CHANCE)), strict=True):
-        plain.add_edge(int(i), int(j), hops=1.0 / float(graph.chance[i, j]))
+    plain.add_nodes_from(range(len(graph.probability)))
+    for i, j in zip(*np.nonzero(np.triu(graph.probability >= LEAST_PROBABILITY)), strict=True):
+        plain.add_edge(int(i), int(j), hops=1.0 / float(graph.probability[i, j]))
     return plain
 
 
@@ -54,9 +54,7 @@ def test_certain_links_are_those_in_range(seed, num_robots):
     for i in range(num_robots):
         for j in range(num_robots):
             apart_m = math.dist(position_m[i], position_m[j])
-            assert graph.chance[i, j] == float(i != j and apart_m <= range_m)
-            if i != j:
-                assert graph.distance[i, j] == pytest.approx(apart_m / range_m)
+            assert graph.probability[i, j] == float(i != j and apart_m <= range_m)
     assert graph.relative_std == 0.0
 
 
@@ -68,19 +66,8 @@ def test_the_chance_is_that_of_being_in_range(spread_m, deviations):
     position_m = np.array([[0.0, 0.0], [250.0 - deviations * deviation_m, 0.0]])
     graph = link_graph(links_between(RADIO, position_m, np.array(spread_m)))
     expected = {-2.6: 0.0, 2.6: 1.0}.get(deviations, norm.cdf(deviations))
-    assert graph.chance[0, 1] == graph.chance[1, 0] == pytest.approx(expected, abs=0.0096)
-    assert graph.chance[0, 0] == graph.chance[1, 1] == 0.0
-
-
-def test_a_known_distance_of_one_range_is_no_cause_for_concern():
-    """Neither is one of nearly no metres."""
-    links = links_between(RADIO, np.array([[0.0, 0.0], [250.0, 0.0], [250.0, 0.0]]))
-    links = links._replace(noise_mw=1.0, threshold=1.0, received_mw=np.round(links.received_mw))
-    links.received_mw[0, 1] = 1.0
-    graph = link_graph(links)
-    assert graph.chance[0, 1] == 1.0
-    assert graph.distance[0, 1] == 1.0
-    assert np.all(np.isfinite(graph.chance))
+    assert graph.probability[0, 1] == graph.probability[1, 0] == pytest.approx(expected, abs=0.0096)
+    assert graph.probability[0, 0] == graph.probability[1, 1] == 0.0
 
 
 @given(seed=seeds, num_robots=st.integers(2, 9), is_certain=st.booleans())
@@ -130,7 +117,7 @@ def test_links_that_decode_rarely_are_no_way():
     for distance_m, is_link in ((285.0, False), (284.0, True)):
         position_m = np.array([[0.0, 0.0], [distance_m, 0.0]])
         graph = link_graph(links_between(RADIO, position_m, np.array([20.0, 0.0])))
-        assert graph.chance[0, 1] > 0.0
+        assert graph.probability[0, 1] > 0.0
         assert (graph.hops[0, 1] < OUT_OF_REACH) == is_link
         assert graph.has_no_isolated_node == is_link
 

@@ -1,0 +1,128 @@
+"""Teams in the plane: who is connected to whom, and the shortest tree that connects everyone."""
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from swarm_mj.compiled import compiled
+
+ROOT = -1  # the parent of the root
+
+
+@compiled()
+def squared_distance(position_m: Float[np.ndarray, "N 2"], i: int, j: int) -> float:
+    """The square of how far two robots are apart [m²]."""
+    dx = position_m[i, 0] - position_m[j, 0]
+    dy = position_m[i, 1] - position_m[j, 1]
+    return dx * dx + dy * dy
+
+
+@compiled()
+def gather_connected(
+    position_m: Float[np.ndarray, "N 2"],
+    range_m: float,
+    first: int,
+    is_met: Bool[np.ndarray, "N"],
+    members: Int[np.ndarray, "N"],
+) -> int:
+    """Floods the disk graph from one robot.
+
+    Args:
+        position_m: Positions [m].
+        range_m: Two robots at most this far apart are neighbours [m].
+        first: Where the flood begins.
+        is_met: Whom it need not reach; written in place, whoever it reaches is added.
+        members: Filled with everyone reached, the first one included.
+
+    Returns:
+        How many were reached.
+    """
+    members[0] = first
+    is_met[first] = True
+    num_members = 1
+    num_spread = 0
+    while num_spread < num_members:
+        i = members[num_spread]
+        num_spread += 1
+        for j in range(position_m.shape[0]):
+            if not is_met[j] and squared_distance(position_m, i, j) <= range_m * range_m:
+                is_met[j] = True
+                members[num_members] = j
+                num_members += 1
+    return num_members
+
+
+def spanning_tree(position_m: Float[np.ndarray, "B N 2"]) -> Int[np.ndarray, "B N"]:
+    """Each robot's parent in the Euclidean minimum spanning tree, or `ROOT`.
+
+    Prim's algorithm gives the edges; peeling leaves off until one robot is left directs them, so
+    the root is a centre of the tree, and no robot is deeper than it must be.
+
+    Args:
+        position_m: Positions [m].
+
+    Returns:
+        The parents.
+    """
+    parent = np.empty(position_m.shape[:2], dtype=np.int64)
+    _grow_and_peel(position_m, parent)
+    return parent
+
+
+@compiled()
+def _grow_and_peel(position_m: Float[np.ndarray, "B N 2"], parent: Int[np.ndarray, "B N"]) -> None:
+    num_missions, num_robots = parent.shape
+    is_edge = np.empty((num_robots, num_robots), dtype=np.bool_)
+    for b in range(num_missions):
+        is_edge[:] = False
+        _grow(position_m[b], is_edge)
+        _peel(is_edge, parent[b])
+
+
+@compiled()
+def _grow(
+    position_m: Float[np.ndarray, "N 2"],
+    is_edge: Bool[np.ndarray, "N N"],
+) -> None:
+    """Prim's algorithm from robot 0."""
+    num_robots = position_m.shape[0]
+    nearest = np.zeros(num_robots, dtype=np.int64)
+    squared_m2 = np.full(num_robots, np.inf)
+    in_tree = np.zeros(num_robots, dtype=np.bool_)
+    added = 0
+    for _ in range(num_robots - 1):
+        in_tree[added] = True
+        closest = -1
+        for j in range(num_robots):
+            if not in_tree[j]:
+                apart_m2 = squared_distance(position_m, added, j)
+                if apart_m2 < squared_m2[j]:
+                    squared_m2[j] = apart_m2
+                    nearest[j] = added
+                if closest < 0 or squared_m2[j] < squared_m2[closest]:
+                    closest = j
+        is_edge[closest, nearest[closest]] = is_edge[nearest[closest], closest] = True
+        added = closest
+
+
+@compiled()
+def _peel(
+    is_edge: Bool[np.ndarray, "N N"],
+    parent: Int[np.ndarray, "N"],
+) -> None:
+    """Leaves point at their neighbour and go, round by round, until the root is left."""
+    num_robots = parent.shape[0]
+    degree = np.empty(num_robots, dtype=np.int64)
+    for i in range(num_robots):
+        degree[i] = is_edge[i].sum()
+    parent[:] = ROOT
+    num_left = num_robots
+    while num_left > 1:
+        leaves = np.flatnonzero(degree == 1)
+        for leaf in leaves:
+            if num_left > 1:
+                neighbour = np.flatnonzero(is_edge[leaf])[0]
+                parent[leaf] = neighbour
+                is_edge[leaf, neighbour] = is_edge[neighbour, leaf] = False
+                degree[leaf] = 0
+                degree[neighbour] -= 1
+                num_left -= 1

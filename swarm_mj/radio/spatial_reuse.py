@@ -1,0 +1,164 @@
+"""Spatial reuse (Nelson and Kleinrock 1985) by interference (Grönkvist, Hansson 2001).
+
+The common rule: in each slot the owner of the turn broadcasts. Beginning half a round away in the
+order, one robot after the other joins if by Eqs. 1-4 nobody who decodes a packet so far would lose
+it, the robot itself included, and somebody would gain one. Noise is the unit of power.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int
+
+from swarm_mj.compiled import compiled
+from swarm_mj.mission.geometry import squared_distance
+from swarm_mj.radio.kernels import is_received, received_power, sinr
+
+NOISE = 1.0
+
+
+class _Slot(NamedTuple):
+    """Who broadcasts in a slot so far, and what every robot receives."""
+
+    is_sender: Bool[np.ndarray, "N"]
+    signal: Float[np.ndarray, "N"]  # of the packet that each robot decodes; 0 is none
+    total: Float[np.ndarray, "N"]  # of all packets in the air
+
+
+@compiled()
+def write_joined(
+    believed_m: Float[np.ndarray, "B N N 2"],
+    is_known: Bool[np.ndarray, "B N N"],
+    turn: Int[np.ndarray, "B"],
+    range_m: float,
+    threshold: float,
+    has_joined: Float32[np.ndarray, "B N N"],
+) -> None:
+    """Writes who sends by the rule, in the order of identities and by each robot's own beliefs.
+
+    Args:
+        believed_m: Where robot i believes the others to be [m].
+        is_known: Whom it knows; after the first unknown robot that is asked nobody joins.
+        turn: Whose turn it is, mod N.
+        range_m: Distance at which a lone transmission just decodes [m].
+        threshold: Least SINR that decodes, linear [1].
+        has_joined: 1 where robot k sends, by robot i's beliefs, else 0; overwritten.
+    """
+    num_missions, num_robots = is_known.shape[:2]
+    at_1_m = threshold * range_m * range_m
+    has_joined[...] = 0.0
+    for b in range(num_missions):
+        owner = turn[b] % num_robots
+        for i in range(num_robots):
+            slot = _silent_slot(num_robots)
+            if is_known[b, i, owner]:
+                has_joined[b, i, owner] = 1.0
+                _join(owner, believed_m[b, i], at_1_m, threshold, slot)
+            for place in range(num_robots):
+                k = (turn[b] + num_robots // 2 + place) % num_robots
+                if not (is_known[b, i, owner] and is_known[b, i, k]):
+                    break
+                if _may_join(k, believed_m[b, i], at_1_m, threshold, slot):
+                    has_joined[b, i, k] = 1.0
+                    _join(k, believed_m[b, i], at_1_m, threshold, slot)
+
+
+@compiled()
+def keep_joined(
+    believed_m: Float[np.ndarray, "B N N 2"],
+    order: Int[np.ndarray, "B N"],
+    turn: Int[np.ndarray, "B"],
+    range_m: float,
+    threshold: float,
+    is_sending: Bool[np.ndarray, "B N"],
+) -> None:
+    """Leaves those among the senders who send by the rule and their own beliefs.
+
+    Args:
+        believed_m: Where robot i believes the others to be [m].
+        order: In which the robots take turns.
+        turn: Whose turn it is, by place in the order, mod N.
+        range_m: Distance at which a lone transmission just decodes [m].
+        threshold: Least SINR that decodes, linear [1].
+        is_sending: Who may send; overwritten by who does. The owner of the turn always does.
+    """
+    num_missions, num_robots = order.shape
+    at_1_m = threshold * range_m * range_m
+    asked = np.empty(num_robots, dtype=np.int64)  # whether they join, one after the other
+    for b in range(num_missions):
+        owner = order[b, turn[b] % num_robots]
+        half_round = turn[b] + num_robots // 2
+        for place in range(num_robots):
+            asked[place] = order[b, (half_round + place) % num_robots]
+        for i in range(num_robots):
+            is_sending[b, i] = i == owner or (
+                is_sending[b, i] and _joins(i, owner, asked, believed_m[b, i], at_1_m, threshold)
+            )
+
+
+@compiled()
+def _joins(
+    i: int,
+    owner: int,
+    asked: Int[np.ndarray, "N"],
+    believed_m: Float[np.ndarray, "N 2"],
+    at_1_m: float,
+    threshold: float,
+) -> bool:
+    """Whether robot i joins the owner of the turn, by the rule and its own beliefs."""
+    slot = _silent_slot(asked.shape[0])
+    _join(owner, believed_m, at_1_m, threshold, slot)
+    # A robot that may not join the owner alone may not join it with others either.
+    if not _may_join(i, believed_m, at_1_m, threshold, slot):
+        return False
+    # A sender that is asked again may not join either: nobody would gain by it.
+    for k in asked:
+        if _may_join(k, believed_m, at_1_m, threshold, slot):
+            _join(k, believed_m, at_1_m, threshold, slot)
+        if k == i:
+            break
+    return slot.is_sender[i]
+
+
+@compiled()
+def _silent_slot(num_robots: int) -> _Slot:
+    return _Slot(np.zeros(num_robots, dtype=np.bool_), np.zeros(num_robots), np.zeros(num_robots))
+
+
+@compiled()
+def _may_join(
+    k: int, believed_m: Float[np.ndarray, "N 2"], at_1_m: float, threshold: float, slot: _Slot
+) -> bool:
+    """Whether nobody would lose a packet and somebody would gain one if k were a sender too."""
+    is_sender, signal, total = slot
+    if signal[k] > 0.0:
+        return False
+    is_of_use = False
+    for j in range(signal.shape[0]):
+        if j != k and not is_sender[j]:
+            received = received_power(at_1_m, squared_distance(believed_m, k, j))
+            if signal[j] > 0.0:
+                if received > signal[j]:
+                    return False
+                interference = total[j] - signal[j] + received
+                if not is_received(sinr(signal[j], interference, NOISE), threshold):
+                    return False
+            elif is_received(sinr(received, total[j], NOISE), threshold):
+                is_of_use = True
+    return is_of_use
+
+
+@compiled()
+def _join(
+    k: int, believed_m: Float[np.ndarray, "N 2"], at_1_m: float, threshold: float, slot: _Slot
+) -> None:
+    """Makes k a sender: whom everyone decodes, and what is in the air."""
+    is_sender, signal, total = slot
+    is_sender[k] = True
+    for j in range(signal.shape[0]):
+        if j != k:
+            received = received_power(at_1_m, squared_distance(believed_m, k, j))
+            is_free = not is_sender[j] and signal[j] == 0.0
+            if is_free and is_received(sinr(received, total[j], NOISE), threshold):
+                signal[j] = received
+            total[j] += received

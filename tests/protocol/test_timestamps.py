@@ -1,0 +1,65 @@
+"""Timestamps alone, against the buffers of the protocol and by hand."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarm_mj.protocol.buffers import empty_buffers, merge
+from swarm_mj.protocol.timestamps import (
+    is_newer,
+    merge_expected,
+    merge_timestamps,
+    observe_own,
+    rise,
+)
+
+
+def random_slot(seed, num_robots):
+    """T in whole windows, and whom everyone hears: half of them nobody."""
+    rng = np.random.default_rng(seed)
+    timestamp = rng.integers(0, 9, (num_robots, num_robots)).astype(float)
+    robots = np.arange(num_robots)
+    heard = np.where(rng.random(num_robots) < 0.5, rng.integers(0, num_robots, num_robots), robots)
+    return timestamp, heard
+
+
+def after_merge(timestamp, heard):
+    """T after the protocol's own merge."""
+    buffers = empty_buffers(1, len(heard))
+    buffers.timestamp[0] = timestamp
+    merge(buffers, heard[None])
+    return buffers.timestamp[0]
+
+
+def test_eq8_only_the_strictly_newer_wins():
+    assert is_newer(2.5, 2.0)
+    assert not is_newer(2.0, 2.0)
+    assert not is_newer(1.5, 2.0)
+    assert (rise(2.5, 2.0), rise(2.0, 2.0), rise(1.5, 2.0)) == (0.5, 0.0, 0.0)
+
+
+def test_eq5_everyone_observes_itself():
+    timestamp = np.arange(4.0).reshape(2, 2)
+    observe_own(timestamp, 7.5)
+    assert timestamp.tolist() == [[7.5, 1.0], [2.0, 7.5]]
+
+
+@given(seed=st.integers(0, 2**32 - 1), num_robots=st.integers(1, 8))
+def test_eq8_timestamps_are_those_of_the_buffers(seed, num_robots):
+    before, heard = random_slot(seed, num_robots)
+    timestamp, expected = before.copy(), after_merge(before, heard)
+    total = merge_timestamps(before, heard, timestamp)
+    np.testing.assert_array_equal(timestamp, expected)
+    assert total == np.sum(expected - before)
+
+
+@given(seed=st.integers(0, 2**32 - 1), num_robots=st.integers(1, 8))
+def test_eq8_the_mean_over_hearing_or_not(seed, num_robots):
+    before, heard = random_slot(seed, num_robots)
+    probability = np.random.default_rng(seed).integers(0, 5, num_robots) / 4
+    merged = np.empty((num_robots, num_robots), dtype=np.float32)
+    merge_expected(before.astype(np.float32), heard, probability, merged)
+    share = probability[:, None]
+    expected = share * after_merge(before, heard) + (1.0 - share) * before
+    assert merged == pytest.approx(expected)

@@ -1,0 +1,54 @@
+"""Who joins whom by interference, with the true radio as judge."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from spatial_rule import agreed_senders, radio
+
+from swarm_mj.radio.spatial_reuse import keep_joined, write_joined
+
+seeds = st.integers(0, 2**32 - 1)
+thresholds = st.sampled_from([0.3, 1.25, 4.0])
+
+
+@given(seed=seeds, num_robots=st.integers(2, 15), threshold=thresholds)
+def test_eq3_those_who_may_send_and_join_do(seed, num_robots, threshold):
+    """Everyone believes the truth; who may not send does not, but for the owner of the turn."""
+    rng = np.random.default_rng(seed)
+    position_m = rng.uniform(-500, 500, (num_robots, 2))
+    order, turn = rng.permutation(num_robots), int(rng.integers(0, 99))
+    may_send = rng.random(num_robots) < 0.7
+    is_sending = may_send[None].copy()
+    believed_m = np.tile(position_m, (1, num_robots, 1, 1))
+    keep_joined(believed_m, order[None], np.array([turn]), 250.0, threshold, is_sending)
+    agreed = agreed_senders(order, turn, position_m, radio(250.0, threshold))
+    expected = {i for i in agreed if may_send[i]} | {order[turn % num_robots]}
+    assert set(np.flatnonzero(is_sending[0]).tolist()) == expected
+
+
+@given(seed=seeds, num_robots=st.integers(2, 12), threshold=thresholds)
+def test_eq3_each_robot_reckons_with_its_own_beliefs(seed, num_robots, threshold):
+    """Robot i believes in places of its own, and the order is that of identities."""
+    rng = np.random.default_rng(seed)
+    believed_m = rng.uniform(-500, 500, (1, num_robots, num_robots, 2))
+    turn = int(rng.integers(0, 99))
+    has_joined = np.ones((1, num_robots, num_robots), dtype=np.float32)
+    is_known = np.ones((1, num_robots, num_robots), dtype=bool)
+    write_joined(believed_m, is_known, np.array([turn]), 250.0, threshold, has_joined)
+    order = np.arange(num_robots)
+    for i in range(num_robots):
+        expected = agreed_senders(order, turn, believed_m[0, i], radio(250.0, threshold))
+        assert set(np.flatnonzero(has_joined[0, i]).tolist()) == expected
+
+
+@pytest.mark.parametrize(("unknown", "expected"), [(0, []), (3, [0, 2]), (2, [0])])
+def test_nobody_joins_after_a_robot_of_unknown_place(unknown, expected):
+    """Two pairs far apart: robot 2 is asked first, then 3, 0 and 1; the turn is robot 0's."""
+    position_m = np.array([[0.0, 0.0], [100.0, 0.0], [1000.0, 0.0], [1100.0, 0.0]])
+    believed_m = np.tile(position_m, (1, 4, 1, 1))
+    is_known = np.ones((1, 4, 4), dtype=bool)
+    is_known[..., unknown] = False
+    has_joined = np.empty((1, 4, 4), dtype=np.float32)
+    write_joined(believed_m, is_known, np.array([0]), 250.0, 1.0, has_joined)
+    assert [np.flatnonzero(row).tolist() for row in has_joined[0]] == [expected] * 4
