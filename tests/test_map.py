@@ -73,7 +73,8 @@ def imports(path):
     ("name", "known"),
     [
         ("compiled", set()),
-        ("mission/specification", set()),
+        ("fields", set()),
+        ("mission/specification", {"fields"}),
         ("mission/batched_rng", set()),
         ("mission/geometry", {"compiled"}),
         ("mission/placement", {"compiled", "mission.geometry"}),

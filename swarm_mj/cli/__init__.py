@@ -5,36 +5,64 @@
 Exit codes: 0 done, 2 bad input, 130 interrupted.
 """
 
-import argparse
+import importlib
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 BAD_INPUT, INTERRUPTED = 2, 130
+COMMANDS = {  # each a module here, with its options, `Options`, and what it does, `run`
+    "fly": "Fly one mission and record its replay.",
+    "evaluate": "Fly policies over the same missions and say where they stand.",
+    "train": "Train a communication policy by PPO.",
+    "figures": "Draw the paper's figures from results.",
+    "replay": "Open a replay in rerun's viewer.",
+    "scene": "Write the scene of a mission as one MJCF file.",
+    "bench": "Time the simulation and its parts.",
+}
 
 
-class _Parser(argparse.ArgumentParser):
-    """Complains in one line."""
+def parse(arguments: Sequence[str]) -> tuple[Any, Any]:
+    """What a command line asks for; imports here, so that Ctrl-C is heard while modules load.
 
-    def error(self, message: str) -> NoReturn:
-        """Prints the complaint and where to read on; exits with 2."""
-        self.exit(BAD_INPUT, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+    Args:
+        arguments: What was typed after `swarm-mj`.
+
+    Returns:
+        The command's `run`, and the options to call it with.
+
+    Raises:
+        ValueError: A value is unknown or outside its range.
+        SystemExit: The line cannot be read, or only help was asked for.
+    """
+    if arguments and arguments[0] in COMMANDS:
+        from rich.console import Console
+
+        from swarm_mj.cli import options
+
+        with Console(stderr=True).status("Loading ..."):
+            command = importlib.import_module(f"swarm_mj.cli.{arguments[0]}")
+        prog, summary = f"swarm-mj {arguments[0]}", COMMANDS[arguments[0]]
+        return command.run, options.parse(command.Options, arguments[1:], prog, summary)
+    _show_or_refuse(arguments)
 
 
-def make_parser() -> argparse.ArgumentParser:
-    """The parser of all commands; imported here, so that Ctrl-C is heard while they load."""
-    from swarm_mj.cli import bench, evaluate, figures, fly, replay, scene, train
+def _show_or_refuse(arguments: Sequence[str]) -> NoReturn:
+    """Shows the help or the version, or says what is wrong with a line without a command."""
+    from swarm_mj.cli.options import Parser
     from swarm_mj.io.provenance import version
 
-    parser = _Parser(
+    parser = Parser(
         prog="swarm-mj",
         description="Robot swarms on MuJoCo that share their state over a radio they compete for.",
+        epilog="`swarm-mj COMMAND --help` explains a command.",
     )
     parser.add_argument("--version", action="version", version=f"swarm-mj {version()}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for command in (fly, evaluate, train, figures, replay, scene, bench):
-        command.add_parser(commands)
-    return parser
+    for name, summary in COMMANDS.items():
+        commands.add_parser(name, help=summary)
+    parser.parse_args(arguments)
+    parser.error("name the command first")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -47,10 +75,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code.
     """
     try:
-        typed = sys.argv[1:] if arguments is None else list(arguments)
-        options = make_parser().parse_args(typed)
-        options.typed = typed
-        return options.run(options)
+        run, options = parse(sys.argv[1:] if arguments is None else list(arguments))
+        return run(options)
     except (ValueError, OSError) as error:
         sys.stderr.write(f"swarm-mj: error: {error}\n")
         return BAD_INPUT

@@ -1,8 +1,8 @@
 """`swarm-mj bench`: how fast the simulation and evaluations are on this machine."""
 
-import argparse
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
@@ -14,49 +14,34 @@ from swarm_mj.benchmark.simulation import (
     bench,
     bench_evaluation,
 )
-from swarm_mj.cli.options import new_parser
 from swarm_mj.evaluation.published import BASELINES
+from swarm_mj.fields import setting
 from swarm_mj.policies.planner.policy import regular_length
 from swarm_mj.policies.planner.settings import PlannerSettings
 
 if TYPE_CHECKING:
     from swarm_mj.benchmark.learning import LearningTiming
 
-LIMITS = {"missions": (1, 10_000), "threads": (1, 256), "episodes": (0, 10_000), "jobs": (1, 256)}
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """The options of `swarm-mj bench`."""
+
+    missions: tuple[int, ...] = setting((1, 32, 256), "missions side by side", low=1, high=10_000)
+    threads: int = setting(1, "threads of MuJoCo and torch", low=1, high=256)
+    seconds: float = setting(2.0, "a measurement's time, about", unit="s", low=0.1, high=600.0)
+    episodes: int = setting(
+        100,
+        "missions of each baseline in the evaluation that is timed; 0 leaves it out",
+        low=0,
+        high=10_000,
+    )
+    jobs: int = setting(2, "processes of that evaluation", low=1, high=256)
+    no_learning: bool = setting(False, "leave out the networks and the training")
 
 
-def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no public type
-    """Adds the command."""
-    parser = new_parser(
-        commands,
-        "bench",
-        "Time the simulation: random walks of 40 robots with round robin, and an evaluation.",
-    )
-    parser.add_argument(
-        "--missions",
-        type=int,
-        nargs="+",
-        default=[1, 32, 256],
-        help="how many missions stand side by side",
-    )
-    parser.add_argument("--threads", type=int, default=1, help="of MuJoCo and torch")
-    parser.add_argument("--seconds", type=float, default=2.0, help="per measurement, about")
-    parser.add_argument(
-        "--episodes",
-        type=int,
-        default=100,
-        help="of each baseline in the evaluation that is timed; 0 leaves it out",
-    )
-    parser.add_argument("--jobs", type=int, default=2, help="processes of that evaluation")
-    parser.add_argument(
-        "--no-learning", action="store_true", help="leave out the networks and the training"
-    )
-    parser.set_defaults(run=run)
-
-
-def run(options: argparse.Namespace) -> int:
+def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
-    _check(options)
     with Console(stderr=True).status("Measuring ...") as status:
         tables = list(_measure(options, status.update))
     console = Console(highlight=False)
@@ -65,17 +50,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _check(options: argparse.Namespace) -> None:
-    for name, (low, high) in LIMITS.items():
-        given = getattr(options, name)
-        for value in given if isinstance(given, list) else [given]:
-            if not low <= value <= high:
-                raise ValueError(f"{name} must be from {low} to {high}, not {value}")
-    if not 0.1 <= options.seconds <= 600.0:
-        raise ValueError(f"seconds must be from 0.1 to 600, not {options.seconds:g}")
-
-
-def _measure(options: argparse.Namespace, say: Callable[[str], None]) -> Iterator[Table]:
+def _measure(options: Options, say: Callable[[str], None]) -> Iterator[Table]:
     timings = []
     for num_missions in options.missions:
         say(f"Measuring {num_missions} missions side by side ...")

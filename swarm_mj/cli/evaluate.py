@@ -1,59 +1,77 @@
 """`swarm-mj evaluate`: policies over the same missions, with error bars."""
 
-import argparse
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from swarm_mj.cli.evaluation_table import print_results
-from swarm_mj.cli.interrupt import deferred_interrupt
-from swarm_mj.cli.options import new_parser
-from swarm_mj.cli.outputs import check_writable
-from swarm_mj.cli.study_options import add_study_options, study_of
+from swarm_mj.cli.interrupt import deferred_interrupt, heard_interrupt
+from swarm_mj.cli.mission_options import several_missions
+from swarm_mj.cli.outputs import check_outputs
+from swarm_mj.cli.policy_options import NAMES, PolicyOptions
+from swarm_mj.cli.progress import WorkBar
 from swarm_mj.evaluation import progress
 from swarm_mj.evaluation.batch import BatchCosts, fly_batch
 from swarm_mj.evaluation.jobs import run_jobs
+from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.evaluation.results import write_csv, write_json
 from swarm_mj.evaluation.study import Study
 from swarm_mj.evaluation.summary import Evaluated, summarise
+from swarm_mj.fields import same_as, setting
+from swarm_mj.mission import Mission
+from swarm_mj.policies.registry import POLICIES, normalised, with_payload
 
 DONE, INTERRUPTED = 0, 130
-MAX_JOBS = 256
+OUTPUT = "output"  # a heading of the help
+DEFAULT_POLICIES = ("planner", *BASELINES)
 
 
-def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no public type
-    """Adds the command."""
-    parser = new_parser(
-        commands,
-        "evaluate",
-        "Fly policies over the same missions and say where they stand, with error bars.",
-        epilog="Exit codes: 0 done, 2 bad input, 130 interrupted (with --json or --csv, --resume "
-        "continues).",
+@dataclass(frozen=True, kw_only=True)
+class Options(PolicyOptions):
+    """The options of `swarm-mj evaluate`."""
+
+    EPILOG: ClassVar = (
+        "Exit codes: 0 done, 2 bad input, 130 interrupted (with --json or --csv, --resume "
+        "continues)."
     )
-    add_study_options(parser)
-    parser.add_argument("--jobs", type=int, default=1, help="processes, 1 to 256")
-    group = parser.add_argument_group("output")
-    group.add_argument(
-        "--json", type=Path, metavar="FILE", help="write all figures and each mission's costs"
+    policy: tuple[str, ...] = setting(
+        DEFAULT_POLICIES,
+        f"{NAMES}, all of these, or directories of learned policies",
+        convert=normalised,
     )
-    group.add_argument(
-        "--csv", type=Path, metavar="FILE", help="write all figures, one row a result"
-    )
-    group.add_argument("--force", action="store_true", help="replace existing results and progress")
-    group.add_argument(
-        "--resume", action="store_true", help="continue where an interruption broke off"
-    )
-    parser.set_defaults(run=run)
+    episodes: int = same_as(Study, "episodes")
+    seed: int = same_as(Study, "seed")
+    baseline: str | None = same_as(Study, "baseline")
+    jobs: int = setting(1, "processes", low=1, high=256)
+    missions: tuple[Mission, ...] = several_missions()
+    json: Path | None = setting(None, "write all figures and each mission's costs", group=OUTPUT)
+    csv: Path | None = setting(None, "write all figures, one row a result", group=OUTPUT)
+    force: bool = setting(False, "replace existing results and progress", group=OUTPUT)
+    resume: bool = setting(False, "continue where an interruption broke off", group=OUTPUT)
+
+    @property
+    def study(self) -> Study:
+        """The study that the options name; raises ValueError as it does."""
+        named = [name for name in self.policy if name != "all"]
+        named = list(dict.fromkeys(named + list(POLICIES if "all" in self.policy else ())))
+        flown = dict(zip(named, with_payload(named, self.payload), strict=True))
+        return Study(
+            policies=tuple(dict.fromkeys(flown.values())),
+            regimes=self.missions,
+            episodes=self.episodes,
+            seed=self.seed,
+            probability=self.probability,
+            is_deterministic=self.is_deterministic,
+            baseline=None if self.baseline is None else flown.get(self.baseline, self.baseline),
+        )
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
-    if not 1 <= options.jobs <= MAX_JOBS:
-        raise ValueError(f"jobs must be from 1 to {MAX_JOBS}, not {options.jobs}")
-    study = study_of(options)
+    study = options.study
     kept = _check_outputs(options)
     console = Console(stderr=True, highlight=False)
     header = study.header()
@@ -72,17 +90,14 @@ def run(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _check_outputs(options: argparse.Namespace) -> Path | None:
+def _check_outputs(options: Options) -> Path | None:
     """The progress file, or None without outputs; raises ValueError for what cannot be written."""
     outputs = [path for path in (options.json, options.csv) if path]
     if not outputs:
         if options.resume:
             raise ValueError("--resume needs the --json or --csv of the run that was interrupted")
         return None
-    for path in outputs:
-        check_writable(path, "results", must_be_new=not options.force)
-    if len({path.resolve() for path in outputs}) < len(outputs):
-        raise ValueError(f"--json and --csv name the same file, {options.csv}")
+    check_outputs({"--json": options.json, "--csv": options.csv}, must_be_new=not options.force)
     kept = progress.progress_path(outputs[0])
     if kept.exists() and not (options.resume or options.force):
         raise ValueError(
@@ -110,20 +125,10 @@ def _fly(
     """Flies the batches that `costs` lacks, into `costs` and the progress file."""
     left = [index for index in range(len(study.batches)) if index not in costs]
     missions = [len(batch.seeds) for batch in study.batches]
-    bar = Progress(
-        TextColumn("Flying"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("missions"),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-    )
+    done = sum(missions[index] for index in costs)
+    bar = WorkBar("Flying", sum(missions), "missions", completed=done, console=console)
     flown = run_jobs(fly_batch, [study.batches[index] for index in left], num_jobs)
-    with bar, closing(flown):
-        task = bar.add_task(
-            "fly", total=sum(missions), completed=sum(missions[index] for index in costs)
-        )
+    with bar, closing(flown), heard_interrupt() as interrupt_again:
         for which, batch_costs in flown:
             index = left[which]
             with deferred_interrupt() as is_interrupted:
@@ -132,7 +137,8 @@ def _fly(
                     progress.append(kept, index, batch_costs)
             if is_interrupted():
                 raise KeyboardInterrupt
-            bar.update(task, advance=missions[index])
+            interrupt_again()
+            bar.advance(missions[index])
 
 
 def _interrupted(study: Study, costs: dict[int, BatchCosts], kept: Path | None) -> str:
@@ -142,7 +148,7 @@ def _interrupted(study: Study, costs: dict[int, BatchCosts], kept: Path | None) 
     return f"Interrupted after {flown} of {total} missions; {hint}."
 
 
-def _write(options: argparse.Namespace, evaluated: list[Evaluated]) -> None:
+def _write(options: Options, evaluated: list[Evaluated]) -> None:
     results = [each.result for each in evaluated]
     if options.json:
         missions = [

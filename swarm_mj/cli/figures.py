@@ -1,45 +1,40 @@
 """`swarm-mj figures`: draws the paper's figures from result files."""
 
-import argparse
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 
-from swarm_mj.cli.options import new_parser
 from swarm_mj.cli.outputs import check_writable
+from swarm_mj.cli.terminal import plain_console
 from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS
 from swarm_mj.evaluation.results import read_results
+from swarm_mj.fields import setting
 
 
-def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no public type
-    """Adds the command."""
-    parser = new_parser(
-        commands,
-        "figures",
-        "Draw the paper's figures, ours beside the published curves, from result files.",
-    )
-    parser.add_argument(
-        "results",
-        type=Path,
-        nargs="+",
-        metavar="RESULTS.csv",
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """The options of `swarm-mj figures`."""
+
+    results: tuple[Path, ...] = setting(
         help="files of one preset that `swarm-mj evaluate --csv` wrote",
+        metavar="RESULTS.csv",
+        is_positional=True,
     )
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where to write")
-    _add_several(parser, "--figure", FIGURES, "which to draw", "all")
-    _add_several(parser, "--format", FORMATS, "of the files", "svg and png")
-    parser.add_argument("--force", action="store_true", help="replace existing figures")
-    group = parser.add_argument_group(FLOCK, "The mission that is flown for it.")
-    group.add_argument("--flock-policy", default="mst", metavar="POLICY", help="who talks to whom")
-    group.add_argument("--flock-seed", type=int, default=1, metavar="SEED", help="the mission's")
-    parser.set_defaults(run=run)
+    out: Path = setting(help="where to write", metavar="DIR")
+    figure: tuple[str, ...] = setting(FIGURES, "which to draw", choices=FIGURES, shown="all")
+    format: tuple[str, ...] = setting(("svg", "png"), "of the files", choices=FORMATS)
+    force: bool = setting(False, "replace existing figures")
+    flock_policy: str = setting(
+        "mst", "who talks to whom in it", metavar="POLICY", group=f"the mission flown for {FLOCK}"
+    )
+    flock_seed: int = setting(1, "its seed", group=f"the mission flown for {FLOCK}")
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
     results = [result for path in options.results for result in read_results(path)]
-    paths = {name: _paths(options, name) for name in options.figure or FIGURES}
+    paths = {name: _paths(options, name) for name in dict.fromkeys(options.figure)}
     with Console(stderr=True).status("Drawing ...") as status:
         from swarm_mj.evaluation.figures.gallery import (
             draw_figure,  # matplotlib takes its time to import
@@ -59,29 +54,14 @@ def run(options: argparse.Namespace) -> int:
             status.update(f"Writing {name} ...")
             for path in paths[name]:
                 save(drawn[name], path)
-    console = Console(highlight=False, soft_wrap=True, markup=False)
-    console.print(f"Wrote {' '.join(str(path) for name in paths for path in paths[name])}")
+    written = " ".join(str(path) for name in paths for path in paths[name])
+    plain_console().print(f"Wrote {written}")
     return 0
 
 
-def _add_several(
-    parser: argparse.ArgumentParser, flag: str, choices: tuple[str, ...], what: str, default: str
-) -> None:
-    """An option of several values, after one flag or several."""
-    parser.add_argument(
-        flag,
-        action="extend",
-        nargs="+",
-        choices=choices,
-        metavar="NAME",
-        help=f"{what}: {', '.join(choices)} (default: {default})",
-    )
-
-
-def _paths(options: argparse.Namespace, name: str) -> list[Path]:
+def _paths(options: Options, name: str) -> list[Path]:
     """A figure's files; raises ValueError for those that cannot be written."""
-    endings = dict.fromkeys(options.format or ("svg", "png"))
-    paths = [options.out / f"{name}.{ending}" for ending in endings]
+    paths = [options.out / f"{name}.{ending}" for ending in dict.fromkeys(options.format)]
     for path in paths:
         check_writable(path, "figure", must_be_new=not options.force)
     return paths

@@ -1,6 +1,5 @@
 """`swarm-mj fly`: flies one mission, records its replay and says what it cost."""
 
-import argparse
 import json
 import os
 import shlex
@@ -8,22 +7,23 @@ import time
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from swarm_mj.cli.flight_table import flight_numbers, flight_table
 from swarm_mj.cli.interrupt import deferred_interrupt
-from swarm_mj.cli.options import add_mission_options, mission_of, new_parser, this_command
-from swarm_mj.cli.outputs import check_writable
+from swarm_mj.cli.mission_options import one_mission
+from swarm_mj.cli.outputs import check_outputs
+from swarm_mj.cli.policy_options import NAMES, PolicyOptions
+from swarm_mj.cli.progress import WorkBar
+from swarm_mj.cli.terminal import plain_console, this_command
+from swarm_mj.fields import setting
 from swarm_mj.io.atomic_file import atomic_write
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import (
-    PAYLOADS,
-    POLICIES,
     is_directory,
     make_policy,
     normalised,
@@ -37,6 +37,7 @@ from swarm_mj.swarm import Swarm
 
 DONE, INTERRUPTED = 0, 130
 REPLAYS = Path("replays")
+OUTPUT = "output"  # a heading of the help
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,63 +54,40 @@ class _Flight:
 COMPILING_WINDOWS = 10  # in which three robots do all that a flight does, schedules included
 
 
-def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no public type
-    """Adds the command."""
-    parser = new_parser(
-        commands,
-        "fly",
-        "Fly one mission and record its replay.",
-        epilog="Exit codes: 0 done, 2 bad input, 130 interrupted (what was flown is recorded).",
+@dataclass(frozen=True, kw_only=True)
+class Options(PolicyOptions):
+    """The options of `swarm-mj fly`."""
+
+    EPILOG: ClassVar = (
+        "Exit codes: 0 done, 2 bad input, 130 interrupted (what was flown is recorded)."
     )
-    parser.add_argument(
-        "--policy",
-        type=normalised,
-        default="planner",
-        help=f"who talks to whom: {', '.join(POLICIES)}, or a directory with a learned policy",
+    policy: str = setting(
+        "planner",
+        f"{NAMES}, or a directory with a learned policy",
+        convert=normalised,
     )
-    parser.add_argument(
-        "--probability",
-        type=float,
-        default=None,
-        help="of a transmission, for policies that have one (default: tuned for the regime)",
-    )
-    parser.add_argument(
-        "--deterministic",
-        action="store_true",
-        help="a learned policy takes the most probable recipient instead of a draw",
-    )
-    parser.add_argument(
-        "--payload",
-        default=PAYLOADS[0],
-        help="what the planner's packets carry beyond the buffers T, M and P: "
-        f"{', '.join(PAYLOADS)}",
-    )
-    parser.add_argument("--seed", type=int, default=1, help="the same seed is the same mission")
-    add_mission_options(parser)
-    group = parser.add_argument_group("output")
-    recording = group.add_mutually_exclusive_group()
-    recording.add_argument(
-        "--record",
-        type=Path,
+    seed: int = setting(1, "the same seed is the same mission")
+    mission: Mission = one_mission()
+    record: Path | None = setting(
+        None,
+        "the replay",
+        group=OUTPUT,
         metavar="FILE.rrd",
-        help="the replay (default: a fresh name under replays/)",
+        shown=f"a fresh name under {REPLAYS}/",
     )
-    recording.add_argument("--no-record", action="store_true", help="record no replay")
-    group.add_argument("--force", action="store_true", help="replace an existing replay")
-    group.add_argument(
-        "--observer", type=int, default=0, help="the robot whose knowledge the replay shows"
-    )
-    group.add_argument("--view", action="store_true", help="open the replay afterwards")
-    group.add_argument("--json", type=Path, metavar="FILE", help="write a summary")
-    parser.set_defaults(run=run)
+    no_record: bool = setting(False, "record no replay", group=OUTPUT)
+    json: Path | None = setting(None, "write a summary", group=OUTPUT)
+    force: bool = setting(False, "replace existing files", group=OUTPUT)
+    observer: int = setting(0, "the robot whose knowledge the replay shows", group=OUTPUT)
+    view: bool = setting(False, "open the replay afterwards", group=OUTPUT)
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
-    (options.policy,) = with_payload([options.policy], options.payload)
-    mission = mission_of(options)
+    options = replace(options, policy=with_payload([options.policy], options.payload)[0])
+    mission = options.mission
     policy = _make_policy(options, mission)
-    path = _check_outputs(options)
+    path = _replay_path(options)
     console = Console(stderr=True, highlight=False)
     with console.status("Preparing the swarm (compiles once, then it is cached) ..."):
         _compile_ahead(options, mission)
@@ -118,42 +96,39 @@ def run(options: argparse.Namespace) -> int:
     flight = _fly(swarm, policy, recorder, console)
     with deferred_interrupt(), console.status("Writing ..."):
         _write(_config(options, mission, policy), mission, flight, path, options.json)
-    _print(options, mission, flight, path)
+    _print(options, flight, path)
     if flight.was_interrupted:
         console.print(f"Interrupted after {len(flight.flown)} of {mission.num_windows} windows.")
         return INTERRUPTED
     return run_viewer(view_command(path)) if options.view and path else DONE
 
 
-def _make_policy(options: argparse.Namespace, mission: Mission) -> Policy:
+def _make_policy(options: Options, mission: Mission) -> Policy:
     return make_policy(
-        options.policy, mission, options.probability, is_deterministic=options.deterministic
+        options.policy, mission, options.probability, is_deterministic=options.is_deterministic
     )
 
 
-def _check_outputs(options: argparse.Namespace) -> Path | None:
+def _replay_path(options: Options) -> Path | None:
     """The replay's path, or None; raises ValueError for what could not be written later."""
-    if options.json:
-        check_writable(options.json, "summary")
-    if options.no_record:
-        if options.view:
-            raise ValueError("--view needs a replay; leave out --no-record")
-        return None
-    path = options.record or _fresh_name(options)
-    if path.suffix != ".rrd":
+    if options.no_record and options.record:
+        raise ValueError("--no-record is not allowed with --record; leave one out")
+    if options.no_record and options.view:
+        raise ValueError("--view needs a replay; leave out --no-record")
+    path = None if options.no_record else options.record or _fresh_name(options)
+    if path and path.suffix != ".rrd":
         raise ValueError(f"replay must be named *.rrd, not {path}")
-    check_writable(path, "replay", must_be_new=not options.force)
-    if options.json and options.json.resolve() == path.resolve():
-        raise ValueError(f"--record and --json name the same file, {path}")
-    if options.view:
+    check_outputs({"--record": path, "--json": options.json}, must_be_new=not options.force)
+    if options.view and path:
         view_command(path)  # complains now if there is no display
     return path
 
 
-def _fresh_name(options: argparse.Namespace) -> Path:
+def _fresh_name(options: Options) -> Path:
     """A name of this process's own, for flights that start in the same second."""
     when = f"{datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}"
-    return REPLAYS / f"{options.task}-{_short(options.policy)}-seed{options.seed}-{when}.rrd"
+    task, policy = options.mission.task, _short(options.policy)
+    return REPLAYS / f"{task}-{policy}-seed{options.seed}-{when}.rrd"
 
 
 def _short(policy: str) -> str:
@@ -164,14 +139,14 @@ def _short(policy: str) -> str:
     return path.parent.name if path.name == "policy" else path.name
 
 
-def _compile_ahead(options: argparse.Namespace, mission: Mission) -> None:
+def _compile_ahead(options: Options, mission: Mission) -> None:
     """Flies such a mission in small, with both its halves, so that compiling is not timed."""
     smallest = replace(mission, num_robots=3, range_ratio=10.0, num_windows=COMPILING_WINDOWS)
     for _ in rollout(Swarm(smallest, [0]), _make_policy(options, smallest)):
         pass
 
 
-def _recorder(options: argparse.Namespace, swarm: Swarm, policy: Policy) -> Recorder:
+def _recorder(options: Options, swarm: Swarm, policy: Policy) -> Recorder:
     return Recorder(
         swarm, ego=options.observer, is_broadcast=policy.window(swarm.mission).is_broadcast
     )
@@ -180,23 +155,15 @@ def _recorder(options: argparse.Namespace, swarm: Swarm, policy: Policy) -> Reco
 def _fly(swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Console) -> _Flight:
     """Flies with a progress bar; Ctrl-C ends the flight after a whole window."""
     flown: list[WindowRecord] = []
-    bar = Progress(
-        TextColumn("Flying"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("windows, age {task.fields[age]:.1f}"),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-    )
     start_s = time.perf_counter()
+    bar = WorkBar("Flying", swarm.mission.num_windows, "windows", console=console)
     with deferred_interrupt() as is_interrupted, bar:
-        task = bar.add_task("fly", total=swarm.mission.num_windows, age=0.0)
         for window in rollout(swarm, policy):
             flown.append(window)
             if recorder:
                 recorder.add(window)
-            bar.update(task, advance=1, age=float(window.costs.age_windows[0]))
+            bar.text = f"age {float(window.costs.age_windows[0]):.1f}"
+            bar.advance()
             if is_interrupted():
                 break
         was_interrupted = is_interrupted() and len(flown) < swarm.mission.num_windows
@@ -210,7 +177,7 @@ def _fly(swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Conso
     )
 
 
-def _config(options: argparse.Namespace, mission: Mission, policy: Policy) -> dict[str, Any]:
+def _config(options: Options, mission: Mission, policy: Policy) -> dict[str, Any]:
     """Everything that makes this flight again."""
     return {
         **asdict(mission),
@@ -244,11 +211,9 @@ def _write(
             part.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 
-def _print(
-    options: argparse.Namespace, mission: Mission, flight: _Flight, path: Path | None
-) -> None:
+def _print(options: Options, flight: _Flight, path: Path | None) -> None:
     """Prints the table and how to open the replay."""
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console, mission = plain_console(), options.mission
     team = f"{mission.num_robots} robots"
     if mission.switched_off:
         team += f", {mission.switched_off:.0%} of them off half-way"

@@ -13,13 +13,39 @@ def deferred_interrupt() -> Iterator[Callable[[], bool]]:
     Yields:
         Whether Ctrl-C was pressed.
     """
+    with _noted(is_deferred=True) as was_pressed:
+        yield was_pressed
+
+
+@contextmanager
+def heard_interrupt() -> Iterator[Callable[[], None]]:
+    """Within it Ctrl-C interrupts at once, and again, should a library have swallowed it.
+
+    An exception is lost if it comes while compiled code calls back into Python, as it does while
+    numba loads kernels.
+
+    Yields:
+        A function that interrupts if Ctrl-C was pressed before.
+    """
+    with _noted(is_deferred=False) as was_pressed:
+
+        def interrupt_again() -> None:
+            if was_pressed():
+                raise KeyboardInterrupt
+
+        yield interrupt_again
+
+
+@contextmanager
+def _noted(*, is_deferred: bool) -> Iterator[Callable[[], bool]]:
+    """Notes Ctrl-C; interrupts, too, unless it is the first and deferred."""
     was_pressed = False
 
     def note(signal_number: int, frame: FrameType | None) -> None:
         nonlocal was_pressed
-        if was_pressed:
+        is_first, was_pressed = not was_pressed, True
+        if not (is_first and is_deferred):
             signal.default_int_handler(signal_number, frame)
-        was_pressed = True
 
     before = signal.getsignal(signal.SIGINT)
     if before == signal.SIG_IGN:  # a job that its shell shields from Ctrl-C stays so

@@ -1,118 +1,181 @@
-"""Options that several commands share, and the mission they name."""
+"""A dataclass as a command line: each option is a field, with its help, range and default.
+
+tyro does this too, but refuses in boxes of several lines, knows no abbreviations and drops all but
+the last of `--robots 10 --robots 20`.
+"""
 
 import argparse
-import os
-import shutil
-import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
+from dataclasses import MISSING, Field, field, fields
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, NoReturn, TypeVar, get_origin
 
-from swarm_mj.mission import PRESETS, Boundary, Mission, PhysicsMode, Task
+from swarm_mj.fields import check, kind_of, range_of
 
-DEFAULTS = Mission()
-
-
-class _Formatter(argparse.ArgumentDefaultsHelpFormatter):
-    """Shows a default where there is one to show."""
-
-    def _get_help_string(self, action: argparse.Action) -> str | None:
-        if action.default in (None, False):
-            return action.help
-        return super()._get_help_string(action)
+Options = TypeVar("Options")
+BAD_INPUT = 2
+MANY = 10**9  # from here on, the end of a range is only there to catch slips
+METAVARS: dict[Any, str] = {int: "N", float: "X", str: "NAME", Path: "FILE"}
 
 
-def new_parser(commands: Any, name: str, summary: str, epilog: str = "") -> argparse.ArgumentParser:  # noqa: ANN401 - argparse names no public type
-    """A command's parser: its summary as its help, defaults shown with every option."""
-    return commands.add_parser(
-        name,
-        help=summary,
-        description=summary,
-        epilog=epilog,
-        formatter_class=_Formatter,
-    )
+class Parser(argparse.ArgumentParser):
+    """Complains in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Prints the complaint and where to read on; exits with 2."""
+        self.exit(BAD_INPUT, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
 
 
-def this_command(name: str = "swarm-mj") -> str:
-    """How the reader can call a program beside this Python: by name, or by path if it must be."""
-    program = Path(sys.executable).with_name(name)
-    found = shutil.which(name)
-    if (found and Path(found) == program) or not program.exists():
-        return name
-    return os.path.relpath(program)
+class _Formatter(argparse.HelpFormatter):
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, max_help_position=26)
+
+    def _format_args(self, action: argparse.Action, default_metavar: Any) -> str:  # noqa: ANN401 - argparse asks with None, too
+        """`NAME ...` rather than `NAME [NAME ...]`."""
+        return (
+            f"{action.metavar} ..."
+            if action.nargs == "+"
+            else super()._format_args(action, default_metavar)
+        )
 
 
-def add_mission_options(parser: argparse.ArgumentParser) -> None:
-    """The options that make a mission."""
-    group = parser.add_argument_group("mission")
-    group.add_argument(
-        "--task", default="flocking", help=f"what the robots do: {listed(get_args(Task))}"
-    )
-    group.add_argument(
-        "--robots", type=int, default=DEFAULTS.num_robots, help="size of the team, 2 to 1000"
-    )
-    group.add_argument(
-        "--velocity-ratio",
-        type=float,
-        default=DEFAULTS.velocity_ratio,
-        help="largest velocity per axis, as the share of 1 km covered in 50 s (0.15 is 3 m/s), "
-        "0.001 to 5",
-    )
-    group.add_argument(
-        "--range-ratio",
-        type=float,
-        default=DEFAULTS.range_ratio,
-        help="range of a packet in silence, as a share of 1 km, 0.01 to 10",
-    )
-    group.add_argument(
-        "--windows",
-        type=int,
-        default=DEFAULTS.num_windows,
-        help="length, in windows of 100 ms, 1 to 100000",
-    )
-    group.add_argument(
-        "--preset",
-        default="paper",
-        help=f"{listed(PRESETS)}: the paper's text, or what its authors' code does",
-    )
-    group.add_argument(
-        "--physics",
-        default=DEFAULTS.physics,
-        help=f"{listed(get_args(PhysicsMode))}: Eq. 15 to rounding error, or forces and bounces",
-    )
-    group.add_argument(
-        "--boundary",
-        default=DEFAULTS.boundary,
-        help=f"{listed(get_args(Boundary))}; the paper's flocks fly out of the area: none",
-    )
-    group.add_argument(
-        "--switched-off",
-        type=float,
-        default=DEFAULTS.switched_off,
-        help="fraction of the robots that is switched off half-way, and nobody is told, 0 to 0.9",
-    )
+def nested(
+    add: Callable[[argparse.ArgumentParser], None], build: Callable[[dict[str, Any]], Any]
+) -> Any:  # noqa: ANN401 - a dataclass field takes the type of its attribute
+    """A field of several options, which `add` declares; `build` makes it of those given."""
+    return field(metadata={"add": add, "build": build})
 
 
-def mission_of(options: argparse.Namespace) -> Mission:
-    """The mission that the options name.
+def parse(kind: type[Options], arguments: Sequence[str], prog: str, summary: str) -> Options:
+    """The command line as an instance of its dataclass.
+
+    Args:
+        kind: The dataclass; its `EPILOG`, if it has one, ends the help.
+        arguments: What was typed after the command.
+        prog: How the command is called.
+        summary: What it does.
+
+    Returns:
+        The options; a field called `typed`, if there is one, has the arguments themselves.
 
     Raises:
-        ValueError: A value is unknown or outside its range.
+        ValueError: A value is not among the choices, or out of range.
+        SystemExit: The options cannot be read, or help was asked for.
     """
-    if options.preset not in PRESETS:
-        raise ValueError(f"preset must be one of {listed(PRESETS)}, not {options.preset!r}")
-    return PRESETS[options.preset](
-        options.task,
-        num_robots=options.robots,
-        velocity_ratio=options.velocity_ratio,
-        range_ratio=options.range_ratio,
-        num_windows=options.windows,
-        physics=options.physics,
-        boundary=options.boundary,
-        switched_off=options.switched_off,
+    parser = parser_of(kind, prog, summary)
+    given = vars(parser.parse_args(arguments))
+    values: dict[str, Any] = {"typed": tuple(arguments)}
+    for spec in fields(kind):  # pyright: ignore[reportArgumentType]
+        if "build" in spec.metadata:
+            values[spec.name] = spec.metadata["build"](given)
+        elif spec.name in given:
+            is_many = isinstance(given[spec.name], list)
+            values[spec.name] = tuple(given[spec.name]) if is_many else given[spec.name]
+    names = {spec.name for spec in fields(kind)}  # pyright: ignore[reportArgumentType]
+    options = kind(**{name: value for name, value in values.items() if name in names})
+    check(options)
+    return options
+
+
+def parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
+    """The parser of a dataclass's options."""
+    specs = fields(kind)
+    needed = [_metavar(spec) for spec in specs if spec.metadata.get("is_positional")]
+    needed += [f"{flag_of(spec)} {_metavar(spec)}" for spec in specs if _is_required(spec)]
+    parser = Parser(
+        prog=prog,
+        usage=" ".join([prog, *needed, "[OPTIONS]"]),
+        description=summary,
+        epilog=getattr(kind, "EPILOG", None),
+        formatter_class=_Formatter,
+        argument_default=argparse.SUPPRESS,
     )
+    groups: dict[str, Any] = {}
+    for spec in specs:
+        title = spec.metadata.get("group", "")
+        if "add" in spec.metadata:
+            spec.metadata["add"](parser)
+        elif "help" in spec.metadata:
+            if title and title not in groups:
+                groups[title] = parser.add_argument_group(title)
+            default, is_required = shown_default(spec), _is_required(spec)
+            add_option(groups.get(title, parser), spec, spec.name, default, is_required=is_required)
+    return parser
 
 
-def listed(names: Iterable[str]) -> str:
-    """Names in a row."""
-    return ", ".join(names)
+def add_option(
+    group: Any,  # noqa: ANN401 - argparse names no public type of groups
+    spec: Field[Any],
+    dest: str,
+    default: str,
+    *,
+    is_many: bool = False,
+    is_required: bool = False,
+) -> None:
+    """Declares a field as an option.
+
+    Args:
+        group: The parser, or a group of it.
+        spec: The field.
+        dest: The value's name among those parsed; absent if the option was not given.
+        default: The default as text; empty for none.
+        is_many: Whether it takes several values, after one flag or several.
+        is_required: Whether it must be given.
+    """
+    text = _help(spec, default)
+    if kind_of(spec) is bool:
+        group.add_argument(flag_of(spec), dest=dest, action="store_true", help=text)
+        return
+    how: dict[str, Any] = {
+        "type": spec.metadata.get("convert") or kind_of(spec),
+        "metavar": _metavar(spec),
+        "help": text,
+    }
+    if is_many or get_origin(spec.type) is tuple:
+        how |= {"nargs": "+", "action": "extend"}
+    if spec.metadata.get("is_positional"):
+        group.add_argument(dest, **how)
+    else:
+        group.add_argument(flag_of(spec), dest=dest, required=is_required, **how)
+
+
+def flag_of(spec: Field[Any]) -> str:
+    """The flag of a field: `--windows` of `num_windows`."""
+    name = spec.name.removeprefix("num_").removeprefix("is_")
+    return "--" + name.replace("_", "-")
+
+
+def as_typed(value: object) -> str:
+    """A setting's value as it is typed."""
+    if isinstance(value, tuple):
+        return " ".join(map(as_typed, value))
+    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
+
+
+def shown_default(spec: Field[Any]) -> str:
+    """A default as text; empty if there is none to show."""
+    if "shown" in spec.metadata:
+        return spec.metadata["shown"]
+    has_none = any(spec.default is nothing for nothing in (MISSING, None, False, ()))
+    return "" if has_none else as_typed(spec.default)
+
+
+def _help(spec: Field[Any], default: str) -> str:
+    """Meaning, choices, unit, range, default."""
+    allowed = spec.metadata
+    text = allowed["help"]
+    if "choices" in allowed:
+        text += f": {', '.join(allowed['choices'])}"
+    if "low" in allowed:
+        has_end = allowed["high"] < MANY
+        text += f", {range_of(spec)}" if has_end else f", {allowed['low']} or more"
+    return (text + (f" (default: {default})" if default else "")).replace("%", "%%")
+
+
+def _metavar(spec: Field[Any]) -> str:
+    return spec.metadata.get("metavar") or METAVARS.get(kind_of(spec), "VALUE")
+
+
+def _is_required(spec: Field[Any]) -> bool:
+    is_option = "help" in spec.metadata and not spec.metadata.get("is_positional")
+    return is_option and spec.default is MISSING

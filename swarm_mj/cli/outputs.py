@@ -5,6 +5,25 @@ from pathlib import Path
 from swarm_mj.io.atomic_file import temp_path
 
 
+def check_outputs(outputs: dict[str, Path | None], *, must_be_new: bool) -> None:
+    """Passes if a command can write all its files.
+
+    Args:
+        outputs: The files by their options; None is not written.
+        must_be_new: Whether existing files are refused.
+
+    Raises:
+        ValueError: One cannot be written, or two are the same.
+    """
+    named: dict[Path, str] = {}
+    for flag, path in outputs.items():
+        if path is not None:
+            check_writable(path, flag, must_be_new=must_be_new)
+            if path.resolve() in named:
+                raise ValueError(f"{named[path.resolve()]} and {flag} name the same file, {path}")
+            named[path.resolve()] = flag
+
+
 def check_writable(path: Path, what: str, *, must_be_new: bool = False) -> None:
     """Passes if a file can be written there.
 

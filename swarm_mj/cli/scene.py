@@ -1,38 +1,39 @@
 """`swarm-mj scene`: writes the composed MJCF model."""
 
-import argparse
 import shlex
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from rich.console import Console
-
-from swarm_mj.cli.options import add_mission_options, mission_of, new_parser, this_command
+from swarm_mj.cli.mission_options import one_mission
 from swarm_mj.cli.outputs import check_writable
+from swarm_mj.cli.terminal import plain_console, this_command
+from swarm_mj.fields import setting
 from swarm_mj.io.atomic_file import atomic_write
-from swarm_mj.physics.scene import compose
-from swarm_mj.swarm import Swarm
+from swarm_mj.mission import Mission
 
 
-def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no public type
-    """Adds the command."""
-    parser = new_parser(commands, "scene", "Write the scene of a mission as one MJCF file.")
-    add_mission_options(parser)
-    parser.add_argument("--seed", type=int, default=1, help="of the mission whose start is shown")
-    parser.add_argument("--out", type=Path, default=Path("scene.xml"), help="the file to write")
-    parser.add_argument("--force", action="store_true", help="replace an existing file")
-    parser.set_defaults(run=run)
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """The options of `swarm-mj scene`."""
+
+    mission: Mission = one_mission()
+    seed: int = setting(1, "of the mission whose start is shown")
+    out: Path = setting(Path("scene.xml"), "the file to write")
+    force: bool = setting(False, "replace an existing file")
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
-    mission = mission_of(options)
+    from swarm_mj.physics.scene import compose  # MuJoCo takes its time to import
+    from swarm_mj.swarm import Swarm
+
+    mission = options.mission
     check_writable(options.out, "scene", must_be_new=not options.force)
     spec = compose(mission, start=Swarm(mission, [options.seed]).states)
     spec.compile()
     with atomic_write(options.out) as part:
         part.write_text(spec.to_xml(), encoding="utf-8")
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console = plain_console()
     side = f"{mission.side_m:.0f} m"
     console.print(f"Wrote {options.out}: {mission.num_robots} robots on {side} by {side}")
     file = shlex.quote(str(options.out))

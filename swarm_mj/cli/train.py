@@ -1,55 +1,76 @@
 """`swarm-mj train`: trains a communication policy by PPO on the physics scene."""
 
-import argparse
 import os
 import shlex
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 from rich.console import Console
 from rich.table import Table
 
 from swarm_mj.cli.interrupt import deferred_interrupt
-from swarm_mj.cli.options import DEFAULTS, new_parser, this_command
+from swarm_mj.cli.mission_options import mission_flags
+from swarm_mj.cli.options import nested
 from swarm_mj.cli.outputs import check_writable
-from swarm_mj.cli.train_options import add_options
+from swarm_mj.cli.terminal import plain_console, this_command
+from swarm_mj.cli.train_options import add_setting_options, given_settings
 from swarm_mj.cli.train_progress import Watch, age_of
 from swarm_mj.cli.train_settings import (
+    BUDGETS,
     asked_limits,
     asked_settings,
     check_memory,
-    stored_settings,
+    refuse_others,
 )
-from swarm_mj.mission import PRESETS
-
-if TYPE_CHECKING:
-    from swarm_mj.learning.progress import Progress
-    from swarm_mj.learning.run_folder import Run
+from swarm_mj.fields import setting
+from swarm_mj.learning.progress import Progress
+from swarm_mj.learning.run_folder import SETTINGS, Run, check_new, read_run
+from swarm_mj.policies.stored import read_policy
 
 DONE, INTERRUPTED = 0, 130
+MANY_DECISIONS = 10**12
 
 
-def add_parser(commands: Any) -> None:  # noqa: ANN401 - argparse names no public type
-    """Adds the command."""
-    parser = new_parser(
-        commands,
-        "train",
-        "Train a communication policy by PPO; the best one is OUT/policy.",
-        epilog="A run that was interrupted, or killed, goes on with --out OUT --resume and ends "
-        "as if it had not been. OUT holds settings.json, curve.csv, tensorboard, policy and "
-        "checkpoint.pt. Exit codes: 0 done, 2 bad input, 130 interrupted (--resume goes on).",
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """The options of `swarm-mj train`."""
+
+    EPILOG: ClassVar = (
+        "A run that was interrupted, or killed, goes on with --out OUT --resume and ends as if it "
+        "had not been. OUT holds policy, the best so far; settings.json, curve.csv, tensorboard "
+        "and checkpoint.pt. Exit codes: 0 done, 2 bad input, 130 interrupted (--resume goes on)."
     )
-    add_options(parser)
-    parser.set_defaults(run=run)
+    out: Path = setting(help="the run's folder", metavar="runs/NAME")
+    resume: bool = setting(False, "go on with the run in OUT")
+    budget: int | None = setting(
+        None,
+        "stop after so many decisions of teams, in all",
+        low=1,
+        high=MANY_DECISIONS,
+        shown=f"{BUDGETS['robot']}, team: {BUDGETS['team']}; none with --minutes",
+    )
+    minutes: float | None = setting(
+        None, "stop after so long, in all, evaluations included; above 0"
+    )
+    replay_every: int | None = setting(
+        None,
+        "record the first held-out mission in OUT/replays whenever so many decisions are made",
+        label="replay-every",
+        low=1,
+        high=MANY_DECISIONS,
+    )
+    init: Path | None = setting(None, "begin with a stored policy", metavar="POLICY")
+    settings: dict[str, Any] = nested(add_setting_options, given_settings)
+    typed: tuple[str, ...] = ()
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
     console = Console(stderr=True, highlight=False, soft_wrap=True)
-    with console.status("Preparing (torch takes its time to load) ..."):
+    with console.status("Preparing ..."):
         asked = _asked_run(options)
-        from swarm_mj.learning.run import train
+        from swarm_mj.learning.run import train  # stable-baselines3 takes its time to import
     try:
         with deferred_interrupt() as is_interrupted:
             with Watch(console, asked.limits, is_interrupted) as watch:
@@ -75,26 +96,30 @@ def run(options: argparse.Namespace) -> int:
     return DONE if is_over else INTERRUPTED
 
 
-def _asked_run(options: argparse.Namespace) -> "Run":
+def _asked_run(options: Options) -> Run:
     """What the options ask for; raises ValueError before anything is written."""
-    from swarm_mj.learning.run_folder import SETTINGS, Run, check_new, read_run
-    from swarm_mj.policies.stored import read_policy
-
+    given, stored, init = options.settings, None, None
     if options.resume:
         stored = read_run(options.out)
-        training = stored_settings(options, stored.training)
-        limits = asked_limits(options, training.arm, stored.limits)
-        asked = replace(stored, training=training, limits=limits)
+        if options.init is not None:
+            raise ValueError(f"{options.out} has begun, so --init {options.init} is too late")
+        refuse_others(given, stored.training, f"the run in {options.out}")
+        training, command, init = stored.training, stored.command, stored.init
     else:
         check_new(options.out)
-        init = read_policy(options.init)[1] if options.init else None
-        training = asked_settings(options, init)
-        limits = asked_limits(options, training.arm)
-        command = shlex.join(["swarm-mj", *options.typed])
-        asked = Run(training=training, limits=limits, command=command, init=options.init)
+        init = options.init
+        training = asked_settings(given, read_policy(init)[1] if init else None, init)
+        command = shlex.join(["swarm-mj", "train", *options.typed])
+    limits = asked_limits(
+        stored.limits if stored else None,
+        training.arm,
+        budget=options.budget,
+        minutes=options.minutes,
+        replay_every=options.replay_every,
+    )
     check_writable(options.out / SETTINGS, "run")
-    check_memory(asked.training, _memory_bytes())
-    return asked
+    check_memory(training, _memory_bytes())
+    return Run(training=training, limits=limits, command=command, init=init)
 
 
 def _memory_bytes() -> int | None:
@@ -105,15 +130,15 @@ def _memory_bytes() -> int | None:
         return None
 
 
-def _print(out: Path, asked: "Run", progress: "Progress", *, is_over: bool) -> None:
+def _print(out: Path, asked: Run, progress: Progress, *, is_over: bool) -> None:
     """Prints what the run came to, and what to do with it."""
-    console = Console(highlight=False, soft_wrap=True, markup=False)
+    console = plain_console()
     console.print(_table(out, asked, progress))
     for label, line in _next_commands(out, asked, progress, is_over=is_over):
         console.print(f"{label:10}{line}")
 
 
-def _table(out: Path, asked: "Run", progress: "Progress") -> Table:
+def _table(out: Path, asked: Run, progress: Progress) -> Table:
     training = asked.training
     sizes = ", ".join(map(str, training.robots))
     table = Table(
@@ -138,10 +163,12 @@ def _table(out: Path, asked: "Run", progress: "Progress") -> Table:
 
 
 def _next_commands(
-    out: Path, asked: "Run", progress: "Progress", *, is_over: bool
+    out: Path, asked: Run, progress: Progress, *, is_over: bool
 ) -> list[tuple[str, str]]:
     """What to do next, and the commands that do it."""
-    name, policy, mission = this_command(), shlex.quote(str(out / "policy")), _mission_flags(asked)
+    name, policy = this_command(), shlex.quote(str(out / "policy"))
+    training = asked.training
+    mission = mission_flags(replace(training.mission, num_robots=training.robots[0]))
     lines = [
         ("Watch:", f"{this_command('tensorboard')} --logdir {shlex.quote(str(out))}"),
         ("Go on:", _resume_command(out, 2 * progress.decisions if is_over else None)),
@@ -153,21 +180,6 @@ def _next_commands(
         ("Evaluate:", f"{name} evaluate --policy {policy} tdma {mission}"),
         *lines,
     ]
-
-
-def _mission_flags(asked: "Run") -> str:
-    """The options that name the missions trained on, for commands whose defaults are others."""
-    mission, training = asked.training.mission, asked.training
-    values = {
-        "--task": (mission.task, None),
-        "--preset": (mission.preset, DEFAULTS.preset),
-        "--robots": (training.robots[0], DEFAULTS.num_robots),
-        "--range-ratio": (mission.range_ratio, DEFAULTS.range_ratio),
-        "--velocity-ratio": (mission.velocity_ratio, DEFAULTS.velocity_ratio),
-        "--windows": (mission.num_windows, DEFAULTS.num_windows),
-        "--boundary": (mission.boundary, PRESETS[mission.preset](mission.task).boundary),
-    }
-    return " ".join(f"{flag} {value}" for flag, (value, usual) in values.items() if value != usual)
 
 
 def _resume_command(out: Path, budget: int | None = None) -> str:

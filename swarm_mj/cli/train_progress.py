@@ -7,9 +7,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
-from rich.table import Column
-from rich.text import Text
+
+from swarm_mj.cli.progress import WorkBar
 
 if TYPE_CHECKING:
     from swarm_mj.learning.run_folder import Limits
@@ -17,18 +16,6 @@ if TYPE_CHECKING:
 
 FINISHING = "finishing this rollout, then all is kept; Ctrl-C again breaks off at once"
 WHOLE = 1.0  # the bar's total
-BAR_WIDTH = 12
-
-
-class _What(ProgressColumn):
-    """What the run is at; looked up whenever the bar is drawn, so Ctrl-C shows at once."""
-
-    def __init__(self, is_interrupted: Callable[[], bool]) -> None:
-        super().__init__(Column(no_wrap=True, min_width=len("Evaluating")))
-        self._is_interrupted = is_interrupted
-
-    def render(self, task: Task) -> Text:
-        return Text("Finishing" if self._is_interrupted() else task.fields["what"])
 
 
 class Watch:
@@ -45,22 +32,15 @@ class Watch:
             is_interrupted: Whether Ctrl-C was pressed.
         """
         self._console, self._limits, self._is_interrupted = console, limits, is_interrupted
-        self._bar = Progress(
-            _What(is_interrupted),
-            BarColumn(BAR_WIDTH),
-            TextColumn("{task.fields[text]}"),
-            console=console,
-            transient=True,
-            disable=not console.is_terminal,
-        )
-        self._task = self._bar.add_task("", total=WHOLE, what="Training", text="")
+        self._what = "Training"
+        self._bar = WorkBar(self._shown, WHOLE, console=console, shows_time_left=False)
         self._start: Status | None = None  # of this session
         self._num_rows = 0
         self.has_stopped = False  # whether the run was told to stop
         self.has_begun = False  # whether there was anything to do
 
     def __enter__(self) -> "Watch":
-        self._bar.start()
+        self._bar.__enter__()
         return self
 
     def __exit__(
@@ -69,7 +49,7 @@ class Watch:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._bar.stop()
+        self._bar.__exit__(kind, error, traceback)
 
     def __call__(self, status: "Status") -> bool:
         """Shows a status; returns whether to go on."""
@@ -78,16 +58,16 @@ class Watch:
             self._num_rows = len(status.progress.curve)
         self.has_begun = True
         self._print_new_row(status)
-        self._bar.update(
-            self._task,
-            completed=share_done(status, self._limits),
-            what="Training" if status.evaluated is None else "Evaluating",
-            text=_text(status, self._start, self._limits),
-        )
+        self._what = "Training" if status.evaluated is None else "Evaluating"
+        self._bar.text = _text(status, self._start, self._limits)
+        self._bar.move_to(share_done(status, self._limits))
         if self._is_interrupted() and not self.has_stopped:
             self.has_stopped = True
             self._console.print(f"Interrupted: {FINISHING}.")
         return not self.has_stopped
+
+    def _shown(self) -> str:
+        return "Finishing" if self._is_interrupted() else self._what
 
     def _print_new_row(self, status: "Status") -> None:
         curve = status.progress.curve

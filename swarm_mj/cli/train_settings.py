@@ -1,49 +1,41 @@
-"""From the options of `swarm-mj train` to a run's settings and limits.
+"""From the options of `swarm-mj train` to a run's settings and limits."""
 
-The settings bring torch along, which takes its time to import; so functions import them.
-"""
-
-import argparse
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-from swarm_mj.cli.options import DEFAULTS, listed
-from swarm_mj.cli.train_options import BUDGETS, PLACES, option_flag, shown, stored_value
+from swarm_mj.cli.train_options import stored_value, typed
+from swarm_mj.gnn.feature_sets import make_extractor
+from swarm_mj.learning.run_folder import Limits
+from swarm_mj.learning.settings import Training, arm_settings
 from swarm_mj.mission import PRESETS, Mission
+from swarm_mj.policies.policy_config import PolicyConfig
 
-if TYPE_CHECKING:
-    from swarm_mj.learning.run_folder import Limits
-    from swarm_mj.learning.settings import Training
-    from swarm_mj.policies.policy_config import PolicyConfig
-
-MANY_DECISIONS = 10**12
+BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's way
 USUAL_GROUPS = 4  # of missions that end at different times
 SHARE_OF_MEMORY = 0.5  # that a run's arrays may take
-RANGES = {"learning_rate": (1e-9, 1.0), "entropy": (0.0, 10.0), "discount": (0.0, 1.0)}
 
 
-def asked_settings(options: argparse.Namespace, init: "PolicyConfig | None" = None) -> "Training":
+def asked_settings(
+    given: dict[str, Any], init: PolicyConfig | None = None, init_path: Path | None = None
+) -> Training:
     """The settings of a new run.
 
     Args:
-        options: As parsed.
+        given: The settings that were given, by their places.
         init: Of the policy that it begins with.
+        init_path: Where that policy is.
 
     Returns:
-        The arm's own settings, changed by the options.
+        The usual settings of the credit assignment, changed by those given.
 
     Raises:
         ValueError: A value is unknown or outside its range, or contradicts another.
     """
-    from swarm_mj.learning.settings import arm_settings
-
-    sizes = _sizes(options)
+    sizes = given.get("robots", (Mission().num_robots,))
     training = arm_settings(
-        "robot" if options.arm is None else options.arm,
-        _mission(options, sizes[0]),
-        sizes,
-        0 if options.seed is None else options.seed,
+        given.get("arm", "robot"), _mission(given, sizes[0]), sizes, given.get("seed", 0)
     )
     if init is not None:
         training = replace(
@@ -52,65 +44,63 @@ def asked_settings(options: argparse.Namespace, init: "PolicyConfig | None" = No
             features=init.features,
             silence_logit=init.silence_logit,
         )
-        _refuse_others(options, training, "network.", f"the policy {options.init}")
-        _refuse_others(options, training, "features", f"the policy {options.init}")
-    missions = _missions(options.missions, training.missions, len(sizes))
+        shape = {place: value for place, value in given.items() if _is_shape(place)}
+        refuse_others(shape, training, f"the policy {init_path}")
+    missions = _missions(given.get("missions"), training.missions, len(sizes))
     training = replace(training, missions=missions)  # first, for its errors
     training = replace(training, groups=_groups(missions, len(sizes)))
-    training = _changed(training, options)
+    training = _changed(training, given)
     _check(training)
     return training
 
 
-def stored_settings(options: argparse.Namespace, training: "Training") -> "Training":
-    """The settings of a run that goes on: its own.
-
-    Args:
-        options: As parsed.
-        training: What the run began with.
-
-    Returns:
-        The same.
+def refuse_others(given: dict[str, Any], training: Training, whose: str) -> None:
+    """Passes if given settings are those of a run, or of the policy that it begins with.
 
     Raises:
-        ValueError: An option contradicts them.
+        ValueError: One contradicts.
     """
-    if options.init is not None:
-        raise ValueError(f"{options.out} has begun, so --init {options.init} is too late")
-    _refuse_others(options, training, "", f"the run in {options.out}")
-    return training
+    for place, value in given.items():
+        stored = stored_value(training, place)
+        if value != stored:
+            has = typed(place, stored).partition(" ")[2]
+            raise ValueError(f"{typed(place, value)} is not what {whose} has, {has}; leave it out")
 
 
-def asked_limits(options: argparse.Namespace, arm: str, stored: "Limits | None" = None) -> "Limits":
-    """When a run stops: as the options say, else as before, else by the arm's budget.
+def asked_limits(
+    limits: Limits | None,
+    arm: str,
+    *,
+    budget: int | None = None,
+    minutes: float | None = None,
+    replay_every: int | None = None,
+) -> Limits:
+    """When a run stops: as asked, else as before, else by the usual budget.
 
     Args:
-        options: As parsed.
+        limits: Of a run that goes on; given ones take their place.
         arm: Whose budget counts if nothing else does.
-        stored: The limits of a run that goes on; given ones take their place.
+        budget: Team decisions in all.
+        minutes: In all.
+        replay_every: Team decisions between two replays.
 
     Returns:
         The limits.
 
     Raises:
-        ValueError: A number is outside its range.
+        ValueError: The time is no positive number.
     """
-    from swarm_mj.learning.run_folder import Limits
-
-    _check_whole("budget", options.budget)
-    _check_whole("replay-every", options.replay_every)
-    minutes = options.minutes
     if minutes is not None and not (minutes > 0.0 and math.isfinite(minutes)):
         raise ValueError(f"minutes must be a number above 0, not {minutes:g}")
-    limits = stored or Limits(decisions=BUDGETS[arm])
-    if options.budget is not None or minutes is not None:
-        limits = replace(limits, decisions=options.budget, minutes=minutes)
-    if options.replay_every is not None:
-        limits = replace(limits, replay_every=options.replay_every)
+    limits = limits or Limits(decisions=BUDGETS[arm])
+    if budget is not None or minutes is not None:
+        limits = replace(limits, decisions=budget, minutes=minutes)
+    if replay_every is not None:
+        limits = replace(limits, replay_every=replay_every)
     return limits
 
 
-def check_memory(training: "Training", total_bytes: int | None) -> None:
+def check_memory(training: Training, total_bytes: int | None) -> None:
     """Passes if a run's arrays leave enough memory for all the rest.
 
     Args:
@@ -129,7 +119,7 @@ def check_memory(training: "Training", total_bytes: int | None) -> None:
         )
 
 
-def rollout_bytes(training: "Training") -> int:
+def rollout_bytes(training: Training) -> int:
     """What a run's largest arrays take: the rollout, and what robots remember of packets."""
     nodes = max(training.robots)
     rows = training.missions * nodes  # a graph each
@@ -138,25 +128,11 @@ def rollout_bytes(training: "Training") -> int:
     return rows * (graph * (training.ppo.num_steps + 1) + remembered)
 
 
-def _sizes(options: argparse.Namespace) -> tuple[int, ...]:
-    return tuple(dict.fromkeys(options.robots or (DEFAULTS.num_robots,)))
-
-
-def _mission(options: argparse.Namespace, num_robots: int) -> Mission:
-    preset = "paper" if options.preset is None else options.preset
-    if preset not in PRESETS:
-        raise ValueError(f"preset must be one of {listed(PRESETS)}, not {preset!r}")
-    given = {
-        "range_ratio": options.range_ratio,
-        "velocity_ratio": options.velocity_ratio,
-        "num_windows": options.windows,
-        "boundary": options.boundary,
-    }
-    return PRESETS[preset](
-        "stationary" if options.task is None else options.task,
-        num_robots=num_robots,
-        **{name: value for name, value in given.items() if value is not None},
-    )
+def _mission(given: dict[str, Any], num_robots: int) -> Mission:
+    own = {place.partition(".")[2]: v for place, v in given.items() if place.startswith("mission.")}
+    preset, task = own.pop("preset", "paper"), own.pop("task", "stationary")
+    replace(Mission(), preset=preset, task=task)  # refuses what is unknown
+    return PRESETS[preset](task, num_robots=num_robots, **own)
 
 
 def _missions(asked: int | None, usual: int, num_sizes: int) -> int:
@@ -169,7 +145,7 @@ def _missions(asked: int | None, usual: int, num_sizes: int) -> int:
         return -(-usual // num_sizes) * num_sizes
     if asked % num_sizes:
         fewer = asked // num_sizes * num_sizes
-        ways = listed(str(n) for n in (fewer, fewer + num_sizes) if n > 0)
+        ways = ", ".join(str(n) for n in (fewer, fewer + num_sizes) if n > 0)
         raise ValueError(
             f"missions must be a multiple of the {num_sizes} team sizes, such as {ways}, not "
             f"{asked}"
@@ -183,29 +159,25 @@ def _groups(missions: int, num_sizes: int) -> int:
     return min(able, key=lambda n: (abs(n - USUAL_GROUPS), -n), default=1)
 
 
-def _changed(training: "Training", options: argparse.Namespace) -> "Training":
-    """The settings with what the options say in place of the arm's own."""
+def _changed(training: Training, given: dict[str, Any]) -> Training:
+    """The settings with what was given in place of the usual."""
     parts: dict[str, dict[str, Any]] = {"network": {}, "ppo": {}, "": {}}
-    for name, place in PLACES.items():
-        owner, _, its = place.rpartition(".")
-        value = getattr(options, name)
-        if owner in parts and name != "robots" and value is not None:
-            parts[owner][its] = value
-    _check_ranges(options)
+    for place, value in given.items():
+        part, _, name = place.rpartition(".")
+        if part in parts:
+            parts[part][name] = value
     own = parts.pop("")
     if "features" in own:
-        parts["network"]["num_features"] = _num_features(own["features"])
+        parts["network"]["num_features"] = len(make_extractor(own["features"], Mission()).names)
     changed = {part: replace(getattr(training, part), **its) for part, its in parts.items()}
     return replace(training, **own, **changed)
 
 
-def _num_features(features: str) -> int:
-    from swarm_mj.gnn.feature_sets import make_extractor
-
-    return len(make_extractor(features, DEFAULTS).names)
+def _is_shape(place: str) -> bool:
+    return place == "features" or place.startswith("network.")
 
 
-def _check(training: "Training") -> None:
+def _check(training: Training) -> None:
     """Raises ValueError for settings that are sound one by one, but not together."""
     for size in training.robots:
         replace(training.mission, num_robots=size)
@@ -214,29 +186,3 @@ def _check(training: "Training") -> None:
             "reward velocity-variance depends on who talks only if the robots flock; add --task "
             "flocking"
         )
-
-
-def _check_ranges(options: argparse.Namespace) -> None:
-    for name, (low, high) in RANGES.items():
-        value = getattr(options, name)
-        if value is not None and not low <= value <= high:
-            raise ValueError(f"{option_flag(name)} must be from {low:g} to {high:g}, not {value:g}")
-
-
-def _check_whole(label: str, value: int | None) -> None:
-    if value is not None and not 1 <= value <= MANY_DECISIONS:
-        raise ValueError(f"{label} must be from 1 to {MANY_DECISIONS}, not {value}")
-
-
-def _refuse_others(
-    options: argparse.Namespace, training: "Training", prefix: str, whose: str
-) -> None:
-    """Raises ValueError if a given option is not what it is in the settings."""
-    for name, place in PLACES.items():
-        given = _sizes(options) if name == "robots" and options.robots else getattr(options, name)
-        if given is None or not place.startswith(prefix):
-            continue
-        stored = stored_value(training, place)
-        if given != stored:
-            flag = f"{option_flag(name)} {shown(given)}"
-            raise ValueError(f"{flag} is not what {whose} has, {shown(stored)}; leave it out")

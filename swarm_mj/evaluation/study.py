@@ -7,10 +7,11 @@ from itertools import product
 from typing import Any
 
 from swarm_mj.evaluation.batch import Batch
+from swarm_mj.fields import check, setting
 from swarm_mj.io.provenance import code_digest, commit, version
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Parameters, Policy
-from swarm_mj.policies.registry import is_learned, make_policy
+from swarm_mj.policies.registry import is_learned, make_policy, normalised
 from swarm_mj.swarm import MAX_SEED
 
 MAX_EPISODES = 100_000
@@ -27,17 +28,22 @@ class Study:
 
     policies: tuple[str, ...]  # names among `POLICIES`, or directories of learned ones
     regimes: tuple[Mission, ...]
-    episodes: int = 100  # missions of each policy in each regime
-    seed: int = 1000  # of the first mission; the others follow one by one
-    probability: float | None = None  # of a transmission; None is each policy's own
+    episodes: int = setting(100, "missions of each policy in each regime", low=1, high=MAX_EPISODES)
+    seed: int = setting(1000, "seed of the first mission; the others follow one by one")
+    probability: float | None = setting(None, low=0.0, high=1.0)  # None is each policy's own
     is_deterministic: bool = False  # whether learned policies take the most probable recipient
-    baseline: str | None = None  # whom the others are compared to; None is the first policy
+    baseline: str | None = setting(
+        None,
+        "whom the others are compared to, mission by mission",
+        metavar="POLICY",
+        shown="the first policy",
+        convert=normalised,
+    )
 
     def __post_init__(self) -> None:
         if not self.policies or not self.regimes:
             raise ValueError("an evaluation needs at least 1 policy and 1 regime")
-        if not 1 <= self.episodes <= MAX_EPISODES:
-            raise ValueError(f"episodes must be from 1 to {MAX_EPISODES}, not {self.episodes}")
+        check(self)
         if not 0 <= self.seed <= MAX_SEED - self.episodes + 1:
             raise ValueError(
                 f"seed must be from 0 to {MAX_SEED - self.episodes + 1}, the last of "

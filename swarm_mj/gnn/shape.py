@@ -5,6 +5,8 @@ from typing import Literal, get_args
 
 from torch import Tensor
 
+from swarm_mj.fields import check, setting
+
 Edges = Literal["paper", "reference", "both"]
 
 
@@ -16,28 +18,24 @@ class GnnShape:
         ValueError: A number is out of its range, or the edges have no such name.
     """
 
-    num_features: int  # F: numbers per node
-    num_outputs: int = 1  # O: numbers per node that come out
-    latent: int = 64  # width of every layer
-    depth: int = 3  # layers of every perceptron, with a ReLU after all but the last
-    receptive_field: int = 5  # K: how often the one shared GN block is applied
-    is_linear: bool = False  # GN(v) = A v with the mean-normalised adjacency A
-    edges: Edges = "paper"  # paper: parents hear children; reference: children hear parents
+    num_features: int = setting(low=1, high=1024)  # F: numbers per node
+    num_outputs: int = setting(1, low=1, high=1024)  # O: numbers per node that come out
+    latent: int = setting(64, "width of every layer", low=1, high=1024)
+    depth: int = setting(3, "layers of every MLP, a ReLU after all but the last", low=1, high=8)
+    receptive_field: int = setting(
+        5, "K: how often the one shared GN block is applied", low=0, high=16
+    )
+    # GN(v) = A v with the mean-normalised adjacency A
+    is_linear: bool = setting(False, "the linear variant: no perceptrons in the GN block")
+    # paper: parents hear children; reference: children hear parents
+    edges: Edges = setting(
+        "paper",
+        "edges from children to parents as in the text, back as in the authors' code, or both",
+        choices=get_args(Edges),
+    )
 
     def __post_init__(self) -> None:
-        for name, low, high in (
-            ("num_features", 1, 1024),
-            ("num_outputs", 1, 1024),
-            ("latent", 1, 1024),
-            ("depth", 1, 8),
-            ("receptive_field", 0, 16),
-        ):
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ValueError(f"{name} must be from {low} to {high}, not {value}")
-        if self.edges not in get_args(Edges):
-            names = ", ".join(get_args(Edges))
-            raise ValueError(f"edges must be one of {names}, not {self.edges!r}")
+        check(self)
 
     @property
     def has_core(self) -> bool:

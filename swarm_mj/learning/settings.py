@@ -5,13 +5,14 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args
 
+from swarm_mj.fields import check, setting
 from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.graphs import FeatureSet
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.learning.team_env import Reward
 from swarm_mj.mission import Mission
 
-Arm = Literal["robot", "team"]
+CreditAssignment = Literal["robot", "team"]  # per robot, per team
 HELD_OUT_SEED = 500_000  # of the first held-out mission; training draws from 2^40 on
 EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as speech
 MOST_ROBOTS = 200  # a team decision takes robots² nodes
@@ -21,21 +22,28 @@ MOST_ROBOTS = 200  # a team decision takes robots² nodes
 class PpoSettings:
     """Proximal policy optimisation, in stable-baselines3's terms."""
 
-    learning_rate: float  # of Adam
+    learning_rate: float = setting(
+        help="of Adam, at the start", label="learning rate", low=1e-9, high=1.0
+    )
     decay: float  # of the learning rate ...
     decay_steps: int  # ... in each of so many optimiser steps ...
     least_share: float = 0.0  # ... but not below this share of it
     num_steps: int  # windows of each mission in a rollout
     num_minibatches: int  # that a rollout is shared out to
     num_epochs: int  # passes over a rollout
-    discount: float  # gamma
+    discount: float = setting(
+        help="gamma; 0: a packet's credit is that of its own window alone", low=0.0, high=1.0
+    )
     gae_lambda: float
     clip: float  # of the probability ratio
     clips_value: bool  # by the same number
-    entropy: float  # weight of the entropy bonus
+    entropy: float = setting(help="weight of the entropy bonus", low=0.0, high=10.0)
     value: float  # weight of the value's squared error
     max_gradient_norm: float = 0.5
     adam_epsilon: float = 1e-6
+
+    def __post_init__(self) -> None:
+        check(self)
 
 
 # III-C, and for what it leaves open the authors' code, whose value loss has an extra 1/2. A decay
@@ -81,33 +89,45 @@ class Training:
         ValueError: A value is unknown, outside its range, or does not go with another.
     """
 
-    arm: Arm
+    arm: CreditAssignment = setting(
+        help="credit assignment, per robot (each is paid for what its own packets changed; learns "
+        "in minutes) or per team (one reward for all, the paper's way)",
+        choices=get_args(CreditAssignment),
+    )
     mission: Mission
-    robots: tuple[int, ...]  # sizes of the teams
-    features: FeatureSet
+    robots: tuple[int, ...] = setting(
+        help="size of the team; several are trained on together", low=2, high=MOST_ROBOTS
+    )
+    features: FeatureSet = setting(
+        help="what the network sees of each teammate", choices=get_args(FeatureSet)
+    )
     network: GnnShape  # that acts
     shares_trunk: bool  # whether values come from the acting network's last stage but one number
     silence_logit: float  # what silence has ahead, but in a robot's own turn
-    reward: Reward
+    reward: Reward = setting(
+        help="the cost to lower; velocity-variance needs --arm team",
+        choices=get_args(Reward),
+    )
     ppo: PpoSettings
-    missions: int  # side by side
+    missions: int = setting(help="flown side by side", low=1, high=4096)
     groups: int  # of missions that end at different times
-    seed: int
-    evaluate_every: int  # team decisions between two evaluations
-    held_out: int  # missions of each evaluation, of each team size
-    threads: int  # torch's own
+    seed: int = setting(help="the same seed is the same policy", low=0, high=2**63 - 1)
+    evaluate_every: int = setting(
+        help="team decisions between two evaluations",
+        label="evaluation interval",
+        low=1,
+        high=10**12,
+    )
+    held_out: int = setting(
+        help="missions of an evaluation, of each team size",
+        label="held-out missions",
+        low=1,
+        high=10_000,
+    )
+    threads: int = setting(help="torch's threads", low=1, high=256)
 
     def __post_init__(self) -> None:
-        _check_choice("arm", self.arm, Arm)
-        _check_choice("features", self.features, FeatureSet)
-        _check_choice("reward", self.reward, Reward)
-        _check_range("missions", self.missions, 1, 4096)
-        _check_range("seed", self.seed, 0, 2**63 - 1)
-        _check_range("evaluation interval", self.evaluate_every, 1, 10**12)
-        _check_range("held-out missions", self.held_out, 1, 10_000)
-        _check_range("threads", self.threads, 1, 256)
-        for size in self.robots:
-            _check_range("robots", size, 2, MOST_ROBOTS)
+        check(self)
         if self.arm == "robot" and self.reward != "aoi":
             raise ValueError(f"reward {self.reward} is a team's; choose arm team, or reward aoi")
 
@@ -141,7 +161,8 @@ def arm_settings(arm: str, mission: Mission, robots: Sequence[int], seed: int = 
     Raises:
         ValueError: A value is unknown or outside its range.
     """
-    _check_choice("arm", arm, Arm)
+    if arm not in get_args(CreditAssignment):
+        raise ValueError(f"arm must be one of {', '.join(get_args(CreditAssignment))}, not {arm!r}")
     team = _team_settings(mission, tuple(robots), seed)
     if arm == "team":
         return team
@@ -216,13 +237,3 @@ def from_json(given: dict[str, Any]) -> Training:
         return Training(**{**given, **parts})
     except (KeyError, TypeError) as error:
         raise ValueError(f"not the settings of this version's training runs: {error}") from error
-
-
-def _check_choice(label: str, value: str, choices: Any) -> None:  # noqa: ANN401 - a Literal
-    if value not in get_args(choices):
-        raise ValueError(f"{label} must be one of {', '.join(get_args(choices))}, not {value!r}")
-
-
-def _check_range(label: str, value: int, low: int, high: int) -> None:
-    if not low <= value <= high:
-        raise ValueError(f"{label} must be from {low} to {high}, not {value}")

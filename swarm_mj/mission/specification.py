@@ -6,9 +6,10 @@ Where the paper's text and its authors' code differ, each difference is a field 
 
 import math
 from collections.abc import Callable
-from dataclasses import Field, dataclass, field, fields, replace
-from numbers import Integral, Real
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
+
+from swarm_mj.fields import check, setting
 
 Task = Literal["stationary", "random-walk", "flocking"]
 PhysicsMode = Literal["exact", "contact"]
@@ -22,29 +23,24 @@ MISSION_DISTANCE_M = (
 )
 MISSION_DURATION_S = 50.0  # 500 windows of 100 ms: the duration that velocity ratios mean (IV-B)
 SQUARE_METRES_PER_KM2 = 1e6
-# What a field's annotation admits, NumPy's numbers included, and how a message calls it.
-KINDS: dict[Any, tuple[type, str]] = {
-    int: (Integral, "a whole number"),
-    float: (Real, "a number"),
-    bool: (bool, "True or False"),
-}
 
 
 def _quantity(
-    default: float | int, label: str, unit: str, source: str, low: float, high: float
+    default: float | int,
+    label: str,
+    unit: str,
+    source: str,
+    low: float,
+    high: float,
+    help: str = "",
 ) -> Any:  # noqa: ANN401 - a dataclass field takes the type of its attribute
-    """A field that carries its name in words, its unit, its source and its allowed range."""
-    return field(
-        default=default,
-        metadata={"label": label, "unit": unit, "source": source, "low": low, "high": high},
-    )
+    """A number of the mission: name in words, unit, source, range; with help, an option."""
+    return setting(default, help, label=label, unit=unit, source=source, low=low, high=high)
 
 
-def _choice(default: str, label: str, source: str, choices: object) -> Any:  # noqa: ANN401 - as above
-    """A field that carries its name in words, its source and its allowed values."""
-    return field(
-        default=default, metadata={"label": label, "source": source, "choices": get_args(choices)}
-    )
+def _choice(default: str, label: str, source: str, choices: object, help: str = "") -> Any:  # noqa: ANN401 - as above
+    """One of several names, given as a `Literal`."""
+    return setting(default, help, label=label, source=source, choices=get_args(choices))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,20 +51,40 @@ class Mission:
         ValueError: A field is outside its range; the message names the value and the range.
     """
 
-    preset: str = _choice("paper", "preset", "text or code", Literal["paper", "reference"])
-    task: Task = _choice("flocking", "task", "IV", Task)
-    num_robots: int = _quantity(40, "number of robots", "robots", "IV-B", 2.0, 1000.0)
+    preset: str = _choice(
+        "paper",
+        "preset",
+        "text or code",
+        Literal["paper", "reference"],
+        "the paper's text, or what its authors' code does",
+    )
+    task: Task = _choice("flocking", "task", "IV", Task, "what the robots do")
+    num_robots: int = _quantity(
+        40, "number of robots", "robots", "IV-B", 2.0, 1000.0, "size of the team"
+    )
     density_per_km2: float = _quantity(40.0, "density", "robots/km²", "IV-B", 0.1, 10_000.0)
-    range_ratio: float = _quantity(0.25, "range ratio", "of 1 km", "IV-B", 0.01, 10.0)
-    velocity_ratio: float = _quantity(0.15, "velocity ratio", "of 1 km in 50 s", "IV-B", 0.001, 5.0)
+    range_ratio: float = _quantity(
+        0.25, "range ratio", "of 1 km", "IV-B", 0.01, 10.0, "range of a packet in silence"
+    )
+    velocity_ratio: float = _quantity(
+        0.15,
+        "velocity ratio",
+        "of 1 km in 50 s",
+        "IV-B",
+        0.001,
+        5.0,
+        "largest velocity per axis (0.15: 3 m/s)",
+    )
     max_acceleration_mps2: float = _quantity(20.0, "A_max", "m/s²", "IV-B", 0.01, 1000.0)
     window_s: float = _quantity(0.1, "window", "s", "IV-B", 0.01, 10.0)
-    num_windows: int = _quantity(500, "number of windows", "windows", "IV-B", 1.0, 100_000.0)
+    num_windows: int = _quantity(
+        500, "number of windows", "windows", "IV-B", 1.0, 100_000.0, "length, in windows of 100 ms"
+    )
     # The paper writes "1 dBm", but a threshold on a ratio is a ratio: 1 dB.
     sinr_threshold_db: float = _quantity(1.0, "SINR threshold", "dB", "IV-B", -30.0, 60.0)
     noise_dbm: float = _quantity(-50.0, "noise power", "dBm", "IV-B", -200.0, 50.0)
     frequency_hz: float = _quantity(2.4e9, "centre frequency", "Hz", "IV-B", 1e6, 1e12)
-    # Half-way, and nobody is told who; `switch_off` says how many robots that is.
+    # `switch_off` says how many robots that is.
     switched_off: float = _quantity(
         0.0,
         "fraction of the robots that is switched off",
@@ -76,10 +92,19 @@ class Mission:
         "not the paper's",
         0.0,
         0.9,
+        "robots switched off half-way, unannounced",
     )
 
-    physics: PhysicsMode = _choice("exact", "physics", "Eq. 15 or forces", PhysicsMode)
-    boundary: Boundary = _choice("reflect", "boundary", "IV-A", Boundary)
+    physics: PhysicsMode = _choice(
+        "exact",
+        "physics",
+        "Eq. 15 or forces",
+        PhysicsMode,
+        "Eq. 15 to rounding error, or forces and bounces",
+    )
+    boundary: Boundary = _choice(
+        "reflect", "boundary", "IV-A", Boundary, "what the edge of the area does to robots"
+    )
     wall_hit: WallHit = _choice("mirror", "wall hit", "IV-A; the code clips", WallHit)
     half_duplex: HalfDuplex = _choice("strict", "half duplex", "Eq. 3", HalfDuplex)
     flocking_set: FlockingSet = _choice("heard", "flocking set F", "Eq. 16", FlockingSet)
@@ -89,8 +114,7 @@ class Mission:
     tree_root_transmits: bool = False  # IV-C; the code's root addresses the last robot
 
     def __post_init__(self) -> None:
-        for spec in fields(self):
-            _check(spec, getattr(self, spec.name))
+        check(self)
 
     @property
     def side_m(self) -> float:
@@ -116,22 +140,6 @@ class Mission:
     def has_walls(self) -> bool:
         """Whether robots are reflected at the boundary of the area."""
         return self.boundary == "reflect"
-
-
-def _check(spec: Field[Any], value: Any) -> None:  # noqa: ANN401 - any field's value
-    """Raises ValueError when a field's value is of another kind, no choice, or out of range."""
-    allowed = spec.metadata
-    label = allowed.get("label", spec.name)
-    kind, described = KINDS.get(spec.type, (object, ""))
-    if "choices" in allowed and value not in allowed["choices"]:
-        raise ValueError(f"{label} must be one of {', '.join(allowed['choices'])}, not {value!r}")
-    if "low" not in allowed:
-        is_allowed, limits = True, ""
-    else:
-        is_allowed = isinstance(value, Real) and allowed["low"] <= value <= allowed["high"]
-        limits = f" from {allowed['low']:g} to {allowed['high']:g} [{allowed['unit']}]"
-    if not is_allowed or not isinstance(value, kind):
-        raise ValueError(f"{label} must be {described}{limits}, not {value}")
 
 
 def paper(task: Task = "flocking", **overrides: Any) -> Mission:  # noqa: ANN401 - Mission's own fields

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarm_mj.cli import main
+from swarm_mj.cli import main, parse
 from swarm_mj.evaluation.results import COLUMNS, read_results
 from swarm_mj.mission import paper
-from swarm_mj.policies.registry import make_policy
+from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
@@ -43,6 +43,33 @@ def same_files(folder, whole):
         assert (folder / name).read_bytes() == (whole / name).read_bytes()
 
 
+def study(*arguments):
+    return parse(["evaluate", *map(str, arguments)])[1].study
+
+
+def test_the_default_is_the_shipped_policy_and_the_papers_baselines_on_the_papers_flocks():
+    default = study()
+    assert default.policies == ("planner", "random-flooding", "round-robin", "mst")
+    assert default.regimes == (paper("flocking"),)
+    assert (default.episodes, default.seed, default.compared_to) == (100, 1000, "planner")
+
+
+def test_all_is_every_policy_after_those_named():
+    assert study("--policy", "all").policies == tuple(POLICIES)
+    assert study("--policy", "mst", "--policy", "all").policies[0] == "mst"
+    assert study("--policy", "all", "mst").policies[0] == "mst"
+    assert set(study("--policy", "mst", "all", "--range-ratio", 0.5).policies) == set(POLICIES)
+
+
+def test_the_planner_flies_without_payload_under_a_name_of_its_own():
+    alone = "planner --payload none"
+    named = study("--policy", "tdma", "planner", "--payload", "none", "--baseline", "planner")
+    assert named.policies == ("tdma", alone)
+    assert named.compared_to == alone
+    assert study("--policy", "planner", alone).policies == ("planner", alone)
+    assert study("--payload", "none").policies[0] == alone
+
+
 def test_results_are_what_the_library_computes(whole):
     results = read_results(whole / "r.csv")
     objects = json.loads((whole / "r.json").read_text())["results"]
@@ -66,7 +93,7 @@ def test_two_jobs_end_in_the_same_files(swarm_mj, tmp_path, whole):
 # Evaluates as `swarm-mj` does, and ends itself by a signal when so many batches are kept.
 EVALUATE_AND_END = """
 import os, signal, sys
-from swarm_mj.cli import main
+from swarm_mj.cli import main, parse
 from swarm_mj.evaluation import progress
 which, count = int(sys.argv[1]), int(sys.argv[2])
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
@@ -190,8 +217,8 @@ def test_one_mission_of_one_window_has_results(swarm_mj, tmp_path):
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        (["--episodes", "0"], "episodes must be from 1 to 100000, not 0"),
-        (["--jobs", "0"], "jobs must be from 1 to 256, not 0"),
+        (["--episodes", "0"], "episodes must be a whole number from 1 to 100000, not 0"),
+        (["--jobs", "0"], "jobs must be a whole number from 1 to 256, not 0"),
         (["--robots", "10", "1"], "a whole number from 2 to 1000 [robots], not 1"),
         (
             ["--switched-off", "0.95"],

@@ -110,8 +110,8 @@ def test_two_presets_are_refused(swarm_mj, tmp_path, results):
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        (["--figure", "fig9"], "invalid choice: 'fig9'"),
-        (["--format", "gif"], "invalid choice: 'gif'"),
+        (["--figure", "fig9"], "figure must be one of fig2, fig3, fig4, fig5, fig6, not 'fig9'"),
+        (["--format", "gif"], "format must be one of svg, png, pdf, not 'gif'"),
         (["--figure", "fig2", "--flock-policy", "nobody"], "policy must be one of"),
         (["--figure", "fig2", "--flock-seed", "-1"], "seeds must be"),
     ],

@@ -135,7 +135,10 @@ def test_contact_physics_flies(swarm_mj, tmp_path, boundary):
         (["--preset", "mine"], "preset must be one of paper, reference, not 'mine'"),
         (["--physics", "quantum"], "physics must be one of exact, contact, not 'quantum'"),
         (["--boundary", "torus"], "boundary must be one of reflect, none, not 'torus'"),
-        (["--policy", "mst", "--probability", "1.5"], "probability must be from 0 to 1, not 1.5"),
+        (
+            ["--policy", "mst", "--probability", "1.5"],
+            "probability must be a number from 0 to 1, not 1.5",
+        ),
         (["--policy", "round-robin", "--probability", "0.1"], "takes no transmission probability"),
         (["--seed", "-1"], "not [-1]"),
         (["--seed", "18446744073709551616"], "from 0 to 9223372036854775807"),
@@ -189,15 +192,17 @@ def test_the_summary_names_the_tuned_probability(swarm_mj, tmp_path):
     assert config["observer"] == 2
 
 
-def test_an_existing_replay_needs_force(swarm_mj, tmp_path):
+@pytest.mark.parametrize("flag", ["--record", "--json"])
+def test_an_existing_file_needs_force(swarm_mj, tmp_path, flag):
     path = tmp_path / "a.rrd"
     path.write_text("precious")
-    refused = swarm_mj("fly", *SHORT, "--record", path)
+    refused = swarm_mj("fly", *SHORT, flag, path)
     assert refused.returncode == 2
-    assert "--force" in refused.stderr
+    assert f"{flag} {path} exists; name another, or replace it with --force" in refused.stderr
+    assert files(tmp_path) == ["a.rrd"]
     assert path.read_text() == "precious"
-    assert swarm_mj("fly", *SHORT, "--record", path, "--force").returncode == 0
-    check_replay(path)
+    assert swarm_mj("fly", *SHORT, flag, path, "--force").returncode == 0
+    check_replay(path) if flag == "--record" else json.loads(path.read_text())
 
 
 def test_viewing_needs_a_display_and_says_so_first(tmp_path):
@@ -217,13 +222,13 @@ import signal, sys
 from pathlib import Path
 from swarm_mj.cli import fly, main
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
-windows = fly.fly
+windows = fly.rollout
 def told(*arguments):
     for count, window in enumerate(windows(*arguments)):
         if count == 40:
             Path("under-way").touch()
         yield window
-fly.fly = told
+fly.rollout = told
 sys.exit(main(sys.argv[1:]))
 """
 

@@ -1,26 +1,150 @@
-"""The options' mission is the library's, and their defaults are its defaults."""
+"""A dataclass as a command line, shown in small; every command's help fits and says all."""
 
-from swarm_mj.cli import make_parser
-from swarm_mj.cli.options import mission_of
-from swarm_mj.mission import Mission, paper, reference
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from swarm_mj.cli import COMMANDS, main
+from swarm_mj.cli.options import parse
+from swarm_mj.fields import setting
 
 
-def options(*arguments):
-    return make_parser().parse_args(["fly", *arguments])
+@dataclass(frozen=True, kw_only=True)
+class Picnic:
+    """Some options."""
+
+    guests: tuple[str, ...] = setting(help="who comes", is_positional=True, metavar="WHO")
+    num_cakes: int = setting(2, "how many", unit="cakes", low=1, high=9)
+    hours: float | None = setting(None, "how long", low=0.5, high=8.0, shown="until it rains")
+    sizes: tuple[int, ...] = setting((1, 2), "of the cakes", low=1, high=3)
+    is_vegan: bool = setting(False, "100 % plants")
+    drink: str = setting("tea", "what there is", choices=("tea", "juice"), group="drinks")
+    place: Path = setting(help="where", metavar="MEADOW")
+    typed: tuple[str, ...] = ()
+    note: int = 7  # no help, no option
 
 
-def test_the_default_mission_is_the_bare_one():
-    assert mission_of(options()) == Mission()
+def picnic(*arguments):
+    return parse(Picnic, arguments, "picnic", "Have a picnic.")
 
 
-def test_every_option_reaches_its_field():
-    given = options(
-        "--task", "random-walk", "--robots", "7", "--velocity-ratio", "0.5", "--range-ratio",
-        "0.3", "--windows", "9", "--physics", "contact", "--boundary", "none",
-        "--switched-off", "0.2",
+def test_defaults_are_the_dataclasss():
+    assert picnic("ann", "--place", "p") == Picnic(
+        guests=("ann",), place=Path("p"), typed=("ann", "--place", "p")
+    )
+
+
+def test_every_kind_of_value_is_read():
+    line = "ann bob --cakes 9 --hours 0.5 --sizes 3 1 --sizes 2 --vegan --drink juice --place a/b"
+    assert picnic(*line.split()) == Picnic(
+        guests=("ann", "bob"), num_cakes=9, hours=0.5, sizes=(3, 1, 2), is_vegan=True,
+        drink="juice", place=Path("a/b"), typed=tuple(line.split()),
     )  # fmt: skip
-    assert mission_of(given) == paper(
-        "random-walk", num_robots=7, velocity_ratio=0.5, range_ratio=0.3, num_windows=9,
-        physics="contact", boundary="none", switched_off=0.2,
-    )  # fmt: skip
-    assert mission_of(options("--preset", "reference")) == reference(boundary="reflect")
+
+
+def test_flags_may_be_cut_short():
+    assert picnic("ann", "--pl", "p", "--veg").is_vegan
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        ("--cakes 10", "num_cakes must be a whole number from 1 to 9 [cakes], not 10"),
+        ("--hours nan", "hours must be a number from 0.5 to 8, not nan"),
+        ("--sizes 1 4", "sizes must be a whole number from 1 to 3, not 4"),
+        ("--drink wine", "drink must be one of tea, juice, not 'wine'"),
+    ],
+)
+def test_values_out_of_range_are_refused(arguments, complaint):
+    with pytest.raises(ValueError, match="must be") as refusal:
+        picnic("ann", "--place", "p", *arguments.split())
+    assert str(refusal.value) == complaint
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        ("ann", "the following arguments are required: --place"),
+        ("--place p", "the following arguments are required: WHO"),
+        ("ann --place p --cakes many", "argument --cakes: invalid int value: 'many'"),
+        ("ann --place p --rain", "unrecognized arguments: --rain"),
+        ("ann --p p --cakes", "argument --cakes: expected one argument"),
+        ("ann --place p --note 3", "unrecognized arguments: --note 3"),
+    ],
+)
+def test_lines_that_cannot_be_read_are_refused_in_one_line(capsys, arguments, complaint):
+    with pytest.raises(SystemExit) as end:
+        picnic(*arguments.split())
+    assert end.value.code == 2
+    assert capsys.readouterr().err == f"picnic: error: {complaint} (see picnic --help)\n"
+
+
+HELP = """\
+usage: picnic WHO --place MEADOW [OPTIONS]
+
+Have a picnic.
+
+positional arguments:
+  WHO             who comes
+
+options:
+  -h, --help      show this help message and exit
+  --cakes N       how many, 1 to 9 [cakes] (default: 2)
+  --hours X       how long, 0.5 to 8 (default: until it rains)
+  --sizes N ...   of the cakes, 1 to 3 (default: 1 2)
+  --vegan         100 % plants
+  --place MEADOW  where
+
+drinks:
+  --drink NAME    what there is: tea, juice (default: tea)
+"""
+
+
+def test_help_says_meaning_choices_range_unit_and_default(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit) as end:
+        picnic("--help")
+    assert end.value.code == 0
+    assert capsys.readouterr().out == HELP
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_help_fits_into_80_columns_without_noise(capsys, monkeypatch, command):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit) as end:
+        main([command, "--help"])
+    assert end.value.code == 0
+    shown = capsys.readouterr().out
+    assert max(map(len, shown.splitlines())) <= 80
+    assert COMMANDS[command] in shown
+    for noise in ("None", "MISSING", "()", "[]", "{", "dataclass"):
+        assert noise not in shown
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["fly", "--help"]])
+def test_help_does_not_wait_for_heavy_libraries(arguments):
+    script = f"""
+import sys
+from swarm_mj.cli import main
+try:
+    main({arguments!r})
+except SystemExit:
+    pass
+heavy = {{"torch", "stable_baselines3", "tensorboard", "rerun", "matplotlib"}} & set(sys.modules)
+sys.exit(str(heavy) if heavy else 0)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("arguments", [[], ["flly"], ["--", "fly"], ["--wings"]])
+def test_a_line_without_a_command_is_refused_in_one_line(capsys, arguments):
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    assert end.value.code == 2
+    printed = capsys.readouterr()
+    assert len(printed.err.splitlines()) == 1
+    assert printed.out == ""

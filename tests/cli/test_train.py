@@ -199,19 +199,6 @@ def test_missions_of_several_sizes_are_shared_out_evenly(here, capsys):
     assert "stationary, 3, 4, 5 robots" in capsys.readouterr().out
 
 
-def test_the_parser_of_all_commands_does_not_wait_for_torch():
-    script = """
-import sys
-from swarm_mj.cli import make_parser
-make_parser()
-print([name for name in ("torch", "stable_baselines3", "tensorboard") if name in sys.modules])
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "[]"
-
-
 def test_help_suffices(capsys):
     for arguments in (["--help"], ["train", "--help"]):
         with pytest.raises(SystemExit) as ended:

@@ -1,19 +1,20 @@
 """From options to settings and limits; what the help says is what the arms have."""
 
-import argparse
 from dataclasses import replace
 from functools import reduce
+from pathlib import Path
 
 import pytest
 from tiny_policies import tiny_config, tiny_network
 
-from swarm_mj.cli.train_options import BUDGETS, add_options
+from swarm_mj.cli import main, parse
 from swarm_mj.cli.train_settings import (
+    BUDGETS,
     asked_limits,
     asked_settings,
     check_memory,
+    refuse_others,
     rollout_bytes,
-    stored_settings,
 )
 from swarm_mj.learning.run import make_model
 from swarm_mj.learning.run_folder import Limits
@@ -21,41 +22,40 @@ from swarm_mj.learning.settings import arm_settings
 from swarm_mj.mission import paper
 
 
-def parsed(*arguments):
-    parser = argparse.ArgumentParser()
-    add_options(parser)
-    return parser.parse_args(["--out", "runs/x", *map(str, arguments)])
+def given(*arguments):
+    """The settings that a command line gives."""
+    return parse(["train", "--out", "runs/x", *map(str, arguments)])[1].settings
 
 
 def asked(*arguments):
-    return asked_settings(parsed(*arguments))
+    return asked_settings(given(*arguments))
 
 
-def test_the_defaults_that_the_help_shows_are_those_of_the_arms():
-    parser = argparse.ArgumentParser()
-    add_options(parser)
-    shown = " ".join(parser.format_help().split())
+def test_the_defaults_that_the_help_shows_are_the_usual_settings(capsys):
+    with pytest.raises(SystemExit):
+        main(["train", "--help"])
+    shown = " ".join(capsys.readouterr().out.split())
     robot, team = (arm_settings(arm, paper("stationary"), (40,)) for arm in ("robot", "team"))
     for text in (
-        f"message passes (default: {robot.network.receptive_field}, team: 5)",
-        f"width of every layer (default: {robot.network.latent}, team: 64)",
-        f"of Adam, at the start (default: {robot.ppo.learning_rate}, team: 0.0001)",
-        f"weight of the entropy bonus (default: {robot.ppo.entropy}, team: 1e-06)",
+        f"is applied, 0 to 16 (default: {robot.network.receptive_field}, team: 5)",
+        f"width of every layer, 1 to 1024 (default: {robot.network.latent}, team: 64)",
+        f"at the start, 1e-09 to 1 (default: {robot.ppo.learning_rate}, team: 0.0001)",
+        f"entropy bonus, 0 to 10 (default: {robot.ppo.entropy}, team: 1e-06)",
         f"(default: {robot.features}, team: the preset's own)",
-        f"flown side by side (default: {robot.missions}, team: {team.missions})",
-        "is the same policy (default: 0)",
+        f"side by side, 1 to 4096 (default: {robot.missions}, team: {team.missions})",
+        "is the same policy, 0 or more (default: 0)",
         "stationary, random-walk, flocking (default: stationary)",
         "paper, reference (default: paper)",
-        "several are trained on together (default: 40)",
+        "several are trained on together, 2 to 200 (default: 40)",
         "reflect, none (default: the preset's own)",
-        f"of each team size (default: {robot.held_out})",
+        f"of each team size, 1 to 10000 (default: {robot.held_out})",
         f"(default: {BUDGETS['robot']}, team: {BUDGETS['team']}; none with --minutes)",
     ):
         assert text in shown
 
 
 @pytest.mark.parametrize("arm", BUDGETS)
-def test_without_options_a_run_is_the_arms_own(arm):
+def test_without_options_a_run_has_the_usual_settings(arm):
     assert asked("--arm", arm) == arm_settings(arm, paper("stationary"), (40,))
 
 
@@ -101,7 +101,7 @@ def test_the_linear_variant_is_asked_for_by_its_flag():
     assert not asked().network.is_linear
 
 
-def test_the_preset_decides_the_papers_arm():
+def test_the_preset_decides_the_papers_way():
     code = asked("--arm", "team", "--preset", "reference")
     assert (code.features, code.network.num_outputs, code.sums_nodes) == ("reference", 2, True)
     assert code.mission.half_duplex == "eavesdroppers"
@@ -129,38 +129,38 @@ def test_a_size_counts_once():
 
 def test_a_policy_to_begin_with_brings_its_network():
     config = tiny_config(tiny_network("reference", num_outputs=2), "reference")
-    training = asked_settings(parsed("--init", "p", "--latent", 6, "--seed", 3), config)
+    training = asked_settings(given("--latent", 6, "--seed", 3), config)
     assert training.network == config.network
     assert (training.features, training.silence_logit) == ("reference", 1.5)
     with pytest.raises(ValueError, match="--depth 3 is not what the policy p has, 2; leave it"):
-        asked_settings(parsed("--init", "p", "--depth", 3), config)
+        asked_settings(given("--depth", 3), config, Path("p"))
 
 
 def test_a_run_that_goes_on_has_its_own_settings():
     training = asked("--latent", 5)
-    assert stored_settings(parsed("--latent", 5, "--robots", 40), training) == training
-    with pytest.raises(ValueError, match="--arm team is not what the run in runs/x has, robot"):
-        stored_settings(parsed("--arm", "team"), training)
+    refuse_others(given("--latent", 5, "--robots", 40), training, "the run")
+    with pytest.raises(ValueError, match="--arm team is not what the run has, robot; leave it"):
+        refuse_others(given("--arm", "team"), training, "the run")
 
 
 @pytest.mark.parametrize(
-    ("options", "decisions", "minutes"),
+    ("asked", "decisions", "minutes"),
     [
-        ((), 200_000, None),
-        (("--budget", 5), 5, None),
-        (("--minutes", 2), None, 2.0),
-        (("--budget", 5, "--minutes", 2), 5, 2.0),
+        ({}, 200_000, None),
+        ({"budget": 5}, 5, None),
+        ({"minutes": 2.0}, None, 2.0),
+        ({"budget": 5, "minutes": 2.0}, 5, 2.0),
     ],
 )
-def test_a_new_run_stops_as_asked_or_by_the_arms_budget(options, decisions, minutes):
-    limits = asked_limits(parsed(*options), "robot")
+def test_a_new_run_stops_as_asked_or_by_the_usual_budget(asked, decisions, minutes):
+    limits = asked_limits(None, "robot", **asked)
     assert (limits.decisions, limits.minutes) == (decisions, minutes)
 
 
 def test_a_run_that_goes_on_stops_as_before_or_as_asked_now():
     stored = Limits(decisions=5, minutes=1.0, replay_every=3)
-    assert asked_limits(parsed(), "robot", stored) == stored
-    moved = asked_limits(parsed("--minutes", 2, "--replay-every", 9), "robot", stored)
+    assert asked_limits(stored, "robot") == stored
+    moved = asked_limits(stored, "robot", minutes=2.0, replay_every=9)
     assert moved == Limits(decisions=None, minutes=2.0, replay_every=9)
 
 

@@ -9,12 +9,12 @@ from swarm_mj.gnn.shape import GnnShape
 @pytest.mark.parametrize(
     ("its", "complaint"),
     [
-        ({"num_features": 0}, "num_features must be from 1 to 1024, not 0"),
-        ({"num_outputs": 1025}, "num_outputs must be from 1 to 1024, not 1025"),
-        ({"latent": 0}, "latent must be from 1 to 1024, not 0"),
-        ({"depth": 9}, "depth must be from 1 to 8, not 9"),
-        ({"receptive_field": -1}, "receptive_field must be from 0 to 16, not -1"),
-        ({"receptive_field": 17}, "receptive_field must be from 0 to 16, not 17"),
+        ({"num_features": 0}, "num_features must be a whole number from 1 to 1024, not 0"),
+        ({"num_outputs": 1025}, "num_outputs must be a whole number from 1 to 1024, not 1025"),
+        ({"latent": 0}, "latent must be a whole number from 1 to 1024, not 0"),
+        ({"depth": 9}, "depth must be a whole number from 1 to 8, not 9"),
+        ({"receptive_field": -1}, "receptive_field must be a whole number from 0 to 16, not -1"),
+        ({"receptive_field": 17}, "receptive_field must be a whole number from 0 to 16, not 17"),
     ],
 )
 def test_a_shape_refuses_what_is_out_of_range(its, complaint):

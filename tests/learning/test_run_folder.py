@@ -62,7 +62,10 @@ def test_what_is_no_settings_is_refused(tmp_path, text):
         (lambda d: d["training"]["ppo"].update(clip=None), "training.ppo.clip is None"),
         (lambda d: d["training"].update(robots=["4"]), "training.robots is '4'"),
         (lambda d: d["training"].pop("arm"), "arm"),
-        (lambda d: d["training"]["network"].update(latent=0), "latent must be from 1 to"),
+        (
+            lambda d: d["training"]["network"].update(latent=0),
+            "latent must be a whole number from 1 to",
+        ),
         (lambda d: d["limits"].update(wings=2), "wings"),
         (lambda d: d.pop("command"), "command"),
     ],

@@ -59,15 +59,15 @@ def test_silence_is_dropped_only_where_it_earns_nothing():
 @pytest.mark.parametrize(
     ("changes", "complaint"),
     [
-        ({"missions": 0}, "missions must be from 1 to 4096, not 0"),
-        ({"missions": 4097}, "missions must be from 1 to 4096, not 4097"),
-        ({"seed": -1}, "seed must be from 0 to 9223372036854775807, not -1"),
+        ({"missions": 0}, "missions must be a whole number from 1 to 4096, not 0"),
+        ({"missions": 4097}, "missions must be a whole number from 1 to 4096, not 4097"),
+        ({"seed": -1}, "seed must be a whole number from 0 to 9223372036854775807, not -1"),
         ({"seed": 2**63}, "not 9223372036854775808"),
-        ({"evaluate_every": 0}, "evaluation interval must be from 1"),
-        ({"held_out": 0}, "held-out missions must be from 1 to 10000, not 0"),
-        ({"threads": 0}, "threads must be from 1 to 256, not 0"),
-        ({"robots": (10, 1)}, "robots must be from 2 to 200, not 1"),
-        ({"robots": (201,)}, "robots must be from 2 to 200, not 201"),
+        ({"evaluate_every": 0}, "evaluation interval must be a whole number from 1"),
+        ({"held_out": 0}, "held-out missions must be a whole number from 1 to 10000, not 0"),
+        ({"threads": 0}, "threads must be a whole number from 1 to 256, not 0"),
+        ({"robots": (10, 1)}, "robots must be a whole number from 2 to 200, not 1"),
+        ({"robots": (201,)}, "robots must be a whole number from 2 to 200, not 201"),
         ({"reward": "velocity-variance"}, "reward velocity-variance is a team's"),
     ],
 )

@@ -289,7 +289,7 @@ def test_loading_needs_no_training_library(policy):
     "code",
     [
         "import swarm_mj.policies, swarm_mj.evaluation.study",
-        "from swarm_mj.cli import make_parser; make_parser().format_help()",
+        "from swarm_mj.cli import parse; parse(['evaluate'])",
         "from swarm_mj.mission import paper; from swarm_mj.policies import *;"
         "make_policy('mst', paper())",
     ],

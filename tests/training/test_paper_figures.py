@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 from synthetic import result
 
-from swarm_mj.cli import make_parser
-from swarm_mj.cli.study_options import study_of
+from swarm_mj.cli import parse
 from swarm_mj.evaluation.published import points, published
 from swarm_mj.evaluation.results import read_results, write_csv
 
@@ -62,7 +61,7 @@ def files(folder):
 def test_the_commands_cover_every_published_regime(experiment, calls, settings):
     seen, *_ = calls
     assert experiment.evaluate(settings, 3, force=False) == 0
-    studies = [study_of(make_parser().parse_args(arguments)) for arguments in seen]
+    studies = [parse(arguments)[1].study for arguments in seen]
     assert all((study.episodes, study.seed) == (100, 2000) for study in studies)
     found = [
         (regime.preset, point)

@@ -6,8 +6,7 @@ import sys
 
 import pytest
 
-from swarm_mj.cli import make_parser
-from swarm_mj.cli.study_options import study_of
+from swarm_mj.cli import parse
 from swarm_mj.evaluation.figures.contents import FIGURES, RESULT_FIGURES
 from swarm_mj.evaluation.published import published
 from swarm_mj.policies.registry import POLICIES
@@ -30,7 +29,7 @@ def test_the_figures_are_the_papers():
 @pytest.mark.parametrize("figure", RESULT_FIGURES.values(), ids=lambda figure: figure.name)
 def test_the_command_named_evaluates_the_drawn_policies_in_the_figures_regimes(figure, preset):
     program, *arguments = shlex.split(figure.command(preset))
-    study = study_of(make_parser().parse_args(arguments))
+    study = parse(arguments)[1].study
     assert program == "swarm-mj"
     left_out = {"oracle-lookahead"}
     if preset == "reference":

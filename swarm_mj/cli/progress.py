@@ -1,0 +1,91 @@
+"""The one bar of all long work: what is under way, how far it is, how long it will take."""
+
+from collections.abc import Callable
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TimeRemainingColumn
+from rich.text import Text
+
+BAR_WIDTH = 20
+
+
+class WorkBar:
+    """A bar on the terminal while a `with` statement lasts; it leaves nothing behind.
+
+    Attributes:
+        what: What is under way, or a function that tells it whenever the bar is drawn.
+        text: What stands behind the bar.
+    """
+
+    def __init__(
+        self,
+        what: str | Callable[[], str],
+        total: float | int,
+        unit: str = "",
+        *,
+        completed: float | int = 0,
+        console: Console | None = None,
+        shows_time_left: bool = True,
+    ) -> None:
+        """Prepares the bar.
+
+        Args:
+            what: What is under way, or a function that tells it.
+            total: How much work there is.
+            unit: What the work is counted in; without it, numbers are not shown.
+            completed: How much is done already.
+            console: Where to draw; None is standard error.
+            shows_time_left: Whether to say how long it will take at the speed so far.
+        """
+        self.what, self.text = what, ""
+        self._unit = unit
+        columns = [_Told(self._shown_what), BarColumn(BAR_WIDTH), _Told(self._shown_text)]
+        times = [TimeRemainingColumn()] if shows_time_left else []
+        console = console or Console(stderr=True, highlight=False)
+        self._bar = Progress(
+            *columns, *times, console=console, transient=True, disable=not console.is_terminal
+        )
+        self._id = self._bar.add_task("", total=total, completed=int(completed))
+
+    def __enter__(self) -> "WorkBar":
+        self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._bar.stop()
+
+    def advance(self, done: int = 1) -> None:
+        """So much more is done."""
+        self._bar.advance(self._id, done)
+
+    def move_to(self, completed: float) -> None:
+        """So much is done in all."""
+        self._bar.update(self._id, completed=completed)
+
+    def refresh(self) -> None:
+        """Draws the bar now, rather than at its next turn."""
+        self._bar.refresh()
+
+    def _shown_what(self, _task: Task) -> str:
+        return self.what if isinstance(self.what, str) else self.what()
+
+    def _shown_text(self, task: Task) -> str:
+        count = f"{task.completed:.0f}/{task.total:.0f} {self._unit}" if self._unit else ""
+        return ", ".join(filter(None, (count, self.text)))
+
+
+class _Told(ProgressColumn):
+    """A column of text that is asked for whenever it is drawn."""
+
+    def __init__(self, tell: Callable[[Task], str]) -> None:
+        super().__init__()
+        self._tell = tell
+
+    def render(self, task: Task) -> Text:
+        return Text(self._tell(task))

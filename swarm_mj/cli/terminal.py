@@ -1,0 +1,22 @@
+"""What commands print, and how they name themselves."""
+
+import os
+import shutil
+import sys
+from pathlib import Path
+
+from rich.console import Console
+
+
+def plain_console(*, is_error: bool = False) -> Console:
+    """A terminal that shows text as it is: no colours of its own, no broken lines, no markup."""
+    return Console(stderr=is_error, highlight=False, soft_wrap=True, markup=False)
+
+
+def this_command(name: str = "swarm-mj") -> str:
+    """How the reader can call a program beside this Python: by name, or by path if it must be."""
+    program = Path(sys.executable).with_name(name)
+    found = shutil.which(name)
+    if (found and Path(found) == program) or not program.exists():
+        return name
+    return os.path.relpath(program)

@@ -1,0 +1,87 @@
+"""Fields that say what they mean: name, unit, source, range and help stand beside the value.
+
+A dataclass of such fields is the settings, their documentation and, in `cli.options`, the command
+line at once.
+"""
+
+from dataclasses import MISSING, Field, field, fields
+from numbers import Integral, Real
+from types import NoneType
+from typing import Any, Literal, get_args, get_origin
+
+# What an annotation admits, NumPy's numbers included, and how a message calls it.
+KINDS: dict[Any, tuple[type, str]] = {
+    int: (Integral, "a whole number"),
+    float: (Real, "a number"),
+    bool: (bool, "True or False"),
+}
+
+
+def setting(default: Any = MISSING, help: str = "", **metadata: Any) -> Any:  # noqa: ANN401 - a dataclass field takes the type of its attribute
+    """A field that says what it means.
+
+    Args:
+        default: The value unless given; without one, it must be given.
+        help: What it means, on the command line; without it, the field is no option.
+        **metadata: `label`, the name in words; `unit`; `source`, where the default comes from;
+            `low` and `high`, the range; `choices`; and what `cli.options` shows: `group`, the
+            heading it stands under; `metavar`; `shown`, the default in words; `is_positional`, for
+            an option without a flag; `convert`, what makes a value of what was typed.
+
+    Returns:
+        The field.
+    """
+    return field(default=default, metadata=metadata | ({"help": help} if help else {}))
+
+
+def same_as(owner: type[Any], name: str) -> Any:  # noqa: ANN401 - as above
+    """A field like another dataclass's: its default, meaning and range."""
+    spec = owner.__dataclass_fields__[name]
+    return field(default=spec.default, metadata=spec.metadata)
+
+
+def check(settings: Any) -> None:  # noqa: ANN401 - any dataclass
+    """Passes if every field's value is of its kind and in its range, or among its choices.
+
+    Raises:
+        ValueError: One is not; the message names it, what is allowed, and the value.
+    """
+    for spec in fields(settings):
+        value = getattr(settings, spec.name)
+        if value is None and NoneType in get_args(spec.type):
+            continue
+        for each in value if isinstance(value, tuple) else (value,):
+            _check_value(spec, each)
+
+
+def kind_of(spec: Field[Any]) -> Any:  # noqa: ANN401 - a type
+    """The type of a field's single value: `int` of `int`, `int | None` and `tuple[int, ...]`."""
+    if get_origin(spec.type) is Literal:
+        return str
+    kinds = [kind for kind in get_args(spec.type) if kind not in (NoneType, Ellipsis)]
+    return kinds[0] if kinds else spec.type
+
+
+def range_of(spec: Field[Any]) -> str:
+    """A field's allowed numbers and their unit, in words."""
+    allowed = spec.metadata
+    ends = (
+        f"{end:g}" if isinstance(end, float) else str(end)
+        for end in (allowed["low"], allowed["high"])
+    )
+    return " to ".join(ends) + (f" [{allowed['unit']}]" if allowed.get("unit") else "")
+
+
+def _check_value(spec: Field[Any], value: Any) -> None:  # noqa: ANN401 - any field's value
+    allowed = spec.metadata
+    label = allowed.get("label", spec.name)
+    kind, described = KINDS.get(kind_of(spec), (object, ""))
+    if "choices" in allowed and value not in allowed["choices"]:
+        raise ValueError(f"{label} must be one of {', '.join(allowed['choices'])}, not {value!r}")
+    is_allowed = isinstance(value, kind)
+    limits = ""
+    if "low" in allowed:
+        is_allowed = is_allowed and allowed["low"] <= value <= allowed["high"]
+        limits = f" from {range_of(spec)}"
+    if not is_allowed:
+        raise ValueError(f"{label} must be {described}{limits}, not {value}")

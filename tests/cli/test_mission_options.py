@@ -1,0 +1,86 @@
+"""The options' missions are the library's, and their defaults are its defaults."""
+
+import pytest
+
+from swarm_mj.cli import parse
+from swarm_mj.cli.mission_options import mission_flags
+from swarm_mj.mission import paper, reference
+
+
+def mission(*arguments):
+    return parse(["fly", *map(str, arguments)])[1].mission
+
+
+def missions(*arguments):
+    return parse(["evaluate", *map(str, arguments)])[1].missions
+
+
+@pytest.mark.parametrize("task", ["stationary", "random-walk", "flocking"])
+@pytest.mark.parametrize(("preset", "make"), [("paper", paper), ("reference", reference)])
+def test_the_default_is_the_presets_own_mission_for_every_command(preset, make, task):
+    options = ["--task", task, "--preset", preset]
+    assert mission(*options) == make(task)
+    assert missions(*options) == (make(task),)
+    assert parse(["scene", *options])[1].mission == make(task)
+
+
+def test_flocks_have_no_boundary_unless_they_are_given_one():
+    assert mission().boundary == "none"
+    assert mission("--task", "stationary").boundary == "reflect"
+    assert mission("--boundary", "reflect") == paper("flocking", boundary="reflect")
+
+
+def test_every_option_reaches_its_field():
+    given = mission(
+        "--task", "random-walk", "--robots", "7", "--velocity-ratio", "0.5", "--range-ratio",
+        "0.3", "--windows", "9", "--physics", "contact", "--boundary", "none",
+        "--switched-off", "0.2",
+    )  # fmt: skip
+    assert given == paper(
+        "random-walk", num_robots=7, velocity_ratio=0.5, range_ratio=0.3, num_windows=9,
+        physics="contact", boundary="none", switched_off=0.2,
+    )  # fmt: skip
+
+
+def test_sweeps_multiply_and_values_follow_one_flag_or_several():
+    regimes = missions(
+        *("--task", "stationary", "random-walk", "--robots", 10, "--robots", 20, 10),
+        *("--preset", "reference", "--velocity-ratio", 0.3, "--range-ratio", 0.25, 0.5),
+    )
+    assert regimes == tuple(
+        reference(task, num_robots=n, velocity_ratio=0.3, range_ratio=ratio)
+        for task in ("stationary", "random-walk")
+        for n in (10, 20)
+        for ratio in (0.25, 0.5)
+    )
+
+
+def test_how_many_fail_is_swept_too():
+    assert missions("--robots", 10, "--switched-off", 0, 0.2) == (
+        paper("flocking", num_robots=10),
+        paper("flocking", num_robots=10, switched_off=0.2),
+    )
+
+
+@pytest.mark.parametrize(
+    "wanted",
+    [
+        paper("stationary"),
+        paper("flocking", boundary="reflect", range_ratio=1 / 3, num_windows=7),
+        reference("random-walk", physics="contact", switched_off=0.1),
+    ],
+)
+def test_the_flags_of_a_mission_make_it_again(wanted):
+    assert mission(*mission_flags(wanted).split()) == wanted
+
+
+def test_flags_leave_out_what_is_as_usual():
+    assert mission_flags(paper("stationary", num_robots=9)) == "--task stationary --robots 9"
+
+
+@pytest.mark.parametrize("command", ["fly", "evaluate"])
+def test_unknown_names_are_refused_by_name(swarm_mj, command):
+    """As a process: the type checker of these tests would come first."""
+    done = swarm_mj(command, "--task", "swim")
+    assert done.returncode == 2
+    assert "task must be one of stationary, random-walk, flocking, not 'swim'" in done.stderr
