@@ -8,7 +8,6 @@ of the best until both are worse; the authors' grid is flown whole, as they did.
 evaluation's. Ctrl-C leaves the table as it was.
 """
 
-import argparse
 import csv
 import math
 import sys
@@ -18,18 +17,18 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from swarm_mj.cli import script
+from swarm_mj.cli.interrupt import heard_interrupt
+from swarm_mj.cli.progress import WorkBar
+from swarm_mj.cli.terminal import plain_console
+from swarm_mj.fields import same_as, setting
 from swarm_mj.io.atomic_file import atomic_write
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tuning import TABLE, Tuned, read_table
 from swarm_mj.swarm import Swarm
-
-DONE, BAD_INPUT, INTERRUPTED = 0, 2, 130
-FIRST_SEED = 5000  # an evaluation's begin at 1000
-EPISODES = 50
 
 AUTHORS_GRID = (0.04, 0.06, 0.08, 0.1, 0.12, 0.15)  # of flooding and MST, in the authors' code
 WIDE_GRID = (0.01, 0.02, 0.03, *AUTHORS_GRID, 0.2, 0.25, 0.3, 0.4)
@@ -151,77 +150,46 @@ def write_table(rows: Sequence[Tuned], path: Path) -> None:
         writer.writerows(asdict(row) for row in rows)
 
 
-def main() -> int:
-    """Runs the command; returns its exit code."""
-    options = _parser().parse_args()
-    console = Console(stderr=True, highlight=False, soft_wrap=True, markup=False)
-    try:
-        _check(options)
-        policies = [name for name in TUNED_POLICIES if name in (options.policy or TUNED_POLICIES)]
-        kept = [] if len(policies) == len(TUNED_POLICIES) else read_table(options.out)
-        seeds = range(options.seed, options.seed + options.episodes)
-        found = _tune_all(searches(policies, options.windows), seeds, console)
-        rows = [row for row in kept if row.policy not in policies] + found
-        rows.sort(key=lambda row: TUNED_POLICIES.index(row.policy))
-        write_table(rows, options.out)
-    except (ValueError, OSError) as error:
-        sys.stderr.write(f"tune: error: {error}\n")
-        return BAD_INPUT
-    except KeyboardInterrupt:
-        sys.stderr.write("tune: interrupted; the table is as it was\n")
-        return INTERRUPTED
-    console.print(f"{len(found)} of {len(rows)} probabilities tuned: {options.out}")
-    return DONE
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """What is tuned, and on which missions."""
 
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        description="Tunes the probability of every policy that has one, in every regime of the "
-        "paper's figures, for the least age of information.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    policy: tuple[str, ...] = setting(
+        TUNED_POLICIES, "tune these only; other rows are kept", choices=TUNED_POLICIES
     )
-    parser.add_argument(
-        "--policy",
-        action="append",
-        help=f"tune this one only, repeatable: {', '.join(TUNED_POLICIES)}; other rows are kept",
-    )
-    parser.add_argument("--episodes", type=int, default=EPISODES, help="missions a probability")
-    parser.add_argument("--seed", type=int, default=FIRST_SEED, help="of the first mission")
-    parser.add_argument("--windows", type=int, default=500, help="a mission's length")
-    parser.add_argument("--out", type=Path, default=TABLE, help="the table", metavar="FILE.csv")
-    return parser
+    episodes: int = setting(50, "missions a probability", low=2, high=10_000)
+    seed: int = setting(5000, "of the first mission; an evaluation's begin at 1000")
+    num_windows: int = same_as(Mission, "num_windows")
+    out: Path = setting(TABLE, "the table", metavar="FILE.csv", shown="the package's")
 
 
-def _check(options: argparse.Namespace) -> None:
-    """Raises ValueError for what argparse lets pass."""
-    for name in options.policy or ():
-        if name not in TUNED_POLICIES:
-            raise ValueError(f"policy must be one of {', '.join(TUNED_POLICIES)}, not {name!r}")
-    if options.episodes < 2:
-        raise ValueError(f"episodes must be 2 or more, not {options.episodes}")
+def run(options: Options) -> int:
+    """Tunes and writes the table; returns the exit code."""
+    console = plain_console(is_error=True)
     if options.out.is_dir():
         raise ValueError(f"{options.out} is a folder; name a file")
+    policies = [name for name in TUNED_POLICIES if name in options.policy]
+    kept = [] if len(policies) == len(TUNED_POLICIES) else read_table(options.out)
+    seeds = range(options.seed, options.seed + options.episodes)
+    found = _tune_all(searches(policies, options.num_windows), seeds, console)
+    rows = [row for row in kept if row.policy not in policies] + found
+    rows.sort(key=lambda row: TUNED_POLICIES.index(row.policy))
+    write_table(rows, options.out)
+    console.print(f"{len(found)} of {len(rows)} probabilities tuned: {options.out}")
+    return 0
 
 
 def _tune_all(work: Sequence[Search], seeds: range, console: Console) -> list[Tuned]:
     """Tunes with a progress bar, and says where a grid may have been too narrow."""
-    bar = Progress(
-        TextColumn("Tuning {task.fields[policy]}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-    )
     rows: list[Tuned] = []
-    with bar:
-        task = bar.add_task("tune", total=len(work), policy="")
+    with WorkBar("Tuning", len(work), "regimes") as bar, heard_interrupt() as interrupt_again:
         for search in work:
-            bar.update(task, policy=search.policy)
+            bar.text = search.policy
             row = tune(search, seeds, _guess(search.grid, rows))
+            interrupt_again()
             rows.append(row)
             _report_edge(row, search.grid, console)
-            bar.update(task, advance=1)
+            bar.advance()
     return rows
 
 
@@ -241,4 +209,4 @@ def _report_edge(row: Tuned, grid: tuple[float, ...], console: Console) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(script(Options, run))

@@ -7,8 +7,11 @@ Exit codes: 0 done, 2 bad input, 130 interrupted.
 
 import importlib
 import sys
-from collections.abc import Sequence
-from typing import Any, NoReturn
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+Options = TypeVar("Options")
 
 BAD_INPUT, INTERRUPTED = 2, 130
 COMMANDS = {  # each a module here, with its options, `Options`, and what it does, `run`
@@ -74,12 +77,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
-    try:
+
+    def work() -> int:
         run, options = parse(sys.argv[1:] if arguments is None else list(arguments))
         return run(options)
+
+    return _exit_code("swarm-mj", work)
+
+
+def script(
+    kind: type[Options], run: Callable[[Options], int], arguments: Sequence[str] | None = None
+) -> int:
+    """Runs a program of its own, such as those of `tools/`.
+
+    Args:
+        kind: The dataclass of its options; its module's docstring says what it does.
+        run: What to do with them.
+        arguments: The command line after the program's name; None is this process's.
+
+    Returns:
+        The exit code.
+    """
+    from swarm_mj.cli import options
+
+    module = sys.modules[kind.__module__]
+    name = Path(str(module.__file__)).stem
+    typed = sys.argv[1:] if arguments is None else list(arguments)
+    summary = str(module.__doc__).partition("\n")[0]
+    return _exit_code(name, lambda: run(options.parse(kind, typed, name, summary)))
+
+
+def _exit_code(name: str, work: Callable[[], int]) -> int:
+    """Does the work; says what is wrong with the input, or that it was interrupted, in one line."""
+    try:
+        return work()
     except (ValueError, OSError) as error:
-        sys.stderr.write(f"swarm-mj: error: {error}\n")
+        sys.stderr.write(f"{name}: error: {error}\n")
         return BAD_INPUT
     except KeyboardInterrupt:
-        sys.stderr.write("swarm-mj: interrupted\n")
+        sys.stderr.write(f"{name}: interrupted\n")
         return INTERRUPTED
