@@ -13,7 +13,7 @@ from pathlib import Path
 from statistics import mean
 
 from swarm_mj.evaluation.published import SWEEPS
-from swarm_mj.evaluation.results import Result, read_results
+from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, read_results
 
 DONE, BAD_INPUT = 0, 2
 COSTS = {
@@ -47,9 +47,18 @@ def table(results: Sequence[Result], cost: str) -> str:
     rows = [
         [f"{swept.replace('_', ' ')}, {label}", *(f"{x:g}" for x in xs)],
         ["---"] * (len(xs) + 1),
-        *([policy, *(cells.get((policy, x), "") for x in xs)] for policy in policies),
+        *(
+            [_name(policy, results), *(cells.get((policy, x), "") for x in xs)]
+            for policy in policies
+        ),
     ]
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+
+
+def _name(policy: str, results: Sequence[Result]) -> str:
+    """A policy's name, and whether its packets carry more than the paper's."""
+    more = any(carries_more(result) for result in results if result.policy == policy)
+    return f"{policy} ({CARRIES_MORE})" if more else policy
 
 
 def _cell(result: Result, cost: str) -> str:

@@ -7,25 +7,25 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.evaluation.results import Result
+from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
 
 MIN_WIDTH = 100  # of the console; narrower ones wrap lines rather than cut numbers off
-NAME_WIDTH = 22  # of a policy that fits in there; a longer directory's name widens the table
+NAME_WIDTH = 17  # of a policy that fits in there; a longer directory's name widens the table
 NONE = "-"
 
 
 def print_results(results: Sequence[Result]) -> None:
     """Prints a table per regime; results of a regime stand together."""
-    longest = max(len(result.policy) for result in results)
+    longest = max(len(line) for result in results for line in _name(result).splitlines())
     width = max(MIN_WIDTH + max(0, longest - NAME_WIDTH), Console().width)
     console = Console(highlight=False, markup=False, width=width)
     for regime, group in groupby(results, _regime):
         of_regime = sorted(group, key=lambda result: result.aoi_mean)
         console.print(regime)
         console.print(_table(of_regime))
-        console.print(_floor(of_regime))
+        console.print(_bound(of_regime))
         console.print()
-    console.print(_legend(results[0]))
+    console.print(_legend(results))
 
 
 def _regime(result: Result) -> str:
@@ -39,25 +39,38 @@ def _regime(result: Result) -> str:
 
 
 def _table(results: Sequence[Result]) -> Table:
+    """Two lines a policy; velocities only of teams that move."""
+    moves = results[0].task != "stationary"
     table = Table(box=SIMPLE_HEAD, show_edge=False, padding=0)
     table.add_column("policy", no_wrap=True)
-    for name in ("AoI ± SEM\n95 %", "median", "p95", "difference\n95 %"):
-        table.add_column(name, justify="right")
-    for name in ("velocity\nvariance", "packets\narrived", "published\nvariance"):
+    names = ["AoI ± SEM\n95 %", "median\np95", "difference\n95 %", "packets\nreached", "hearers"]
+    published = "published\nvariance" if moves else "published"
+    for name in [*names, *(["velocity\nvariance"] if moves else []), published]:
         table.add_column(name, justify="right")
     for r in results:
         table.add_row(
-            r.policy,
+            _name(r),
             f"{_with_error(r.aoi_mean, r.aoi_sem)}\n{_interval(r.aoi_ci_low, r.aoi_ci_high)}",
-            _number(r.aoi_median),
-            _number(r.aoi_p95),
+            f"{_number(r.aoi_median)}\n{_number(r.aoi_p95)}",
             f"{_number(r.aoi_difference_mean)}\n"
             f"{_interval(r.aoi_difference_ci_low, r.aoi_difference_ci_high)}",
-            _number(r.velocity_variance_mean, 4),
-            f"{_number(r.packets_per_window)}\n{_share(r.delivery_ratio)}",
+            f"{_number(r.packets_per_window)}\n{_share(_reached(r))}",
+            _number(r.hearers_per_packet),
+            *([_number(r.velocity_variance_mean, 4)] if moves else []),
             _published(r),
         )
     return table
+
+
+def _name(result: Result) -> str:
+    """A policy's name; below it its option, or what its packets carry beyond T, M and P."""
+    name = result.policy.replace(" --", "\n  --")
+    return f"{name}\n  + {result.payload}" if carries_more(result) else name
+
+
+def _reached(result: Result) -> float | None:
+    """The share of packets that reached whom they were meant for; of broadcasts, anyone."""
+    return result.heard_ratio if result.delivery_ratio is None else result.delivery_ratio
 
 
 def _published(result: Result) -> str:
@@ -68,22 +81,32 @@ def _published(result: Result) -> str:
     return f"{age}\n{_number(result.published_velocity_variance_mean, 4)}"
 
 
-def _floor(results: Sequence[Result]) -> str:
-    """The floor; flocks fly as they are told, so each policy may have its own."""
-    floors = [result.aoi_floor_mean for result in results]
-    low, high = f"{min(floors):.2f}", f"{max(floors):.2f}"
-    return f"connectivity floor: {low}" + (f" to {high}, by policy" if low != high else "")
+def _bound(results: Sequence[Result]) -> str:
+    """The lower bound; flocks fly as they are told, so each policy may have its own."""
+    bounds = [result.aoi_floor_mean for result in results]
+    low, high = f"{min(bounds):.2f}", f"{max(bounds):.2f}"
+    return f"lower bound (connectivity): {low}" + (f" to {high}, by policy" if low != high else "")
 
 
-def _legend(result: Result) -> str:
-    """What the columns mean."""
-    return (
-        f"AoI: age of information [windows], mean over {result.episodes} missions from seed "
-        f"{result.seed}, its standard error and its 95 % interval; median and p95 over missions. "
-        f"Difference: to {result.baseline}, mission by mission. Velocity variance [m²/s²]. Packets "
-        "sent in a window, and the share that arrived. Floor: the age that sharing within "
-        "connected parts at once would leave."
+def _legend(results: Sequence[Result]) -> str:
+    """What the columns mean, a sentence each."""
+    first = results[0]
+    sentences = [
+        "AoI: age of information, how old a robot's news of another is [windows]; mean over "
+        f"{first.episodes} missions from seed {first.seed}, standard error and 95 % interval.",
+        "Median and p95 are over missions.",
+        f"Difference: AoI minus that of {first.baseline}, mission by mission.",
+        "Packets: sent in a window, and the share that reached its addressee or, of broadcasts, "
+        "at least one robot; hearers: robots that decoded a broadcast, on average.",
+    ]
+    if any(result.task != "stationary" for result in results):
+        sentences.append("Velocity variance [m²/s²].")
+    sentences.append(
+        "Lower bound: the AoI if all robots with a path between them shared everything at once."
     )
+    if any(carries_more(result) for result in results):
+        sentences.append(f"+: packets {CARRIES_MORE}, which the paper's carry.")
+    return " ".join(sentences)
 
 
 def _number(value: float | None, digits: int = 2) -> str:

@@ -84,6 +84,14 @@ class Result:
     config: str  # JSON: every field of the mission, the policy and its parameters
 
 
+CARRIES_MORE = "carry more than T, M, P"  # what is said of such policies wherever they are shown
+
+
+def carries_more(result: Result) -> bool:
+    """Whether packets carry more than T, M and P (II-B); older files do not tell."""
+    return result.payload not in (None, "none")
+
+
 COLUMNS = tuple(spec.name for spec in fields(Result))
 NUMBERS = {int: "a whole number", float: "a finite number", str: "a text"}
 WAY_OUT = "make them with `swarm-mj evaluate --csv FILE`"

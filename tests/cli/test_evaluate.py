@@ -211,7 +211,7 @@ def test_one_mission_of_one_window_has_results(swarm_mj, tmp_path):
     done = swarm_mj("evaluate", *SMALL, "--windows", 1, "--episodes", 1, "--csv", "r.csv")
     assert done.returncode == 0, done.stderr
     assert [result.aoi_sem for result in read_results(tmp_path / "r.csv")] == [None] * 4
-    assert "connectivity floor" in done.stdout
+    assert "lower bound (connectivity)" in done.stdout
 
 
 @pytest.mark.parametrize(

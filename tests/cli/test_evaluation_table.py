@@ -30,6 +30,9 @@ LARGEST = {
     "aoi_difference_ci_high": -111.111,
     "velocity_variance_mean": 12.3456,
     "packets_per_window": 79.987,
+    "heard_ratio": 1.0,
+    "hearers_per_packet": 39.125,
+    "payload": "snapshots",
     "published_aoi_mean": 115.7268,
     "published_aoi_sem": 12.964,
 }
@@ -49,7 +52,9 @@ def printed(capsys, monkeypatch):
 
 @pytest.mark.parametrize("columns", [60, 100])
 def test_the_largest_numbers_are_whole_at_100_columns(printed, columns):
-    results = [some_result("random-flooding", 123.456, **LARGEST), some_result("mst", 1.0)]
+    names = ("random-flooding", "oracle-lookahead", "planner --payload none")
+    moving = {"task": "flocking"} | LARGEST
+    results = [some_result(name, 123.456, **moving) for name in names]
     lines = printed(results, columns)
     assert max(map(len, lines)) <= 100
     text = "\n".join(lines)
@@ -82,14 +87,57 @@ def test_regimes_in_which_robots_fail_are_apart_and_say_so(printed):
     ]
 
 
+def rows(lines, policy):
+    """The words of both lines of a policy's row."""
+    first = next(index for index, line in enumerate(lines) if line.startswith(policy))
+    return lines[first].split(), lines[first + 1].split()
+
+
 def test_what_does_not_exist_is_a_dash(printed):
-    lines = printed([some_result("mst", 2.0, **NOTHING)], 100)
-    first = next(index for index, line in enumerate(lines) if line.startswith("mst"))
-    assert lines[first].split() == ["mst", "2.00", "1.00", "1.00", "-", "1.0000", "1.00", "-"]
-    assert lines[first + 1].split() == ["-"]  # of no packets, no share arrived
+    nothing = NOTHING | {"task": "flocking"}
+    above, below = rows(printed([some_result("mst", 2.0, **nothing)], 100), "mst")
+    assert above == ["mst", "2.00", "1.00", "-", "1.00", "-", "1.0000", "-"]
+    assert below == ["1.00", "-"]  # p95; no packet was sent, so no share of them arrived
 
 
-def test_the_floor_stands_below(printed):
+def test_broadcasts_have_hearers_and_addressed_packets_arrive(printed):
+    broadcast = {"delivery_ratio": None, "heard_ratio": 0.97, "hearers_per_packet": 4.111}
+    addressed = {"delivery_ratio": 0.77, "heard_ratio": None, "hearers_per_packet": None}
+    results = [some_result("tdma", 1.0, **broadcast), some_result("mst", 2.0, **addressed)]
+    lines = printed(results, 100)
+    (above, below), (above_mst, below_mst) = rows(lines, "tdma"), rows(lines, "mst")
+    assert "97%" in below
+    assert "4.11" in above
+    assert "77%" in below_mst
+    assert "-" in above_mst
+
+
+@pytest.mark.parametrize(
+    ("payload", "mark"), [("snapshots", ["+", "snapshots"]), ("none", []), (None, [])]
+)
+def test_who_carries_more_than_the_paper_s_packets_is_marked_and_explained(printed, payload, mark):
+    lines = printed([some_result("planner", 1.0, payload=payload)], 100)
+    _, below = rows(lines, "planner")
+    assert below[: len(mark)] == mark
+    assert ("+: packets carry more than T, M, P" in " ".join(lines)) == bool(mark)
+
+
+def test_an_option_stands_below_its_policy(printed):
+    lines = printed([some_result("planner --payload none", 1.0, payload="none")], 100)
+    above, below = rows(lines, "planner")
+    assert above[:2] == ["planner", "1.00"]
+    assert below[:2] == ["--payload", "none"]
+
+
+def test_velocities_are_those_of_teams_that_move(printed):
+    at_rest = "\n".join(printed([some_result("a", 1.0, task="stationary")], 100))
+    moving = "\n".join(printed([some_result("a", 1.0, task="random-walk")], 100))
+    assert "elocity variance" not in at_rest
+    assert "variance" not in at_rest
+    assert "Velocity variance [m²/s²]" in moving
+
+
+def test_the_lower_bound_stands_below(printed):
     lines = printed([some_result("a", 1.0), some_result("b", 2.0, aoi_floor_mean=1.75)], 100)
-    assert "connectivity floor: 1.00 to 1.75, by policy" in lines
-    assert "connectivity floor: 1.00" in printed([some_result("a", 1.0)], 100)
+    assert "lower bound (connectivity): 1.00 to 1.75, by policy" in lines
+    assert "lower bound (connectivity): 1.00" in printed([some_result("a", 1.0)], 100)

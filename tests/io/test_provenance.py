@@ -52,6 +52,11 @@ def test_only_the_package_makes_a_commit_unclean(tmp_path, monkeypatch):
     clean = provenance.commit()
     assert len(clean) == 12
     (tmp_path / "results.csv").write_text("mine")
+    (tmp_path / "assets" / "figures").mkdir(parents=True)
+    (tmp_path / "assets" / "figures" / "fig4.svg").write_text("drawn from results")
     assert provenance.commit() == clean
+    (tmp_path / "assets" / "robot.xml").write_text("new")
+    assert provenance.commit() == f"{clean}+"
+    (tmp_path / "assets" / "robot.xml").unlink()
     (package / "b.py").write_text("new")
     assert provenance.commit() == f"{clean}+"

@@ -36,6 +36,16 @@ def test_policies_down_the_swept_number_across_the_least_cost_first(tool, tmp_pa
     )
 
 
+def test_who_carries_more_than_the_paper_s_packets_is_named_so(tool):
+    rows = [
+        result("planner", aoi_mean=1.0, payload="snapshots"),
+        result("tdma", aoi_mean=2.0, payload="none"),
+    ]
+    lines = tool.table(rows, "aoi").splitlines()
+    assert lines[2].startswith("| planner (carry more than T, M, P) |")
+    assert lines[3].startswith("| tdma |")
+
+
 def test_robots_that_fail_have_a_table_of_their_own(tool, tmp_path, capsys):
     rows = [
         result("mst", aoi_mean=43.0, aoi_sem=1.0),

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from swarm_mj.evaluation.figures.contents import OPTIONS, ResultFigure
 from swarm_mj.evaluation.published import points
-from swarm_mj.evaluation.results import Result
+from swarm_mj.evaluation.results import Result, carries_more
 from swarm_mj.mission import PRESETS
 
 # A figure compares policies, so all else is the same.
@@ -25,6 +25,7 @@ class Curve:
 
     method: str  # a policy's name, or what the paper calls a learned one
     is_published: bool
+    carries_more: bool = False  # than T, M and P in its packets
     is_level: bool  # x means nothing to the method: the same value all over the axis
     x: Float[np.ndarray, "X"]
     mean: Float[np.ndarray, "X"]
@@ -116,12 +117,16 @@ def config_of(result: Result) -> dict[str, Any]:
 
 def _ours(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[Curve]:
     rows: dict[tuple[str, bool], list[tuple[float, float, float]]] = {}
+    more = {result.policy for result in results if carries_more(result)}
     for result in results:
         x = _x(figure, result)
         ends = (figure.xs[0], figure.xs[-1]) if x is None else (x,)
         its = rows.setdefault((result.policy, x is None), [])
         its.extend((end, *_mean_and_sem(figure, cost, result)) for end in ends)
-    return [_curve(policy, its, is_level=is_level) for (policy, is_level), its in rows.items()]
+    return [
+        _curve(policy, its, is_level=is_level, carries_more=policy in more)
+        for (policy, is_level), its in rows.items()
+    ]
 
 
 def _mean_and_sem(figure: ResultFigure, cost: str, result: Result) -> tuple[float, float]:
@@ -151,11 +156,18 @@ def _curve(
     *,
     is_published: bool = False,
     is_level: bool = False,
+    carries_more: bool = False,
 ) -> Curve:
     """A curve through rows of x, mean and standard error."""
     x, mean, sem = np.array(sorted(rows), dtype=float).T
     return Curve(
-        method=method, is_published=is_published, is_level=is_level, x=x, mean=mean, sem=sem
+        method=method,
+        is_published=is_published,
+        carries_more=carries_more,
+        is_level=is_level,
+        x=x,
+        mean=mean,
+        sem=sem,
     )
 
 

@@ -11,9 +11,16 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocat
 
 from swarm_mj.evaluation.figures.contents import Panel, ResultFigure, Scale
 from swarm_mj.evaluation.figures.curves import Curve, curves, results_of
-from swarm_mj.evaluation.figures.labels import name_ends
-from swarm_mj.evaluation.figures.style import FAINT, INK, WIDTH_IN, look_of, styled
-from swarm_mj.evaluation.results import Result
+from swarm_mj.evaluation.figures.labels import MORE, name_ends, name_of
+from swarm_mj.evaluation.figures.style import (
+    FAINT,
+    INK,
+    WIDTH_IN,
+    look_of,
+    styled,
+    write_caption,
+)
+from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
 
 TOP_IN, PANEL_IN, GAP_IN, BOTTOM_IN = 0.86, 3.3, 0.35, 0.75
 LEFT, RIGHT, MARGIN = 0.085, 0.8, 0.985  # of the width; the curves' names stand on the right
@@ -55,10 +62,12 @@ def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
             hspace=GAP_IN / PANEL_IN,
         )
         for axes, panel in zip(grid[:, 0], figure.panels, strict=True):
-            _fill(axes, figure, panel, curves(figure, panel.cost, found))
+            its = curves(figure, panel.cost, found)
+            _fill(axes, figure, panel, its)
         grid[-1, 0].set_xlabel(figure.x_label)
-        _head(drawing, figure, found[0], height_in)
-        drawing.text(LEFT, 0.12 / height_in, caption(figure, found), fontsize=7, color=FAINT)
+        is_marked = any(carries_more(result) for result in found)
+        _head(drawing, figure, found[0], height_in, is_marked=is_marked)
+        write_caption(drawing, LEFT, 0.12 / height_in, caption(figure, found))
     return drawing
 
 
@@ -70,7 +79,7 @@ def caption(figure: ResultFigure, results: Sequence[Result]) -> str:
     noun = "commit" if len(commits) == 1 else "commits"
     code = f"swarm_mj {result.version}" + (f", {noun} {', '.join(commits)}" if commits else "")
     return (
-        f"{figure.name}, preset {result.preset}: {result.episodes} episodes, seeds {result.seed} "
+        f"{figure.name}, preset {result.preset}: {result.episodes} missions, seeds {result.seed} "
         f"to {last}, {result.num_windows} windows each; {code}"
     )
 
@@ -120,7 +129,7 @@ def _draw_level(axes: Axes, curve: Curve) -> None:
 
 
 def _label(curve: Curve) -> str:
-    label = look_of(curve.method).label
+    label = name_of(curve)
     return f"{label}, published" if curve.is_published else label
 
 
@@ -160,8 +169,10 @@ def _plain(value: float, _position: int | None = None) -> str:
     return f"{value:g}"
 
 
-def _head(drawing: Figure, figure: ResultFigure, result: Result, height_in: float) -> None:
-    """The title, what is the same all over the figure, and what solid and dashed mean."""
+def _head(
+    drawing: Figure, figure: ResultFigure, result: Result, height_in: float, *, is_marked: bool
+) -> None:
+    """The title, what is the same all over the figure, and what lines and marks mean."""
     fixed = [FIXED[name].format(getattr(result, name)) for name in figure.fixed]
     regime = ", ".join([figure.task.replace("-", " "), *fixed])
     line = 1.0 - 0.28 / height_in
@@ -172,12 +183,16 @@ def _head(drawing: Figure, figure: ResultFigure, result: Result, height_in: floa
         [], [], color=FAINT, marker="o", markersize=4.5 * RING, linestyle="--", linewidth=1.2
     )
     published.set_markerfacecolor("white")
+    labels = ["this package, mean ± SEM", "published, mean ± SEM"]
+    if is_marked:
+        labels.append(f"{MORE}: packets {CARRIES_MORE}")
     drawing.legend(
-        handles=[ours, published],
-        labels=["this package, mean ± SEM", "published by the paper's authors, mean ± SEM"],
+        handles=[ours, published, Line2D([], [], linestyle="")][: len(labels)],
+        labels=labels,
         loc="upper left",
         bbox_to_anchor=(LEFT, 1.0 - 0.4 / height_in),
-        ncols=2,
+        ncols=3,
+        columnspacing=1.0,
         frameon=False,
         fontsize=8,
         borderpad=0.0,

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MultipleLocator, StrMethodFormatter
 
-from swarm_mj.evaluation.figures.style import FAINT, RAMP, WIDTH_IN, styled
+from swarm_mj.evaluation.figures.style import FAINT, RAMP, WIDTH_IN, styled, write_caption
+from swarm_mj.evaluation.results import CARRIES_MORE
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.registry import make_policy
@@ -157,6 +158,7 @@ def _write(drawing: Figure, mission: Mission, policy_name: str, seed: int) -> No
     """Title and caption."""
     drawing.text(0.08, 0.93, "A flock at its start and its end", fontsize=12, fontweight="bold")
     code = f"swarm_mj {version()}" + (f", commit {commit()}" if commit() else "")
-    flown = f"{mission.num_robots} robots, policy {policy_name}, seed {seed}"
+    carries = "" if make_policy(policy_name, mission).payload == "none" else f" ({CARRIES_MORE})"
+    flown = f"{mission.num_robots} robots, policy {policy_name}{carries}, seed {seed}"
     caption = f"fig2, preset {mission.preset}: {flown}, {mission.num_windows} windows; {code}"
-    drawing.text(0.08, 0.03, caption, fontsize=7, color=FAINT)
+    write_caption(drawing, 0.08, 0.03, caption)

@@ -11,6 +11,7 @@ from swarm_mj.evaluation.figures.curves import Curve
 from swarm_mj.evaluation.figures.style import look_of
 
 LINE_IN = 0.165  # from one name to the next
+MORE = "+"  # after the names of methods whose packets carry more than T, M and P
 PLACE = 1.045  # of the axes' width
 
 
@@ -28,7 +29,7 @@ def name_ends(axes: Axes, curves: Sequence[Curve]) -> None:
     for curve, end, place in zip(named.values(), ends, places, strict=True):
         look = look_of(curve.method)
         axes.annotate(
-            look.label,
+            name_of(curve),
             xy=end,
             xytext=(PLACE, place),
             textcoords="axes fraction",
@@ -47,6 +48,12 @@ def name_ends(axes: Axes, curves: Sequence[Curve]) -> None:
                 "relpos": (0.0, 0.5),
             },
         )
+
+
+def name_of(curve: Curve) -> str:
+    """A method's name, marked where its packets carry more than T, M and P."""
+    label = look_of(curve.method).label
+    return f"{label} {MORE}" if curve.carries_more else label
 
 
 def spread(wanted: Float[np.ndarray, "L"], gap: float, span: float = 1.0) -> Float[np.ndarray, "L"]:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from swarm_mj.evaluation.figures.style import FAINT, INK, WIDTH_IN, look_of, styled
+from swarm_mj.evaluation.figures.style import CAPTION, FAINT, INK, WIDTH_IN, look_of, styled
 
 PANEL_IN, CAPTION_IN = 3.1, 0.45
 X_LABELS = {"decisions": "team decisions, thousands", "minutes": "minutes of training"}
@@ -69,7 +69,7 @@ def draw_learning(panels: Sequence[LearningPanel], caption: str) -> Figure:
         grid = drawing.subplots(len(panels), squeeze=False)
         for axes, panel in zip(grid[:, 0], panels, strict=True):
             _fill(axes, panel)
-        drawing.supxlabel(caption, x=0.01, ha="left", fontsize=7, color=FAINT)
+        drawing.supxlabel(caption, x=0.01, ha="left", fontsize=7, color=FAINT, gid=CAPTION)
     return drawing
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import matplotlib.style
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from swarm_mj.io.atomic_file import atomic_write
 
@@ -47,6 +48,7 @@ RC = {
 }
 # Left to themselves, these formats write down when they were made.
 UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+CAPTION = "caption"  # the name of the text that files also have among their own descriptions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,8 +99,13 @@ def styled() -> AbstractContextManager[None]:
     return matplotlib.style.context(["default", RC])
 
 
+def write_caption(figure: Figure, x: float, y: float, text: str) -> None:
+    """Writes where a figure's numbers come from, small, from a place on the figure on."""
+    figure.text(x, y, text, fontsize=7, color=FAINT, gid=CAPTION)
+
+
 def save(figure: Figure, path: Path) -> None:
-    """Writes a figure; the same figure gives the same bytes.
+    """Writes a figure, its caption among the file's own data; the same figure gives the same bytes.
 
     Args:
         figure: Drawn in this style.
@@ -109,4 +116,15 @@ def save(figure: Figure, path: Path) -> None:
     """
     kind = path.suffix.removeprefix(".")
     with styled(), atomic_write(path) as part:
-        figure.savefig(part, format=kind, metadata=UNDATED.get(kind))
+        figure.savefig(
+            part, format=kind, metadata=UNDATED.get(kind, {}) | _description(figure, kind)
+        )
+
+
+def _description(figure: Figure, kind: str) -> dict[str, str]:
+    """The caption, as the format's own field."""
+    field = "Subject" if kind == "pdf" else "Description"
+    for text in figure.findobj(Text):
+        if isinstance(text, Text) and text.get_gid() == CAPTION:
+            return {field: text.get_text()}
+    return {}

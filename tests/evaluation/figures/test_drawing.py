@@ -74,6 +74,18 @@ def test_every_method_is_named_once_and_slanted_if_only_the_paper_has_it():
     }
 
 
+def test_who_carries_more_than_the_paper_s_packets_is_marked_and_the_mark_explained():
+    marked = [result("planner", payload="snapshots"), result("tdma", payload="none")]
+    drawing = draw(FIG4, marked)
+    (axes,) = drawing.axes
+    assert {"planner +", "TDMA"} < set(names(axes))
+    assert {"planner +", "TDMA"} < set(bars(axes))
+    texts = [text.get_text() for text in drawing.legends[0].get_texts()]
+    assert texts[2:] == ["+: packets carry more than T, M, P"]
+    plain = draw(FIG4, [result("tdma", payload="none")])
+    assert len(plain.legends[0].get_texts()) == 2
+
+
 def test_names_point_to_the_ends_of_their_curves():
     (axes,) = draw(FIG4, sweep("random-flooding", "range_ratio", FLOODING)).axes
     assert names(axes)["random flooding"].xy == (1.0, 12.0)
@@ -110,11 +122,14 @@ def test_title_regime_and_caption_say_what_is_shown(figure):
     texts = [text.get_text() for text in drawing.texts]
     assert figure.title in texts
     assert texts[-1] == (
-        f"{figure.name}, preset reference: 4 episodes, seeds 50 to 53, 500 windows each; "
+        f"{figure.name}, preset reference: 4 missions, seeds 50 to 53, 500 windows each; "
         "swarm_mj 1.2.3, commit abc123"
     )
     (legend,) = drawing.legends
-    assert [text.get_text().split()[0] for text in legend.get_texts()] == ["this", "published"]
+    assert [text.get_text().split(",")[0] for text in legend.get_texts()] == [
+        "this package",
+        "published",
+    ]
     assert all("SEM" in text.get_text() for text in legend.get_texts())
     regime = {
         "fig3": "stationary, 40 robots, range ratio 0.25",
@@ -136,7 +151,12 @@ def test_ticks_are_the_published_places_and_all_curves_are_inside():
 
 
 def test_nothing_that_is_written_overlaps_or_leaves_the_page():
-    every = [result(policy, aoi_mean=12.0 + 0.1 * n) for n, policy in enumerate(LOOKS)]
+    every = [
+        result(
+            policy, aoi_mean=12.0 + 0.1 * n, payload="snapshots" if policy == "planner" else None
+        )
+        for n, policy in enumerate(LOOKS)
+    ]
     drawing = draw(FIG4, every)
     FigureCanvasAgg(drawing).draw()
     (axes,) = drawing.axes

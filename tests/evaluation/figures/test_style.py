@@ -78,6 +78,21 @@ def test_the_same_figure_is_the_same_file(tmp_path, kind):
     assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
 
 
+def test_files_say_what_their_caption_says(tmp_path):
+    drawing = draw(RESULT_FIGURES["fig4"], everything())
+    caption = drawing.texts[-1].get_text()
+    assert "4 missions, seeds 50 to 53" in caption
+    for kind in FORMATS:
+        save(drawing, tmp_path / f"fig4.{kind}")
+    with Image.open(tmp_path / "fig4.png") as picture:
+        assert picture.text["Description"] == caption
+    root = ElementTree.parse(tmp_path / "fig4.svg").getroot()
+    assert caption in [
+        text.text for text in root.iter("{http://purl.org/dc/elements/1.1/}description")
+    ]
+    assert caption.encode() in (tmp_path / "fig4.pdf").read_bytes()
+
+
 def test_a_failure_leaves_the_old_file(tmp_path, monkeypatch):
     (tmp_path / "fig4.png").write_bytes(b"old")
     drawing = draw(RESULT_FIGURES["fig4"], everything())

@@ -1,0 +1,54 @@
+"""The committed figures against the committed results: `make figures` makes both agree."""
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from PIL import Image
+
+from swarm_mj.evaluation.figures.contents import FLOCK, RESULT_FIGURES
+from swarm_mj.evaluation.figures.curves import results_of
+from swarm_mj.evaluation.figures.drawing import caption
+from swarm_mj.evaluation.results import read_results
+
+ROOT = Path(__file__).parent.parent.parent
+DESCRIPTION = "{http://purl.org/dc/elements/1.1/}description"
+REMAKE = "in a clean checkout, `make figures` draws the results, with ARGS=--force makes them anew"
+PRESETS = ("paper", "reference")
+
+
+def written(preset, name, kind):
+    """A committed figure's own caption."""
+    path = ROOT / "assets" / "figures" / preset / f"{name}.{kind}"
+    if kind == "png":
+        with Image.open(path) as picture:
+            return picture.text.get("Description", "")
+    return "".join(node.text or "" for node in ElementTree.parse(path).iter(DESCRIPTION))
+
+
+@pytest.fixture(scope="module", params=PRESETS)
+def results(request):
+    """All committed results of a preset."""
+    files = sorted((ROOT / "training" / "results").glob(f"{request.param}-*.csv"))
+    return request.param, [result for file in files for result in read_results(file)]
+
+
+@pytest.mark.parametrize("kind", ["svg", "png"])
+@pytest.mark.parametrize("name", RESULT_FIGURES)
+def test_a_figure_s_caption_is_that_of_its_results(results, name, kind):
+    """The same commit, number of missions and seeds."""
+    preset, rows = results
+    figure = RESULT_FIGURES[name]
+    assert written(preset, name, kind) == caption(figure, results_of(figure, rows)), REMAKE
+
+
+def test_all_results_of_a_preset_are_of_one_commit_and_as_many_missions(results):
+    _, rows = results
+    assert len({(row.commit, row.episodes, row.seed) for row in rows}) == 1, REMAKE
+    assert re.fullmatch(r"[0-9a-f]{12}", rows[0].commit), REMAKE
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_flock_is_flown_by_clean_code(preset):
+    assert re.search(r"commit [0-9a-f]{12}$", written(preset, FLOCK, "svg")), REMAKE
