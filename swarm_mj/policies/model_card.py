@@ -48,6 +48,7 @@ def _network(config: PolicyConfig) -> str:
         "result whom it addresses in the next window, or that it stays silent.\n\n"
         f"- network: {kind}, receptive field {shape.receptive_field}, width {shape.latent}, "
         f"{shape.depth} layers in each MLP; {EDGES[shape.edges]}\n"
+        "- packets: T, M and P, as the paper's, and nothing more\n"
         f"- features: `{config.features}`, {shape.num_features} for each robot\n"
         f"- outputs: {shape.num_outputs} for each robot; {config.silence_logit:g} is added to the "
         "logit of silence" + (" but in its own turn" if config.features == "extended" else "")

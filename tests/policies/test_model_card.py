@@ -26,6 +26,7 @@ def test_the_card_of_a_trained_policy():
     for line in (
         "- network: Aggregation GNN, receptive field 1, width 6, 2 layers in each MLP; parents and "
         "children hear each other",
+        "- packets: T, M and P, as the paper's, and nothing more",
         "- features: `extended`, 18 for each robot",
         "- outputs: 1 for each robot; 1.5 is added to the logit of silence but in its own turn",
         "    swarm-mj fly --policy DIR --task random-walk",
