@@ -1,12 +1,12 @@
 """What the robots do (IV-A): stand still, walk at random, or flock on what they have heard."""
 
 from collections.abc import Sequence
-from typing import Protocol, no_type_check, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
-from numba import njit
 
+from swarm_mj.compiled import compiled
 from swarm_mj.mission import FlockingSet, Mission
 from swarm_mj.mission.batched_rng import Stream, normal
 from swarm_mj.physics.state import RobotStates
@@ -108,8 +108,7 @@ def flocking(
     return acceleration
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _mean_difference(
     timestamp: Float[np.ndarray, "B N N"],
     believed_mps: Float[np.ndarray, "B N N 2"],

@@ -1,12 +1,11 @@
 """A batch of missions: one policy in one regime, flown side by side, and what each cost."""
 
 from dataclasses import dataclass
-from typing import no_type_check
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from numba import njit
 
+from swarm_mj.compiled import compiled
 from swarm_mj.evaluation.lower_bound import ConnectivityFloor
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Parameters
@@ -150,8 +149,7 @@ def count_ages(
     _count_ages(timestamp, now, SLOT_WINDOWS, is_active, counts)
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _count_ages(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],

@@ -1,12 +1,11 @@
 """From a network's numbers to a decision (III-C): logits over recipients, silence among them."""
 
-from typing import no_type_check
-
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
-from numba import njit
 from torch import Tensor
+
+from swarm_mj.compiled import compiled
 
 IMPOSSIBLE = -1e9  # the logit of a recipient that may not be addressed; finite, so that 0 p stays 0
 
@@ -64,8 +63,7 @@ def sample(
     return chosen
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _sample(
     logits: Float[np.ndarray, "R N"],
     uniform: Float[np.ndarray, "R"],

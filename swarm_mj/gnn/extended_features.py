@@ -5,12 +5,12 @@ From its own buffer, the packets it sent and decoded, its identity, the team's s
 
 import math
 from dataclasses import replace
-from typing import ClassVar, no_type_check
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Shaped
-from numba import njit
 
+from swarm_mj.compiled import compiled
 from swarm_mj.gnn.graphs import Graphs
 from swarm_mj.gnn.packet_memory import Memory
 from swarm_mj.gnn.turns import write_turns
@@ -122,8 +122,7 @@ class LocalFeatures(ExtendedFeatures):
         return replace(seen, node=seen.node[:, :, is_kept], has_turn=np.zeros_like(seen.has_turn))
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _log_age(now: float, then: float) -> float:
     """The age on a logarithmic scale: 0 is now, 1 is long ago or never."""
     if then <= NEVER:
@@ -131,15 +130,13 @@ def _log_age(now: float, then: float) -> float:
     return min(1.0, math.log1p(now - then) / math.log1p(LONG_WINDOWS))
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _log_news(windows: float) -> float:
     """Summed rises of timestamps on the scale of ages."""
     return math.log1p(windows) / math.log1p(LONG_WINDOWS)
 
 
-@njit(cache=True, fastmath=True)
-@no_type_check
+@compiled(fastmath=True)
 def _news(
     own: Float32[np.ndarray, "N"],
     neighbour: Float32[np.ndarray, "N"],
@@ -154,8 +151,7 @@ def _news(
     return by_packet / own.shape[0], by_both / own.shape[0]
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _fill(
     timestamp: Float[np.ndarray, "B N N"],
     position_m: Float[np.ndarray, "B N N 2"],
@@ -183,8 +179,7 @@ def _fill(
             may_address[b, i, i] = True
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _fill_teammates(
     b: int,
     i: int,
@@ -228,8 +223,7 @@ def _fill_teammates(
         may_address[k] = not is_known[k] or ranges <= ADDRESS_RANGES
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _fill_oneself(i: int, spoken_log_age: float, node: Shaped[np.ndarray, "N"]) -> None:
     """What concerns all neighbours together; the news of each then goes to its logarithm."""
     news, unsaid_news = 0.0, 0.0
@@ -242,8 +236,7 @@ def _fill_oneself(i: int, spoken_log_age: float, node: Shaped[np.ndarray, "N"]) 
     node[i].news, node[i].unsaid_news = _log_news(news), _log_news(unsaid_news)
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _count_near(
     believed_m: Float[np.ndarray, "N 2"], is_known: Bool[np.ndarray, "N"], k: int, range_m: float
 ) -> int:

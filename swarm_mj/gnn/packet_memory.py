@@ -3,14 +3,13 @@
 Every robot's memory is its own: row `[b, i]` is written from what robot `i` sent and decoded only.
 """
 
-from typing import no_type_check
-
 import numpy as np
 from jaxtyping import Float, Float32, Int
-from numba import njit
 
+from swarm_mj.compiled import compiled
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.timestamps import merge_timestamps, observe_own
 from swarm_mj.protocol.window import SLOT_WINDOWS
 
 
@@ -61,8 +60,7 @@ class Memory:
         self._before[...] = views.buffers.timestamp
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _take_in(
     recipient: Int[np.ndarray, "B N"],
     heard_from: Int[np.ndarray, "B N"],
@@ -78,8 +76,7 @@ def _take_in(
     """One phase: what was said, who decoded it, and `timestamp` merged as the buffers were."""
     num_missions, num_robots = recipient.shape
     for b in range(num_missions):
-        for i in range(num_robots):
-            timestamp[b, i, i] = time[b]
+        observe_own(timestamp[b], time[b])
         packet = timestamp[b].copy()
         for i in range(num_robots):
             if is_transmission and recipient[b, i] != i:
@@ -91,5 +88,4 @@ def _take_in(
                 neighbour[b, i, k] = packet[k]
                 if recipient[b, k] == i:
                     addressed_by[b, i, k] = time[b]
-                for j in range(num_robots):
-                    timestamp[b, i, j] = max(timestamp[b, i, j], packet[k, j])
+        merge_timestamps(packet, heard_from[b], timestamp[b])

@@ -7,11 +7,11 @@ near anyone: nobody joins after it. Robots that believe the same positions find 
 without a word.
 """
 
-from typing import no_type_check
-
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
-from numba import njit
+
+from swarm_mj.compiled import compiled
+from swarm_mj.mission.geometry import squared_distance
 
 
 def write_turns(
@@ -35,8 +35,7 @@ def write_turns(
     _write(believed_m, is_known, now, radius_m, taken, has_turn)
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _write(
     believed_m: Float[np.ndarray, "B N N 2"],
     is_known: Bool[np.ndarray, "B N N"],
@@ -57,8 +56,7 @@ def _write(
                     has_turn[b, i, taken[m], n] = 1.0
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _join(
     believed_m: Float[np.ndarray, "N 2"],
     is_known: Bool[np.ndarray, "N"],
@@ -75,9 +73,7 @@ def _join(
             break
         is_free = True
         for m in range(num_taken):
-            dx = believed_m[k, 0] - believed_m[taken[m], 0]
-            dy = believed_m[k, 1] - believed_m[taken[m], 1]
-            if k == taken[m] or dx * dx + dy * dy < least_m2:
+            if k == taken[m] or squared_distance(believed_m, k, taken[m]) < least_m2:
                 is_free = False
                 break
         if is_free:

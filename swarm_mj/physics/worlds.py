@@ -9,13 +9,12 @@ Positions come from MuJoCo's step; only the mirror at a wall writes them. Two mo
 """
 
 from dataclasses import replace
-from typing import no_type_check
 
 import numpy as np
 from jaxtyping import Bool, Float
 from mujoco import batch
-from numba import njit
 
+from swarm_mj.compiled import compiled
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import ROBOT_MASS_KG, compose, num_substeps, timestep_s
 from swarm_mj.physics.state import RobotStates
@@ -154,8 +153,7 @@ def _empty_like(states: RobotStates) -> RobotStates:
     )
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _first_not_finite(
     states: Float[np.ndarray, "B N 2"],
 ) -> int:
@@ -166,8 +164,7 @@ def _first_not_finite(
     return -1
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _kick(
     qpos: Float[np.ndarray, "B N 2"],
     qvel: Float[np.ndarray, "B N 2"],

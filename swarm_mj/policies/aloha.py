@@ -1,13 +1,13 @@
 """Slotted ALOHA broadcast (Abramson 1970; Roberts 1975)."""
 
 from collections.abc import Sequence
-from typing import no_type_check
 
 import numpy as np
 from jaxtyping import Bool, Float
-from numba import njit
 
+from swarm_mj.compiled import compiled
 from swarm_mj.mission.batched_rng import Stream, uniform
+from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.policies.policy import BroadcastPolicy, check_probability
 from swarm_mj.protocol.local_views import LocalViews
 
@@ -69,8 +69,7 @@ def num_contenders(views: LocalViews, range_m: float) -> Float[np.ndarray, "B N"
     return contenders
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _count(
     is_known: Bool[np.ndarray, "B N N"],
     believed_m: Float[np.ndarray, "B N N 2"],
@@ -80,11 +79,10 @@ def _count(
     num_missions, num_robots = contenders.shape
     for b in range(num_missions):
         for i in range(num_robots):
+            place_m = believed_m[b, i]
             num_known = num_near = 1
             for j in range(num_robots):
                 if is_known[b, i, j] and j != i:
-                    dx = believed_m[b, i, j, 0] - believed_m[b, i, i, 0]
-                    dy = believed_m[b, i, j, 1] - believed_m[b, i, i, 1]
                     num_known += 1
-                    num_near += dx * dx + dy * dy <= range_m * range_m
+                    num_near += squared_distance(place_m, j, i) <= range_m * range_m
             contenders[b, i] = num_robots * num_near / num_known

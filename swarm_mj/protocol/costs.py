@@ -1,12 +1,11 @@
 """The costs (II-C, IV-A): age of information (Eq. 10), velocity variance (Eq. 17), packets."""
 
 from dataclasses import dataclass
-from typing import no_type_check
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from numba import njit
 
+from swarm_mj.compiled import compiled
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import NEVER, Buffers
 from swarm_mj.protocol.window import Phase
@@ -166,8 +165,7 @@ def window_costs(
 
 # In these, None for `is_active` is compiled apart: without the tests, and as fast as without them.
 # Times are halves of a window, so their sum is exact and adding in any order changes nothing.
-@njit(cache=True, fastmath={"reassoc"})
-@no_type_check
+@compiled(fastmath={"reassoc"})
 def _mean_age(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
@@ -192,8 +190,7 @@ def _mean_age(
         is_complete[b] = num_unknown == 0
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _variance(
     velocity_mps: Float[np.ndarray, "B N 2"],
     is_active: Bool[np.ndarray, "B N"] | None,
@@ -214,8 +211,7 @@ def _variance(
         variance[b] = total / num_active
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _count_addressed(
     recipient: Int[np.ndarray, "B N"],
     heard: Int[np.ndarray, "B N"],
@@ -235,8 +231,7 @@ def _count_addressed(
                 overheard[b] += not is_meant
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _count_broadcasts(
     recipient: Int[np.ndarray, "B N"],
     heard: Int[np.ndarray, "B N"],
@@ -258,8 +253,7 @@ def _count_broadcasts(
         received[b] += is_heard.sum()
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _mean_depth(
     timestamp: Float[np.ndarray, "B N N"],
     parent: Int[np.ndarray, "B N N"],

@@ -6,12 +6,12 @@ are broadcasts that nobody answers. Index order: `[b, i]` is robot `i` of missio
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, no_type_check, runtime_checkable
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from numba import njit
 
+from swarm_mj.compiled import compiled
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST, Buffers, merge, observe_self, record_attempt
 from swarm_mj.radio.free_space import Channel
@@ -229,8 +229,7 @@ def _of_active(
     return np.where(is_active, robots, np.arange(is_active.shape[1], dtype=robots.dtype))
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _answer_senders(
     recipient: Int[np.ndarray, "B N"],
     heard: Int[np.ndarray, "B N"],

@@ -1,10 +1,9 @@
 """The ego robot's parent tree (II-B) as a drawing: hops to the right, leaves below each other."""
 
-from typing import no_type_check
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from numba import njit
+
+from swarm_mj.compiled import compiled
 
 
 def dendrogram(
@@ -26,8 +25,7 @@ def dendrogram(
     return place
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _place_all(
     parent: Int[np.ndarray, "T N"], root: int, place: Float[np.ndarray, "T N 2"]
 ) -> None:
@@ -41,8 +39,7 @@ def _place_all(
             place[t, j, 1] = place[t, j, 1] / (num_leaves - 1) if num_leaves > 1 else 0.5
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _descend(
     parent: Int[np.ndarray, "N"],
     root: int,
@@ -69,8 +66,7 @@ def _descend(
     return num_visited, num_leaves
 
 
-@njit(cache=True)
-@no_type_check
+@compiled()
 def _centre(
     parent: Int[np.ndarray, "N"], order: Int[np.ndarray, "M"], place: Float[np.ndarray, "N 2"]
 ) -> None:
