@@ -65,8 +65,13 @@ def test_every_equation_ends_the_first_line_of_one_docstring():
 def imports(path):
     """The modules of this package that a file imports."""
     for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("swarm_mj"):
-            yield node.module.removeprefix("swarm_mj.")
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module == "swarm_mj":
+            names = [f"swarm_mj.{alias.name}" for alias in node.names]
+        else:
+            names = [node.module] if isinstance(node, ast.ImportFrom) else []
+        yield from (n.removeprefix("swarm_mj.") for n in names if n.startswith("swarm_mj."))
 
 
 @pytest.mark.parametrize(
@@ -94,8 +99,38 @@ def test_the_library_knows_neither_training_nor_tools():
         assert not re.search(r"^(from|import) (training|tools)\b", path.read_text(), re.MULTILINE)
 
 
-@pytest.mark.parametrize("heavy", ["torch", "stable_baselines3", "rerun", "dm_control"])
-def test_the_core_does_not_load_heavy_libraries(heavy):
-    core = "swarm_mj.rollout, swarm_mj.replay.recorder"
-    code = f"import sys, {core}; sys.exit({heavy!r} in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+# Each imports those before it only: so no two of them import each other, by whatever way.
+ROOMS = (
+    *("__init__", "compiled", "fields", "io", "mission", "physics", "radio", "protocol", "control"),
+    *("gnn", "policies", "swarm", "rollout", "evaluation", "replay", "learning", "envs"),
+    *("benchmark", "cli", "__main__"),
+)
+
+
+def test_every_file_stands_in_a_room_of_the_order():
+    assert {home(path).split(".")[0] for path in PACKAGE.rglob("*.py")} == set(ROOMS)
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_imports_go_forward_only(room):
+    """Imports within functions count, too."""
+    earlier = ROOMS[: ROOMS.index(room) + 1]
+    for path in PACKAGE.rglob("*.py"):
+        if home(path).split(".")[0] == room:
+            assert {name.split(".")[0] for name in imports(path)} <= set(earlier), path
+
+
+@pytest.mark.parametrize(
+    ("core", "heavy"),
+    [
+        ("swarm_mj.policies", {"mujoco"}),
+        (
+            "swarm_mj.rollout, swarm_mj.replay.recorder",
+            {"torch", "stable_baselines3", "rerun", "dm_control"},
+        ),
+    ],
+)
+def test_the_core_does_not_load_heavy_libraries(core, heavy):
+    code = f"import sys, {core}; print(*({heavy} & sys.modules.keys()))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
