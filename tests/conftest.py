@@ -1,7 +1,28 @@
 """What every test runs under."""
 
+from pathlib import Path
+
+import pytest
 from hypothesis import settings
 
 # Compiling takes its time on an example's first run; no law here is about time.
 settings.register_profile("swarm_mj", deadline=None, max_examples=50)
 settings.load_profile("swarm_mj")
+
+TRAINING = Path(__file__).parent.parent / "training"
+
+
+def stamps(folder):
+    """When each file was last written, but for those that Python caches."""
+    files = (path for path in folder.rglob("*") if path.is_file() and path.suffix != ".pyc")
+    return {path: path.stat().st_mtime_ns for path in files}
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _experiments_are_left_alone():
+    """Fails the last test of a session that wrote under `training/`, where measured results are."""
+    before = stamps(TRAINING)
+    yield
+    after = stamps(TRAINING)
+    written = {path for path in before | after if before.get(path) != after.get(path)}
+    assert not written, f"tests wrote {', '.join(map(str, sorted(written)))}"

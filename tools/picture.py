@@ -6,7 +6,6 @@ Runs rerun's own viewer headless, so what it shows is what people see. Needs a V
 software one will do (Debian and Ubuntu: `apt-get install mesa-vulkan-drivers`).
 """
 
-import argparse
 import io
 import os
 import re
@@ -18,12 +17,15 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from PIL import Image
 from rerun.experimental import ViewerClient
 
+from swarm_mj.cli import script
+from swarm_mj.fields import setting
 from swarm_mj.replay.read import check_replay, windows
 
 START_TIMEOUT_S = 60.0
@@ -34,23 +36,21 @@ ZOOM_STEP = 0.1  # of the viewer's own zoom
 SETTLE_S = 1.0  # after a jump in time, until everything is drawn
 
 
-def main() -> int:
-    """Runs the command; returns its exit code."""
-    parser = argparse.ArgumentParser(description="Takes a picture of a replay without a screen.")
-    parser.add_argument("replay", type=Path, help="an .rrd file that `swarm-mj fly` recorded")
-    parser.add_argument("--window", type=int, help="the window to show (default: the middle one)")
-    parser.add_argument("--out", type=Path, default=Path("replay.png"), help="default: replay.png")
-    parser.add_argument("--size", default="2560x1400", help="WIDTHxHEIGHT in pixels")
-    parser.add_argument("--zoom", type=int, default=6, help="steps by which texts are enlarged")
-    arguments = parser.parse_args()
-    try:
-        take_picture(
-            arguments.replay, arguments.window, arguments.out, arguments.size, arguments.zoom
-        )
-    except (ValueError, OSError, TimeoutError) as error:
-        print(f"picture: error: {error}", file=sys.stderr)
-        return 2
-    print(arguments.out)
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """What is shown, and how large."""
+
+    replay: Path = setting(help="an .rrd file that `swarm-mj fly` recorded", is_positional=True)
+    window: int | None = setting(None, "the window to show", shown="the middle one")
+    out: Path = setting(Path("replay.png"), "the picture")
+    size: str = setting("2560x1400", "in pixels", metavar="WIDTHxHEIGHT")
+    zoom: int = setting(6, "steps by which texts are enlarged", low=0, high=40)
+
+
+def run(options: Options) -> int:
+    """Takes the picture; returns the exit code."""
+    take_picture(options.replay, options.window, options.out, options.size, options.zoom)
+    print(options.out)
     return 0
 
 
@@ -160,4 +160,4 @@ def _wait(is_done: Callable[[], bool], timeout_s: float, complaint: str) -> None
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(script(Options, run))

@@ -6,18 +6,20 @@ Their weights (NumPy arrays by TensorFlow name) become a policy directory, which
 `reference` preset; its mean age of information is compared with theirs in standard errors.
 """
 
-import argparse
 import math
 import sys
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
 
+from swarm_mj.cli import script
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.evaluation.jobs import run_jobs
 from swarm_mj.evaluation.study import Study
+from swarm_mj.fields import setting
 from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.io.provenance import version
@@ -25,7 +27,7 @@ from swarm_mj.mission import reference
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.policies.stored import save_policy
 
-DONE, TOO_FAR, BAD_INPUT = 0, 1, 2
+TOO_FAR = 1
 THEIR_AOI, THEIR_SEM = 37.5, 1.0  # over 100 episodes of their simulator [windows]
 MOST_STANDARD_ERRORS = 3.0
 SHAPE = GnnShape(num_features=7, num_outputs=2, edges="reference")
@@ -90,29 +92,29 @@ def costs_of(folder: Path, episodes: int, seed: int, num_jobs: int) -> list[floa
     return [aoi for index in sorted(flown) for aoi in flown[index].aoi]
 
 
-def main() -> int:
-    """Runs the tool; returns 1 if the costs are too far apart."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("weights", type=Path, help="the authors' .npz")
-    parser.add_argument("--out", type=Path, help="keep the policy directory here")
-    parser.add_argument("--episodes", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=2000, help="of the first mission")
-    parser.add_argument("--jobs", type=int, default=2, help="processes")
-    options = parser.parse_args()
-    try:
-        with tempfile.TemporaryDirectory() as scratch:
-            folder = options.out or Path(scratch) / "policy"
-            store(options.weights, folder)
-            costs = costs_of(folder, options.episodes, options.seed, options.jobs)
-    except (ValueError, OSError) as error:
-        sys.stderr.write(f"reference_policy: error: {error}\n")
-        return BAD_INPUT
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """Whose weights, and on which missions."""
+
+    weights: Path = setting(help="the authors' .npz", is_positional=True)
+    out: Path | None = setting(None, "keep the policy directory here", metavar="DIR")
+    episodes: int = setting(100, "missions", low=2, high=100_000)
+    seed: int = setting(2000, "of the first mission")
+    jobs: int = setting(2, "processes", low=1, high=256)
+
+
+def run(options: Options) -> int:
+    """Flies the policy and compares; returns 1 if the costs are too far apart."""
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = options.out or Path(scratch) / "policy"
+        store(options.weights, folder)
+        costs = costs_of(folder, options.episodes, options.seed, options.jobs)
     mean, sem = float(np.mean(costs)), float(np.std(costs, ddof=1) / math.sqrt(len(costs)))
     apart = (mean - THEIR_AOI) / math.hypot(sem, THEIR_SEM)
     print(f"here {mean:.2f} ± {sem:.2f} windows over {len(costs)} missions")
     print(f"published {THEIR_AOI} ± {THEIR_SEM}: {apart:+.2f} combined standard errors apart")
-    return DONE if abs(apart) <= MOST_STANDARD_ERRORS else TOO_FAR
+    return 0 if abs(apart) <= MOST_STANDARD_ERRORS else TOO_FAR
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(script(Options, run))

@@ -6,16 +6,17 @@ One table per file, task, preset, fraction switched off and cost: policies down,
 across, mean ± standard error over missions, published values in brackets.
 """
 
-import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
 
+from swarm_mj.cli import script
 from swarm_mj.evaluation.published import SWEEPS
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, read_results
+from swarm_mj.fields import setting
 
-DONE, BAD_INPUT = 0, 2
 COSTS = {
     "aoi": ("age of information [windows]", 1),
     "velocity_variance": ("velocity variance [m²/s²]", 3),
@@ -82,22 +83,29 @@ def _kind(result: Result) -> tuple[str, ...]:
     return (result.task, f"preset {result.preset}", *([fate] if result.switched_off else []))
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """What is shown."""
+
+    files: tuple[Path, ...] = setting(
+        help="made by swarm-mj evaluate --csv", metavar="RESULTS.csv", is_positional=True
+    )
+
+
+def run(options: Options) -> int:
     """Prints the tables; returns the exit code."""
-    parser = argparse.ArgumentParser(description="Results as Markdown tables.")
-    parser.add_argument("files", type=Path, nargs="+", help="made by swarm-mj evaluate --csv")
-    options = parser.parse_args(arguments)
-    try:
-        for path in options.files:
-            results = read_results(path)
-            for kind in sorted({_kind(result) for result in results}):
-                own = [result for result in results if _kind(result) == kind]
-                for cost in COSTS if own[0].task == "flocking" else ["aoi"]:
-                    print(f"{', '.join(kind)}\n\n{table(own, cost)}\n")
-    except (ValueError, OSError) as error:
-        sys.stderr.write(f"results_table: error: {error}\n")
-        return BAD_INPUT
-    return DONE
+    for path in options.files:
+        results = read_results(path)
+        for kind in sorted({_kind(result) for result in results}):
+            own = [result for result in results if _kind(result) == kind]
+            for cost in COSTS if own[0].task == "flocking" else ["aoi"]:
+                print(f"{', '.join(kind)}\n\n{table(own, cost)}\n")
+    return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the tool; returns its exit code."""
+    return script(Options, run, arguments)
 
 
 if __name__ == "__main__":

@@ -1,30 +1,31 @@
-"""Both arms under the `reference` preset on 10 stationary robots, on one axis of team decisions.
+"""Both credit assignments on 10 stationary robots, preset `reference`, by team decisions.
 
     python training/both_arms.py
 
-Arm `team` has the authors' settings: their features, edges, network and PPO. At 40 robots it makes
-a few decisions a second on a CPU, so the comparison is made where it can get somewhere. Arm `robot`
-is flown with its own features, and with the authors' seven, which know of no turns.
+Per team, training has the authors' settings: their features, edges, network and PPO. At 40 robots
+it makes a few decisions a second on a CPU, so the comparison is made where it can get somewhere.
+Per robot, it is run with features of its own, and with the authors' seven, which know of no turns.
 """
 
 import sys
 from dataclasses import dataclass
 
-from learning import evaluate, run, train
+from learning import Experiment, run
+
+from swarm_mj.fields import setting
 
 
 @dataclass(frozen=True, kw_only=True)
-class BothArms:
-    """The settings; the rest is each arm's own."""
+class BothArms(Experiment):
+    """The settings; the rest is each credit assignment's own."""
 
-    num_robots: int = 10
-    seed: int = 0
-    team_minutes: float = 40.0
-    robot_minutes: float = 4.0
-    episodes: int = 100
+    num_robots: int = setting(10, "size of the team", low=2, high=200)
+    seed: int = setting(0, "of the training")
+    team_minutes: float = setting(40.0, "of training per team", low=0.01, high=10_000.0)
+    robot_minutes: float = setting(4.0, "of each training per robot", low=0.01, high=10_000.0)
 
     def __call__(self) -> None:
-        """Trains both, then evaluates both."""
+        """Trains with each, then evaluates all."""
         missions = f"--preset reference --task stationary --robots {self.num_robots}"
         runs = (
             ("robot", f"--arm robot --minutes {self.robot_minutes:g}"),
@@ -32,18 +33,15 @@ class BothArms:
             ("team", f"--arm team --minutes {self.team_minutes:g}"),
         )
         policies = [
-            train(
+            self.train(
                 f"{name}-{self.num_robots}-reference-seed{self.seed}",
-                f"{options} {missions} --seed {self.seed}".split(),
+                f"{options} {missions} --seed {self.seed}",
             )
             for name, options in runs
         ]
-        evaluate(
-            f"both-arms-{self.num_robots}",
-            [*policies, "tdma", "mst", "round-robin"],
-            f"{missions} --episodes {self.episodes} --jobs 2".split(),
-        )
+        baselines = ("tdma", "mst", "round-robin")
+        self.evaluate(f"both-arms-{self.num_robots}", [*policies, *baselines], missions)
 
 
 if __name__ == "__main__":
-    sys.exit(run(BothArms()))
+    sys.exit(run(BothArms))

@@ -6,17 +6,17 @@ Flies the same missions with every policy and prints how much of the velocity va
 the end. Flocks without a boundary are the paper's, reflected ones the default flight's.
 """
 
-import argparse
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from rich.console import Console
-from rich.progress import track
 from rich.table import Table
 
+from swarm_mj.cli import script
+from swarm_mj.cli.progress import WorkBar
 from swarm_mj.evaluation.published import BASELINES
+from swarm_mj.fields import setting
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission, paper
 from swarm_mj.policies.registry import make_policy
@@ -29,9 +29,11 @@ class Settings:
     """What is flown."""
 
     mission: Mission = paper("flocking")
-    first_seed: int = 0
-    num_missions: int = 100
-    agreed_share: float = 0.01  # a flock has agreed when less of its first variance is left
+    first_seed: int = setting(0, "of the first mission")
+    num_missions: int = setting(100, "for each policy and boundary", low=1, high=10_000)
+    agreed_share: float = setting(
+        0.01, "a flock with less of its first variance left has agreed", low=0.0, high=1.0
+    )
 
 
 def left_over(settings: Settings, policy_name: str) -> np.ndarray:
@@ -39,17 +41,17 @@ def left_over(settings: Settings, policy_name: str) -> np.ndarray:
     seeds = range(settings.first_seed, settings.first_seed + settings.num_missions)
     swarm = Swarm(settings.mission, seeds)
     policy = make_policy(policy_name, settings.mission)
-    windows = rollout(swarm, policy)
-    total = settings.mission.num_windows
-    summary = summarise(list(track(windows, policy_name, total, transient=True)))
+    windows = []
+    with WorkBar(policy_name, settings.mission.num_windows, "windows") as bar:
+        for window in rollout(swarm, policy):
+            windows.append(window)
+            bar.advance()
+    summary = summarise(windows)
     return summary.velocity_variance_last / summary.velocity_variance_first
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def run(open_area: Settings) -> int:
     """Runs the experiment; returns its exit code."""
-    parser = argparse.ArgumentParser(description="How far flocks agree on a velocity.")
-    parser.parse_args(arguments)
-    open_area = Settings()
     walled = replace(open_area, mission=replace(open_area.mission, boundary="reflect"))
     table = Table(title=f"Velocity variance left, {open_area.num_missions} missions")
     for heading in ("boundary", "policy"):
@@ -71,4 +73,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(script(Settings, run))

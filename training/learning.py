@@ -4,15 +4,16 @@ Each experiment calls the commands that a reader would type, so a run that is in
 when the experiment is started again.
 """
 
-import argparse
 import shutil
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from swarm_mj.cli import main as swarm_mj
+from swarm_mj.cli import script
+from swarm_mj.fields import setting
 
-RUNS = Path("runs")
 RESULTS = Path("training/results/learning")
 FIRST_SEED = 2000  # of the final evaluation's missions, which no training and no tuning has seen
 
@@ -21,50 +22,61 @@ class Failed(Exception):  # noqa: N818 - as KeyboardInterrupt
     """A command has said why, and its exit code is the experiment's."""
 
 
-def train(name: str, options: Sequence[str]) -> Path:
-    """Trains, or goes on training, and keeps the learning curve under `training/results`.
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """Trains, evaluates and leaves its numbers; each experiment is one of these, called."""
 
-    Args:
-        name: Of the run.
-        options: Of `swarm-mj train`; those of the limits are given on resuming, too.
+    runs: Path = setting(Path("runs"), "where runs are kept, to go on with", metavar="DIR")
+    results: Path = setting(RESULTS, "where curves and evaluations go", metavar="DIR")
+    episodes: int = setting(100, "missions of the final evaluation", low=1, high=100_000)
+    jobs: int = setting(2, "its processes", low=1, high=256)
 
-    Returns:
-        The best policy's folder.
+    def __call__(self) -> None:
+        """Does all the work."""
+        raise NotImplementedError
 
-    Raises:
-        Failed: The command failed or was interrupted.
-    """
-    folder = RUNS / name
-    resume = ["--resume"] if (folder / "settings.json").exists() else []
-    _run(["train", *options, "--out", str(folder), *resume])
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(folder / "curve.csv", RESULTS / f"{name}-curve.csv")
-    return folder / "policy"
+    def train(self, name: str, options: str) -> Path:
+        """Trains, or goes on training, and keeps the learning curve among the results.
+
+        Args:
+            name: Of the run.
+            options: Of `swarm-mj train`; those of the limits are given on resuming, too.
+
+        Returns:
+            The best policy's folder.
+
+        Raises:
+            Failed: The command failed or was interrupted.
+        """
+        folder = self.runs / name
+        resume = ["--resume"] if (folder / "settings.json").exists() else []
+        _run(["train", *options.split(), "--out", str(folder), *resume])
+        self.results.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(folder / "curve.csv", self.results / f"{name}-curve.csv")
+        return folder / "policy"
+
+    def evaluate(self, name: str, policies: Sequence[Path | str], options: str) -> None:
+        """Flies policies on missions they have never seen; the file stands among the results.
+
+        Args:
+            name: Of the results.
+            policies: Folders, or names of hand-written policies.
+            options: Of `swarm-mj evaluate`.
+
+        Raises:
+            Failed: The command failed or was interrupted.
+        """
+        how = f"--seed {FIRST_SEED} --episodes {self.episodes} --jobs {self.jobs} {options}"
+        csv = str(self.results / f"{name}.csv")
+        _run(["evaluate", "--policy", *map(str, policies), *how.split(), "--csv", csv, "--force"])
 
 
-def evaluate(name: str, policies: Sequence[Path | str], options: Sequence[str]) -> None:
-    """Flies policies on missions they have never seen; results go under `training/results`.
-
-    Args:
-        name: Of the results.
-        policies: Folders, or names of hand-written policies.
-        options: Of `swarm-mj evaluate`.
-
-    Raises:
-        Failed: The command failed or was interrupted.
-    """
-    out = RESULTS / f"{name}.csv"
-    command = ["evaluate", "--policy", *map(str, policies), "--seed", str(FIRST_SEED)]
-    _run([*command, *options, "--csv", str(out), "--force"])
+def run(kind: type[Experiment], arguments: Sequence[str] | None = None) -> int:
+    """Runs an experiment with the options typed; returns its exit code."""
+    return script(kind, _exit_code, arguments)
 
 
-def run(experiment: object) -> int:
-    """Runs an experiment, a callable; returns its exit code."""
-    assert callable(experiment)
-    argparse.ArgumentParser(
-        description=sys.modules["__main__"].__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    ).parse_args()
+def _exit_code(experiment: Experiment) -> int:
     try:
         experiment()
     except Failed as failed:

@@ -8,7 +8,6 @@ Fig. 4's. `--force` removes what is there first. An interrupted run continues wh
 as long as the commit is the same. Results wait under `runs/` until all are there.
 """
 
-import argparse
 import os
 import sys
 from collections.abc import Sequence
@@ -16,10 +15,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from swarm_mj.cli import main as swarm_mj
+from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.contents import RESULT_FIGURES, ResultFigure
 from swarm_mj.evaluation.progress import progress_path
 from swarm_mj.evaluation.results import read_results
+from swarm_mj.fields import setting
 from swarm_mj.io.provenance import commit
+from swarm_mj.mission import PRESETS
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -28,12 +30,24 @@ ROOT = Path(__file__).resolve().parent.parent
 class Settings:
     """What is evaluated, and where it goes."""
 
-    presets: tuple[str, ...] = ("paper", "reference")
-    figures: tuple[str, ...] = ("fig4", "fig5", "fig6")
-    episodes: int = 100  # missions per policy and regime, as many as the paper's
-    first_seed: int = 2000  # the planner's numbers were chosen on missions from 1000
-    results: Path = ROOT / "training" / "results"
-    drafts: Path = ROOT / "runs" / "paper_figures"
+    presets: tuple[str, ...] = setting(("paper", "reference"), "whose", choices=tuple(PRESETS))
+    figures: tuple[str, ...] = setting(
+        ("fig4", "fig5", "fig6"), "which results", choices=tuple(RESULT_FIGURES)
+    )
+    # As many as the paper's; the planner's numbers were chosen on missions from 1000.
+    episodes: int = setting(100, "missions per policy and regime", low=1, high=100_000)
+    first_seed: int = setting(2000, "of the first mission")
+    results: Path = setting(
+        ROOT / "training" / "results", "where they go", metavar="DIR", shown="training/results"
+    )
+    drafts: Path = setting(
+        ROOT / "runs" / "paper_figures",
+        "where they wait until all are there",
+        metavar="DIR",
+        shown="runs/paper_figures",
+    )
+    jobs: int = setting(os.cpu_count() or 1, "processes", low=1, high=256)
+    force: bool = setting(False, "make all anew")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,17 +108,10 @@ def _is_current(draft: Path) -> bool:
     return draft.exists()
 
 
-def main() -> int:
+def run(settings: Settings) -> int:
     """Runs the experiment; returns its exit code."""
-    parser = argparse.ArgumentParser(
-        description="Make the results of the paper's figures under training/results/."
-    )
-    jobs = os.cpu_count() or 1
-    parser.add_argument("--jobs", type=int, default=jobs, help=f"processes (default: {jobs})")
-    parser.add_argument("--force", action="store_true", help="make all anew")
-    options = parser.parse_args()
-    return evaluate(Settings(), options.jobs, force=options.force)
+    return evaluate(settings, settings.jobs, force=settings.force)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(script(Settings, run))

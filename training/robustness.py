@@ -7,16 +7,16 @@ half-way, the authors' preset, and contact physics. One file a question under
 training/results/robustness; what is there is kept, `--force` makes all anew.
 """
 
-import argparse
 import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from swarm_mj.cli import main as swarm_mj
+from swarm_mj.cli import script
+from swarm_mj.fields import setting
 
-ROOT = Path(__file__).resolve().parent.parent
-RESULTS = ROOT / "training" / "results" / "robustness"
+RESULTS = Path(__file__).resolve().parent / "results" / "robustness"
 QUESTIONS = {
     "switched-off": "--task stationary --switched-off 0.1 0.2 --episodes 30",
     "switched-off-walking": "--task random-walk --robots 10 40 --switched-off 0.1 --episodes 30",
@@ -34,36 +34,30 @@ WITHOUT_ORACLE = ("switched-off", "switched-off-walking", "team-sizes")
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What is flown, and on which missions."""
+    """What is flown, on which missions, and where the results go."""
 
-    policies: tuple[str, ...] = ("tdma", "planner", "gnn")
-    first_seed: int = 2000
+    policies: tuple[str, ...] = setting(("tdma", "planner", "gnn"), "who is flown")
+    first_seed: int = setting(2000, "of the first mission")
+    results: Path = setting(
+        RESULTS, "where the files go", metavar="DIR", shown="training/results/robustness"
+    )
+    jobs: int = setting(os.cpu_count() or 1, "processes", low=1, high=256)
+    force: bool = setting(False, "make all anew")
 
 
-def answer(settings: Settings, jobs: int, *, force: bool) -> int:
+def answer(settings: Settings) -> int:
     """Flies what is missing, or all by force; returns the exit code."""
     for name, options in QUESTIONS.items():
-        path = RESULTS / f"{name}.csv"
-        if path.exists() and not force:
+        path = settings.results / f"{name}.csv"
+        if path.exists() and not settings.force:
             continue
         policies = [*settings.policies, *(() if name in WITHOUT_ORACLE else ("greedy-oracle",))]
-        command = ["evaluate", "--policy", *policies, *options.split()]
-        command += ["--seed", str(settings.first_seed), "--jobs", str(jobs)]
-        code = swarm_mj([*command, "--csv", str(path), "--force"])
+        how = f"{options} --seed {settings.first_seed} --jobs {settings.jobs}".split()
+        code = swarm_mj(["evaluate", "--policy", *policies, *how, "--csv", str(path), "--force"])
         if code != 0:
             return code
     return 0
 
 
-def main() -> int:
-    """Runs the experiment; returns its exit code."""
-    parser = argparse.ArgumentParser(description="Fly the shipped policy where it was not trained.")
-    jobs = os.cpu_count() or 1
-    parser.add_argument("--jobs", type=int, default=jobs, help=f"processes (default: {jobs})")
-    parser.add_argument("--force", action="store_true", help="make all anew")
-    options = parser.parse_args()
-    return answer(Settings(), options.jobs, force=options.force)
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(script(Settings, answer))

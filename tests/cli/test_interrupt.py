@@ -1,10 +1,11 @@
 """Ctrl-C noted first, obeyed at once the second time, and as ever afterwards."""
 
+import contextlib
 import signal
 
 import pytest
 
-from swarm_mj.cli.interrupt import deferred_interrupt
+from swarm_mj.cli.interrupt import deferred_interrupt, heard_interrupt
 
 
 def test_the_first_ctrl_c_is_noted_and_the_second_interrupts():
@@ -27,3 +28,19 @@ def test_a_shielded_job_stays_shielded():
         assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def test_a_ctrl_c_that_is_heard_interrupts_at_once():
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt), heard_interrupt():
+        signal.raise_signal(signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) == before
+
+
+def test_a_ctrl_c_that_a_library_swallowed_is_not_lost():
+    with heard_interrupt() as interrupt_again:
+        interrupt_again()
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            interrupt_again()

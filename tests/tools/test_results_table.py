@@ -2,6 +2,7 @@
 
 import importlib.util
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -16,8 +17,10 @@ TOOL = Path(__file__).parent.parent.parent / "tools" / "results_table.py"
 def tool():
     spec = importlib.util.spec_from_file_location("results_table", TOOL)
     module = importlib.util.module_from_spec(spec)
+    sys.modules["results_table"] = module  # its options look their module up
     spec.loader.exec_module(module)
-    return module
+    yield module
+    del sys.modules["results_table"]
 
 
 def test_policies_down_the_swept_number_across_the_least_cost_first(tool, tmp_path, capsys):

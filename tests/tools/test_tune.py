@@ -147,7 +147,7 @@ def test_one_policy_alone_keeps_the_rows_of_the_others(tool, tmp_path):
     ("arguments", "complaint"),
     [
         (["--policy", "tdma"], "one of random-flooding, mst, aloha, gossip, not 'tdma'"),
-        (["--episodes", "1"], "episodes must be 2 or more, not 1"),
+        (["--episodes", "1"], "episodes must be a whole number from 2 to 10000, not 1"),
         (["--seed", "-1"], "seeds must be"),
         (["--windows", "0"], "number of windows must be"),
         (["--out", "."], ". is a folder"),
