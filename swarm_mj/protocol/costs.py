@@ -83,33 +83,24 @@ def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets
     Returns:
         The counts, per mission.
     """
-    first, second = phases
-    num_missions = first.recipient.shape[0]
-    none = np.full(num_missions, np.nan)
+    first, second = (_count(phase.recipient, phase.heard) for phase in phases)
+    none = np.full(first.shape[1], np.nan)
     if is_broadcast:
-        sent, heard, receptions = np.zeros((3, num_missions))
-        for phase in phases:
-            _count_broadcasts(phase.recipient, phase.heard, sent, heard, receptions)
-        return Packets(
-            sent=sent,
-            attempted=none,
-            delivered=none,
-            overheard=none,
-            answered=none,
-            heard=heard,
-            receptions=receptions,
-        )
-    sent, delivered, overheard, responses, answered = np.zeros((5, num_missions))
-    _count_addressed(first.recipient, first.heard, sent, delivered, overheard)
-    _count_addressed(second.recipient, second.heard, responses, answered, overheard)
+        sent, _, _, heard, receptions = first + second
+        attempted = delivered = overheard = answered = none
+    else:
+        heard = receptions = none
+        sent, delivered, overheard, _, _ = first
+        _, answered, overheard_responses, _, _ = second
+        attempted, overheard = sent, overheard + overheard_responses
     return Packets(
         sent=sent,
-        attempted=sent,
+        attempted=attempted,
         delivered=delivered,
         overheard=overheard,
         answered=answered,
-        heard=none,
-        receptions=none,
+        heard=heard,
+        receptions=receptions,
     )
 
 
@@ -212,45 +203,30 @@ def _variance(
 
 
 @compiled()
-def _count_addressed(
-    recipient: Int[np.ndarray, "B N"],
-    heard: Int[np.ndarray, "B N"],
-    sent: Float[np.ndarray, "B"],
-    received: Float[np.ndarray, "B"],
-    overheard: Float[np.ndarray, "B"],
-) -> None:
-    """Adds a phase's packets to the counts; whoever addresses itself sends nothing."""
-    num_missions, num_robots = recipient.shape
-    for b in range(num_missions):
-        for i in range(num_robots):
-            sent[b] += recipient[b, i] != i
-            sender = heard[b, i]
-            if sender != i:
-                is_meant = recipient[b, sender] == i
-                received[b] += is_meant
-                overheard[b] += not is_meant
+def _count(
+    recipient: Int[np.ndarray, "B N"], heard: Int[np.ndarray, "B N"]
+) -> Float[np.ndarray, "5 B"]:
+    """Counts one phase's packets; whoever addresses itself sends nothing.
 
-
-@compiled()
-def _count_broadcasts(
-    recipient: Int[np.ndarray, "B N"],
-    heard: Int[np.ndarray, "B N"],
-    sent: Float[np.ndarray, "B"],
-    received: Float[np.ndarray, "B"],
-    receptions: Float[np.ndarray, "B"],
-) -> None:
-    """Adds a phase's packets to the counts; whoever addresses itself sends nothing."""
+    Rows are packets sent, receptions by the addressee, receptions by another, packets that
+    somebody decoded, and all receptions.
+    """
     num_missions, num_robots = recipient.shape
+    counts = np.zeros((5, num_missions))
     is_heard = np.empty(num_robots, dtype=np.bool_)
     for b in range(num_missions):
         is_heard[:] = False
         for i in range(num_robots):
-            sent[b] += recipient[b, i] != i
+            counts[0, b] += recipient[b, i] != i
             sender = heard[b, i]
             if sender != i:
-                receptions[b] += 1
+                is_meant = recipient[b, sender] == i
+                counts[1, b] += is_meant
+                counts[2, b] += not is_meant
+                counts[3, b] += not is_heard[sender]
+                counts[4, b] += 1
                 is_heard[sender] = True
-        received[b] += is_heard.sum()
+    return counts
 
 
 @compiled()

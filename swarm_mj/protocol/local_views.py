@@ -1,6 +1,7 @@
 """What a robot may know (II-C, Eq. 9's argument): its own view, and nothing else."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -29,5 +30,10 @@ class LocalViews:
     @property
     def silence(self) -> Int[np.ndarray, "B N"]:
         """The recipients that mean silence: everyone addresses itself."""
-        num_missions, num_robots = self.buffers.timestamp.shape[:2]
-        return np.broadcast_to(np.arange(num_robots), (num_missions, num_robots))
+        return _oneself(self.buffers.shape)
+
+
+@cache
+def _oneself(shape: tuple[int, int]) -> Int[np.ndarray, "B N"]:
+    """Every robot's own identity."""
+    return np.broadcast_to(np.arange(shape[1]), shape)
