@@ -1,11 +1,10 @@
 """What a policy's `config.json` says: how to make its network, and where it comes from."""
 
 import json
-import math
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
-from types import NoneType
-from typing import Any, get_args
+from typing import Annotated, Any, Literal
+
+import msgspec
 
 from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.shape import GnnShape
@@ -14,28 +13,6 @@ from swarm_mj.mission import Mission
 FORMAT = "swarm_mj policy"
 FORMAT_VERSION = 1
 MAX_SILENCE_LOGIT = 100.0  # either way; e^100 to one is certain
-# What JSON calls the types of Python that it comes as.
-KINDS: dict[Any, str] = {
-    int: "a whole number",
-    float: "a number",
-    bool: "true or false",
-    str: "a text",
-    dict: "an object",
-    list: "a list",
-    NoneType: "null",
-}
-ITS_KINDS: dict[str, tuple[Any, ...]] = {
-    "network": (dict,),
-    "features": (str,),
-    "silence_logit": (float, int),
-    "training": (dict,),
-    "evaluation": (dict,),
-    "commit": (str, NoneType),
-    "version": (str,),
-}
-# A field's type is its kind; a Literal's arguments are texts to choose from.
-CHOICES = {spec.name: get_args(spec.type) for spec in fields(GnnShape) if get_args(spec.type)}
-NETWORK_KINDS = {s.name: (str,) if s.name in CHOICES else (s.type,) for s in fields(GnnShape)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,65 +69,38 @@ def from_json(text: str | bytes) -> PolicyConfig:
         ValueError: It is no JSON, not this format, of a newer version, or a value is unknown,
             missing, of another kind or out of range.
     """
-    content = _parsed(text)
-    if not isinstance(content, dict):
-        raise ValueError(f"it must be {KINDS[dict]}, not {KINDS[type(content)]}")
-    if content.pop("format", None) != FORMAT:
-        raise ValueError(f'its format must be "{FORMAT}"')
-    _check_version(content.pop("format_version", None))
-    _check_kinds("", content, ITS_KINDS)
-    _check_kinds("network.", content["network"], NETWORK_KINDS)
-    for name, choices in CHOICES.items():
-        if content["network"][name] not in choices:
-            raise ValueError(
-                f"network.{name} must be one of {', '.join(choices)}, not "
-                f"{_shown(content['network'][name])}"
-            )
-    content["network"] = GnnShape(**content["network"])
-    content["silence_logit"] = float(content["silence_logit"])
-    return PolicyConfig(**content)
-
-
-def _parsed(text: str | bytes) -> Any:  # noqa: ANN401 - anything in JSON
     try:
-        return json.loads(text, parse_constant=_refuse, parse_float=_finite)
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"it is no JSON ({error})") from error
+        version = msgspec.json.decode(text, type=_Header).format_version
+        if version > FORMAT_VERSION:
+            raise ValueError(
+                f"its format_version is {version}, and this swarm_mj reads {FORMAT_VERSION}; "
+                "update it"
+            )
+        document = msgspec.json.decode(text, type=_Document)
+        return msgspec.convert(document, PolicyConfig, from_attributes=True)
+    except RecursionError as error:
+        raise ValueError("it is nested too deep") from error
+    except msgspec.DecodeError as error:
+        raise ValueError(" ".join(str(error)[:160].split())) from error
 
 
-def _refuse(number: str) -> float:
-    raise ValueError(f"{number} is no finite number")
+class _Header(msgspec.Struct):
+    """What files of any version begin with."""
+
+    format: Literal["swarm_mj policy"]  # FORMAT
+    format_version: Annotated[int, msgspec.Meta(ge=1)]
 
 
-def _finite(number: str) -> float:
-    return float(number) if math.isfinite(float(number)) else _refuse(number)
-
-
-def _check_version(version: Any) -> None:  # noqa: ANN401 - anything in JSON
-    """Raises ValueError unless this code can read the format's version."""
-    if type(version) is not int or version < 1:
-        raise ValueError(f"its format_version must be a whole number from 1, not {_shown(version)}")
-    if version > FORMAT_VERSION:
-        raise ValueError(
-            f"its format_version is {version}, and this swarm_mj reads {FORMAT_VERSION}; update it"
-        )
-
-
-def _check_kinds(
-    prefix: str, content: dict[str, Any], kinds: Mapping[str, tuple[Any, ...]]
-) -> None:
-    """Raises ValueError unless there are these keys and no others, each of one of its kinds."""
-    for key in content:
-        if key not in kinds:
-            raise ValueError(f"it has an unknown key, {prefix}{key:.40}")
-    for key, allowed in kinds.items():
-        if key not in content:
-            raise ValueError(f"it lacks the key {prefix}{key}")
-        if type(content[key]) not in allowed:  # in JSON, true is no number
-            described = " or ".join(KINDS[kind] for kind in allowed)
-            raise ValueError(f"{prefix}{key} must be {described}, not {_shown(content[key])}")
-
-
-def _shown(value: Any) -> str:  # noqa: ANN401 - anything in JSON
-    """A value as it stands in the file, or its beginning."""
-    return f"{json.dumps(value):.40}"
+# All keys are needed, and no others are known, whatever has a default in Python.
+_Network: Any = msgspec.defstruct(
+    "_Network", [(spec.name, spec.type) for spec in fields(GnnShape)], forbid_unknown_fields=True
+)
+_Document: Any = msgspec.defstruct(
+    "_Document",
+    [
+        (spec.name, _Network if spec.type is GnnShape else spec.type)
+        for spec in fields(PolicyConfig)
+    ],
+    bases=(_Header,),
+    forbid_unknown_fields=True,
+)

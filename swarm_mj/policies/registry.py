@@ -25,47 +25,15 @@ from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.radio.free_space import from_db
 from swarm_mj.radio.mission_radio import radio_of
 
-
-def _random_flooding(mission: Mission, probability: float | None) -> Policy:
-    return RandomFlooding(
-        _or_tuned(probability, "random-flooding", mission),
-        names_addressee=mission.half_duplex == "eavesdroppers",
-    )
+WITHOUT_PAYLOAD = "planner --payload none"  # packets carry T, M and P alone
+PAYLOADS = ("snapshots", "none")
 
 
-def _round_robin(mission: Mission, probability: float | None) -> Policy:  # noqa: ARG001
-    _refuse(probability, "round-robin")
-    return RoundRobin()
-
-
-def _mst(mission: Mission, probability: float | None) -> Policy:
-    return MinimumSpanningTree(
-        _or_tuned(probability, "mst", mission),
-        is_recomputed=mission.tree_recomputed,
-        root_transmits=mission.tree_root_transmits,
-    )
-
-
-def _aloha(mission: Mission, probability: float | None) -> Policy:
-    return Aloha(_or_tuned(probability, "aloha", mission), range_m=mission.range_m)
-
-
-def _gossip(mission: Mission, probability: float | None) -> Policy:
-    return InnovationGossip(_or_tuned(probability, "gossip", mission))
-
-
-def _tdma(mission: Mission, probability: float | None) -> Policy:  # noqa: ARG001
-    _refuse(probability, "tdma")
-    return Tdma()
-
-
-def _spatial_tdma(mission: Mission, probability: float | None) -> SpatialTdma:
-    _refuse(probability, "spatial-tdma")
+def _spatial_tdma(mission: Mission) -> SpatialTdma:
     return SpatialTdma(range_m=mission.range_m, threshold=from_db(mission.sinr_threshold_db))
 
 
-def _planner(mission: Mission, probability: float | None) -> Policy:
-    _refuse(probability, "planner")
+def _planner(mission: Mission) -> Planner:
     return Planner(
         radio_of(mission),
         PlannerSettings(),
@@ -75,35 +43,28 @@ def _planner(mission: Mission, probability: float | None) -> Policy:
     )
 
 
-def _planner_without_payload(mission: Mission, probability: float | None) -> Policy:
-    _refuse(probability, WITHOUT_PAYLOAD)
-    return PlannerWithoutPayload(radio_of(mission), PlannerSettings(), _spatial_tdma(mission, None))
-
-
-def _oracle(mission: Mission, probability: float | None) -> Policy:
-    _refuse(probability, "greedy-oracle")
-    return GreedyOracle(radio_of(mission))
-
-
-def _oracle_lookahead(mission: Mission, probability: float | None) -> Policy:
-    _refuse(probability, "oracle-lookahead")
-    return LookaheadOracle(radio_of(mission))
-
-
-WITHOUT_PAYLOAD = "planner --payload none"  # packets carry T, M and P alone
-PAYLOADS = ("snapshots", "none")
-RULES: dict[str, Callable[[Mission, float | None], Policy]] = {
-    "random-flooding": _random_flooding,
-    "round-robin": _round_robin,
-    "mst": _mst,
-    "aloha": _aloha,
-    "gossip": _gossip,
-    "tdma": _tdma,
+# What makes each policy, given the mission and, for these four, a transmission probability.
+HAVE_PROBABILITY = {"random-flooding", "mst", "aloha", "gossip"}
+RULES: dict[str, Callable[..., Policy]] = {
+    "random-flooding": lambda mission, probability: RandomFlooding(
+        probability, names_addressee=mission.half_duplex == "eavesdroppers"
+    ),
+    "round-robin": lambda _: RoundRobin(),
+    "mst": lambda mission, probability: MinimumSpanningTree(
+        probability,
+        is_recomputed=mission.tree_recomputed,
+        root_transmits=mission.tree_root_transmits,
+    ),
+    "aloha": lambda mission, probability: Aloha(probability, range_m=mission.range_m),
+    "gossip": lambda _, probability: InnovationGossip(probability),
+    "tdma": lambda _: Tdma(),
     "spatial-tdma": _spatial_tdma,
     "planner": _planner,
-    WITHOUT_PAYLOAD: _planner_without_payload,
-    "greedy-oracle": _oracle,
-    "oracle-lookahead": _oracle_lookahead,
+    WITHOUT_PAYLOAD: lambda mission: PlannerWithoutPayload(
+        radio_of(mission), PlannerSettings(), _spatial_tdma(mission)
+    ),
+    "greedy-oracle": lambda mission: GreedyOracle(radio_of(mission)),
+    "oracle-lookahead": lambda mission: LookaheadOracle(radio_of(mission)),
 }
 SHIPPED = "gnn"  # the learned policy that comes with the package, in assets/policies/
 POLICIES = (*RULES, SHIPPED)
@@ -184,15 +145,15 @@ def make_policy(
         )
     if is_deterministic:
         raise ValueError(f"{name} draws from no network's distribution; leave --deterministic out")
-    return RULES[name](mission, probability)
+    if name in HAVE_PROBABILITY:
+        tuned = tuned_probability(name, mission) if probability is None else probability
+        return RULES[name](mission, tuned)
+    _refuse(probability, name)
+    return RULES[name](mission)
 
 
 def _is_path(name: str) -> bool:
     return any(separator in name for separator in (os.sep, os.altsep) if separator)
-
-
-def _or_tuned(probability: float | None, name: str, mission: Mission) -> float:
-    return tuned_probability(name, mission) if probability is None else probability
 
 
 def _refuse(probability: float | None, name: str) -> None:
