@@ -9,6 +9,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from swarm_mj.evaluation.batch import BatchCosts
 
 
@@ -61,43 +63,32 @@ def resume(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]:
         start(path, header)
         return {}
     first, *lines = whole.split(b"\n")
-    _check_header(path, _parsed(path, first), header)
-    done = [_parsed(path, line) for line in lines]
     try:
-        costs = {batch["batch"]: BatchCosts(**batch["costs"]) for batch in done}
-    except (KeyError, TypeError) as error:
-        raise ValueError(_damaged(path)) from error
-    if cut_off:
-        path.write_bytes(whole + b"\n")
-    return costs
-
-
-def _line(content: dict[str, Any]) -> bytes:
-    return json.dumps(content, allow_nan=False).encode() + b"\n"
-
-
-def _parsed(path: Path, line: bytes) -> dict[str, Any]:
-    try:
-        content = json.loads(line)
-    except ValueError as error:
-        raise ValueError(_damaged(path)) from error
-    if not isinstance(content, dict):
-        raise ValueError(_damaged(path))
-    return content
-
-
-def _damaged(path: Path) -> str:
-    return f"progress {path} is damaged; start over with --force instead of --resume"
-
-
-def _check_header(path: Path, before: dict[str, Any], now: dict[str, Any]) -> None:
-    """Raises ValueError, naming what differs first, unless both are the same."""
-    difference = _difference("", before, now)
-    if difference:
+        before = msgspec.json.decode(first, type=dict[str, Any])
+        batches = [msgspec.json.decode(line, type=_Batch) for line in lines]
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise ValueError(
+            f"progress {path} is damaged; start over with --force instead of --resume"
+        ) from error
+    if difference := _difference("", before, header):
         raise ValueError(
             f"progress {path} is of another evaluation: {difference}; repeat that one, or start "
             "over with --force instead of --resume"
         )
+    if cut_off:
+        path.write_bytes(whole + b"\n")
+    return {batch.batch: batch.costs for batch in batches}
+
+
+class _Batch(msgspec.Struct):
+    """A line of the file."""
+
+    batch: int
+    costs: BatchCosts
+
+
+def _line(content: dict[str, Any]) -> bytes:
+    return json.dumps(content, allow_nan=False).encode() + b"\n"
 
 
 def _difference(name: str, before: Any, now: Any) -> str:  # noqa: ANN401 - anything in JSON

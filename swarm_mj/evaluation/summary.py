@@ -2,17 +2,16 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.published import published
-from swarm_mj.evaluation.results import Result
+from swarm_mj.evaluation.results import COLUMNS, Result
 from swarm_mj.evaluation.statistics import (
     Interval,
-    Spread,
     bootstrap_interval,
     quantile_of_counts,
     spread,
@@ -59,8 +58,7 @@ def summarise(
         Evaluated(
             result=Result(
                 **_regime(study, policy, regime),
-                **_aoi(own),
-                **_spread("velocity_variance", spread(np.array(own.velocity_variance))),
+                **_costs(own),
                 **_packets(own, regime),
                 **_completeness(own),
                 **_differences(own, merged[regime, study.compared_to]),
@@ -103,30 +101,19 @@ def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
     }
 
 
-def _aoi(costs: BatchCosts) -> dict[str, Any]:
-    aoi = spread(np.array(costs.aoi))
-    steady, floor = np.array(costs.aoi_steady), np.array(costs.aoi_floor)
-    ages = np.array(costs.ages)
-    return _spread("aoi", aoi) | {
-        "aoi_p95": aoi.p95,
-        "aoi_worst": aoi.worst,
-        "aoi_steady_mean": float(np.mean(steady)),
-        "aoi_steady_sem": sem(steady),
-        "age_p95": SLOT_WINDOWS * quantile_of_counts(ages, 0.95),
-        "age_worst": SLOT_WINDOWS * quantile_of_counts(ages, 1.0),
-        "aoi_floor_mean": float(np.mean(floor)),
-        "aoi_floor_sem": sem(floor),
-    }
-
-
-def _spread(cost: str, missions: Spread) -> dict[str, Any]:
-    return {
-        f"{cost}_mean": missions.mean,
-        f"{cost}_std": missions.std,
-        f"{cost}_sem": missions.sem,
-        **_interval(cost, missions.interval),
-        f"{cost}_median": missions.median,
-    }
+def _costs(costs: BatchCosts) -> dict[str, Any]:
+    """Age of information and velocity variance over missions, and ages over pairs of robots."""
+    columns: dict[str, Any] = {}
+    for cost in ("aoi", "velocity_variance"):
+        found = asdict(spread(np.array(getattr(costs, cost))))
+        columns |= _interval(cost, Interval(**found.pop("interval")))
+        columns |= {f"{cost}_{name}": value for name, value in found.items()}
+    for cost in ("aoi_steady", "aoi_floor"):
+        samples = np.array(getattr(costs, cost))
+        columns |= {f"{cost}_mean": float(np.mean(samples)), f"{cost}_sem": sem(samples)}
+    for name, share in (("age_p95", 0.95), ("age_worst", 1.0)):
+        columns[name] = SLOT_WINDOWS * quantile_of_counts(np.array(costs.ages), share)
+    return {name: value for name, value in columns.items() if name in COLUMNS}
 
 
 def _interval(name: str, interval: Interval) -> dict[str, Any]:
