@@ -2,6 +2,7 @@
 
 import numpy as np
 import rerun as rr
+from jaxtyping import Float
 
 from swarm_mj.mission import Mission
 from swarm_mj.replay import palette
@@ -58,14 +59,14 @@ def draw_robots(sheet: Sheet, full_scale: float) -> None:
     colours[:, log.ego] = palette.EGO
     colours[~log.is_on] = palette.SWITCHED_OFF
     names = [f"r{i}" for i in range(num_robots)]
-    sheet.fixed(
+    sheet.layer(
         "arena/robots",
-        rr.Points2D.from_fields(
-            radii=screen(5.5), labels=names, show_labels=False, draw_order=30.0
-        ),
+        rr.Points2D,
+        {"radii": screen(5.5), "labels": names, "show_labels": False, "draw_order": 30.0},
+        per_window,
+        positions=log.position_m.reshape(-1, 2),
+        colors=colours.reshape(-1, 3),
     )
-    where = log.position_m.reshape(-1, 2)
-    sheet.points("arena/robots", where, colours.reshape(-1, 3), per_window)
     if log.has_motion:
         _draw_headings(sheet)
         _draw_trails(sheet)
@@ -78,15 +79,11 @@ def draw_beliefs(sheet: Sheet) -> None:
     shown = log.is_known & (np.arange(log.parent.shape[1]) != log.ego)
     believed, truth = log.believed_m[shown], log.position_m[shown]
     per_window = np.sum(shown, axis=1)
-    sheet.line_style("arena/belief/error", palette.dim(palette.BELIEF, 0.8), 0.6, 3.0)
-    sheet.lines("arena/belief/error", believed, truth, per_window)
-    sheet.fixed(
-        "arena/belief/ring",
-        rr.Ellipses2D.from_fields(colors=[palette.BELIEF], line_radii=screen(0.8), draw_order=4.0),
-    )
-    half_sizes = np.full((len(believed), 2), RING_SHARE * sheet.frame.reach_m)
-    rings = rr.Ellipses2D.columns(centers=believed, half_sizes=half_sizes)
-    sheet.timed("arena/belief/ring", rings.partition(per_window))
+    look = (palette.dim(palette.BELIEF, 0.8), 0.6, 3.0)
+    sheet.lines("arena/belief/error", (believed, truth), per_window, look)
+    radius_m = RING_SHARE * sheet.frame.reach_m
+    style = {"colors": [palette.BELIEF], "line_radii": screen(0.8), "draw_order": 4.0}
+    _draw_rings(sheet, "arena/belief/ring", believed, radius_m, per_window, style)
 
 
 def draw_tree_on_map(sheet: Sheet) -> None:
@@ -96,8 +93,7 @@ def draw_tree_on_map(sheet: Sheet) -> None:
     links = Links(
         num_windows=len(log.window), row=row, sender=log.parent[row, child], receiver=child
     )
-    sheet.line_style("arena/tree", palette.TREE, 0.8, 6.0)
-    sheet.lines("arena/tree", *ends(log, links), links.per_window)
+    sheet.lines("arena/tree", ends(log, links), links.per_window, (palette.TREE, 0.8, 6.0))
 
 
 def draw_radio(sheet: Sheet, packets: dict[str, Links], range_m: float) -> None:
@@ -108,8 +104,8 @@ def draw_radio(sheet: Sheet, packets: dict[str, Links], range_m: float) -> None:
     else:
         _draw_requests(sheet, packets)
         _draw_responses(sheet, packets)
-        colour = palette.dim(palette.OVERHEARD, 0.6)
-        _draw_lines(sheet, "overheard", packets["overheard"], colour, 0.7, 10.0)
+        look = (palette.dim(palette.OVERHEARD, 0.6), 0.7, 10.0)
+        _draw_lines(sheet, "overheard", packets["overheard"], look)
 
 
 def _grid(frame: Frame) -> list[list[tuple[float, float]]]:
@@ -128,9 +124,9 @@ def _draw_headings(sheet: Sheet) -> None:
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
     way = HEADING_SHARE * sheet.frame.reach_m * velocity / np.maximum(speed, 1e-9)
     where = log.position_m.reshape(-1, 2)
-    sheet.line_style("arena/heading", palette.HEADING, 0.8, 29.0)
     per_window = [log.position_m.shape[1]] * len(log.window)
-    sheet.lines("arena/heading", where, where + way, per_window)
+    look = (palette.HEADING, 0.8, 29.0)
+    sheet.lines("arena/heading", (where, where + way), per_window, look)
 
 
 def _draw_trails(sheet: Sheet) -> None:
@@ -138,10 +134,10 @@ def _draw_trails(sheet: Sheet) -> None:
     rows = np.arange(len(log.window))
     past = range(0, TRAIL_WINDOWS + 1, TRAIL_STRIDE)
     trail = np.stack([log.position_m[np.maximum(0, rows - ago)] for ago in past], axis=2)
-    strips = trail.reshape(-1, len(past), 2)
-    sheet.line_style("arena/trail", palette.TRAIL, 1.0, -5.0)
     per_window = [log.position_m.shape[1]] * len(rows)
-    sheet.timed("arena/trail", rr.LineStrips2D.columns(strips=strips).partition(per_window))
+    style = {"colors": [palette.TRAIL], "radii": screen(1.0), "draw_order": -5.0}
+    strips = trail.reshape(-1, len(past), 2)
+    sheet.layer("arena/trail", rr.LineStrips2D, style, per_window, strips=strips)
 
 
 def _draw_ego(sheet: Sheet) -> None:
@@ -149,62 +145,50 @@ def _draw_ego(sheet: Sheet) -> None:
     log = sheet.log
     radius_m = 2.0 * RING_SHARE * sheet.frame.reach_m
     where = log.position_m[:, log.ego]
-    sheet.fixed(
-        "arena/ego",
-        rr.Ellipses2D.from_fields(
-            half_sizes=[(radius_m, radius_m)],
-            colors=[palette.EGO],
-            line_radii=screen(1.2),
-            draw_order=31.0,
-        ),
-    )
-    sheet.timed("arena/ego", rr.Ellipses2D.columns(centers=where))
-    sheet.fixed(
-        "arena/ego/name",
-        rr.Points2D.from_fields(
-            radii=screen(0.1), colors=[palette.EGO], labels=[f"r{log.ego}"], show_labels=True
-        ),
-    )
+    ring = {"colors": [palette.EGO], "line_radii": screen(1.2), "draw_order": 31.0}
+    size = {"half_sizes": [(radius_m, radius_m)]}
+    sheet.layer("arena/ego", rr.Ellipses2D, ring | size, centers=where)
+    name = {"radii": screen(0.1), "colors": [palette.EGO], "labels": [f"r{log.ego}"]}
     below = where - (0.0, 3.0 * radius_m)
-    sheet.timed("arena/ego/name", rr.Points2D.columns(positions=below))
+    sheet.layer("arena/ego/name", rr.Points2D, name | {"show_labels": True}, positions=below)
 
 
 def _draw_ranges(sheet: Sheet, range_m: float) -> None:
     """Circles of the range in silence around those who transmit first."""
     row, sender = np.nonzero(transmitters(sheet.log))
     centres = sheet.log.position_m[row, sender]
-    sheet.fixed(
-        "arena/radio/range",
-        rr.Ellipses2D.from_fields(colors=[palette.RANGE], line_radii=screen(0.6), draw_order=1.0),
-    )
-    circles = rr.Ellipses2D.columns(centers=centres, half_sizes=np.full((len(row), 2), range_m))
     per_window = np.bincount(row, minlength=len(sheet.log.window))
-    sheet.timed("arena/radio/range", circles.partition(per_window))
+    style = {"colors": [palette.RANGE], "line_radii": screen(0.6), "draw_order": 1.0}
+    _draw_rings(sheet, "arena/radio/range", centres, range_m, per_window, style)
+
+
+def _draw_rings(
+    sheet: Sheet,
+    path: str,
+    centre: Float[np.ndarray, "L 2"],
+    radius_m: float,
+    per_window: np.ndarray,
+    style: dict[str, object],
+) -> None:
+    half_sizes = np.full(centre.shape, radius_m)
+    sheet.layer(path, rr.Ellipses2D, style, per_window, centers=centre, half_sizes=half_sizes)
 
 
 def _draw_broadcasts(sheet: Sheet, heard: Links) -> None:
     """A halo around whoever transmits, and lines from there to all who decode it."""
     row, sender = np.nonzero(transmitters(sheet.log))
-    sheet.fixed(
-        "arena/radio/transmitter",
-        rr.Points2D.from_fields(
-            colors=[palette.BROADCAST], radii=screen(HALO_POINTS), draw_order=25.0
-        ),
-    )
-    halos = rr.Points2D.columns(positions=sheet.log.position_m[row, sender])
+    where = sheet.log.position_m[row, sender]
     per_window = np.bincount(row, minlength=len(sheet.log.window))
-    sheet.timed("arena/radio/transmitter", halos.partition(per_window))
-    _draw_lines(sheet, "heard", heard, palette.BROADCAST, 1.0, 18.0)
+    style = {"colors": [palette.BROADCAST], "radii": screen(HALO_POINTS), "draw_order": 25.0}
+    sheet.layer("arena/radio/transmitter", rr.Points2D, style, per_window, positions=where)
+    _draw_lines(sheet, "heard", heard, (palette.BROADCAST, 1.0, 18.0))
 
 
 def _draw_requests(sheet: Sheet, packets: dict[str, Links]) -> None:
-    path = "arena/radio/delivered"
-    sheet.arrows(path, packets["delivered"], colour=palette.DELIVERED, width=2.0, order=20.0)
-    lost = packets["lost"]
-    sheet.arrows(
-        "arena/radio/lost", lost, colour=palette.LOST, width=1.8, order=19.0, share=LOST_SHARE
-    )
-    _draw_lines(sheet, "lost/rest", lost, palette.dim(palette.LOST, 0.5), 0.7, 18.0)
+    delivered, lost = packets["delivered"], packets["lost"]
+    sheet.arrows("arena/radio/delivered", delivered, look=(palette.DELIVERED, 2.0, 20.0))
+    sheet.arrows("arena/radio/lost", lost, look=(palette.LOST, 1.8, 19.0), share=LOST_SHARE)
+    _draw_lines(sheet, "lost/rest", lost, (palette.dim(palette.LOST, 0.5), 0.7, 18.0))
 
 
 def _draw_responses(sheet: Sheet, packets: dict[str, Links]) -> None:
@@ -213,25 +197,19 @@ def _draw_responses(sheet: Sheet, packets: dict[str, Links]) -> None:
     sheet.arrows(
         "arena/radio/answered",
         packets["answered"],
-        colour=palette.ANSWERED,
-        width=1.5,
-        order=21.0,
+        look=(palette.ANSWERED, 1.5, 21.0),
         aside_m=aside_m,
     )
     sheet.arrows(
         "arena/radio/unanswered",
         packets["unanswered"],
-        colour=palette.dim(palette.ANSWERED, 0.6),
-        width=1.2,
-        order=18.0,
+        look=(palette.dim(palette.ANSWERED, 0.6), 1.2, 18.0),
         share=LOST_SHARE,
         aside_m=aside_m,
     )
 
 
 def _draw_lines(
-    sheet: Sheet, name: str, links: Links, colour: palette.Colour, width: float, order: float
+    sheet: Sheet, name: str, links: Links, look: tuple[palette.Colour, float, float]
 ) -> None:
-    path = f"arena/radio/{name}"
-    sheet.line_style(path, colour, width, order)
-    sheet.lines(path, *ends(sheet.log, links), links.per_window)
+    sheet.lines(f"arena/radio/{name}", ends(sheet.log, links), links.per_window, look)

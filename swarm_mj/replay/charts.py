@@ -27,12 +27,15 @@ def draw_tree(sheet: Sheet, full_scale: float) -> None:
     colours[:, log.ego] = palette.EGO
     shown = log.is_known.copy()
     shown[:, log.ego] = True
-    sheet.fixed("tree/nodes", rr.Points2D.from_fields(radii=screen(4.5), draw_order=2.0))
-    sheet.points("tree/nodes", place[shown], colours[shown], np.sum(shown, axis=1))
+    style = {"radii": screen(4.5), "draw_order": 2.0}
+    where, per_window = place[shown], np.sum(shown, axis=1)
+    sheet.layer(
+        "tree/nodes", rr.Points2D, style, per_window, positions=where, colors=colours[shown]
+    )
     row, child = np.nonzero(log.is_known & (np.arange(log.parent.shape[1]) != log.ego))
-    sheet.line_style("tree/edges", palette.TREE, 0.8, 1.0)
     per_window = np.bincount(row, minlength=len(log.window))
-    sheet.lines("tree/edges", place[row, log.parent[row, child]], place[row, child], per_window)
+    edges = (place[row, log.parent[row, child]], place[row, child])
+    sheet.lines("tree/edges", edges, per_window, (palette.TREE, 0.8, 1.0))
 
 
 def draw_age_matrix(sheet: Sheet, full_scale: float) -> None:
@@ -51,14 +54,12 @@ def draw_age_matrix(sheet: Sheet, full_scale: float) -> None:
 def draw_plots(sheet: Sheet, packets: dict[str, Links]) -> None:
     """Age of information, packets per second and velocity variance over the mission."""
     log = sheet.log
-    sheet.fixed(
+    sheet.layer(
         "plots/age/mean",
-        rr.Measurements.from_fields(
-            names=["team, mean ± std"], colors=[palette.MEAN_AGE], widths=[2.0]
-        ),
-    )
-    sheet.timed(
-        "plots/age/mean", rr.Measurements.columns(values=log.age_mean, variances=log.age_std**2)
+        rr.Measurements,
+        {"names": ["team, mean ± std"], "colors": [palette.MEAN_AGE], "widths": [2.0]},
+        values=log.age_mean,
+        variances=log.age_std**2,
     )
     _plot(sheet, "plots/age/worst", "worst pair", palette.WORST_AGE, log.age_max)
     own_mean = np.mean(log.ego_age, axis=1)

@@ -1,6 +1,6 @@
 """A sheet to draw a log on: rerun's recording with the log's two timelines."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -49,44 +49,51 @@ class Sheet:
         ]
         self._recording.send_columns(path, indexes=times, columns=list(columns))
 
-    def points(
+    def layer(
         self,
         path: str,
-        position: Float[np.ndarray, "L 2"],
-        colours: np.ndarray,
-        per_window: Sequence[int] | np.ndarray,
+        kind: Any,  # noqa: ANN401 - any rerun archetype
+        style: Mapping[str, object],
+        per_window: Sequence[int] | np.ndarray | None = None,
+        **columns: np.ndarray,
     ) -> None:
-        """Points with a colour each, so many per window."""
-        self.timed(
-            path, rr.Points2D.columns(positions=position, colors=colours).partition(per_window)
-        )
+        """Draws things that change, in a style that does not.
+
+        Args:
+            path: Of the entity.
+            kind: The archetype.
+            style: Its fields that never change.
+            per_window: How many things each window has; None is one.
+            **columns: Its fields that change, for all windows one after the other.
+        """
+        self.fixed(path, kind.from_fields(**style))
+        drawn = kind.columns(**columns)
+        self.timed(path, drawn if per_window is None else drawn.partition(per_window))
 
     def lines(
         self,
         path: str,
-        start: Float[np.ndarray, "L 2"],
-        end: Float[np.ndarray, "L 2"],
+        ends: tuple[Float[np.ndarray, "L 2"], Float[np.ndarray, "L 2"]],
         per_window: Sequence[int] | np.ndarray,
+        look: tuple[Colour, float, float],
     ) -> None:
-        """Straight lines, so many per window."""
-        strips = np.stack([start, end], axis=1)
-        self.timed(path, rr.LineStrips2D.columns(strips=strips).partition(per_window))
+        """Straight lines.
 
-    def line_style(self, path: str, colour: Colour, width: float, order: float) -> None:
-        """Colour, width on the screen and drawing order of lines."""
-        self.fixed(
-            path,
-            rr.LineStrips2D.from_fields(colors=[colour], radii=screen(width), draw_order=order),
-        )
+        Args:
+            path: Of the entity.
+            ends: Where they begin, and where they end.
+            per_window: How many each window has.
+            look: Colour, width on the screen [points], and place in the order of drawing.
+        """
+        style = _style(*look)
+        self.layer(path, rr.LineStrips2D, style, per_window, strips=np.stack(ends, axis=1))
 
     def arrows(
         self,
         path: str,
         links: Links,
         *,
-        colour: Colour,
-        width: float,
-        order: float,
+        look: tuple[Colour, float, float],
         share: float = 1.0,
         aside_m: float = 0.0,
     ) -> None:
@@ -95,9 +102,7 @@ class Sheet:
         Args:
             path: Of the entity.
             links: The packets.
-            colour: Theirs.
-            width: On the screen [points].
-            order: Larger is drawn above.
+            look: As of lines.
             share: Of the way to the receiver that the arrow reaches.
             aside_m: Offset to the left, so that an answer stands beside what it answers [m].
         """
@@ -105,8 +110,15 @@ class Sheet:
         way = end - start
         length = np.linalg.norm(way, axis=1, keepdims=True)
         left = np.stack([-way[:, 1], way[:, 0]], axis=1) / np.maximum(length, 1e-6)
-        self.fixed(
-            path, rr.Arrows2D.from_fields(colors=[colour], radii=screen(width), draw_order=order)
+        self.layer(
+            path,
+            rr.Arrows2D,
+            _style(*look),
+            links.per_window,
+            origins=start + aside_m * left,
+            vectors=share * way,
         )
-        arrows = rr.Arrows2D.columns(origins=start + aside_m * left, vectors=share * way)
-        self.timed(path, arrows.partition(links.per_window))
+
+
+def _style(colour: Colour, width: float, order: float) -> dict[str, object]:
+    return {"colors": [colour], "radii": screen(width), "draw_order": order}
