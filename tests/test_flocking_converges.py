@@ -60,20 +60,20 @@ def test_flock_that_hears_nothing_never_converges(name, preset, physics):
     np.testing.assert_allclose(swarm.states.velocity_mps, start_mps, rtol=1e-12)
     variance = np.sum(np.var(start_mps, axis=1), axis=1)
     np.testing.assert_allclose(summary.velocity_variance_last, variance, rtol=1e-12)
-    assert np.all(summary.packets_attempted > 0)
-    assert np.all(summary.packets_delivered == 0)
+    assert np.all(summary.packets_sent > 0)
+    assert np.nansum([summary.packets_delivered, summary.packets_heard]) == 0
 
 
 @pytest.mark.parametrize("preset", [paper, reference])
 @pytest.mark.parametrize("name", BASELINES)
 def test_fig6_every_baseline_makes_the_flock_converge(name, preset):
-    """Over the mission the velocity variance falls below a third in each of 20 missions.
+    """Over the mission the velocity variance falls below a third in each of 8 missions.
 
     A few robots out of everyone's reach can fly away, so single missions keep up to 16 % (the
     worst of 300 seeds); the median mission keeps less than 1e-6, of which 1e-3 is asked here.
     """
     mission = preset("flocking")
-    swarm = Swarm(mission, list(range(20)))
+    swarm = Swarm(mission, list(range(8)))
     start = np.sum(spread_mps(swarm) ** 2, axis=1)
     summary = summarise(list(rollout(swarm, make_policy(name, mission))))
     kept = summary.velocity_variance_last / start
@@ -88,7 +88,7 @@ def test_a_flock_between_walls_converges_too(name, physics):
 
     Of 100 seeds the median mission keeps 5e-4 and the worst 9 %; asked here are 5e-3 and a third.
     """
-    swarm = Swarm(paper("flocking", physics=physics, boundary="reflect"), list(range(20)))
+    swarm = Swarm(paper("flocking", physics=physics, boundary="reflect"), list(range(8)))
     start = np.sum(spread_mps(swarm) ** 2, axis=1)
     summary = summarise(list(rollout(swarm, make_policy(name, swarm.mission))))
     kept = summary.velocity_variance_last / start
