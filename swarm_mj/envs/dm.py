@@ -123,15 +123,9 @@ class SwarmTask(_Task):
 
     def get_observation(self, physics: SwarmPhysics) -> OrderedDict[str, np.ndarray | np.float64]:
         """What the buffers hold (II-B), [i, j]: what i knows about j; and the time [windows]."""
-        buffers = physics.swarm.buffers
-        return OrderedDict(
-            timestamp=buffers.timestamp[0].copy(),
-            position_m=buffers.position_m[0].copy(),
-            velocity_mps=buffers.velocity_mps[0].copy(),
-            parent=buffers.parent[0].copy(),
-            last_attempt=buffers.last_attempt[0].copy(),
-            now=physics.swarm.now[0],
-        )
+        buffers = vars(physics.swarm.buffers)
+        known = {name: array[0].copy() for name, array in buffers.items()}
+        return OrderedDict(known, now=physics.swarm.now[0])
 
     def get_reward(self, physics: SwarmPhysics) -> float:
         """Minus the age of information after the window (cost of Eq. 10) [windows]."""

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import msgspec
+
 from swarm_mj.mission import PRESETS, Mission
 
 METHODS = {
@@ -79,16 +81,7 @@ def points() -> tuple[Point, ...]:
     """All points of all curves, in the order of the file."""
     with Path(__file__).with_suffix(".csv").open(newline="", encoding="utf-8") as file:
         return tuple(
-            Point(
-                figure=row["figure"],
-                method=row["method"],
-                x_name=row["x_name"],
-                x=float(row["x"]),
-                cost=COSTS[row["cost"]],
-                mean=float(row["mean"]),
-                std=float(row["std"]),
-                episodes=int(row["episodes"]),
-            )
+            msgspec.convert(row | {"cost": COSTS[row["cost"]]}, Point, strict=False)
             for row in csv.DictReader(file)
         )
 

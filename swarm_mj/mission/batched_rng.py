@@ -8,6 +8,8 @@ from jaxtyping import Float
 BLOCK = 64  # draws made at once: enough to make the loop over missions cheap
 
 Draw = Callable[[np.random.Generator, tuple[int, ...]], np.ndarray]
+uniform: Draw = np.random.Generator.random  # on [0, 1)
+normal: Draw = np.random.Generator.standard_normal
 
 
 class Stream:
@@ -41,13 +43,3 @@ class Stream:
             self._next = 0
         self._next += 1
         return self._block[self._next - 1]
-
-
-def uniform(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
-    """Uniform on [0, 1)."""
-    return rng.random(shape)
-
-
-def normal(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
-    """Standard normal."""
-    return rng.standard_normal(shape)
