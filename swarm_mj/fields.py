@@ -78,7 +78,8 @@ def _check_value(spec: Field[Any], value: Any) -> None:  # noqa: ANN401 - any fi
     kind, described = KINDS.get(kind_of(spec), (object, ""))
     if "choices" in allowed and value not in allowed["choices"]:
         raise ValueError(f"{label} must be one of {', '.join(allowed['choices'])}, not {value!r}")
-    is_allowed = isinstance(value, kind)
+    is_number = not isinstance(value, bool)  # Python's True is 1
+    is_allowed = isinstance(value, kind) and (is_number or kind in (bool, object))
     limits = ""
     if "low" in allowed:
         is_allowed = is_allowed and allowed["low"] <= value <= allowed["high"]

@@ -14,8 +14,8 @@ from swarm_mj.gnn.fast import FastAggregationGnn
 from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.graphs import Graphs, PaperFeatures
 from swarm_mj.gnn.shape import GnnShape
-from swarm_mj.learning.run import make_model
 from swarm_mj.learning.settings import arm_settings
+from swarm_mj.learning.train import make_model
 from swarm_mj.mission import Mission, paper
 from swarm_mj.policies.round_robin import RoundRobin
 from swarm_mj.swarm import Swarm

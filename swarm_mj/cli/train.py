@@ -24,8 +24,7 @@ from swarm_mj.cli.train_settings import (
     refuse_others,
 )
 from swarm_mj.fields import setting
-from swarm_mj.learning.progress import Progress
-from swarm_mj.learning.run_folder import SETTINGS, Run, check_new, read_run
+from swarm_mj.learning.run_folder import SETTINGS, Progress, Run, check_new, read_run
 from swarm_mj.policies.stored import read_policy
 
 DONE, INTERRUPTED = 0, 130
@@ -70,7 +69,7 @@ def run(options: Options) -> int:
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     with console.status("Preparing ..."):
         asked = _asked_run(options)
-        from swarm_mj.learning.run import train  # stable-baselines3 takes its time to import
+        from swarm_mj.learning.train import train  # stable-baselines3 takes its time to import
     try:
         with deferred_interrupt() as is_interrupted:
             with Watch(console, asked.limits, is_interrupted) as watch:

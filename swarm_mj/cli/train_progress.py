@@ -11,8 +11,8 @@ from rich.console import Console
 from swarm_mj.cli.progress import WorkBar
 
 if TYPE_CHECKING:
+    from swarm_mj.learning.callback import Status
     from swarm_mj.learning.run_folder import Limits
-    from swarm_mj.learning.session import Status
 
 FINISHING = "finishing this rollout, then all is kept; Ctrl-C again breaks off at once"
 WHOLE = 1.0  # the bar's total

@@ -7,6 +7,7 @@ or not there.
 import io
 import json
 import zipfile
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,12 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 from swarm_mj.io.atomic_file import atomic_write
-from swarm_mj.learning import progress as progresses
-from swarm_mj.learning.env import MissionsEnv
-from swarm_mj.learning.missions import Course
-from swarm_mj.learning.progress import Progress
+from swarm_mj.learning.mission_batch import ActionHistory
+from swarm_mj.learning.run_folder import Accumulator, Progress
 from swarm_mj.learning.settings import Training
+from swarm_mj.learning.vec_env import MissionsEnv
 
-CHECKPOINT_VERSION = 1
+CHECKPOINT_VERSION = 2
 
 
 def save(
@@ -40,29 +40,28 @@ def save(
     Raises:
         OSError: The file cannot be written.
     """
-    courses = [group.course() for group in missions_of(model).groups]
+    name, keys, *rest = np.random.get_state()  # noqa: NPY002 - PPO shuffles minibatches with it
     state: dict[str, Any] = {
         "version": CHECKPOINT_VERSION,
         "training": json.dumps(training.to_json()),
-        "policy": model.policy.state_dict(),
-        "optimizer": model.policy.optimizer.state_dict(),
+        "parameters": model.get_parameters(),  # of the networks and the optimiser
         "num_timesteps": model.num_timesteps,
         "num_updates": model._n_updates,
-        "episode_starts": torch.from_numpy(np.array(model._last_episode_starts)),
-        "courses": [
+        "episode_starts": torch.tensor(model._last_episode_starts),
+        "histories": [
             {
-                "seeds": course.seeds,
-                "last_window": course.last_window,
-                "recipients": torch.from_numpy(course.recipients),
+                "seeds": batch.history.seeds,
+                "last_window": batch.history.last_window,
+                "recipients": torch.tensor(np.array(batch.history.recipients, dtype=np.int16)),
             }
-            for course in courses
+            for batch in missions_of(model).batches
         ],
         "reward_normaliser": _normaliser_state(model),
         "torch_rng": torch.get_rng_state(),
         "cuda_rng": torch.cuda.get_rng_state(model.device) if _is_on_cuda(model) else None,
-        "numpy_rng": _legacy_numpy_state(),
-        "seeds_rng": json.dumps(rng.bit_generator.state),
-        "progress": progress.to_json(),
+        "numpy_rng": [name, np.asarray(keys).tolist(), *rest],
+        "seeds_rng": rng.bit_generator.state,
+        "progress": asdict(progress),
     }
     content = io.BytesIO()
     torch.save(state, content)
@@ -112,13 +111,14 @@ def _read(path: Path) -> dict[str, Any]:
     content = io.BytesIO(path.read_bytes())
     try:
         with zipfile.ZipFile(content) as archive:
-            flawed = archive.testzip()
+            if archive.testzip() is not None:
+                raise zipfile.BadZipFile
         content.seek(0)
-        state = None if flawed else torch.load(content, map_location="cpu", weights_only=True)
+        state = torch.load(content, map_location="cpu", weights_only=True)
     except Exception as error:  # torch names no exception of its own for damaged files
-        raise ValueError(_damaged(path)) from error
-    if flawed:
-        raise ValueError(_damaged(path))
+        raise ValueError(
+            f"checkpoint {path} is damaged, or none; begin a new run with another --out"
+        ) from error
     if not isinstance(state, dict) or "version" not in state:
         raise ValueError(f"{path} is no checkpoint of swarm-mj train")
     if state["version"] != CHECKPOINT_VERSION:
@@ -129,25 +129,14 @@ def _read(path: Path) -> dict[str, Any]:
     return state
 
 
-def _damaged(path: Path) -> str:
-    return f"checkpoint {path} is damaged, or none; begin a new run with another --out"
-
-
 def _restore(state: dict[str, Any], model: PPO, rng: np.random.Generator) -> Progress:
-    model.policy.load_state_dict(state["policy"])
-    model.policy.optimizer.load_state_dict(state["optimizer"])
+    model.set_parameters(state["parameters"], device=model.device)
     model.num_timesteps = state["num_timesteps"]
     model._n_updates = state["num_updates"]
     env = missions_of(model)
     graphs = [
-        group.fly_again(
-            Course(
-                seeds=course["seeds"],
-                last_window=course["last_window"],
-                recipients=course["recipients"].numpy(),
-            )
-        )
-        for group, course in zip(env.groups, state["courses"], strict=True)
+        batch.replay(ActionHistory(**history | {"recipients": [*history["recipients"].numpy()]}))
+        for batch, history in zip(env.batches, state["histories"], strict=True)
     ]
     model._last_obs = env.observe(graphs)
     model._last_episode_starts = state["episode_starts"].numpy()
@@ -155,24 +144,15 @@ def _restore(state: dict[str, Any], model: PPO, rng: np.random.Generator) -> Pro
     torch.set_rng_state(state["torch_rng"])
     if state["cuda_rng"] is not None and _is_on_cuda(model):
         torch.cuda.set_rng_state(state["cuda_rng"], model.device)
-    _restore_legacy_numpy(state["numpy_rng"])
-    rng.bit_generator.state = json.loads(state["seeds_rng"])
-    return progresses.from_json(state["progress"])
+    np.random.set_state(tuple(state["numpy_rng"]))  # noqa: NPY002 - as in `save`
+    rng.bit_generator.state = state["seeds_rng"]
+    progress = state["progress"]
+    accumulator = Accumulator(**progress["since_evaluation"])
+    return Progress(**progress | {"since_evaluation": accumulator})
 
 
 def _is_on_cuda(model: PPO) -> bool:
     return model.device.type == "cuda"
-
-
-def _legacy_numpy_state() -> str:
-    """NumPy's global generator, which stable-baselines3 shuffles minibatches with."""
-    name, keys, position, has_gauss, gauss = np.random.get_state()  # noqa: NPY002
-    return json.dumps([name, np.asarray(keys).tolist(), position, has_gauss, gauss])
-
-
-def _restore_legacy_numpy(state: str) -> None:
-    name, keys, *rest = json.loads(state)
-    np.random.set_state((name, np.array(keys, dtype=np.uint32), *rest))  # noqa: NPY002
 
 
 def _normaliser_state(model: PPO) -> dict[str, Any] | None:
@@ -180,19 +160,13 @@ def _normaliser_state(model: PPO) -> dict[str, Any] | None:
     env = model.get_env()
     if not isinstance(env, VecNormalize):
         return None
-    running = env.ret_rms
-    return {
-        "mean": float(running.mean),
-        "var": float(running.var),
-        "count": float(running.count),
-        "returns": torch.from_numpy(env.returns.copy()),
-    }
+    running = {name: float(value) for name, value in vars(env.ret_rms).items()}
+    return {"running": running, "returns": torch.tensor(env.returns)}
 
 
 def _restore_normaliser(model: PPO, state: dict[str, Any] | None) -> None:
     env = model.get_env()
     if isinstance(env, VecNormalize) and state is not None:
-        env.ret_rms.mean = np.array(state["mean"])
-        env.ret_rms.var = np.array(state["var"])
-        env.ret_rms.count = state["count"]
+        for name, value in state["running"].items():
+            setattr(env.ret_rms, name, value)
         env.returns = state["returns"].numpy()

@@ -1,8 +1,9 @@
-"""How a network flies missions that training never sees."""
+"""Held-out missions: what the policy under training costs where it never trained."""
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
@@ -13,6 +14,9 @@ from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.learning.settings import HELD_OUT_SEED, Training
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn import LearnedPolicy
+from swarm_mj.protocol.costs import WindowCosts
+from swarm_mj.replay.recorder import Recorder
+from swarm_mj.rollout import rollout
 from swarm_mj.swarm import Swarm
 
 
@@ -31,16 +35,6 @@ class HeldOut:
     def to_json(self) -> dict[str, float | None]:
         """All numbers by name."""
         return asdict(self)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Flown:
-    """What held-out missions of one team size cost, window by window."""
-
-    age_windows: Float[np.ndarray, "windows B"]
-    velocity_variance_m2ps2: Float[np.ndarray, "windows B"]
-    attempted: Float[np.ndarray, "windows B"]
-    delivered: Float[np.ndarray, "windows B"]
 
 
 def held_out_policy(training: Training, network: AggregationGnn, mission: Mission) -> LearnedPolicy:
@@ -70,45 +64,63 @@ def evaluate(
         What they cost.
     """
     missions = held_out_missions(training)
-    flown = [
-        _fly(training, network, mission, lambda share, n=n: on_window((n + share) / len(missions)))
+    costs = [
+        _costs(
+            training, network, mission, lambda share, n=n: on_window((n + share) / len(missions))
+        )
         for n, mission in enumerate(missions)
     ]
-    age = [each.age_windows for each in flown]
-    variance = [each.velocity_variance_m2ps2 for each in flown]
+    age = [np.array([window.age_windows for window in windows]) for windows in costs]
+    variance = [np.array([w.velocity_variance_m2ps2 for w in windows]) for windows in costs]
     objective = [each / size for each, size in zip(age, training.robots, strict=True)]
     if training.reward == "velocity-variance":
         objective = variance
-    attempted = sum(int(each.attempted.sum()) for each in flown)
+    packets = [window.packets for windows in costs for window in windows]
+    attempted = sum(int(each.attempted.sum()) for each in packets)
     return HeldOut(
         aoi=_mean(age),
         aoi_sem=_standard_error([each.mean(axis=0) for each in age]),
         aoi_steady=_mean([each[len(each) // 2 :] for each in age]),
         velocity_variance=_mean(variance),
         packets_per_window=attempted / sum(each.size for each in age),
-        delivery_ratio=sum(int(each.delivered.sum()) for each in flown) / max(1, attempted),
+        delivery_ratio=sum(int(each.delivered.sum()) for each in packets) / max(1, attempted),
         objective=_mean(objective),
     )
 
 
-def _fly(
+def record_replay(
+    training: Training, network: AggregationGnn, decisions: int, folder: Path
+) -> None:
+    """Records the first held-out mission, as the network flies it after so many team decisions."""
+    from swarm_mj.replay.write import write_replay  # rerun takes its time to import
+
+    mission = held_out_missions(training)[0]
+    swarm = Swarm(mission, [HELD_OUT_SEED])
+    recorder = Recorder(swarm)
+    for window in rollout(swarm, held_out_policy(training, network, mission)):
+        recorder.add(window)
+    config: dict[str, object] = {
+        "decisions": decisions,
+        "seed": HELD_OUT_SEED,
+        "training seed": training.seed,
+    }
+    path = folder / f"decisions-{decisions:09d}.rrd"
+    write_replay(recorder.log(), mission, config, path)
+
+
+def _costs(
     training: Training,
     network: AggregationGnn,
     mission: Mission,
     on_window: Callable[[float], None],
-) -> _Flown:
+) -> list[WindowCosts]:
+    """What held-out missions of one team size cost, window by window."""
     swarm = Swarm(mission, range(HELD_OUT_SEED, HELD_OUT_SEED + training.held_out))
-    policy = held_out_policy(training, network, mission)
-    windows = []
+    policy, costs = held_out_policy(training, network, mission), []
     for window in range(mission.num_windows):
-        windows.append(swarm.step(policy))
+        costs.append(swarm.step(policy))
         on_window((window + 1) / mission.num_windows)
-    return _Flown(
-        age_windows=np.array([each.age_windows for each in windows]),
-        velocity_variance_m2ps2=np.array([each.velocity_variance_m2ps2 for each in windows]),
-        attempted=np.array([each.packets.attempted for each in windows]),
-        delivered=np.array([each.packets.delivered for each in windows]),
-    )
+    return costs
 
 
 def _mean(by_size: Sequence[Float[np.ndarray, "windows B"]]) -> float:

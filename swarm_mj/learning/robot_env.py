@@ -1,4 +1,4 @@
-"""Arm `robot`: every robot of every mission is one row, paid its own credit."""
+"""Credit assignment per robot: each robot is one environment, its reward a difference reward."""
 
 from collections.abc import Sequence
 
@@ -6,39 +6,39 @@ import numpy as np
 from gymnasium import spaces
 
 from swarm_mj.gnn.graphs import Graphs
-from swarm_mj.learning.env import MissionsEnv, Observation, graph_spaces, largest_team
-from swarm_mj.learning.missions import Group, Outcome, padded
+from swarm_mj.learning.mission_batch import MissionBatch, Transition
+from swarm_mj.learning.vec_env import MissionsEnv, Observation, graph_spaces, largest_team, padded
 
 
 class RobotEnv(MissionsEnv):
-    """R rows, one a robot; the action is whom it addresses, the reward its credit per pair.
+    """R environments, one a robot; the action is whom it addresses, the reward its credit per pair.
 
     Credit is what the team would not have gained in this window had the robot been silent
     (`credit.credits_of`), over the number of pairs, so that all team sizes count alike.
     """
 
-    def __init__(self, groups: Sequence[Group]) -> None:
-        """Takes the groups, already started."""
-        num_nodes = largest_team(groups)
+    def __init__(self, batches: Sequence[MissionBatch]) -> None:
+        """Takes the batches, already started."""
+        num_nodes = largest_team(batches)
         observation: dict[str, spaces.Space] = {
-            **graph_spaces(num_nodes, groups[0].num_features, ()),
+            **graph_spaces(num_nodes, batches[0].num_features, ()),
             "owner": spaces.Box(0, num_nodes - 1, (1,), np.int32),
         }
-        num_rows = [group.num_missions * group.mission.num_robots for group in groups]
-        super().__init__(groups, num_rows, spaces.Dict(observation), spaces.Discrete(num_nodes))
-        self._owner = np.concatenate(
-            [
-                np.tile(np.arange(g.mission.num_robots, dtype=np.int32), g.num_missions)
-                for g in groups
-            ]
-        )[:, None]
+        owners = [
+            np.tile(np.arange(batch.mission.num_robots, dtype=np.int32), batch.num_missions)
+            for batch in batches
+        ]
+        self._owner = np.concatenate(owners)[:, None]
+        super().__init__(
+            batches, [*map(len, owners)], spaces.Dict(observation), spaces.Discrete(num_nodes)
+        )
 
     def _observe(self, graphs: Sequence[Graphs], envs: slice) -> Observation:
-        """The rows' graphs, stacked and padded."""
+        """The robots' graphs, stacked and padded."""
         return {**padded(graphs, self.num_nodes), "owner": self._owner[envs]}
 
-    def _step_group(self, group: Group, actions: np.ndarray) -> Outcome:
-        return group.step(actions.reshape(group.num_missions, -1), with_credit=True)
-
-    def _reward_of(self, group: Group, outcome: Outcome) -> np.ndarray:
-        return outcome.credit.ravel() / group.mission.num_robots**2
+    def _step_batch(
+        self, batch: MissionBatch, actions: np.ndarray
+    ) -> tuple[Transition, np.ndarray]:
+        transition = batch.step(actions.reshape(batch.num_missions, -1), with_credit=True)
+        return transition, transition.credit.ravel() / batch.mission.num_robots**2

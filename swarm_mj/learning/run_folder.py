@@ -1,15 +1,17 @@
-"""A run's folder: what is where, and `settings.json`, from which a run starts over or goes on."""
+"""A run's folder: what is where, what was asked for, and how far the run has come."""
 
+import csv
 import json
 import shutil
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from swarm_mj.io.atomic_directory import atomic_directory, present_folder
 from swarm_mj.io.atomic_file import atomic_write
-from swarm_mj.learning.settings import Training, arm_settings, from_json
-from swarm_mj.mission import Mission
+from swarm_mj.learning.settings import Training, from_json
+from swarm_mj.protocol.costs import WindowCosts
 
 SETTINGS, CHECKPOINT, CURVE = "settings.json", "checkpoint.pt", "curve.csv"
 INIT, POLICY, REPLAYS, TENSORBOARD = "init", "policy", "replays", "tensorboard"
@@ -35,6 +37,55 @@ class Run:
     limits: Limits
     command: str  # that began it
     init: Path | None = None  # the stored policy that it begins with
+
+
+@dataclass(kw_only=True)
+class Accumulator:
+    """What the missions in training cost since the last evaluation."""
+
+    seconds: float = 0.0
+    decisions: int = 0  # of teams
+    age_windows: float = 0.0  # summed over the decisions
+    attempted: int = 0  # packets
+    delivered: int = 0
+
+    def add(self, batches: Iterable[WindowCosts]) -> None:
+        """Adds a window of all missions, but no time."""
+        for costs in batches:
+            self.decisions += len(costs.age_windows)
+            self.age_windows += float(costs.age_windows.sum())
+            self.attempted += int(costs.packets.attempted.sum())
+            self.delivered += int(costs.packets.delivered.sum())
+
+    def means(self) -> dict[str, float]:
+        """Per mission and window; empty before the first."""
+        if not self.decisions:
+            return {}
+        return {
+            "rollout/aoi": self.age_windows / self.decisions,
+            "rollout/packets_per_window": self.attempted / self.decisions,
+            "rollout/delivery_ratio": self.delivered / max(1, self.attempted),
+            "rollout/decisions_per_s": self.decisions / max(self.seconds, 1e-9),
+        }
+
+
+@dataclass(kw_only=True)
+class Progress:
+    """Where a run stands."""
+
+    decisions: int = 0  # of teams, in all sessions
+    minutes: float = 0.0  # in all sessions, evaluations included
+    next_evaluation: int = 0  # team decisions
+    next_replay: int = 0  # team decisions
+    best_objective: float = float("inf")
+    curve: list[dict[str, float]] = field(default_factory=list)  # one row an evaluation
+    since_evaluation: Accumulator = field(default_factory=Accumulator)
+    optimiser: dict[str, float] = field(default_factory=dict)  # what PPO last logged of itself
+
+    @property
+    def best(self) -> dict[str, float] | None:
+        """The evaluation of the policy that is kept."""
+        return min(self.curve, key=lambda row: row["objective"], default=None)
 
 
 def write_run(folder: Path, run: Run) -> None:
@@ -112,6 +163,23 @@ def remove_parts(folder: Path) -> None:
             part.unlink(missing_ok=True)
 
 
+def write_curve(path: Path, curve: list[dict[str, float]]) -> None:
+    """Writes a learning curve, one row an evaluation.
+
+    Args:
+        path: The CSV file.
+        curve: Rows by name; the later ones may have names that the first lacks.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    names = list(dict.fromkeys(name for row in curve for name in row))
+    with atomic_write(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, names)
+        writer.writeheader()
+        writer.writerows(curve)
+
+
 def _run_of(document: Any) -> Run:  # noqa: ANN401 - anything in JSON
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise ValueError(f'the format must be "{FORMAT}"')
@@ -120,27 +188,9 @@ def _run_of(document: Any) -> Run:  # noqa: ANN401 - anything in JSON
             f"the format_version is {document['format_version']!r:.40}, and this swarm_mj reads "
             f"{FORMAT_VERSION}; resume with the version that wrote it"
         )
-    _check_kinds("training", document["training"], _some_training())
     return Run(
         training=from_json(document["training"]),
         limits=Limits(**document["limits"]),
         command=str(document["command"]),
         init=None if document["init"] is None else Path(document["init"]),
     )
-
-
-def _some_training() -> dict[str, Any]:
-    return json.loads(json.dumps(arm_settings("robot", Mission(), (2,)).to_json()))
-
-
-def _check_kinds(name: str, given: Any, sample: Any) -> None:  # noqa: ANN401 - anything in JSON
-    """Raises ValueError unless a piece of JSON has the kinds of values that a sample has."""
-    allowed = (int, float) if isinstance(sample, float) else (type(sample),)
-    if type(given) not in allowed:  # in JSON, true is no number
-        raise ValueError(f"{name} is {given!r:.40}, which is of another kind")
-    if isinstance(sample, dict):
-        for key, value in sample.items():
-            _check_kinds(f"{name}.{key}", given[key], value)
-    if isinstance(sample, list):
-        for value in given:
-            _check_kinds(name, value, sample[0])

@@ -10,8 +10,8 @@ import pytest
 import torch
 
 from swarm_mj.cli import main
+from swarm_mj.learning.callback import TrainingCallback
 from swarm_mj.learning.run_folder import read_run
-from swarm_mj.learning.session import Session
 from swarm_mj.policies.stored import read_policy
 from swarm_mj.replay.read import windows
 
@@ -95,7 +95,7 @@ class SignalsAt:
     """Sends Ctrl-C in certain windows of the training, or of its evaluations."""
 
     def __init__(self, monkeypatch, method, *calls):
-        original, count = getattr(Session, method), 0
+        original, count = getattr(TrainingCallback, method), 0
 
         def signalling(session, *arguments):
             nonlocal count
@@ -105,7 +105,7 @@ class SignalsAt:
             return original(session, *arguments)
 
         self.before = signal.signal(signal.SIGINT, signal.default_int_handler)
-        monkeypatch.setattr(Session, method, signalling)
+        monkeypatch.setattr(TrainingCallback, method, signalling)
 
     def __enter__(self):
         return self

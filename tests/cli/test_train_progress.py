@@ -7,9 +7,8 @@ import pytest
 from rich.console import Console
 
 from swarm_mj.cli.train_progress import Watch, age_of, minutes_left, share_done
-from swarm_mj.learning.progress import Progress
-from swarm_mj.learning.run_folder import Limits
-from swarm_mj.learning.session import Status
+from swarm_mj.learning.callback import Status
+from swarm_mj.learning.run_folder import Limits, Progress
 
 ROW = {"decisions": 1000.0, "minutes": 0.5, "aoi": 31.5, "aoi_sem": 0.25, "objective": 1.0}
 

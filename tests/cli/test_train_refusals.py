@@ -108,6 +108,10 @@ REFUSED = [
     ((*DONE, "--budget", "-1"), "budget must be a whole number from 1"),
     (("--out", "cut-settings", "--resume"), "settings.json are damaged, or no run's"),
     (("--out", "new-settings", "--resume"), "format_version is 2, and this swarm_mj reads 1"),
+    (
+        ("--out", "text-seed", "--resume"),
+        "seed must be a whole number from 0 to 9223372036854775807",
+    ),
     (("--out", "cut-checkpoint", "--resume"), "checkpoint.pt is damaged, or none; begin a new"),
     (("--out", "mixed-up", "--resume"), "it was made with other settings than the run's"),
 ]
@@ -128,6 +132,9 @@ def prepare(folder):
         "damaged/config.json": b"{",
         "cut-settings/settings.json": as_bytes(settings)[:-40],
         "new-settings/settings.json": as_bytes(newer),
+        "text-seed/settings.json": as_bytes(
+            settings | {"training": settings["training"] | {"seed": "3"}}
+        ),
         "cut-checkpoint/settings.json": as_bytes(settings),
         "cut-checkpoint/checkpoint.pt": checkpoint[:-40],
         "mixed-up/settings.json": as_bytes(other),

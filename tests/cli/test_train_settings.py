@@ -16,9 +16,9 @@ from swarm_mj.cli.train_settings import (
     refuse_others,
     rollout_bytes,
 )
-from swarm_mj.learning.run import make_model
 from swarm_mj.learning.run_folder import Limits
 from swarm_mj.learning.settings import arm_settings
+from swarm_mj.learning.train import make_model
 from swarm_mj.mission import paper
 
 

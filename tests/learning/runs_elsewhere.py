@@ -19,10 +19,9 @@ from small_runs import StopAfter, difference, end_of, go_on, run, small_training
 
 from swarm_mj.cli import main
 from swarm_mj.gnn.action_distribution import sample
-from swarm_mj.learning.missions import Group
-from swarm_mj.learning.progress import Progress
-from swarm_mj.learning.run import train
-from swarm_mj.learning.run_folder import Limits
+from swarm_mj.learning.mission_batch import MissionBatch
+from swarm_mj.learning.run_folder import Limits, Progress
+from swarm_mj.learning.train import train
 from swarm_mj.mission import paper
 
 RESUMED = {
@@ -133,9 +132,9 @@ def _train_and_die(arguments, moment, moments):
 def _load_compiled_functions():
     """Once, for all children: the simulation, the features, the credits, the draws."""
     mission = paper("stationary", num_robots=4, range_ratio=1.0)
-    group = Group(mission, "extended", 2, np.random.default_rng(1), first_windows=2)
+    batch = MissionBatch(mission, "extended", 2, np.random.default_rng(1), first_windows=2)
     for _ in range(2):
-        group.step(np.array([[1, 1, 2, 3], [0, 1, 0, 3]]), with_credit=True)
+        batch.step(np.array([[1, 1, 2, 3], [0, 1, 0, 3]]), with_credit=True)
     sample(np.zeros((2, 3), dtype=np.float32), np.array([0.1, 0.9]))
 
 

@@ -1,14 +1,13 @@
 """Training runs of a second or less, and what they leave."""
 
-import json
 import math
 from dataclasses import replace
 
 import torch
 
-from swarm_mj.learning.run import train
 from swarm_mj.learning.run_folder import CHECKPOINT, Limits
 from swarm_mj.learning.settings import arm_settings
+from swarm_mj.learning.train import train
 from swarm_mj.mission import paper
 
 torch.set_num_threads(1)  # tests share the machine's cores
@@ -55,8 +54,8 @@ def run(training, folder, decisions=192, listener=go_on, **options):
 def end_of(folder):
     """All that a run has come to but its time: weights, optimiser, random states, curve, policy."""
     state = torch.load(folder / CHECKPOINT, weights_only=True)
-    progress = json.loads(state.pop("progress"))
-    progress["minutes"] = progress["tally"]["seconds"] = None
+    progress = state.pop("progress")
+    progress["minutes"] = progress["since_evaluation"]["seconds"] = None
     for row in progress["curve"]:
         row["minutes"] = row["rollout/decisions_per_s"] = None
     policy = (folder / "policy" / "model.safetensors").read_bytes()

@@ -10,8 +10,8 @@ from torch.distributions import Categorical
 
 from swarm_mj.learning.actor_critic import entropy, gumbel_sample, log_probability
 from swarm_mj.learning.checkpoint import missions_of
-from swarm_mj.learning.run import make_model
 from swarm_mj.learning.settings import arm_settings
+from swarm_mj.learning.train import make_model
 from swarm_mj.mission import PRESETS
 
 RUNS = [
@@ -65,10 +65,10 @@ def robot_by_robot(model, training):
     """
     policy, missions = model.policy, []
     env = missions_of(model)
-    for group, outcome in zip(env.groups, env.outcomes, strict=True):
-        graphs = outcome.graphs
-        num_robots = group.mission.num_robots
-        for b in range(group.num_missions):
+    for batch, transition in zip(env.batches, env.transitions, strict=True):
+        graphs = transition.graphs
+        num_robots = batch.mission.num_robots
+        for b in range(batch.num_missions):
             robots = []
             for i in range(num_robots):
                 row = b * num_robots + i

@@ -1,16 +1,17 @@
 """Checkpoints that are damaged, foreign, of another version or of other settings."""
 
+import math
 import pickle
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
 from small_runs import go_on, run, small_training
 
 from swarm_mj.learning.checkpoint import load, save
-from swarm_mj.learning.progress import Progress
-from swarm_mj.learning.run import make_model, train
-from swarm_mj.learning.run_folder import CHECKPOINT, Limits
+from swarm_mj.learning.run_folder import CHECKPOINT, Accumulator, Limits, Progress
+from swarm_mj.learning.train import make_model, train
 
 TRAINING = small_training()
 
@@ -74,7 +75,7 @@ def test_a_file_that_would_run_code_does_not(tmp_path):
 
 def test_another_version_is_refused(kept, tmp_path):
     content = changed(kept, tmp_path, lambda state: state.update(version=99))
-    with pytest.raises(ValueError, match=r"version 99, and this swarm_mj reads 1; resume with"):
+    with pytest.raises(ValueError, match=r"version 99, and this swarm_mj reads 2; resume with"):
         load_bytes(tmp_path, content)
 
 
@@ -87,12 +88,12 @@ def test_other_settings_are_refused(kept, tmp_path):
 @pytest.mark.parametrize(
     "change",
     [
-        lambda state: state.pop("policy"),
-        lambda state: state.update(policy={}),
-        lambda state: state.update(courses=[]),
+        lambda state: state.pop("parameters"),
+        lambda state: state.update(parameters={}),
+        lambda state: state.update(histories=[]),
         lambda state: state.update(torch_rng=torch.zeros(3)),
-        lambda state: state.update(seeds_rng="{}"),
-        lambda state: state.update(progress="{}"),
+        lambda state: state.update(seeds_rng={}),
+        lambda state: state.update(progress={"wings": 2}),
     ],
 )
 def test_one_that_lacks_something_is_refused_in_one_line(kept, tmp_path, change):
@@ -101,9 +102,29 @@ def test_one_that_lacks_something_is_refused_in_one_line(kept, tmp_path, change)
     assert "\n" not in str(caught.value)
 
 
+def test_progress_comes_back_to_the_last_bit(tmp_path):
+    row = {"decisions": 10.0, "aoi": 1 / 3, "objective": 0.2}
+    progress = Progress(
+        decisions=7,
+        minutes=0.1 + 0.2,
+        next_evaluation=12,
+        curve=[row, row | {"train/explained_variance": math.nan}],
+        since_evaluation=Accumulator(seconds=1e-9 / 3, decisions=5, age_windows=0.1),
+        optimiser={"train/entropy": 2 / 3},
+    )
+    model, rng = make_model(TRAINING)
+    model._last_episode_starts = np.ones(model.n_envs, dtype=bool)
+    save(tmp_path / "c.pt", TRAINING, model, rng, progress)
+    again = load(tmp_path / "c.pt", TRAINING, *make_model(TRAINING))
+    assert math.isnan(again.curve[1].pop("train/explained_variance"))
+    progress.curve[1].pop("train/explained_variance")
+    assert again == progress
+    assert again.best_objective == math.inf
+
+
 def test_a_checkpoint_that_cannot_be_written_is_an_os_error(tmp_path):
     model, rng = make_model(TRAINING)
-    model._last_episode_starts = torch.ones(model.n_envs, dtype=torch.bool).numpy()
+    model._last_episode_starts = np.ones(model.n_envs, dtype=bool)
     (tmp_path / "file").touch()
     with pytest.raises(OSError, match="file"):
         save(tmp_path / "file" / "c.pt", TRAINING, model, rng, Progress())

@@ -9,7 +9,7 @@ from small_runs import small_training
 from tiny_policies import tiny_network
 
 from swarm_mj.learning.held_out import evaluate, held_out_policy
-from swarm_mj.learning.missions import FIRST_TRAINING_SEED
+from swarm_mj.learning.mission_batch import FIRST_TRAINING_SEED
 from swarm_mj.learning.settings import HELD_OUT_SEED
 from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm

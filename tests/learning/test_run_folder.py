@@ -1,26 +1,35 @@
-"""A run's folder: its settings on disk, what may begin there, what kills leave."""
+"""A run's folder: its settings on disk, what may begin there, what kills leave, the curve."""
 
+import csv
 import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from small_runs import small_training
 from tiny_policies import save_tiny
 
+from swarm_mj.learning.mission_batch import make_batches
 from swarm_mj.learning.run_folder import (
     INIT,
     SETTINGS,
+    Accumulator,
     Limits,
+    Progress,
     Run,
     check_new,
     own_init,
     read_run,
     remove_parts,
+    write_curve,
     write_run,
 )
+from swarm_mj.learning.team_env import TeamEnv
+from swarm_mj.mission import paper
 
 LIMITS = Limits(decisions=5, minutes=0.5, replay_every=3)
+ROW = {"decisions": 10.0, "aoi": 1 / 3, "objective": 0.2}
 RUN = Run(training=small_training(sizes=(4, 6)), limits=LIMITS, command="swarm-mj train --out x")
 
 
@@ -57,10 +66,19 @@ def test_what_is_no_settings_is_refused(tmp_path, text):
     ("change", "complaint"),
     [
         (lambda d: d.update(format_version=2), "format_version is 2, and this swarm_mj reads 1"),
-        (lambda d: d["training"].update(seed="3"), "training.seed is '3', which is of another"),
-        (lambda d: d["training"].update(missions=True), "training.missions is True"),
-        (lambda d: d["training"]["ppo"].update(clip=None), "training.ppo.clip is None"),
-        (lambda d: d["training"].update(robots=["4"]), "training.robots is '4'"),
+        (
+            lambda d: d["training"].update(seed="3"),
+            r"(?s)seed.*3",
+        ),
+        (
+            lambda d: d["training"].update(missions=True),
+            "missions must be a whole number from 1 to 4096, not True",
+        ),
+        (lambda d: d["training"]["ppo"].update(clip=None), r"(?s)clip.*None"),
+        (
+            lambda d: d["training"].update(robots=["4"]),
+            r"(?s)robots.*'?4",
+        ),
         (lambda d: d["training"].pop("arm"), "arm"),
         (
             lambda d: d["training"]["network"].update(latent=0),
@@ -116,3 +134,38 @@ def test_a_run_keeps_its_own_copy_of_the_policy_it_begins_with(tmp_path):
     save_tiny(tmp_path / "given", seed=2)
     assert own_init(tmp_path / "run", tmp_path / "given") == own
     assert (own / "model.safetensors").read_bytes() == before
+
+
+def test_the_best_is_the_least_objective_and_the_first_of_equals():
+    assert Progress().best is None
+    rows = [ROW | {"objective": x, "decisions": float(n)} for n, x in enumerate((3.0, 1.0, 1.0))]
+    assert Progress(curve=rows).best is rows[1]
+
+
+def test_totals_are_per_mission_and_window():
+    mission = paper("stationary", num_robots=3, num_windows=9, range_ratio=1.0)
+    env = TeamEnv(make_batches(mission, (3,), "paper", 4, 2, np.random.default_rng(1)))
+    env.reset()
+    accumulator, ages, sent, arrived = Accumulator(), [], 0, 0
+    assert accumulator.means() == {}
+    for _ in range(5):
+        env.step(np.array([[1, 1, 2], [0, 2, 0], [0, 1, 2], [0, 1, 1]]))
+        costs = [transition.costs for transition in env.transitions]
+        accumulator.add(costs)
+        ages += [age for its in costs for age in its.age_windows]
+        sent += sum(its.packets.attempted.sum() for its in costs)
+        arrived += sum(its.packets.delivered.sum() for its in costs)
+    accumulator.seconds = 4.0
+    means = accumulator.means()
+    assert means["rollout/aoi"] == pytest.approx(sum(ages) / 20)
+    assert means["rollout/packets_per_window"] == sent / 20 == 1.0
+    assert means["rollout/delivery_ratio"] == pytest.approx(arrived / sent)
+    assert means["rollout/decisions_per_s"] == 5.0
+
+
+def test_a_curve_is_a_table_even_if_later_rows_have_more_columns(tmp_path):
+    write_curve(tmp_path / "curve.csv", [ROW, ROW | {"train/entropy": 0.5}])
+    with (tmp_path / "curve.csv").open(newline="") as file:
+        first, second = csv.DictReader(file)
+    assert {name: float(x) for name, x in first.items() if x} == ROW
+    assert float(second["train/entropy"]) == 0.5

@@ -5,7 +5,7 @@ import pytest
 import torch
 from gymnasium import spaces
 
-from swarm_mj.learning.speakers import SILENT_SHARE, SpeakersBuffer
+from swarm_mj.learning.active_rollout_buffer import SILENT_SHARE, ActiveRolloutBuffer
 
 STEPS, ROWS, ROBOTS = 40, 50, 5
 
@@ -18,7 +18,7 @@ def filled(speaks):
             "number": spaces.Box(0, STEPS * ROWS, (1,), np.float32),
         }
     )
-    buffer = SpeakersBuffer(STEPS, space, spaces.Discrete(ROBOTS), device="cpu", n_envs=ROWS)
+    buffer = ActiveRolloutBuffer(STEPS, space, spaces.Discrete(ROBOTS), device="cpu", n_envs=ROWS)
     owner = np.tile(np.arange(ROBOTS, dtype=np.int32), ROWS // ROBOTS)[:, None]
     for step in range(STEPS):
         number = np.arange(step * ROWS, (step + 1) * ROWS, dtype=np.float32)

@@ -8,10 +8,10 @@ import pytest
 from small_runs import StopAfter, go_on, run, small_training
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from swarm_mj.learning import session
-from swarm_mj.learning.run import train
+from swarm_mj.learning import callback
 from swarm_mj.learning.run_folder import CURVE, POLICY, REPLAYS, TENSORBOARD, Limits
 from swarm_mj.learning.settings import HELD_OUT_SEED
+from swarm_mj.learning.train import train
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.stored import read_policy
 from swarm_mj.replay.read import windows
@@ -132,14 +132,14 @@ def test_a_better_policy_takes_the_place_of_the_last_and_a_worse_one_does_not(
     tmp_path, monkeypatch
 ):
     objectives = iter([3.0, 1.0, 2.0, 1.0])
-    evaluate = session.evaluate
+    evaluate = callback.evaluate
 
     def judged(*arguments):
         return type(found := evaluate(*arguments))(
             **found.to_json() | {"objective": next(objectives)}
         )
 
-    monkeypatch.setattr(session, "evaluate", judged)
+    monkeypatch.setattr(callback, "evaluate", judged)
     progress = run(TRAINING, tmp_path / "run")
     assert progress.best_objective == 1.0
     _, config = read_policy(tmp_path / "run" / POLICY)

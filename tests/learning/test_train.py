@@ -10,8 +10,8 @@ from small_runs import go_on, run, small_training
 from tiny_policies import save_tiny
 
 from swarm_mj.learning.checkpoint import missions_of
-from swarm_mj.learning.run import StepDecay, make_model, train
 from swarm_mj.learning.run_folder import INIT, SETTINGS, Limits
+from swarm_mj.learning.train import StepDecay, make_model, train
 from swarm_mj.policies.stored import read_policy
 
 
@@ -84,7 +84,7 @@ def test_a_run_begins_with_the_policy_it_is_given(tmp_path, arm):
 def test_mixed_sizes_are_trained_on_and_evaluated_together(tmp_path):
     training = small_training(sizes=(3, 6))
     model, _ = make_model(training)
-    sizes = [group.mission.num_robots for group in missions_of(model).groups]
+    sizes = [batch.mission.num_robots for batch in missions_of(model).batches]
     assert sizes == [3, 6, 3, 6]
     progress = run(training, tmp_path / "run", 64)
     _, config = read_policy(tmp_path / "run" / "policy")

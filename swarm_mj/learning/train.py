@@ -1,4 +1,4 @@
-"""A training run (III-C): stable-baselines3's PPO, from empty folder to stored policy.
+"""The PPO run (III-C): stable-baselines3's loop, from empty folder to stored policy.
 
 A run's folder holds `settings.json`, `checkpoint.pt`, `curve.csv` (one row an evaluation),
 `tensorboard/`, `policy/` (the best so far), `init/` (the policy it began with, if any) and, on
@@ -17,25 +17,26 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from swarm_mj.learning import checkpoint
+from swarm_mj.learning.active_rollout_buffer import ActiveRolloutBuffer
 from swarm_mj.learning.actor_critic import GnnActorCritic, TeamActorCritic
+from swarm_mj.learning.callback import Listener, Stopped, TrainingCallback
 from swarm_mj.learning.checkpoint import missions_of
-from swarm_mj.learning.missions import make_groups
-from swarm_mj.learning.progress import Progress, write_curve
+from swarm_mj.learning.mission_batch import make_batches
 from swarm_mj.learning.robot_env import RobotEnv
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
     CURVE,
     TENSORBOARD,
     Limits,
+    Progress,
     Run,
     check_new,
     own_init,
     remove_parts,
+    write_curve,
     write_run,
 )
-from swarm_mj.learning.session import Listener, Session, Stopped
 from swarm_mj.learning.settings import Training
-from swarm_mj.learning.speakers import SpeakersBuffer
 from swarm_mj.learning.team_env import TeamEnv
 from swarm_mj.policies.stored import read_policy
 
@@ -50,7 +51,7 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
     """
     torch.set_num_threads(training.threads)
     rng = np.random.default_rng(training.seed)
-    groups = make_groups(
+    batches = make_batches(
         training.mission,
         training.robots,
         training.features,
@@ -59,7 +60,9 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
         rng,
     )
     ppo = training.ppo
-    env: VecEnv = RobotEnv(groups) if training.arm == "robot" else TeamEnv(groups, training.reward)
+    env: VecEnv = (
+        RobotEnv(batches) if training.arm == "robot" else TeamEnv(batches, training.reward)
+    )
     batch_size = _batch_size(training, env.num_envs)
     if training.reward == "velocity-variance":  # as in the authors' code
         env = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=ppo.discount)
@@ -82,7 +85,9 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
             max_grad_norm=ppo.max_gradient_norm,
             seed=training.seed % 2**32,
             normalize_advantage=not training.drops_silence,
-            rollout_buffer_class=SpeakersBuffer if training.drops_silence else DictRolloutBuffer,
+            rollout_buffer_class=ActiveRolloutBuffer
+            if training.drops_silence
+            else DictRolloutBuffer,
             policy_kwargs=_policy_settings(training),
         )
     decay.model = model
@@ -165,19 +170,19 @@ def train(
     run = Run(training=training, limits=limits, command=command, init=init)
     progress = _resumed(folder, run, model, rng) or _begun(folder, run, model)
     model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))
-    session = Session(run, folder, progress, rng, listener)
+    callback = TrainingCallback(run, folder, progress, rng, listener)
     env = missions_of(model)
     wanted = -(-(limits.decisions or NO_BUDGET) // env.num_teams) * env.num_envs
     try:
         if wanted > model.num_timesteps:
             model.learn(
                 wanted - model.num_timesteps,
-                callback=session,
-                log_interval=NO_BUDGET,  # the session dumps, with team decisions on the axis
+                callback=callback,
+                log_interval=NO_BUDGET,  # the callback dumps, with team decisions on the axis
                 reset_num_timesteps=model.num_timesteps == 0,
             )
-        session.init_callback(model)
-        session.finish()
+        callback.init_callback(model)
+        callback.finish()
     except Stopped:
         pass
     finally:

@@ -9,15 +9,16 @@ from stable_baselines3.common.type_aliases import DictRolloutBufferSamples
 SILENT_SHARE = 0.1  # of the silent rows that are learned from
 
 
-class SpeakersBuffer(DictRolloutBuffer):
-    """Yields the rows that spoke, and a share of the silent ones.
+class ActiveRolloutBuffer(DictRolloutBuffer):
+    """Yields the rows that transmitted, and a share of the silent ones.
 
     Without discount a robot's advantage is its credit, and a silent robot's is 0: its row adds
     nothing to the policy's gradient. So most of the rows, which cost as much as the others, can be
     left out; some stay for the entropy. Credits are not normalised, for their zero means something.
 
-    What PPO logs of its passes (value, clipping, divergence) is over the rows kept, where speech is
-    more frequent than it is; values, which nothing reads without discount, are learned from these.
+    What PPO logs of its passes (value, clipping, divergence) is over the rows kept, among which
+    transmissions are more frequent than in the rollout. Values, which nothing reads without
+    discount, are learned from these rows, too.
     """
 
     def compute_returns_and_advantage(self, last_values: object, dones: np.ndarray) -> None:
@@ -42,8 +43,8 @@ class SpeakersBuffer(DictRolloutBuffer):
             for name in FLAT:
                 setattr(self, name, self.swap_and_flatten(getattr(self, name)))
             self.generator_ready = True
-        is_speaker = self.actions[:, 0] != self.observations["owner"][:, 0]
-        is_kept = is_speaker | (np.random.random(num_rows) < SILENT_SHARE)  # noqa: NPY002 - as SB3
+        is_active = self.actions[:, 0] != self.observations["owner"][:, 0]
+        is_kept = is_active | (np.random.random(num_rows) < SILENT_SHARE)  # noqa: NPY002 - as SB3
         kept = np.random.permutation(np.flatnonzero(is_kept))  # noqa: NPY002
         num_batches = max(1, round(num_rows / (batch_size or num_rows)))
         for rows in np.array_split(kept, num_batches):

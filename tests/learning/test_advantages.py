@@ -9,7 +9,7 @@ from small_runs import small_training
 from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_mj.learning.checkpoint import missions_of
-from swarm_mj.learning.run import make_model
+from swarm_mj.learning.train import make_model
 
 DISCOUNT, GAE_LAMBDA, STEPS = 0.9, 0.7, 26  # missions are of 20 windows, cut at 5, 10 and 15
 
@@ -86,9 +86,9 @@ def test_nothing_leaks_over_the_end_of_a_mission(arm, monkeypatch):
         for t in range(STEPS):
             num_cut += "terminal_observation" in watch.infos[t][e]
             num_over += watch.dones[t][e] and "terminal_observation" not in watch.infos[t][e]
-    rows = model.n_envs // len(missions_of(model).groups)
+    rows = model.n_envs // len(missions_of(model).batches)
     assert num_cut == 3 * rows
-    assert num_over == 2 * rows  # of the group that is not cut, and of the first one once more
+    assert num_over == 2 * rows  # of the batch that is not cut, and of the first one once more
     np.testing.assert_allclose(buffer.returns, buffer.advantages + buffer.values, rtol=1e-5)
 
 

@@ -1,4 +1,4 @@
-"""What happens between a training run's rollouts: evaluations, the best policy, checkpoints."""
+"""What PPO calls during a run: held-out evaluations, the best policy, checkpoints, replays."""
 
 import time
 from collections.abc import Callable
@@ -15,25 +15,29 @@ from swarm_mj.io.provenance import commit, version
 from swarm_mj.learning import checkpoint
 from swarm_mj.learning.actor_critic import GnnActorCritic
 from swarm_mj.learning.checkpoint import missions_of
-from swarm_mj.learning.held_out import HeldOut, evaluate, held_out_missions, held_out_policy
-from swarm_mj.learning.progress import Progress, Tally, write_curve
-from swarm_mj.learning.run_folder import CHECKPOINT, CURVE, POLICY, REPLAYS, Run
+from swarm_mj.learning.held_out import HeldOut, evaluate, record_replay
+from swarm_mj.learning.run_folder import (
+    CHECKPOINT,
+    CURVE,
+    POLICY,
+    REPLAYS,
+    Accumulator,
+    Progress,
+    Run,
+    write_curve,
+)
 from swarm_mj.learning.settings import HELD_OUT_SEED
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.policies.stored import save_policy
-from swarm_mj.replay.recorder import Recorder
-from swarm_mj.rollout import rollout
-from swarm_mj.swarm import Swarm
 
-OPTIMISER = ("entropy", "explained_variance", "approx_kl", "clip_fraction", "value_loss")
+OPTIMISER = tuple(
+    f"train/{name}"
+    for name in ("entropy", "explained_variance", "approx_kl", "clip_fraction", "value_loss")
+)
 
 
 class Stopped(Exception):  # noqa: N818 - nothing went wrong
     """The run has reached a limit, or its listener has had enough; all is kept."""
-
-
-class _BrokenOff(Exception):  # noqa: N818 - as above
-    """The listener has had enough in the middle of an evaluation."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +55,7 @@ class Status:
 Listener = Callable[[Status], bool]
 
 
-class Session(BaseCallback):
+class TrainingCallback(BaseCallback):
     """One sitting of a run; PPO calls it, and waits for it between rollouts."""
 
     def __init__(
@@ -101,8 +105,9 @@ class Session(BaseCallback):
 
     def _on_step(self) -> bool:
         env = missions_of(self._ppo)
-        self._progress.tally.add(env)
-        self._aoi = float(np.mean([outcome.age_windows.mean() for outcome in env.outcomes]))
+        costs = [transition.costs for transition in env.transitions]
+        self._progress.since_evaluation.add(costs)
+        self._aoi = float(np.mean([each.age_windows.mean() for each in costs]))
         self._tell()
         return True
 
@@ -133,7 +138,8 @@ class Session(BaseCallback):
             self._evaluate(decisions)
         every = self._limits.replay_every
         if every and decisions >= progress.next_replay and self._goes_on:
-            self._record_replay(decisions)
+            network = acting_network(self._ppo)
+            record_replay(self._training, network, decisions, self._folder / REPLAYS)
             progress.next_replay = (decisions // every + 1) * every
         is_old = time.monotonic() - self._saved_s >= self._limits.checkpoint_every_s
         if is_old or is_due or is_last or not self._goes_on:
@@ -146,7 +152,7 @@ class Session(BaseCallback):
         """Moves the time since the last call into the progress."""
         now_s = time.monotonic()
         self._progress.minutes += (now_s - self._counted_s) / 60.0
-        self._progress.tally.seconds += now_s - self._counted_s
+        self._progress.since_evaluation.seconds += now_s - self._counted_s
         self._counted_s = now_s
 
     def _evaluate(self, decisions: int) -> None:
@@ -154,13 +160,13 @@ class Session(BaseCallback):
         progress, every = self._progress, self._training.evaluate_every
         network = acting_network(self._ppo)
         self._count_time()
-        means = progress.tally.means()
+        means = progress.since_evaluation.means()
         try:
             held_out = evaluate(self._training, network.to(self._ppo.device), self._on_window)
-        except _BrokenOff:
+        except Stopped:
             return
         self._count_time()
-        progress.tally = Tally()
+        progress.since_evaluation = Accumulator()
         progress.next_evaluation = (decisions // every + 1) * every
         known = {name: x for name, x in held_out.to_json().items() if x is not None}
         row = {"decisions": float(decisions), "minutes": progress.minutes, **known}
@@ -175,7 +181,7 @@ class Session(BaseCallback):
     def _on_window(self, share: float) -> None:
         self._tell(share)
         if not self._goes_on:
-            raise _BrokenOff
+            raise Stopped
 
     def _log(self, row: dict[str, float], decisions: int) -> None:
         for name, value in row.items():
@@ -185,9 +191,7 @@ class Session(BaseCallback):
     def _optimiser_means(self) -> dict[str, float]:
         """What PPO logged of its last passes over a rollout; empty before the first."""
         logged = self.logger.name_to_value
-        names = {name: f"train/{name}" for name in OPTIMISER if f"train/{name}" in logged}
-        means = {label: float(logged[label]) for label in names.values()}
-        return means
+        return {name: float(logged[name]) for name in OPTIMISER if name in logged}
 
     def _config(self, decisions: int, held_out: HeldOut) -> PolicyConfig:
         training = self._training
@@ -210,25 +214,6 @@ class Session(BaseCallback):
             commit=commit(),
             version=version(),
         )
-
-    def _record_replay(self, decisions: int) -> None:
-        """The first held-out mission, as the policy flies it now."""
-        from swarm_mj.replay.write import write_replay  # rerun takes its time to import
-
-        training = self._training
-        mission = held_out_missions(training)[0]
-        swarm = Swarm(mission, [HELD_OUT_SEED])
-        policy = held_out_policy(training, acting_network(self._ppo), mission)
-        recorder = Recorder(swarm)
-        for flown in rollout(swarm, policy):
-            recorder.add(flown)
-        path = self._folder / REPLAYS / f"decisions-{decisions:09d}.rrd"
-        config: dict[str, object] = {
-            "decisions": decisions,
-            "seed": HELD_OUT_SEED,
-            "training seed": training.seed,
-        }
-        write_replay(recorder.log(), mission, config, path)
 
 
 def acting_network(model: PPO) -> AggregationGnn:
