@@ -116,7 +116,7 @@ def test_missions_that_cannot_be_made_leave_nothing(tmp_path):
 
 
 def test_training_that_diverges_says_so_and_keeps_what_was_before(tmp_path):
-    training = with_ppo(small_training(), learning_rate=1e30, max_gradient_norm=1e30)
+    training = with_ppo(small_training(), least_share=1e33, max_gradient_norm=1e30)
     with pytest.raises(ValueError, match=r"no longer finite after \d+ decisions; begin a new run"):
         run(training, tmp_path / "run", 320)
     read_policy(tmp_path / "run" / "policy")
