@@ -132,6 +132,7 @@ def _whole(counts: Float[np.ndarray, "B"]) -> list[int | None]:
     return [int(count) if np.isfinite(count) else None for count in counts]
 
 
+@compiled()
 def count_ages(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
@@ -146,17 +147,6 @@ def count_ages(
         counts: By age in slots; added to in place.
         is_active: Whose pairs count; None is everyone's.
     """
-    _count_ages(timestamp, now, SLOT_WINDOWS, is_active, counts)
-
-
-@compiled()
-def _count_ages(
-    timestamp: Float[np.ndarray, "B N N"],
-    now: Float[np.ndarray, "B"],
-    slot_windows: float,
-    is_active: Bool[np.ndarray, "B N"] | None,
-    counts: Int[np.ndarray, "bins"],
-) -> None:
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
@@ -164,5 +154,5 @@ def _count_ages(
                 continue
             for j in range(num_robots):
                 if is_active is None or is_active[b, j]:
-                    counts[int((now[b] - timestamp[b, i, j]) / slot_windows)] += 1
-            counts[int((now[b] - timestamp[b, i, i]) / slot_windows)] -= 1
+                    counts[int((now[b] - timestamp[b, i, j]) / SLOT_WINDOWS)] += 1
+            counts[int((now[b] - timestamp[b, i, i]) / SLOT_WINDOWS)] -= 1

@@ -111,8 +111,7 @@ class Physics:
 
     def _step_exact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
         self._batch.step()
-        states = _empty_like(self._states)
-        _kick(
+        position_m, velocity_mps = _kick(
             self._qpos,
             self._qvel,
             self._ctrl,
@@ -122,10 +121,10 @@ class Physics:
             self._mission.max_velocity_mps,
             self._mission.half_side_m,
             self._wall,
-            states.position_m,
-            states.velocity_mps,
         )
-        self._states = states
+        self._states = RobotStates(
+            position_m=position_m, velocity_mps=velocity_mps, is_active=self._states.is_active
+        )
 
     def _step_contact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
         limit_mps = self._mission.max_velocity_mps
@@ -145,18 +144,8 @@ class Physics:
         )
 
 
-def _empty_like(states: RobotStates) -> RobotStates:
-    return RobotStates(
-        position_m=np.empty(states.position_m.shape),
-        velocity_mps=np.empty(states.velocity_mps.shape),
-        is_active=states.is_active,
-    )
-
-
 @compiled()
-def _first_not_finite(
-    states: Float[np.ndarray, "B N 2"],
-) -> int:
+def _first_not_finite(states: Float[np.ndarray, "B N 2"]) -> int:
     flat = states.ravel()
     for n in range(flat.size):
         if not np.isfinite(flat[n]):
@@ -175,11 +164,10 @@ def _kick(
     limit_mps: float,
     wall_m: float,
     wall: int,
-    position: Float[np.ndarray, "B N 2"],
-    velocity: Float[np.ndarray, "B N 2"],
-) -> None:
-    """Accelerates, clips, reflects, and copies the states out; qpos has already moved by v dt."""
+) -> tuple[Float[np.ndarray, "B N 2"], Float[np.ndarray, "B N 2"]]:
+    """Accelerates, clips, reflects, and copies p and v out; qpos has already moved by v dt."""
     num_missions, num_robots = acceleration.shape[:2]
+    position, velocity = np.empty(qpos.shape), np.empty(qpos.shape)
     for b in range(num_missions):
         for i in range(num_robots):
             for axis in range(2):
@@ -195,3 +183,4 @@ def _kick(
                 ctrl[b, i, axis] = v
                 position[b, i, axis] = p
                 velocity[b, i, axis] = v
+    return position, velocity

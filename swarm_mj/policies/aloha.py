@@ -1,18 +1,15 @@
 """Slotted ALOHA broadcast (Abramson 1970; Roberts 1975)."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from jaxtyping import Bool, Float
 
 from swarm_mj.compiled import compiled
-from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.mission.geometry import squared_distance
-from swarm_mj.policies.policy import BroadcastPolicy, check_probability
+from swarm_mj.policies.policy import BroadcastPolicy, RandomTransmission
 from swarm_mj.protocol.local_views import LocalViews
 
 
-class Aloha(BroadcastPolicy):
+class Aloha(RandomTransmission, BroadcastPolicy):
     """Every robot broadcasts now and then, as often as its neighbourhood bears, unanswered.
 
     In slotted ALOHA what counts is the load that all n stations offer together, so each of them
@@ -35,17 +32,8 @@ class Aloha(BroadcastPolicy):
         Raises:
             ValueError: The probability is not in [0, 1].
         """
-        self._probability = check_probability(probability)
+        super().__init__(probability)
         self._range_m = range_m
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """The probability that anyone of a neighbourhood broadcasts."""
-        return {"probability": self._probability}
-
-    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Gives every robot its own stream of numbers; arguments as in `Policy.start`."""
-        self._stream = Stream(rngs, uniform, (num_robots,))
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Each robot that draws a broadcast."""
@@ -64,9 +52,7 @@ def num_contenders(views: LocalViews, range_m: float) -> Float[np.ndarray, "B N"
     Returns:
         The team's size times the share of the known robots, itself included, believed in range.
     """
-    contenders = np.empty(views.buffers.shape)
-    _count(views.buffers.is_known, views.buffers.position_m, range_m, contenders)
-    return contenders
+    return _count(views.buffers.is_known, views.buffers.position_m, range_m)
 
 
 @compiled()
@@ -74,9 +60,9 @@ def _count(
     is_known: Bool[np.ndarray, "B N N"],
     believed_m: Float[np.ndarray, "B N N 2"],
     range_m: float,
-    contenders: Float[np.ndarray, "B N"],
-) -> None:
-    num_missions, num_robots = contenders.shape
+) -> Float[np.ndarray, "B N"]:
+    num_missions, num_robots = is_known.shape[:2]
+    contenders = np.empty((num_missions, num_robots))
     for b in range(num_missions):
         for i in range(num_robots):
             place_m = believed_m[b, i]
@@ -86,3 +72,4 @@ def _count(
                     num_known += 1
                     num_near += squared_distance(place_m, j, i) <= range_m * range_m
             contenders[b, i] = num_robots * num_near / num_known
+    return contenders

@@ -5,41 +5,24 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool
 
-from swarm_mj.mission.batched_rng import Stream, uniform
-from swarm_mj.policies.policy import BroadcastPolicy, check_probability
+from swarm_mj.policies.policy import BroadcastPolicy, RandomTransmission
 from swarm_mj.protocol.local_views import LocalViews
 
 
-class InnovationGossip(BroadcastPolicy):
+class InnovationGossip(RandomTransmission, BroadcastPolicy):
     """Every robot broadcasts the more likely the more is new to tell, twice a window, unanswered.
 
     What is new is how much its knowledge has become fresher since its own last broadcast: the rise
     of T^{i,j}, its own included, averaged over the team [windows]. A robot broadcasts with p times
-    that, and at most with certainty. So robots that hear much pass it on soon, and one that hears
-    nothing still tells where it is now and then. Nobody answers: two unanswered broadcasts a window
-    cost less age than one packet that a neighbour answers. Uses the robot's own buffer, and what it
-    remembers of it.
+    that, and at most with certainty: p is for each window of news. So robots that hear much pass it
+    on soon, and one that hears nothing still tells where it is now and then. Nobody answers: two
+    unanswered broadcasts a window cost less age than one packet that a neighbour answers. Uses the
+    robot's own buffer, and what it remembers of it.
     """
-
-    def __init__(self, probability: float) -> None:
-        """Prepares the policy.
-
-        Args:
-            probability: Of a broadcast in a slot, for each window of news.
-
-        Raises:
-            ValueError: The probability is not in [0, 1].
-        """
-        self._probability = check_probability(probability)
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """The probability of a broadcast for each window of news."""
-        return {"probability": self._probability}
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Gives every robot its own numbers, and all to tell; arguments as in `Policy.start`."""
-        self._stream = Stream(rngs, uniform, (num_robots,))
+        super().start(num_robots, rngs)
         self._told = np.zeros((len(rngs), num_robots))  # mean T at the last broadcast [windows]
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:

@@ -5,14 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Int
 
-from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.mission.geometry import ROOT, spanning_tree
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.policies.policy import CentralisedPolicy, check_probability
+from swarm_mj.policies.policy import CentralisedPolicy, RandomTransmission
 from swarm_mj.protocol.local_views import LocalViews
 
 
-class MinimumSpanningTree(CentralisedPolicy):
+class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
     """Every robot exchanges buffers with its parent in the tree with probability p (IV-C).
 
     Centralised: the tree is built from all true positions at the start of the mission.
@@ -32,19 +31,14 @@ class MinimumSpanningTree(CentralisedPolicy):
         Raises:
             ValueError: The probability is not in [0, 1].
         """
-        self._probability = check_probability(probability)
+        super().__init__(probability)
         self._is_recomputed = is_recomputed
         self._root_transmits = root_transmits
         self._parent: np.ndarray | None = None
 
-    @property
-    def parameters(self) -> dict[str, float]:
-        """The probability of a transmission."""
-        return {"probability": self._probability}
-
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Forgets the last mission's tree; arguments as in `Policy.start`."""
-        self._stream = Stream(rngs, uniform, (num_robots,))
+        super().start(num_robots, rngs)
         self._parent = None
 
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:

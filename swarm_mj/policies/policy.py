@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from swarm_mj.mission import Mission
+from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.local_views import LocalViews
@@ -98,12 +99,24 @@ class CentralisedPolicy(Policy, ABC):
         """
 
 
-def check_probability(probability: float) -> float:
-    """The probability itself.
+class RandomTransmission(Policy):
+    """What policies share whose robots draw whether they transmit."""
 
-    Raises:
-        ValueError: It is not in [0, 1].
-    """
-    if not 0.0 <= probability <= 1.0:
-        raise ValueError(f"transmission probability must be from 0 to 1, not {probability:g}")
-    return probability
+    def __init__(self, probability: float) -> None:
+        """Takes the probability, whose meaning is each policy's own.
+
+        Raises:
+            ValueError: The probability is not in [0, 1].
+        """
+        if not 0.0 <= probability <= 1.0:
+            raise ValueError(f"transmission probability must be from 0 to 1, not {probability:g}")
+        self._probability = probability
+
+    @property
+    def parameters(self) -> Parameters:
+        """The probability."""
+        return {"probability": self._probability}
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Gives every robot its own stream of numbers; arguments as in `Policy.start`."""
+        self._stream = Stream(rngs, uniform, (num_robots,))

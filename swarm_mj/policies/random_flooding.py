@@ -7,12 +7,12 @@ from jaxtyping import Bool, Int
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform
-from swarm_mj.policies.policy import BroadcastPolicy, check_probability
+from swarm_mj.policies.policy import BroadcastPolicy, RandomTransmission
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.window import DoubleBroadcast, WindowProtocol
 
 
-class RandomFlooding(BroadcastPolicy):
+class RandomFlooding(RandomTransmission, BroadcastPolicy):
     """Every robot rebroadcasts with probability p, twice per window, unanswered (IV-C).
 
     As in the authors' code a robot that transmits draws an addressee from the whole team, and is
@@ -31,7 +31,7 @@ class RandomFlooding(BroadcastPolicy):
         Raises:
             ValueError: The probability is not in [0, 1].
         """
-        self._probability = check_probability(probability)
+        super().__init__(probability)
         self._names_addressee = names_addressee
 
     def window(self, mission: Mission) -> WindowProtocol:
@@ -40,11 +40,6 @@ class RandomFlooding(BroadcastPolicy):
             silence_is_attempt=mission.silence_is_attempt,
             moves_each_slot=mission.moves_each_transmission,
         )
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """The probability of a transmission."""
-        return {"probability": self._probability}
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Gives every robot its own stream of numbers; arguments as in `Policy.start`."""

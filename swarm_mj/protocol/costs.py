@@ -50,12 +50,10 @@ def age_of_information(
     Returns:
         The age [windows], and whether everyone of these has heard of everyone of these.
     """
-    age = np.empty(now.shape)
-    is_complete = np.empty(now.shape, dtype=np.bool_)
-    _mean_age(buffers.timestamp, now, is_active, age, is_complete)
-    return age, is_complete
+    return _mean_age(buffers.timestamp, now, is_active)
 
 
+@compiled()
 def velocity_variance(
     velocity_mps: Float[np.ndarray, "B N 2"], is_active: Bool[np.ndarray, "B N"] | None = None
 ) -> Float[np.ndarray, "B"]:
@@ -68,8 +66,20 @@ def velocity_variance(
     Returns:
         The variance, per mission.
     """
-    variance = np.empty(velocity_mps.shape[0])
-    _variance(velocity_mps, is_active, variance)
+    num_missions, num_robots = velocity_mps.shape[:2]
+    variance = np.empty(num_missions)
+    for b in range(num_missions):
+        total = 0.0
+        num_active = num_robots if is_active is None else is_active[b].sum()
+        for axis in range(2):
+            mean = 0.0
+            for i in range(num_robots):
+                if is_active is None or is_active[b, i]:
+                    mean += velocity_mps[b, i, axis] / num_active
+            for i in range(num_robots):
+                if is_active is None or is_active[b, i]:
+                    total += (velocity_mps[b, i, axis] - mean) ** 2
+        variance[b] = total / num_active
     return variance
 
 
@@ -161,10 +171,9 @@ def _mean_age(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
     is_active: Bool[np.ndarray, "B N"] | None,
-    age: Float[np.ndarray, "B"],
-    is_complete: Bool[np.ndarray, "B"],
-) -> None:
+) -> tuple[Float[np.ndarray, "B"], Bool[np.ndarray, "B"]]:
     num_missions, num_robots = timestamp.shape[:2]
+    age, is_complete = np.empty(num_missions), np.empty(num_missions, dtype=np.bool_)
     for b in range(num_missions):
         total = 0.0
         num_unknown = 0
@@ -179,27 +188,7 @@ def _mean_age(
                 num_unknown += timestamp[b, i, j] <= NEVER
         age[b] = now[b] - total / (num_active * num_active)
         is_complete[b] = num_unknown == 0
-
-
-@compiled()
-def _variance(
-    velocity_mps: Float[np.ndarray, "B N 2"],
-    is_active: Bool[np.ndarray, "B N"] | None,
-    variance: Float[np.ndarray, "B"],
-) -> None:
-    num_missions, num_robots = velocity_mps.shape[:2]
-    for b in range(num_missions):
-        total = 0.0
-        num_active = num_robots if is_active is None else is_active[b].sum()
-        for axis in range(2):
-            mean = 0.0
-            for i in range(num_robots):
-                if is_active is None or is_active[b, i]:
-                    mean += velocity_mps[b, i, axis] / num_active
-            for i in range(num_robots):
-                if is_active is None or is_active[b, i]:
-                    total += (velocity_mps[b, i, axis] - mean) ** 2
-        variance[b] = total / num_active
+    return age, is_complete
 
 
 @compiled()
