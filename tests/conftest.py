@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from forks import Forks
 from hypothesis import settings
 
 # Compiling takes its time on an example's first run; no law here is about time.
@@ -26,3 +27,11 @@ def _experiments_are_left_alone():
     after = stamps(TRAINING)
     written = {path for path in before | after if before.get(path) != after.get(path)}
     assert not written, f"tests wrote {', '.join(map(str, sorted(written)))}"
+
+
+@pytest.fixture(scope="session")
+def forks(tmp_path_factory):
+    """Runs programs, each as a process of its own."""
+    programs = Forks(tmp_path_factory.mktemp("said"))
+    yield programs
+    programs.close()

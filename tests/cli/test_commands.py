@@ -1,9 +1,13 @@
 """The other commands as processes: scene, replay, bench, help."""
 
+from functools import partial
+
 import mujoco
 import numpy as np
 import pytest
 
+from swarm_mj.benchmark import learning
+from swarm_mj.cli import main
 from swarm_mj.mission import paper
 from swarm_mj.swarm import Swarm
 
@@ -55,7 +59,8 @@ def test_replay_refuses_what_is_no_whole_replay(swarm_mj, tmp_path):
 
 
 def test_bench_prints_the_whole_and_its_parts(swarm_mj):
-    done = swarm_mj("bench", "--missions", 1, 3, "--seconds", 0.1, "--episodes", 1)
+    short = ("--seconds", 0.1, "--episodes", 1, "--no-learning")
+    done = swarm_mj("bench", "--missions", 1, 3, *short)
     assert done.returncode == 0, done.stderr
     for row in ("windows per second", "plain mj_step", "radio and buffers", "move", "decide"):
         assert row in done.stdout
@@ -65,12 +70,17 @@ def test_bench_prints_the_whole_and_its_parts(swarm_mj):
         "greedy-oracle",
     ):
         assert row in done.stdout
+    assert "Learning" not in done.stdout
 
 
-def test_bench_leaves_the_evaluation_out(swarm_mj):
-    done = swarm_mj("bench", "--missions", 1, "--seconds", 0.1, "--episodes", 0)
-    assert done.returncode == 0, done.stderr
-    assert "Evaluation" not in done.stdout
+def test_bench_times_learning_and_leaves_the_evaluation_out(monkeypatch, capsys):
+    """In teams of 4, for speed."""
+    monkeypatch.setattr(learning, "bench_learning", partial(learning.bench_learning, num_robots=4))
+    assert main(["bench", "--missions", "1", "--seconds", "0.1", "--episodes", "0"]) == 0
+    printed = capsys.readouterr().out
+    assert "Evaluation" not in printed
+    for row in ("forward and backward", "training, arm robot", "training, arm team", "decision"):
+        assert row in printed
 
 
 @pytest.mark.parametrize(

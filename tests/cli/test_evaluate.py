@@ -2,8 +2,6 @@
 
 import json
 import signal
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -27,11 +25,10 @@ def files(folder):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def whole(forks, tmp_path_factory):
     """The files of an evaluation that nothing interrupted."""
     folder = tmp_path_factory.mktemp("whole")
-    command = [sys.executable, "-m", "swarm_mj", "evaluate", *TWO_POLICIES, *BOTH]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    done = forks.run(folder, "swarm_mj", "evaluate", *TWO_POLICIES, *BOTH)
     assert done.returncode == 0, done.stderr
     assert files(folder) == ["r.csv", "r.json"]
     return folder
@@ -104,22 +101,26 @@ def ending(*arguments):
     if len(kept) == count:
         os.kill(os.getpid(), which)
 progress.append = ending
-sys.exit(main(sys.argv[3:]))
+if __name__ == "__main__":  # jobs import it
+    sys.exit(main(sys.argv[3:]))
 """
 
 
-def evaluate_and_end(folder, which, count, *arguments):
-    command = [sys.executable, "-c", EVALUATE_AND_END, str(int(which)), str(count), "evaluate"]
-    return subprocess.run(
-        [*command, *map(str, arguments)],
-        cwd=folder, capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
+@pytest.fixture
+def evaluate_and_end(forks, tmp_path_factory):
+    script = tmp_path_factory.mktemp("script") / "evaluate_and_end.py"
+    script.write_text(EVALUATE_AND_END)
+
+    def run(folder, which, count, *arguments):
+        return forks.run(folder, script, int(which), count, "evaluate", *arguments)
+
+    return run
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
 @pytest.mark.parametrize("count", [1, 3])
 def test_ctrl_c_keeps_what_was_flown_and_resuming_ends_in_the_same_files(
-    swarm_mj, tmp_path, whole, jobs, count
+    swarm_mj, evaluate_and_end, tmp_path, whole, jobs, count
 ):
     done = evaluate_and_end(tmp_path, signal.SIGINT, count, *TWO_POLICIES, *BOTH, "--jobs", jobs)
     assert done.returncode == 130, done.stderr
@@ -133,7 +134,9 @@ def test_ctrl_c_keeps_what_was_flown_and_resuming_ends_in_the_same_files(
     same_files(tmp_path, whole)
 
 
-def test_a_killed_evaluation_resumes_even_if_its_last_line_was_cut(swarm_mj, tmp_path, whole):
+def test_a_killed_evaluation_resumes_even_if_its_last_line_was_cut(
+    swarm_mj, evaluate_and_end, tmp_path, whole
+):
     done = evaluate_and_end(tmp_path, signal.SIGKILL, 2, *TWO_POLICIES, *BOTH)
     assert done.returncode == -signal.SIGKILL
     path = tmp_path / "r.json.progress"
@@ -142,14 +145,14 @@ def test_a_killed_evaluation_resumes_even_if_its_last_line_was_cut(swarm_mj, tmp
     same_files(tmp_path, whole)
 
 
-def test_resuming_flies_only_what_is_left(tmp_path):
+def test_resuming_flies_only_what_is_left(evaluate_and_end, tmp_path):
     """Three of four batches are kept, so the second kept batch never comes."""
     evaluate_and_end(tmp_path, signal.SIGKILL, 3, *TWO_POLICIES, *BOTH)
     done = evaluate_and_end(tmp_path, signal.SIGKILL, 2, *TWO_POLICIES, *BOTH, "--resume")
     assert done.returncode == 0, done.stderr
 
 
-def test_progress_needs_a_word_on_what_to_do_with_it(swarm_mj, tmp_path, whole):
+def test_progress_needs_a_word_on_what_to_do_with_it(evaluate_and_end, swarm_mj, tmp_path, whole):
     evaluate_and_end(tmp_path, signal.SIGKILL, 1, *TWO_POLICIES, *BOTH)
     kept = (tmp_path / "r.json.progress").read_bytes()
     refused = swarm_mj("evaluate", *TWO_POLICIES, *BOTH)
@@ -170,7 +173,9 @@ def test_resuming_what_never_began_begins_it(swarm_mj, tmp_path, whole):
 FAIL = ("--switched-off", "0", "0.4", "--policy", "mst", "--episodes", "3")
 
 
-def test_robots_that_fail_are_another_regime_in_results_and_progress(swarm_mj, tmp_path):
+def test_robots_that_fail_are_another_regime_in_results_and_progress(
+    evaluate_and_end, swarm_mj, tmp_path
+):
     evaluate_and_end(tmp_path, signal.SIGKILL, 1, *SMALL, *FAIL, *BOTH)
     other = swarm_mj("evaluate", *SMALL, *FAIL, *BOTH, "--resume", "--switched-off", 0.2)
     alike = ("--switched-off", "0", "0.2", *FAIL[3:])

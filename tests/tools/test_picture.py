@@ -1,8 +1,7 @@
 """The headless picture as a process; taking one needs a Vulkan driver."""
 
 import ctypes.util
-import subprocess
-import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,26 +12,25 @@ TOOL = Path(__file__).parent.parent.parent / "tools" / "picture.py"
 DRIVERS = [*Path("/usr/share/vulkan/icd.d").glob("*.json"), *Path("/etc/vulkan/icd.d").glob("*")]
 
 
-def picture(*arguments, cwd):
-    return subprocess.run(
-        [sys.executable, TOOL, *map(str, arguments)],
-        cwd=cwd, capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
+@pytest.fixture
+def picture(forks, tmp_path):
+    """Runs the tool in an empty folder; returns the finished process."""
+    return partial(forks.run, tmp_path, TOOL)
 
 
 @pytest.fixture(scope="module")
-def replay(tmp_path_factory):
+def replay(forks, tmp_path_factory):
     folder = tmp_path_factory.mktemp("replay")
-    command = [sys.executable, "-m", "swarm_mj", "fly", "--windows", "30", "--record", "a.rrd"]
-    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    flown = forks.run(folder, "swarm_mj", "fly", "--windows", 30, "--record", "a.rrd")
+    assert flown.returncode == 0, flown.stderr
     return folder / "a.rrd"
 
 
 @pytest.mark.skipif(
     not DRIVERS or not ctypes.util.find_library("vulkan"), reason="no Vulkan driver on this machine"
 )
-def test_a_picture_shows_something(replay, tmp_path):
-    done = picture(replay, "--window", 20, "--out", "a.png", "--size", "1280x720", cwd=tmp_path)
+def test_a_picture_shows_something(picture, replay, tmp_path):
+    done = picture(replay, "--window", 20, "--out", "a.png", "--size", "1280x720")
     assert done.returncode == 0, done.stderr
     with Image.open(tmp_path / "a.png") as image:
         pixels = np.asarray(image.convert("RGB"))
@@ -51,17 +49,17 @@ def test_a_picture_shows_something(replay, tmp_path):
         (["--out", "missing/a.png"], "does not exist: missing"),
     ],
 )
-def test_bad_input_is_one_clear_line(replay, tmp_path, arguments, complaint):
-    done = picture(replay, *arguments, cwd=tmp_path)
+def test_bad_input_is_one_clear_line(picture, replay, tmp_path, arguments, complaint):
+    done = picture(replay, *arguments)
     assert done.returncode == 2
     assert complaint in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_truncated_replay_is_refused(replay, tmp_path):
+def test_a_truncated_replay_is_refused(picture, replay, tmp_path):
     broken = tmp_path / "broken.rrd"
     broken.write_bytes(replay.read_bytes()[:50_000])
-    done = picture(broken, cwd=tmp_path)
+    done = picture(broken)
     assert done.returncode == 2
     assert "no whole replay" in done.stderr

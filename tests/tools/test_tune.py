@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -31,11 +32,10 @@ def tool():
     del sys.modules["tune"]
 
 
-def run(*arguments, cwd):
-    return subprocess.run(
-        [sys.executable, TOOL, *map(str, arguments)],
-        cwd=cwd, capture_output=True, text=True, timeout=300, check=False,
-    )  # fmt: skip
+@pytest.fixture
+def run(forks, tmp_path):
+    """Runs the tool in an empty folder; returns the finished process."""
+    return partial(forks.run, tmp_path, TOOL)
 
 
 def search(tool, grid, make=paper):
@@ -132,10 +132,10 @@ def test_tables_are_read_as_they_were_written(tool, monkeypatch, tmp_path):
     assert read_table(tmp_path / "a.csv") == rows
 
 
-def test_one_policy_alone_keeps_the_rows_of_the_others(tool, tmp_path):
+def test_one_policy_alone_keeps_the_rows_of_the_others(tool, run, tmp_path):
     path = tmp_path / "tuned.csv"
     tool.write_table(read_table(tool.TABLE), path)
-    done = run("--policy", "gossip", *QUICK, "--seed", "8", "--out", path, cwd=tmp_path)
+    done = run("--policy", "gossip", *QUICK, "--seed", "8", "--out", path)
     assert done.returncode == 0, done.stderr
     assert "28 of 112 probabilities tuned" in done.stderr
     before, after = read_table(tool.TABLE), read_table(path)
@@ -154,9 +154,9 @@ def test_one_policy_alone_keeps_the_rows_of_the_others(tool, tmp_path):
         (["--policy", "mst", "--out", "missing.csv"], "missing.csv"),
     ],
 )
-def test_bad_input_is_one_clear_line_and_leaves_nothing(tmp_path, arguments, complaint):
+def test_bad_input_is_one_clear_line_and_leaves_nothing(run, tmp_path, arguments, complaint):
     out = [] if "--out" in arguments else ["--out", "a.csv"]
-    done = run(*QUICK, *out, *arguments, cwd=tmp_path)
+    done = run(*QUICK, *out, *arguments)
     assert done.returncode == 2
     assert complaint in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
