@@ -59,7 +59,7 @@ def table(results: Sequence[Result], cost: str) -> str:
 def _name(policy: str, results: Sequence[Result]) -> str:
     """A policy's name, and whether its packets carry more than the paper's."""
     more = any(carries_more(result) for result in results if result.policy == policy)
-    return f"{policy} ({CARRIES_MORE})" if more else policy
+    return f"{policy} (packets {CARRIES_MORE})" if more else policy
 
 
 def _cell(result: Result, cost: str) -> str:

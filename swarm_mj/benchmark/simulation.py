@@ -34,7 +34,6 @@ REPETITIONS = 7  # of each measurement; their median counts, for machines are sh
 MISSION = paper("random-walk")
 DENSE = replace(MISSION, range_ratio=1.0)
 PLAN_SIZES = (40, 80, 200)  # robots
-AUTHORS_WINDOWS_PER_S = 500.0  # the authors' environment, one mission on one core: 350 to 600
 
 
 @dataclass(frozen=True, kw_only=True)

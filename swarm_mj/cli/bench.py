@@ -8,7 +8,6 @@ from rich.console import Console
 from rich.table import Table
 
 from swarm_mj.benchmark.simulation import (
-    AUTHORS_WINDOWS_PER_S,
     EvaluationTiming,
     Timing,
     bench,
@@ -74,10 +73,6 @@ def _table(timings: list[Timing]) -> Table:
     for timing in timings:
         table.add_column(f"{timing.num_missions}", justify="right")
     table.add_row("windows per second", *(f"{t.windows_per_s:,.0f}" for t in timings))
-    table.add_row(
-        f"  of the authors' {AUTHORS_WINDOWS_PER_S:.0f}",
-        *(f"{t.windows_per_s / AUTHORS_WINDOWS_PER_S:.1f} x" for t in timings),
-    )
     table.add_row("one window, µs", *(f"{1e6 / t.windows_per_s:.2f}" for t in timings))
     table.add_row("  in plain mj_steps", *(f"{t.in_mj_steps:.2f} x" for t in timings))
     table.add_row("plain mj_step, µs", *(f"{t.mj_step_us:.2f}" for t in timings), end_section=True)

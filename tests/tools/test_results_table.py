@@ -45,7 +45,7 @@ def test_who_carries_more_than_the_paper_s_packets_is_named_so(tool):
         result("tdma", aoi_mean=2.0, payload="none"),
     ]
     lines = tool.table(rows, "aoi").splitlines()
-    assert lines[2].startswith("| planner (carry more than T, M, P) |")
+    assert lines[2].startswith("| planner (packets carry more than T, M, P) |")
     assert lines[3].startswith("| tdma |")
 
 
