@@ -18,15 +18,15 @@ from swarm_mj.fields import setting
 
 RESULTS = Path(__file__).resolve().parent / "results" / "robustness"
 QUESTIONS = {
-    "switched-off": "--task stationary --switched-off 0.1 0.2 --episodes 30",
-    "switched-off-walking": "--task random-walk --robots 10 40 --switched-off 0.1 --episodes 30",
-    "reference": "--preset reference --task stationary --range-ratio 0.25 0.5 --episodes 20",
-    "reference-walking": "--preset reference --task random-walk --robots 10 40 --episodes 20",
-    "reference-flocking": "--preset reference --task flocking --episodes 20",
-    "contact": "--physics contact --task random-walk --episodes 10",
-    "ranges": "--task stationary --range-ratio 0.18 0.3 0.4 --episodes 10",
-    "speeds": "--task random-walk --velocity-ratio 0.05 0.3 0.5 --episodes 10",
-    "team-sizes": "--task stationary --robots 10 20 80 120 200 --episodes 6",
+    "switched-off": "--task stationary --switched-off 0.1 0.2 --episodes 12",
+    "switched-off-walking": "--task random-walk --robots 10 40 --switched-off 0.1 --episodes 12",
+    "reference": "--preset reference --task stationary --range-ratio 0.25 0.5 --episodes 8",
+    "reference-walking": "--preset reference --task random-walk --robots 10 40 --episodes 8",
+    "reference-flocking": "--preset reference --task flocking --episodes 8",
+    "contact": "--physics contact --task random-walk --episodes 8",
+    "ranges": "--task stationary --range-ratio 0.18 0.3 0.4 --episodes 8",
+    "speeds": "--task random-walk --velocity-ratio 0.05 0.3 0.5 --episodes 8",
+    "team-sizes": "--task stationary --robots 10 20 80 120 200 --episodes 4",
 }
 # The oracle goes on addressing robots that are off, and takes minutes a mission of 200 robots.
 WITHOUT_ORACLE = ("switched-off", "switched-off-walking", "team-sizes")

@@ -62,7 +62,7 @@ def test_the_commands_cover_every_published_regime(experiment, calls, settings):
     seen, *_ = calls
     assert experiment.evaluate(settings, 3, force=False) == 0
     studies = [parse(arguments)[1].study for arguments in seen]
-    assert all((study.episodes, study.seed) == (100, 2000) for study in studies)
+    assert all((study.episodes, study.seed) == (50, 2000) for study in studies)
     found = [
         (regime.preset, point)
         for study in studies
