@@ -213,7 +213,8 @@ def test_existing_results_need_force(swarm_mj, tmp_path, output):
 
 
 def test_one_mission_of_one_window_has_results(swarm_mj, tmp_path):
-    done = swarm_mj("evaluate", *SMALL, "--windows", 1, "--episodes", 1, "--csv", "r.csv")
+    missions = ("--robots", 5, "--windows", 1, "--range-ratio", 0.5, "--episodes", 1)
+    done = swarm_mj("evaluate", *missions, "--csv", "r.csv")
     assert done.returncode == 0, done.stderr
     assert [result.aoi_sem for result in read_results(tmp_path / "r.csv")] == [None] * 4
     assert "lower bound (connectivity)" in done.stdout
