@@ -6,21 +6,21 @@ Index order: row `i` sends or is passed through, column `j` or `k` is reached or
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from swarm_mj.compiled import compiled
+from swarm_mj.policies.planner.settings import WeightSettings
 from swarm_mj.radio.links import Links, lone_probabilities
 
-LEAST_PROBABILITY = 0.05  # links that decode more rarely count as none
 OUT_OF_REACH = np.inf  # instead of a number of hops
-SLACK = 0.25  # hops by which a way may be longer than the shortest and still count as one
 
 
 @dataclass(frozen=True, kw_only=True)
 class LinkGraph:
     """What follows from links alone; it is symmetric, as the links are."""
 
-    probability: Float[np.ndarray, "N N"]  # probability that j decodes i when nobody else speaks
+    probability: Float[np.ndarray, "N N"]  # that j decodes i when nobody else transmits
+    is_linked: Bool[np.ndarray, "N N"]  # whether that is often enough to count
     hops: Float[np.ndarray, "N N"]  # expected transmissions from i to j, or `OUT_OF_REACH`
     downstream: Float[np.ndarray, "N N"]  # whom k's news reach through i by a shortest way, i too
     relative_std: float  # of the distance of linked robots, in the mean [1]
@@ -28,27 +28,27 @@ class LinkGraph:
     @property
     def has_no_isolated_node(self) -> bool:
         """Whether everyone has a link."""
-        return bool(np.all(np.any(self.probability >= LEAST_PROBABILITY, axis=1)))
+        return bool(np.all(np.any(self.is_linked, axis=1)))
 
     @property
     def linked_share(self) -> float:
         """The share of all pairs that are linked, among robots that have links."""
-        num_linked = int(np.sum(np.any(self.probability >= LEAST_PROBABILITY, axis=1)))
+        num_linked = int(np.sum(np.any(self.is_linked, axis=1)))
         return float(np.sum(self.probability)) / max(1, num_linked * (num_linked - 1))
 
 
-def link_graph(links: Links) -> LinkGraph:
+def link_graph(links: Links, settings: WeightSettings) -> LinkGraph:
     """The graph of these links; a link of probability p is a way of 1 / p hops."""
     probability = lone_probabilities(links)
-    hops = _hops(np.where(probability >= LEAST_PROBABILITY, probability, 0.0))
+    is_linked = probability >= settings.min_probability
+    hops = _hops(np.where(is_linked, probability, 0.0))
+    total = max(np.sum(probability), settings.min_probability)
     return LinkGraph(
         probability=probability,
+        is_linked=is_linked,
         hops=hops,
-        downstream=_downstream(hops, SLACK),
-        relative_std=float(
-            np.sum(probability / links.distance_over_std)
-            / max(np.sum(probability), LEAST_PROBABILITY)
-        ),
+        downstream=_downstream(hops, settings.slack_hops),
+        relative_std=float(np.sum(probability / links.distance_over_std) / total),
     )
 
 

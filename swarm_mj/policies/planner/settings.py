@@ -88,6 +88,10 @@ class WeightSettings:
     share_per_std: float = 3.0  # added, times the relative standard deviation of distances
     share_isolated: float = 0.1  # added, if a robot has no link
     max_share: float = 1.05  # and no more than this
+    min_probability: float = 0.05  # links that decode more rarely count as none [1]
+    slack_hops: float = (
+        0.25  # by which a path may exceed the shortest and still count as one [hops]
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,7 +23,7 @@ def heuristic_weights(links: Links, settings: WeightSettings) -> Weights:
     Returns:
         The weight of every receiver and subject, and the least share.
     """
-    graph = link_graph(links)
+    graph = link_graph(links, settings)
     weight = np.maximum(graph.downstream, 1.0) ** settings.downstream_exponent
     weight *= np.clip(graph.hops, 1.0, len(weight)) ** settings.hops_exponent
     share = settings.share_unlinked + settings.share_per_link * graph.linked_share

@@ -11,13 +11,20 @@ from scipy.stats import norm
 from standing_teams import flooded_team
 
 from swarm_mj.mission import paper
-from swarm_mj.policies.planner.link_graph import LEAST_PROBABILITY, OUT_OF_REACH, SLACK, link_graph
+from swarm_mj.policies.planner import link_graph as module
+from swarm_mj.policies.planner.link_graph import OUT_OF_REACH
+from swarm_mj.policies.planner.settings import WeightSettings
 from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
 
 seeds = st.integers(0, 2**32 - 1)
 RADIO = radio_of(paper("stationary"))  # decodes up to 250 m in silence
 FAR_M = 5000.0
+SETTINGS = WeightSettings(min_probability=0.05, slack_hops=0.25)
+
+
+def link_graph(links):
+    return module.link_graph(links, SETTINGS)
 
 
 def places(num_robots, seed):
@@ -41,7 +48,9 @@ def as_networkx(graph):
     """The links that count, each as long as packets must be sent until one decodes."""
     plain = nx.Graph()
     plain.add_nodes_from(range(len(graph.probability)))
-    for i, j in zip(*np.nonzero(np.triu(graph.probability >= LEAST_PROBABILITY)), strict=True):
+    for i, j in zip(
+        *np.nonzero(np.triu(graph.probability >= SETTINGS.min_probability)), strict=True
+    ):
         plain.add_edge(int(i), int(j), hops=1.0 / float(graph.probability[i, j]))
     return plain
 
@@ -106,7 +115,11 @@ def test_nearly_shortest_ways_count_too(seed, num_robots):
         for j in set(nx.node_connected_component(plain, k)) - {k}:
             ways = list(nx.all_simple_paths(plain, k, j))
             lengths = [nx.path_weight(plain, way, "hops") for way in ways]
-            near = [way for way, n in zip(ways, lengths, strict=True) if n < min(lengths) + SLACK]
+            near = [
+                way
+                for way, n in zip(ways, lengths, strict=True)
+                if n < min(lengths) + SETTINGS.slack_hops
+            ]
             for i in {i for way in near for i in way} - {k}:
                 expected[i, k] += 1.0
     assert graph.downstream.tolist() == expected.tolist()

@@ -57,7 +57,7 @@ def test_a_row_of_three_by_hand():
 def test_who_has_more_behind_it_and_is_as_far_is_worth_more(seed, num_robots):
     """And who is farther with as many behind it is worth less."""
     links = team_links(num_robots, seed)
-    squared, graph = weights_of(links).squared_rise, link_graph(links)
+    squared, graph = weights_of(links).squared_rise, link_graph(links, SETTINGS)
     for k in range(num_robots):
         told = [j for j in range(num_robots) if j != k and graph.hops[j, k] < OUT_OF_REACH]
         for a in told:
