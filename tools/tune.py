@@ -23,7 +23,7 @@ from swarm_mj.cli.interrupt import heard_interrupt
 from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import plain_console
 from swarm_mj.fields import same_as, setting
-from swarm_mj.io.atomic_file import atomic_write
+from swarm_mj.io.atomic import atomic_write
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.registry import make_policy

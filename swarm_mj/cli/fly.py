@@ -1,6 +1,5 @@
 """`swarm-mj fly`: flies one mission, records its replay and says what it cost."""
 
-import json
 import os
 import shlex
 import time
@@ -19,7 +18,7 @@ from swarm_mj.cli.policy_options import NAMES, PolicyOptions
 from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import plain_console, this_command
 from swarm_mj.fields import setting
-from swarm_mj.io.atomic_file import atomic_write
+from swarm_mj.io.atomic import write_json
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
@@ -207,8 +206,7 @@ def _write(
             "interrupted": flight.was_interrupted,
             "replay": str(path) if path else None,
         }
-        with atomic_write(json_) as part:
-            part.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+        write_json(json_, document)
 
 
 def _print(options: Options, flight: _Flight, path: Path | None) -> None:

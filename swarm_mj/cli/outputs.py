@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from swarm_mj.io.atomic_file import temp_path
+from swarm_mj.io.atomic import temp_path
 
 
 def check_outputs(outputs: dict[str, Path | None], *, must_be_new: bool) -> None:

@@ -8,7 +8,7 @@ from swarm_mj.cli.mission_options import one_mission
 from swarm_mj.cli.outputs import check_writable
 from swarm_mj.cli.terminal import plain_console, this_command
 from swarm_mj.fields import setting
-from swarm_mj.io.atomic_file import atomic_write
+from swarm_mj.io.atomic import write_text
 from swarm_mj.mission import Mission
 
 
@@ -31,8 +31,7 @@ def run(options: Options) -> int:
     check_writable(options.out, "scene", must_be_new=not options.force)
     spec = compose(mission, start=Swarm(mission, [options.seed]).states)
     spec.compile()
-    with atomic_write(options.out) as part:
-        part.write_text(spec.to_xml(), encoding="utf-8")
+    write_text(options.out, spec.to_xml())
     console = plain_console()
     side = f"{mission.side_m:.0f} m"
     console.print(f"Wrote {options.out}: {mission.num_robots} robots on {side} by {side}")

@@ -1,7 +1,6 @@
 """Results of evaluations as files: one row per policy and regime, as CSV or JSON."""
 
 import csv
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, asdict, dataclass, fields
@@ -9,7 +8,7 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, get_args
 
-from swarm_mj.io.atomic_file import atomic_write
+from swarm_mj.io import atomic
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,7 +132,7 @@ def write_csv(path: Path, results: Sequence[Result]) -> None:
     Raises:
         OSError: The file cannot be written.
     """
-    with atomic_write(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+    with atomic.atomic_write(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
         writer.writerows(asdict(result) for result in results)
@@ -157,9 +156,7 @@ def write_json(
         asdict(result) | {name: list(values) for name, values in lists.items()}
         for result, lists in zip(results, missions, strict=True)
     ]
-    with atomic_write(path) as part:
-        text = json.dumps({"results": objects}, indent=2, allow_nan=False)
-        part.write_text(text + "\n", encoding="utf-8")
+    atomic.write_json(path, {"results": objects})
 
 
 def _check_header(path: Path, header: Sequence[str]) -> None:

@@ -16,7 +16,7 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
-from swarm_mj.io.atomic_file import atomic_write
+from swarm_mj.io.atomic import atomic_write
 from swarm_mj.learning.mission_batch import ActionHistory
 from swarm_mj.learning.run_folder import Accumulator, Progress
 from swarm_mj.learning.settings import Training

@@ -8,8 +8,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.io.atomic_directory import atomic_directory, present_folder
-from swarm_mj.io.atomic_file import atomic_write
+from swarm_mj.io.atomic import atomic_directory, atomic_write, present_folder, write_json
 from swarm_mj.learning.settings import Training, from_json
 from swarm_mj.protocol.costs import WindowCosts
 
@@ -103,8 +102,7 @@ def write_run(folder: Path, run: Run) -> None:
         "init": None if run.init is None else str(run.init.resolve()),
     }
     folder.mkdir(parents=True, exist_ok=True)
-    with atomic_write(folder / SETTINGS) as part:
-        part.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    write_json(folder / SETTINGS, document)
 
 
 def read_run(folder: Path) -> Run:

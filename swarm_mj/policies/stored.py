@@ -11,7 +11,7 @@ from torch import Tensor
 from swarm_mj.gnn.fast import FastAggregationGnn
 from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.network import AggregationGnn
-from swarm_mj.io.atomic_directory import atomic_directory, present_folder
+from swarm_mj.io.atomic import atomic_directory, present_folder
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn import LearnedPolicy
 from swarm_mj.policies.model_card import model_card

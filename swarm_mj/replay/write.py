@@ -4,7 +4,7 @@ from pathlib import Path
 
 import rerun as rr
 
-from swarm_mj.io.atomic_file import atomic_write
+from swarm_mj.io.atomic import atomic_write
 from swarm_mj.mission import Mission
 from swarm_mj.replay import arena, charts, palette
 from swarm_mj.replay.frame import frame

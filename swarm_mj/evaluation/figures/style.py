@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from swarm_mj.io.atomic_file import atomic_write
+from swarm_mj.io.atomic import atomic_write
 
 WIDTH_IN = 7.5  # shown at 900 pixels, a point of type is 1.7 pixels
 DPI = 240

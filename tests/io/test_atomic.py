@@ -1,11 +1,55 @@
-"""Folders are replaced whole: a failure or a kill at any moment leaves one that is."""
+"""Files and folders are replaced whole: a failure or a kill at any moment leaves one that is."""
 
+import json
 import shutil
 from pathlib import Path
 
 import pytest
 
-from swarm_mj.io.atomic_directory import atomic_directory, present_folder
+from swarm_mj.io.atomic import atomic_directory, atomic_write, present_folder, write_json
+
+
+def test_a_file_appears_when_it_is_whole(tmp_path):
+    path = tmp_path / "a" / "b.txt"
+    with atomic_write(path) as part:
+        part.write_text("text")
+        assert not path.exists()
+    assert path.read_text() == "text"
+    assert list(path.parent.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("failure", [OSError, KeyboardInterrupt])
+def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path, failure):
+    path = tmp_path / "summary.json"
+    path.write_text("old")
+
+    def write_half():
+        with atomic_write(path) as part:
+            part.write_text("ne")
+            raise failure
+
+    with pytest.raises(failure):
+        write_half()
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_link_stays_and_its_file_is_replaced(tmp_path):
+    (tmp_path / "real").write_text("old")
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "real")
+    with atomic_write(link) as part:
+        part.write_text("new")
+    assert link.is_symlink()
+    assert (tmp_path / "real").read_text() == "new"
+
+
+def test_what_json_cannot_say_is_not_written(tmp_path):
+    write_json(tmp_path / "a.json", {"aoi": 1.5, "name": "ä", "none": None})
+    assert json.loads((tmp_path / "a.json").read_text()) == {"aoi": 1.5, "name": "ä", "none": None}
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        write_json(tmp_path / "a.json", {"aoi": float("nan")})
+    assert json.loads((tmp_path / "a.json").read_text())["aoi"] == 1.5
 
 
 def write(path, text):
