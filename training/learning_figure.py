@@ -5,24 +5,35 @@
 Writes assets/figures/learning.svg and .png.
 """
 
+import csv
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
 
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
 from swarm_mj.cli import script
-from swarm_mj.evaluation.figures.learning import LearningCurve, LearningPanel, Level, draw_learning
-from swarm_mj.evaluation.figures.style import save
+from swarm_mj.evaluation.figures.style import CAPTION, FAINT, INK, WIDTH_IN, look_of, save, styled
 from swarm_mj.evaluation.results import read_results
 from swarm_mj.fields import setting
 
 RESULTS = Path("training/results/learning")
+SCHEDULES = ("tdma", "spatial-tdma")
 PURPLE = "#aa3377"
 TITLE = "Training the shipped gnn: mean over teams of 20, 40 and 80 robots at rest"
-CAPTION = (
+SAID = (
     "Curve: 12 held-out missions a size, mean ± SEM. Levels: 8 missions a size from seed 3000. "
     "training/shipped_gnn.py, seed 1, commit e15dd2968009"
 )
+HEIGHT_IN = 3.1 + 0.45  # of the axes, of the caption below
+PALE, BAND = 0.85, 0.15  # of the line, of its standard error
+MOST_AGE = 1.25  # the axis ends above the highest level, by so much; the curve may begin above it
+COLUMNS = ("minutes", "aoi", "aoi_sem")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,22 +45,71 @@ class LearningFigure:
 
     def __call__(self) -> int:
         """Draws it."""
-        curve = LearningCurve(
-            label="gnn (T, M, P only)", colour=PURPLE, files=(self.results / "rest-curve.csv",)
-        )
-        panel = LearningPanel(title=TITLE, x="minutes", curves=(curve,), levels=self._levels())
-        figure = draw_learning([panel], CAPTION)
+        figure = draw(read_curve(self.results / "rest-curve.csv"), self._levels())
         for kind in ("svg", "png"):
             save(figure, self.out.with_suffix(f".{kind}"))
         return 0
 
-    def _levels(self) -> tuple[Level, ...]:
-        """What the schedules cost, the mean over the same sizes of the team."""
+    def _levels(self) -> dict[str, float]:
+        """What the schedules cost, the mean over the same sizes of the team [windows]."""
         results = read_results(self.results / "candidates-rest.csv")
-        return tuple(
-            Level(policy=name, aoi=mean(r.aoi_mean for r in results if r.policy == name))
-            for name in ("tdma", "spatial-tdma")
-        )
+        return {
+            name: mean(result.aoi_mean for result in results if result.policy == name)
+            for name in SCHEDULES
+        }
+
+
+def read_curve(path: Path) -> dict[str, np.ndarray]:
+    """The columns of a learning curve that are drawn, by their names.
+
+    Raises:
+        ValueError: It is no learning curve.
+        OSError: It cannot be read.
+    """
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    try:
+        if not rows:
+            raise KeyError(COLUMNS)
+        return {name: np.array([float(row[name]) for row in rows]) for name in COLUMNS}
+    except (KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{path} is no learning curve with {', '.join(COLUMNS)}") from error
+
+
+def draw(curve: Mapping[str, np.ndarray], levels: Mapping[str, float]) -> Figure:
+    """The curve over the minutes of training, and the levels of policies that do not learn."""
+    with styled():
+        drawing = Figure(figsize=(WIDTH_IN, HEIGHT_IN), layout="constrained")
+        axes = drawing.subplots()
+        age, sem = curve["aoi"], curve["aoi_sem"]
+        axes.plot(curve["minutes"], age, color=PURPLE, alpha=PALE, label="gnn (T, M, P only)")
+        band = {"color": PURPLE, "alpha": BAND, "linewidth": 0.0}
+        axes.fill_between(curve["minutes"], age - sem, age + sem, **band)
+        for policy, level in levels.items():
+            _draw_level(axes, policy, level)
+        axes.set_title(TITLE, loc="left", color=INK)
+        axes.set_xlabel("minutes of training")
+        axes.set_ylabel("age of information [windows]")
+        axes.set_ylim(0.0, MOST_AGE * max(levels.values()))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.legend(loc="lower right", frameon=False, fontsize=8)
+        drawing.supxlabel(SAID, x=0.01, ha="left", fontsize=7, color=FAINT, gid=CAPTION)
+    return drawing
+
+
+def _draw_level(axes: Axes, policy: str, level: float) -> None:
+    """A dotted line, named with its cost beside the axes."""
+    look = look_of(policy)
+    axes.axhline(level, color=look.colour, linewidth=0.9, linestyle=(0, (1, 1.5)))
+    axes.annotate(
+        f"{look.label} {level:.1f}",
+        (1.01, level),
+        xycoords=("axes fraction", "data"),
+        color=look.ink,
+        fontsize=8,
+        va="center",
+        annotation_clip=False,
+    )
 
 
 if __name__ == "__main__":
