@@ -1,18 +1,17 @@
 """How fast the paper's network decides, on its own and for a team, and how fast both arms train."""
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import torch
-from jaxtyping import Int
 from stable_baselines3.common.callbacks import BaseCallback
 
-from swarm_mj.benchmark.simulation import microseconds
+from swarm_mj.benchmark.simulation import Row, microseconds
 from swarm_mj.gnn.fast import FastAggregationGnn
 from swarm_mj.gnn.feature_sets import make_extractor
-from swarm_mj.gnn.graphs import Graphs, PaperFeatures
+from swarm_mj.gnn.graphs import PaperFeatures
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.learning.settings import arm_settings
 from swarm_mj.learning.train import make_model
@@ -25,86 +24,57 @@ WARM_UP_WINDOWS = 100  # after which most robots know most others
 SHAPE = GnnShape(num_features=len(PaperFeatures.names))  # the paper's
 
 
-@dataclass(frozen=True, kw_only=True)
-class NetworkTiming:
-    """The paper's network (K = 5, width 64) on the CPU.
-
-    The yardstick is a plain product of the same numbers: as many rows as the network has nodes,
-    through one 64 by 64 layer, in the same run.
-    """
-
-    num_missions: int
-    forward_per_s: float  # team decisions
-    backward_per_s: float  # team decisions, forward included
-    layer_us: float  # one layer over all nodes of a team, the yardstick
-
-    @property
-    def forward_in_layers(self) -> float:
-        """A team's decision in such layers."""
-        return 1e6 / self.forward_per_s / self.layer_us
-
-
-@dataclass(frozen=True, kw_only=True)
-class LearningTiming:
-    """How fast learning and deciding are at 40 stationary robots."""
-
-    networks: tuple[NetworkTiming, ...]
-    own_decision_us: dict[str, float]  # one robot's network on its own graph, by what it is
-    training_per_s: dict[str, float]  # team decisions, rollouts and optimisation, by arm
-
-
-def bench_learning(
+def learning_rows(
     *, num_robots: int = NUM_ROBOTS, threads: int = 1, seconds: float = 2.0
-) -> LearningTiming:
-    """Times the networks and the arms; no weights are kept.
+) -> Iterator[Row]:
+    """Times the networks and the arms, in team decisions per second; no weights are kept.
 
     Args:
         num_robots: N.
         threads: torch's.
         seconds: About how long each measurement takes [s].
-
-    Returns:
-        The timing.
     """
     torch.set_num_threads(threads)
     mission = paper("stationary", num_robots=num_robots)
+    for num_missions in (1, 32):
+        yield from _network_rows(mission, num_missions, seconds)
+    for arm in ("robot", "team"):
+        yield Row(f"training, arm {arm}", _training_per_s(arm, mission, threads, seconds), "{:.1f}")
     robot = arm_settings("robot", mission, (num_robots,))
     own = {"arm robot's": (robot.network, robot.features), "the paper's": (SHAPE, "paper")}
-    return LearningTiming(
-        networks=tuple(_network_timing(mission, missions, seconds) for missions in (1, 32)),
-        own_decision_us={
-            name: _own_decision_us(mission, shape, features, seconds)
-            for name, (shape, features) in own.items()
-        },
-        training_per_s={
-            arm: _training_per_s(arm, mission, threads, seconds) for arm in ("robot", "team")
-        },
-    )
+    for name, (shape, features) in own.items():
+        node, parent = (rows[:1] for rows in _graphs(mission, features, 1))
+        decision_us = _forward_us(FastAggregationGnn(shape), node, parent, seconds=seconds / 2)
+        yield Row(f"one robot's decision, {name} network, µs", decision_us, "{:.0f}")
 
 
-def _network_timing(mission: Mission, num_missions: int, seconds: float) -> NetworkTiming:
+def _network_rows(mission: Mission, num_missions: int, seconds: float) -> Iterator[Row]:
+    """The paper's network (K = 5, width 64) on the CPU.
+
+    The yardstick is a plain product of the same numbers: as many rows as the network has nodes,
+    through one 64 by 64 layer, in the same run.
+    """
     network = FastAggregationGnn(SHAPE)
-    node, parent = _tensors(_graphs(mission, "paper", num_missions))
+    node, parent = _graphs(mission, "paper", num_missions)
     layer = torch.nn.Linear(SHAPE.latent, SHAPE.latent)
     rows = torch.randn(node.shape[0] * node.shape[1], SHAPE.latent)
 
     def learn() -> None:
         network(node, parent).sum().backward()
 
-    forward_us = microseconds(_inferring(lambda: network(node, parent)), seconds)
-    return NetworkTiming(
-        num_missions=num_missions,
-        forward_per_s=1e6 * num_missions / forward_us,
-        backward_per_s=1e6 * num_missions / microseconds(learn, seconds),
-        layer_us=microseconds(_inferring(lambda: layer(rows)), seconds / 2) / num_missions,
-    )
+    forward_us = _forward_us(network, node, parent, seconds=seconds)
+    backward_us = microseconds(learn, seconds)
+    layer_us = _forward_us(layer, rows, seconds=seconds / 2)
+    missions = f"{num_missions} mission{'s' if num_missions > 1 else ''}"
+    forward_per_s, backward_per_s = (1e6 * num_missions / us for us in (forward_us, backward_us))
+    yield Row(f"the paper's network, {missions}, forward", forward_per_s, "{:.0f}")
+    yield Row("  in 64 x 64 layers over as many nodes", forward_us / layer_us, "{:.1f} x")
+    yield Row("  forward and backward", backward_per_s, "{:.0f}")
 
 
-def _own_decision_us(mission: Mission, shape: GnnShape, features: str, seconds: float) -> float:
-    """One robot's network on its own graph [µs]."""
-    network = FastAggregationGnn(shape)
-    node, parent = (rows[:1] for rows in _tensors(_graphs(mission, features, 1)))
-    return microseconds(_inferring(lambda: network(node, parent)), seconds / 2)
+def _forward_us(network: torch.nn.Module, *inputs: torch.Tensor, seconds: float) -> float:
+    """What a network takes that does not learn [µs]."""
+    return microseconds(torch.inference_mode()(lambda: network(*inputs)), seconds)
 
 
 def _training_per_s(arm: str, mission: Mission, threads: int, seconds: float) -> float:
@@ -122,7 +92,8 @@ def _training_per_s(arm: str, mission: Mission, threads: int, seconds: float) ->
     model, _ = make_model(fewer)
     clock = _Clock(seconds)
     model.learn(10**12, callback=clock, log_interval=10**9)
-    return clock.num_rollouts * ppo.num_steps * fewer.missions / clock.elapsed_s
+    num_rollouts = len(clock.starts_s) - 1
+    return num_rollouts * ppo.num_steps * fewer.missions / clock.elapsed_s
 
 
 class _Clock(BaseCallback):
@@ -131,27 +102,25 @@ class _Clock(BaseCallback):
     def __init__(self, seconds: float) -> None:
         super().__init__()
         self._seconds = seconds
-        self._starts_s: list[float] = []
-
-    @property
-    def num_rollouts(self) -> int:
-        """Timed ones."""
-        return len(self._starts_s) - 2
+        self._has_warmed_up = False
+        self.starts_s: list[float] = []  # of rollouts, from the second one on
 
     @property
     def elapsed_s(self) -> float:
-        """From the second rollout's start to the last one's."""
-        return self._starts_s[-1] - self._starts_s[1]
+        """Over whole rollouts."""
+        return self.starts_s[-1] - self.starts_s[0] if self.starts_s else 0.0
 
     def _on_rollout_start(self) -> None:
-        self._starts_s.append(time.perf_counter())
+        if self._has_warmed_up:
+            self.starts_s.append(time.perf_counter())
+        self._has_warmed_up = True
 
     def _on_step(self) -> bool:
-        return self.num_rollouts < 1 or self.elapsed_s < self._seconds
+        return self.elapsed_s < self._seconds
 
 
-def _graphs(mission: Mission, features: str, num_missions: int) -> Graphs:
-    """What teams see that have talked for a while."""
+def _graphs(mission: Mission, features: str, num_missions: int) -> tuple[torch.Tensor, ...]:
+    """What teams see that have talked for a while: features and parents of all robots' nodes."""
     swarm, policy = Swarm(mission, range(num_missions)), RoundRobin()
     extractor = make_extractor(features, mission)
     extractor.start(num_missions, mission.num_robots)
@@ -159,17 +128,4 @@ def _graphs(mission: Mission, features: str, num_missions: int) -> Graphs:
     for _ in range(WARM_UP_WINDOWS):
         swarm.step(policy)
         graphs = extractor.graphs(swarm.views)
-    return graphs
-
-
-def _tensors(graphs: Graphs) -> tuple[torch.Tensor, torch.Tensor]:
-    parent: Int[np.ndarray, "R N"] = graphs.parent.astype(np.int64)
-    return torch.from_numpy(graphs.node), torch.from_numpy(parent)
-
-
-def _inferring(call: Callable[[], object]) -> Callable[[], None]:
-    def infer() -> None:
-        with torch.inference_mode():
-            call()
-
-    return infer
+    return torch.from_numpy(graphs.node), torch.from_numpy(graphs.parent.astype(np.int64))

@@ -1,11 +1,13 @@
 """How fast the simulation is: windows per second, whole and in parts, beside plain MuJoCo steps.
 
-And how long an evaluation takes, the oracle, and a robot that plans.
+And how long an evaluation takes, the oracle, and a robot that plans. A loop of plain mj_steps in
+the same run is the yardstick.
 """
 
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Int
@@ -36,50 +38,24 @@ DENSE = replace(MISSION, range_ratio=1.0)
 PLAN_SIZES = (40, 80, 200)  # robots
 
 
-@dataclass(frozen=True, kw_only=True)
-class Timing:
-    """The speed of B missions side by side; times are per window of one mission."""
+class Row(NamedTuple):
+    """A line of a table."""
 
-    num_missions: int
-    windows_per_s: float  # the whole simulation
-    mj_step_us: float  # a plain loop of mj_step over as many worlds, the yardstick of this run
-    parts_us: dict[str, float]
-
-    @property
-    def in_mj_steps(self) -> float:
-        """A whole window's time in plain mj_steps."""
-        return 1e6 / self.windows_per_s / self.mj_step_us
+    name: str
+    value: float
+    form: str = "{:.2f}"  # of the value
+    ends_section: bool = False
 
 
-@dataclass(frozen=True, kw_only=True)
-class EvaluationTiming:
-    """How long an evaluation takes: random walks of 40 robots, from empty buffers to the last."""
-
-    episodes: int
-    num_jobs: int
-    baselines_s: float  # the paper's three baselines over all episodes, starting the jobs included
-    oracle_s: float  # the oracle over one episode, one process
-    plan_ms: Mapping[int, float]  # by team size: a robot's plan of one epoch, made at once
-    dense_plan_ms: float  # of the first size, where everyone hears everyone
-    mj_step_us: float  # the yardstick of this run, as above
-
-    @property
-    def window_in_mj_steps(self) -> float:
-        """A window of the baselines on the wall clock, in plain mj_steps."""
-        num_windows = len(BASELINES) * self.episodes * MISSION.num_windows
-        return 1e6 * self.baselines_s / num_windows / self.mj_step_us
-
-
-def bench(num_missions: int, *, num_threads: int = 1, seconds: float = 2.0) -> Timing:
-    """Times random walks of 40 robots with round robin.
+def simulation_rows(
+    num_missions: int, *, num_threads: int = 1, seconds: float = 2.0
+) -> Iterator[Row]:
+    """Times random walks of 40 robots with round robin, per window of one mission.
 
     Args:
-        num_missions: B.
+        num_missions: B, side by side.
         num_threads: MuJoCo's own.
         seconds: About how long each measurement takes [s].
-
-    Returns:
-        The timing.
     """
     swarm = Swarm(MISSION, range(num_missions), num_threads=num_threads)
     policy = RoundRobin()
@@ -96,49 +72,51 @@ def bench(num_missions: int, *, num_threads: int = 1, seconds: float = 2.0) -> T
         "radio alone": lambda: swarm.channel(swarm.states.position_m, recipient),
         "hops (flights only)": lambda: mean_hops(swarm.buffers),
     }
-    whole_us = microseconds(lambda: swarm.step(policy), seconds)
-    return Timing(
-        num_missions=num_missions,
-        windows_per_s=1e6 * num_missions / whole_us,
-        mj_step_us=microseconds(_plain_steps(MISSION), seconds / 4),
-        parts_us={
-            name: microseconds(part, seconds / 4) / num_missions for name, part in parts.items()
-        },
-    )
+    window_us = microseconds(lambda: swarm.step(policy), seconds) / num_missions
+    step_us = microseconds(_plain_steps(MISSION), seconds / 4)
+    yield Row("windows per second", 1e6 / window_us, "{:,.0f}")
+    yield Row("one window, µs", window_us)
+    yield Row("  in plain mj_steps", window_us / step_us, "{:.2f} x")
+    yield Row("plain mj_step, µs", step_us, ends_section=True)
+    for name, part in parts.items():
+        yield Row(f"{name}, µs", microseconds(part, seconds / 4) / num_missions)
 
 
-def bench_evaluation(episodes: int, *, num_jobs: int = 2, seconds: float = 2.0) -> EvaluationTiming:
-    """Times an evaluation of the paper's baselines, and the oracle.
+def evaluation_rows(num_episodes: int, *, num_jobs: int = 2, seconds: float = 2.0) -> Iterator[Row]:
+    """Times an evaluation of the paper's baselines, the oracle, and a robot's plans of an epoch.
 
     Args:
-        episodes: Missions of each baseline; the oracle flies at most `ORACLE_EPISODES`.
-        num_jobs: Processes that share the baselines' missions.
-        seconds: About how long the plain steps are measured, four times over [s].
-
-    Returns:
-        The timing.
+        num_episodes: Missions of each baseline; the oracle flies at most `ORACLE_EPISODES`.
+        num_jobs: Processes that share the baselines' missions; starting them counts.
+        seconds: About how long the other measurements take, four times over [s].
     """
     for policy in (*BASELINES, "greedy-oracle"):  # compiles, if it never has
-        _fly(Study(policies=(policy,), regimes=(replace(MISSION, num_windows=1),), episodes=1), 1)
-    baselines = Study(policies=BASELINES, regimes=(MISSION,), episodes=episodes)
-    num_oracles = min(episodes, ORACLE_EPISODES)
-    oracle = Study(policies=("greedy-oracle",), regimes=(MISSION,), episodes=num_oracles)
-    return EvaluationTiming(
-        episodes=episodes,
-        num_jobs=num_jobs,
-        baselines_s=_fly(baselines, num_jobs),
-        oracle_s=_fly(oracle, 1) / num_oracles,
-        plan_ms={
-            size: microseconds(_planning(replace(MISSION, num_robots=size)), seconds / 4) / 1000.0
-            for size in PLAN_SIZES
-        },
-        dense_plan_ms=microseconds(_planning(DENSE), seconds / 4) / 1000.0,
-        mj_step_us=microseconds(_plain_steps(MISSION), seconds / 4),
+        _flying_s(policy, num_episodes=1, mission=replace(MISSION, num_windows=1))
+    baselines_s = _flying_s(*BASELINES, num_episodes=num_episodes, num_jobs=num_jobs)
+    step_us = microseconds(_plain_steps(MISSION), seconds / 4)
+    num_windows = len(BASELINES) * num_episodes * MISSION.num_windows
+    yield Row(f"{', '.join(BASELINES)}; {num_jobs} jobs, s", baselines_s, "{:.1f}")
+    yield Row(
+        "  one window, in plain mj_steps", 1e6 * baselines_s / num_windows / step_us, "{:.2f} x"
     )
+    num_oracles = min(num_episodes, ORACLE_EPISODES)
+    oracle_s = _flying_s("greedy-oracle", num_episodes=num_oracles)
+    yield Row("greedy-oracle, one episode, s", oracle_s / num_oracles)
+    for size in PLAN_SIZES:
+        plan_ms = microseconds(_planning(replace(MISSION, num_robots=size)), seconds / 4) / 1000.0
+        num_halves = 2 * regular_length(size, PlannerSettings().epochs)
+        yield Row(f"planner, one robot's plan of an epoch, {size} robots, ms", plan_ms, "{:.1f}")
+        yield Row("  for each half window, ms", plan_ms / num_halves)
+    dense_ms = microseconds(_planning(DENSE), seconds / 4) / 1000.0
+    yield Row("  of 40 robots at range ratio 1, ms", dense_ms, "{:.1f}")
+    yield Row("plain mj_step, µs", step_us)
 
 
-def _fly(study: Study, num_jobs: int) -> float:
-    """Wall time of a study's missions [s]."""
+def _flying_s(
+    *policies: str, num_episodes: int, num_jobs: int = 1, mission: Mission = MISSION
+) -> float:
+    """Wall time of an evaluation's missions [s]."""
+    study = Study(policies=policies, regimes=(mission,), episodes=num_episodes)
     start_s = time.perf_counter()
     for _ in run_jobs(fly_batch, study.batches, num_jobs):
         pass

@@ -2,28 +2,26 @@
 
 import pytest
 
-from swarm_mj.benchmark.learning import NetworkTiming, bench_learning
+from swarm_mj.benchmark.learning import learning_rows
 
 
 @pytest.fixture(scope="module")
-def timing():
-    return bench_learning(num_robots=4, seconds=0.05)
+def rows():
+    return list(learning_rows(num_robots=4, seconds=0.05))
 
 
-def test_networks_are_timed_alone_and_by_the_batch(timing):
-    assert [each.num_missions for each in timing.networks] == [1, 32]
-    for each in timing.networks:
-        assert 0.0 < each.backward_per_s < each.forward_per_s
-        assert each.layer_us > 0.0
+def test_networks_are_timed_alone_and_by_the_batch(rows):
+    for first, missions in ((0, "1 mission"), (3, "32 missions")):
+        forward, layers, backward = rows[first : first + 3]
+        assert forward.name == f"the paper's network, {missions}, forward"
+        assert 0.0 < backward.value < forward.value
+        assert layers.value > 1.0
 
 
-def test_both_arms_train_and_both_networks_decide(timing):
-    assert set(timing.training_per_s) == {"robot", "team"}
-    assert set(timing.own_decision_us) == {"arm robot's", "the paper's"}
-    assert all(value > 0.0 for value in timing.training_per_s.values())
-    assert all(value > 0.0 for value in timing.own_decision_us.values())
-
-
-def test_a_decision_in_layers():
-    each = NetworkTiming(num_missions=1, forward_per_s=200.0, backward_per_s=50.0, layer_us=100.0)
-    assert each.forward_in_layers == pytest.approx(50.0)
+def test_both_arms_train_and_both_networks_decide(rows):
+    named = {row.name: row.value for row in rows}
+    for name in (
+        *("training, arm robot", "training, arm team"),
+        *(f"one robot's decision, {whose} network, µs" for whose in ("arm robot's", "the paper's")),
+    ):
+        assert named[name] > 0.0

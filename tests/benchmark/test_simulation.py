@@ -2,21 +2,22 @@
 
 import pytest
 
-from swarm_mj.benchmark.simulation import bench, bench_evaluation
+from swarm_mj.benchmark.simulation import evaluation_rows, simulation_rows
 
 
 def test_a_timing_is_consistent():
-    timing = bench(2, seconds=0.05)
-    assert timing.num_missions == 2
-    assert timing.windows_per_s > 0
-    assert all(part > 0 for part in timing.parts_us.values())
-    whole_us = 1e6 / timing.windows_per_s
-    assert timing.in_mj_steps == pytest.approx(whole_us / timing.mj_step_us)
+    rows = {row.name: row.value for row in simulation_rows(2, seconds=0.05)}
+    assert all(value > 0 for value in rows.values())
+    assert rows["windows per second"] == pytest.approx(1e6 / rows["one window, µs"])
+    in_steps = rows["one window, µs"] / rows["plain mj_step, µs"]
+    assert rows["  in plain mj_steps"] == pytest.approx(in_steps)
+    assert rows["radio alone, µs"] < rows["one window, µs"]
 
 
 def test_an_evaluations_timing_is_consistent():
-    timing = bench_evaluation(2, num_jobs=1, seconds=0.05)
-    assert (timing.episodes, timing.num_jobs) == (2, 1)
-    assert timing.oracle_s > 0
-    window_us = 1e6 * timing.baselines_s / (3 * 2 * 500)  # three baselines, 500 windows each
-    assert timing.window_in_mj_steps == pytest.approx(window_us / timing.mj_step_us)
+    rows = {row.name: row.value for row in evaluation_rows(2, num_jobs=1, seconds=0.05)}
+    assert all(value > 0 for value in rows.values())
+    baselines_s = rows["random-flooding, round-robin, mst; 1 jobs, s"]
+    window_us = 1e6 * baselines_s / (3 * 2 * 500)  # three baselines, 500 windows each
+    in_steps = window_us / rows["plain mj_step, µs"]
+    assert rows["  one window, in plain mj_steps"] == pytest.approx(in_steps)

@@ -75,7 +75,7 @@ def test_bench_prints_the_whole_and_its_parts(swarm_mj):
 
 def test_bench_times_learning_and_leaves_the_evaluation_out(monkeypatch, capsys):
     """In teams of 4, for speed."""
-    monkeypatch.setattr(learning, "bench_learning", partial(learning.bench_learning, num_robots=4))
+    monkeypatch.setattr(learning, "learning_rows", partial(learning.learning_rows, num_robots=4))
     assert main(["bench", "--missions", "1", "--seconds", "0.1", "--episodes", "0"]) == 0
     printed = capsys.readouterr().out
     assert "Evaluation" not in printed
