@@ -2,19 +2,18 @@
 
 import numpy as np
 import rerun as rr
-from jaxtyping import Float
+from jaxtyping import UInt8
 
 from swarm_mj.mission import Mission
 from swarm_mj.replay import palette
 from swarm_mj.replay.frame import Frame
 from swarm_mj.replay.links import Links, ends, transmitters
-from swarm_mj.replay.sheet import Sheet, screen
+from swarm_mj.replay.sheet import Sheet
 
 SQUARE_M = 100.0
 MAX_SQUARES = 60  # across the ground; more would be too small to see
 TRAIL_WINDOWS = 150
 TRAIL_STRIDE = 15
-HALO_POINTS = 9.0  # around a transmitter, on the screen
 LOST_SHARE = 0.6  # a lost packet's arrow stops short of its receiver
 HEADING_SHARE = 0.06  # a heading's length, of half the map's width
 RING_SHARE = 0.014  # the radius of a ring around a believed position, likewise
@@ -29,19 +28,11 @@ def draw_area(sheet: Sheet, mission: Mission) -> None:
         sheet.timed("arena", rr.Transform3D.columns(translation=away, mat3x3=mirrors))
     else:
         sheet.fixed("arena", rr.Transform3D(mat3x3=MIRROR))
-    sheet.fixed(
-        "arena/area/grid",
-        rr.LineStrips2D(
-            _grid(sheet.frame), colors=[palette.GRID], radii=screen(0.5), draw_order=-20
-        ),
-    )
+    sheet.fixed_layer("arena/area/grid", strips=_grid(sheet.frame))
     half = mission.half_side_m
-    outline = [[(-half, -half), (half, -half), (half, half), (-half, half), (-half, -half)]]
-    name, colour = ("walls", palette.WALL) if mission.has_walls else ("outline", palette.OUTLINE)
-    sheet.fixed(
-        f"arena/area/{name}",
-        rr.LineStrips2D(outline, colors=[colour], radii=screen(1.5), draw_order=-19),
-    )
+    outline = [(-half, -half), (half, -half), (half, half), (-half, half), (-half, -half)]
+    name = "walls" if mission.has_walls else "outline"
+    sheet.fixed_layer(f"arena/area/{name}", strips=[outline])
 
 
 def square_m(frame: Frame) -> float:
@@ -50,23 +41,14 @@ def square_m(frame: Frame) -> float:
     return SQUARE_M * 10.0 ** max(0, int(np.ceil(np.log10(across_m / SQUARE_M / MAX_SQUARES))))
 
 
-def draw_robots(sheet: Sheet, full_scale: float) -> None:
-    """Robots in the colour of the age of what the ego robot knows, or off; headings and trails."""
+def draw_robots(sheet: Sheet, colours: UInt8[np.ndarray, "T N 3"]) -> None:
+    """Robots in their colours, or off; the ego robot's ring; headings and trails."""
     log = sheet.log
-    num_windows, num_robots = log.parent.shape
-    per_window = [num_robots] * num_windows
-    colours = palette.age_colours(log.ego_age, full_scale, log.is_known)
-    colours[:, log.ego] = palette.EGO
-    colours[~log.is_on] = palette.SWITCHED_OFF
-    names = [f"r{i}" for i in range(num_robots)]
-    sheet.layer(
-        "arena/robots",
-        rr.Points2D,
-        {"radii": screen(5.5), "labels": names, "show_labels": False, "draw_order": 30.0},
-        per_window,
-        positions=log.position_m.reshape(-1, 2),
-        colors=colours.reshape(-1, 3),
-    )
+    shown = np.where(log.is_on[..., None], colours, np.array(palette.SWITCHED_OFF, np.uint8))
+    names = [f"r{i}" for i in range(log.parent.shape[1])]
+    sheet.fixed("arena/robots", rr.Points2D.from_fields(labels=names, show_labels=False))
+    where = log.position_m.reshape(-1, 2)
+    sheet.layer("arena/robots", positions=where, colors=shown.reshape(-1, 3))
     if log.has_motion:
         _draw_headings(sheet)
         _draw_trails(sheet)
@@ -76,36 +58,53 @@ def draw_robots(sheet: Sheet, full_scale: float) -> None:
 def draw_beliefs(sheet: Sheet) -> None:
     """A ring where the ego robot believes each robot to be, and a line from there to the truth."""
     log = sheet.log
-    shown = log.is_known & (np.arange(log.parent.shape[1]) != log.ego)
-    believed, truth = log.believed_m[shown], log.position_m[shown]
-    per_window = np.sum(shown, axis=1)
-    look = (palette.dim(palette.BELIEF, 0.8), 0.6, 3.0)
-    sheet.lines("arena/belief/error", (believed, truth), per_window, look)
-    radius_m = RING_SHARE * sheet.frame.reach_m
-    style = {"colors": [palette.BELIEF], "line_radii": screen(0.8), "draw_order": 4.0}
-    _draw_rings(sheet, "arena/belief/ring", believed, radius_m, per_window, style)
+    row, other = np.nonzero(log.is_other_known)
+    believed = log.believed_m[row, other]
+    sheet.lines("arena/belief/error", believed, log.position_m[row, other], row)
+    sheet.rings("arena/belief/ring", believed, RING_SHARE * sheet.frame.reach_m, row)
 
 
 def draw_tree_on_map(sheet: Sheet) -> None:
     """The ego robot's parent tree between the robots' true positions."""
     log = sheet.log
-    row, child = np.nonzero(log.is_known & (np.arange(log.parent.shape[1]) != log.ego))
-    links = Links(
-        num_windows=len(log.window), row=row, sender=log.parent[row, child], receiver=child
-    )
-    sheet.lines("arena/tree", ends(log, links), links.per_window, (palette.TREE, 0.8, 6.0))
+    row, child = np.nonzero(log.is_other_known)
+    parent = log.parent[row, child]
+    sheet.lines("arena/tree", log.position_m[row, parent], log.position_m[row, child], row)
 
 
 def draw_radio(sheet: Sheet, packets: dict[str, Links], range_m: float) -> None:
-    """Ranges of those who transmit, and their packets: to hearers, or by fate to addressees."""
-    _draw_ranges(sheet, range_m)
-    if sheet.log.is_broadcast:
-        _draw_broadcasts(sheet, packets["heard"])
+    """Who transmits first, the range in silence around them, and all packets by their fate."""
+    log = sheet.log
+    row, sender = np.nonzero(transmitters(log))
+    where = log.position_m[row, sender]
+    sheet.rings("arena/radio/range", where, range_m, row)
+    if log.is_broadcast:
+        sheet.layer("arena/radio/transmitter", row, positions=where)
     else:
-        _draw_requests(sheet, packets)
-        _draw_responses(sheet, packets)
-        look = (palette.dim(palette.OVERHEARD, 0.6), 0.7, 10.0)
-        _draw_lines(sheet, "overheard", packets["overheard"], look)
+        lost = packets["lost"]
+        sheet.lines("arena/radio/lost/rest", *ends(log, lost), lost.row)
+    aside_m = 0.8 * RING_SHARE * sheet.frame.reach_m  # an answer stands beside its request
+    arrows = {
+        "delivered": (1.0, 0.0),
+        "lost": (LOST_SHARE, 0.0),
+        "answered": (1.0, aside_m),
+        "unanswered": (LOST_SHARE, aside_m),
+    }
+    for fate, links in packets.items():
+        if fate in arrows:
+            _draw_arrows(sheet, fate, links, *arrows[fate])
+        else:
+            sheet.lines(f"arena/radio/{fate}", *ends(log, links), links.row)
+
+
+def _draw_arrows(sheet: Sheet, fate: str, links: Links, share: float, aside_m: float) -> None:
+    """Packets as arrows, so much of the way to their receivers and so far to its left."""
+    start, end = ends(sheet.log, links)
+    way = end - start
+    length = np.linalg.norm(way, axis=1, keepdims=True)
+    left = np.stack([-way[:, 1], way[:, 0]], axis=1) / np.maximum(length, 1e-6)
+    origins, vectors = start + aside_m * left, share * way
+    sheet.layer(f"arena/radio/{fate}", links.row, origins=origins, vectors=vectors)
 
 
 def _grid(frame: Frame) -> list[list[tuple[float, float]]]:
@@ -119,14 +118,11 @@ def _grid(frame: Frame) -> list[list[tuple[float, float]]]:
 
 def _draw_headings(sheet: Sheet) -> None:
     """A line into the direction of flight; all have one length, for agreement is in directions."""
-    log = sheet.log
-    velocity = log.velocity_mps.reshape(-1, 2)
+    velocity = sheet.log.velocity_mps.reshape(-1, 2)
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
     way = HEADING_SHARE * sheet.frame.reach_m * velocity / np.maximum(speed, 1e-9)
-    where = log.position_m.reshape(-1, 2)
-    per_window = [log.position_m.shape[1]] * len(log.window)
-    look = (palette.HEADING, 0.8, 29.0)
-    sheet.lines("arena/heading", (where, where + way), per_window, look)
+    where = sheet.log.position_m.reshape(-1, 2)
+    sheet.lines("arena/heading", where, where + way)
 
 
 def _draw_trails(sheet: Sheet) -> None:
@@ -134,10 +130,7 @@ def _draw_trails(sheet: Sheet) -> None:
     rows = np.arange(len(log.window))
     past = range(0, TRAIL_WINDOWS + 1, TRAIL_STRIDE)
     trail = np.stack([log.position_m[np.maximum(0, rows - ago)] for ago in past], axis=2)
-    per_window = [log.position_m.shape[1]] * len(rows)
-    style = {"colors": [palette.TRAIL], "radii": screen(1.0), "draw_order": -5.0}
-    strips = trail.reshape(-1, len(past), 2)
-    sheet.layer("arena/trail", rr.LineStrips2D, style, per_window, strips=strips)
+    sheet.layer("arena/trail", strips=trail.reshape(-1, len(past), 2))
 
 
 def _draw_ego(sheet: Sheet) -> None:
@@ -145,71 +138,7 @@ def _draw_ego(sheet: Sheet) -> None:
     log = sheet.log
     radius_m = 2.0 * RING_SHARE * sheet.frame.reach_m
     where = log.position_m[:, log.ego]
-    ring = {"colors": [palette.EGO], "line_radii": screen(1.2), "draw_order": 31.0}
-    size = {"half_sizes": [(radius_m, radius_m)]}
-    sheet.layer("arena/ego", rr.Ellipses2D, ring | size, centers=where)
-    name = {"radii": screen(0.1), "colors": [palette.EGO], "labels": [f"r{log.ego}"]}
-    below = where - (0.0, 3.0 * radius_m)
-    sheet.layer("arena/ego/name", rr.Points2D, name | {"show_labels": True}, positions=below)
-
-
-def _draw_ranges(sheet: Sheet, range_m: float) -> None:
-    """Circles of the range in silence around those who transmit first."""
-    row, sender = np.nonzero(transmitters(sheet.log))
-    centres = sheet.log.position_m[row, sender]
-    per_window = np.bincount(row, minlength=len(sheet.log.window))
-    style = {"colors": [palette.RANGE], "line_radii": screen(0.6), "draw_order": 1.0}
-    _draw_rings(sheet, "arena/radio/range", centres, range_m, per_window, style)
-
-
-def _draw_rings(
-    sheet: Sheet,
-    path: str,
-    centre: Float[np.ndarray, "L 2"],
-    radius_m: float,
-    per_window: np.ndarray,
-    style: dict[str, object],
-) -> None:
-    half_sizes = np.full(centre.shape, radius_m)
-    sheet.layer(path, rr.Ellipses2D, style, per_window, centers=centre, half_sizes=half_sizes)
-
-
-def _draw_broadcasts(sheet: Sheet, heard: Links) -> None:
-    """A halo around whoever transmits, and lines from there to all who decode it."""
-    row, sender = np.nonzero(transmitters(sheet.log))
-    where = sheet.log.position_m[row, sender]
-    per_window = np.bincount(row, minlength=len(sheet.log.window))
-    style = {"colors": [palette.BROADCAST], "radii": screen(HALO_POINTS), "draw_order": 25.0}
-    sheet.layer("arena/radio/transmitter", rr.Points2D, style, per_window, positions=where)
-    _draw_lines(sheet, "heard", heard, (palette.BROADCAST, 1.0, 18.0))
-
-
-def _draw_requests(sheet: Sheet, packets: dict[str, Links]) -> None:
-    delivered, lost = packets["delivered"], packets["lost"]
-    sheet.arrows("arena/radio/delivered", delivered, look=(palette.DELIVERED, 2.0, 20.0))
-    sheet.arrows("arena/radio/lost", lost, look=(palette.LOST, 1.8, 19.0), share=LOST_SHARE)
-    _draw_lines(sheet, "lost/rest", lost, (palette.dim(palette.LOST, 0.5), 0.7, 18.0))
-
-
-def _draw_responses(sheet: Sheet, packets: dict[str, Links]) -> None:
-    """Beside the requests that they answer."""
-    aside_m = 0.8 * RING_SHARE * sheet.frame.reach_m
-    sheet.arrows(
-        "arena/radio/answered",
-        packets["answered"],
-        look=(palette.ANSWERED, 1.5, 21.0),
-        aside_m=aside_m,
-    )
-    sheet.arrows(
-        "arena/radio/unanswered",
-        packets["unanswered"],
-        look=(palette.dim(palette.ANSWERED, 0.6), 1.2, 18.0),
-        share=LOST_SHARE,
-        aside_m=aside_m,
-    )
-
-
-def _draw_lines(
-    sheet: Sheet, name: str, links: Links, look: tuple[palette.Colour, float, float]
-) -> None:
-    sheet.lines(f"arena/radio/{name}", ends(sheet.log, links), links.per_window, look)
+    sheet.rings("arena/ego", where, radius_m)
+    name = rr.Points2D.from_fields(labels=[f"r{log.ego}"], show_labels=True)
+    sheet.fixed("arena/ego/name", name)
+    sheet.layer("arena/ego/name", positions=where - (0.0, 3.0 * radius_m))

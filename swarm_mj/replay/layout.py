@@ -21,19 +21,16 @@ MARGIN = 1.06  # of the map, around what it must show
 
 
 def layout(log: Log, frame: Frame, packets: dict[str, Links]) -> rrb.Blueprint:
-    """The blueprint of a replay.
-
-    Args:
-        log: What is shown.
-        frame: The part of the ground that the map shows.
-        packets: Its packets by their fate.
-
-    Returns:
-        Two tabs: the mission, and the radio of every robot.
-    """
+    """The blueprint of a replay: two tabs, the mission, and the radio of every robot."""
+    reach, follows = MARGIN * frame.reach_m, ", follows the team" if frame.moves else ""
+    name = f"Map, squares of {square_m(frame):g} m{follows}"
+    shown = _drawing("/", name, (-reach, reach), (-reach, reach), contents=["/arena/**"])
+    samples = _drawing(
+        "/legend", "Legend", (0.0, legend.WIDTH), (-3.5, legend.HEIGHT), titlebar=False
+    )
     charts = _charts(log, packets)
     mission = rrb.Horizontal(
-        rrb.Vertical(_map(frame), _legend(), row_shares=[4, 1]),
+        rrb.Vertical(shown, samples, row_shares=[4, 1]),
         rrb.Vertical(*charts, row_shares=[4, *[3] * (len(charts) - 1)]),
         column_shares=[11, 10],
         name="Mission",
@@ -54,27 +51,21 @@ def layout(log: Log, frame: Frame, packets: dict[str, Links]) -> rrb.Blueprint:
     )
 
 
-def _map(frame: Frame) -> rrb.Spatial2DView:
-    reach = MARGIN * frame.reach_m
-    follows = ", follows the team" if frame.moves else ""
+def _drawing(
+    origin: str,
+    name: str,
+    x_range: tuple[float, float],
+    y_range: tuple[float, float],
+    **options: Any,  # noqa: ANN401 - any of the view's
+) -> rrb.Spatial2DView:
+    """A part of the plane; the look does not depend on the viewer's theme."""
+    bounds = rrb.VisualBounds2D(x_range=x_range, y_range=y_range)
     return rrb.Spatial2DView(
-        origin="/",
-        contents=["/arena/**"],
-        name=f"Map, squares of {square_m(frame):g} m{follows}",
+        origin=origin,
+        name=name,
         background=palette.BACKGROUND,
-        visual_bounds=rrb.VisualBounds2D(x_range=[-reach, reach], y_range=[-reach, reach]),
-    )
-
-
-def _legend() -> rrb.Spatial2DView:
-    return rrb.Spatial2DView(
-        origin="/legend",
-        name="Legend",
-        titlebar=False,
-        background=palette.BACKGROUND,
-        visual_bounds=rrb.VisualBounds2D(
-            x_range=[0.0, legend.WIDTH], y_range=[-3.5, legend.HEIGHT]
-        ),
+        visual_bounds=bounds,
+        **options,
     )
 
 
@@ -89,35 +80,21 @@ def _charts(log: Log, packets: dict[str, Links]) -> list[rrb.View | rrb.Containe
     )
     counts = packet_counts(log, packets)
     rates = [rate(of) for name, (_, of) in counts.items() if name != HIDDEN["radio"]]
+    width, height = ((-0.05 * size, 1.05 * size) for size in (TREE_WIDTH, TREE_HEIGHT))
+    matrix = rrb.TensorView(
+        origin="/ages",
+        name="Age of information, all pairs",
+        scalar_mapping=rrb.TensorScalarMapping(colormap="Viridis", mag_filter="Nearest"),
+        view_fit="Fill",
+    )
     charts: list[rrb.View | rrb.Container] = [
-        rrb.Horizontal(_tree(ego), _ages()),
+        rrb.Horizontal(_drawing("/tree", f"Tree of {ego}, in hops", width, height), matrix),
         _plot("age", f"Age of information [windows]: team ± std (green), {ego} (white)", ages),
         _plot("radio", radio, rates),
     ]
     if log.has_motion:
         charts.append(_plot("flock", "Velocity variance [m²/s²]", [log.velocity_variance_m2ps2]))
     return charts
-
-
-def _tree(ego: str) -> rrb.Spatial2DView:
-    return rrb.Spatial2DView(
-        origin="/tree",
-        name=f"Tree of {ego}, in hops",
-        background=palette.BACKGROUND,
-        visual_bounds=rrb.VisualBounds2D(
-            x_range=[-0.05 * TREE_WIDTH, 1.05 * TREE_WIDTH],
-            y_range=[-0.05 * TREE_HEIGHT, 1.05 * TREE_HEIGHT],
-        ),
-    )
-
-
-def _ages() -> rrb.TensorView:
-    return rrb.TensorView(
-        origin="/ages",
-        name="Age of information, all pairs",
-        scalar_mapping=rrb.TensorScalarMapping(colormap="Viridis", mag_filter="Nearest"),
-        view_fit="Fill",
-    )
 
 
 def _plot(entity: str, name: str, shown: Sequence[np.ndarray]) -> rrb.TimeSeriesView:

@@ -2,72 +2,71 @@
 
 import itertools
 import re
-from collections.abc import Callable
-from typing import TypeAlias
 
 import numpy as np
 import rerun as rr
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.arena import HALO_POINTS, LOST_SHARE
-from swarm_mj.replay.palette import Colour
+from swarm_mj.replay.arena import LOST_SHARE
+from swarm_mj.replay.layers import LAYERS, screen
 from swarm_mj.replay.recorder import Log
-from swarm_mj.replay.sheet import Sheet, screen
+from swarm_mj.replay.sheet import Sheet
 
 WIDTH, HEIGHT = 100.0, 13.5  # of the view, in units of its own, y down
 LEFT, RAMP = 4.0, 31.0  # where the ramp of ages begins, and how long it is
 COLUMN, ROW = 14.2, 8.4  # from one sample to the next, to the right of the ramp
 SAMPLE = 5.0  # the length of a sample
+RADII = {"radio/range": 2.0, "belief/ring": 0.8}  # of sampled rings
 BELOW = 2.6  # from a sample to its text
 NUM_SHADES = 60
 
-Sample: TypeAlias = Callable[[float, float], rr.AsComponents]  # draws it around x, y
-
 
 def draw_legend(sheet: Sheet, full_scale: float) -> None:
-    """The ramp of ages, and a sample of everything that the map shows.
-
-    Args:
-        sheet: Where to draw.
-        full_scale: The age at which the ramp ends [windows].
-    """
+    """The ramp of ages, which ends at `full_scale` [windows], and samples of what the map shows."""
     _draw_ramp(sheet, full_scale)
-    for row, samples in enumerate((packet_samples(sheet.log), ground_samples(sheet.log))):
-        for column, (text, draw) in enumerate(samples.items()):
+    for row, samples in enumerate((radio_samples(sheet.log), other_samples(sheet.log))):
+        for column, (text, layer) in enumerate(samples.items()):
             x, y = LEFT + RAMP + (column + 0.9) * COLUMN, row * ROW
             path = "legend/" + re.sub(r"\W", "_", text)
-            sheet.fixed(path, draw(x, y))
+            _draw_sample(sheet, path, layer, x, y)
             _write(sheet, f"{path}/text", [text], [(x, y + BELOW)])
 
 
-def packet_samples(log: Log) -> dict[str, Sample]:
-    """What the map shows of the radio."""
+def radio_samples(log: Log) -> dict[str, str]:
+    """What the map shows of the radio: texts, and the layers that they name."""
     if log.is_broadcast:
-        colour = palette.BROADCAST
         return {
-            "transmits": _halo(colour),
-            "is heard by": _line(colour, 1.0),
-            "radio range": _ring(palette.RANGE, 0.6, 2.0),
+            "transmits": "radio/transmitter",
+            "is heard by": "radio/heard",
+            "radio range": "radio/range",
         }
+    return {fate: f"radio/{fate}" for fate in ("delivered", "lost", "answered", "overheard")}
+
+
+def other_samples(log: Log) -> dict[str, str]:
+    """What else it shows, likewise."""
+    ego = f"r{log.ego}"
+    motion = {"heading": "heading", f"{ego}'s belief": "belief/ring"}
+    reach = {"radio range": "radio/range"}  # of broadcasts, it stands beside them
     return {
-        "delivered": _arrow(palette.DELIVERED, 2.0),
-        "lost": _arrow(palette.LOST, 1.8, LOST_SHARE),
-        "answered": _arrow(palette.ANSWERED, 1.5),
-        "overheard": _line(palette.dim(palette.OVERHEARD, 0.6), 0.7),
+        **(motion if log.has_motion else {}),
+        f"{ego}'s tree": "tree",
+        **({} if log.is_broadcast else reach),
     }
 
 
-def ground_samples(log: Log) -> dict[str, Sample]:
-    """What else it shows."""
-    ego = f"r{log.ego}"
-    shown: dict[str, Sample] = {}
-    if log.has_motion:
-        shown["heading"] = _line(palette.HEADING, 0.8)
-        shown[f"{ego}'s belief"] = _ring(palette.BELIEF, 0.8, 0.8)
-    shown[f"{ego}'s tree"] = _line(palette.TREE, 0.8)
-    if not log.is_broadcast:
-        shown["radio range"] = _ring(palette.RANGE, 0.6, 2.0)
-    return shown
+def _draw_sample(sheet: Sheet, path: str, name: str, x: float, y: float) -> None:
+    """A layer's line, arrow, ring or point around a place."""
+    layer = LAYERS[f"arena/{name}"]
+    start, radius = (x - SAMPLE / 2, y), RADII.get(name, 0.0)
+    share = LOST_SHARE if name == "radio/lost" else 1.0
+    shapes = {
+        rr.LineStrips2D: {"strips": [[start, (x + SAMPLE / 2, y)]]},
+        rr.Arrows2D: {"origins": [start], "vectors": [(share * SAMPLE, 0.0)]},
+        rr.Ellipses2D: {"centers": [(x, y)], "half_sizes": [(radius, radius)]},
+        rr.Points2D: {"positions": [(x, y)]},
+    }
+    sheet.fixed(path, layer.kind.from_fields(**layer.style, **shapes[layer.kind]))
 
 
 def _draw_ramp(sheet: Sheet, full_scale: float) -> None:
@@ -83,36 +82,7 @@ def _draw_ramp(sheet: Sheet, full_scale: float) -> None:
     _write(sheet, "legend/about_ages", [about], [(LEFT + 0.5 * RAMP, ROW)])
 
 
-def _line(colour: Colour, width: float) -> Sample:
-    return lambda x, y: rr.LineStrips2D(
-        [[(x - SAMPLE / 2, y), (x + SAMPLE / 2, y)]], colors=[colour], radii=screen(width)
-    )
-
-
-def _arrow(colour: Colour, width: float, share: float = 1.0) -> Sample:
-    return lambda x, y: rr.Arrows2D(
-        origins=[(x - SAMPLE / 2, y)],
-        vectors=[(share * SAMPLE, 0.0)],
-        colors=[colour],
-        radii=screen(width),
-    )
-
-
-def _ring(colour: Colour, width: float, radius: float) -> Sample:
-    return lambda x, y: rr.Ellipses2D(
-        centers=[(x, y)], half_sizes=[(radius, radius)], colors=[colour], line_radii=screen(width)
-    )
-
-
-def _halo(colour: Colour) -> Sample:
-    return lambda x, y: rr.Points2D([(x, y)], colors=[colour], radii=screen(HALO_POINTS))
-
-
 def _write(sheet: Sheet, path: str, texts: list[str], places: list[tuple[float, float]]) -> None:
     """Texts as the labels of invisible points."""
-    sheet.fixed(
-        path,
-        rr.Points2D(
-            places, labels=texts, show_labels=True, radii=screen(0.1), colors=[palette.TEXT]
-        ),
-    )
+    style = {"show_labels": True, "radii": screen(0.1), "colors": [palette.TEXT]}
+    sheet.fixed(path, rr.Points2D.from_fields(positions=places, labels=texts, **style))

@@ -38,20 +38,9 @@ WORST_AGE: Colour = (150, 158, 172)
 VARIANCE: Colour = (240, 200, 80)
 
 # Nine equal steps of viridis (van der Walt and Smith, 2015, CC0), stale to fresh.
-_VIRIDIS = np.array(
-    [
-        (68, 1, 84),
-        (71, 44, 122),
-        (59, 81, 139),
-        (44, 113, 142),
-        (33, 144, 141),
-        (39, 173, 129),
-        (92, 200, 99),
-        (170, 220, 50),
-        (253, 231, 37),
-    ],
-    dtype=float,
-)
+_VIRIDIS = np.frombuffer(
+    bytes.fromhex("440154 472c7a 3b518b 2c718e 21908d 27ad81 5cc863 aadc32 fde725"), dtype=np.uint8
+).reshape(-1, 3)
 ROUND = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 10.0)
 _STALEST = 0.10  # the darkest end of viridis would vanish on the background
 

@@ -8,9 +8,8 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.rollout import WindowRecord
 from swarm_mj.swarm import Swarm
 
-MAX_AGE_MATRIX_BYTES = (
-    64e6  # longer or larger flights keep the age matrix of every k-th window only
-)
+# Longer or larger flights keep the age matrix of every k-th window only.
+MAX_AGE_MATRIX_BYTES = 64e6
 AGE_BYTES = 4  # float32
 
 
@@ -45,6 +44,11 @@ class Log:
     def has_motion(self) -> bool:
         """Whether any robot moves."""
         return bool(np.any(self.velocity_mps))
+
+    @property
+    def is_other_known(self) -> Bool[np.ndarray, "T N"]:
+        """Whether the ego robot has heard of j, which is not itself."""
+        return self.is_known & (np.arange(self.is_known.shape[1]) != self.ego)
 
 
 class Recorder:
@@ -82,11 +86,7 @@ class Recorder:
         buffers, states, phases = self._swarm.buffers, self._swarm.states, self._swarm.phases
         age = self._swarm.now[0] - buffers.timestamp[0]
         num_robots = len(age)
-        is_on = (
-            np.ones(num_robots, bool)
-            if self._swarm.states.is_active is None
-            else self._swarm.states.is_active[0]
-        )
+        is_on = np.ones(num_robots, bool) if states.is_active is None else states.is_active[0]
         others = age[is_on[:, None] & is_on & ~np.eye(num_robots, dtype=bool)]
         own = self._ego
         if len(self._rows) % self._stride == 0:
@@ -110,14 +110,7 @@ class Recorder:
         )
 
     def log(self) -> Log:
-        """Everything recorded so far.
-
-        Returns:
-            The log.
-
-        Raises:
-            ValueError: Nothing was recorded.
-        """
+        """Everything recorded so far; raises ValueError if that is nothing."""
         if not self._rows:
             raise ValueError("a replay needs at least 1 window flown, not 0")
         columns = {name: np.stack([row[name] for row in self._rows]) for name in self._rows[0]}

@@ -1,6 +1,6 @@
 """A sheet to draw a log on: rerun's recording with the log's two timelines."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -8,16 +8,10 @@ import rerun as rr
 from jaxtyping import Float, Int
 
 from swarm_mj.replay.frame import Frame
-from swarm_mj.replay.links import Links, ends
-from swarm_mj.replay.palette import Colour
+from swarm_mj.replay.layers import LAYERS
 from swarm_mj.replay.recorder import Log
 
 TIMELINE = "window"
-
-
-def screen(points: float) -> float:
-    """A radius in points of the screen, the same at every zoom; rerun marks these as negative."""
-    return -points
 
 
 class Sheet:
@@ -49,76 +43,45 @@ class Sheet:
         ]
         self._recording.send_columns(path, indexes=times, columns=list(columns))
 
+    def fixed_layer(self, path: str, **fields: Any) -> None:  # noqa: ANN401 - any of rerun's
+        """Draws things of a layer that never change, by the fields of the layer's archetype."""
+        layer = LAYERS[path]
+        self.fixed(path, layer.kind.from_fields(**layer.style, **fields))
+
     def layer(
-        self,
-        path: str,
-        kind: Any,  # noqa: ANN401 - any rerun archetype
-        style: Mapping[str, object],
-        per_window: Sequence[int] | np.ndarray | None = None,
-        **columns: np.ndarray,
+        self, path: str, row: Int[np.ndarray, "L"] | None = None, **columns: np.ndarray
     ) -> None:
-        """Draws things that change, in a style that does not.
+        """Draws things of a layer that change.
 
         Args:
-            path: Of the entity.
-            kind: The archetype.
-            style: Its fields that never change.
-            per_window: How many things each window has; None is one.
-            **columns: Its fields that change, for all windows one after the other.
+            path: One of `LAYERS`.
+            row: The log's window of each thing, ascending; None: all windows have as many.
+            **columns: The fields of the layer's archetype, with a value for each thing.
         """
-        self.fixed(path, kind.from_fields(**style))
-        drawn = kind.columns(**columns)
-        self.timed(path, drawn if per_window is None else drawn.partition(per_window))
+        self.fixed_layer(path)
+        num_windows = len(self.log.window)
+        if row is None:
+            num_things = len(next(iter(columns.values())))
+            row = np.repeat(np.arange(num_windows), num_things // num_windows)
+        per_window = np.bincount(row, minlength=num_windows)
+        self.timed(path, LAYERS[path].kind.columns(**columns).partition(per_window))
 
     def lines(
         self,
         path: str,
-        ends: tuple[Float[np.ndarray, "L 2"], Float[np.ndarray, "L 2"]],
-        per_window: Sequence[int] | np.ndarray,
-        look: tuple[Colour, float, float],
+        start: Float[np.ndarray, "L 2"],
+        end: Float[np.ndarray, "L 2"],
+        row: Int[np.ndarray, "L"] | None = None,
     ) -> None:
-        """Straight lines.
+        """Draws straight lines; `row` as for `layer`."""
+        self.layer(path, row, strips=np.stack([start, end], axis=1))
 
-        Args:
-            path: Of the entity.
-            ends: Where they begin, and where they end.
-            per_window: How many each window has.
-            look: Colour, width on the screen [points], and place in the order of drawing.
-        """
-        style = _style(*look)
-        self.layer(path, rr.LineStrips2D, style, per_window, strips=np.stack(ends, axis=1))
-
-    def arrows(
+    def rings(
         self,
         path: str,
-        links: Links,
-        *,
-        look: tuple[Colour, float, float],
-        share: float = 1.0,
-        aside_m: float = 0.0,
+        centre: Float[np.ndarray, "L 2"],
+        radius_m: float,
+        row: Int[np.ndarray, "L"] | None = None,
     ) -> None:
-        """Packets as arrows from sender towards receiver.
-
-        Args:
-            path: Of the entity.
-            links: The packets.
-            look: As of lines.
-            share: Of the way to the receiver that the arrow reaches.
-            aside_m: Offset to the left, so that an answer stands beside what it answers [m].
-        """
-        start, end = ends(self.log, links)
-        way = end - start
-        length = np.linalg.norm(way, axis=1, keepdims=True)
-        left = np.stack([-way[:, 1], way[:, 0]], axis=1) / np.maximum(length, 1e-6)
-        self.layer(
-            path,
-            rr.Arrows2D,
-            _style(*look),
-            links.per_window,
-            origins=start + aside_m * left,
-            vectors=share * way,
-        )
-
-
-def _style(colour: Colour, width: float, order: float) -> dict[str, object]:
-    return {"colors": [colour], "radii": screen(width), "draw_order": order}
+        """Draws circles; `row` as for `layer`."""
+        self.layer(path, row, centers=centre, half_sizes=np.full(centre.shape, radius_m))

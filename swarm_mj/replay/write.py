@@ -61,15 +61,18 @@ def draw(sheet: Sheet, mission: Mission, packets: dict[str, Links]) -> None:
         mission: Its numbers.
         packets: Its packets by their fate.
     """
-    full_scale = palette.nice_scale(sheet.log.age)
+    log = sheet.log
+    full_scale = palette.nice_scale(log.age)
+    colours = palette.age_colours(log.ego_age, full_scale, log.is_known)
+    colours[:, log.ego] = palette.EGO
     arena.draw_area(sheet, mission)
-    arena.draw_robots(sheet, full_scale)
-    if sheet.log.has_motion:
+    arena.draw_robots(sheet, colours)
+    if log.has_motion:
         arena.draw_beliefs(sheet)
     arena.draw_tree_on_map(sheet)
     arena.draw_radio(sheet, packets, mission.range_m)
     draw_legend(sheet, full_scale)
-    charts.draw_tree(sheet, full_scale)
+    charts.draw_tree(sheet, colours)
     charts.draw_age_matrix(sheet, full_scale)
     charts.draw_plots(sheet, packets)
     charts.draw_states(sheet)

@@ -1,0 +1,50 @@
+"""What lies over what on the map, and that there is no layer which no mission draws."""
+
+from dataclasses import replace
+
+from reading import static
+from rerun.chunk import RrdReader
+
+from swarm_mj.replay.layers import LAYERS
+from swarm_mj.replay.write import write_replay
+
+
+def entities(path):
+    """What a replay shows on its map and in its tree."""
+    found = {chunk.entity_path.removeprefix("/") for chunk in RrdReader(path).stream()}
+    return {name for name in found if name.startswith(("arena/", "tree/"))}
+
+
+def test_every_layer_is_drawn_by_some_mission_and_nothing_else(
+    replay, flood_replay, two_way, tmp_path
+):
+    unbounded = replace(two_way.mission, boundary="none")
+    write_replay(two_way.log, unbounded, {"seed": 5}, tmp_path / "free.rrd")
+    drawn = entities(replay) | entities(flood_replay) | entities(tmp_path / "free.rrd")
+    assert drawn == set(LAYERS)
+
+
+def test_the_ground_lies_below_beliefs_these_below_packets_and_these_below_robots():
+    order = {name: layer.order for name, layer in LAYERS.items()}
+    ground = [
+        order[name] for name in order if name.startswith("arena/area") or name == "arena/trail"
+    ]
+    beliefs = [order[name] for name in ("arena/belief/error", "arena/belief/ring", "arena/tree")]
+    packets = [
+        order[name]
+        for name in order
+        if name.startswith("arena/radio") and name != "arena/radio/range"
+    ]
+    assert max(ground) < min(beliefs) <= max(beliefs) < min(packets) < max(packets)
+    assert max(packets) < order["arena/robots"] < order["arena/ego"]
+
+
+def test_a_layer_s_look_is_kept_in_the_file(replay):
+    entity = "/arena/radio/lost"
+    layer = LAYERS["arena/radio/lost"]
+    red, green, blue = layer.colour
+    colour = static(replay, entity, "Arrows2D:colors")
+    assert colour.tolist() == [(red << 24) + (green << 16) + (blue << 8) + 255]
+    assert static(replay, entity, "Arrows2D:draw_order").tolist() == [layer.order]
+    # rerun takes radii below 0 as points of the screen.
+    assert float(static(replay, entity, "Arrows2D:radii")[0]) < 0.0
