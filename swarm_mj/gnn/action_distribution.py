@@ -46,31 +46,16 @@ def recipient_logits(
     return logits.masked_fill(~may_address, IMPOSSIBLE)
 
 
+@compiled()
 def sample(
     logits: Float[np.ndarray, "R N"], uniform: Float[np.ndarray, "R"]
 ) -> Int[np.ndarray, "R"]:
     """A recipient from each row's Boltzmann distribution, by its cumulated probabilities.
 
-    Args:
-        logits: Over recipients.
-        uniform: One number in [0, 1) a row; the same number is the same decision.
-
-    Returns:
-        The recipients.
+    `uniform` is one number in [0, 1) a row; the same number is the same decision.
     """
-    chosen = np.empty(logits.shape[0], dtype=np.int64)
-    _sample(logits, uniform, chosen)
-    return chosen
-
-
-@compiled()
-def _sample(
-    logits: Float[np.ndarray, "R N"],
-    uniform: Float[np.ndarray, "R"],
-    chosen: Int[np.ndarray, "R"],
-) -> None:
     num_rows, num_nodes = logits.shape
-    weight = np.empty(num_nodes)
+    chosen, weight = np.zeros(num_rows, dtype=np.int64), np.empty(num_nodes)
     for r in range(num_rows):
         highest = logits[r].max()
         total = 0.0
@@ -78,10 +63,10 @@ def _sample(
             weight[k] = np.exp(logits[r, k] - highest)
             total += weight[k]
         left = uniform[r] * total
-        chosen[r] = 0
         for k in range(num_nodes):
             if weight[k] > 0.0:
                 chosen[r] = k  # the last possible one, should rounding leave a rest
                 left -= weight[k]
                 if left < 0.0:
                     break
+    return chosen

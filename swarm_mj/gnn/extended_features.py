@@ -12,9 +12,10 @@ from jaxtyping import Bool, Float, Float32, Shaped
 
 from swarm_mj.compiled import compiled
 from swarm_mj.gnn.graphs import Graphs
-from swarm_mj.gnn.packet_memory import Memory
+from swarm_mj.gnn.packet_memory import Memory, empty_memory, remember
 from swarm_mj.gnn.turns import write_turns
 from swarm_mj.mission import Mission
+from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import from_db
@@ -65,13 +66,12 @@ class ExtendedFeatures:
 
     def start(self, num_missions: int, num_robots: int) -> None:
         """Forgets the packets of earlier missions; arguments as in `FeatureExtractor.start`."""
-        self._memory = Memory(num_missions, num_robots)
+        self._memory = empty_memory(num_missions, num_robots)
 
     def graphs(self, views: LocalViews) -> Graphs:
         """What every robot's network sees now; must see every window."""
-        self._memory.update(views)
-        buffers, memory = views.buffers, self._memory
-        num_missions, num_robots = buffers.shape
+        remember(self._memory, views)
+        buffers, (num_missions, num_robots) = views.buffers, views.buffers.shape
         node = np.empty((num_missions, num_robots, num_robots), dtype=NODE)
         may_address = np.empty(node.shape, dtype=np.bool_)
         _fill(
@@ -79,11 +79,7 @@ class ExtendedFeatures:
             buffers.position_m,
             buffers.last_attempt,
             views.now,
-            memory.heard,
-            memory.addressed_by,
-            memory.sent,
-            memory.neighbour,
-            memory.said,
+            self._memory,
             self._range_m,
             node,
             may_address,
@@ -102,8 +98,7 @@ class ExtendedFeatures:
         believed_m = views.buffers.position_m
         is_known = views.buffers.is_known | np.eye(views.num_robots, dtype=np.bool_)
         for field, ranges in TURN_RANGES.items():
-            radius_m = np.array([ranges * self._range_m])
-            write_turns(believed_m, is_known, views.now, radius_m, node[field][..., None])
+            write_turns(believed_m, is_known, views.now, ranges * self._range_m, node[field])
         now = views.now.astype(np.int64)
         write_joined(believed_m, is_known, now, self._range_m, self._threshold, node["has_joined"])
 
@@ -123,17 +118,15 @@ class LocalFeatures(ExtendedFeatures):
 
 
 @compiled()
-def _log_age(now: float, then: float) -> float:
-    """The age on a logarithmic scale: 0 is now, 1 is long ago or never."""
-    if then <= NEVER:
-        return 1.0
-    return min(1.0, math.log1p(now - then) / math.log1p(LONG_WINDOWS))
+def _logarithm(windows: float) -> float:
+    """Times on a logarithmic scale, up to 1 at `LONG_WINDOWS`."""
+    return math.log1p(windows) / math.log1p(LONG_WINDOWS)
 
 
 @compiled()
-def _log_news(windows: float) -> float:
-    """Summed rises of timestamps on the scale of ages."""
-    return math.log1p(windows) / math.log1p(LONG_WINDOWS)
+def _log_age(now: float, then: float) -> float:
+    """The age on this scale: 0 is now, 1 is long ago or never."""
+    return 1.0 if then <= NEVER else min(1.0, _logarithm(now - then))
 
 
 @compiled(fastmath=True)
@@ -157,70 +150,41 @@ def _fill(
     position_m: Float[np.ndarray, "B N N 2"],
     last_attempt: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
-    heard: Float32[np.ndarray, "B N N"],
-    addressed_by: Float32[np.ndarray, "B N N"],
-    sent: Float32[np.ndarray, "B N"],
-    neighbour: Float32[np.ndarray, "B N N N"],
-    said: Float32[np.ndarray, "B N N"],
+    memory: Memory,
     range_m: float,
     node: Shaped[np.ndarray, "B N N"],
     may_address: Bool[np.ndarray, "B N N"],
 ) -> None:
-    num_missions, num_robots = now.shape[0], timestamp.shape[1]
+    """All features but those of turns by distance or interference."""
+    num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
+            own, believed_m = timestamp[b, i].astype(np.float32), position_m[b, i]
             is_known = timestamp[b, i] > NEVER
             is_known[i] = True
-            _fill_teammates(
-                b, i, timestamp, position_m, is_known, last_attempt, now[b], heard, addressed_by,
-                neighbour, said, range_m, node[b, i], may_address[b, i],
-            )  # fmt: skip
-            _fill_oneself(i, _log_age(now[b], sent[b, i]), node[b, i])
-            may_address[b, i, i] = True
-
-
-@compiled()
-def _fill_teammates(
-    b: int,
-    i: int,
-    timestamp: Float[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "B N N 2"],
-    is_known: Bool[np.ndarray, "N"],
-    last_attempt: Float[np.ndarray, "B N N"],
-    now: float,
-    heard: Float32[np.ndarray, "B N N"],
-    addressed_by: Float32[np.ndarray, "B N N"],
-    neighbour: Float32[np.ndarray, "B N N N"],
-    said: Float32[np.ndarray, "B N N"],
-    range_m: float,
-    node: Shaped[np.ndarray, "N"],
-    may_address: Bool[np.ndarray, "N"],
-) -> None:
-    """The features of every teammate that concern it alone."""
-    num_robots = is_known.shape[0]
-    own = timestamp[b, i].astype(np.float32)
-    known_share = is_known.sum() / num_robots
-    for k in range(num_robots):
-        dx = position_m[b, i, k, 0] - position_m[b, i, i, 0]
-        dy = position_m[b, i, k, 1] - position_m[b, i, i, 1]
-        ranges = math.sqrt(dx * dx + dy * dy) / range_m
-        is_near = is_known[k] and k != i and ranges <= 1.0
-        node[k].is_oneself = k == i
-        node[k].is_known = is_known[k]
-        node[k].timestamp_age = _log_age(now, timestamp[b, i, k])
-        node[k].distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known[k] else 0.0
-        node[k].is_near = is_near
-        node[k].heard_age = _log_age(now, heard[b, i, k])
-        node[k].attempt_age = _log_age(now, last_attempt[b, i, k])
-        node[k].addressed_age = _log_age(now, addressed_by[b, i, k])
-        node[k].news, node[k].unsaid_news = 0.0, 0.0
-        if is_near:
-            node[k].news, node[k].unsaid_news = _news(own, neighbour[b, i, k], said[b, i])
-        node[k].turn_rank = ((k - int(now)) % num_robots) / num_robots
-        node[k].neighbours = _count_near(position_m[b, i], is_known, k, range_m) / CROWD
-        node[k].known_share = known_share
-        node[k].team_size = num_robots / TEAM
-        may_address[k] = not is_known[k] or ranges <= ADDRESS_RANGES
+            known_share = is_known.sum() / num_robots
+            for k in range(num_robots):
+                ranges = math.sqrt(squared_distance(believed_m, k, i)) / range_m
+                is_near = is_known[k] and k != i and ranges <= 1.0
+                of_k = node[b, i, k]
+                of_k.is_oneself = k == i
+                of_k.is_known = is_known[k]
+                of_k.timestamp_age = _log_age(now[b], timestamp[b, i, k])
+                of_k.distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known[k] else 0.0
+                of_k.is_near = is_near
+                of_k.heard_age = _log_age(now[b], memory.heard[b, i, k])
+                of_k.attempt_age = _log_age(now[b], last_attempt[b, i, k])
+                of_k.addressed_age = _log_age(now[b], memory.addressed_by[b, i, k])
+                of_k.news, of_k.unsaid_news = 0.0, 0.0
+                if is_near:
+                    news = _news(own, memory.neighbour[b, i, k], memory.said[b, i])
+                    of_k.news, of_k.unsaid_news = news
+                of_k.turn_rank = ((k - int(now[b])) % num_robots) / num_robots
+                of_k.neighbours = _count_near(believed_m, is_known, k, range_m) / CROWD
+                of_k.known_share = known_share
+                of_k.team_size = num_robots / TEAM
+                may_address[b, i, k] = k == i or not is_known[k] or ranges <= ADDRESS_RANGES
+            _fill_oneself(i, _log_age(now[b], memory.sent[b, i]), node[b, i])
 
 
 @compiled()
@@ -230,10 +194,10 @@ def _fill_oneself(i: int, spoken_log_age: float, node: Shaped[np.ndarray, "N"]) 
     for k in range(node.shape[0]):
         news += node[k].news
         unsaid_news += node[k].unsaid_news
-        node[k].news = _log_news(node[k].news)
-        node[k].unsaid_news = _log_news(node[k].unsaid_news)
+        node[k].news = _logarithm(node[k].news)
+        node[k].unsaid_news = _logarithm(node[k].unsaid_news)
     node[i].heard_age = spoken_log_age
-    node[i].news, node[i].unsaid_news = _log_news(news), _log_news(unsaid_news)
+    node[i].news, node[i].unsaid_news = _logarithm(news), _logarithm(unsaid_news)
 
 
 @compiled()
@@ -245,7 +209,5 @@ def _count_near(
     if is_known[k]:
         for j in range(is_known.shape[0]):
             if is_known[j] and j != k:
-                dx = believed_m[j, 0] - believed_m[k, 0]
-                dy = believed_m[j, 1] - believed_m[k, 1]
-                count += dx * dx + dy * dy <= range_m * range_m
+                count += squared_distance(believed_m, j, k) <= range_m * range_m
     return count

@@ -1,7 +1,11 @@
 """What a robot remembers of the packets that it sent and decoded, beside its buffer.
 
 Every robot's memory is its own: row `[b, i]` is written from what robot `i` sent and decoded only.
+A packet's timestamps are its sender's at that time. They are followed from window to window here,
+by Alg. 1: who decoded a packet saw them.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Float32, Int
@@ -13,79 +17,56 @@ from swarm_mj.protocol.timestamps import merge_timestamps, observe_own
 from swarm_mj.protocol.window import SLOT_WINDOWS
 
 
-class Memory:
-    """When each robot last heard, addressed and was addressed by whom, and what packets said.
-
-    A packet's timestamps are its sender's at that time. They are followed from window to window
-    here, by Alg. 1: who decoded a packet saw them.
-    """
+class Memory(NamedTuple):
+    """When each robot last heard, addressed and was addressed by whom, and what packets said."""
 
     heard: Float32[np.ndarray, "B N N"]  # when i last decoded a packet of k itself [windows]
     addressed_by: Float32[np.ndarray, "B N N"]  # when such a packet was last meant for i [windows]
     sent: Float32[np.ndarray, "B N"]  # when i last spoke first [windows]
     neighbour: Float32[np.ndarray, "B N N N"]  # T^{k,j} in the last packet of k that i decoded
     said: Float32[np.ndarray, "B N N"]  # T^{i,j} when i last spoke first [windows]
+    timestamp: Float32[np.ndarray, "B N N"]  # T^{i,j} when the last window ended [windows]
 
-    def __init__(self, num_missions: int, num_robots: int) -> None:
-        """Begins empty: nothing was ever heard or said."""
-        pairs = (num_missions, num_robots, num_robots)
-        self.heard = np.full(pairs, NEVER, dtype=np.float32)
-        self.addressed_by = np.full(pairs, NEVER, dtype=np.float32)
-        self.sent = np.full(pairs[:2], NEVER, dtype=np.float32)
-        self.neighbour = np.full((*pairs, num_robots), NEVER, dtype=np.float32)
-        self.said = np.full(pairs, NEVER, dtype=np.float32)
-        self._before = np.full(pairs, NEVER, dtype=np.float32)  # T when the last window began
 
-    def update(self, views: LocalViews) -> None:
-        """Takes in the window that has just ended; must see every window.
+def empty_memory(num_missions: int, num_robots: int) -> Memory:
+    """Nothing was ever heard or said."""
+    robots = (num_missions, num_robots)
+    pairs = (*robots, num_robots)
+    shapes = (pairs, pairs, robots, (*pairs, num_robots), pairs, pairs)
+    return Memory(*(np.full(shape, NEVER, dtype=np.float32) for shape in shapes))
 
-        Args:
-            views: At the end of a window of transmission and response, or at the start.
-        """
-        if views.phases:
-            transmission, response = views.phases
-            for phase, time in ((transmission, views.now - SLOT_WINDOWS), (response, views.now)):
-                _take_in(
-                    phase.recipient,
-                    phase.heard,
-                    time,
-                    phase is transmission,
-                    self._before,
-                    self.heard,
-                    self.addressed_by,
-                    self.sent,
-                    self.neighbour,
-                    self.said,
-                )
-        self._before[...] = views.buffers.timestamp
+
+def remember(memory: Memory, views: LocalViews) -> None:
+    """Takes in the window of transmission and response that has just ended; must see every one."""
+    if views.phases:
+        transmission, response = views.phases
+        half_way = views.now - SLOT_WINDOWS
+        _take_in(memory, transmission.recipient, transmission.heard, half_way, True)
+        _take_in(memory, response.recipient, response.heard, views.now, False)
+    memory.timestamp[...] = views.buffers.timestamp
 
 
 @compiled()
 def _take_in(
+    memory: Memory,
     recipient: Int[np.ndarray, "B N"],
-    heard_from: Int[np.ndarray, "B N"],
+    heard: Int[np.ndarray, "B N"],
     time: Float[np.ndarray, "B"],
     is_transmission: bool,
-    timestamp: Float32[np.ndarray, "B N N"],
-    heard: Float32[np.ndarray, "B N N"],
-    addressed_by: Float32[np.ndarray, "B N N"],
-    sent: Float32[np.ndarray, "B N"],
-    neighbour: Float32[np.ndarray, "B N N N"],
-    said: Float32[np.ndarray, "B N N"],
 ) -> None:
-    """One phase: what was said, who decoded it, and `timestamp` merged as the buffers were."""
+    """One phase: what was said, who decoded it, and timestamps merged as the buffers were."""
     num_missions, num_robots = recipient.shape
     for b in range(num_missions):
-        observe_own(timestamp[b], time[b])
-        packet = timestamp[b].copy()
+        observe_own(memory.timestamp[b], time[b])
+        packet = memory.timestamp[b].copy()
         for i in range(num_robots):
             if is_transmission and recipient[b, i] != i:
-                sent[b, i] = time[b]
-                said[b, i] = packet[i]
-            k = heard_from[b, i]
+                memory.sent[b, i] = time[b]
+                memory.said[b, i] = packet[i]
+            k = heard[b, i]
             if k != i:
-                heard[b, i, k] = time[b]
-                neighbour[b, i, k] = packet[k]
+                memory.heard[b, i, k] = time[b]
+                memory.neighbour[b, i, k] = packet[k]
                 if recipient[b, k] == i:
-                    addressed_by[b, i, k] = time[b]
-        merge_timestamps(packet, heard_from[b], timestamp[b])
+                    memory.addressed_by[b, i, k] = time[b]
+        merge_timestamps(packet, heard[b], memory.timestamp[b])

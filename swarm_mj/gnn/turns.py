@@ -14,46 +14,31 @@ from swarm_mj.compiled import compiled
 from swarm_mj.mission.geometry import squared_distance
 
 
+@compiled()
 def write_turns(
     believed_m: Float[np.ndarray, "B N N 2"],
     is_known: Bool[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
-    radius_m: Float[np.ndarray, "radii"],
-    has_turn: Float32[np.ndarray, "B N N radii"],
+    radius_m: float,
+    has_turn: Float32[np.ndarray, "B N N"],
 ) -> None:
-    """Writes which of the robots that each robot knows have a turn, for every radius.
+    """Writes which of the robots that each robot knows have a turn.
 
     Args:
         believed_m: Where robot i believes the others to be [m].
         is_known: Whom it knows; itself, always.
         now: t [windows].
-        radius_m: Least distances of robots that have a turn at once [m].
-        has_turn: 1 where robot k has a turn at a radius, by robot i's beliefs, else 0;
-            overwritten.
+        radius_m: Least distance of robots that have a turn at once [m].
+        has_turn: 1 where robot k has a turn by robot i's beliefs, else 0; overwritten.
     """
-    taken = np.empty(believed_m.shape[1], dtype=np.int64)
-    _write(believed_m, is_known, now, radius_m, taken, has_turn)
-
-
-@compiled()
-def _write(
-    believed_m: Float[np.ndarray, "B N N 2"],
-    is_known: Bool[np.ndarray, "B N N"],
-    now: Float[np.ndarray, "B"],
-    radius_m: Float[np.ndarray, "radii"],
-    taken: Int[np.ndarray, "N"],
-    has_turn: Float32[np.ndarray, "B N N radii"],
-) -> None:
     num_missions, num_robots = is_known.shape[:2]
+    taken = np.empty(num_robots, dtype=np.int64)
     has_turn[...] = 0.0
     for b in range(num_missions):
         for i in range(num_robots):
-            for n in range(radius_m.shape[0]):
-                num_taken = _join(
-                    believed_m[b, i], is_known[b, i], int(now[b]), radius_m[n] ** 2, taken
-                )
-                for m in range(num_taken):
-                    has_turn[b, i, taken[m], n] = 1.0
+            num_taken = _join(believed_m[b, i], is_known[b, i], int(now[b]), radius_m**2, taken)
+            for k in taken[:num_taken]:
+                has_turn[b, i, k] = 1.0
 
 
 @compiled()

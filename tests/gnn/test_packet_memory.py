@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mixed_missions import NUM_ROBOTS, NUM_WINDOWS, SEEDS, mixed_views, random_recipients
 
-from swarm_mj.gnn.packet_memory import Memory
+from swarm_mj.gnn.packet_memory import empty_memory, remember
 from swarm_mj.mission import paper, reference
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.mission_radio import radio_of
@@ -69,12 +69,12 @@ def read_packets(diaries, packets, now):
 def test_alg1_memory_is_what_was_sent_and_decoded(make, task):
     mission = make(task, num_robots=NUM_ROBOTS)
     wire = wired(mission)
-    memory = Memory(len(SEEDS), NUM_ROBOTS)
+    memory = empty_memory(len(SEEDS), NUM_ROBOTS)
     diaries = [[Diary(NUM_ROBOTS) for _ in range(NUM_ROBOTS)] for _ in SEEDS]
-    memory.update(wire.swarm.views)
+    remember(memory, wire.swarm.views)
     for now, recipient in enumerate(random_recipients(seed=0)):
         wire.swarm.exchange(recipient)
-        memory.update(wire.swarm.views)
+        remember(memory, wire.swarm.views)
         read_packets(diaries, wire.packets[-2:], float(now))
         for name in ARRAYS:
             expected = [[getattr(diary, name) for diary in team] for team in diaries]
@@ -85,9 +85,9 @@ def test_alg1_memory_is_what_was_sent_and_decoded(make, task):
 
 def remembered(views: list[LocalViews]):
     """All of a memory, copied window by window."""
-    memory = Memory(len(SEEDS), NUM_ROBOTS)
+    memory = empty_memory(len(SEEDS), NUM_ROBOTS)
     for view in views:
-        memory.update(view)
+        remember(memory, view)
         yield {name: getattr(memory, name).copy() for name in ARRAYS}
 
 
@@ -102,7 +102,7 @@ def test_eq9_a_memory_rests_on_packets_sent_and_decoded_only(robot):
 
 
 def test_a_memory_begins_empty():
-    memory = Memory(2, 3)
-    memory.update(Swarm(paper("stationary", num_robots=3), [1, 2]).views)
+    memory = empty_memory(2, 3)
+    remember(memory, Swarm(paper("stationary", num_robots=3), [1, 2]).views)
     for name in ARRAYS:
         assert not np.any(getattr(memory, name))

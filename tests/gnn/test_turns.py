@@ -19,10 +19,11 @@ def turns(believed_m, is_known, now, radius_m=RADII):
     its_m = rng.uniform(-250.0, 250.0, (2, num_robots, num_robots, 2))
     its_known = rng.random((2, num_robots, num_robots)) < 0.9
     its_m[1, -1], its_known[1, -1] = believed_m, is_known
-    has_turn = np.full((2, num_robots, num_robots, len(radius_m)), 7.0, dtype=np.float32)
-    write_turns(its_m, its_known, np.array([now + 1.0, float(now)]), radius_m, has_turn)
+    has_turn = np.full((len(radius_m), 2, num_robots, num_robots), 7.0, dtype=np.float32)
+    for radius, its in zip(radius_m, has_turn, strict=True):
+        write_turns(its_m, its_known, np.array([now + 1.0, float(now)]), radius, its)
     assert np.all((has_turn == 0.0) | (has_turn == 1.0))
-    return has_turn[1, -1].T == 1.0
+    return has_turn[:, 1, -1] == 1.0
 
 
 def order(num_robots, now):
