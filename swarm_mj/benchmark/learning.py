@@ -13,7 +13,7 @@ from swarm_mj.gnn.fast import FastAggregationGnn
 from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.graphs import PaperFeatures
 from swarm_mj.gnn.shape import GnnShape
-from swarm_mj.learning.settings import arm_settings
+from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import make_model
 from swarm_mj.mission import Mission, paper
 from swarm_mj.policies.round_robin import RoundRobin
@@ -40,7 +40,7 @@ def learning_rows(
         yield from _network_rows(mission, num_missions, seconds)
     for arm in ("robot", "team"):
         yield Row(f"training, arm {arm}", _training_per_s(arm, mission, threads, seconds), "{:.1f}")
-    robot = arm_settings("robot", mission, (num_robots,))
+    robot = usual_settings("robot", mission, (num_robots,))
     own = {"arm robot's": (robot.network, robot.features), "the paper's": (SHAPE, "paper")}
     for name, (shape, features) in own.items():
         node, parent = (rows[:1] for rows in _graphs(mission, features, 1))
@@ -79,7 +79,7 @@ def _forward_us(network: torch.nn.Module, *inputs: torch.Tensor, seconds: float)
 
 def _training_per_s(arm: str, mission: Mission, threads: int, seconds: float) -> float:
     """Team decisions over whole rollouts and the optimisation after each, the first left out."""
-    settings = arm_settings(arm, mission, (mission.num_robots,))
+    settings = usual_settings(arm, mission, (mission.num_robots,))
     ppo, share = settings.ppo, settings.groups
     # One group of missions, and minibatches of about the arm's own size, so that it ends in time.
     fewer = replace(

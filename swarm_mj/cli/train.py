@@ -73,15 +73,7 @@ def run(options: Options) -> int:
     try:
         with deferred_interrupt() as is_interrupted:
             with Watch(console, asked.limits, is_interrupted) as watch:
-                progress = train(
-                    asked.training,
-                    options.out,
-                    asked.limits,
-                    listener=watch,
-                    init=asked.init,
-                    is_resumed=options.resume,
-                    command=asked.command,
-                )
+                progress = train(asked, options.out, listener=watch, is_resumed=options.resume)
             is_over = not watch.has_stopped
             _print(options.out, asked, progress, is_over=is_over)
     except KeyboardInterrupt:

@@ -10,7 +10,7 @@ from typing import Any, get_origin
 
 from swarm_mj.cli.options import add_option, as_typed, flag_of
 from swarm_mj.gnn.shape import GnnShape
-from swarm_mj.learning.settings import PpoSettings, Training, arm_settings
+from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission
 
 PARTS = {"": Training, "network.": GnnShape, "ppo.": PpoSettings, "mission.": Mission}
@@ -66,7 +66,7 @@ def _usual_of(arm: str, place: str) -> str:
     """The default as text, if it does not depend on preset or task."""
     missions = (PRESETS["paper"]("stationary"), PRESETS["reference"]("flocking"))
     usual, other = (
-        stored_value(arm_settings(arm, each, (each.num_robots,)), place) for each in missions
+        stored_value(usual_settings(arm, each, (each.num_robots,)), place) for each in missions
     )
     depends = usual != other and place not in ("mission.preset", "mission.task")
     return "the preset's own" if depends else as_typed(usual)

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.cli.train_options import stored_value, typed
-from swarm_mj.gnn.feature_sets import make_extractor
+from swarm_mj.gnn.feature_sets import num_features
 from swarm_mj.learning.run_folder import Limits
-from swarm_mj.learning.settings import Training, arm_settings
+from swarm_mj.learning.settings import Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.policy_config import PolicyConfig
 
@@ -34,7 +34,7 @@ def asked_settings(
         ValueError: A value is unknown or outside its range, or contradicts another.
     """
     sizes = given.get("robots", (Mission().num_robots,))
-    training = arm_settings(
+    training = usual_settings(
         given.get("arm", "robot"), _mission(given, sizes[0]), sizes, given.get("seed", 0)
     )
     if init is not None:
@@ -168,7 +168,7 @@ def _changed(training: Training, given: dict[str, Any]) -> Training:
             parts[part][name] = value
     own = parts.pop("")
     if "features" in own:
-        parts["network"]["num_features"] = len(make_extractor(own["features"], Mission()).names)
+        parts["network"]["num_features"] = num_features(own["features"])
     changed = {part: replace(getattr(training, part), **its) for part, its in parts.items()}
     return replace(training, **own, **changed)
 

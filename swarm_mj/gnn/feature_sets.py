@@ -15,14 +15,9 @@ FEATURE_SETS: dict[str, Callable[[Mission], FeatureExtractor]] = {
 
 
 def make_extractor(features: str, mission: Mission) -> FeatureExtractor:
-    """An extractor by the name of its feature set.
+    """An extractor by the name of its feature set; it is to be started.
 
-    Args:
-        features: A key of `FEATURE_SETS`.
-        mission: Whose area, duration and range normalise the features.
-
-    Returns:
-        The extractor; it is to be started.
+    The mission's area, duration and range normalise the features.
 
     Raises:
         ValueError: Unknown name.
@@ -30,3 +25,8 @@ def make_extractor(features: str, mission: Mission) -> FeatureExtractor:
     if features not in FEATURE_SETS:
         raise ValueError(f"features must be one of {', '.join(FEATURE_SETS)}, not {features!r}")
     return FEATURE_SETS[features](mission)
+
+
+def num_features(features: str) -> int:
+    """How many numbers a feature set has for each node; raises ValueError as `make_extractor`."""
+    return len(make_extractor(features, Mission()).names)

@@ -4,18 +4,16 @@ Index order: `[r, k]` is what the robot of row `r` knows about robot `k`; row `b
 of mission `b`.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal, Protocol, runtime_checkable
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
+from jaxtyping import Bool, Float, Float32, Int, Shaped
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.protocol.local_views import LocalViews
 
-FeatureSet = Literal["paper", "reference", "local", "extended"]
 REFERENCE_WINDOWS = 500.0  # what the authors' code divides times by, whatever the mission [windows]
 
 
@@ -36,23 +34,11 @@ class FeatureExtractor(Protocol):
     names: ClassVar[tuple[str, ...]]  # of the features, in order; there are F
 
     def start(self, num_missions: int, num_robots: int) -> None:
-        """Forgets earlier missions.
-
-        Args:
-            num_missions: B.
-            num_robots: N.
-        """
+        """Forgets earlier missions; now there are B of N robots."""
         ...
 
     def graphs(self, views: LocalViews) -> Graphs:
-        """What every robot's network sees now, row [b N + i] from view [b, i] only.
-
-        Args:
-            views: All robots' views, side by side.
-
-        Returns:
-            The graphs of B N robots.
-        """
+        """What every robot's network sees now, row [b N + i] from view [b, i] only."""
         ...
 
 
@@ -68,31 +54,26 @@ class PaperFeatures:
     )  # fmt: skip
 
     def __init__(self, mission: Mission) -> None:
-        """Takes the mission's duration and the side of its area."""
         self._num_windows = mission.num_windows
         self._side_m = mission.side_m
         self._duration_s = mission.num_windows * mission.window_s
 
     def start(self, num_missions: int, num_robots: int) -> None:
-        """Nothing is remembered; arguments as in `FeatureExtractor.start`."""
+        """Nothing is remembered."""
 
     def graphs(self, views: LocalViews) -> Graphs:
         """The buffers as they are; positions from the area's middle, velocities per mission."""
         buffers = views.buffers
-        is_oneself = np.eye(buffers.shape[1], dtype=np.bool_)
-        position = np.moveaxis(buffers.position_m / self._side_m, -1, 0)
-        velocity = np.moveaxis(buffers.velocity_mps * (self._duration_s / self._side_m), -1, 0)
-        features = {
-            "is oneself": is_oneself,
-            "is known": buffers.is_known | is_oneself,
-            "T": buffers.timestamp / self._num_windows,
-            "p_x": position[0],
-            "p_y": position[1],
-            "v_x": velocity[0],
-            "v_y": velocity[1],
-            "L": buffers.last_attempt / self._num_windows,
-        }
-        return everyone_addressable([features[name] for name in self.names], buffers)
+        is_oneself = np.broadcast_to(np.eye(views.num_robots, dtype=np.bool_), buffers.parent.shape)
+        return _everyone_addressable(
+            buffers,
+            is_oneself,
+            buffers.is_known | is_oneself,
+            buffers.timestamp / self._num_windows,
+            buffers.position_m / self._side_m,
+            buffers.velocity_mps * (self._duration_s / self._side_m),
+            buffers.last_attempt / self._num_windows,
+        )
 
 
 class ReferenceFeatures:
@@ -110,42 +91,34 @@ class ReferenceFeatures:
         """Takes nothing from the mission."""
 
     def start(self, num_missions: int, num_robots: int) -> None:
-        """Nothing is remembered; arguments as in `FeatureExtractor.start`."""
+        """Nothing is remembered."""
 
     def graphs(self, views: LocalViews) -> Graphs:
         """The buffers as the authors' code shows them to its network."""
         buffers, now = views.buffers, views.now[:, None, None]
-        position = _from_own(buffers.position_m) / MISSION_DISTANCE_M
-        velocity = _from_own(buffers.velocity_mps) / MISSION_DISTANCE_M
-        features = {
-            "T - t": (buffers.timestamp - now) / REFERENCE_WINDOWS,
-            "zero": np.zeros(buffers.timestamp.shape),
-            "p_x relative": position[0],
-            "p_y relative": position[1],
-            "v_x relative": velocity[0],
-            "v_y relative": velocity[1],
-            "L - t": (buffers.last_attempt - now) / REFERENCE_WINDOWS,
-        }
-        return everyone_addressable([features[name] for name in self.names], buffers)
+        return _everyone_addressable(
+            buffers,
+            (buffers.timestamp - now) / REFERENCE_WINDOWS,
+            np.zeros(buffers.timestamp.shape),
+            _from_own(buffers.position_m) / MISSION_DISTANCE_M,
+            _from_own(buffers.velocity_mps) / MISSION_DISTANCE_M,
+            (buffers.last_attempt - now) / REFERENCE_WINDOWS,
+        )
 
 
-def _from_own(
-    vectors: Float[np.ndarray, "B N N axis"],
-) -> Float[np.ndarray, "axis B N N"]:
-    """Each robot's vectors minus its own, axis by axis."""
+def _from_own(vectors: Float[np.ndarray, "B N N axis"]) -> Float[np.ndarray, "B N N axis"]:
+    """Each robot's vectors minus its own."""
     own = np.diagonal(vectors, axis1=1, axis2=2).swapaxes(1, 2)
-    return np.moveaxis(vectors - own[:, :, None], -1, 0)
+    return vectors - own[:, :, None]
 
 
-def everyone_addressable(features: Sequence[np.ndarray], buffers: Buffers) -> Graphs:
-    """Graphs with these features, in order, in which every robot may be addressed."""
+def _everyone_addressable(buffers: Buffers, *features: Shaped[np.ndarray, "B N N ..."]) -> Graphs:
+    """Graphs with these features, numbers or vectors, in which every robot may be addressed."""
     num_missions, num_robots = buffers.shape
     rows = (num_missions * num_robots, num_robots)
-    node = np.empty((*buffers.timestamp.shape, len(features)), dtype=np.float32)
-    for k, values in enumerate(features):
-        node[..., k] = values
+    columns = [values.reshape(*rows, -1) for values in features]
     return Graphs(
-        node=node.reshape(*rows, len(features)),
+        node=np.concatenate(columns, axis=2, dtype=np.float32, casting="same_kind"),
         parent=buffers.parent.reshape(rows),
         may_address=np.ones(rows, dtype=np.bool_),
         has_turn=np.zeros(rows[0], dtype=np.bool_),

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -60,15 +60,15 @@ class TrainingCallback(BaseCallback):
 
     def __init__(
         self,
+        model: PPO,
         run: Run,
         folder: Path,
         progress: Progress,
         rng: np.random.Generator,
         listener: Listener,
     ) -> None:
-        """Takes what it needs; PPO brings itself."""
         super().__init__()
-        self._run, self._training, self._limits = run, run.training, run.limits
+        self._ppo, self._run, self._training, self._limits = model, run, run.training, run.limits
         self._folder, self._progress = folder, progress
         self._rng, self._listener = rng, listener
         self._counted_s = time.monotonic()  # up to here, time is in the progress
@@ -80,26 +80,17 @@ class TrainingCallback(BaseCallback):
     def decisions(self) -> int:
         """Team decisions in all sessions so far."""
         env = missions_of(self._ppo)
-        return self.model.num_timesteps // env.num_envs * env.num_teams
+        return self._ppo.num_timesteps // env.num_envs * env.num_teams
 
     @property
     def minutes(self) -> float:
         """Of all sessions so far."""
         return self._progress.minutes + (time.monotonic() - self._counted_s) / 60.0
 
-    @property
-    def _ppo(self) -> PPO:
-        assert isinstance(self.model, PPO)
-        return self.model
-
-    def finish(self) -> None:
-        """Keeps what the last rollout led to."""
-        self._between_rollouts(is_last=True)
-
     def _on_rollout_start(self) -> None:
         limit = self._limits.minutes
         is_last = (limit is not None and self.minutes >= limit) or not self._goes_on
-        self._between_rollouts(is_last=is_last)
+        self.between_rollouts(is_last=is_last)
         if is_last or not self._goes_on:
             raise Stopped
 
@@ -127,11 +118,13 @@ class TrainingCallback(BaseCallback):
         )
         self._goes_on = self._listener(status) and self._goes_on
 
-    def _between_rollouts(self, *, is_last: bool) -> None:
-        progress, decisions = self._progress, self.decisions
+    def between_rollouts(self, *, is_last: bool) -> None:
+        """Evaluates, records a replay and keeps a checkpoint, each if it is due."""
+        progress, decisions, logged = self._progress, self.decisions, self.logger.name_to_value
         _check_finite(self._ppo, decisions)
         progress.decisions = decisions
-        progress.optimiser = self._optimiser_means() or progress.optimiser
+        means = {name: float(logged[name]) for name in OPTIMISER if name in logged}
+        progress.optimiser = means or progress.optimiser  # of PPO's last passes over a rollout
         is_new = not progress.curve or progress.curve[-1]["decisions"] < decisions
         is_due = is_new and (is_last or decisions >= progress.next_evaluation)
         if is_due:
@@ -168,10 +161,12 @@ class TrainingCallback(BaseCallback):
         self._count_time()
         progress.since_evaluation = Accumulator()
         progress.next_evaluation = (decisions // every + 1) * every
-        known = {name: x for name, x in held_out.to_json().items() if x is not None}
+        known = {name: x for name, x in asdict(held_out).items() if x is not None}
         row = {"decisions": float(decisions), "minutes": progress.minutes, **known}
         progress.curve.append(row | means | progress.optimiser)
-        self._log(progress.curve[-1], decisions)
+        for name, value in progress.curve[-1].items():
+            self.logger.record(name if "/" in name else f"held_out/{name}", value)
+        self.logger.dump(decisions)
         write_curve(self._folder / CURVE, progress.curve)
         if held_out.objective < progress.best_objective:
             progress.best_objective = held_out.objective
@@ -183,16 +178,6 @@ class TrainingCallback(BaseCallback):
         if not self._goes_on:
             raise Stopped
 
-    def _log(self, row: dict[str, float], decisions: int) -> None:
-        for name, value in row.items():
-            self.logger.record(name if "/" in name else f"held_out/{name}", value)
-        self.logger.dump(decisions)
-
-    def _optimiser_means(self) -> dict[str, float]:
-        """What PPO logged of its last passes over a rollout; empty before the first."""
-        logged = self.logger.name_to_value
-        return {name: float(logged[name]) for name in OPTIMISER if name in logged}
-
     def _config(self, decisions: int, held_out: HeldOut) -> PolicyConfig:
         training = self._training
         return PolicyConfig(
@@ -200,13 +185,13 @@ class TrainingCallback(BaseCallback):
             features=training.features,
             silence_logit=training.silence_logit,
             training={
-                **training.to_json(),
+                **asdict(training),
                 "command": self._run.command,
                 "decisions": decisions,
                 "minutes": self._progress.minutes,
             },
             evaluation={
-                **held_out.to_json(),
+                **asdict(held_out),
                 "missions": training.held_out * len(training.robots),
                 "first_seed": HELD_OUT_SEED,
                 "chosen_by": "the least objective of all evaluations on these same missions",

@@ -28,14 +28,7 @@ CHECKPOINT_VERSION = 2
 def save(
     path: Path, training: Training, model: PPO, rng: np.random.Generator, progress: Progress
 ) -> None:
-    """Writes a checkpoint; call it between rollouts.
-
-    Args:
-        path: The file.
-        training: The run's settings.
-        model: Its environment is a `MissionsEnv`, normalised or not.
-        rng: Draws the missions' seeds.
-        progress: Kept along.
+    """Writes a checkpoint; call it between rollouts. `rng` draws the missions' seeds.
 
     Raises:
         OSError: The file cannot be written.
@@ -43,7 +36,7 @@ def save(
     name, keys, *rest = np.random.get_state()  # noqa: NPY002 - PPO shuffles minibatches with it
     state: dict[str, Any] = {
         "version": CHECKPOINT_VERSION,
-        "training": json.dumps(training.to_json()),
+        "training": json.dumps(asdict(training)),
         "parameters": model.get_parameters(),  # of the networks and the optimiser
         "num_timesteps": model.num_timesteps,
         "num_updates": model._n_updates,
@@ -70,16 +63,7 @@ def save(
 
 
 def load(path: Path, training: Training, model: PPO, rng: np.random.Generator) -> Progress:
-    """Puts a run back to where a checkpoint was made.
-
-    Args:
-        path: The file.
-        training: The run's settings.
-        model: Made of these settings; it and its missions are changed.
-        rng: As in `save`; changed.
-
-    Returns:
-        The progress.
+    """Puts a model and its missions, made of these settings, back to where a checkpoint was made.
 
     Raises:
         ValueError: The file is damaged, foreign, of a newer version or of other settings.
@@ -87,7 +71,7 @@ def load(path: Path, training: Training, model: PPO, rng: np.random.Generator) -
     """
     state = _read(path)
     try:
-        if json.loads(state["training"]) != json.loads(json.dumps(training.to_json())):
+        if json.loads(state["training"]) != json.loads(json.dumps(asdict(training))):
             raise ValueError("it was made with other settings than the run's")
         return _restore(state, model, rng)
     except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:

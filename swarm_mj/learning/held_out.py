@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,10 +32,6 @@ class HeldOut:
     delivery_ratio: float
     objective: float  # what the best policy has least of: the reward's cost, each size alike
 
-    def to_json(self) -> dict[str, float | None]:
-        """All numbers by name."""
-        return asdict(self)
-
 
 def held_out_policy(training: Training, network: AggregationGnn, mission: Mission) -> LearnedPolicy:
     """The policy under training, as it flies."""
@@ -53,23 +49,14 @@ def evaluate(
     network: AggregationGnn,
     on_window: Callable[[float], None] = lambda share: None,  # noqa: ARG005
 ) -> HeldOut:
-    """Flies the held-out missions; draws nothing from the generators of the training.
+    """What the held-out missions cost; draws nothing from the generators of the training.
 
     Args:
         training: Names the missions.
         network: That acts, on any device.
         on_window: Told after every window what share is flown; what it raises ends the evaluation.
-
-    Returns:
-        What they cost.
     """
-    missions = held_out_missions(training)
-    costs = [
-        _costs(
-            training, network, mission, lambda share, n=n: on_window((n + share) / len(missions))
-        )
-        for n, mission in enumerate(missions)
-    ]
+    costs = _fly(training, network, on_window)
     age = [np.array([window.age_windows for window in windows]) for windows in costs]
     variance = [np.array([w.velocity_variance_m2ps2 for w in windows]) for windows in costs]
     objective = [each / size for each, size in zip(age, training.robots, strict=True)]
@@ -108,19 +95,18 @@ def record_replay(
     write_replay(recorder.log(), mission, config, path)
 
 
-def _costs(
-    training: Training,
-    network: AggregationGnn,
-    mission: Mission,
-    on_window: Callable[[float], None],
-) -> list[WindowCosts]:
-    """What held-out missions of one team size cost, window by window."""
-    swarm = Swarm(mission, range(HELD_OUT_SEED, HELD_OUT_SEED + training.held_out))
-    policy, costs = held_out_policy(training, network, mission), []
-    for window in range(mission.num_windows):
-        costs.append(swarm.step(policy))
-        on_window((window + 1) / mission.num_windows)
-    return costs
+def _fly(
+    training: Training, network: AggregationGnn, on_window: Callable[[float], None]
+) -> list[list[WindowCosts]]:
+    """What the held-out missions of each team size cost, window by window."""
+    seeds, sizes = range(HELD_OUT_SEED, HELD_OUT_SEED + training.held_out), []
+    for mission in (missions := held_out_missions(training)):
+        swarm, policy = Swarm(mission, seeds), held_out_policy(training, network, mission)
+        sizes.append([])
+        for window in range(1, mission.num_windows + 1):
+            sizes[-1].append(swarm.step(policy))
+            on_window((len(sizes) - 1 + window / mission.num_windows) / len(missions))
+    return sizes
 
 
 def _mean(by_size: Sequence[Float[np.ndarray, "windows B"]]) -> float:

@@ -34,7 +34,7 @@ class Run:
 
     training: Training
     limits: Limits
-    command: str  # that began it
+    command: str = ""  # that began it
     init: Path | None = None  # the stored policy that it begins with
 
 
@@ -96,9 +96,7 @@ def write_run(folder: Path, run: Run) -> None:
     document = {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
-        "training": run.training.to_json(),
-        "limits": asdict(run.limits),
-        "command": run.command,
+        **asdict(run),
         "init": None if run.init is None else str(run.init.resolve()),
     }
     folder.mkdir(parents=True, exist_ok=True)
@@ -162,11 +160,7 @@ def remove_parts(folder: Path) -> None:
 
 
 def write_curve(path: Path, curve: list[dict[str, float]]) -> None:
-    """Writes a learning curve, one row an evaluation.
-
-    Args:
-        path: The CSV file.
-        curve: Rows by name; the later ones may have names that the first lacks.
+    """Writes a learning curve, one row an evaluation; later rows may have more columns.
 
     Raises:
         OSError: The file cannot be written.

@@ -1,18 +1,17 @@
-"""What a training run depends on, and the settings of both arms."""
+"""What a training run depends on, and what is usual for both kinds of credit assignment."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 from swarm_mj.fields import check, setting
-from swarm_mj.gnn.feature_sets import make_extractor
-from swarm_mj.gnn.graphs import FeatureSet
+from swarm_mj.gnn.feature_sets import FEATURE_SETS, num_features
 from swarm_mj.gnn.shape import GnnShape
-from swarm_mj.learning.team_env import Reward
 from swarm_mj.mission import Mission
 
 CreditAssignment = Literal["robot", "team"]  # per robot, per team
+Reward = Literal["aoi", "velocity-variance"]
 HELD_OUT_SEED = 500_000  # of the first held-out mission; training draws from 2^40 on
 EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as speech
 MOST_ROBOTS = 200  # a team decision takes robots² nodes
@@ -98,8 +97,8 @@ class Training:
     robots: tuple[int, ...] = setting(
         help="size of the team; several are trained on together", low=2, high=MOST_ROBOTS
     )
-    features: FeatureSet = setting(
-        help="what the network sees of each teammate", choices=get_args(FeatureSet)
+    features: str = setting(
+        help="what the network sees of each teammate", choices=tuple(FEATURE_SETS)
     )
     network: GnnShape  # that acts
     shares_trunk: bool  # whether values come from the acting network's last stage but one number
@@ -141,13 +140,9 @@ class Training:
         """Whether silent rows, which without discount earn nothing, may be left out."""
         return self.arm == "robot" and self.ppo.discount == 0.0
 
-    def to_json(self) -> dict[str, Any]:
-        """All settings as JSON has them."""
-        return asdict(self)
 
-
-def arm_settings(arm: str, mission: Mission, robots: Sequence[int], seed: int = 0) -> Training:
-    """An arm's own settings.
+def usual_settings(arm: str, mission: Mission, robots: Sequence[int], seed: int = 0) -> Training:
+    """The usual settings of a credit assignment; `dataclasses.replace` changes some.
 
     Args:
         arm: `robot`, made to learn in minutes, or `team`, the paper's way (III-C).
@@ -155,74 +150,58 @@ def arm_settings(arm: str, mission: Mission, robots: Sequence[int], seed: int = 
         robots: Sizes of the teams.
         seed: Of all draws.
 
-    Returns:
-        The settings; `dataclasses.replace` changes some.
-
     Raises:
         ValueError: A value is unknown or outside its range.
     """
     if arm not in get_args(CreditAssignment):
         raise ValueError(f"arm must be one of {', '.join(get_args(CreditAssignment))}, not {arm!r}")
-    team = _team_settings(mission, tuple(robots), seed)
-    if arm == "team":
-        return team
-    return replace(
-        team,
-        arm="robot",
-        features="extended",
-        network=GnnShape(
-            num_features=_num_features("extended"),
+    given: dict[str, Any] = {"arm": arm, "mission": mission, "robots": tuple(robots), "seed": seed}
+    own = _per_robot() if arm == "robot" else _per_team(is_reference=mission.preset == "reference")
+    shared = {"reward": "aoi", "groups": 4, "evaluate_every": 10_000, "held_out": 12, "threads": 1}
+    return Training(**given, **own, **shared)
+
+
+def _per_robot() -> dict[str, Any]:
+    return {
+        "features": "extended",
+        "network": GnnShape(
+            num_features=num_features("extended"),
             latent=32,
             depth=2,
             receptive_field=1,
             edges="both",
         ),
-        shares_trunk=True,
-        silence_logit=7.0,
-        ppo=ROBOT,
-        missions=16,
-        evaluate_every=10_000,
-    )
+        "shares_trunk": True,
+        "silence_logit": 7.0,
+        "ppo": ROBOT,
+        "missions": 16,
+    }
 
 
-def _team_settings(mission: Mission, robots: tuple[int, ...], seed: int) -> Training:
+def _per_team(*, is_reference: bool) -> dict[str, Any]:
     """III-C, or the authors' code: other features, and two numbers per node.
 
     Both have the code's edges. Over the text's, which lead from children to parents, nothing of the
     robot itself reaches a teammate's node: whom it addresses could depend neither on where it is
     nor on the time.
     """
-    is_reference = mission.preset == "reference"
-    features: FeatureSet = "reference" if is_reference else "paper"
-    return Training(
-        arm="team",
-        mission=mission,
-        robots=robots,
-        features=features,
-        network=GnnShape(
-            num_features=_num_features(features),
+    features = "reference" if is_reference else "paper"
+    return {
+        "features": features,
+        "network": GnnShape(
+            num_features=num_features(features),
             num_outputs=2 if is_reference else 1,
             edges="reference",
         ),
-        shares_trunk=False,
-        silence_logit=0.0 if is_reference else EVEN_SILENCE,
-        reward="aoi",
-        ppo=TEAM_REFERENCE if is_reference else TEAM_PAPER,
-        missions=32,
-        groups=4,
-        seed=seed,
-        evaluate_every=10_000,
-        held_out=12,
-        threads=1,
-    )
-
-
-def _num_features(features: str) -> int:
-    return len(make_extractor(features, Mission()).names)
+        "shares_trunk": False,
+        "silence_logit": 0.0 if is_reference else EVEN_SILENCE,
+        "ppo": TEAM_REFERENCE if is_reference else TEAM_PAPER,
+        "missions": 32,
+    }
 
 
 def from_json(given: dict[str, Any]) -> Training:
-    """The settings that `Training.to_json` wrote.
+    """The settings whose `dataclasses.asdict` was written.
 
     Raises:
         ValueError: A key is missing or unknown, or a value is outside its range.
@@ -234,6 +213,6 @@ def from_json(given: dict[str, Any]) -> Training:
             "ppo": PpoSettings(**given["ppo"]),
             "robots": tuple(given["robots"]),
         }
-        return Training(**{**given, **parts})
+        return Training(**given | parts)
     except (KeyError, TypeError) as error:
         raise ValueError(f"not the settings of this version's training runs: {error}") from error

@@ -1,17 +1,15 @@
 """Shared team reward, the paper's way (III-C): each mission is one environment."""
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from gymnasium import spaces
 
 from swarm_mj.gnn.graphs import Graphs
 from swarm_mj.learning.mission_batch import MissionBatch, Transition
+from swarm_mj.learning.settings import Reward
 from swarm_mj.learning.vec_env import MissionsEnv, Observation, graph_spaces, largest_team, padded
 from swarm_mj.protocol.buffers import NO_PARENT
-
-Reward = Literal["aoi", "velocity-variance"]
 
 
 class TeamEnv(MissionsEnv):

@@ -27,7 +27,6 @@ from swarm_mj.learning.run_folder import (
     CHECKPOINT,
     CURVE,
     TENSORBOARD,
-    Limits,
     Progress,
     Run,
     check_new,
@@ -123,7 +122,6 @@ class StepDecay:
     """The learning rate, falling by a factor in each of so many optimiser steps (III-C)."""
 
     def __init__(self, training: Training) -> None:
-        """Begins at the settings' rate."""
         self._ppo = training.ppo
         self.model: PPO | None = None
 
@@ -135,29 +133,14 @@ class StepDecay:
         return self._ppo.learning_rate * max(share, self._ppo.least_share)
 
 
-def train(
-    training: Training,
-    folder: Path,
-    limits: Limits,
-    *,
-    listener: Listener,
-    init: Path | None = None,
-    is_resumed: bool = False,
-    command: str = "",
-) -> Progress:
-    """Trains until a limit, or until the listener has had enough.
+def train(run: Run, folder: Path, *, listener: Listener, is_resumed: bool = False) -> Progress:
+    """Trains until a limit, or until the listener has had enough; returns where the run stands.
 
     Args:
-        training: The settings.
-        folder: The run's folder; made if it is not there.
-        limits: When to stop.
+        run: What is asked for; the policy that it begins with has the settings' network.
+        folder: The run's; made if it is not there.
         listener: Told how it goes.
-        init: A stored policy to begin with, whose network is the settings'.
         is_resumed: Go on from the folder's checkpoint, or start over if it did not get that far.
-        command: Noted beside the policy.
-
-    Returns:
-        Where the run stands.
 
     Raises:
         ValueError: The missions cannot be made, the folder is another's, the checkpoint is damaged
@@ -166,13 +149,12 @@ def train(
     """
     if not is_resumed:
         check_new(folder)
-    model, rng = make_model(training)
-    run = Run(training=training, limits=limits, command=command, init=init)
+    model, rng = make_model(run.training)
     progress = _resumed(folder, run, model, rng) or _begun(folder, run, model)
     model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))
-    callback = TrainingCallback(run, folder, progress, rng, listener)
+    callback = TrainingCallback(model, run, folder, progress, rng, listener)
     env = missions_of(model)
-    wanted = -(-(limits.decisions or NO_BUDGET) // env.num_teams) * env.num_envs
+    wanted = -(-(run.limits.decisions or NO_BUDGET) // env.num_teams) * env.num_envs
     try:
         if wanted > model.num_timesteps:
             model.learn(
@@ -182,7 +164,7 @@ def train(
                 reset_num_timesteps=model.num_timesteps == 0,
             )
         callback.init_callback(model)
-        callback.finish()
+        callback.between_rollouts(is_last=True)
     except Stopped:
         pass
     finally:

@@ -6,9 +6,8 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from swarm_mj.gnn.feature_sets import make_extractor
+from swarm_mj.gnn.feature_sets import num_features
 from swarm_mj.gnn.shape import GnnShape
-from swarm_mj.mission import Mission
 
 FORMAT = "swarm_mj policy"
 FORMAT_VERSION = 1
@@ -24,7 +23,7 @@ class PolicyConfig:
     """
 
     network: GnnShape
-    features: str  # the name of a feature set, see `make_extractor`
+    features: str  # the name of a feature set, see `FEATURE_SETS`
     silence_logit: float = 0.0  # added to silence, but in a robot's own turn
     training: dict[str, Any]  # JSON: the settings, the seed, the budget spent, the command
     evaluation: dict[str, Any]  # JSON: what it cost on which missions
@@ -32,11 +31,11 @@ class PolicyConfig:
     version: str  # as above
 
     def __post_init__(self) -> None:
-        num_features = len(make_extractor(self.features, Mission()).names)
-        if self.network.num_features != num_features:
+        expected = num_features(self.features)
+        if self.network.num_features != expected:
             raise ValueError(
                 f"network.num_features is {self.network.num_features}, but the {self.features} "
-                f"features are {num_features}"
+                f"features are {expected}"
             )
         if self.network.num_outputs not in (1, 2):
             raise ValueError(f"network.num_outputs must be 1 or 2, not {self.network.num_outputs}")

@@ -17,7 +17,7 @@ from swarm_mj.cli.train_settings import (
     rollout_bytes,
 )
 from swarm_mj.learning.run_folder import Limits
-from swarm_mj.learning.settings import arm_settings
+from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import make_model
 from swarm_mj.mission import paper
 
@@ -35,7 +35,7 @@ def test_the_defaults_that_the_help_shows_are_the_usual_settings(capsys):
     with pytest.raises(SystemExit):
         main(["train", "--help"])
     shown = " ".join(capsys.readouterr().out.split())
-    robot, team = (arm_settings(arm, paper("stationary"), (40,)) for arm in ("robot", "team"))
+    robot, team = (usual_settings(arm, paper("stationary"), (40,)) for arm in ("robot", "team"))
     for text in (
         f"is applied, 0 to 16 (default: {robot.network.receptive_field}, team: 5)",
         f"width of every layer, 1 to 1024 (default: {robot.network.latent}, team: 64)",
@@ -56,7 +56,7 @@ def test_the_defaults_that_the_help_shows_are_the_usual_settings(capsys):
 
 @pytest.mark.parametrize("arm", BUDGETS)
 def test_without_options_a_run_has_the_usual_settings(arm):
-    assert asked("--arm", arm) == arm_settings(arm, paper("stationary"), (40,))
+    assert asked("--arm", arm) == usual_settings(arm, paper("stationary"), (40,))
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from small_runs import StopAfter, difference, end_of, go_on, run, small_training
 from swarm_mj.cli import main
 from swarm_mj.gnn.action_distribution import sample
 from swarm_mj.learning.mission_batch import MissionBatch
-from swarm_mj.learning.run_folder import Limits, Progress
+from swarm_mj.learning.run_folder import Limits, Progress, Run
 from swarm_mj.learning.train import train
 from swarm_mj.mission import paper
 
@@ -67,9 +67,8 @@ def timed(folder):
     progress, num_sessions = Progress(), 0
     while progress.decisions < 192:
         limits = Limits(decisions=192, minutes=progress.minutes + 0.1 / 60.0)
-        progress = train(
-            training, folder / "timed", limits, listener=go_on, is_resumed=num_sessions > 0
-        )
+        asked = Run(training=training, limits=limits)
+        progress = train(asked, folder / "timed", listener=go_on, is_resumed=num_sessions > 0)
         num_sessions += 1
     ends = [end_of(folder / name) for name in ("untimed", "timed")]
     for end in ends:

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import torch
 
-from swarm_mj.learning.run_folder import CHECKPOINT, Limits
-from swarm_mj.learning.settings import arm_settings
+from swarm_mj.learning.run_folder import CHECKPOINT, Limits, Run
+from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import train
 from swarm_mj.mission import paper
 
@@ -16,7 +16,7 @@ torch.set_num_threads(1)  # tests share the machine's cores
 def small_training(arm="robot", task="stationary", sizes=(5,), discount=None, **changes):
     """Settings of tiny networks on short missions; rollouts of 32 decisions, 64 of two sizes."""
     mission = paper(task, num_robots=sizes[0], num_windows=20, range_ratio=0.6)
-    its = arm_settings(arm, mission, sizes, seed=3)
+    its = usual_settings(arm, mission, sizes, seed=3)
     ppo = replace(its.ppo, num_steps=8, num_minibatches=3, num_epochs=2)
     network = replace(its.network, latent=6, depth=2, receptive_field=1)
     usual = {
@@ -45,10 +45,11 @@ class StopAfter:
         return self.left > 0
 
 
-def run(training, folder, decisions=192, listener=go_on, **options):
+def run(training, folder, decisions=192, listener=go_on, *, init=None, is_resumed=False):
     """Trains; checkpoints stand between all rollouts."""
     limits = Limits(decisions=decisions, checkpoint_every_s=0.0)
-    return train(training, folder, limits, listener=listener, **options)
+    asked = Run(training=training, limits=limits, init=init)
+    return train(asked, folder, listener=listener, is_resumed=is_resumed)
 
 
 def end_of(folder):

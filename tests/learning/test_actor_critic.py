@@ -10,7 +10,7 @@ from torch.distributions import Categorical
 
 from swarm_mj.learning.actor_critic import entropy, gumbel_sample, log_probability
 from swarm_mj.learning.checkpoint import missions_of
-from swarm_mj.learning.settings import arm_settings
+from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import make_model
 from swarm_mj.mission import PRESETS
 
@@ -25,7 +25,7 @@ RUNS = [
 def model_of(arm, preset, sizes):
     """A model whose weights are large enough that decisions depend on what is seen."""
     mission = PRESETS[preset]("random-walk", num_robots=5, num_windows=20, range_ratio=0.6)
-    training = arm_settings(arm, mission, sizes, seed=1)
+    training = usual_settings(arm, mission, sizes, seed=1)
     training = replace(training, missions=4, network=replace(training.network, latent=8, depth=2))
     model, _ = make_model(training)
     with torch.no_grad():

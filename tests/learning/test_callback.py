@@ -3,13 +3,14 @@
 import csv
 import json
 import time
+from dataclasses import replace
 
 import pytest
 from small_runs import StopAfter, go_on, run, small_training
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from swarm_mj.learning import callback
-from swarm_mj.learning.run_folder import CURVE, POLICY, REPLAYS, TENSORBOARD, Limits
+from swarm_mj.learning.run_folder import CURVE, POLICY, REPLAYS, TENSORBOARD, Limits, Run
 from swarm_mj.learning.settings import HELD_OUT_SEED
 from swarm_mj.learning.train import train
 from swarm_mj.policies.registry import make_policy
@@ -43,7 +44,8 @@ def whole(tmp_path_factory):
         return True
 
     limits = Limits(decisions=192, replay_every=100)
-    progress = train(TRAINING, folder, limits, listener=listen, command="swarm-mj train --out x")
+    asked = Run(training=TRAINING, limits=limits, command="swarm-mj train --out x")
+    progress = train(asked, folder, listener=listen)
     return folder, progress, heard
 
 
@@ -135,9 +137,7 @@ def test_a_better_policy_takes_the_place_of_the_last_and_a_worse_one_does_not(
     evaluate = callback.evaluate
 
     def judged(*arguments):
-        return type(found := evaluate(*arguments))(
-            **found.to_json() | {"objective": next(objectives)}
-        )
+        return replace(evaluate(*arguments), objective=next(objectives))
 
     monkeypatch.setattr(callback, "evaluate", judged)
     progress = run(TRAINING, tmp_path / "run")
@@ -147,8 +147,8 @@ def test_a_better_policy_takes_the_place_of_the_last_and_a_worse_one_does_not(
 
 
 def test_minutes_end_a_run_after_a_whole_rollout(tmp_path):
-    limits = Limits(minutes=1e-9)
-    progress = train(TRAINING, tmp_path / "run", limits, listener=go_on)
+    asked = Run(training=TRAINING, limits=Limits(minutes=1e-9))
+    progress = train(asked, tmp_path / "run", listener=go_on)
     assert progress.decisions == 0
     assert [row["decisions"] for row in progress.curve] == [0.0]
 
@@ -158,7 +158,8 @@ def test_minutes_end_a_run_after_a_whole_rollout(tmp_path):
         return True
 
     limits = Limits(minutes=progress.minutes + 0.02 / 60.0)
-    progress = train(TRAINING, tmp_path / "run", limits, listener=slow, is_resumed=True)
+    asked = Run(training=TRAINING, limits=limits)
+    progress = train(asked, tmp_path / "run", listener=slow, is_resumed=True)
     assert progress.decisions % 32 == 0
     assert 0 < progress.decisions <= 64
     assert progress.curve[-1]["decisions"] == progress.decisions

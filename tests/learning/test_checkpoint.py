@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from small_runs import go_on, run, small_training
+from small_runs import run, small_training
 
 from swarm_mj.learning.checkpoint import load, save
-from swarm_mj.learning.run_folder import CHECKPOINT, Accumulator, Limits, Progress
-from swarm_mj.learning.train import make_model, train
+from swarm_mj.learning.run_folder import CHECKPOINT, Accumulator, Progress
+from swarm_mj.learning.train import make_model
 
 TRAINING = small_training()
 
@@ -133,4 +133,4 @@ def test_a_checkpoint_that_cannot_be_written_is_an_os_error(tmp_path):
 def test_a_run_does_not_begin_over_another(tmp_path):
     (tmp_path / CHECKPOINT).touch()
     with pytest.raises(ValueError, match=r"holds checkpoint.pt"):
-        train(TRAINING, tmp_path, Limits(decisions=1), listener=go_on)
+        run(TRAINING, tmp_path, 1)

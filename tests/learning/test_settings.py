@@ -9,7 +9,7 @@ from small_runs import small_training
 
 from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.network import AggregationGnn
-from swarm_mj.learning.settings import arm_settings, from_json
+from swarm_mj.learning.settings import from_json, usual_settings
 from swarm_mj.mission import PRESETS, paper, reference
 
 ARMS = [(arm, preset) for arm in ("robot", "team") for preset in PRESETS]
@@ -17,20 +17,20 @@ ARMS = [(arm, preset) for arm in ("robot", "team") for preset in PRESETS]
 
 @pytest.mark.parametrize(("arm", "preset"), ARMS)
 def test_settings_come_back_from_json_as_they_were(arm, preset):
-    training = arm_settings(arm, PRESETS[preset]("random-walk"), (10, 40), seed=2**62)
-    assert from_json(json.loads(json.dumps(training.to_json()))) == training
+    training = usual_settings(arm, PRESETS[preset]("random-walk"), (10, 40), seed=2**62)
+    assert from_json(json.loads(json.dumps(asdict(training)))) == training
 
 
 @pytest.mark.parametrize(("arm", "preset"), ARMS)
 def test_a_network_takes_what_its_features_are(arm, preset):
-    training = arm_settings(arm, PRESETS[preset]("random-walk"), (10,))
+    training = usual_settings(arm, PRESETS[preset]("random-walk"), (10,))
     names = make_extractor(training.features, training.mission).names
     assert training.network.num_features == len(names)
 
 
 def test_arm_team_is_the_papers():
     """III-C: Adam at 1e-4 that decays by 0.95, gamma 0.99, clip 0.1, 32 missions, K = 5."""
-    training = arm_settings("team", paper("stationary"), (40,))
+    training = usual_settings("team", paper("stationary"), (40,))
     ppo, network = training.ppo, training.network
     assert (ppo.learning_rate, ppo.decay, ppo.discount, ppo.clip) == (1e-4, 0.95, 0.99, 0.1)
     assert (network.receptive_field, network.latent, network.depth) == (5, 64, 3)
@@ -42,7 +42,7 @@ def test_arm_team_is_the_papers():
 
 
 def test_arm_team_under_the_reference_preset_is_the_authors():
-    training = arm_settings("team", reference("stationary"), (40,))
+    training = usual_settings("team", reference("stationary"), (40,))
     network = training.network
     assert (training.features, network.edges, network.num_outputs) == ("reference", "reference", 2)
     assert training.sums_nodes
@@ -50,7 +50,7 @@ def test_arm_team_under_the_reference_preset_is_the_authors():
 
 
 def test_silence_is_dropped_only_where_it_earns_nothing():
-    robot = arm_settings("robot", paper("stationary"), (40,))
+    robot = usual_settings("robot", paper("stationary"), (40,))
     assert robot.drops_silence == (robot.ppo.discount == 0.0)
     assert not replace(robot, ppo=replace(robot.ppo, discount=0.5)).drops_silence
     assert not small_training("team").drops_silence
@@ -81,7 +81,7 @@ def test_whom_a_robot_addresses_can_depend_on_where_it_is(preset):
     """The text's edges lead from children to parents: the robot's own state reached nobody."""
     mission = preset("stationary", num_robots=4)
     torch.manual_seed(0)
-    network = AggregationGnn(arm_settings("team", mission, (4,)).network)
+    network = AggregationGnn(usual_settings("team", mission, (4,)).network)
     node = torch.rand(1, 4, network.shape.num_features)
     parent = torch.tensor([[-1, 0, 1, 0]])
     moved = node.clone()
@@ -92,7 +92,7 @@ def test_whom_a_robot_addresses_can_depend_on_where_it_is(preset):
 
 def test_an_unknown_arm_is_refused():
     with pytest.raises(ValueError, match="arm must be one of robot, team, not 'both'"):
-        arm_settings("both", paper("stationary"), (40,))
+        usual_settings("both", paper("stationary"), (40,))
 
 
 @pytest.mark.parametrize("part", ["network", "ppo", "mission", ""])

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from small_runs import go_on, run, small_training
+from small_runs import run, small_training
 from tiny_policies import save_tiny
 
 from swarm_mj.learning.checkpoint import missions_of
-from swarm_mj.learning.run_folder import INIT, SETTINGS, Limits
-from swarm_mj.learning.train import StepDecay, make_model, train
+from swarm_mj.learning.run_folder import INIT, SETTINGS
+from swarm_mj.learning.train import StepDecay, make_model
 from swarm_mj.policies.stored import read_policy
 
 
@@ -111,7 +111,7 @@ def test_missions_that_cannot_be_made_leave_nothing(tmp_path):
     training = small_training()
     sparse = replace(training, mission=replace(training.mission, range_ratio=0.01))
     with pytest.raises(ValueError, match="too sparse"):
-        train(sparse, tmp_path / "run", Limits(decisions=1), listener=go_on)
+        run(sparse, tmp_path / "run", 1)
     assert not (tmp_path / "run").exists()
 
 
