@@ -15,7 +15,6 @@ from statistics import mean
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.style import CAPTION, FAINT, INK, WIDTH_IN, look_of, save, styled
@@ -91,7 +90,7 @@ def draw(curve: Mapping[str, np.ndarray], levels: Mapping[str, float]) -> Figure
         axes.set_xlabel("minutes of training")
         axes.set_ylabel("age of information [windows]")
         axes.set_ylim(0.0, MOST_AGE * max(levels.values()))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_major_formatter("{x:g}")
         axes.legend(loc="lower right", frameon=False, fontsize=8)
         drawing.supxlabel(SAID, x=0.01, ha="left", fontsize=7, color=FAINT, gid=CAPTION)
     return drawing

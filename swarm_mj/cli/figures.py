@@ -36,9 +36,8 @@ def run(options: Options) -> int:
     results = [result for path in options.results for result in read_results(path)]
     paths = {name: _paths(options, name) for name in dict.fromkeys(options.figure)}
     with Console(stderr=True).status("Drawing ...") as status:
-        from swarm_mj.evaluation.figures.gallery import (
-            draw_figure,  # matplotlib takes its time to import
-        )
+        # matplotlib takes its time to import
+        from swarm_mj.evaluation.figures.drawing import draw_figure
         from swarm_mj.evaluation.figures.style import save
 
         drawn = {}

@@ -1,12 +1,12 @@
 """Curves from result files, and the published ones beside them."""
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby
 from typing import Any
 
+import msgspec
 import numpy as np
 from jaxtyping import Float
 
@@ -24,20 +24,16 @@ class Curve:
     """A cost of one method over a figure's x."""
 
     method: str  # a policy's name, or what the paper calls a learned one
-    is_published: bool
+    is_published: bool = False
     carries_more: bool = False  # than T, M and P in its packets
-    is_level: bool  # x means nothing to the method: the same value all over the axis
+    is_level: bool = False  # x means nothing to the method: the same value all over the axis
     x: Float[np.ndarray, "X"]
     mean: Float[np.ndarray, "X"]
     sem: Float[np.ndarray, "X"]  # standard error of the mean; nan where it is unknown
 
 
 def preset_of(results: Sequence[Result]) -> str:
-    """The one preset of all results.
-
-    Raises:
-        ValueError: There are several, or it is unknown.
-    """
+    """The one preset of all results; raises ValueError if there are several, or it is unknown."""
     presets = list(dict.fromkeys(result.preset for result in results))
     if len(presets) > 1:
         raise ValueError(
@@ -81,38 +77,17 @@ def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
 
 
 def curves(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[Curve]:
-    """All curves of a panel.
+    """The published curves of a cost, then ours, each in the order of their rows.
 
     Args:
         figure: Which figure.
         cost: The panel's: aoi or velocity_variance.
         results: Those that belong into the figure.
 
-    Returns:
-        The published curves, then ours, each in the order of their rows.
-
     Raises:
         ValueError: A cost is not positive.
     """
     return _published(figure, cost) + _ours(figure, cost, results)
-
-
-def config_of(result: Result) -> dict[str, Any]:
-    """What a result says it was made with.
-
-    Raises:
-        ValueError: It is not a JSON object.
-    """
-    try:
-        config = json.loads(result.config)
-    except ValueError:
-        config = None
-    if not isinstance(config, dict):
-        raise ValueError(
-            f"config of {result.policy} must be a JSON object, not {result.config!r:.60}; make "
-            "the results with `swarm-mj evaluate --csv FILE`"
-        )
-    return config
 
 
 def _ours(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[Curve]:
@@ -150,35 +125,31 @@ def _published(figure: ResultFigure, cost: str) -> list[Curve]:
     return drawn
 
 
-def _curve(
-    method: str,
-    rows: Sequence[tuple[float, float, float]],
-    *,
-    is_published: bool = False,
-    is_level: bool = False,
-    carries_more: bool = False,
-) -> Curve:
+def _curve(method: str, rows: Sequence[tuple[float, float, float]], **traits: bool) -> Curve:
     """A curve through rows of x, mean and standard error."""
     x, mean, sem = np.array(sorted(rows), dtype=float).T
-    return Curve(
-        method=method,
-        is_published=is_published,
-        carries_more=carries_more,
-        is_level=is_level,
-        x=x,
-        mean=mean,
-        sem=sem,
-    )
+    return Curve(method=method, x=x, mean=mean, sem=sem, **traits)
 
 
 def _x(figure: ResultFigure, result: Result) -> float | None:
     """Where a result stands on the axis; None for a policy without a receptive field."""
     if figure.sweeps_missions:
         return float(getattr(result, figure.x_name))
-    x = config_of(result).get(figure.x_name)
+    x = _config(result).get(figure.x_name)
     if x is not None and not isinstance(x, int | float):
         raise ValueError(f"{figure.x_name} of {result.policy} must be a number, not {x!r}")
     return None if x is None else float(x)
+
+
+def _config(result: Result) -> dict[str, Any]:
+    """What a result says it was made with; raises ValueError unless it is a JSON object."""
+    try:
+        return msgspec.json.decode(result.config, type=dict[str, Any])
+    except msgspec.DecodeError as error:
+        raise ValueError(
+            f"config of {result.policy} must be a JSON object, not {result.config!r:.60}; make "
+            "the results with `swarm-mj evaluate --csv FILE`"
+        ) from error
 
 
 def _check_agreed(figure: ResultFigure, results: Sequence[Result]) -> None:
@@ -198,7 +169,7 @@ def _check_agreed(figure: ResultFigure, results: Sequence[Result]) -> None:
 def _check_papers(figure: ResultFigure, result: Result) -> None:
     """Raises ValueError unless the missions are the paper's but for x."""
     swept = set(OPTIONS) - set(figure.fixed)
-    said = config_of(result) | asdict(result)
+    said = _config(result) | asdict(result)
     for name, expected in asdict(figure.mission(result.preset)).items():
         if name not in swept and said.get(name, expected) != expected:
             raise ValueError(

@@ -1,4 +1,4 @@
-"""Draws a result figure: curves with error bars, named at their ends."""
+"""Draws a figure by its name; result figures are curves with error bars, named at their ends."""
 
 from collections.abc import Sequence
 
@@ -7,10 +7,17 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
+from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 
-from swarm_mj.evaluation.figures.contents import Panel, ResultFigure, Scale
-from swarm_mj.evaluation.figures.curves import Curve, curves, results_of
+from swarm_mj.evaluation.figures.contents import (
+    FLOCK,
+    RESULT_FIGURES,
+    Panel,
+    ResultFigure,
+    Scale,
+)
+from swarm_mj.evaluation.figures.curves import Curve, curves, preset_of, results_of
+from swarm_mj.evaluation.figures.flock import draw_flock
 from swarm_mj.evaluation.figures.labels import MORE, name_ends, name_of
 from swarm_mj.evaluation.figures.style import (
     FAINT,
@@ -31,23 +38,31 @@ FIXED = {
 }
 RING = 1.6  # a published marker's size, of ours
 HEADROOM = 0.06  # of the axis, beyond the highest and the lowest curve
-
+PLAIN = "{x:g}"  # a number on an axis
 SHORT = 7  # of a commit's digits
 
 
-def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
-    """A result figure of the paper, ours and the published curves.
+def draw_figure(
+    name: str, results: Sequence[Result], *, flock_policy: str, flock_seed: int
+) -> Figure:
+    """Draws a figure.
 
     Args:
-        figure: Which one.
+        name: One of `FIGURES`.
         results: One or more, of one preset; other regimes are passed over.
-
-    Returns:
-        The drawing.
+        flock_policy: Who talks to whom in the flock's mission.
+        flock_seed: That mission's.
 
     Raises:
-        ValueError: The results hold no point of it, or cannot be compared.
+        ValueError: The results hold no point of it or cannot be compared, or no such flock flies.
     """
+    if name == FLOCK:
+        return draw_flock(preset_of(results), flock_policy, flock_seed)
+    return draw(RESULT_FIGURES[name], results)
+
+
+def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
+    """A result figure of the paper, ours and the published curves; otherwise as `draw_figure`."""
     found = results_of(figure, results)
     num_panels = len(figure.panels)
     height_in = TOP_IN + num_panels * PANEL_IN + (num_panels - 1) * GAP_IN + BOTTOM_IN
@@ -63,7 +78,10 @@ def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
         )
         for axes, panel in zip(grid[:, 0], figure.panels, strict=True):
             its = curves(figure, panel.cost, found)
-            _fill(axes, figure, panel, its)
+            _set_axes(axes, figure, panel, its)
+            for curve in its:
+                _draw_curve(axes, curve)
+            name_ends(axes, its)
         grid[-1, 0].set_xlabel(figure.x_label)
         is_marked = any(carries_more(result) for result in found)
         _head(drawing, figure, found[0], height_in, is_marked=is_marked)
@@ -84,57 +102,28 @@ def caption(figure: ResultFigure, results: Sequence[Result]) -> str:
     )
 
 
-def _fill(axes: Axes, figure: ResultFigure, panel: Panel, its: Sequence[Curve]) -> None:
-    """Draws a panel's curves and names them."""
-    _set_axes(axes, figure, panel, its)
-    for curve in its:
-        draw_one = _draw_level if curve.is_level else _draw_curve
-        draw_one(axes, curve)
-    name_ends(axes, its)
-
-
 def _draw_curve(axes: Axes, curve: Curve) -> None:
-    """A line with error bars; a published marker is a ring around ours where both agree."""
-    look = look_of(curve.method)
-    axes.errorbar(
-        curve.x,
-        curve.mean,
-        yerr=curve.sem,
-        label=_label(curve),
-        color=look.colour,
-        marker=look.marker,
-        markersize=RING * look.size if curve.is_published else look.size,
-        markerfacecolor="white" if curve.is_published else look.colour,
-        linestyle=_line(curve),
-        linewidth=look.width,
-        elinewidth=0.9,
-        capsize=2.0,
-    )
-
-
-def _draw_level(axes: Axes, curve: Curve) -> None:
-    """A line through the axes; ours with a band of its standard error."""
-    look = look_of(curve.method)
-    axes.plot(
-        curve.x,
-        curve.mean,
-        label=_label(curve),
-        color=look.colour,
-        linestyle=_line(curve),
-        linewidth=look.width,
-    )
-    if not curve.is_published:
+    """A line with error bars, or a level with a band; a published marker is a ring around ours."""
+    look, is_published = look_of(curve.method), curve.is_published
+    line = {
+        "label": name_of(curve) + (", published" if is_published else ""),
+        "color": look.colour,
+        "linestyle": "--" if is_published else "-",
+        "linewidth": look.width,
+    }
+    if not curve.is_level:
+        marker = {
+            "marker": look.marker,
+            "markersize": RING * look.size if is_published else look.size,
+            "markerfacecolor": "white" if is_published else look.colour,
+        }
+        bars = {"yerr": curve.sem, "elinewidth": 0.9, "capsize": 2.0}
+        axes.errorbar(curve.x, curve.mean, **bars, **line, **marker)
+        return
+    axes.plot(curve.x, curve.mean, **line)
+    if not is_published:
         low, high = curve.mean - curve.sem, curve.mean + curve.sem
         axes.fill_between(curve.x, low, high, color=look.colour, alpha=0.2, linewidth=0.0)
-
-
-def _label(curve: Curve) -> str:
-    label = name_of(curve)
-    return f"{label}, published" if curve.is_published else label
-
-
-def _line(curve: Curve) -> str:
-    return "--" if curve.is_published else "-"
 
 
 def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, its: Sequence[Curve]) -> None:
@@ -148,11 +137,11 @@ def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, its: Sequence[Curv
     axes.set_ylim(*_widened(y, HEADROOM, panel.scale))
     axes.xaxis.set_major_locator(FixedLocator(np.unique(x).tolist()))
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(FuncFormatter(_plain))
+    axes.xaxis.set_major_formatter(PLAIN)
     if panel.scale == "log":
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_minor_locator(NullLocator())
-        axes.yaxis.set_major_formatter(FuncFormatter(_plain))
+        axes.yaxis.set_major_formatter(PLAIN)
     axes.set_title(panel.label, loc="left", color=INK)
 
 
@@ -165,10 +154,6 @@ def _widened(values: Float[np.ndarray, "V"], share: float, scale: Scale) -> tupl
     return low - share * (high - low), high + share * (high - low)
 
 
-def _plain(value: float, _position: int | None = None) -> str:
-    return f"{value:g}"
-
-
 def _head(
     drawing: Figure, figure: ResultFigure, result: Result, height_in: float, *, is_marked: bool
 ) -> None:
@@ -179,10 +164,8 @@ def _head(
     drawing.text(LEFT, line, figure.title, fontsize=12, fontweight="bold", va="baseline")
     drawing.text(MARGIN, line, regime, color=FAINT, va="baseline", ha="right")
     ours = Line2D([], [], color=FAINT, marker="o", markersize=4.5)
-    published = Line2D(
-        [], [], color=FAINT, marker="o", markersize=4.5 * RING, linestyle="--", linewidth=1.2
-    )
-    published.set_markerfacecolor("white")
+    ring = {"marker": "o", "markersize": 4.5 * RING, "markerfacecolor": "white"}
+    published = Line2D([], [], color=FAINT, linestyle="--", linewidth=1.2, **ring)
     labels = ["this package, mean ± SEM", "published, mean ± SEM"]
     if is_marked:
         labels.append(f"{MORE}: packets {CARRIES_MORE}")

@@ -9,7 +9,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import MultipleLocator, StrMethodFormatter
+from matplotlib.ticker import MultipleLocator
 
 from swarm_mj.evaluation.figures.style import FAINT, RAMP, WIDTH_IN, styled, write_caption
 from swarm_mj.evaluation.results import CARRIES_MORE
@@ -46,18 +46,10 @@ class Snapshot:
 
 
 def fly_flock(mission: Mission, policy_name: str, seed: int) -> tuple[Snapshot, Snapshot]:
-    """Flies a mission; its first and its last moment.
-
-    Args:
-        mission: What is flown.
-        policy_name: Who talks to whom, a name among `POLICIES`.
-        seed: The mission's.
-
-    Returns:
-        The team before the first window and after the last.
+    """Flies a mission; the team before its first window and after its last.
 
     Raises:
-        ValueError: The policy is unknown, or the seed out of range.
+        ValueError: The policy is none of `POLICIES`, or the seed out of range.
     """
     policy = make_policy(policy_name, mission)
     swarm = Swarm(mission, [seed])
@@ -68,19 +60,10 @@ def fly_flock(mission: Mission, policy_name: str, seed: int) -> tuple[Snapshot, 
 
 
 def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
-    """Flies the preset's flock and draws its start and its end.
+    """Flies the preset's flock and draws its start and its end, an arrow per robot.
 
-    Args:
-        preset: A key of `PRESETS`.
-        policy_name: As for `fly_flock`.
-        seed: As for `fly_flock`.
-
-    Returns:
-        The drawing: an arrow per robot; its colour is how far the robot's velocity is from the
-        team's mean.
-
-    Raises:
-        ValueError: As `fly_flock`.
+    An arrow's colour is how far the robot's velocity is from the team's mean. Raises ValueError as
+    `fly_flock` does.
     """
     mission = PRESETS[preset]("flocking")
     start, end = fly_flock(mission, policy_name, seed)
@@ -149,7 +132,7 @@ def _frame(panels: tuple[Axes, Axes], position_m: Float[np.ndarray, "P 2"]) -> N
         axes.set_aspect("equal")
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_locator(MultipleLocator(0.5))
-            axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            axis.set_major_formatter("{x:g}")
     panels[0].set_ylabel("y [km]")
     panels[1].tick_params(labelleft=False)
 

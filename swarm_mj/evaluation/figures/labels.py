@@ -56,20 +56,14 @@ def name_of(curve: Curve) -> str:
     return f"{label} {MORE}" if curve.carries_more else label
 
 
-def spread(wanted: Float[np.ndarray, "L"], gap: float, span: float = 1.0) -> Float[np.ndarray, "L"]:
-    """The places nearest to those wanted, in least squares, that keep their order and distance.
+def spread(wanted: Float[np.ndarray, "L"], gap: float) -> Float[np.ndarray, "L"]:
+    """The places nearest to those wanted, in least squares, that keep their order and a gap.
 
-    Args:
-        wanted: Where each would stand.
-        gap: The least distance between neighbours.
-        span: They stand from 0 to here, if there is room for all.
-
-    Returns:
-        Where each stands.
+    They stand from 0 to 1, if there is room for all.
     """
     order = np.argsort(wanted, kind="stable")
     steps = gap * np.arange(len(wanted))
     base = isotonic_regression(wanted[order] - steps).x
     places = np.empty(len(wanted))
-    places[order] = np.clip(base, 0.0, max(0.0, span - steps[-1])) + steps
+    places[order] = np.clip(base, 0.0, max(0.0, 1.0 - steps[-1])) + steps
     return places

@@ -46,8 +46,12 @@ RC = {
     "savefig.facecolor": "white",
     "svg.hashsalt": "swarm_mj",  # the same figure is the same file
 }
-# Left to themselves, these formats write down when they were made.
-UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+# The field that has a format's caption, and those that would say when the file was made.
+METADATA = {
+    "svg": ("Description", {"Date": None}),
+    "png": ("Description", {}),
+    "pdf": ("Subject", {"CreationDate": None}),
+}
 CAPTION = "caption"  # the name of the text that files also have among their own descriptions
 
 
@@ -108,23 +112,18 @@ def save(figure: Figure, path: Path) -> None:
     """Writes a figure, its caption among the file's own data; the same figure gives the same bytes.
 
     Args:
-        figure: Drawn in this style.
+        figure: Drawn in this style, with a caption.
         path: The file, replaced if it exists; its ending is one of `FORMATS`.
 
     Raises:
         OSError: The file cannot be written.
     """
     kind = path.suffix.removeprefix(".")
+    field, undated = METADATA[kind]
+    caption = next(
+        text.get_text()
+        for text in figure.findobj(Text)
+        if isinstance(text, Text) and text.get_gid() == CAPTION
+    )
     with styled(), atomic_write(path) as part:
-        figure.savefig(
-            part, format=kind, metadata=UNDATED.get(kind, {}) | _description(figure, kind)
-        )
-
-
-def _description(figure: Figure, kind: str) -> dict[str, str]:
-    """The caption, as the format's own field."""
-    field = "Subject" if kind == "pdf" else "Description"
-    for text in figure.findobj(Text):
-        if isinstance(text, Text) and text.get_gid() == CAPTION:
-            return {field: text.get_text()}
-    return {}
+        figure.savefig(part, format=kind, metadata={field: caption, **undated})

@@ -7,8 +7,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.text import Text
 from synthetic import everything, result, sweep
 
-from swarm_mj.evaluation.figures.contents import RESULT_FIGURES
-from swarm_mj.evaluation.figures.drawing import draw
+from swarm_mj.evaluation.figures.contents import FIGURES, RESULT_FIGURES
+from swarm_mj.evaluation.figures.drawing import draw, draw_figure
 from swarm_mj.evaluation.figures.style import LOOKS
 
 FIG3, FIG4, FIG5, FIG6 = RESULT_FIGURES.values()
@@ -180,3 +180,11 @@ def test_the_oracle_is_a_thin_black_line():
     ]
     assert line.get_color() == "#000000"
     assert line.get_linewidth() < min(others)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_name_draws_its_figure_under_the_results_preset(name):
+    drawing = draw_figure(name, everything("paper"), flock_policy="round-robin", flock_seed=2)
+    caption = drawing.texts[-1].get_text()
+    assert caption.startswith(f"{name}, preset paper: ")
+    assert ("policy round-robin, seed 2" in caption) == (name == "fig2")
