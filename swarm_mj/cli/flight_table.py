@@ -6,6 +6,7 @@ from typing import Any
 
 from rich.table import Table
 
+from swarm_mj.cli.terminal import named_values
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
 from swarm_mj.rollout import Summary
@@ -16,13 +17,12 @@ AGE = "age of information: how old a robot's news of another is, over all pairs"
 
 def flight_numbers(policy: Policy, summary: Summary) -> dict[str, Any]:
     """The summary of the one mission flown, and what flew it; what does not exist is None."""
-    numbers: dict[str, Any] = {}
+    numbers: dict[str, Any] = {"num_windows": summary.num_windows}
     for name, value in asdict(summary).items():
-        number = value if isinstance(value, int) else float(value[0])
-        is_count = name.startswith("packets_") or name == "complete_window"
-        if math.isnan(number):
-            number = None
-        numbers[name] = int(number) if is_count and number is not None else number
+        if name != "num_windows":
+            is_count = name.startswith("packets_") or name == "complete_window"
+            number = float(value[0])
+            numbers[name] = None if math.isnan(number) else int(number) if is_count else number
     first, last = numbers["velocity_variance_first"], numbers["velocity_variance_last"]
     return numbers | {
         "velocity_variance_left": last / first if first > 0.0 else None,
@@ -31,38 +31,27 @@ def flight_numbers(policy: Policy, summary: Summary) -> dict[str, Any]:
     }
 
 
-def flight_table(
-    mission: Mission, policy: Policy, summary: Summary, wall_s: float, *, title: str
-) -> Table:
-    """What the flight cost, as a table for the terminal.
+def flight_table(title: str, mission: Mission, numbers: dict[str, Any], wall_s: float) -> Table:
+    """What a flight cost, by its `flight_numbers`, as a table of at most 14 rows.
 
     Args:
-        mission: What was flown.
-        policy: Who talked to whom.
-        summary: Its costs.
-        wall_s: How long it took here [s].
         title: The table's.
-
-    Returns:
-        At most 14 rows.
+        mission: What was flown.
+        numbers: What it cost.
+        wall_s: How long it took here [s].
     """
-    numbers = flight_numbers(policy, summary)
-    table = Table(
-        title=title, title_justify="left", caption=AGE, caption_justify="left", show_header=False
-    )
+    decider = "a centre that is told where all are"
     rows = {
-        f"windows of {mission.window_s:g} s flown": f"{summary.num_windows} in {wall_s:.2f} s",
+        f"windows of {mission.window_s:g} s flown": f"{numbers['num_windows']} in {wall_s:.2f} s",
         "age of information, mean": _windows(numbers["aoi_mean"], mission, 2),
         "everyone had heard of everyone": _windows(numbers["complete_window"], mission, 0, "after"),
         "radio hops that news travelled, mean": f"{numbers['hops_mean']:.2f}",
         **_packets(numbers),
         "packets carry": _payload(numbers["payload"]),
-        "who decides": _decider(is_centralised=numbers["is_centralised"]),
+        "who decides": decider if numbers["is_centralised"] else "each robot, by what it has heard",
         **({} if mission.task == "stationary" else _velocities(mission, numbers)),
     }
-    for name, value in rows.items():
-        table.add_row(name, value)
-    return table
+    return named_values(title, rows, caption=AGE)
 
 
 def _windows(value: float | int | None, mission: Mission, digits: int, word: str = "") -> str:
@@ -100,12 +89,6 @@ def _payload(payload: str) -> str:
     """What packets carry; T, M and P are the paper's names for what a robot knows (II-B)."""
     states = "known states (T, M, P)"
     return states if payload == "none" else f"{states} and {payload}"
-
-
-def _decider(*, is_centralised: bool) -> str:
-    if is_centralised:
-        return "a centre that is told where all are"
-    return "each robot, by what it has heard"
 
 
 def _velocities(mission: Mission, numbers: dict[str, Any]) -> dict[str, str]:

@@ -37,19 +37,6 @@ from swarm_mj.swarm import Swarm
 DONE, INTERRUPTED = 0, 130
 REPLAYS = Path("replays")
 OUTPUT = "output"  # a heading of the help
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Flight:
-    """A flight as the command line saw it."""
-
-    policy: Policy
-    flown: list[WindowRecord]
-    recorder: Recorder | None
-    was_interrupted: bool
-    wall_s: float
-
-
 COMPILING_WINDOWS = 10  # in which three robots do all that a flight does, schedules included
 
 
@@ -92,12 +79,27 @@ def run(options: Options) -> int:
         _compile_ahead(options, mission)
         swarm = Swarm(mission, [options.seed])
         recorder = _recorder(options, swarm, policy) if path else None
-    flight = _fly(swarm, policy, recorder, console)
+    start_s = time.perf_counter()
+    flown = _fly(swarm, policy, recorder, console)
+    wall_s = time.perf_counter() - start_s
+    was_interrupted = len(flown) < mission.num_windows
     with deferred_interrupt(), console.status("Writing ..."):
-        _write(_config(options, mission, policy), mission, flight, path, options.json)
-    _print(options, flight, path)
-    if flight.was_interrupted:
-        console.print(f"Interrupted after {len(flight.flown)} of {mission.num_windows} windows.")
+        config, numbers = _config(options, policy), flight_numbers(policy, summarise(flown))
+        if path and recorder:
+            from swarm_mj.replay.write import write_replay  # rerun takes its time to import
+
+            known = {key: value for key, value in config.items() if value is not None}
+            write_replay(recorder.log(), mission, known, path)
+        if options.json:
+            took = {"wall_seconds": wall_s, "interrupted": was_interrupted}
+            replay = {"replay": str(path) if path else None}
+            write_json(options.json, {"config": config} | numbers | took | replay)
+    out = plain_console()
+    out.print(flight_table(_title(options), mission, numbers, wall_s))
+    if path:
+        out.print(f"Open the replay:  {this_command()} replay {shlex.quote(str(path))}")
+    if was_interrupted:
+        console.print(f"Interrupted after {len(flown)} of {mission.num_windows} windows.")
         return INTERRUPTED
     return run_viewer(view_command(path)) if options.view and path else DONE
 
@@ -146,15 +148,15 @@ def _compile_ahead(options: Options, mission: Mission) -> None:
 
 
 def _recorder(options: Options, swarm: Swarm, policy: Policy) -> Recorder:
-    return Recorder(
-        swarm, ego=options.observer, is_broadcast=policy.window(swarm.mission).is_broadcast
-    )
+    is_broadcast = policy.window(swarm.mission).is_broadcast
+    return Recorder(swarm, ego=options.observer, is_broadcast=is_broadcast)
 
 
-def _fly(swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Console) -> _Flight:
+def _fly(
+    swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Console
+) -> list[WindowRecord]:
     """Flies with a progress bar; Ctrl-C ends the flight after a whole window."""
     flown: list[WindowRecord] = []
-    start_s = time.perf_counter()
     bar = WorkBar("Flying", swarm.mission.num_windows, "windows", console=console)
     with deferred_interrupt() as is_interrupted, bar:
         for window in rollout(swarm, policy):
@@ -165,21 +167,13 @@ def _fly(swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Conso
             bar.advance()
             if is_interrupted():
                 break
-        was_interrupted = is_interrupted() and len(flown) < swarm.mission.num_windows
-    wall_s = time.perf_counter() - start_s
-    return _Flight(
-        policy=policy,
-        flown=flown,
-        recorder=recorder,
-        was_interrupted=was_interrupted,
-        wall_s=wall_s,
-    )
+    return flown
 
 
-def _config(options: Options, mission: Mission, policy: Policy) -> dict[str, Any]:
+def _config(options: Options, policy: Policy) -> dict[str, Any]:
     """Everything that makes this flight again."""
     return {
-        **asdict(mission),
+        **asdict(options.mission),
         "policy": options.policy,
         **policy.parameters,
         "seed": options.seed,
@@ -189,34 +183,9 @@ def _config(options: Options, mission: Mission, policy: Policy) -> dict[str, Any
     }
 
 
-def _write(
-    config: dict[str, Any], mission: Mission, flight: _Flight, path: Path | None, json_: Path | None
-) -> None:
-    """Writes the replay and the summary."""
-    if path and flight.recorder:
-        from swarm_mj.replay.write import write_replay  # rerun takes its time to import
-
-        kept = {key: value for key, value in config.items() if value is not None}
-        write_replay(flight.recorder.log(), mission, kept, path)
-    if json_:
-        document = {
-            "config": config,
-            **flight_numbers(flight.policy, summarise(flight.flown)),
-            "wall_seconds": flight.wall_s,
-            "interrupted": flight.was_interrupted,
-            "replay": str(path) if path else None,
-        }
-        write_json(json_, document)
-
-
-def _print(options: Options, flight: _Flight, path: Path | None) -> None:
-    """Prints the table and how to open the replay."""
-    console, mission = plain_console(), options.mission
+def _title(options: Options) -> str:
+    mission = options.mission
     team = f"{mission.num_robots} robots"
     if mission.switched_off:
         team += f", {mission.switched_off:.0%} of them off half-way"
-    title = f"{mission.task}, {options.policy}, {team}, seed {options.seed}"
-    summary = summarise(flight.flown)
-    console.print(flight_table(mission, flight.policy, summary, flight.wall_s, title=title))
-    if path:
-        console.print(f"Open the replay:  {this_command()} replay {shlex.quote(str(path))}")
+    return f"{mission.task}, {options.policy}, {team}, seed {options.seed}"

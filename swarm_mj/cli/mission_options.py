@@ -4,10 +4,10 @@ import argparse
 from dataclasses import Field, fields, replace
 from functools import partial
 from itertools import product
-from typing import Any, get_args
+from typing import Any
 
 from swarm_mj.cli.options import add_option, as_typed, flag_of, nested
-from swarm_mj.mission import PRESETS, Mission, Task, paper
+from swarm_mj.mission import PRESETS, Mission, paper
 
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]
 
@@ -23,10 +23,7 @@ def several_missions() -> Any:  # noqa: ANN401 - as above
 
 
 def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
-    """The missions that options name.
-
-    Args:
-        given: The options, by `mission.` and the field's name; a list sweeps.
+    """The missions that options name, by `mission.` and the field's name; a list sweeps.
 
     Returns:
         All combinations, the last field's values varying fastest.
@@ -34,20 +31,17 @@ def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
     Raises:
         ValueError: A value is unknown or outside its range.
     """
-    swept = {
-        name: given[f"mission.{name}"] for spec in SPECS if _is_given(name := spec.name, given)
-    }
-    values = [list(dict.fromkeys(v)) if isinstance(v, list) else [v] for v in swept.values()]
-    return tuple(_mission(**dict(zip(swept, each, strict=True))) for each in product(*values))
+    swept = {spec.name: place for spec in SPECS if (place := f"mission.{spec.name}") in given}
+    values = [given[place] for place in swept.values()]
+    values = [list(dict.fromkeys(v)) if isinstance(v, list) else [v] for v in values]
+    return tuple(make_mission(**dict(zip(swept, each, strict=True))) for each in product(*values))
 
 
-def default_of(spec: Field[Any], preset: str = "paper") -> str:
-    """A mission's own value; where it depends on the task, the flock's beside the others'."""
-    own = {task: as_typed(getattr(PRESETS[preset](task), spec.name)) for task in get_args(Task)}
-    flocks, others = own["flocking"], own["stationary"]
-    if spec.name == "task":
-        return paper().task
-    return others if flocks == others else f"{others}; {flocks} for flocks, as in the paper"
+def make_mission(**given: Any) -> Mission:  # noqa: ANN401 - fields of a mission
+    """A mission of the preset and task that are given, or usual, changed by the other fields."""
+    preset, task = (given.pop(name, getattr(Mission(), name)) for name in ("preset", "task"))
+    replace(Mission(), preset=preset, task=task)  # refuses what is unknown
+    return PRESETS[preset](task, **given)
 
 
 def mission_flags(mission: Mission) -> str:
@@ -61,18 +55,18 @@ def mission_flags(mission: Mission) -> str:
     )
 
 
-def _is_given(name: str, given: dict[str, Any]) -> bool:
-    return f"mission.{name}" in given
-
-
-def _mission(**given: Any) -> Mission:  # noqa: ANN401 - fields of a mission
-    preset, task = (given.pop(name, getattr(Mission(), name)) for name in ("preset", "task"))
-    replace(Mission(), preset=preset, task=task)  # refuses what is unknown
-    return PRESETS[preset](task, **given)
-
-
 def _add(parser: argparse.ArgumentParser, *, is_many: bool = False) -> None:
     about = "Each takes several values; those multiply." if is_many else None
     group = parser.add_argument_group("missions" if is_many else "mission", about)
     for spec in SPECS:
-        add_option(group, spec, f"mission.{spec.name}", default_of(spec), is_many=is_many)
+        add_option(group, spec, f"mission.{spec.name}", _default_of(spec), is_many=is_many)
+
+
+def _default_of(spec: Field[Any]) -> str:
+    """A mission's own value; where it depends on the task, the flock's beside the others'."""
+    flocks, others = (
+        as_typed(getattr(paper(task), spec.name)) for task in ("flocking", "stationary")
+    )
+    if flocks == others or spec.name == "task":
+        return flocks
+    return f"{others}; {flocks} for flocks, as in the paper"

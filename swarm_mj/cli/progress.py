@@ -1,7 +1,6 @@
 """The one bar of all long work: what is under way, how far it is, how long it will take."""
 
 from collections.abc import Callable
-from types import TracebackType
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TimeRemainingColumn
@@ -28,15 +27,9 @@ class WorkBar:
         console: Console | None = None,
         shows_time_left: bool = True,
     ) -> None:
-        """Prepares the bar.
+        """Prepares the bar, on standard error unless told otherwise.
 
-        Args:
-            what: What is under way, or a function that tells it.
-            total: How much work there is.
-            unit: What the work is counted in; without it, numbers are not shown.
-            completed: How much is done already.
-            console: Where to draw; None is standard error.
-            shows_time_left: Whether to say how long it will take at the speed so far.
+        Without a unit, it shows no numbers; the time left is by the speed so far.
         """
         self.what, self.text = what, ""
         self._unit = unit
@@ -52,12 +45,7 @@ class WorkBar:
         self._bar.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._bar.stop()
 
     def advance(self, done: int = 1) -> None:
@@ -67,10 +55,6 @@ class WorkBar:
     def move_to(self, completed: float) -> None:
         """So much is done in all."""
         self._bar.update(self._id, completed=completed)
-
-    def refresh(self) -> None:
-        """Draws the bar now, rather than at its next turn."""
-        self._bar.refresh()
 
     def _shown_what(self, _task: Task) -> str:
         return self.what if isinstance(self.what, str) else self.what()

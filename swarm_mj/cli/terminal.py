@@ -6,11 +6,21 @@ import sys
 from pathlib import Path
 
 from rich.console import Console
+from rich.table import Table
 
 
 def plain_console(*, is_error: bool = False) -> Console:
     """A terminal that shows text as it is: no colours of its own, no broken lines, no markup."""
     return Console(stderr=is_error, highlight=False, soft_wrap=True, markup=False)
+
+
+def named_values(title: str, rows: dict[str, str], caption: str | None = None) -> Table:
+    """A table of values beside their names."""
+    table = Table(title=title, title_justify="left", show_header=False)
+    table.caption, table.caption_justify = caption, "left"
+    for name, value in rows.items():
+        table.add_row(name, value)
+    return table
 
 
 def this_command(name: str = "swarm-mj") -> str:

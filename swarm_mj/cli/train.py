@@ -1,5 +1,6 @@
 """`swarm-mj train`: trains a communication policy by PPO on the physics scene."""
 
+import math
 import os
 import shlex
 from dataclasses import dataclass, replace
@@ -7,27 +8,27 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from rich.console import Console
-from rich.table import Table
 
 from swarm_mj.cli.interrupt import deferred_interrupt
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
 from swarm_mj.cli.outputs import check_writable
-from swarm_mj.cli.terminal import plain_console, this_command
-from swarm_mj.cli.train_options import add_setting_options, given_settings
+from swarm_mj.cli.terminal import named_values, plain_console, this_command
 from swarm_mj.cli.train_progress import Watch, age_of
 from swarm_mj.cli.train_settings import (
-    BUDGETS,
-    asked_limits,
+    add_setting_options,
     asked_settings,
     check_memory,
+    given_settings,
     refuse_others,
 )
 from swarm_mj.fields import setting
-from swarm_mj.learning.run_folder import SETTINGS, Progress, Run, check_new, read_run
+from swarm_mj.learning.run_folder import SETTINGS, Limits, Progress, Run, check_new, read_run
+from swarm_mj.learning.settings import Training
 from swarm_mj.policies.stored import read_policy
 
 DONE, INTERRUPTED = 0, 130
+BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's way
 MANY_DECISIONS = 10**12
 
 
@@ -72,7 +73,8 @@ def run(options: Options) -> int:
         from swarm_mj.learning.train import train  # stable-baselines3 takes its time to import
     try:
         with deferred_interrupt() as is_interrupted:
-            with Watch(console, asked.limits, is_interrupted) as watch:
+            watch = Watch(console, asked.limits, is_interrupted)
+            with watch:
                 progress = train(asked, options.out, listener=watch, is_resumed=options.resume)
             is_over = not watch.has_stopped
             _print(options.out, asked, progress, is_over=is_over)
@@ -89,28 +91,47 @@ def run(options: Options) -> int:
 
 def _asked_run(options: Options) -> Run:
     """What the options ask for; raises ValueError before anything is written."""
-    given, stored, init = options.settings, None, None
-    if options.resume:
-        stored = read_run(options.out)
-        if options.init is not None:
-            raise ValueError(f"{options.out} has begun, so --init {options.init} is too late")
-        refuse_others(given, stored.training, f"the run in {options.out}")
-        training, command, init = stored.training, stored.command, stored.init
-    else:
-        check_new(options.out)
-        init = options.init
-        training = asked_settings(given, read_policy(init)[1] if init else None, init)
-        command = shlex.join(["swarm-mj", "train", *options.typed])
-    limits = asked_limits(
-        stored.limits if stored else None,
-        training.arm,
-        budget=options.budget,
-        minutes=options.minutes,
-        replay_every=options.replay_every,
-    )
+    run = _begun_run(options) if options.resume else _new_run(options)
+    run = replace(run, limits=asked_limits(run.limits, options))
     check_writable(options.out / SETTINGS, "run")
-    check_memory(training, _memory_bytes())
-    return Run(training=training, limits=limits, command=command, init=init)
+    check_memory(run.training, _memory_bytes())
+    return run
+
+
+def _begun_run(options: Options) -> Run:
+    run = read_run(options.out)
+    if options.init is not None:
+        raise ValueError(f"{options.out} has begun, so --init {options.init} is too late")
+    refuse_others(options.settings, run.training, f"the run in {options.out}")
+    return run
+
+
+def _new_run(options: Options) -> Run:
+    check_new(options.out)
+    init = options.init
+    training = asked_settings(options.settings, read_policy(init)[1] if init else None, init)
+    return Run(
+        training=training,
+        limits=Limits(decisions=BUDGETS[training.arm]),
+        command=shlex.join(["swarm-mj", "train", *options.typed]),
+        init=init,
+    )
+
+
+def asked_limits(limits: Limits, options: Options) -> Limits:
+    """When a run stops: as before, or usual, unless the options say otherwise.
+
+    Raises:
+        ValueError: The time is no positive number.
+    """
+    minutes = options.minutes
+    if minutes is not None and not (minutes > 0.0 and math.isfinite(minutes)):
+        raise ValueError(f"minutes must be a number above 0, not {minutes:g}")
+    if options.budget is not None or minutes is not None:
+        limits = replace(limits, decisions=options.budget, minutes=minutes)
+    if options.replay_every is not None:
+        limits = replace(limits, replay_every=options.replay_every)
+    return limits
 
 
 def _memory_bytes() -> int | None:
@@ -123,34 +144,34 @@ def _memory_bytes() -> int | None:
 
 def _print(out: Path, asked: Run, progress: Progress, *, is_over: bool) -> None:
     """Prints what the run came to, and what to do with it."""
-    console = plain_console()
-    console.print(_table(out, asked, progress))
+    training, console = asked.training, plain_console()
+    sizes = ", ".join(map(str, training.robots))
+    title = f"{out}: arm {training.arm}, {training.mission.task}, {sizes} robots"
+    rows = {
+        **_evaluated(training, progress),
+        "decisions": f"{progress.decisions:,}",
+        "minutes": f"{progress.minutes:.1f}",
+        "best policy": str(out / "policy") if progress.best else "none yet",
+    }
+    console.print(named_values(title, rows))
     for label, line in _next_commands(out, asked, progress, is_over=is_over):
         console.print(f"{label:10}{line}")
 
 
-def _table(out: Path, asked: Run, progress: Progress) -> Table:
-    training = asked.training
-    sizes = ", ".join(map(str, training.robots))
-    table = Table(
-        title=f"{out}: arm {training.arm}, {training.mission.task}, {sizes} robots",
-        title_justify="left",
-        show_header=False,
-    )
+def _evaluated(training: Training, progress: Progress) -> dict[str, str]:
+    """What the held-out missions cost, if they were ever flown."""
     best = progress.best
-    if best is not None:
-        table.add_row("held-out age, at first", f"{age_of(progress.curve[0])} windows")
-        table.add_row(
-            "held-out age, best policy",
-            f"{age_of(best)} windows, after {best['decisions']:,.0f} decisions; chosen on these",
-        )
-        if training.reward == "velocity-variance":
-            first, last = (row["velocity_variance"] for row in (progress.curve[0], best))
-            table.add_row("velocity variance, of these", f"{first:.4f}, {last:.4f} m²/s²")
-    table.add_row("decisions", f"{progress.decisions:,}")
-    table.add_row("minutes", f"{progress.minutes:.1f}")
-    table.add_row("best policy", str(out / "policy") if best else "none yet")
-    return table
+    if best is None:
+        return {}
+    first, decisions = progress.curve[0], f"{best['decisions']:,.0f} decisions"
+    rows = {
+        "held-out age, at first": f"{age_of(first)} windows",
+        "held-out age, best policy": f"{age_of(best)} windows, after {decisions}; chosen on these",
+    }
+    if training.reward == "velocity-variance":
+        variances = ", ".join(f"{row['velocity_variance']:.4f}" for row in (first, best))
+        rows["velocity variance, of these"] = f"{variances} m²/s²"
+    return rows
 
 
 def _next_commands(

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from datetime import timedelta
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -18,56 +17,41 @@ FINISHING = "finishing this rollout, then all is kept; Ctrl-C again breaks off a
 WHOLE = 1.0  # the bar's total
 
 
-class Watch:
-    """The listener of a run: shows where it stands, and passes Ctrl-C on."""
+class Watch(WorkBar):
+    """The listener of a run, and its bar: shows where it stands, and passes Ctrl-C on."""
 
     def __init__(
         self, console: Console, limits: "Limits", is_interrupted: Callable[[], bool]
     ) -> None:
-        """Prepares the bar; it is drawn within a `with` statement.
-
-        Args:
-            console: Where to draw.
-            limits: Of the run.
-            is_interrupted: Whether Ctrl-C was pressed.
-        """
+        """Prepares the bar; `is_interrupted` says whether Ctrl-C was pressed."""
+        super().__init__(self._shown, WHOLE, console=console, shows_time_left=False)
         self._console, self._limits, self._is_interrupted = console, limits, is_interrupted
-        self._what = "Training"
-        self._bar = WorkBar(self._shown, WHOLE, console=console, shows_time_left=False)
+        self._doing = "Training"
         self._start: Status | None = None  # of this session
         self._num_rows = 0
         self.has_stopped = False  # whether the run was told to stop
-        self.has_begun = False  # whether there was anything to do
 
-    def __enter__(self) -> "Watch":
-        self._bar.__enter__()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self._bar.__exit__(kind, error, traceback)
+    @property
+    def has_begun(self) -> bool:
+        """Whether there was anything to do."""
+        return self._start is not None
 
     def __call__(self, status: "Status") -> bool:
         """Shows a status; returns whether to go on."""
         if self._start is None:
             self._start = status
             self._num_rows = len(status.progress.curve)
-        self.has_begun = True
         self._print_new_row(status)
-        self._what = "Training" if status.evaluated is None else "Evaluating"
-        self._bar.text = _text(status, self._start, self._limits)
-        self._bar.move_to(share_done(status, self._limits))
+        self._doing = "Training" if status.evaluated is None else "Evaluating"
+        self.text = _text(status, self._start, self._limits)
+        self.move_to(share_done(status, self._limits))
         if self._is_interrupted() and not self.has_stopped:
             self.has_stopped = True
             self._console.print(f"Interrupted: {FINISHING}.")
         return not self.has_stopped
 
     def _shown(self) -> str:
-        return "Finishing" if self._is_interrupted() else self._what
+        return "Finishing" if self._is_interrupted() else self._doing
 
     def _print_new_row(self, status: "Status") -> None:
         curve = status.progress.curve
@@ -92,13 +76,7 @@ def share_done(status: "Status", limits: "Limits") -> float:
 
 
 def minutes_left(status: "Status", start: "Status", limits: "Limits") -> float | None:
-    """Until the first limit, at this session's speed; None until it has one.
-
-    Args:
-        status: Now.
-        start: When this session began.
-        limits: Of the run.
-    """
+    """Until the first limit, at the speed since `start`; None until there is one."""
     left = []
     if limits.minutes:
         left.append(limits.minutes - status.minutes)

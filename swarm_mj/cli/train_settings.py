@@ -1,42 +1,73 @@
-"""From the options of `swarm-mj train` to a run's settings and limits."""
+"""From the options of `swarm-mj train` to a run's settings.
 
-import math
-from dataclasses import replace
+The options are fields of the settings, by their dotted place in them. Unless given, each is the
+usual one of the credit assignment, or in a resumed run the run's own.
+"""
+
+import argparse
+from dataclasses import Field, fields, replace
+from functools import reduce
 from pathlib import Path
-from typing import Any
+from typing import Any, get_origin
 
-from swarm_mj.cli.train_options import stored_value, typed
+from swarm_mj.cli.mission_options import make_mission
+from swarm_mj.cli.options import add_option, as_typed, flag_of
 from swarm_mj.gnn.feature_sets import num_features
-from swarm_mj.learning.run_folder import Limits
-from swarm_mj.learning.settings import Training, usual_settings
+from swarm_mj.gnn.shape import GnnShape
+from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.policy_config import PolicyConfig
 
-BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's way
 USUAL_GROUPS = 4  # of missions that end at different times
 SHARE_OF_MEMORY = 0.5  # that a run's arrays may take
+PARTS = {"": Training, "network.": GnnShape, "ppo.": PpoSettings, "mission.": Mission}
+HEADINGS = {"": "run", "network.": "network", "ppo.": "PPO", "mission.": "missions"}
+NOT_TRAINED = ("num_robots", "physics", "switched_off")  # team sizes are the run's own
+SPECS: dict[str, Field[Any]] = {
+    f"{part}{spec.name}": spec
+    for part, owner in PARTS.items()
+    for spec in fields(owner)
+    if "help" in spec.metadata and not (owner is Mission and spec.name in NOT_TRAINED)
+}
+
+
+def add_setting_options(parser: argparse.ArgumentParser) -> None:
+    """Declares them, under a heading for each part of the settings."""
+    groups = {part: parser.add_argument_group(title) for part, title in HEADINGS.items()}
+    for place, spec in SPECS.items():
+        add_option(groups[place.removesuffix(spec.name)], spec, place, _usual(place))
+
+
+def given_settings(given: dict[str, Any]) -> dict[str, Any]:
+    """The settings that were given, by their places."""
+    return {
+        place: tuple(dict.fromkeys(given[place]))
+        if get_origin(spec.type) is tuple
+        else given[place]
+        for place, spec in SPECS.items()
+        if place in given
+    }
 
 
 def asked_settings(
     given: dict[str, Any], init: PolicyConfig | None = None, init_path: Path | None = None
 ) -> Training:
-    """The settings of a new run.
+    """The settings of a new run: the usual ones of the credit assignment, changed by those given.
 
     Args:
         given: The settings that were given, by their places.
         init: Of the policy that it begins with.
         init_path: Where that policy is.
 
-    Returns:
-        The usual settings of the credit assignment, changed by those given.
-
     Raises:
         ValueError: A value is unknown or outside its range, or contradicts another.
     """
-    sizes = given.get("robots", (Mission().num_robots,))
-    training = usual_settings(
-        given.get("arm", "robot"), _mission(given, sizes[0]), sizes, given.get("seed", 0)
+    own, network = _part("", given), _part("network.", given)
+    sizes = own.get("robots", (Mission().num_robots,))
+    mission = make_mission(
+        **{"task": "stationary", "num_robots": sizes[0]} | _part("mission.", given)
     )
+    training = usual_settings(own.get("arm", "robot"), mission, sizes)
     if init is not None:
         training = replace(
             training,
@@ -44,12 +75,20 @@ def asked_settings(
             features=init.features,
             silence_logit=init.silence_logit,
         )
-        shape = {place: value for place, value in given.items() if _is_shape(place)}
+        shape = ("features", *(f"network.{name}" for name in network))
+        shape = {place: given[place] for place in shape if place in given}
         refuse_others(shape, training, f"the policy {init_path}")
-    missions = _missions(given.get("missions"), training.missions, len(sizes))
+    missions = _missions(own.get("missions"), training.missions, len(sizes))
     training = replace(training, missions=missions)  # first, for its errors
-    training = replace(training, groups=_groups(missions, len(sizes)))
-    training = _changed(training, given)
+    if "features" in own:
+        network["num_features"] = num_features(own["features"])
+    training = replace(
+        training,
+        groups=_groups(missions, len(sizes)),
+        network=replace(training.network, **network),
+        ppo=replace(training.ppo, **_part("ppo.", given)),
+        **own,
+    )
     _check(training)
     return training
 
@@ -61,51 +100,14 @@ def refuse_others(given: dict[str, Any], training: Training, whose: str) -> None
         ValueError: One contradicts.
     """
     for place, value in given.items():
-        stored = stored_value(training, place)
+        stored = _stored(training, place)
         if value != stored:
-            has = typed(place, stored).partition(" ")[2]
-            raise ValueError(f"{typed(place, value)} is not what {whose} has, {has}; leave it out")
-
-
-def asked_limits(
-    limits: Limits | None,
-    arm: str,
-    *,
-    budget: int | None = None,
-    minutes: float | None = None,
-    replay_every: int | None = None,
-) -> Limits:
-    """When a run stops: as asked, else as before, else by the usual budget.
-
-    Args:
-        limits: Of a run that goes on; given ones take their place.
-        arm: Whose budget counts if nothing else does.
-        budget: Team decisions in all.
-        minutes: In all.
-        replay_every: Team decisions between two replays.
-
-    Returns:
-        The limits.
-
-    Raises:
-        ValueError: The time is no positive number.
-    """
-    if minutes is not None and not (minutes > 0.0 and math.isfinite(minutes)):
-        raise ValueError(f"minutes must be a number above 0, not {minutes:g}")
-    limits = limits or Limits(decisions=BUDGETS[arm])
-    if budget is not None or minutes is not None:
-        limits = replace(limits, decisions=budget, minutes=minutes)
-    if replay_every is not None:
-        limits = replace(limits, replay_every=replay_every)
-    return limits
+            typed = f"{flag_of(SPECS[place])} {as_typed(value)}"
+            raise ValueError(f"{typed} is not what {whose} has, {as_typed(stored)}; leave it out")
 
 
 def check_memory(training: Training, total_bytes: int | None) -> None:
-    """Passes if a run's arrays leave enough memory for all the rest.
-
-    Args:
-        training: The settings.
-        total_bytes: Of the machine; None if it does not tell.
+    """Passes if a run's arrays leave enough of the machine's memory, if it is known, for the rest.
 
     Raises:
         ValueError: They would take too large a share.
@@ -128,19 +130,21 @@ def rollout_bytes(training: Training) -> int:
     return rows * (graph * (training.ppo.num_steps + 1) + remembered)
 
 
-def _mission(given: dict[str, Any], num_robots: int) -> Mission:
-    own = {place.partition(".")[2]: v for place, v in given.items() if place.startswith("mission.")}
-    preset, task = own.pop("preset", "paper"), own.pop("task", "stationary")
-    replace(Mission(), preset=preset, task=task)  # refuses what is unknown
-    return PRESETS[preset](task, num_robots=num_robots, **own)
+def _part(part: str, given: dict[str, Any]) -> dict[str, Any]:
+    """Those that were given of one part of the settings, by their names."""
+    return {
+        spec.name: given[place]
+        for place, spec in SPECS.items()
+        if place == part + spec.name and place in given
+    }
+
+
+def _stored(settings: object, place: str) -> object:
+    return reduce(getattr, place.split("."), settings)
 
 
 def _missions(asked: int | None, usual: int, num_sizes: int) -> int:
-    """How many missions fly side by side: every team size has as many as the others.
-
-    Raises:
-        ValueError: So many cannot be shared out among the sizes.
-    """
+    """How many missions fly side by side: every team size has as many as the others."""
     if asked is None:
         return -(-usual // num_sizes) * num_sizes
     if asked % num_sizes:
@@ -159,24 +163,6 @@ def _groups(missions: int, num_sizes: int) -> int:
     return min(able, key=lambda n: (abs(n - USUAL_GROUPS), -n), default=1)
 
 
-def _changed(training: Training, given: dict[str, Any]) -> Training:
-    """The settings with what was given in place of the usual."""
-    parts: dict[str, dict[str, Any]] = {"network": {}, "ppo": {}, "": {}}
-    for place, value in given.items():
-        part, _, name = place.rpartition(".")
-        if part in parts:
-            parts[part][name] = value
-    own = parts.pop("")
-    if "features" in own:
-        parts["network"]["num_features"] = num_features(own["features"])
-    changed = {part: replace(getattr(training, part), **its) for part, its in parts.items()}
-    return replace(training, **own, **changed)
-
-
-def _is_shape(place: str) -> bool:
-    return place == "features" or place.startswith("network.")
-
-
 def _check(training: Training) -> None:
     """Raises ValueError for settings that are sound one by one, but not together."""
     for size in training.robots:
@@ -186,3 +172,23 @@ def _check(training: Training) -> None:
             "reward velocity-variance depends on who talks only if the robots flock; add --task "
             "flocking"
         )
+
+
+def _usual(place: str) -> str:
+    """The default as text: per robot and, where it differs, per team."""
+    if place == "arm":
+        return "robot"
+    robot, team = (_usual_of(arm, place) for arm in ("robot", "team"))
+    if robot == "False":
+        return ""
+    return robot if robot == team else f"{robot}, team: {team}"
+
+
+def _usual_of(arm: str, place: str) -> str:
+    """The default as text, if it does not depend on preset or task."""
+    missions = (PRESETS["paper"]("stationary"), PRESETS["reference"]("flocking"))
+    usual, other = (
+        _stored(usual_settings(arm, each, (each.num_robots,)), place) for each in missions
+    )
+    depends = usual != other and place not in ("mission.preset", "mission.task")
+    return "the preset's own" if depends else as_typed(usual)

@@ -45,7 +45,7 @@ def shown(policy_name, task, its):
     """The table's rows as a mapping, and all its text."""
     mission = paper(task, num_robots=6)
     policy = make_policy(policy_name, mission)
-    table = flight_table(mission, policy, its, 1.5, title="a title")
+    table = flight_table("a title", mission, flight_numbers(policy, its), 1.5)
     console = Console(width=80, highlight=False)
     with console.capture() as printed:
         console.print(table)

@@ -13,7 +13,7 @@ def shown(is_terminal, work):
     console = Console(file=file, force_terminal=is_terminal, width=100, color_system=None)
     with WorkBar("Flying", 40, "missions", completed=10, console=console) as bar:
         work(bar)
-        bar.refresh()
+        bar._bar.refresh()
     return file.getvalue()
 
 

@@ -8,23 +8,21 @@ import pytest
 from tiny_policies import tiny_config, tiny_network
 
 from swarm_mj.cli import main, parse
-from swarm_mj.cli.train_settings import (
-    BUDGETS,
-    asked_limits,
-    asked_settings,
-    check_memory,
-    refuse_others,
-    rollout_bytes,
-)
+from swarm_mj.cli.train import BUDGETS, asked_limits
+from swarm_mj.cli.train_settings import asked_settings, check_memory, refuse_others, rollout_bytes
 from swarm_mj.learning.run_folder import Limits
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import make_model
 from swarm_mj.mission import paper
 
 
+def options(*arguments):
+    return parse(["train", "--out", "runs/x", *map(str, arguments)])[1]
+
+
 def given(*arguments):
     """The settings that a command line gives."""
-    return parse(["train", "--out", "runs/x", *map(str, arguments)])[1].settings
+    return options(*arguments).settings
 
 
 def asked(*arguments):
@@ -146,21 +144,21 @@ def test_a_run_that_goes_on_has_its_own_settings():
 @pytest.mark.parametrize(
     ("asked", "decisions", "minutes"),
     [
-        ({}, 200_000, None),
-        ({"budget": 5}, 5, None),
-        ({"minutes": 2.0}, None, 2.0),
-        ({"budget": 5, "minutes": 2.0}, 5, 2.0),
+        ((), 200_000, None),
+        (("--budget", 5), 5, None),
+        (("--minutes", 2.0), None, 2.0),
+        (("--budget", 5, "--minutes", 2.0), 5, 2.0),
     ],
 )
 def test_a_new_run_stops_as_asked_or_by_the_usual_budget(asked, decisions, minutes):
-    limits = asked_limits(None, "robot", **asked)
+    limits = asked_limits(Limits(decisions=BUDGETS["robot"]), options(*asked))
     assert (limits.decisions, limits.minutes) == (decisions, minutes)
 
 
 def test_a_run_that_goes_on_stops_as_before_or_as_asked_now():
     stored = Limits(decisions=5, minutes=1.0, replay_every=3)
-    assert asked_limits(stored, "robot") == stored
-    moved = asked_limits(stored, "robot", minutes=2.0, replay_every=9)
+    assert asked_limits(stored, options()) == stored
+    moved = asked_limits(stored, options("--minutes", 2.0, "--replay-every", 9))
     assert moved == Limits(decisions=None, minutes=2.0, replay_every=9)
 
 
