@@ -1,6 +1,7 @@
 """A batch of missions: one policy in one regime, flown side by side, and what each cost."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -14,7 +15,13 @@ from swarm_mj.protocol.window import SLOT_WINDOWS
 from swarm_mj.rollout import WindowRecord, rollout
 from swarm_mj.swarm import Swarm
 
-PACKETS = ("sent", "delivered", "heard", "receptions")  # the counts that are kept
+MEANS = ("aoi", "aoi_floor", "velocity_variance", "hops")  # over windows
+PACKETS = {  # totals, and what `protocol.costs.Packets` calls them
+    "packets_sent": "sent",
+    "packets_delivered": "delivered",
+    "packets_heard": "heard",
+    "receptions": "receptions",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,44 +92,37 @@ class Tally:
         self._swarm = swarm
         self._floor = ConnectivityFloor(num_missions, mission.num_robots, mission.range_m)
         self._num_steady = mission.num_windows - mission.num_windows // 2
-        self._aoi, self._steady, self._floor_age, self._variance, self._hops = np.zeros(
-            (5, num_missions)
-        )
-        self._packets = {name: np.zeros(num_missions) for name in PACKETS}
+        self._sums = {name: np.zeros(num_missions) for name in (*MEANS, "aoi_steady", *PACKETS)}
         self._complete = np.full(num_missions, np.inf)
         self._ages = np.zeros(round(mission.num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
 
     def add(self, flown: WindowRecord) -> None:
         """Adds a window; the swarm stands at its end."""
-        swarm, costs = self._swarm, flown.costs
-        self._aoi += costs.age_windows
-        if swarm.now[0] > swarm.mission.num_windows - self._num_steady:
-            self._steady += costs.age_windows
-        self._floor_age += self._floor.next(
-            swarm.states.position_m, swarm.now, swarm.states.is_active
-        )
-        self._variance += costs.velocity_variance_m2ps2
-        self._hops += flown.hops
-        for name, count in self._packets.items():
-            count += getattr(costs.packets, name)
+        swarm, costs, is_active = self._swarm, flown.costs, self._swarm.states.is_active
+        is_steady = swarm.now[0] > swarm.mission.num_windows - self._num_steady
+        packets = {name: getattr(costs.packets, count) for name, count in PACKETS.items()}
+        added = packets | {
+            "aoi": costs.age_windows,
+            "aoi_steady": costs.age_windows * is_steady,
+            "aoi_floor": self._floor.next(swarm.states.position_m, swarm.now, is_active),
+            "velocity_variance": costs.velocity_variance_m2ps2,
+            "hops": flown.hops,
+        }
+        for name, total in self._sums.items():
+            total += added[name]
         complete = np.where(costs.is_complete, swarm.now, np.inf)
         np.minimum(self._complete, complete, out=self._complete)
-        count_ages(swarm.buffers.timestamp, swarm.now, self._ages, swarm.states.is_active)
+        count_ages(swarm.buffers.timestamp, swarm.now, self._ages, is_active)
 
     def costs(self) -> BatchCosts:
         """What the missions cost, all windows of them flown."""
-        num_windows = self._swarm.mission.num_windows
+        sums, num_windows = self._sums, self._swarm.mission.num_windows
+        packets: dict[str, Any] = {name: _whole(sums[name]) for name in PACKETS}
         return BatchCosts(
-            aoi=(self._aoi / num_windows).tolist(),
-            aoi_steady=(self._steady / self._num_steady).tolist(),
-            aoi_floor=(self._floor_age / num_windows).tolist(),
-            velocity_variance=(self._variance / num_windows).tolist(),
-            hops=(self._hops / num_windows).tolist(),
+            **{name: (sums[name] / num_windows).tolist() for name in MEANS},
+            **packets,
+            aoi_steady=(sums["aoi_steady"] / self._num_steady).tolist(),
             complete_window=_whole(self._complete),
-            packets_sent=self._packets["sent"].astype(int).tolist(),
-            packets_delivered=_whole(self._packets["delivered"]),
-            packets_heard=_whole(self._packets["heard"]),
-            receptions=_whole(self._packets["receptions"]),
             ages=self._ages.tolist(),
         )
 

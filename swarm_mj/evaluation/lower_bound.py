@@ -17,13 +17,7 @@ class ConnectivityFloor:
     """
 
     def __init__(self, num_missions: int, num_robots: int, range_m: float) -> None:
-        """Starts before the first window: nobody knows anyone.
-
-        Args:
-            num_missions: B.
-            num_robots: N.
-            range_m: Two robots at most this far apart are neighbours [m].
-        """
+        """Starts before the first window: nobody knows anyone; neighbours are within `range_m`."""
         self._timestamp = np.full((num_missions, num_robots, num_robots), NEVER)
         self._range_m = range_m
 
@@ -44,15 +38,8 @@ class ConnectivityFloor:
             The mean over all pairs, oneself included, as age of information has it [windows].
         """
         age = np.empty(now.shape)
-        everyone = np.ones(position_m.shape[:2], dtype=np.bool_)
-        _share(
-            self._timestamp,
-            position_m,
-            self._range_m,
-            now,
-            everyone if is_on is None else is_on,
-            age,
-        )
+        shares = np.ones(position_m.shape[:2], dtype=np.bool_) if is_on is None else is_on
+        _share(self._timestamp, position_m, self._range_m, now, shares, age)
         return age
 
 

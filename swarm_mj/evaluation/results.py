@@ -8,6 +8,7 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, get_args
 
+from swarm_mj.fields import kind_of
 from swarm_mj.io import atomic
 
 
@@ -92,19 +93,15 @@ def carries_more(result: Result) -> bool:
 
 
 COLUMNS = tuple(spec.name for spec in fields(Result))
+NEEDED = tuple(spec.name for spec in fields(Result) if spec.default is MISSING)
 NUMBERS = {int: "a whole number", float: "a finite number", str: "a text"}
 WAY_OUT = "make them with `swarm-mj evaluate --csv FILE`"
 
 
 def read_results(path: Path) -> list[Result]:
-    """The rows of a results file that `swarm-mj evaluate --csv` wrote.
+    """The rows of a results file that `swarm-mj evaluate --csv` wrote, one or more, in its order.
 
-    Args:
-        path: The CSV file; columns that no result has are passed over, and those with a default
-            may be missing.
-
-    Returns:
-        One or more results, in the file's order.
+    Columns that no result has are passed over, and those with a default may be missing.
 
     Raises:
         ValueError: The file is no CSV, lacks columns or rows, or a cell is not what it must be.
@@ -113,7 +110,9 @@ def read_results(path: Path) -> list[Result]:
     try:
         with path.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file, strict=True)
-            _check_header(path, reader.fieldnames or ())
+            missing = [name for name in NEEDED if name not in (reader.fieldnames or ())]
+            if missing:
+                raise ValueError(f"results {path} lack the columns {', '.join(missing)}; {WAY_OUT}")
             results = [_result(f"{path}, line {reader.line_num}", row) for row in reader]
     except (csv.Error, UnicodeDecodeError) as error:
         raise ValueError(f"results {path} are no CSV ({error}); {WAY_OUT}") from error
@@ -123,11 +122,7 @@ def read_results(path: Path) -> list[Result]:
 
 
 def write_csv(path: Path, results: Sequence[Result]) -> None:
-    """Writes results as CSV; what does not exist is an empty cell.
-
-    Args:
-        path: The file, replaced if it exists.
-        results: Its rows.
+    """Writes results as the rows of a CSV file, replaced if it exists; None is an empty cell.
 
     Raises:
         OSError: The file cannot be written.
@@ -152,18 +147,8 @@ def write_json(
         ValueError: Not as many lists as results.
         OSError: The file cannot be written.
     """
-    objects = [
-        asdict(result) | {name: list(values) for name, values in lists.items()}
-        for result, lists in zip(results, missions, strict=True)
-    ]
+    objects = [{**asdict(one), **lists} for one, lists in zip(results, missions, strict=True)]
     atomic.write_json(path, {"results": objects})
-
-
-def _check_header(path: Path, header: Sequence[str]) -> None:
-    needed = [spec.name for spec in fields(Result) if spec.default is MISSING]
-    missing = [name for name in needed if name not in header]
-    if missing:
-        raise ValueError(f"results {path} lack the columns {', '.join(missing)}; {WAY_OUT}")
 
 
 def _result(place: str, row: dict[str, Any]) -> Result:
@@ -176,13 +161,13 @@ def _result(place: str, row: dict[str, Any]) -> Result:
 
 def _value(place: str, spec: Field[Any], text: str) -> Any:  # noqa: ANN401 - any field's value
     """A cell as its field's type."""
-    kinds: tuple[Any, ...] = get_args(spec.type) or (spec.type,)
-    if text == "" and NoneType in kinds:
+    if text == "" and NoneType in get_args(spec.type):
         return None
+    kind = kind_of(spec)
     try:
-        value = kinds[0](text)
+        value = kind(text)
     except ValueError:
         value = math.nan
     if text == "" or (isinstance(value, float) and not math.isfinite(value)):
-        raise ValueError(f"results {place}: {spec.name} must be {NUMBERS[kinds[0]]}, not {text!r}")
+        raise ValueError(f"results {place}: {spec.name} must be {NUMBERS[kind]}, not {text!r}")
     return value

@@ -15,11 +15,17 @@ from swarm_mj.evaluation.statistics import (
     bootstrap_interval,
     quantile_of_counts,
     spread,
+    standard_error,
 )
-from swarm_mj.evaluation.statistics import standard_error as sem
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.window import SLOT_WINDOWS
+
+COSTS = ("aoi", "velocity_variance")  # of each mission
+REGIME = (  # the fields of a mission that a result repeats
+    *("task", "preset", "num_robots", "range_ratio", "velocity_ratio"),
+    *("boundary", "physics", "num_windows", "switched_off"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,15 +40,12 @@ class Evaluated:
 def summarise(
     study: Study, costs: Mapping[int, BatchCosts], made_by: Mapping[str, Any]
 ) -> list[Evaluated]:
-    """The results of a study, regime by regime, policy by policy.
+    """The results of a study, one per policy and regime: regime by regime, policy by policy.
 
     Args:
         study: What was asked for.
         costs: What each batch cost, by its index in `study.batches`, in any order.
         made_by: The code's `version` and `commit` when the first of them began.
-
-    Returns:
-        One per policy and regime.
 
     Raises:
         ValueError: A batch is missing.
@@ -87,16 +90,11 @@ def merge(batches: Sequence[BatchCosts]) -> BatchCosts:
 
 
 def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
-    names = (
-        *("task", "preset", "num_robots", "range_ratio", "velocity_ratio"),
-        *("boundary", "physics", "num_windows", "switched_off"),
-    )
-    parameters = study.parameters[regime, policy]
-    return {name: getattr(regime, name) for name in names} | {
+    return {name: getattr(regime, name) for name in REGIME} | {
         "policy": policy,
         "episodes": study.episodes,
         "seed": study.seed,
-        "probability": parameters.get("probability"),
+        "probability": study.parameters[regime, policy].get("probability"),
         "payload": study.make_policy(policy, regime).payload,
     }
 
@@ -104,13 +102,13 @@ def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
 def _costs(costs: BatchCosts) -> dict[str, Any]:
     """Age of information and velocity variance over missions, and ages over pairs of robots."""
     columns: dict[str, Any] = {}
-    for cost in ("aoi", "velocity_variance"):
+    for cost in COSTS:
         found = asdict(spread(np.array(getattr(costs, cost))))
         columns |= _interval(cost, Interval(**found.pop("interval")))
         columns |= {f"{cost}_{name}": value for name, value in found.items()}
     for cost in ("aoi_steady", "aoi_floor"):
         samples = np.array(getattr(costs, cost))
-        columns |= {f"{cost}_mean": float(np.mean(samples)), f"{cost}_sem": sem(samples)}
+        columns |= {f"{cost}_mean": float(np.mean(samples)), f"{cost}_sem": standard_error(samples)}
     for name, share in (("age_p95", 0.95), ("age_worst", 1.0)):
         columns[name] = SLOT_WINDOWS * quantile_of_counts(np.array(costs.ages), share)
     return {name: value for name, value in columns.items() if name in COLUMNS}
@@ -152,13 +150,13 @@ def _completeness(costs: BatchCosts) -> dict[str, Any]:
 def _differences(costs: BatchCosts, baseline: BatchCosts) -> dict[str, Any]:
     """Paired: the same missions, mission by mission; None of the baseline to itself."""
     differences: dict[str, Any] = {}
-    for cost in ("aoi", "velocity_variance"):
-        name = f"{cost}_difference"
-        difference = np.array(getattr(costs, cost)) - np.array(getattr(baseline, cost))
-        differences |= {f"{name}_mean": None, **_interval(name, Interval(low=None, high=None))}
+    for cost in COSTS:
+        mean, interval = None, Interval(low=None, high=None)
         if costs is not baseline:
-            differences[f"{name}_mean"] = float(np.mean(difference))
-            differences |= _interval(name, bootstrap_interval(difference))
+            difference = np.array(getattr(costs, cost)) - np.array(getattr(baseline, cost))
+            mean, interval = float(np.mean(difference)), bootstrap_interval(difference)
+        name = f"{cost}_difference"
+        differences |= {f"{name}_mean": mean, **_interval(name, interval)}
     return differences
 
 
@@ -166,6 +164,6 @@ def _published(policy: str, regime: Mission) -> dict[str, Any]:
     points = published(policy, regime)
     return {
         f"published_{cost}_{figure}": getattr(points[cost], figure) if cost in points else None
-        for cost in ("aoi", "velocity_variance")
+        for cost in COSTS
         for figure in ("mean", "sem")
     }
