@@ -9,15 +9,9 @@ from jaxtyping import Bool, Float, Int
 def dendrogram(
     parent: Int[np.ndarray, "T N"], is_known: Bool[np.ndarray, "T N"], root: int
 ) -> Float[np.ndarray, "T N 2"]:
-    """Places every known robot: x is its depth [hops], y its height, 0 to 1; nan when unknown.
+    """Where each robot stands that the root, the ego robot, has heard of; nan for the others.
 
-    Args:
-        parent: P of the root's buffer.
-        is_known: Whether the root has heard of the robot.
-        root: The ego robot.
-
-    Returns:
-        Places (x, y).
+    x is its depth [hops], y its height, 0 to 1; `parent` is P of the root's buffer.
     """
     place = np.full((*parent.shape, 2), np.nan)
     is_child = is_known & (np.arange(parent.shape[1]) != root)

@@ -26,12 +26,7 @@ class Frame:
 def frame(log: Log, half_side_m: float) -> Frame:
     """The smallest square that holds the area and all ways, or else all robots at any time.
 
-    Args:
-        log: The flight.
-        half_side_m: Half the side of the area, which is centred on the origin [m].
-
-    Returns:
-        The map's frame; it follows the team if robots go far beyond the area.
+    It follows the team if robots go far beyond the area, which is centred on the origin.
     """
     farthest_m = float(np.max(np.abs(log.position_m)))
     if farthest_m <= NEAR * half_side_m:

@@ -29,12 +29,6 @@ def fates(log: Log) -> dict[str, Links]:
     Addressed packets are delivered, lost, overheard, answered or unanswered. `lost` and
     `unanswered` ones end at the robot they were meant for, which did not decode them; a packet that
     k other robots overheard is k links. Broadcasts have no addressee: `heard` leads to each hearer.
-
-    Args:
-        log: The flight.
-
-    Returns:
-        The links of each fate.
     """
     row, phase, hearer = np.nonzero(log.heard != np.arange(log.heard.shape[2]))
     speaker = log.heard[row, phase, hearer]

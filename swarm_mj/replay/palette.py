@@ -53,16 +53,7 @@ def dim(colour: Colour, share: float) -> Colour:
 def age_colours(
     age_windows: Float[np.ndarray, "*S"], full_scale: float, is_known: Bool[np.ndarray, "*S"]
 ) -> UInt8[np.ndarray, "*S 3"]:
-    """Colours of ages: bright yellow is fresh, dark violet is `full_scale` or older, grey unknown.
-
-    Args:
-        age_windows: Ages [windows].
-        full_scale: The age at which the ramp ends [windows].
-        is_known: Whether there is an age at all.
-
-    Returns:
-        RGB.
-    """
+    """RGB of ages: bright yellow is fresh, dark violet is `full_scale` or older, grey unknown."""
     freshness = 1.0 - (1.0 - _STALEST) * np.clip(age_windows / full_scale, 0.0, 1.0)
     place = freshness * (len(_VIRIDIS) - 1)
     steps = np.arange(len(_VIRIDIS))

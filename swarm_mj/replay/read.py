@@ -13,9 +13,6 @@ from swarm_mj.replay.sheet import TIMELINE
 def check_replay(path: Path) -> None:
     """Passes for a whole replay.
 
-    Args:
-        path: The file.
-
     Raises:
         ValueError: There is no such file, or it is no recording, or a truncated one.
     """
@@ -23,9 +20,8 @@ def check_replay(path: Path) -> None:
         raise ValueError(f"there is no replay {path}; `swarm-mj fly` records one")
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore"
-            )  # of a missing footer; what follows from it is said here
+            # Of a missing footer; what follows from it is said here.
+            warnings.simplefilter("ignore")
             num_recordings = len(RrdReader(path).recordings())
     except Exception as error:
         raise ValueError(f"{path} is no whole replay: truncated, or not an .rrd file") from error
@@ -34,13 +30,7 @@ def check_replay(path: Path) -> None:
 
 
 def windows(path: Path) -> Int[np.ndarray, "T"]:
-    """The windows of a replay, in order.
-
-    Args:
-        path: A whole replay.
-
-    Returns:
-        Their numbers; 1 is a mission's first.
+    """The numbers of a whole replay's windows, in order; 1 is a mission's first.
 
     Raises:
         ValueError: The recording is not one of a swarm.

@@ -73,7 +73,7 @@ class Recorder:
         self._swarm = swarm
         self._ego = ego
         self._is_broadcast = is_broadcast
-        self._rows: list[dict[str, np.ndarray | float]] = []
+        self._rows: list[dict[str, np.ndarray]] = []
         self._age: list[np.ndarray] = []
 
     @property
@@ -91,23 +91,23 @@ class Recorder:
         own = self._ego
         if len(self._rows) % self._stride == 0:
             self._age.append(age.astype(np.float32))
-        self._rows.append(
-            {
-                "position_m": states.position_m[0].copy(),
-                "velocity_mps": states.velocity_mps[0].copy(),
-                "recipient": np.stack([phase.recipient[0] for phase in phases]),
-                "heard": np.stack([phase.heard[0] for phase in phases]),
-                "is_on": is_on.copy(),
-                "is_known": buffers.is_known[0, own].copy(),
-                "believed_m": buffers.position_m[0, own].copy(),
-                "ego_age": age[own].copy(),  # a view would keep the whole matrix
-                "parent": buffers.parent[0, own].copy(),
-                "age_mean": float(flown.costs.age_windows[0]),
-                "age_std": float(np.std(others)),
-                "age_max": float(np.max(others)),
-                "velocity_variance_m2ps2": float(flown.costs.velocity_variance_m2ps2[0]),
-            }
-        )
+        shown = {
+            "position_m": states.position_m[0],
+            "velocity_mps": states.velocity_mps[0],
+            "recipient": [phase.recipient[0] for phase in phases],
+            "heard": [phase.heard[0] for phase in phases],
+            "is_on": is_on,
+            "is_known": buffers.is_known[0, own],
+            "believed_m": buffers.position_m[0, own],
+            "ego_age": age[own],
+            "parent": buffers.parent[0, own],
+            "age_mean": flown.costs.age_windows[0],
+            "age_std": np.std(others),
+            "age_max": np.max(others),
+            "velocity_variance_m2ps2": flown.costs.velocity_variance_m2ps2[0],
+        }
+        # Copies: the swarm writes its arrays in place, and a view would keep a whole matrix.
+        self._rows.append({name: np.array(value) for name, value in shown.items()})
 
     def log(self) -> Log:
         """Everything recorded so far; raises ValueError if that is nothing."""

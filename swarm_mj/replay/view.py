@@ -12,12 +12,6 @@ LOOPBACK = "127.0.0.1"
 def view_command(path: Path) -> list[str]:
     """The command that opens a replay in a window.
 
-    Args:
-        path: The replay.
-
-    Returns:
-        The command and its arguments.
-
     Raises:
         ValueError: There is no display to open a window on.
     """
@@ -31,14 +25,7 @@ def view_command(path: Path) -> list[str]:
 
 
 def serve_command(path: Path) -> tuple[list[str], str]:
-    """The command that serves a replay to a browser on this machine only.
-
-    Args:
-        path: The replay.
-
-    Returns:
-        The command and its arguments, and the address to open.
-    """
+    """The command that serves a replay to this machine's browsers only, and the address to open."""
     data_port, page_port = _free_ports()
     command = [
         *(sys.executable, "-m", "rerun", "--serve-web", "--bind", LOOPBACK),

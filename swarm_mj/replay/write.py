@@ -54,13 +54,7 @@ def _write(log: Log, mission: Mission, config: dict[str, object], path: Path, *,
 
 
 def draw(sheet: Sheet, mission: Mission, packets: dict[str, Links]) -> None:
-    """Draws every layer of a replay.
-
-    Args:
-        sheet: Where to draw, and what.
-        mission: Its numbers.
-        packets: Its packets by their fate.
-    """
+    """Draws every layer of a replay; `packets` by their fate."""
     log = sheet.log
     full_scale = palette.nice_scale(log.age)
     colours = palette.age_colours(log.ego_age, full_scale, log.is_known)

@@ -46,14 +46,11 @@ def preset_of(results: Sequence[Result]) -> str:
 
 
 def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
-    """The results that belong into a figure.
+    """The results that belong into a figure, one per policy and x, in their order.
 
     Args:
         figure: Whose missions count; other regimes are passed over.
         results: One or more, of one preset.
-
-    Returns:
-        One result per policy and x, in their order.
 
     Raises:
         ValueError: There are none, two are of the same policy and x, or they cannot be compared

@@ -83,8 +83,7 @@ def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
                 _draw_curve(axes, curve)
             name_ends(axes, its)
         grid[-1, 0].set_xlabel(figure.x_label)
-        is_marked = any(carries_more(result) for result in found)
-        _head(drawing, figure, found[0], height_in, is_marked=is_marked)
+        _head(drawing, figure, found, height_in)
         write_caption(drawing, LEFT, 0.12 / height_in, caption(figure, found))
     return drawing
 
@@ -155,10 +154,10 @@ def _widened(values: Float[np.ndarray, "V"], share: float, scale: Scale) -> tupl
 
 
 def _head(
-    drawing: Figure, figure: ResultFigure, result: Result, height_in: float, *, is_marked: bool
+    drawing: Figure, figure: ResultFigure, results: Sequence[Result], height_in: float
 ) -> None:
     """The title, what is the same all over the figure, and what lines and marks mean."""
-    fixed = [FIXED[name].format(getattr(result, name)) for name in figure.fixed]
+    fixed = [FIXED[name].format(getattr(results[0], name)) for name in figure.fixed]
     regime = ", ".join([figure.task.replace("-", " "), *fixed])
     line = 1.0 - 0.28 / height_in
     drawing.text(LEFT, line, figure.title, fontsize=12, fontweight="bold", va="baseline")
@@ -167,7 +166,7 @@ def _head(
     ring = {"marker": "o", "markersize": 4.5 * RING, "markerfacecolor": "white"}
     published = Line2D([], [], color=FAINT, linestyle="--", linewidth=1.2, **ring)
     labels = ["this package, mean ± SEM", "published, mean ± SEM"]
-    if is_marked:
+    if any(carries_more(result) for result in results):
         labels.append(f"{MORE}: packets {CARRIES_MORE}")
     drawing.legend(
         handles=[ours, published, Line2D([], [], linestyle="")][: len(labels)],
