@@ -28,13 +28,9 @@ class ActiveRolloutBuffer(DictRolloutBuffer):
         self.returns[...] = self.rewards
 
     def get(self, batch_size: int | None = None) -> Generator[DictRolloutBufferSamples, None, None]:
-        """One pass over the rows kept, shuffled.
+        """One pass over the rows kept, shuffled, in minibatches.
 
-        Args:
-            batch_size: Of a minibatch, were no row left out; they become smaller in proportion.
-
-        Yields:
-            Minibatches.
+        Were no row left out, they would be of the given size; they become smaller in proportion.
         """
         num_rows = self.buffer_size * self.n_envs
         if not self.generator_ready:

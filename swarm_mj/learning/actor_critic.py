@@ -5,7 +5,7 @@ from typing import Any
 
 import torch
 from gymnasium import spaces
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.type_aliases import PyTorchObs, Schedule
 from torch import Tensor
@@ -34,7 +34,6 @@ class GnnActorCritic(ActorCriticPolicy):
         silence_logit: float,
         **others: Any,  # noqa: ANN401 - ActorCriticPolicy's own
     ) -> None:
-        """Makes the networks; what is not named here is stable-baselines3's."""
         self._shape, self._shares_trunk = shape, shares_trunk
         self._silence_logit = silence_logit
         super().__init__(observation_space, action_space, lr_schedule, **others)
@@ -68,20 +67,19 @@ class GnnActorCritic(ActorCriticPolicy):
                 own[name][: len(tensor)].copy_(tensor)
 
     def _robots(
-        self,
-        node: Float[Tensor, "R N F"],
-        parent: Int[Tensor, "R N"],
-        may_address: Bool[Tensor, "R N"],
-        has_turn: Bool[Tensor, "R"],
-        owner: Int[Tensor, "R"],
+        self, obs: dict[str, Tensor], owner: Int[Tensor, "R"]
     ) -> tuple[Float[Tensor, "R N"], Float[Tensor, "R N"]]:
         """Logits over recipients, and a value for every node, of every robot's graph."""
+        node, parent = obs["node"].flatten(0, -3), obs["parent"].long().flatten(0, -2)
+        may_address, has_turn = obs["may_address"].bool().flatten(0, -2), obs["has_turn"].bool()
         output = self.network(node, parent)
         if self._shares_trunk:
             values, output = output[:, :, -1], output[:, :, :-1]
         else:
             values = self.value_network(node, parent)[:, :, 0]
-        logits = recipient_logits(output, owner, may_address, self._silence_logit, has_turn)
+        logits = recipient_logits(
+            output, owner, may_address, self._silence_logit, has_turn.flatten()
+        )
         return logits, values
 
     def logits_and_value(
@@ -90,13 +88,7 @@ class GnnActorCritic(ActorCriticPolicy):
         """What the decisions of each environment are drawn from, and its value."""
         assert isinstance(obs, dict)
         owner = obs["owner"].long()
-        logits, values = self._robots(
-            obs["node"],
-            obs["parent"].long(),
-            obs["may_address"].bool(),
-            obs["has_turn"].bool().squeeze(1),
-            owner.squeeze(1),
-        )
+        logits, values = self._robots(obs, owner.squeeze(1))
         return logits, values.gather(1, owner).squeeze(1)
 
     def forward(
@@ -134,7 +126,6 @@ class TeamActorCritic(GnnActorCritic):
     """
 
     def __init__(self, *spaces_and_schedule: Any, sums_nodes: bool, **others: Any) -> None:  # noqa: ANN401 - GnnActorCritic's
-        """Takes whether all nodes count in the value; the rest is `GnnActorCritic`'s."""
         self._sums_nodes = sums_nodes
         super().__init__(*spaces_and_schedule, **others)
 
@@ -143,16 +134,9 @@ class TeamActorCritic(GnnActorCritic):
     ) -> tuple[Float[Tensor, "E *robots N"], Float[Tensor, "E"]]:
         """What the decisions of each team are drawn from, and its value."""
         assert isinstance(obs, dict)
-        num_teams, num_robots = obs["may_address"].shape[:2]
+        shape = num_teams, num_robots = obs["may_address"].shape[:2]
         owner = torch.arange(num_robots, device=obs["node"].device).repeat(num_teams)
-        logits, values = self._robots(
-            obs["node"].flatten(0, 1),
-            obs["parent"].long().flatten(0, 1),
-            obs["may_address"].bool().flatten(0, 1),
-            obs["has_turn"].bool().flatten(),
-            owner,
-        )
-        shape = (num_teams, num_robots)
+        logits, values = self._robots(obs, owner)
         counted = obs["is_robot"].bool()[:, :, None] & obs["is_robot"].bool()[:, None, :]
         if not self._sums_nodes:
             counted = counted & torch.eye(num_robots, dtype=torch.bool, device=counted.device)

@@ -55,16 +55,8 @@ def gain(
 ) -> Float[np.ndarray, "W"]:
     """How much age W windows of Alg. 1 take from what robots know about others.
 
-    Args:
-        timestamp: T before the windows [windows]; left as it is.
-        position_m: Where the robots are [m].
-        recipient: Whom each robot addresses; itself is silence.
-        channel: Who decodes whom.
-        now: t at the start of each window [windows].
-        mission: Which mission's T each window starts from.
-
-    Returns:
-        The sum over pairs of robots of what T rises by [windows].
+    Arguments are as in `credits_of`, one row a window; `mission` says which mission's T each window
+    starts from. Returns the sum over pairs of robots of what T rises by [windows].
     """
     heard = channel(position_m, recipient)
     answered = respondents(Phase(recipient=recipient, heard=heard))

@@ -43,7 +43,7 @@ class Transition:
 
 
 class MissionBatch:
-    """Missions of one team size that begin and end together."""
+    """Missions of one team size that begin and end together; the first ones are cut off."""
 
     def __init__(
         self,
@@ -54,15 +54,7 @@ class MissionBatch:
         *,
         first_windows: int,
     ) -> None:
-        """Starts the first missions.
-
-        Args:
-            mission: What they have in common.
-            features: Name of the feature set.
-            num_missions: B.
-            rng: Draws the missions' seeds.
-            first_windows: Where the first missions are cut off [windows].
-        """
+        """Starts the first missions, of so many windows; `rng` draws the missions' seeds."""
         self.mission = mission
         self.num_missions = num_missions
         self._rng = rng
@@ -124,18 +116,9 @@ def make_batches(
     num_batches: int,
     rng: np.random.Generator,
 ) -> list[MissionBatch]:
-    """Batches whose first missions are cut at different windows, sizes in turn.
+    """Batches whose first missions are cut at different windows; team sizes take turns.
 
-    Args:
-        mission: What all missions have in common but for the team's size.
-        team_sizes: Of the teams; batch g has the one at place g mod their number.
-        features: Name of the feature set.
-        num_missions: In all batches together.
-        num_batches: Into which the missions are shared out evenly.
-        rng: Draws the missions' seeds.
-
-    Returns:
-        The batches.
+    So many missions in all are shared out evenly; `rng` draws their seeds.
 
     Raises:
         ValueError: The missions cannot be shared out evenly, or a size would have no batch.

@@ -131,8 +131,7 @@ def check_new(folder: Path) -> None:
         raise ValueError(
             f"{folder} holds a run; go on with it by --resume, or name another folder by --out"
         )
-    names = {path.name for path in folder.iterdir()} if folder.exists() else set()
-    others = sorted(name for name in names if not name.endswith(".part"))
+    others = sorted(path.name for path in folder.glob("*") if not path.name.endswith(".part"))
     if others:
         raise ValueError(f"{folder} holds {others[0]}, which is no run's; name another by --out")
 

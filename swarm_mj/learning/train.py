@@ -22,7 +22,6 @@ from swarm_mj.learning.actor_critic import GnnActorCritic, TeamActorCritic
 from swarm_mj.learning.callback import Listener, Stopped, TrainingCallback
 from swarm_mj.learning.checkpoint import missions_of
 from swarm_mj.learning.mission_batch import make_batches
-from swarm_mj.learning.robot_env import RobotEnv
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
     CURVE,
@@ -36,7 +35,7 @@ from swarm_mj.learning.run_folder import (
     write_run,
 )
 from swarm_mj.learning.settings import Training
-from swarm_mj.learning.team_env import TeamEnv
+from swarm_mj.learning.vec_env import RobotEnv, TeamEnv
 from swarm_mj.policies.stored import read_policy
 
 NO_BUDGET = 10**15  # team decisions
@@ -94,11 +93,7 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
 
 
 def _batch_size(training: Training, num_envs: int) -> int:
-    """Rows of a minibatch.
-
-    Raises:
-        ValueError: It would be less than 2, of which advantages have no spread.
-    """
+    """Rows of a minibatch; raises ValueError for less than 2: advantages would have no spread."""
     num_rows, num_minibatches = num_envs * training.ppo.num_steps, training.ppo.num_minibatches
     if num_rows < 2 * num_minibatches:
         raise ValueError(
@@ -150,7 +145,7 @@ def train(run: Run, folder: Path, *, listener: Listener, is_resumed: bool = Fals
     if not is_resumed:
         check_new(folder)
     model, rng = make_model(run.training)
-    progress = _resumed(folder, run, model, rng) or _begun(folder, run, model)
+    progress = _begun(folder, run, model, rng)
     model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))
     callback = TrainingCallback(model, run, folder, progress, rng, listener)
     env = missions_of(model)
@@ -172,23 +167,16 @@ def train(run: Run, folder: Path, *, listener: Listener, is_resumed: bool = Fals
     return progress
 
 
-def _resumed(folder: Path, run: Run, model: PPO, rng: np.random.Generator) -> Progress | None:
-    """Takes a run to its last checkpoint; None if it did not get as far as one."""
-    kept = folder / CHECKPOINT
-    if not kept.exists():
-        return None
-    progress = checkpoint.load(kept, run.training, model, rng)
+def _begun(folder: Path, run: Run, model: PPO, rng: np.random.Generator) -> Progress:
+    """Takes a run to its last checkpoint, or else to its beginning; then it can be resumed."""
+    kept, resumed = folder / CHECKPOINT, None
+    if kept.exists():
+        resumed = checkpoint.load(kept, run.training, model, rng)
     remove_parts(folder)
     write_run(folder, run)
-    write_curve(folder / CURVE, progress.curve)
-    return progress
-
-
-def _begun(folder: Path, run: Run, model: PPO) -> Progress:
-    """Takes a run to its beginning; once its settings are written, it can be resumed."""
-    remove_parts(folder)
-    write_run(folder, run)
-    if run.init is not None:
+    if resumed is not None:
+        write_curve(folder / CURVE, resumed.curve)
+    elif run.init is not None:
         assert isinstance(model.policy, GnnActorCritic)
         model.policy.take_acting_network(read_policy(own_init(folder, run.init))[0])
-    return Progress()
+    return resumed or Progress()

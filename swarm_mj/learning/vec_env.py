@@ -1,4 +1,4 @@
-"""Missions behind stable-baselines3's `VecEnv`: what both kinds of credit assignment share."""
+"""Missions behind stable-baselines3's `VecEnv`, by both kinds of credit assignment."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -11,6 +11,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from swarm_mj.gnn.graphs import Graphs
 from swarm_mj.learning.mission_batch import MissionBatch, Transition
+from swarm_mj.learning.settings import Reward
 from swarm_mj.protocol.buffers import NO_PARENT
 
 Observation = dict[str, np.ndarray]
@@ -18,9 +19,10 @@ Step = tuple[Observation, np.ndarray, np.ndarray, list[dict[str, Any]]]
 
 
 class MissionsEnv(VecEnv):
-    """Batches of missions, each one swarm; no Python loop runs over environments.
+    """Batches of missions, already started, each one swarm; no Python loop runs over environments.
 
-    Environments run batch by batch, mission by mission and, if a robot is one, robot by robot.
+    Environments run batch by batch, mission by mission and, if a robot is one, robot by robot:
+    `sizes` says how many each batch has.
     """
 
     def __init__(
@@ -30,9 +32,8 @@ class MissionsEnv(VecEnv):
         observation: spaces.Space,
         action: spaces.Space,
     ) -> None:
-        """Takes the batches, already started, and how many environments each of them is."""
         self.batches = list(batches)
-        self.num_nodes = largest_team(batches)
+        self.num_nodes = _largest_team(batches)
         self.transitions: list[Transition] = []  # of the last window, batch by batch
         self._actions = np.zeros(0)
         ends = np.cumsum(sizes)
@@ -108,41 +109,81 @@ class MissionsEnv(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
 
-def largest_team(batches: Sequence[MissionBatch]) -> int:
-    """Robots of the largest team, to which the others are padded."""
-    return max(batch.mission.num_robots for batch in batches)
+class RobotEnv(MissionsEnv):
+    """R environments, one a robot; the action is whom it addresses, the reward its credit per pair.
 
-
-def graph_spaces(
-    num_nodes: int, num_features: int, rows: tuple[int, ...]
-) -> dict[str, spaces.Space]:
-    """The spaces of one environment's graphs.
-
-    Args:
-        num_nodes: M, of the largest team.
-        num_features: F.
-        rows: (), or one dimension for environments of several robots.
-
-    Returns:
-        Spaces by name, as `padded` orders them.
+    Credit is what the team would not have gained in this window had the robot been silent
+    (`credit.credits_of`), over the number of pairs, so that all team sizes count alike.
     """
-    return {
-        "node": spaces.Box(-np.inf, np.inf, (*rows, num_nodes, num_features), np.float32),
-        "parent": spaces.Box(-1, num_nodes - 1, (*rows, num_nodes), np.int32),
-        "may_address": spaces.MultiBinary([*rows, num_nodes]),
-        "has_turn": spaces.MultiBinary([*rows, 1]),
-    }
+
+    def __init__(self, batches: Sequence[MissionBatch]) -> None:
+        num_nodes = _largest_team(batches)
+        observation = _graph_spaces((num_nodes,), batches[0].num_features)
+        observation["owner"] = spaces.Box(0, num_nodes - 1, (1,), np.int32)
+        owners = [
+            np.tile(np.arange(batch.mission.num_robots, dtype=np.int32), batch.num_missions)
+            for batch in batches
+        ]
+        self._owner = np.concatenate(owners)[:, None]
+        super().__init__(
+            batches, [*map(len, owners)], spaces.Dict(observation), spaces.Discrete(num_nodes)
+        )
+
+    def _observe(self, graphs: Sequence[Graphs], envs: slice) -> Observation:
+        """The robots' graphs, stacked and padded."""
+        return {**padded(graphs, self.num_nodes), "owner": self._owner[envs]}
+
+    def _step_batch(
+        self, batch: MissionBatch, actions: np.ndarray
+    ) -> tuple[Transition, np.ndarray]:
+        transition = batch.step(actions.reshape(batch.num_missions, -1), with_credit=True)
+        return transition, transition.credit.ravel() / batch.mission.num_robots**2
+
+
+class TeamEnv(MissionsEnv):
+    """B environments; the joint action is everyone's recipient, the reward the negative cost.
+
+    With `aoi` the reward is the mean age of information (Eq. 10) over the mission's duration,
+    negative; with `velocity-variance` it is the negative variance (Eq. 17), as in Fig. 6. Smaller
+    teams are padded with robots that do not exist: they are silent and see nothing.
+    """
+
+    def __init__(self, batches: Sequence[MissionBatch], reward: Reward = "aoi") -> None:
+        num_nodes = _largest_team(batches)
+        observation = _graph_spaces((num_nodes, num_nodes), batches[0].num_features)
+        observation["is_robot"] = spaces.MultiBinary(num_nodes)
+        num_missions = [batch.num_missions for batch in batches]
+        action = spaces.MultiDiscrete([num_nodes] * num_nodes)
+        super().__init__(batches, num_missions, spaces.Dict(observation), action)
+        self._reward: Reward = reward
+        sizes = np.repeat([batch.mission.num_robots for batch in batches], num_missions)
+        self._is_robot = np.arange(num_nodes) < sizes[:, None]
+
+    def _observe(self, graphs: Sequence[Graphs], envs: slice) -> Observation:
+        """The teams' graphs, stacked and padded; robots that do not exist may only be silent."""
+        is_robot = self._is_robot[envs]
+        observation = {"is_robot": is_robot}
+        for name, rows in padded(graphs, self.num_nodes).items():
+            teams = np.zeros((*is_robot.shape, *rows.shape[1:]), dtype=rows.dtype)
+            teams[is_robot] = rows
+            observation[name] = teams
+        observation["parent"][~is_robot] = NO_PARENT
+        observation["may_address"] |= np.eye(self.num_nodes, dtype=np.bool_)
+        return observation
+
+    def _step_batch(
+        self, batch: MissionBatch, actions: np.ndarray
+    ) -> tuple[Transition, np.ndarray]:
+        transition = batch.step(actions[:, : batch.mission.num_robots], with_credit=False)
+        if self._reward == "velocity-variance":
+            return transition, -transition.costs.velocity_variance_m2ps2
+        return transition, -transition.costs.age_windows / batch.mission.num_windows
 
 
 def padded(graphs: Sequence[Graphs], num_nodes: int) -> Observation:
-    """All batches' graphs in one, with unconnected nodes that nobody may address.
+    """All batches' graphs in one, by name, with unconnected nodes that nobody may address.
 
-    Args:
-        graphs: One a batch, of at most M nodes.
-        num_nodes: M.
-
-    Returns:
-        The arrays of `Graphs` by name, R rows of M nodes; `has_turn` is [R, 1].
+    Their R rows have M = `num_nodes` nodes, at least as many as the batches'; `has_turn` is [R, 1].
     """
 
     def rows_of(name: str, fill: int, dtype: type) -> np.ndarray:
@@ -159,4 +200,19 @@ def padded(graphs: Sequence[Graphs], num_nodes: int) -> Observation:
         "parent": rows_of("parent", NO_PARENT, np.int32),
         "may_address": rows_of("may_address", False, np.bool_),
         "has_turn": np.concatenate([each.has_turn for each in graphs])[:, None],
+    }
+
+
+def _largest_team(batches: Sequence[MissionBatch]) -> int:
+    """Robots of the largest team, to which the others are padded."""
+    return max(batch.mission.num_robots for batch in batches)
+
+
+def _graph_spaces(nodes: tuple[int, ...], num_features: int) -> dict[str, spaces.Space]:
+    """The spaces of one environment's graphs, of so many nodes, as `padded` orders them."""
+    return {
+        "node": spaces.Box(-np.inf, np.inf, (*nodes, num_features), np.float32),
+        "parent": spaces.Box(-1, nodes[-1] - 1, nodes, np.int32),
+        "may_address": spaces.MultiBinary(nodes),
+        "has_turn": spaces.MultiBinary([*nodes[:-1], 1]),
     }

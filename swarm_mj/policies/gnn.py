@@ -73,17 +73,16 @@ class LearnedPolicy(DecentralisedPolicy):
     def _logits(self, views: LocalViews) -> Float[np.ndarray, "R N"]:
         """Over the recipients of all robots, mission by mission."""
         graphs = self._extractor.graphs(views)
-        node = torch.from_numpy(graphs.node)
-        parent = torch.from_numpy(graphs.parent.astype(np.int64))
-        may_address = torch.from_numpy(graphs.may_address)
-        has_turn = torch.from_numpy(graphs.has_turn)
-        device = next(self._network.parameters()).device
+        parent = torch.from_numpy(graphs.parent.astype(np.int64))  # a copy: buffers are read-only
+        node, may_address, has_turn = map(
+            torch.from_numpy, (graphs.node, graphs.may_address, graphs.has_turn)
+        )
+        device, silence_logit = next(self._network.parameters()).device, self._silence_logit
         with torch.inference_mode(), _one_thread():
             output = self._network(node.to(device), parent.to(device)).cpu()
-            logits = recipient_logits(
-                output, self._owner, may_address, self._silence_logit, has_turn
-            )
-        return logits.numpy()
+            return recipient_logits(
+                output, self._owner, may_address, silence_logit, has_turn
+            ).numpy()
 
     def _digest(self) -> str:
         """A hash of all that its decisions follow from."""

@@ -20,13 +20,13 @@ def model_card(config: PolicyConfig) -> str:
     becomes a block.
     """
     training = dict(_flat(config.training))
-    task = next((v for k, v in training.items() if _last(k) == "task" and isinstance(v, str)), "")
+    task = next((v for k, v in training.items() if v and _is_text(k, v, "task")), "TASK")
     commit = f", commit {config.commit}" if config.commit else ""
     parts = [
         "# A learned communication policy of swarm_mj",
         _network(config),
         "## Fly it",
-        f"    swarm-mj fly --policy DIR --task {task or 'TASK'}",
+        f"    swarm-mj fly --policy DIR --task {task}",
         "`DIR` is this folder; `swarm-mj evaluate` takes it too. Teams of any size fly with it; "
         "those much larger than the ones it was trained on may fare badly.",
         "## Training",
@@ -59,11 +59,10 @@ def _described(values: Mapping[str, Any]) -> Iterator[str]:
     """Paragraphs: a list of the values, then the commands among them."""
     if not values:
         yield "Nothing was noted."
-    commands = {k: v for k, v in values.items() if _last(k) == "command" and isinstance(v, str)}
+    commands = {k: v for k, v in values.items() if _is_text(k, v, "command")}
     if listed := [f"- {k}: {_text(v)}" for k, v in values.items() if k not in commands]:
         yield "\n".join(listed)
-    for command in commands.values():
-        yield "    " + _one_line(command)
+    yield from ("    " + _one_line(command) for command in commands.values())
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -75,8 +74,9 @@ def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
             yield _one_line(f"{prefix}{key}"), value
 
 
-def _last(key: str) -> str:
-    return key.rpartition(".")[2]
+def _is_text(key: str, value: object, name: str) -> bool:
+    """Whether a value under a dotted name is a text of this last name."""
+    return key.rpartition(".")[2] == name and isinstance(value, str)
 
 
 def _text(value: Any) -> str:  # noqa: ANN401 - anything in JSON

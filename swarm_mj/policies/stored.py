@@ -28,11 +28,7 @@ def save_policy(
 ) -> None:
     """Writes a policy, whole or not at all; whoever is killed leaves the old one or the new one.
 
-    Args:
-        folder: Where; a policy there is replaced, and missing parents are made.
-        network: The weights, from any device.
-        config: What they belong to.
-        card: The README; `model_card` of the config unless given.
+    A policy there is replaced; the card is `model_card` of the config unless given.
 
     Raises:
         ValueError: `load_policy` would not take it, or the folder holds other files than a
@@ -63,9 +59,6 @@ def load_policy(folder: Path, mission: Mission, *, is_deterministic: bool = Fals
         folder: Where `save_policy` wrote it.
         mission: Whose area, duration and range normalise what the robots see.
         is_deterministic: Take the most probable recipient instead of a draw.
-
-    Returns:
-        The policy.
 
     Raises:
         ValueError: There is none, or it is damaged, foreign, oversized or of a newer version.
@@ -102,11 +95,7 @@ def read_policy(folder: Path) -> tuple[AggregationGnn, PolicyConfig]:
 
 
 def _read(folder: Path, name: str) -> bytes:
-    """A file's bytes.
-
-    Raises:
-        ValueError: It is missing or oversized.
-    """
+    """A file's bytes; raises ValueError if it is missing or oversized."""
     path = folder / name
     if not path.is_file():
         raise ValueError("there is no such file")
@@ -155,6 +144,5 @@ def _check_replaceable(folder: Path) -> None:
     """Raises ValueError if something else than a policy would be lost."""
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"policy {folder} is a file; name another place, or remove it")
-    others = {path.name for path in folder.iterdir()} - CONTENTS if folder.exists() else ()
-    for name in sorted(others):
+    for name in sorted({path.name for path in folder.glob("*")} - CONTENTS):
         raise ValueError(f"{folder} holds {name}, which is no policy's; name another directory")

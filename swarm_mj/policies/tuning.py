@@ -39,13 +39,6 @@ def tuned_probability(policy_name: str, mission: Mission) -> float:
     Nearest by the ratios of team size, range and velocity, among the regimes of the same preset
     and task: the mission's own where the table has it.
 
-    Args:
-        policy_name: A name among `POLICIES`.
-        mission: The regime.
-
-    Returns:
-        The probability.
-
     Raises:
         ValueError: The policy was not tuned for the mission's preset and task.
     """
@@ -67,12 +60,10 @@ def read_table(path: Path) -> list[Tuned]:
         ValueError: A column is missing or unknown, or a number is none.
     """
     with path.open(encoding="utf-8", newline="") as file:
-        reader = csv.DictReader(file)
-        columns = list(Tuned.__annotations__)
-        if reader.fieldnames != columns:
-            raise ValueError(f"columns of {path} must be {', '.join(columns)}")
-        kinds = Tuned.__annotations__
-        return [Tuned(**{name: kinds[name](row[name]) for name in columns}) for row in reader]
+        reader, kinds = csv.DictReader(file), Tuned.__annotations__
+        if reader.fieldnames != list(kinds):
+            raise ValueError(f"columns of {path} must be {', '.join(kinds)}")
+        return [Tuned(**{name: kind(row[name]) for name, kind in kinds.items()}) for row in reader]
 
 
 @cache

@@ -25,7 +25,7 @@ from swarm_mj.learning.run_folder import (
     write_curve,
     write_run,
 )
-from swarm_mj.learning.team_env import TeamEnv
+from swarm_mj.learning.vec_env import TeamEnv
 from swarm_mj.mission import paper
 
 LIMITS = Limits(decisions=5, minutes=0.5, replay_every=3)

@@ -5,9 +5,7 @@ import pytest
 from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor
 
 from swarm_mj.learning.mission_batch import make_batches
-from swarm_mj.learning.robot_env import RobotEnv
-from swarm_mj.learning.team_env import TeamEnv
-from swarm_mj.learning.vec_env import padded
+from swarm_mj.learning.vec_env import RobotEnv, TeamEnv, padded
 from swarm_mj.mission import paper
 from swarm_mj.protocol.buffers import NO_PARENT
 
