@@ -3,7 +3,7 @@
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from rich.console import Console
 
@@ -72,14 +72,20 @@ class Options(PolicyOptions):
 def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
     study = options.study
-    kept = _check_outputs(options)
+    kept = _progress_file(options)
     console = Console(stderr=True, highlight=False)
     header = study.header()
-    costs = _begin(kept, header, is_resumed=options.resume) if kept else {}
+    costs: dict[int, BatchCosts] = {}
+    if kept and options.resume and kept.exists():
+        costs = progress.resume(kept, header)
+    elif kept:
+        progress.start(kept, header)
     try:
         _fly(study, costs, options.jobs, kept, console)
     except KeyboardInterrupt:
-        console.print(_interrupted(study, costs, kept))
+        hint = "the same command with --resume continues" if kept else "nothing was kept"
+        flown, total = _num_flown(study, costs), study.episodes * len(study.pairs)
+        console.print(f"Interrupted after {flown} of {total} missions; {hint}.")
         return INTERRUPTED
     with deferred_interrupt():
         evaluated = summarise(study, costs, header)
@@ -90,15 +96,15 @@ def run(options: Options) -> int:
     return DONE
 
 
-def _check_outputs(options: Options) -> Path | None:
+def _progress_file(options: Options) -> Path | None:
     """The progress file, or None without outputs; raises ValueError for what cannot be written."""
-    outputs = [path for path in (options.json, options.csv) if path]
-    if not outputs:
+    check_outputs({"--json": options.json, "--csv": options.csv}, must_be_new=not options.force)
+    output = options.json or options.csv
+    if output is None:
         if options.resume:
             raise ValueError("--resume needs the --json or --csv of the run that was interrupted")
         return None
-    check_outputs({"--json": options.json, "--csv": options.csv}, must_be_new=not options.force)
-    kept = progress.progress_path(outputs[0])
+    kept = progress.progress_path(output)
     if kept.exists() and not (options.resume or options.force):
         raise ValueError(
             f"progress {kept} of an interrupted run exists; continue it with --resume, or start "
@@ -107,12 +113,8 @@ def _check_outputs(options: Options) -> Path | None:
     return kept
 
 
-def _begin(kept: Path, header: dict[str, Any], *, is_resumed: bool) -> dict[int, BatchCosts]:
-    """The batches already flown; begins the progress file if there are none."""
-    if is_resumed and kept.exists():
-        return progress.resume(kept, header)
-    progress.start(kept, header)
-    return {}
+def _num_flown(study: Study, costs: dict[int, BatchCosts]) -> int:
+    return sum(len(study.batches[index].seeds) for index in costs)
 
 
 def _fly(
@@ -124,9 +126,8 @@ def _fly(
 ) -> None:
     """Flies the batches that `costs` lacks, into `costs` and the progress file."""
     left = [index for index in range(len(study.batches)) if index not in costs]
-    missions = [len(batch.seeds) for batch in study.batches]
-    done = sum(missions[index] for index in costs)
-    bar = WorkBar("Flying", sum(missions), "missions", completed=done, console=console)
+    total, done = study.episodes * len(study.pairs), _num_flown(study, costs)
+    bar = WorkBar("Flying", total, "missions", completed=done, console=console)
     flown = run_jobs(fly_batch, [study.batches[index] for index in left], num_jobs)
     with bar, closing(flown), heard_interrupt() as interrupt_again:
         for which, batch_costs in flown:
@@ -138,14 +139,7 @@ def _fly(
             if is_interrupted():
                 raise KeyboardInterrupt
             interrupt_again()
-            bar.advance(missions[index])
-
-
-def _interrupted(study: Study, costs: dict[int, BatchCosts], kept: Path | None) -> str:
-    flown = sum(len(study.batches[index].seeds) for index in costs)
-    total = sum(len(batch.seeds) for batch in study.batches)
-    hint = "the same command with --resume continues" if kept else "nothing was kept"
-    return f"Interrupted after {flown} of {total} missions; {hint}."
+            bar.move_to(_num_flown(study, costs))
 
 
 def _write(options: Options, evaluated: list[Evaluated]) -> None:

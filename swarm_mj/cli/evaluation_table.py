@@ -44,22 +44,25 @@ def _table(results: Sequence[Result]) -> Table:
     table = Table(box=SIMPLE_HEAD, show_edge=False, padding=0)
     table.add_column("policy", no_wrap=True)
     names = ["AoI ± SEM\n95 %", "median\np95", "difference\n95 %", "packets\nreached", "hearers"]
-    published = "published\nvariance" if moves else "published"
-    for name in [*names, *(["velocity\nvariance"] if moves else []), published]:
+    names += ["velocity\nvariance", "published\nvariance"] if moves else ["published"]
+    for name in names:
         table.add_column(name, justify="right")
-    for r in results:
-        table.add_row(
-            _name(r),
-            f"{_with_error(r.aoi_mean, r.aoi_sem)}\n{_interval(r.aoi_ci_low, r.aoi_ci_high)}",
-            f"{_number(r.aoi_median)}\n{_number(r.aoi_p95)}",
-            f"{_number(r.aoi_difference_mean)}\n"
-            f"{_interval(r.aoi_difference_ci_low, r.aoi_difference_ci_high)}",
-            f"{_number(r.packets_per_window)}\n{_share(_reached(r))}",
-            _number(r.hearers_per_packet),
-            *([_number(r.velocity_variance_mean, 4)] if moves else []),
-            _published(r),
-        )
+    for result in results:
+        table.add_row(_name(result), *_cells(result, moves=moves))
     return table
+
+
+def _cells(r: Result, *, moves: bool) -> list[str]:
+    return [
+        f"{_with_error(r.aoi_mean, r.aoi_sem)}\n{_interval(r.aoi_ci_low, r.aoi_ci_high)}",
+        f"{_number(r.aoi_median)}\n{_number(r.aoi_p95)}",
+        f"{_number(r.aoi_difference_mean)}\n"
+        f"{_interval(r.aoi_difference_ci_low, r.aoi_difference_ci_high)}",
+        f"{_number(r.packets_per_window)}\n{_number(_reached(r), '.0%')}",
+        _number(r.hearers_per_packet),
+        *([_number(r.velocity_variance_mean, ".4f")] if moves else []),
+        _published(r),
+    ]
 
 
 def _name(result: Result) -> str:
@@ -78,7 +81,7 @@ def _published(result: Result) -> str:
     age = _with_error(result.published_aoi_mean, result.published_aoi_sem)
     if result.published_velocity_variance_mean is None:
         return age
-    return f"{age}\n{_number(result.published_velocity_variance_mean, 4)}"
+    return f"{age}\n{_number(result.published_velocity_variance_mean, '.4f')}"
 
 
 def _bound(results: Sequence[Result]) -> str:
@@ -109,18 +112,12 @@ def _legend(results: Sequence[Result]) -> str:
     return " ".join(sentences)
 
 
-def _number(value: float | None, digits: int = 2) -> str:
-    return NONE if value is None else f"{value:.{digits}f}"
-
-
-def _share(value: float | None) -> str:
-    return NONE if value is None else f"{value:.0%}"
+def _number(value: float | None, form: str = ".2f") -> str:
+    return NONE if value is None else format(value, form)
 
 
 def _with_error(mean: float | None, sem: float | None) -> str:
-    if mean is None:
-        return NONE
-    return f"{mean:.2f}" if sem is None else f"{mean:.2f} ± {sem:.2f}"
+    return _number(mean) if sem is None else f"{_number(mean)} ± {sem:.2f}"
 
 
 def _interval(low: float | None, high: float | None) -> str:

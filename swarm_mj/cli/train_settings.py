@@ -8,7 +8,7 @@ import argparse
 from dataclasses import Field, fields, replace
 from functools import reduce
 from pathlib import Path
-from typing import Any, get_origin
+from typing import Any
 
 from swarm_mj.cli.mission_options import make_mission
 from swarm_mj.cli.options import add_option, as_typed, flag_of
@@ -40,12 +40,10 @@ def add_setting_options(parser: argparse.ArgumentParser) -> None:
 
 def given_settings(given: dict[str, Any]) -> dict[str, Any]:
     """The settings that were given, by their places."""
+    values = {place: given[place] for place in SPECS if place in given}
     return {
-        place: tuple(dict.fromkeys(given[place]))
-        if get_origin(spec.type) is tuple
-        else given[place]
-        for place, spec in SPECS.items()
-        if place in given
+        place: tuple(dict.fromkeys(value)) if isinstance(value, list) else value
+        for place, value in values.items()
     }
 
 
@@ -75,8 +73,9 @@ def asked_settings(
             features=init.features,
             silence_logit=init.silence_logit,
         )
-        shape = ("features", *(f"network.{name}" for name in network))
-        shape = {place: given[place] for place in shape if place in given}
+        shape = {
+            place: given[place] for place in given if place.startswith(("features", "network"))
+        }
         refuse_others(shape, training, f"the policy {init_path}")
     missions = _missions(own.get("missions"), training.missions, len(sizes))
     training = replace(training, missions=missions)  # first, for its errors
