@@ -13,7 +13,7 @@ from typing import Any, NoReturn, TypeVar
 
 Options = TypeVar("Options")
 
-BAD_INPUT, INTERRUPTED = 2, 130
+DONE, BAD_INPUT, INTERRUPTED = 0, 2, 130
 COMMANDS = {  # each a module here, with its options, `Options`, and what it does, `run`
     "fly": "Fly one mission and record its replay.",
     "evaluate": "Fly policies over the same missions and say where they stand.",
@@ -26,13 +26,9 @@ COMMANDS = {  # each a module here, with its options, `Options`, and what it doe
 
 
 def parse(arguments: Sequence[str]) -> tuple[Any, Any]:
-    """What a command line asks for; imports here, so that Ctrl-C is heard while modules load.
+    """What was typed after `swarm-mj` asks for: a command's `run`, and the options to call it with.
 
-    Args:
-        arguments: What was typed after `swarm-mj`.
-
-    Returns:
-        The command's `run`, and the options to call it with.
+    It imports the command here, so that Ctrl-C is heard while modules load.
 
     Raises:
         ValueError: A value is unknown or outside its range.
@@ -69,14 +65,7 @@ def _show_or_refuse(arguments: Sequence[str]) -> NoReturn:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs a command.
-
-    Args:
-        arguments: The command line after the program's name; None is this process's.
-
-    Returns:
-        The exit code.
-    """
+    """Runs a command line, or this process's if none is given; returns the exit code."""
 
     def work() -> int:
         run, options = parse(sys.argv[1:] if arguments is None else list(arguments))
@@ -88,15 +77,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def script(
     kind: type[Options], run: Callable[[Options], int], arguments: Sequence[str] | None = None
 ) -> int:
-    """Runs a program of its own, such as those of `tools/`.
+    """Runs a program of its own, such as those of `tools/`, as `main` does a command.
 
     Args:
         kind: The dataclass of its options; its module's docstring says what it does.
-        run: What to do with them.
-        arguments: The command line after the program's name; None is this process's.
-
-    Returns:
-        The exit code.
+        run: What to do with them; it returns the exit code.
+        arguments: What was typed after the program's name; None is this process's.
     """
     from swarm_mj.cli import options
 

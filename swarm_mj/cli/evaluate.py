@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from rich.console import Console
 
+from swarm_mj.cli import DONE, INTERRUPTED
 from swarm_mj.cli.evaluation_table import print_results
 from swarm_mj.cli.interrupt import deferred_interrupt, heard_interrupt
 from swarm_mj.cli.mission_options import several_missions
@@ -24,7 +25,6 @@ from swarm_mj.fields import same_as, setting
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import POLICIES, normalised, with_payload
 
-DONE, INTERRUPTED = 0, 130
 OUTPUT = "output"  # a heading of the help
 DEFAULT_POLICIES = ("planner", *BASELINES)
 

@@ -40,15 +40,11 @@ def run(options: Options) -> int:
         from swarm_mj.evaluation.figures.drawing import draw_figure
         from swarm_mj.evaluation.figures.style import save
 
+        policy, seed = options.flock_policy, options.flock_seed
         drawn = {}
         for name in paths:
             status.update(f"Drawing {name} ...")
-            drawn[name] = draw_figure(
-                name,
-                results,
-                flock_policy=options.flock_policy,
-                flock_seed=options.flock_seed,
-            )
+            drawn[name] = draw_figure(name, results, flock_policy=policy, flock_seed=seed)
         for name in paths:
             status.update(f"Writing {name} ...")
             for path in paths[name]:

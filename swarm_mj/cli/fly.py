@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 from rich.console import Console
 
+from swarm_mj.cli import DONE, INTERRUPTED
 from swarm_mj.cli.flight_table import flight_numbers, flight_table
 from swarm_mj.cli.interrupt import deferred_interrupt
 from swarm_mj.cli.mission_options import one_mission
@@ -34,7 +35,6 @@ from swarm_mj.replay.view import view_command
 from swarm_mj.rollout import WindowRecord, rollout, summarise
 from swarm_mj.swarm import Swarm
 
-DONE, INTERRUPTED = 0, 130
 REPLAYS = Path("replays")
 OUTPUT = "output"  # a heading of the help
 COMPILING_WINDOWS = 10  # in which three robots do all that a flight does, schedules included

@@ -2,19 +2,16 @@
 
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from types import FrameType
 
 
-@contextmanager
-def deferred_interrupt() -> Iterator[Callable[[], bool]]:
+def deferred_interrupt() -> AbstractContextManager[Callable[[], bool]]:
     """Within it the first Ctrl-C is only noted; a second one interrupts at once, as ever.
 
-    Yields:
-        Whether Ctrl-C was pressed.
+    It yields whether Ctrl-C was pressed.
     """
-    with _noted(is_deferred=True) as was_pressed:
-        yield was_pressed
+    return _noted(is_deferred=True)
 
 
 @contextmanager

@@ -50,35 +50,31 @@ def parse(kind: type[Options], arguments: Sequence[str], prog: str, summary: str
     """The command line as an instance of its dataclass.
 
     Args:
-        kind: The dataclass; its `EPILOG`, if it has one, ends the help.
+        kind: The dataclass; its `EPILOG`, if it has one, ends the help, and a field called `typed`,
+            if it has one, takes the arguments themselves.
         arguments: What was typed after the command.
         prog: How the command is called.
         summary: What it does.
-
-    Returns:
-        The options; a field called `typed`, if there is one, has the arguments themselves.
 
     Raises:
         ValueError: A value is not among the choices, or out of range.
         SystemExit: The options cannot be read, or help was asked for.
     """
-    parser = parser_of(kind, prog, summary)
-    given = vars(parser.parse_args(arguments))
-    values: dict[str, Any] = {"typed": tuple(arguments)}
+    parsed = vars(_parser_of(kind, prog, summary).parse_args(arguments))
+    given: dict[str, Any] = {"typed": tuple(arguments), **parsed}
+    values: dict[str, Any] = {}
     for spec in fields(kind):  # pyright: ignore[reportArgumentType]
         if "build" in spec.metadata:
             values[spec.name] = spec.metadata["build"](given)
         elif spec.name in given:
-            is_many = isinstance(given[spec.name], list)
-            values[spec.name] = tuple(given[spec.name]) if is_many else given[spec.name]
-    names = {spec.name for spec in fields(kind)}  # pyright: ignore[reportArgumentType]
-    options = kind(**{name: value for name, value in values.items() if name in names})
+            value = given[spec.name]
+            values[spec.name] = tuple(value) if isinstance(value, list) else value
+    options = kind(**values)
     check(options)
     return options
 
 
-def parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
-    """The parser of a dataclass's options."""
+def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
     specs = fields(kind)
     needed = [_metavar(spec) for spec in specs if spec.metadata.get("is_positional")]
     needed += [f"{flag_of(spec)} {_metavar(spec)}" for spec in specs if _is_required(spec)]
@@ -90,16 +86,16 @@ def parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
         formatter_class=_Formatter,
         argument_default=argparse.SUPPRESS,
     )
-    groups: dict[str, Any] = {}
+    groups: dict[str, Any] = {"": parser}
     for spec in specs:
-        title = spec.metadata.get("group", "")
         if "add" in spec.metadata:
             spec.metadata["add"](parser)
         elif "help" in spec.metadata:
-            if title and title not in groups:
+            title = spec.metadata.get("group", "")
+            if title not in groups:
                 groups[title] = parser.add_argument_group(title)
-            default, is_required = shown_default(spec), _is_required(spec)
-            add_option(groups.get(title, parser), spec, spec.name, default, is_required=is_required)
+            default, is_required = _shown_default(spec), _is_required(spec)
+            add_option(groups[title], spec, spec.name, default, is_required=is_required)
     return parser
 
 
@@ -112,10 +108,10 @@ def add_option(
     is_many: bool = False,
     is_required: bool = False,
 ) -> None:
-    """Declares a field as an option.
+    """Declares a field as an option of a parser, or of a group of it.
 
     Args:
-        group: The parser, or a group of it.
+        group: The parser, or the group.
         spec: The field.
         dest: The value's name among those parsed; absent if the option was not given.
         default: The default as text; empty for none.
@@ -152,7 +148,7 @@ def as_typed(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
-def shown_default(spec: Field[Any]) -> str:
+def _shown_default(spec: Field[Any]) -> str:
     """A default as text; empty if there is none to show."""
     if "shown" in spec.metadata:
         return spec.metadata["shown"]

@@ -6,14 +6,10 @@ from swarm_mj.io.atomic import temp_path
 
 
 def check_outputs(outputs: dict[str, Path | None], *, must_be_new: bool) -> None:
-    """Passes if a command can write all its files.
-
-    Args:
-        outputs: The files by their options; None is not written.
-        must_be_new: Whether existing files are refused.
+    """Passes if a command can write all its files, named by their options; None is not written.
 
     Raises:
-        ValueError: One cannot be written, or two are the same.
+        ValueError: One cannot be written, two are the same, or one exists but must be new.
     """
     named: dict[Path, str] = {}
     for flag, path in outputs.items():
@@ -25,10 +21,10 @@ def check_outputs(outputs: dict[str, Path | None], *, must_be_new: bool) -> None
 
 
 def check_writable(path: Path, what: str, *, must_be_new: bool = False) -> None:
-    """Passes if a file can be written there.
+    """Passes if a file can be written there, whose missing folders will be made.
 
     Args:
-        path: The file; missing folders will be made.
+        path: The file.
         what: What the file is, for the message.
         must_be_new: Whether an existing file is refused.
 

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from rich.console import Console
 
+from swarm_mj.cli import DONE, INTERRUPTED
 from swarm_mj.cli.interrupt import deferred_interrupt
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
@@ -27,7 +28,6 @@ from swarm_mj.learning.run_folder import SETTINGS, Limits, Progress, Run, check_
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.stored import read_policy
 
-DONE, INTERRUPTED = 0, 130
 BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's way
 MANY_DECISIONS = 10**12
 

@@ -65,11 +65,7 @@ class SwarmPhysics(mujoco.Physics):
         self.restart(self._seed)
 
     def step(self, nstep: int = 1) -> None:
-        """Flies windows of Alg. 1 with the recipients that stand in `recipient`.
-
-        Args:
-            nstep: How many [windows].
-        """
+        """Flies so many windows of Alg. 1 with the recipients that stand in `recipient`."""
         for _ in range(nstep):
             self.swarm.exchange(self.recipient)
         self._show()
@@ -94,13 +90,11 @@ class SwarmTask(_Task):
     def __init__(self, seed: int) -> None:
         """Takes the seed of the first episode's mission."""
         self._next_seed = seed
-        self._num_flown = 0
 
     def initialize_episode(self, physics: SwarmPhysics) -> None:
         """Starts a fresh mission with the next seed."""
         physics.restart(self._next_seed)
         self._next_seed += 1
-        self._num_flown = 0
 
     def before_step(self, action: np.ndarray | Sequence[int], physics: SwarmPhysics) -> None:
         """Sets whom each robot addresses; itself is silence.
@@ -111,10 +105,6 @@ class SwarmTask(_Task):
         recipient = np.asarray(action)[np.newaxis]
         check_robots("recipient", recipient, (1, physics.swarm.mission.num_robots))
         physics.recipient = recipient.astype(np.int64)
-
-    def after_step(self, physics: SwarmPhysics) -> None:  # noqa: ARG002 - a control.Task
-        """Counts the window."""
-        self._num_flown += 1
 
     def action_spec(self, physics: SwarmPhysics) -> specs.BoundedArray:
         """Whom each robot addresses, shape (N,), from 0 to N - 1."""
@@ -135,4 +125,4 @@ class SwarmTask(_Task):
 
     def get_termination(self, physics: SwarmPhysics) -> float | None:
         """A discount of 1 after the last window: a mission is cut off, it reaches no end."""
-        return 1.0 if self._num_flown >= physics.swarm.mission.num_windows else None
+        return 1.0 if physics.swarm.now[0] >= physics.swarm.mission.num_windows else None

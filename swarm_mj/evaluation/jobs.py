@@ -84,7 +84,7 @@ def _workers(work: Callable[[Any], Any], num_jobs: int) -> Iterator[list[Connect
     context = get_context("spawn")
     processes, connections, loaded = [], [], []
     try:
-        with _shielded(), _one_thread():
+        with _shielded():
             for _ in range(num_jobs):
                 ours, theirs = context.Pipe()
                 loaded.append(context.Event())
@@ -120,24 +120,13 @@ def _serve(work: Callable[[Any], Any], connection: Connection, is_loaded: Event)
 
 @contextmanager
 def _shielded() -> Iterator[None]:
-    """Processes started within it never hear Ctrl-C, not even while they load."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Processes started within it start no threads for numerics."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    """Processes started within it never hear Ctrl-C, even as they load, nor start threads for numerics."""
+    handler, before = signal.signal(signal.SIGINT, signal.SIG_IGN), dict(os.environ)
     os.environ.update(ONE_THREAD)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for name in ONE_THREAD.keys() - before.keys():
+            del os.environ[name]
+        os.environ.update(before)
+        signal.signal(signal.SIGINT, handler)

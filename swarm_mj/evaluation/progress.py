@@ -20,39 +20,22 @@ def progress_path(output: Path) -> Path:
 
 
 def start(path: Path, header: dict[str, Any]) -> None:
-    """Begins a progress file, in place of any other.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
+    """Begins a progress file, in place of any other; raises OSError if that cannot be."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(_line(header))
 
 
 def append(path: Path, index: int, costs: BatchCosts) -> None:
-    """Adds a batch.
-
-    Args:
-        path: The progress file.
-        index: The batch's, among the study's.
-        costs: What it cost.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
+    """Adds what a batch cost, by its index among the study's; raises OSError if that cannot be."""
     with path.open("ab") as file:
         file.write(_line({"batch": index, "costs": asdict(costs)}))
 
 
 def resume(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]:
-    """The batches of an interrupted evaluation; a line that was cut off is dropped from the file.
+    """What an interrupted evaluation has flown, by the batches' indices.
 
-    Args:
-        path: The progress file; begun anew if not even its header was written.
-        header: What the batches depend on now.
-
-    Returns:
-        What was flown, by the batches' indices.
+    A line that was cut off is dropped from the file; it is begun anew if not even its header, what
+    the batches depend on, was written.
 
     Raises:
         ValueError: The batches depended on something else, or the file is none of this kind.

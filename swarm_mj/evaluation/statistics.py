@@ -35,17 +35,7 @@ class Spread:
 
 
 def spread(samples: Float[np.ndarray, "n"]) -> Spread:
-    """Mean, errors and quantiles of independent samples.
-
-    Args:
-        samples: One or more.
-
-    Returns:
-        Their spread.
-
-    Raises:
-        ValueError: There are no samples.
-    """
+    """Mean, errors and quantiles of independent samples; raises ValueError if there are none."""
     if samples.size == 0:
         raise ValueError("statistics need at least 1 sample, not 0")
     return Spread(
@@ -71,13 +61,10 @@ def standard_error(samples: Float[np.ndarray, "n"]) -> float | None:
 
 
 def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> Interval:
-    """Bias-corrected and accelerated bootstrap interval of the mean (Efron 1987).
+    """Bias-corrected and accelerated bootstrap interval of the mean, 95 % (Efron 1987).
 
-    Args:
-        samples: Independent ones; for paired differences, one difference per pair.
-
-    Returns:
-        The interval of 95 %, the same whenever the samples are.
+    The samples are independent; of paired differences, one difference a pair. The interval is the
+    same whenever the samples are.
     """
     largest = float(np.max(np.abs(samples), initial=0.0))
     if samples.size < 2 or float(np.ptp(samples)) <= ROUNDING * largest:
@@ -97,14 +84,7 @@ def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> Interval:
 
 
 def quantile_of_counts(counts: Int[np.ndarray, "bins"], share: float) -> int:
-    """The first bin at or below which at least this share of everything counted lies.
-
-    Args:
-        counts: How often each bin was met.
-        share: From 0 to 1.
-
-    Returns:
-        The bin's index.
+    """The first bin at or below which at least this share (0 to 1) of everything counted lies.
 
     Raises:
         ValueError: Nothing was counted.

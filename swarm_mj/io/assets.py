@@ -7,12 +7,6 @@ from pathlib import Path
 def asset(name: str) -> Path:
     """The path of a file or folder in `assets/`, in a checkout or in an installed wheel.
 
-    Args:
-        name: Its name, or path inside `assets/`.
-
-    Returns:
-        Its path.
-
     Raises:
         FileNotFoundError: It is in neither place.
     """
