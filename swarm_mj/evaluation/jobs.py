@@ -120,7 +120,7 @@ def _serve(work: Callable[[Any], Any], connection: Connection, is_loaded: Event)
 
 @contextmanager
 def _shielded() -> Iterator[None]:
-    """Processes started within it never hear Ctrl-C, even as they load, nor start threads for numerics."""
+    """Processes started within it hear no Ctrl-C, even as they load, and start no more threads."""
     handler, before = signal.signal(signal.SIGINT, signal.SIG_IGN), dict(os.environ)
     os.environ.update(ONE_THREAD)
     try:
