@@ -24,7 +24,7 @@ NUM_SHADES = 60
 def draw_legend(sheet: Sheet, full_scale: float) -> None:
     """The ramp of ages, which ends at `full_scale` [windows], and samples of what the map shows."""
     _draw_ramp(sheet, full_scale)
-    for row, samples in enumerate((radio_samples(sheet.log), other_samples(sheet.log))):
+    for row, samples in enumerate(_samples(sheet.log)):
         for column, (text, layer) in enumerate(samples.items()):
             x, y = LEFT + RAMP + (column + 0.9) * COLUMN, row * ROW
             path = "legend/" + re.sub(r"\W", "_", text)
@@ -32,27 +32,16 @@ def draw_legend(sheet: Sheet, full_scale: float) -> None:
             _write(sheet, f"{path}/text", [text], [(x, y + BELOW)])
 
 
-def radio_samples(log: Log) -> dict[str, str]:
-    """What the map shows of the radio: texts, and the layers that they name."""
+def _samples(log: Log) -> tuple[dict[str, str], dict[str, str]]:
+    """Two rows of texts, of the radio and of what else is shown, and the layers that they name."""
+    others = {"heading": "heading", f"r{log.ego}'s belief": "belief/ring"} if log.has_motion else {}
+    others[f"r{log.ego}'s tree"] = "tree"
+    reach = {"radio range": "radio/range"}
     if log.is_broadcast:
-        return {
-            "transmits": "radio/transmitter",
-            "is heard by": "radio/heard",
-            "radio range": "radio/range",
-        }
-    return {fate: f"radio/{fate}" for fate in ("delivered", "lost", "answered", "overheard")}
-
-
-def other_samples(log: Log) -> dict[str, str]:
-    """What else it shows, likewise."""
-    ego = f"r{log.ego}"
-    motion = {"heading": "heading", f"{ego}'s belief": "belief/ring"}
-    reach = {"radio range": "radio/range"}  # of broadcasts, it stands beside them
-    return {
-        **(motion if log.has_motion else {}),
-        f"{ego}'s tree": "tree",
-        **({} if log.is_broadcast else reach),
-    }
+        packets = {"transmits": "radio/transmitter", "is heard by": "radio/heard"}
+        return packets | reach, others
+    fates = ("delivered", "lost", "answered", "overheard")
+    return {fate: f"radio/{fate}" for fate in fates}, others | reach
 
 
 def _draw_sample(sheet: Sheet, path: str, name: str, x: float, y: float) -> None:

@@ -76,11 +76,6 @@ class Recorder:
         self._rows: list[dict[str, np.ndarray]] = []
         self._age: list[np.ndarray] = []
 
-    @property
-    def num_windows(self) -> int:
-        """Windows recorded so far."""
-        return len(self._rows)
-
     def add(self, flown: WindowRecord) -> None:
         """Records the window that was just flown."""
         buffers, states, phases = self._swarm.buffers, self._swarm.states, self._swarm.phases
