@@ -39,7 +39,7 @@ check: setup
 	$(BIN)/basedpyright
 
 test: setup
-	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal $(ARGS)
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadscope --no-loadscope-reorder $(ARGS)
 
 format: setup
 	$(BIN)/ruff format .

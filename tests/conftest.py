@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from forks import Forks
 from hypothesis import settings
+from sampled_types import check_again
 
 # Compiling takes its time on an example's first run; no law here is about time.
 settings.register_profile("swarm_mj", deadline=None, max_examples=50)
@@ -27,6 +28,11 @@ def _experiments_are_left_alone():
     after = stamps(TRAINING)
     written = {path for path in before | after if before.get(path) != after.get(path)}
     assert not written, f"tests wrote {', '.join(map(str, sorted(written)))}"
+
+
+def pytest_runtest_setup():
+    """Types are checked in every test anew."""
+    check_again()
 
 
 @pytest.fixture(scope="session")
