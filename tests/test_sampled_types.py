@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from jaxtyping import TypeCheckError
-from sampled_types import CHECKS
+from sampled_types import CHECKED_CALLS
 
 from swarm_mj.evaluation.statistics import standard_error
 
@@ -14,6 +14,6 @@ SQUARE = np.ones((2, 2))  # where a row is due
 def test_a_wrong_shape_is_refused_in_the_first_calls_of_each_test(test):  # noqa: ARG001
     with pytest.raises(TypeCheckError):
         standard_error(SQUARE)
-    for _ in range(CHECKS):
+    for _ in range(CHECKED_CALLS):
         standard_error(np.ones(2))
     standard_error(SQUARE)
