@@ -65,10 +65,7 @@ def fly_batch(batch: Batch) -> BatchCosts:
     """
     swarm = Swarm(batch.mission, batch.seeds)
     policy = make_policy(
-        batch.policy,
-        batch.mission,
-        batch.probability,
-        is_deterministic=batch.is_deterministic,
+        batch.policy, batch.mission, batch.probability, is_deterministic=batch.is_deterministic
     )
     if batch.parameters is not None and policy.parameters != batch.parameters:
         raise ValueError(

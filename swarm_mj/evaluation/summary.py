@@ -22,10 +22,6 @@ from swarm_mj.mission import Mission
 from swarm_mj.protocol.window import SLOT_WINDOWS
 
 COSTS = ("aoi", "velocity_variance")  # of each mission
-REGIME = (  # the fields of a mission that a result repeats
-    *("task", "preset", "num_robots", "range_ratio", "velocity_ratio"),
-    *("boundary", "physics", "num_windows", "switched_off"),
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +86,9 @@ def merge(batches: Sequence[BatchCosts]) -> BatchCosts:
 
 
 def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
-    return {name: getattr(regime, name) for name in REGIME} | {
+    """What was flown: the numbers of the mission that a result repeats, and the policy."""
+    repeated = {name: value for name, value in asdict(regime).items() if name in COLUMNS}
+    return repeated | {
         "policy": policy,
         "episodes": study.episodes,
         "seed": study.seed,

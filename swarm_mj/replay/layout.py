@@ -61,11 +61,7 @@ def _drawing(
     """A part of the plane; the look does not depend on the viewer's theme."""
     bounds = rrb.VisualBounds2D(x_range=x_range, y_range=y_range)
     return rrb.Spatial2DView(
-        origin=origin,
-        name=name,
-        background=palette.BACKGROUND,
-        visual_bounds=bounds,
-        **options,
+        origin=origin, name=name, background=palette.BACKGROUND, visual_bounds=bounds, **options
     )
 
 

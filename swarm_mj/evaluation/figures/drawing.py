@@ -9,24 +9,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 
-from swarm_mj.evaluation.figures.contents import (
-    FLOCK,
-    RESULT_FIGURES,
-    Panel,
-    ResultFigure,
-    Scale,
-)
+from swarm_mj.evaluation.figures.contents import FLOCK, RESULT_FIGURES, Panel, ResultFigure, Scale
 from swarm_mj.evaluation.figures.curves import Curve, curves, preset_of, results_of
 from swarm_mj.evaluation.figures.flock import draw_flock
 from swarm_mj.evaluation.figures.labels import MORE, name_ends, name_of
-from swarm_mj.evaluation.figures.style import (
-    FAINT,
-    INK,
-    WIDTH_IN,
-    look_of,
-    styled,
-    write_caption,
-)
+from swarm_mj.evaluation.figures.style import FAINT, INK, WIDTH_IN, look_of, styled, write_caption
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
 
 TOP_IN, PANEL_IN, GAP_IN, BOTTOM_IN = 0.86, 3.3, 0.35, 0.75
