@@ -118,11 +118,7 @@ def _num_flown(study: Study, costs: dict[int, BatchCosts]) -> int:
 
 
 def _fly(
-    study: Study,
-    costs: dict[int, BatchCosts],
-    num_jobs: int,
-    kept: Path | None,
-    console: Console,
+    study: Study, costs: dict[int, BatchCosts], num_jobs: int, kept: Path | None, console: Console
 ) -> None:
     """Flies the batches that `costs` lacks, into `costs` and the progress file."""
     left = [index for index in range(len(study.batches)) if index not in costs]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from swarm_mj.cli.outputs import check_writable
+from swarm_mj.cli.outputs import check_outputs
 from swarm_mj.cli.terminal import plain_console
 from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS
 from swarm_mj.evaluation.results import read_results
@@ -58,5 +58,5 @@ def _paths(options: Options, name: str) -> list[Path]:
     """A figure's files; raises ValueError for those that cannot be written."""
     paths = [options.out / f"{name}.{ending}" for ending in dict.fromkeys(options.format)]
     for path in paths:
-        check_writable(path, "figure", must_be_new=not options.force)
+        check_outputs({"figure": path}, must_be_new=not options.force)
     return paths

@@ -23,12 +23,7 @@ from swarm_mj.io.atomic import write_json
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
-from swarm_mj.policies.registry import (
-    is_directory,
-    make_policy,
-    normalised,
-    with_payload,
-)
+from swarm_mj.policies.registry import is_directory, make_policy, normalised, with_payload
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import view_command
@@ -48,18 +43,12 @@ class Options(PolicyOptions):
         "Exit codes: 0 done, 2 bad input, 130 interrupted (what was flown is recorded)."
     )
     policy: str = setting(
-        "planner",
-        f"{NAMES}, or a directory with a learned policy",
-        convert=normalised,
+        "planner", f"{NAMES}, or a directory with a learned policy", convert=normalised
     )
     seed: int = setting(1, "the same seed is the same mission")
     mission: Mission = one_mission()
     record: Path | None = setting(
-        None,
-        "the replay",
-        group=OUTPUT,
-        metavar="FILE.rrd",
-        shown=f"a fresh name under {REPLAYS}/",
+        None, "the replay", group=OUTPUT, metavar="FILE.rrd", shown=f"a fresh name under {REPLAYS}/"
     )
     no_record: bool = setting(False, "record no replay", group=OUTPUT)
     json: Path | None = setting(None, "write a summary", group=OUTPUT)

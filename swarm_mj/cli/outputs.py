@@ -5,32 +5,27 @@ from pathlib import Path
 from swarm_mj.io.atomic import temp_path
 
 
-def check_outputs(outputs: dict[str, Path | None], *, must_be_new: bool) -> None:
-    """Passes if a command can write all its files, named by their options; None is not written.
-
-    Raises:
-        ValueError: One cannot be written, two are the same, or one exists but must be new.
-    """
-    named: dict[Path, str] = {}
-    for flag, path in outputs.items():
-        if path is not None:
-            check_writable(path, flag, must_be_new=must_be_new)
-            if path.resolve() in named:
-                raise ValueError(f"{named[path.resolve()]} and {flag} name the same file, {path}")
-            named[path.resolve()] = flag
-
-
-def check_writable(path: Path, what: str, *, must_be_new: bool = False) -> None:
-    """Passes if a file can be written there, whose missing folders will be made.
+def check_outputs(outputs: dict[str, Path | None], *, must_be_new: bool = False) -> None:
+    """Passes if a command can write all its files; missing folders will be made.
 
     Args:
-        path: The file.
-        what: What the file is, for the message.
-        must_be_new: Whether an existing file is refused.
+        outputs: The files by what they are called in a message; None is not written.
+        must_be_new: Whether existing files are refused.
 
     Raises:
-        ValueError: The file exists, is a folder, or its folder cannot be written.
+        ValueError: A file exists, is a folder, or its folder cannot be written; or two are the
+            same.
     """
+    named: dict[Path, str] = {}
+    for what, path in outputs.items():
+        if path is not None:
+            _check(path, what, must_be_new=must_be_new)
+            if path.resolve() in named:
+                raise ValueError(f"{named[path.resolve()]} and {what} name the same file, {path}")
+            named[path.resolve()] = what
+
+
+def _check(path: Path, what: str, *, must_be_new: bool) -> None:
     try:
         if path.is_dir():
             raise ValueError(f"{what} {path} is a folder; name a file")

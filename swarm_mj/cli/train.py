@@ -13,7 +13,7 @@ from swarm_mj.cli import DONE, INTERRUPTED
 from swarm_mj.cli.interrupt import deferred_interrupt
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
-from swarm_mj.cli.outputs import check_writable
+from swarm_mj.cli.outputs import check_outputs
 from swarm_mj.cli.terminal import named_values, plain_console, this_command
 from swarm_mj.cli.train_progress import Watch, age_of
 from swarm_mj.cli.train_settings import (
@@ -93,7 +93,7 @@ def _asked_run(options: Options) -> Run:
     """What the options ask for; raises ValueError before anything is written."""
     run = _begun_run(options) if options.resume else _new_run(options)
     run = replace(run, limits=asked_limits(run.limits, options))
-    check_writable(options.out / SETTINGS, "run")
+    check_outputs({"run": options.out / SETTINGS})
     check_memory(run.training, _memory_bytes())
     return run
 

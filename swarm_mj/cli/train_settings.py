@@ -68,10 +68,7 @@ def asked_settings(
     training = usual_settings(own.get("arm", "robot"), mission, sizes)
     if init is not None:
         training = replace(
-            training,
-            network=init.network,
-            features=init.features,
-            silence_logit=init.silence_logit,
+            training, network=init.network, features=init.features, silence_logit=init.silence_logit
         )
         shape = {
             place: given[place] for place in given if place.startswith(("features", "network"))
@@ -175,12 +172,10 @@ def _check(training: Training) -> None:
 
 def _usual(place: str) -> str:
     """The default as text: per robot and, where it differs, per team."""
-    if place == "arm":
-        return "robot"
     robot, team = (_usual_of(arm, place) for arm in ("robot", "team"))
     if robot == "False":
         return ""
-    return robot if robot == team else f"{robot}, team: {team}"
+    return robot if place == "arm" or robot == team else f"{robot}, team: {team}"
 
 
 def _usual_of(arm: str, place: str) -> str:

@@ -3,10 +3,11 @@
 import os
 import signal
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnContext
 from multiprocessing.synchronize import Event
 from typing import Any, TypeVar
 
@@ -43,7 +44,11 @@ def run_jobs(
         return
     waiting = iter(enumerate(pieces))
     under_way: dict[Connection, int] = {}
-    with _workers(work, min(num_jobs, len(pieces))) as workers:
+    context = get_context("spawn")
+    with ExitStack() as stack:
+        with _shielded():
+            each = (_worker(work, context) for _ in range(min(num_jobs, len(pieces))))
+            workers = [stack.enter_context(worker) for worker in each]
         for worker in workers:
             _hand_out(waiting, worker, under_way)
         while under_way:
@@ -79,30 +84,21 @@ def _receive(worker: Connection) -> Any:  # noqa: ANN401 - any product
 
 
 @contextmanager
-def _workers(work: Callable[[Any], Any], num_jobs: int) -> Iterator[list[Connection]]:
-    """Processes that work until the block ends; yields a connection to each."""
-    context = get_context("spawn")
-    processes, connections, loaded = [], [], []
+def _worker(work: Callable[[Any], Any], context: SpawnContext) -> Iterator[Any]:
+    """A process that works until the block ends; yields the connection to it."""
+    ours, theirs = context.Pipe()
+    is_loaded = context.Event()
+    process = context.Process(target=_serve, args=(work, theirs, is_loaded), daemon=True)
+    process.start()
+    theirs.close()  # so that the process's end is heard
     try:
-        with _shielded():
-            for _ in range(num_jobs):
-                ours, theirs = context.Pipe()
-                loaded.append(context.Event())
-                process = context.Process(
-                    target=_serve, args=(work, theirs, loaded[-1]), daemon=True
-                )
-                process.start()
-                theirs.close()  # so that a process's end is heard
-                processes.append(process)
-                connections.append(ours)
-        yield connections
+        yield ours
     finally:
-        for process, is_loaded in zip(processes, loaded, strict=False):
-            # Libraries run programs of their own while they load, and complain if they are left.
-            while process.is_alive() and not is_loaded.wait(POLL_S):
-                pass
-            process.terminate()
-            process.join()
+        # Libraries run programs of their own while they load, and complain if they are left.
+        while process.is_alive() and not is_loaded.wait(POLL_S):
+            pass
+        process.terminate()
+        process.join()
 
 
 def _serve(work: Callable[[Any], Any], connection: Connection, is_loaded: Event) -> None:

@@ -14,21 +14,14 @@ ROUNDING = 1e-12  # samples that differ by no more than this share of their size
 
 
 @dataclass(frozen=True, kw_only=True)
-class Interval:
-    """The bootstrap interval of a mean; None where samples do not vary, or there is only one."""
-
-    low: float | None
-    high: float | None
-
-
-@dataclass(frozen=True, kw_only=True)
 class Spread:
     """How samples are spread, in their own unit."""
 
     mean: float
     std: float | None  # of the sample, n - 1 in the denominator; None of one sample
     sem: float | None  # the mean's standard error, std / sqrt(n)
-    interval: Interval
+    ci_low: float | None  # the bootstrap interval of the mean, as below
+    ci_high: float | None
     median: float
     p95: float  # between samples, linear
     worst: float  # the largest
@@ -38,11 +31,13 @@ def spread(samples: Float[np.ndarray, "n"]) -> Spread:
     """Mean, errors and quantiles of independent samples; raises ValueError if there are none."""
     if samples.size == 0:
         raise ValueError("statistics need at least 1 sample, not 0")
+    ci_low, ci_high = bootstrap_interval(samples)
     return Spread(
         mean=float(np.mean(samples)),
         std=standard_deviation(samples),
         sem=standard_error(samples),
-        interval=bootstrap_interval(samples),
+        ci_low=ci_low,
+        ci_high=ci_high,
         median=float(np.median(samples)),
         p95=float(np.percentile(samples, 95.0)),
         worst=float(np.max(samples)),
@@ -60,15 +55,15 @@ def standard_error(samples: Float[np.ndarray, "n"]) -> float | None:
     return None if std is None else std / math.sqrt(samples.size)
 
 
-def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> Interval:
+def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> tuple[float | None, float | None]:
     """Bias-corrected and accelerated bootstrap interval of the mean, 95 % (Efron 1987).
 
     The samples are independent; of paired differences, one difference a pair. The interval is the
-    same whenever the samples are.
+    same whenever the samples are; None and None where they do not vary, or there is only one.
     """
     largest = float(np.max(np.abs(samples), initial=0.0))
     if samples.size < 2 or float(np.ptp(samples)) <= ROUNDING * largest:
-        return Interval(low=None, high=None)
+        return None, None
     from scipy.stats import bootstrap  # takes its time to import
 
     found = bootstrap(
@@ -80,7 +75,7 @@ def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> Interval:
         method="BCa",
         rng=np.random.default_rng(RESAMPLING_SEED),
     ).confidence_interval
-    return Interval(low=float(found.low), high=float(found.high))
+    return float(found.low), float(found.high)
 
 
 def quantile_of_counts(counts: Int[np.ndarray, "bins"], share: float) -> int:

@@ -11,7 +11,6 @@ from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.published import published
 from swarm_mj.evaluation.results import COLUMNS, Result
 from swarm_mj.evaluation.statistics import (
-    Interval,
     bootstrap_interval,
     quantile_of_counts,
     spread,
@@ -102,7 +101,6 @@ def _costs(costs: BatchCosts) -> dict[str, Any]:
     columns: dict[str, Any] = {}
     for cost in COSTS:
         found = asdict(spread(np.array(getattr(costs, cost))))
-        columns |= _interval(cost, Interval(**found.pop("interval")))
         columns |= {f"{cost}_{name}": value for name, value in found.items()}
     for cost in ("aoi_steady", "aoi_floor"):
         samples = np.array(getattr(costs, cost))
@@ -110,10 +108,6 @@ def _costs(costs: BatchCosts) -> dict[str, Any]:
     for name, share in (("age_p95", 0.95), ("age_worst", 1.0)):
         columns[name] = SLOT_WINDOWS * quantile_of_counts(np.array(costs.ages), share)
     return {name: value for name, value in columns.items() if name in COLUMNS}
-
-
-def _interval(name: str, interval: Interval) -> dict[str, Any]:
-    return {f"{name}_ci_low": interval.low, f"{name}_ci_high": interval.high}
 
 
 def _packets(costs: BatchCosts, regime: Mission) -> dict[str, Any]:
@@ -149,12 +143,12 @@ def _differences(costs: BatchCosts, baseline: BatchCosts) -> dict[str, Any]:
     """Paired: the same missions, mission by mission; None of the baseline to itself."""
     differences: dict[str, Any] = {}
     for cost in COSTS:
-        mean, interval = None, Interval(low=None, high=None)
+        mean, low, high = None, None, None
         if costs is not baseline:
             difference = np.array(getattr(costs, cost)) - np.array(getattr(baseline, cost))
-            mean, interval = float(np.mean(difference)), bootstrap_interval(difference)
-        name = f"{cost}_difference"
-        differences |= {f"{name}_mean": mean, **_interval(name, interval)}
+            mean, (low, high) = float(np.mean(difference)), bootstrap_interval(difference)
+        found = {"mean": mean, "ci_low": low, "ci_high": high}
+        differences |= {f"{cost}_difference_{name}": value for name, value in found.items()}
     return differences
 
 

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from swarm_mj.cli.outputs import check_writable
+from swarm_mj.cli.outputs import check_outputs
 
 
 def test_a_file_in_missing_folders_can_be_written(tmp_path):
     path = tmp_path / "a" / "b" / "c.json"
-    check_writable(path, "summary", must_be_new=True)
+    check_outputs({"summary": path}, must_be_new=True)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -17,20 +17,20 @@ def test_a_file_in_missing_folders_can_be_written(tmp_path):
 def test_places_that_cannot_be_written_are_named(tmp_path, name):
     (tmp_path / "file").write_text("kept")
     with pytest.raises(ValueError, match=r"summary .* cannot be written"):
-        check_writable(tmp_path / name, "summary")
+        check_outputs({"summary": tmp_path / name})
     assert [file.name for file in tmp_path.iterdir()] == ["file"]
 
 
 def test_folders_and_existing_files_are_refused(tmp_path):
     with pytest.raises(ValueError, match="is a folder"):
-        check_writable(tmp_path, "replay")
+        check_outputs({"replay": tmp_path})
     path = tmp_path / "old"
     path.write_text("kept")
     with pytest.raises(ValueError, match="--force"):
-        check_writable(path, "replay", must_be_new=True)
-    check_writable(path, "replay")
+        check_outputs({"replay": path}, must_be_new=True)
+    check_outputs({"replay": path})
 
 
 def test_devices_are_refused():
     with pytest.raises(ValueError, match="is a device or a pipe"):
-        check_writable(Path("/dev/null"), "summary")
+        check_outputs({"summary": Path("/dev/null")})
