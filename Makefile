@@ -4,11 +4,12 @@ BIN := .venv/bin
 READY := .venv/ready
 ARGS ?=
 
-.PHONY: help setup fly bench check test format figures picture clean
+.PHONY: help setup fly bench check test attack format figures picture clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
 	@echo "make test    set up if needed and run the tests"
+	@echo "make attack  ten minutes of faults: full disks, kills, damaged files; tried and held"
 	@echo "make check   formatter, linter and type checker"
 	@echo "make bench   time the simulation on this machine"
 	@echo "make figures remake the paper's figures; evaluates what training/results/ lacks"
@@ -40,6 +41,9 @@ check: setup
 
 test: setup
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadscope --no-loadscope-reorder $(ARGS)
+
+attack: setup
+	SWARM_MJ_TRIES=20 $(BIN)/python -m pytest --numprocesses 2 tests/faults $(ARGS)
 
 format: setup
 	$(BIN)/ruff format .
