@@ -92,7 +92,7 @@ def _training_per_s(arm: str, mission: Mission, threads: int, seconds: float) ->
     model, _ = make_model(fewer)
     clock = _Clock(seconds)
     model.learn(10**12, callback=clock, log_interval=10**9)
-    num_rollouts = len(clock.starts_s) - 1
+    num_rollouts = len(clock.starts_s) - 2
     return num_rollouts * ppo.num_steps * fewer.missions / clock.elapsed_s
 
 
@@ -102,18 +102,15 @@ class _Clock(BaseCallback):
     def __init__(self, seconds: float) -> None:
         super().__init__()
         self._seconds = seconds
-        self._has_warmed_up = False
-        self.starts_s: list[float] = []  # of rollouts, from the second one on
+        self.starts_s: list[float] = []  # of rollouts
 
     @property
     def elapsed_s(self) -> float:
-        """Over whole rollouts."""
-        return self.starts_s[-1] - self.starts_s[0] if self.starts_s else 0.0
+        """Over whole rollouts but the first."""
+        return self.starts_s[-1] - self.starts_s[1] if len(self.starts_s) > 1 else 0.0
 
     def _on_rollout_start(self) -> None:
-        if self._has_warmed_up:
-            self.starts_s.append(time.perf_counter())
-        self._has_warmed_up = True
+        self.starts_s.append(time.perf_counter())
 
     def _on_step(self) -> bool:
         return self.elapsed_s < self._seconds
@@ -124,8 +121,8 @@ def _graphs(mission: Mission, features: str, num_missions: int) -> tuple[torch.T
     swarm, policy = Swarm(mission, range(num_missions)), RoundRobin()
     extractor = make_extractor(features, mission)
     extractor.start(num_missions, mission.num_robots)
-    graphs = extractor.graphs(swarm.views)
     for _ in range(WARM_UP_WINDOWS):
+        extractor.graphs(swarm.views)
         swarm.step(policy)
-        graphs = extractor.graphs(swarm.views)
+    graphs = extractor.graphs(swarm.views)
     return torch.from_numpy(graphs.node), torch.from_numpy(graphs.parent.astype(np.int64))

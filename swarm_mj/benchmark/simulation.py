@@ -7,6 +7,7 @@ the same run is the yardstick.
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from timeit import repeat, timeit
 from typing import NamedTuple
 
 import numpy as np
@@ -170,21 +171,7 @@ def _plain_steps(mission: Mission) -> Callable[[], None]:
 
 
 def microseconds(call: Callable[[], object], seconds: float) -> float:
-    """Median time of a call [µs].
-
-    Args:
-        call: What is timed, after a call that is not.
-        seconds: About how long the measurement takes [s].
-    """
+    """Median time of a call, after one that is not timed, in about so many seconds [µs]."""
     call()
-    start_s = time.perf_counter()
-    call()
-    once_s = time.perf_counter() - start_s
-    num_calls = max(1, int(seconds / REPETITIONS / max(once_s, 1e-7)))
-    times_s = []
-    for _ in range(REPETITIONS):
-        start_s = time.perf_counter()
-        for _ in range(num_calls):
-            call()
-        times_s.append((time.perf_counter() - start_s) / num_calls)
-    return 1e6 * float(np.median(times_s))
+    num_calls = max(1, int(seconds / REPETITIONS / max(timeit(call, number=1), 1e-7)))
+    return 1e6 * float(np.median(repeat(call, number=num_calls, repeat=REPETITIONS))) / num_calls

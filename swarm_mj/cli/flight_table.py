@@ -32,14 +32,7 @@ def flight_numbers(policy: Policy, summary: Summary) -> dict[str, Any]:
 
 
 def flight_table(title: str, mission: Mission, numbers: dict[str, Any], wall_s: float) -> Table:
-    """What a flight cost, by its `flight_numbers`, as a table of at most 14 rows.
-
-    Args:
-        title: The table's.
-        mission: What was flown.
-        numbers: What it cost.
-        wall_s: How long it took here [s].
-    """
+    """What a flight cost, by its `flight_numbers`, and took here [s]: at most 14 rows."""
     decider = "a centre that is told where all are"
     rows = {
         f"windows of {mission.window_s:g} s flown": f"{numbers['num_windows']} in {wall_s:.2f} s",

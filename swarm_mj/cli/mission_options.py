@@ -25,11 +25,7 @@ def several_missions() -> Any:  # noqa: ANN401 - as above
 def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
     """The missions that options name, by `mission.` and the field's name; a list sweeps.
 
-    Returns:
-        All combinations, the last field's values varying fastest.
-
-    Raises:
-        ValueError: A value is unknown or outside its range.
+    The last field's values vary fastest; raises ValueError if one is unknown or out of range.
     """
     swept = {spec.name: place for spec in SPECS if (place := f"mission.{spec.name}") in given}
     values = [given[place] for place in swept.values()]

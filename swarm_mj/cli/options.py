@@ -7,6 +7,7 @@ the last of `--robots 10 --robots 20`.
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, Field, field, fields
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar, get_origin
 
@@ -27,9 +28,6 @@ class Parser(argparse.ArgumentParser):
 
 
 class _Formatter(argparse.HelpFormatter):
-    def __init__(self, prog: str) -> None:
-        super().__init__(prog, max_help_position=26)
-
     def _format_args(self, action: argparse.Action, default_metavar: Any) -> str:  # noqa: ANN401 - argparse asks with None, too
         """`NAME ...` rather than `NAME [NAME ...]`."""
         return (
@@ -83,7 +81,7 @@ def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
         usage=" ".join([prog, *needed, "[OPTIONS]"]),
         description=summary,
         epilog=getattr(kind, "EPILOG", None),
-        formatter_class=_Formatter,
+        formatter_class=partial(_Formatter, max_help_position=26),
         argument_default=argparse.SUPPRESS,
     )
     groups: dict[str, Any] = {"": parser}

@@ -27,12 +27,8 @@ _Task: Any = control.Task  # untyped: pyright reads its abstract methods as retu
 def make_environment(mission: Mission, seed: int = 0) -> control.Environment:
     """One mission as an environment of dm_control, and so of dm_env.
 
-    Args:
-        mission: Its numbers.
-        seed: Of the first episode; the next one has `seed + 1`, and so on.
-
-    Returns:
-        The environment; a step is a window, an episode is a mission.
+    A step is a window, an episode is a mission: the first one with the seed given, the next one
+    with `seed + 1`, and so on.
 
     Raises:
         ValueError: The seed is negative, or no connected team could be drawn.

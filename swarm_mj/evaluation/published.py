@@ -67,9 +67,7 @@ class Sweep:
 
 SWEEPS = {
     "stationary": Sweep(
-        figure="fig4_transmit_power",
-        x_name="range_ratio",
-        irrelevant=frozenset({"velocity_ratio"}),
+        figure="fig4_transmit_power", x_name="range_ratio", irrelevant=frozenset({"velocity_ratio"})
     ),
     "random-walk": Sweep(figure="fig5_team_size", x_name="num_robots"),
     "flocking": Sweep(figure="fig6_flocking", x_name="velocity_ratio"),
@@ -87,14 +85,11 @@ def points() -> tuple[Point, ...]:
 
 
 def published(policy: str, mission: Mission) -> dict[str, Point]:
-    """What the paper reports for a policy in a regime, under either preset.
-
-    Args:
-        policy: A name among `POLICIES`.
-        mission: The regime; all that its figure does not sweep must be as its preset has it.
+    """What the paper reports for one of `POLICIES` in a regime, under either preset.
 
     Returns:
-        The points by cost, `aoi` and `velocity_variance`; empty where the paper has none.
+        The points by cost, `aoi` and `velocity_variance`; empty where the paper has none, as where
+        the regime is not its preset's in all that its figure does not sweep.
     """
     sweep = SWEEPS[mission.task]
     free = {name: getattr(mission, name) for name in {sweep.x_name, *sweep.irrelevant}}
