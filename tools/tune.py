@@ -182,11 +182,12 @@ def run(options: Options) -> int:
 def _tune_all(work: Sequence[Search], seeds: range, console: Console) -> list[Tuned]:
     """Tunes with a progress bar, and says where a grid may have been too narrow."""
     rows: list[Tuned] = []
-    with WorkBar("Tuning", len(work), "regimes") as bar, heard_interrupt() as interrupt_again:
+    with WorkBar("Tuning", len(work), "regimes") as bar, heard_interrupt() as was_pressed:
         for search in work:
             bar.text = search.policy
             row = tune(search, seeds, _guess(search.grid, rows))
-            interrupt_again()
+            if was_pressed():
+                raise KeyboardInterrupt
             rows.append(row)
             _report_edge(row, search.grid, console)
             bar.advance()

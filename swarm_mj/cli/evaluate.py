@@ -125,16 +125,15 @@ def _fly(
     total, done = study.episodes * len(study.pairs), _num_flown(study, costs)
     bar = WorkBar("Flying", total, "missions", completed=done, console=console)
     flown = run_jobs(fly_batch, [study.batches[index] for index in left], num_jobs)
-    with bar, closing(flown), heard_interrupt() as interrupt_again:
+    with bar, closing(flown), heard_interrupt() as was_pressed:
         for which, batch_costs in flown:
             index = left[which]
             with deferred_interrupt() as is_interrupted:
                 costs[index] = batch_costs
                 if kept:
                     progress.append(kept, index, batch_costs)
-            if is_interrupted():
+            if is_interrupted() or was_pressed():
                 raise KeyboardInterrupt
-            interrupt_again()
             bar.move_to(_num_flown(study, costs))
 
 

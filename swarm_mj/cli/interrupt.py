@@ -14,23 +14,13 @@ def deferred_interrupt() -> AbstractContextManager[Callable[[], bool]]:
     return _noted(is_deferred=True)
 
 
-@contextmanager
-def heard_interrupt() -> Iterator[Callable[[], None]]:
-    """Within it Ctrl-C interrupts at once, and again, should a library have swallowed it.
+def heard_interrupt() -> AbstractContextManager[Callable[[], bool]]:
+    """Within it Ctrl-C interrupts at once, as ever, but is noted, should a library swallow it.
 
     An exception is lost if it comes while compiled code calls back into Python, as it does while
-    numba loads kernels.
-
-    Yields:
-        A function that interrupts if Ctrl-C was pressed before.
+    numba loads kernels. It yields whether Ctrl-C was pressed.
     """
-    with _noted(is_deferred=False) as was_pressed:
-
-        def interrupt_again() -> None:
-            if was_pressed():
-                raise KeyboardInterrupt
-
-        yield interrupt_again
+    return _noted(is_deferred=False)
 
 
 @contextmanager

@@ -13,13 +13,13 @@ class WorkBar:
     """A bar on the terminal while a `with` statement lasts; it leaves nothing behind.
 
     Attributes:
-        what: What is under way, or a function that tells it whenever the bar is drawn.
+        what: What is under way.
         text: What stands behind the bar.
     """
 
     def __init__(
         self,
-        what: str | Callable[[], str],
+        what: str,
         total: float | int,
         unit: str = "",
         *,
@@ -57,7 +57,7 @@ class WorkBar:
         self._bar.update(self._id, completed=completed)
 
     def _shown_what(self, _task: Task) -> str:
-        return self.what if isinstance(self.what, str) else self.what()
+        return self.what
 
     def _shown_text(self, task: Task) -> str:
         count = f"{task.completed:.0f}/{task.total:.0f} {self._unit}" if self._unit else ""

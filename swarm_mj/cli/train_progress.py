@@ -6,6 +6,7 @@ from datetime import timedelta
 from typing import TYPE_CHECKING
 
 from rich.console import Console
+from rich.progress import Task
 
 from swarm_mj.cli.progress import WorkBar
 
@@ -24,9 +25,8 @@ class Watch(WorkBar):
         self, console: Console, limits: "Limits", is_interrupted: Callable[[], bool]
     ) -> None:
         """Prepares the bar; `is_interrupted` says whether Ctrl-C was pressed."""
-        super().__init__(self._shown, WHOLE, console=console, shows_time_left=False)
+        super().__init__("Training", WHOLE, console=console, shows_time_left=False)
         self._console, self._limits, self._is_interrupted = console, limits, is_interrupted
-        self._doing = "Training"
         self._start: Status | None = None  # of this session
         self._num_rows = 0
         self.has_stopped = False  # whether the run was told to stop
@@ -42,7 +42,7 @@ class Watch(WorkBar):
             self._start = status
             self._num_rows = len(status.progress.curve)
         self._print_new_row(status)
-        self._doing = "Training" if status.evaluated is None else "Evaluating"
+        self.what = "Training" if status.evaluated is None else "Evaluating"
         self.text = _text(status, self._start, self._limits)
         self.move_to(share_done(status, self._limits))
         if self._is_interrupted() and not self.has_stopped:
@@ -50,8 +50,8 @@ class Watch(WorkBar):
             self._console.print(f"Interrupted: {FINISHING}.")
         return not self.has_stopped
 
-    def _shown(self) -> str:
-        return "Finishing" if self._is_interrupted() else self._doing
+    def _shown_what(self, _task: Task) -> str:
+        return "Finishing" if self._is_interrupted() else self.what
 
     def _print_new_row(self, status: "Status") -> None:
         curve = status.progress.curve

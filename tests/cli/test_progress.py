@@ -26,9 +26,9 @@ def test_what_how_far_and_what_else_are_told():
     assert "15/40 missions, age 7.5" in shown(True, work)
 
 
-def test_work_may_be_told_in_all_and_by_a_function():
+def test_work_may_be_told_in_all_and_change():
     def work(bar):
-        bar.what = lambda: "Finishing"
+        bar.what = "Finishing"
         bar.move_to(40.0)
 
     drawn = shown(True, work)
