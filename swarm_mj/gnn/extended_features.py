@@ -11,10 +11,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Shaped
 
 from swarm_mj.compiled import compiled
-from swarm_mj.gnn.graphs import Graphs
+from swarm_mj.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.gnn.packet_memory import Memory, empty_memory, remember
 from swarm_mj.gnn.turns import write_turns
-from swarm_mj.mission import Mission
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.local_views import LocalViews
@@ -54,18 +53,13 @@ TURN_RANGES = {"has_turn_1_5": 1.5, "has_turn_2": 2.0, "has_turn_3": 3.0}  # [ra
 NODE = np.dtype([(field, np.float32) for field in FEATURES])
 
 
-class ExtendedFeatures:
+class ExtendedFeatures(FeatureExtractor):
     """Features for learning in minutes; see `FEATURES`."""
 
     names: ClassVar[tuple[str, ...]] = tuple(FEATURES.values())
 
-    def __init__(self, mission: Mission) -> None:
-        """Takes the radio's range and threshold from the mission."""
-        self._range_m = mission.range_m
-        self._threshold = from_db(mission.sinr_threshold_db)
-
     def start(self, num_missions: int, num_robots: int) -> None:
-        """Forgets the packets of earlier missions; arguments as in `FeatureExtractor.start`."""
+        """Forgets the packets of earlier missions."""
         self._memory = empty_memory(num_missions, num_robots)
 
     def graphs(self, views: LocalViews) -> Graphs:
@@ -80,7 +74,7 @@ class ExtendedFeatures:
             buffers.last_attempt,
             views.now,
             self._memory,
-            self._range_m,
+            self._mission.range_m,
             node,
             may_address,
         )
@@ -95,12 +89,12 @@ class ExtendedFeatures:
 
     def _write_turns(self, views: LocalViews, node: Shaped[np.ndarray, "B N N"]) -> None:
         """Whose turn it is, by distance and by the rule of spatial TDMA."""
-        believed_m = views.buffers.position_m
+        believed_m, range_m = views.buffers.position_m, self._mission.range_m
         is_known = views.buffers.is_known | np.eye(views.num_robots, dtype=np.bool_)
         for field, ranges in TURN_RANGES.items():
-            write_turns(believed_m, is_known, views.now, ranges * self._range_m, node[field])
-        now = views.now.astype(np.int64)
-        write_joined(believed_m, is_known, now, self._range_m, self._threshold, node["has_joined"])
+            write_turns(believed_m, is_known, views.now, ranges * range_m, node[field])
+        now, threshold = views.now.astype(np.int64), from_db(self._mission.sinr_threshold_db)
+        write_joined(believed_m, is_known, now, range_m, threshold, node["has_joined"])
 
 
 class LocalFeatures(ExtendedFeatures):

@@ -1,12 +1,10 @@
 """The one table of feature sets."""
 
-from collections.abc import Callable
-
 from swarm_mj.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.gnn.graphs import FeatureExtractor, PaperFeatures, ReferenceFeatures
 from swarm_mj.mission import Mission
 
-FEATURE_SETS: dict[str, Callable[[Mission], FeatureExtractor]] = {
+FEATURE_SETS: dict[str, type[FeatureExtractor]] = {
     "paper": PaperFeatures,
     "reference": ReferenceFeatures,
     "local": LocalFeatures,

@@ -32,17 +32,21 @@ class FeatureExtractor(Protocol):
     """Makes graphs of local views; one that remembers packets must see every window."""
 
     names: ClassVar[tuple[str, ...]]  # of the features, in order; there are F
+    _mission: Mission
+
+    def __init__(self, mission: Mission) -> None:
+        """Takes the mission whose area, duration and range normalise the features."""
+        self._mission = mission
 
     def start(self, num_missions: int, num_robots: int) -> None:
-        """Forgets earlier missions; now there are B of N robots."""
-        ...
+        """Forgets earlier missions, if it remembers any; now there are B of N robots."""
 
     def graphs(self, views: LocalViews) -> Graphs:
         """What every robot's network sees now, row [b N + i] from view [b, i] only."""
         ...
 
 
-class PaperFeatures:
+class PaperFeatures(FeatureExtractor):
     """The paper's features: T, M and L, by the mission's area and duration.
 
     There is one difference: an explicit flag tells what was never heard of from what was observed
@@ -53,30 +57,23 @@ class PaperFeatures:
         "is oneself", "is known", "T", "p_x", "p_y", "v_x", "v_y", "L",
     )  # fmt: skip
 
-    def __init__(self, mission: Mission) -> None:
-        self._num_windows = mission.num_windows
-        self._side_m = mission.side_m
-        self._duration_s = mission.num_windows * mission.window_s
-
-    def start(self, num_missions: int, num_robots: int) -> None:
-        """Nothing is remembered."""
-
     def graphs(self, views: LocalViews) -> Graphs:
         """The buffers as they are; positions from the area's middle, velocities per mission."""
-        buffers = views.buffers
+        buffers, mission = views.buffers, self._mission
+        duration_s = mission.num_windows * mission.window_s
         is_oneself = np.broadcast_to(np.eye(views.num_robots, dtype=np.bool_), buffers.parent.shape)
         return _everyone_addressable(
             buffers,
             is_oneself,
             buffers.is_known | is_oneself,
-            buffers.timestamp / self._num_windows,
-            buffers.position_m / self._side_m,
-            buffers.velocity_mps * (self._duration_s / self._side_m),
-            buffers.last_attempt / self._num_windows,
+            buffers.timestamp / mission.num_windows,
+            buffers.position_m / mission.side_m,
+            buffers.velocity_mps * (duration_s / mission.side_m),
+            buffers.last_attempt / mission.num_windows,
         )
 
 
-class ReferenceFeatures:
+class ReferenceFeatures(FeatureExtractor):
     """The seven features of the authors' code, constants included.
 
     Ages are negative; positions and velocities are relative to the robot's own, also of robots
@@ -86,12 +83,6 @@ class ReferenceFeatures:
     names: ClassVar[tuple[str, ...]] = (
         "T - t", "zero", "p_x relative", "p_y relative", "v_x relative", "v_y relative", "L - t",
     )  # fmt: skip
-
-    def __init__(self, mission: Mission) -> None:
-        """Takes nothing from the mission."""
-
-    def start(self, num_missions: int, num_robots: int) -> None:
-        """Nothing is remembered."""
 
     def graphs(self, views: LocalViews) -> Graphs:
         """The buffers as the authors' code shows them to its network."""

@@ -86,13 +86,12 @@ def record_replay(
     recorder = Recorder(swarm)
     for window in rollout(swarm, held_out_policy(training, network, mission)):
         recorder.add(window)
-    config: dict[str, object] = {
-        "decisions": decisions,
-        "seed": HELD_OUT_SEED,
-        "training seed": training.seed,
-    }
-    path = folder / f"decisions-{decisions:09d}.rrd"
-    write_replay(recorder.log(), mission, config, path)
+    write_replay(
+        recorder.log(),
+        mission,
+        {"decisions": decisions, "seed": HELD_OUT_SEED, "training seed": training.seed},
+        folder / f"decisions-{decisions:09d}.rrd",
+    )
 
 
 def _fly(

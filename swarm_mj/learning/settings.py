@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, get_args
 
 from swarm_mj.fields import check, setting
@@ -19,25 +19,25 @@ MOST_ROBOTS = 200  # a team decision takes robots² nodes
 
 @dataclass(frozen=True, kw_only=True)
 class PpoSettings:
-    """Proximal policy optimisation, in stable-baselines3's terms."""
+    """PPO, in stable-baselines3's terms; the defaults are those of credit per robot."""
 
     learning_rate: float = setting(
-        help="of Adam, at the start", label="learning rate", low=1e-9, high=1.0
+        1e-3, "of Adam, at the start", label="learning rate", low=1e-9, high=1.0
     )
-    decay: float  # of the learning rate ...
-    decay_steps: int  # ... in each of so many optimiser steps ...
-    least_share: float = 0.0  # ... but not below this share of it
-    num_steps: int  # windows of each mission in a rollout
-    num_minibatches: int  # that a rollout is shared out to
-    num_epochs: int  # passes over a rollout
+    decay: float = 0.95  # of the learning rate ...
+    decay_steps: int = 200  # ... in each of so many optimiser steps ...
+    least_share: float = 0.1  # ... but not below this share of it
+    num_steps: int = 32  # windows of each mission in a rollout
+    num_minibatches: int = 10  # that a rollout is shared out to
+    num_epochs: int = 2  # passes over a rollout
     discount: float = setting(
-        help="gamma; 0: a packet's credit is that of its own window alone", low=0.0, high=1.0
+        0.0, "gamma; 0: a packet's credit is that of its own window alone", low=0.0, high=1.0
     )
-    gae_lambda: float
-    clip: float  # of the probability ratio
-    clips_value: bool  # by the same number
-    entropy: float = setting(help="weight of the entropy bonus", low=0.0, high=10.0)
-    value: float  # weight of the value's squared error
+    gae_lambda: float = 0.9
+    clip: float = 0.2  # of the probability ratio
+    clips_value: bool = False  # by the same number
+    entropy: float = setting(0.002, "weight of the entropy bonus", low=0.0, high=10.0)
+    value: float = 0.5  # weight of the value's squared error
     max_gradient_norm: float = 0.5
     adam_epsilon: float = 1e-6
 
@@ -52,6 +52,7 @@ TEAM_REFERENCE = PpoSettings(
     learning_rate=1e-4,
     decay=0.95,
     decay_steps=5000,
+    least_share=0.0,
     num_steps=4,
     num_minibatches=4,
     num_epochs=4,
@@ -63,20 +64,8 @@ TEAM_REFERENCE = PpoSettings(
     value=0.25,
 )
 TEAM_PAPER = replace(TEAM_REFERENCE, num_minibatches=2, value=0.5)  # minibatches of 64
-ROBOT = PpoSettings(
-    learning_rate=1e-3,
-    decay=0.95,
-    decay_steps=200,
-    least_share=0.1,
-    num_steps=32,
-    num_minibatches=10,
-    num_epochs=2,
-    discount=0.0,
-    gae_lambda=0.9,
-    clip=0.2,
-    clips_value=False,
-    entropy=0.002,
-    value=0.5,
+ROBOTS_NETWORK = GnnShape(
+    num_features=num_features("extended"), latent=32, depth=2, receptive_field=1, edges="both"
 )
 
 
@@ -84,12 +73,15 @@ ROBOT = PpoSettings(
 class Training:
     """A training run: the same settings make the same policy on the same machine.
 
+    The defaults are those of credit per robot, made to learn in minutes.
+
     Raises:
         ValueError: A value is unknown, outside its range, or does not go with another.
     """
 
     arm: CreditAssignment = setting(
-        help="credit assignment, per robot (each is paid for what its own packets changed; learns "
+        "robot",
+        "credit assignment, per robot (each is paid for what its own packets changed; learns "
         "in minutes) or per team (one reward for all, the paper's way)",
         choices=get_args(CreditAssignment),
     )
@@ -98,32 +90,35 @@ class Training:
         help="size of the team; several are trained on together", low=2, high=MOST_ROBOTS
     )
     features: str = setting(
-        help="what the network sees of each teammate", choices=tuple(FEATURE_SETS)
+        "extended", "what the network sees of each teammate", choices=tuple(FEATURE_SETS)
     )
-    network: GnnShape  # that acts
-    shares_trunk: bool  # whether values come from the acting network's last stage but one number
-    silence_logit: float  # what silence has ahead, but in a robot's own turn
+    network: GnnShape = ROBOTS_NETWORK  # that acts
+    shares_trunk: bool = True  # whether values come from its last stage but one number
+    silence_logit: float = 7.0  # what silence has ahead, but in a robot's own turn
     reward: Reward = setting(
-        help="the cost to lower; velocity-variance needs --arm team",
+        "aoi",
+        "the cost to lower; velocity-variance needs --arm team",
         choices=get_args(Reward),
     )
-    ppo: PpoSettings
-    missions: int = setting(help="flown side by side", low=1, high=4096)
-    groups: int  # of missions that end at different times
-    seed: int = setting(help="the same seed is the same policy", low=0, high=2**63 - 1)
+    ppo: PpoSettings = PpoSettings()
+    missions: int = setting(16, "flown side by side", low=1, high=4096)
+    groups: int = 4  # of missions that end at different times
+    seed: int = setting(0, "the same seed is the same policy", low=0, high=2**63 - 1)
     evaluate_every: int = setting(
-        help="team decisions between two evaluations",
+        10_000,
+        "team decisions between two evaluations",
         label="evaluation interval",
         low=1,
         high=10**12,
     )
     held_out: int = setting(
-        help="missions of an evaluation, of each team size",
+        12,
+        "missions of an evaluation, of each team size",
         label="held-out missions",
         low=1,
         high=10_000,
     )
-    threads: int = setting(help="torch's threads", low=1, high=256)
+    threads: int = setting(1, "torch's threads", low=1, high=256)
 
     def __post_init__(self) -> None:
         check(self)
@@ -145,7 +140,7 @@ def usual_settings(arm: str, mission: Mission, robots: Sequence[int], seed: int 
     """The usual settings of a credit assignment; `dataclasses.replace` changes some.
 
     Args:
-        arm: `robot`, made to learn in minutes, or `team`, the paper's way (III-C).
+        arm: `robot`, or `team`, the paper's way (III-C).
         mission: What the missions have in common; its preset says whose way, where they differ.
         robots: Sizes of the teams.
         seed: Of all draws.
@@ -155,27 +150,8 @@ def usual_settings(arm: str, mission: Mission, robots: Sequence[int], seed: int 
     """
     if arm not in get_args(CreditAssignment):
         raise ValueError(f"arm must be one of {', '.join(get_args(CreditAssignment))}, not {arm!r}")
-    given: dict[str, Any] = {"arm": arm, "mission": mission, "robots": tuple(robots), "seed": seed}
-    own = _per_robot() if arm == "robot" else _per_team(is_reference=mission.preset == "reference")
-    shared = {"reward": "aoi", "groups": 4, "evaluate_every": 10_000, "held_out": 12, "threads": 1}
-    return Training(**given, **own, **shared)
-
-
-def _per_robot() -> dict[str, Any]:
-    return {
-        "features": "extended",
-        "network": GnnShape(
-            num_features=num_features("extended"),
-            latent=32,
-            depth=2,
-            receptive_field=1,
-            edges="both",
-        ),
-        "shares_trunk": True,
-        "silence_logit": 7.0,
-        "ppo": ROBOT,
-        "missions": 16,
-    }
+    own = _per_team(is_reference=mission.preset == "reference") if arm == "team" else {}
+    return Training(mission=mission, robots=tuple(robots), seed=seed, **own)
 
 
 def _per_team(*, is_reference: bool) -> dict[str, Any]:
@@ -185,13 +161,12 @@ def _per_team(*, is_reference: bool) -> dict[str, Any]:
     robot itself reaches a teammate's node: whom it addresses could depend neither on where it is
     nor on the time.
     """
-    features = "reference" if is_reference else "paper"
+    features, num_outputs = ("reference", 2) if is_reference else ("paper", 1)
     return {
+        "arm": "team",
         "features": features,
         "network": GnnShape(
-            num_features=num_features(features),
-            num_outputs=2 if is_reference else 1,
-            edges="reference",
+            num_features=num_features(features), num_outputs=num_outputs, edges="reference"
         ),
         "shares_trunk": False,
         "silence_logit": 0.0 if is_reference else EVEN_SILENCE,
@@ -207,12 +182,17 @@ def from_json(given: dict[str, Any]) -> Training:
         ValueError: A key is missing or unknown, or a value is outside its range.
     """
     try:
-        parts: dict[str, Any] = {
-            "mission": Mission(**given["mission"]),
-            "network": GnnShape(**given["network"]),
-            "ppo": PpoSettings(**given["ppo"]),
+        parts = {
+            "mission": _made(Mission, given["mission"]),
+            "network": _made(GnnShape, given["network"]),
+            "ppo": _made(PpoSettings, given["ppo"]),
             "robots": tuple(given["robots"]),
         }
-        return Training(**given | parts)
+        return _made(Training, given | parts)
     except (KeyError, TypeError) as error:
         raise ValueError(f"not the settings of this version's training runs: {error}") from error
+
+
+def _made(kind: type[Any], given: dict[str, Any]) -> Any:  # noqa: ANN401 - of this kind
+    """A dataclass of values by name; raises KeyError or TypeError unless they are all of them."""
+    return kind(**{spec.name: given[spec.name] for spec in fields(kind)} | given)

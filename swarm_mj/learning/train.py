@@ -34,7 +34,7 @@ from swarm_mj.learning.run_folder import (
     write_curve,
     write_run,
 )
-from swarm_mj.learning.settings import Training
+from swarm_mj.learning.settings import PpoSettings, Training
 from swarm_mj.learning.vec_env import RobotEnv, TeamEnv
 from swarm_mj.policies.stored import read_policy
 
@@ -64,13 +64,12 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
     batch_size = _batch_size(training, env.num_envs)
     if training.reward == "velocity-variance":  # as in the authors' code
         env = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=ppo.discount)
-    decay = StepDecay(training)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "You have specified a mini-batch size")  # one is smaller
         model = PPO(
             GnnActorCritic if training.arm == "robot" else TeamActorCritic,
             env,
-            learning_rate=decay,
+            learning_rate=ppo.learning_rate,
             n_steps=ppo.num_steps,
             batch_size=batch_size,
             n_epochs=ppo.num_epochs,
@@ -88,7 +87,7 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
             else DictRolloutBuffer,
             policy_kwargs=_policy_settings(training),
         )
-    decay.model = model
+    model.lr_schedule = lambda _: decayed_rate(ppo, model._n_updates)  # passes so far
     return model, rng
 
 
@@ -113,19 +112,10 @@ def _policy_settings(training: Training) -> dict[str, Any]:
     return settings if training.arm == "robot" else settings | {"sums_nodes": training.sums_nodes}
 
 
-class StepDecay:
-    """The learning rate, falling by a factor in each of so many optimiser steps (III-C)."""
-
-    def __init__(self, training: Training) -> None:
-        self._ppo = training.ppo
-        self.model: PPO | None = None
-
-    def __call__(self, remaining: float) -> float:  # noqa: ARG002 - the budget does not matter
-        """The rate of the coming optimiser steps."""
-        num_updates = 0 if self.model is None else self.model._n_updates  # epochs so far
-        num_steps = num_updates * self._ppo.num_minibatches
-        share = self._ppo.decay ** (num_steps // self._ppo.decay_steps)
-        return self._ppo.learning_rate * max(share, self._ppo.least_share)
+def decayed_rate(ppo: PpoSettings, num_epochs: int) -> float:
+    """The learning rate after so many passes: it falls in steps of the optimiser (III-C)."""
+    share = ppo.decay ** (num_epochs * ppo.num_minibatches // ppo.decay_steps)
+    return ppo.learning_rate * max(share, ppo.least_share)
 
 
 def train(run: Run, folder: Path, *, listener: Listener, is_resumed: bool = False) -> Progress:

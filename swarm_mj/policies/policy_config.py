@@ -6,12 +6,12 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
+from swarm_mj.fields import check, setting
 from swarm_mj.gnn.feature_sets import num_features
 from swarm_mj.gnn.shape import GnnShape
 
 FORMAT = "swarm_mj policy"
 FORMAT_VERSION = 1
-MAX_SILENCE_LOGIT = 100.0  # either way; e^100 to one is certain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,13 +24,14 @@ class PolicyConfig:
 
     network: GnnShape
     features: str  # the name of a feature set, see `FEATURE_SETS`
-    silence_logit: float = 0.0  # added to silence, but in a robot's own turn
+    silence_logit: float = setting(0.0, low=-100.0, high=100.0)  # added, but in one's own turn
     training: dict[str, Any]  # JSON: the settings, the seed, the budget spent, the command
     evaluation: dict[str, Any]  # JSON: what it cost on which missions
     commit: str | None  # the code that trained it
     version: str  # as above
 
     def __post_init__(self) -> None:
+        check(self)
         expected = num_features(self.features)
         if self.network.num_features != expected:
             raise ValueError(
@@ -39,11 +40,6 @@ class PolicyConfig:
             )
         if self.network.num_outputs not in (1, 2):
             raise ValueError(f"network.num_outputs must be 1 or 2, not {self.network.num_outputs}")
-        if not abs(self.silence_logit) <= MAX_SILENCE_LOGIT:
-            raise ValueError(
-                f"silence_logit must be from -{MAX_SILENCE_LOGIT:g} to {MAX_SILENCE_LOGIT:g}, not "
-                f"{self.silence_logit:g}"
-            )
 
 
 def to_json(config: PolicyConfig) -> str:

@@ -102,7 +102,5 @@ def test_settings_of_another_version_are_refused(part):
     for change in (lambda its: its.popitem(), lambda its: its.update(wings=2)):
         given = json.loads(json.dumps(whole))
         change(given[part] if part else given)
-        if part and given[part].keys() < whole[part].keys():
-            continue  # a part's last key may have a default
         with pytest.raises(ValueError, match="not the settings of this version's training runs"):
             from_json(given)

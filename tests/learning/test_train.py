@@ -3,7 +3,6 @@
 import warnings
 from dataclasses import replace
 
-import numpy as np
 import pytest
 import torch
 from small_runs import run, small_training
@@ -11,7 +10,7 @@ from tiny_policies import save_tiny
 
 from swarm_mj.learning.checkpoint import missions_of
 from swarm_mj.learning.run_folder import INIT, SETTINGS
-from swarm_mj.learning.train import StepDecay, make_model
+from swarm_mj.learning.train import make_model
 from swarm_mj.policies.stored import read_policy
 
 
@@ -146,9 +145,3 @@ def test_threads_are_torchs():
         assert torch.get_num_threads() == 2
     finally:
         torch.set_num_threads(before)
-
-
-def test_a_schedule_without_a_model_is_at_its_beginning():
-    """Policies are made before the model that counts."""
-    assert StepDecay(small_training())(1.0) == small_training().ppo.learning_rate
-    assert np.isfinite(StepDecay(small_training())(0.0))

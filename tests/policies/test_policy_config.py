@@ -74,8 +74,8 @@ def test_what_is_no_config(text, complaint):
         ("features", "all", "features must be one of paper, reference, local, extended, not 'all'"),
         ("features", 7, "Expected `str`, got `int` - at .*features"),
         ("silence_logit", "3", "Expected `float`, got `str` - at .*silence_logit"),
-        ("silence_logit", 100.5, "silence_logit must be from -100 to 100, not 100.5"),
-        ("silence_logit", -1e300, r"silence_logit must be from -100 to 100, not -1e\+300"),
+        ("silence_logit", 100.5, "silence_logit must be a number from -100 to 100, not 100.5"),
+        ("silence_logit", -1e300, r"silence_logit must be a number from -100 to 100, not -1e\+300"),
         ("silence_logit", math.nan, "JSON is malformed"),
         ("silence_logit", -math.inf, "JSON is malformed"),
         ("training", [], "Expected `object`, got `array` - at .*training"),
@@ -139,7 +139,7 @@ def test_a_config_made_by_hand_is_checked_too():
     config = tiny_config(tiny_network())
     for overrides, complaint in (
         ({"features": "paper"}, "num_features is 18"),
-        ({"silence_logit": math.nan}, "silence_logit must be from -100 to 100, not nan"),
+        ({"silence_logit": math.nan}, "silence_logit must be a number from -100 to 100, not nan"),
         ({"network": replace(config.network, num_outputs=3)}, "num_outputs must be 1 or 2"),
     ):
         with pytest.raises(ValueError, match=complaint):
