@@ -66,19 +66,24 @@ class ExtendedFeatures(FeatureExtractor):
         """What every robot's network sees now; must see every window."""
         remember(self._memory, views)
         buffers, (num_missions, num_robots) = views.buffers, views.buffers.shape
+        believed_m, range_m = buffers.position_m, self._mission.range_m
         node = np.empty((num_missions, num_robots, num_robots), dtype=NODE)
         may_address = np.empty(node.shape, dtype=np.bool_)
         _fill(
             buffers.timestamp,
-            buffers.position_m,
+            believed_m,
             buffers.last_attempt,
             views.now,
             self._memory,
-            self._mission.range_m,
+            range_m,
             node,
             may_address,
         )
-        self._write_turns(views, node)
+        is_known = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
+        for field, ranges in TURN_RANGES.items():
+            write_turns(believed_m, is_known, views.now, ranges * range_m, node[field])
+        now, threshold = views.now.astype(np.int64), from_db(self._mission.sinr_threshold_db)
+        write_joined(believed_m, is_known, now, range_m, threshold, node["has_joined"])
         rows = (num_missions * num_robots, num_robots)
         return Graphs(
             node=node.view(np.float32).reshape(*rows, len(FEATURES)),
@@ -86,15 +91,6 @@ class ExtendedFeatures(FeatureExtractor):
             may_address=may_address.reshape(rows),
             has_turn=np.diagonal(node["has_joined"], axis1=1, axis2=2).reshape(-1) > 0.0,
         )
-
-    def _write_turns(self, views: LocalViews, node: Shaped[np.ndarray, "B N N"]) -> None:
-        """Whose turn it is, by distance and by the rule of spatial TDMA."""
-        believed_m, range_m = views.buffers.position_m, self._mission.range_m
-        is_known = views.buffers.is_known | np.eye(views.num_robots, dtype=np.bool_)
-        for field, ranges in TURN_RANGES.items():
-            write_turns(believed_m, is_known, views.now, ranges * range_m, node[field])
-        now, threshold = views.now.astype(np.int64), from_db(self._mission.sinr_threshold_db)
-        write_joined(believed_m, is_known, now, range_m, threshold, node["has_joined"])
 
 
 class LocalFeatures(ExtendedFeatures):

@@ -36,7 +36,7 @@ class ActiveRolloutBuffer(DictRolloutBuffer):
         if not self.generator_ready:
             for name, rows in self.observations.items():
                 self.observations[name] = self.swap_and_flatten(rows)
-            for name in FLAT:
+            for name in ("actions", "values", "log_probs", "advantages", "returns"):
                 setattr(self, name, self.swap_and_flatten(getattr(self, name)))
             self.generator_ready = True
         is_active = self.actions[:, 0] != self.observations["owner"][:, 0]
@@ -46,6 +46,3 @@ class ActiveRolloutBuffer(DictRolloutBuffer):
         for rows in np.array_split(kept, num_batches):
             if len(rows):
                 yield self._get_samples(rows)
-
-
-FLAT = ("actions", "values", "log_probs", "advantages", "returns")

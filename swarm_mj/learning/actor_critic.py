@@ -92,9 +92,7 @@ class GnnActorCritic(ActorCriticPolicy):
         return logits, values.gather(1, owner).squeeze(1)
 
     def forward(
-        self,
-        obs: PyTorchObs,
-        deterministic: bool = False,
+        self, obs: PyTorchObs, deterministic: bool = False
     ) -> tuple[Int[Tensor, "E *robots"], Float[Tensor, "E"], Float[Tensor, "E"]]:
         """Actions, values and the actions' log-probabilities."""
         logits, value = self.logits_and_value(obs)

@@ -69,8 +69,8 @@ class TrainingCallback(BaseCallback):
     ) -> None:
         super().__init__()
         self._ppo, self._run, self._training, self._limits = model, run, run.training, run.limits
-        self._folder, self._progress = folder, progress
-        self._rng, self._listener = rng, listener
+        self._folder, self._progress, self._rng, self._listener = folder, progress, rng, listener
+        self._env = missions_of(model)
         self._counted_s = time.monotonic()  # up to here, time is in the progress
         self._saved_s = -np.inf
         self._aoi = float("nan")
@@ -79,8 +79,7 @@ class TrainingCallback(BaseCallback):
     @property
     def decisions(self) -> int:
         """Team decisions in all sessions so far."""
-        env = missions_of(self._ppo)
-        return self._ppo.num_timesteps // env.num_envs * env.num_teams
+        return self._ppo.num_timesteps // self._env.num_envs * self._env.num_teams
 
     @property
     def minutes(self) -> float:
@@ -95,8 +94,7 @@ class TrainingCallback(BaseCallback):
             raise Stopped
 
     def _on_step(self) -> bool:
-        env = missions_of(self._ppo)
-        costs = [transition.costs for transition in env.transitions]
+        costs = [transition.costs for transition in self._env.transitions]
         self._progress.since_evaluation.add(costs)
         self._aoi = float(np.mean([each.age_windows.mean() for each in costs]))
         self._tell()

@@ -42,16 +42,13 @@ def save(
         "num_updates": model._n_updates,
         "episode_starts": torch.tensor(model._last_episode_starts),
         "histories": [
-            {
-                "seeds": batch.history.seeds,
-                "last_window": batch.history.last_window,
-                "recipients": torch.tensor(np.array(batch.history.recipients, dtype=np.int16)),
-            }
+            vars(batch.history)
+            | {"recipients": torch.tensor(np.array(batch.history.recipients, dtype=np.int16))}
             for batch in missions_of(model).batches
         ],
         "reward_normaliser": _normaliser_state(model),
         "torch_rng": torch.get_rng_state(),
-        "cuda_rng": torch.cuda.get_rng_state(model.device) if _is_on_cuda(model) else None,
+        "cuda_rng": torch.cuda.get_rng_state(model.device) if model.device.type == "cuda" else None,
         "numpy_rng": [name, np.asarray(keys).tolist(), *rest],
         "seeds_rng": rng.bit_generator.state,
         "progress": asdict(progress),
@@ -126,17 +123,13 @@ def _restore(state: dict[str, Any], model: PPO, rng: np.random.Generator) -> Pro
     model._last_episode_starts = state["episode_starts"].numpy()
     _restore_normaliser(model, state["reward_normaliser"])
     torch.set_rng_state(state["torch_rng"])
-    if state["cuda_rng"] is not None and _is_on_cuda(model):
+    if state["cuda_rng"] is not None and model.device.type == "cuda":
         torch.cuda.set_rng_state(state["cuda_rng"], model.device)
     np.random.set_state(tuple(state["numpy_rng"]))  # noqa: NPY002 - as in `save`
     rng.bit_generator.state = state["seeds_rng"]
     progress = state["progress"]
     accumulator = Accumulator(**progress["since_evaluation"])
     return Progress(**progress | {"since_evaluation": accumulator})
-
-
-def _is_on_cuda(model: PPO) -> bool:
-    return model.device.type == "cuda"
 
 
 def _normaliser_state(model: PPO) -> dict[str, Any] | None:

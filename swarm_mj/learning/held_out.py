@@ -51,10 +51,7 @@ def evaluate(
 ) -> HeldOut:
     """What the held-out missions cost; draws nothing from the generators of the training.
 
-    Args:
-        training: Names the missions.
-        network: That acts, on any device.
-        on_window: Told after every window what share is flown; what it raises ends the evaluation.
+    `on_window` is told after every window what share is flown; what it raises ends the evaluation.
     """
     costs = _fly(training, network, on_window)
     age = [np.array([window.age_windows for window in windows]) for windows in costs]

@@ -104,8 +104,8 @@ class MissionBatch:
         return self._extractor.graphs(self._swarm.views)
 
     def _draw_seeds(self) -> list[int]:
-        drawn = self._rng.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED, size=self.num_missions)
-        return [int(seed) for seed in drawn]
+        size = self.num_missions
+        return self._rng.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED, size=size).tolist()
 
 
 def make_batches(

@@ -6,7 +6,6 @@ import shutil
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 from swarm_mj.io.atomic import atomic_directory, atomic_write, present_folder, write_json
 from swarm_mj.learning.settings import Training, from_json
@@ -114,7 +113,20 @@ def read_run(folder: Path) -> Run:
     if not path.is_file():
         raise ValueError(f"{folder} holds no run to go on with; to begin one, leave out --resume")
     try:
-        return _run_of(json.loads(path.read_bytes()))
+        document = json.loads(path.read_bytes())
+        if not isinstance(document, dict) or document.get("format") != FORMAT:
+            raise ValueError(f'the format must be "{FORMAT}"')
+        if document["format_version"] != FORMAT_VERSION:
+            raise ValueError(
+                f"the format_version is {document['format_version']!r:.40}, and this swarm_mj "
+                f"reads {FORMAT_VERSION}; resume with the version that wrote it"
+            )
+        return Run(
+            training=from_json(document["training"]),
+            limits=Limits(**document["limits"]),
+            command=str(document["command"]),
+            init=None if document["init"] is None else Path(document["init"]),
+        )
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise ValueError(f"settings {path} are damaged, or no run's: {error}") from error
 
@@ -169,19 +181,3 @@ def write_curve(path: Path, curve: list[dict[str, float]]) -> None:
         writer = csv.DictWriter(file, names)
         writer.writeheader()
         writer.writerows(curve)
-
-
-def _run_of(document: Any) -> Run:  # noqa: ANN401 - anything in JSON
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise ValueError(f'the format must be "{FORMAT}"')
-    if document["format_version"] != FORMAT_VERSION:
-        raise ValueError(
-            f"the format_version is {document['format_version']!r:.40}, and this swarm_mj reads "
-            f"{FORMAT_VERSION}; resume with the version that wrote it"
-        )
-    return Run(
-        training=from_json(document["training"]),
-        limits=Limits(**document["limits"]),
-        command=str(document["command"]),
-        init=None if document["init"] is None else Path(document["init"]),
-    )

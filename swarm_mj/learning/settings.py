@@ -96,9 +96,7 @@ class Training:
     shares_trunk: bool = True  # whether values come from its last stage but one number
     silence_logit: float = 7.0  # what silence has ahead, but in a robot's own turn
     reward: Reward = setting(
-        "aoi",
-        "the cost to lower; velocity-variance needs --arm team",
-        choices=get_args(Reward),
+        "aoi", "the cost to lower; velocity-variance needs --arm team", choices=get_args(Reward)
     )
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)
@@ -137,13 +135,9 @@ class Training:
 
 
 def usual_settings(arm: str, mission: Mission, robots: Sequence[int], seed: int = 0) -> Training:
-    """The usual settings of a credit assignment; `dataclasses.replace` changes some.
+    """The usual settings of credit per `robot` or per `team`, the paper's way (III-C).
 
-    Args:
-        arm: `robot`, or `team`, the paper's way (III-C).
-        mission: What the missions have in common; its preset says whose way, where they differ.
-        robots: Sizes of the teams.
-        seed: Of all draws.
+    The mission's preset says whose way, where they differ; `dataclasses.replace` changes some.
 
     Raises:
         ValueError: A value is unknown or outside its range.

@@ -58,16 +58,15 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
         rng,
     )
     ppo = training.ppo
-    env: VecEnv = (
-        RobotEnv(batches) if training.arm == "robot" else TeamEnv(batches, training.reward)
-    )
+    is_robot = training.arm == "robot"
+    env: VecEnv = RobotEnv(batches) if is_robot else TeamEnv(batches, training.reward)
     batch_size = _batch_size(training, env.num_envs)
     if training.reward == "velocity-variance":  # as in the authors' code
         env = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=ppo.discount)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "You have specified a mini-batch size")  # one is smaller
         model = PPO(
-            GnnActorCritic if training.arm == "robot" else TeamActorCritic,
+            GnnActorCritic if is_robot else TeamActorCritic,
             env,
             learning_rate=ppo.learning_rate,
             n_steps=ppo.num_steps,

@@ -33,14 +33,10 @@ class LearnedPolicy(DecentralisedPolicy):
         silence_logit: float = 0.0,
         is_deterministic: bool = False,
     ) -> None:
-        """Takes the network as it is, live: later changes of its weights count.
+        """Takes the network as it is, live, on any device: later changes of its weights count.
 
-        Args:
-            network: Of one or two numbers per node, as `recipient_logits` takes them, on any
-                device.
-            extractor: Makes the graphs it was trained on.
-            silence_logit: Added to silence, but in a robot's own turn.
-            is_deterministic: Take the most probable recipient instead of a draw.
+        The extractor makes the graphs that it was trained on; the logit is added to silence, but in
+        a robot's own turn.
         """
         self._network = network
         self._extractor = extractor

@@ -18,7 +18,6 @@ from swarm_mj.policies.model_card import model_card
 from swarm_mj.policies.policy_config import PolicyConfig, from_json, to_json
 
 WEIGHTS, CONFIG, CARD = "model.safetensors", "config.json", "README.md"
-CONTENTS = {WEIGHTS, CONFIG, CARD}
 MAX_BYTES = {WEIGHTS: 64_000_000, CONFIG: 1_000_000}
 WAY_OUT = "copy it again, or make one with `swarm-mj train`"
 
@@ -55,10 +54,8 @@ def save_policy(
 def load_policy(folder: Path, mission: Mission, *, is_deterministic: bool = False) -> LearnedPolicy:
     """A policy, ready to fly a mission, which may be of another kind than it was trained on.
 
-    Args:
-        folder: Where `save_policy` wrote it.
-        mission: Whose area, duration and range normalise what the robots see.
-        is_deterministic: Take the most probable recipient instead of a draw.
+    The mission's area, duration and range normalise what the robots see. A deterministic policy
+    takes the most probable recipient instead of a draw.
 
     Raises:
         ValueError: There is none, or it is damaged, foreign, oversized or of a newer version.
@@ -144,5 +141,5 @@ def _check_replaceable(folder: Path) -> None:
     """Raises ValueError if something else than a policy would be lost."""
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"policy {folder} is a file; name another place, or remove it")
-    for name in sorted({path.name for path in folder.glob("*")} - CONTENTS):
+    for name in sorted({path.name for path in folder.glob("*")} - {WEIGHTS, CONFIG, CARD}):
         raise ValueError(f"{folder} holds {name}, which is no policy's; name another directory")
