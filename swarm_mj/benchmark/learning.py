@@ -1,4 +1,4 @@
-"""How fast the paper's network decides, on its own and for a team, and how fast both arms train."""
+"""How fast the paper's network decides, on its own and for a team, and how fast it trains."""
 
 import time
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ SHAPE = GnnShape(num_features=len(PaperFeatures.names))  # the paper's
 def learning_rows(
     *, num_robots: int = NUM_ROBOTS, threads: int = 1, seconds: float = 2.0
 ) -> Iterator[Row]:
-    """Times the networks and the arms, in team decisions per second; no weights are kept.
+    """Times networks and training, in team decisions per second; no weights are kept.
 
     Args:
         num_robots: N.
@@ -81,7 +81,7 @@ def _training_per_s(arm: str, mission: Mission, threads: int, seconds: float) ->
     """Team decisions over whole rollouts and the optimisation after each, the first left out."""
     settings = usual_settings(arm, mission, (mission.num_robots,))
     ppo, share = settings.ppo, settings.groups
-    # One group of missions, and minibatches of about the arm's own size, so that it ends in time.
+    # One group of missions, and minibatches of about the usual size, so that it ends in time.
     fewer = replace(
         settings,
         threads=threads,

@@ -60,6 +60,7 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
     ppo = training.ppo
     is_robot = training.arm == "robot"
     env: VecEnv = RobotEnv(batches) if is_robot else TeamEnv(batches, training.reward)
+    buffer = ActiveRolloutBuffer if training.drops_silence else DictRolloutBuffer
     batch_size = _batch_size(training, env.num_envs)
     if training.reward == "velocity-variance":  # as in the authors' code
         env = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=ppo.discount)
@@ -81,9 +82,7 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
             max_grad_norm=ppo.max_gradient_norm,
             seed=training.seed % 2**32,
             normalize_advantage=not training.drops_silence,
-            rollout_buffer_class=ActiveRolloutBuffer
-            if training.drops_silence
-            else DictRolloutBuffer,
+            rollout_buffer_class=buffer,
             policy_kwargs=_policy_settings(training),
         )
     model.lr_schedule = lambda _: decayed_rate(ppo, model._n_updates)  # passes so far
