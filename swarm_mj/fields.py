@@ -27,9 +27,6 @@ def setting(default: Any = MISSING, help: str = "", **metadata: Any) -> Any:  # 
             `low` and `high`, the range; `choices`; and what `cli.options` shows: `group`, the
             heading it stands under; `metavar`; `shown`, the default in words; `is_positional`, for
             an option without a flag; `convert`, what makes a value of what was typed.
-
-    Returns:
-        The field.
     """
     return field(default=default, metadata=metadata | ({"help": help} if help else {}))
 
@@ -64,12 +61,15 @@ def kind_of(spec: Field[Any]) -> Any:  # noqa: ANN401 - a type
 
 def range_of(spec: Field[Any]) -> str:
     """A field's allowed numbers and their unit, in words."""
-    allowed = spec.metadata
-    ends = (
-        f"{end:g}" if isinstance(end, float) else str(end)
-        for end in (allowed["low"], allowed["high"])
-    )
-    return " to ".join(ends) + (f" [{allowed['unit']}]" if allowed.get("unit") else "")
+    ends = " to ".join(as_typed(spec.metadata[end]) for end in ("low", "high"))
+    return f"{ends} [{spec.metadata['unit']}]" if "unit" in spec.metadata else ends
+
+
+def as_typed(value: object) -> str:
+    """A setting's value as it is typed."""
+    if isinstance(value, tuple):
+        return " ".join(map(as_typed, value))
+    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
 def _check_value(spec: Field[Any], value: Any) -> None:  # noqa: ANN401 - any field's value

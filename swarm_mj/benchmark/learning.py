@@ -29,10 +29,7 @@ def learning_rows(
 ) -> Iterator[Row]:
     """Times networks and training, in team decisions per second; no weights are kept.
 
-    Args:
-        num_robots: N.
-        threads: torch's.
-        seconds: About how long each measurement takes [s].
+    The threads are torch's; each measurement takes about so many seconds.
     """
     torch.set_num_threads(threads)
     mission = paper("stationary", num_robots=num_robots)

@@ -51,12 +51,9 @@ class Row(NamedTuple):
 def simulation_rows(
     num_missions: int, *, num_threads: int = 1, seconds: float = 2.0
 ) -> Iterator[Row]:
-    """Times random walks of 40 robots with round robin, per window of one mission.
+    """Times random walks of 40 robots with round robin, B side by side, per window of one mission.
 
-    Args:
-        num_missions: B, side by side.
-        num_threads: MuJoCo's own.
-        seconds: About how long each measurement takes [s].
+    The threads are MuJoCo's own; each measurement takes about so many seconds.
     """
     swarm = Swarm(MISSION, range(num_missions), num_threads=num_threads)
     policy = RoundRobin()
@@ -86,10 +83,8 @@ def simulation_rows(
 def evaluation_rows(num_episodes: int, *, num_jobs: int = 2, seconds: float = 2.0) -> Iterator[Row]:
     """Times an evaluation of the paper's baselines, the oracle, and a robot's plans of an epoch.
 
-    Args:
-        num_episodes: Missions of each baseline; the oracle flies at most `ORACLE_EPISODES`.
-        num_jobs: Processes that share the baselines' missions; starting them counts.
-        seconds: About how long the other measurements take, four times over [s].
+    The jobs share the baselines' missions, and starting them counts; the oracle flies at most
+    `ORACLE_EPISODES`. The other measurements take about so many seconds, four times over.
     """
     for policy in (*BASELINES, "greedy-oracle"):  # compiles, if it never has
         _flying_s(policy, num_episodes=1, mission=replace(MISSION, num_windows=1))

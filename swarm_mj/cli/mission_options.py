@@ -6,7 +6,8 @@ from functools import partial
 from itertools import product
 from typing import Any
 
-from swarm_mj.cli.options import add_option, as_typed, flag_of, nested
+from swarm_mj.cli.options import add_option, flag_of, nested
+from swarm_mj.fields import as_typed
 from swarm_mj.mission import PRESETS, Mission, paper
 
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]

@@ -11,10 +11,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar, get_origin
 
-from swarm_mj.fields import check, kind_of, range_of
+from swarm_mj.cli import BAD_INPUT
+from swarm_mj.fields import as_typed, check, kind_of, range_of
 
 Options = TypeVar("Options")
-BAD_INPUT = 2
 MANY = 10**9  # from here on, the end of a range is only there to catch slips
 METAVARS: dict[Any, str] = {int: "N", float: "X", str: "NAME", Path: "FILE"}
 
@@ -137,13 +137,6 @@ def flag_of(spec: Field[Any]) -> str:
     """The flag of a field: `--windows` of `num_windows`."""
     name = spec.name.removeprefix("num_").removeprefix("is_")
     return "--" + name.replace("_", "-")
-
-
-def as_typed(value: object) -> str:
-    """A setting's value as it is typed."""
-    if isinstance(value, tuple):
-        return " ".join(map(as_typed, value))
-    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
 def _shown_default(spec: Field[Any]) -> str:

@@ -52,7 +52,7 @@ class WorkBar:
         """So much more is done."""
         self._bar.advance(self._id, done)
 
-    def move_to(self, completed: float) -> None:
+    def move_to(self, completed: float | int) -> None:
         """So much is done in all."""
         self._bar.update(self._id, completed=completed)
 

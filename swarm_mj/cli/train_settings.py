@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.cli.mission_options import make_mission
-from swarm_mj.cli.options import add_option, as_typed, flag_of
+from swarm_mj.cli.options import add_option, flag_of
+from swarm_mj.fields import as_typed
 from swarm_mj.gnn.feature_sets import num_features
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
