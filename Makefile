@@ -2,9 +2,10 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: help setup fly bench check test attack format figures picture clean
+.PHONY: help setup fly bench check test attack lock audit format figures picture clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
@@ -15,17 +16,21 @@ help:
 	@echo "make figures remake the paper's figures; evaluates what training/results/ lacks"
 	@echo "make picture remake the README's picture (needs a Vulkan driver)"
 	@echo "make setup   create .venv from pinned constraints; PYTHON=python3.12 chooses another"
+	@echo "make lock    write tools/hashes.txt anew from the pinned constraints"
+	@echo "make audit   list the licences of what is installed, and its known vulnerabilities"
 	@echo "make clean   remove .venv, replays and caches"
 
 setup: $(READY)
 
-$(READY): pyproject.toml tools/constraints.txt
+# Every wheel must have the hash it was tested with, but torch's, which differ from index to index: a
+# CPU build on one, CUDA's gigabytes on another.
+$(READY): pyproject.toml tools/constraints.txt tools/hashes.txt
 	@$(PYTHON) -c "import sys; sys.exit(0 if sys.version_info >= (3, 11) else \
 	  f'swarm_mj needs Python 3.11 or newer, not {sys.version.split()[0]}; try make PYTHON=python3.11')"
 	@echo "Setting up .venv (a few minutes and 2.7 GB, once) ..."
 	@$(PYTHON) -m venv .venv
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-	  --constraint tools/constraints.txt --editable '.[dev]'
+	@$(PIP) --no-deps --require-hashes --requirement tools/hashes.txt
+	@$(PIP) --constraint tools/constraints.txt --no-build-isolation --editable '.[dev]'
 	@touch $@
 
 fly: setup
@@ -44,6 +49,27 @@ test: setup
 
 attack: setup
 	SWARM_MJ_TRIES=20 $(BIN)/python -m pytest --numprocesses 2 tests/faults $(ARGS)
+
+# What torch alone needs comes with it.
+OF_TORCH := torch triton cuda-bindings cuda-pathfinder cuda-toolkit nvidia-cublas nvidia-cuda-cupti \
+  nvidia-cuda-nvrtc nvidia-cuda-runtime nvidia-cudnn-cu13 nvidia-cufft nvidia-cufile nvidia-curand \
+  nvidia-cusolver nvidia-cusparse nvidia-cusparselt-cu13 nvidia-nccl-cu13 nvidia-nvjitlink \
+  nvidia-nvshmem-cu13 nvidia-nvtx
+
+lock: .venv/audit/ready
+	.venv/audit/bin/uv pip compile pyproject.toml --extra dev --constraint tools/constraints.txt \
+	  --universal --python-version 3.11 --generate-hashes --no-annotate --no-header --quiet \
+	  $(OF_TORCH:%=--no-emit-package %) --output-file tools/hashes.txt
+
+audit: setup .venv/audit/ready
+	.venv/audit/bin/pip-licenses --python $(BIN)/python --order license
+	.venv/audit/bin/pip-audit --require-hashes --disable-pip --strict --requirement tools/hashes.txt
+
+.venv/audit/ready: Makefile
+	@$(PYTHON) -m venv .venv/audit
+	@.venv/audit/bin/python -m pip install --quiet --disable-pip-version-check \
+	  pip-audit==2.10.1 pip-licenses==5.5.5 uv==0.13.9
+	@touch $@
 
 format: setup
 	$(BIN)/ruff format .
