@@ -1,14 +1,13 @@
 """What a policy's `config.json` says: how to make its network, and where it comes from."""
 
 import json
-from dataclasses import asdict, dataclass, fields
-from typing import Annotated, Any, Literal
-
-import msgspec
+from dataclasses import asdict, dataclass
+from typing import Any
 
 from swarm_mj.fields import check, setting
 from swarm_mj.gnn.feature_sets import num_features
 from swarm_mj.gnn.shape import GnnShape
+from swarm_mj.io.reading import read_document
 
 FORMAT = "swarm_mj policy"
 FORMAT_VERSION = 1
@@ -64,38 +63,4 @@ def from_json(text: str | bytes) -> PolicyConfig:
         ValueError: It is no JSON, not this format, of a newer version, or a value is unknown,
             missing, of another kind or out of range.
     """
-    try:
-        version = msgspec.json.decode(text, type=_Header).format_version
-        if version > FORMAT_VERSION:
-            raise ValueError(
-                f"its format_version is {version}, and this swarm_mj reads {FORMAT_VERSION}; "
-                "update it"
-            )
-        document = msgspec.json.decode(text, type=_Document)
-        return msgspec.convert(document, PolicyConfig, from_attributes=True)
-    except RecursionError as error:
-        raise ValueError("it is nested too deep") from error
-    except msgspec.DecodeError as error:
-        raise ValueError(" ".join(str(error)[:160].split())) from error
-
-
-class _Header(msgspec.Struct):
-    """What files of any version begin with."""
-
-    format: Literal["swarm_mj policy"]  # FORMAT
-    format_version: Annotated[int, msgspec.Meta(ge=1)]
-
-
-# All keys are needed, and no others are known, whatever has a default in Python.
-_Network: Any = msgspec.defstruct(
-    "_Network", [(spec.name, spec.type) for spec in fields(GnnShape)], forbid_unknown_fields=True
-)
-_Document: Any = msgspec.defstruct(
-    "_Document",
-    [
-        (spec.name, _Network if spec.type is GnnShape else spec.type)
-        for spec in fields(PolicyConfig)
-    ],
-    bases=(_Header,),
-    forbid_unknown_fields=True,
-)
+    return read_document(text, FORMAT, FORMAT_VERSION, PolicyConfig)

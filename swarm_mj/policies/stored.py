@@ -12,6 +12,7 @@ from swarm_mj.gnn.fast import FastAggregationGnn
 from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.io.atomic import atomic_directory, present_folder
+from swarm_mj.io.reading import check_size, read_file
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn import LearnedPolicy
 from swarm_mj.policies.model_card import model_card
@@ -44,7 +45,7 @@ def save_policy(
         CARD: (model_card(config) if card is None else card).encode(),
     }
     for name in MAX_BYTES:
-        _check_size(name, len(contents[name]))
+        check_size(name, len(contents[name]), MAX_BYTES[name])
     _check_replaceable(folder)
     with atomic_directory(folder) as part:
         for name, content in contents.items():
@@ -92,17 +93,7 @@ def read_policy(folder: Path) -> tuple[AggregationGnn, PolicyConfig]:
 
 
 def _read(folder: Path, name: str) -> bytes:
-    """A file's bytes; raises ValueError if it is missing or oversized."""
-    path = folder / name
-    if not path.is_file():
-        raise ValueError("there is no such file")
-    _check_size(name, path.stat().st_size)
-    return path.read_bytes()
-
-
-def _check_size(name: str, size: int) -> None:
-    if size > MAX_BYTES[name]:
-        raise ValueError(f"{name} may have up to {MAX_BYTES[name]} bytes, not {size}")
+    return read_file(folder / name, "file", MAX_BYTES[name], folder=folder)
 
 
 def _network(config: PolicyConfig, data: bytes) -> AggregationGnn:

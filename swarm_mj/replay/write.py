@@ -7,6 +7,7 @@ import rerun as rr
 from swarm_mj.io.atomic import atomic_write
 from swarm_mj.mission import Mission
 from swarm_mj.replay import arena, charts, palette
+from swarm_mj.replay.digest import add_digest
 from swarm_mj.replay.frame import frame
 from swarm_mj.replay.layout import layout
 from swarm_mj.replay.legend import draw_legend
@@ -32,6 +33,7 @@ def write_replay(log: Log, mission: Mission, config: dict[str, object], path: Pa
     try:
         with atomic_write(path) as part:
             _write(log, mission, config, part, name=path.stem)
+            add_digest(part)
     except RuntimeError as error:  # rerun's, when its writer fails
         raise OSError(f"replay {path} could not be written: {error}") from error
 

@@ -133,7 +133,7 @@ def test_a_file(policy):
 @pytest.mark.parametrize("name", [CONFIG, WEIGHTS])
 def test_a_missing_file(policy, name):
     (policy / name).unlink()
-    refused(policy, f"{name}: there is no such file; .* or make one with `swarm-mj train`")
+    refused(policy, f"{name}: there is no file .* or make one with `swarm-mj train`")
 
 
 @pytest.mark.parametrize(("name", "limit"), [(CONFIG, 1_000_000), (WEIGHTS, 64_000_000)])
@@ -141,13 +141,14 @@ def test_an_oversized_file(policy, name, limit):
     """Sparse: it would take long to read, and is not read."""
     with (policy / name).open("r+b") as file:
         file.truncate(10**13 if name == WEIGHTS else limit + 1)
-    refused(policy, f"{name} may have up to {limit} bytes, not 1")
+    refused(policy, f"{name}: file .*{name} may have up to {limit} bytes, not 1")
 
 
 def test_what_is_no_config(policy):
-    (policy / CONFIG).write_text('{"format": "another"}')
+    (policy / CONFIG).write_text('{"format": "another", "format_version": 1}')
     refused(
-        policy, f"{CONFIG}: Invalid enum value 'another' - at .*format`; copy it again, or make"
+        policy,
+        f'{CONFIG}: its format must be "swarm_mj policy", not .another.; copy it again, or make',
     )
 
 

@@ -1,0 +1,130 @@
+"""The one way of reading what others wrote: nothing is believed that was not checked.
+
+Files are regular, and no larger than expected; JSON has the keys of a dataclass, all of them and no
+others, its numbers are finite, and it is not nested without end. Ranges are the dataclass's own.
+"""
+
+import os
+import stat
+from collections.abc import Iterable
+from dataclasses import fields, is_dataclass
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, BinaryIO, TypeVar
+
+import msgspec
+
+Kind = TypeVar("Kind")
+
+MOST_LEVELS = 20  # lists and objects within each other
+MOST_WORDS = 160  # characters of what msgspec says
+
+
+def open_file(path: Path, what: str, *, folder: Path | None = None) -> BinaryIO:
+    """Opens a regular file, at once: pipes and devices would be waited for, or have no end.
+
+    Args:
+        path: The file; it may be a link.
+        what: It is called in a message.
+        folder: Where it must be, if it must be somewhere: no link leads out of it.
+
+    Raises:
+        ValueError: There is no such file, or it cannot be read.
+    """
+    try:
+        if folder is not None and not path.resolve().is_relative_to(folder.resolve()):
+            raise ValueError(f"{what} {path} is a link that leads out of {folder}; copy the file")
+        number = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    except FileNotFoundError:
+        raise ValueError(f"there is no {what} {path}") from None
+    except (OSError, RuntimeError) as error:  # RuntimeError: Python 3.11 and 3.12, of link loops
+        reason = getattr(error, "strerror", None) or "its links lead in a circle"
+        raise ValueError(f"{what} {path} cannot be read: {reason}") from error
+    if not stat.S_ISREG(os.fstat(number).st_mode):
+        os.close(number)
+        raise ValueError(f"{what} {path} is a folder, a pipe or a device; name a file")
+    return os.fdopen(number, "rb")
+
+
+def read_file(path: Path, what: str, most_bytes: int, *, folder: Path | None = None) -> bytes:
+    """All that a file holds; see `open_file`.
+
+    Raises:
+        ValueError: It cannot be read, or holds more than that.
+        OSError: The disk fails.
+    """
+    with open_file(path, what, folder=folder) as file:
+        size = os.fstat(file.fileno()).st_size
+        content = b"" if size > most_bytes else file.read(most_bytes + 1)
+    check_size(f"{what} {path}", max(size, len(content)), most_bytes)
+    return content
+
+
+def check_size(what: str, size: int, most_bytes: int) -> None:
+    """Raises ValueError for a file that is too large to be read, or to be written."""
+    if size > most_bytes:
+        raise ValueError(f"{what} may have up to {most_bytes} bytes, not {size}")
+
+
+def read_json(text: bytes | str, kind: type[Kind]) -> Kind:
+    """What a text of JSON says, as a dataclass or another type that msgspec knows.
+
+    Raises:
+        ValueError: It is no JSON, is nested too deep, or is not of the kind.
+    """
+    return _decoded(text, kind, bases=())
+
+
+def read_document(text: bytes | str, name: str, version: int, kind: type[Kind]) -> Kind:
+    """As `read_json`, of a JSON object that begins with its `format` and `format_version`.
+
+    Raises:
+        ValueError: It has another format, or a newer version of it; else as `read_json`.
+    """
+    header = _decoded(text, _Header, bases=())
+    if header.format != name:
+        raise ValueError(f'its format must be "{name}", not {header.format!r:.40}')
+    if header.format_version > version:
+        raise ValueError(
+            f"its format_version is {header.format_version}, and this swarm_mj reads {version}; "
+            "update it"
+        )
+    return _decoded(text, kind, bases=(_Header,))
+
+
+class _Header(msgspec.Struct):
+    """What documents of any version begin with."""
+
+    format: str
+    format_version: Annotated[int, msgspec.Meta(ge=1)]
+
+
+def _decoded(text: bytes | str, kind: type[Kind], bases: tuple[type, ...]) -> Kind:
+    try:
+        found = msgspec.json.decode(text, type=_strict(kind, bases))
+        _check_levels([msgspec.json.decode(text)])
+        return msgspec.convert(found, kind, from_attributes=True)
+    except RecursionError as error:
+        raise ValueError("it is nested too deep") from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise ValueError(" ".join(str(error)[:MOST_WORDS].split())) from error
+
+
+@cache
+def _strict(kind: Any, bases: tuple[type, ...] = ()) -> Any:  # noqa: ANN401 - any type
+    """Like a dataclass, but all keys are needed and no others known; other types are themselves."""
+    if not (isinstance(kind, type) and is_dataclass(kind)):
+        return kind
+    keys = [(spec.name, _strict(spec.type)) for spec in fields(kind)]
+    return msgspec.defstruct(
+        f"_{kind.__name__}", keys, bases=bases or None, forbid_unknown_fields=True
+    )
+
+
+def _check_levels(values: Iterable[Any], num_levels: int = 0) -> None:
+    """Raises RecursionError if lists and objects are nested too deep."""
+    if num_levels > MOST_LEVELS:
+        raise RecursionError
+    for value in values:
+        if isinstance(value, list | dict):
+            _check_levels(value.values() if isinstance(value, dict) else value, num_levels + 1)
