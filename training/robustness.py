@@ -1,8 +1,8 @@
-"""How the shipped policy fares where it was not trained, beside TDMA and the oracle.
+"""How the shipped policy fares where it was not trained, beside TDMA, the planner and the oracle.
 
     python training/robustness.py
 
-Teams of 10 to 200, ranges and speeds that the practice did not have, robots that are switched off
+Teams of 10 to 200, ranges and speeds that the training did not have, robots that are switched off
 half-way, the authors' preset, and contact physics. One file a question under
 training/results/robustness; what is there is kept, `--force` makes all anew.
 """

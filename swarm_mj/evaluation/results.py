@@ -63,8 +63,8 @@ class Result:
     heard_ratio: float | None = None  # of broadcasts: decoded by at least one robot
     hearers_per_packet: float | None = None  # robots that decoded a broadcast, on average
     hops_mean: float  # depth of the parent trees, over windows and missions
-    complete_window_median: float | None  # over the missions in which everyone heard of everyone
-    complete_share: float  # of these missions
+    complete_window_median: float | None  # over all missions; None if half never were
+    complete_share: float  # of missions in which everyone heard of everyone
 
     baseline: str  # differences are this policy's minus the baseline's, on the same missions
     aoi_difference_mean: float | None

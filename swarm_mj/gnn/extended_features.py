@@ -65,7 +65,8 @@ class ExtendedFeatures(FeatureExtractor):
     def graphs(self, views: LocalViews) -> Graphs:
         """What every robot's network sees now; must see every window."""
         remember(self._memory, views)
-        buffers, (num_missions, num_robots) = views.buffers, views.buffers.shape
+        buffers = views.buffers
+        num_missions, num_robots = buffers.shape
         believed_m, range_m = buffers.position_m, self._mission.range_m
         node = np.empty((num_missions, num_robots, num_robots), dtype=NODE)
         may_address = np.empty(node.shape, dtype=np.bool_)

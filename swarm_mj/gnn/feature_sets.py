@@ -20,11 +20,15 @@ def make_extractor(features: str, mission: Mission) -> FeatureExtractor:
     Raises:
         ValueError: Unknown name.
     """
-    if features not in FEATURE_SETS:
-        raise ValueError(f"features must be one of {', '.join(FEATURE_SETS)}, not {features!r}")
-    return FEATURE_SETS[features](mission)
+    return _feature_set(features)(mission)
 
 
 def num_features(features: str) -> int:
     """How many numbers a feature set has for each node; raises ValueError as `make_extractor`."""
-    return len(make_extractor(features, Mission()).names)
+    return len(_feature_set(features).names)
+
+
+def _feature_set(features: str) -> type[FeatureExtractor]:
+    if features not in FEATURE_SETS:
+        raise ValueError(f"features must be one of {', '.join(FEATURE_SETS)}, not {features!r}")
+    return FEATURE_SETS[features]

@@ -4,8 +4,9 @@ Index order: `[r, k]` is what the robot of row `r` knows about robot `k`; row `b
 of mission `b`.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Shaped
@@ -27,23 +28,21 @@ class Graphs:
     has_turn: Bool[np.ndarray, "R"]  # whether a common order lets the robot speak now
 
 
-@runtime_checkable
-class FeatureExtractor(Protocol):
+class FeatureExtractor(ABC):
     """Makes graphs of local views; one that remembers packets must see every window."""
 
     names: ClassVar[tuple[str, ...]]  # of the features, in order; there are F
-    _mission: Mission
 
     def __init__(self, mission: Mission) -> None:
         """Takes the mission whose area, duration and range normalise the features."""
         self._mission = mission
 
-    def start(self, num_missions: int, num_robots: int) -> None:
+    def start(self, num_missions: int, num_robots: int) -> None:  # noqa: B027 - most remember none
         """Forgets earlier missions, if it remembers any; now there are B of N robots."""
 
+    @abstractmethod
     def graphs(self, views: LocalViews) -> Graphs:
         """What every robot's network sees now, row [b N + i] from view [b, i] only."""
-        ...
 
 
 class PaperFeatures(FeatureExtractor):

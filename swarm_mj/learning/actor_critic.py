@@ -74,7 +74,7 @@ class GnnActorCritic(ActorCriticPolicy):
         may_address, has_turn = obs["may_address"].bool().flatten(0, -2), obs["has_turn"].bool()
         output = self.network(node, parent)
         if self._shares_trunk:
-            values, output = output[:, :, -1], output[:, :, :-1]
+            output, values = output[:, :, :-1], output[:, :, -1]  # the last number of each node
         else:
             values = self.value_network(node, parent)[:, :, 0]
         logits = recipient_logits(
@@ -132,7 +132,8 @@ class TeamActorCritic(GnnActorCritic):
     ) -> tuple[Float[Tensor, "E *robots N"], Float[Tensor, "E"]]:
         """What the decisions of each team are drawn from, and its value."""
         assert isinstance(obs, dict)
-        shape = num_teams, num_robots = obs["may_address"].shape[:2]
+        shape = obs["may_address"].shape[:2]
+        num_teams, num_robots = shape
         owner = torch.arange(num_robots, device=obs["node"].device).repeat(num_teams)
         logits, values = self._robots(obs, owner)
         counted = obs["is_robot"].bool()[:, :, None] & obs["is_robot"].bool()[:, None, :]

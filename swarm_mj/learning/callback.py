@@ -68,8 +68,14 @@ class TrainingCallback(BaseCallback):
         listener: Listener,
     ) -> None:
         super().__init__()
-        self._ppo, self._run, self._training, self._limits = model, run, run.training, run.limits
-        self._folder, self._progress, self._rng, self._listener = folder, progress, rng, listener
+        self._ppo = model
+        self._run = run
+        self._training = run.training
+        self._limits = run.limits
+        self._folder = folder
+        self._progress = progress
+        self._rng = rng
+        self._listener = listener
         self._env = missions_of(model)
         self._counted_s = time.monotonic()  # up to here, time is in the progress
         self._saved_s = -np.inf

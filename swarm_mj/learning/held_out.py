@@ -95,9 +95,12 @@ def _fly(
     training: Training, network: AggregationGnn, on_window: Callable[[float], None]
 ) -> list[list[WindowCosts]]:
     """What the held-out missions of each team size cost, window by window."""
-    seeds, sizes = range(HELD_OUT_SEED, HELD_OUT_SEED + training.held_out), []
-    for mission in (missions := held_out_missions(training)):
-        swarm, policy = Swarm(mission, seeds), held_out_policy(training, network, mission)
+    missions = held_out_missions(training)
+    seeds = range(HELD_OUT_SEED, HELD_OUT_SEED + training.held_out)
+    sizes = []
+    for mission in missions:
+        swarm = Swarm(mission, seeds)
+        policy = held_out_policy(training, network, mission)
         sizes.append([])
         for window in range(1, mission.num_windows + 1):
             sizes[-1].append(swarm.step(policy))

@@ -73,7 +73,9 @@ class MissionBatch:
         if with_credit:
             credit = credits_of(before, swarm.states.position_m, recipient, swarm.channel, now)
         self.history.recipients.append(recipient.astype(np.int16))
-        graphs, last_graphs, is_cut = self._extractor.graphs(swarm.views), None, False
+        graphs = self._extractor.graphs(swarm.views)
+        last_graphs = None
+        is_cut = False
         if swarm.now[0] >= self.history.last_window:
             is_cut = self.history.last_window < mission.num_windows
             last_graphs = graphs

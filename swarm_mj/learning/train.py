@@ -157,7 +157,8 @@ def train(run: Run, folder: Path, *, listener: Listener, is_resumed: bool = Fals
 
 def _begun(folder: Path, run: Run, model: PPO, rng: np.random.Generator) -> Progress:
     """Takes a run to its last checkpoint, or else to its beginning; then it can be resumed."""
-    kept, resumed = folder / CHECKPOINT, None
+    kept = folder / CHECKPOINT
+    resumed = None
     if kept.exists():
         resumed = checkpoint.load(kept, run.training, model, rng)
     remove_parts(folder)

@@ -18,9 +18,8 @@ WallHit = Literal["mirror", "clip"]
 HalfDuplex = Literal["strict", "eavesdroppers"]
 FlockingSet = Literal["heard", "moving"]
 
-MISSION_DISTANCE_M = (
-    1000.0  # ratios are fractions of this distance, whatever the team's size (IV-B)
-)
+# Ratios are fractions of this distance, whatever the team's size (IV-B).
+MISSION_DISTANCE_M = 1000.0
 MISSION_DURATION_S = 50.0  # 500 windows of 100 ms: the duration that velocity ratios mean (IV-B)
 SQUARE_METRES_PER_KM2 = 1e6
 
@@ -84,7 +83,7 @@ class Mission:
     sinr_threshold_db: float = _quantity(1.0, "SINR threshold", "dB", "IV-B", -30.0, 60.0)
     noise_dbm: float = _quantity(-50.0, "noise power", "dBm", "IV-B", -200.0, 50.0)
     frequency_hz: float = _quantity(2.4e9, "centre frequency", "Hz", "IV-B", 1e6, 1e12)
-    # `switch_off` says how many robots that is.
+    # `robot_failures.num_failures` says how many robots that is.
     switched_off: float = _quantity(
         0.0,
         "fraction of the robots that is switched off",

@@ -17,10 +17,7 @@ from swarm_mj.radio.spatial_reuse import keep_joined
 class SpatialTdma(BroadcastPolicy):
     """TDMA in which robots far enough from the one whose turn it is broadcast beside it.
 
-    The common rule: in each slot the owner of the turn broadcasts, as in `Tdma`. Beginning
-    half a round away in the order, one robot after the other joins if by Eqs. 1-4 nobody who
-    decodes a packet so far would lose it, the robot itself included, and somebody would gain one.
-
+    The common rule, who joins the owner of the turn, is that of `radio.spatial_reuse`.
     Each robot applies the rule to its own buffer, alone, and robots that believe the same decide
     the same. Until a robot has heard of everyone it speaks in its own turn only: so the team begins
     as `Tdma` does, and no robot that joins overlooks a listener of the owner's. Uses the robot's

@@ -170,9 +170,8 @@ def _write_own(
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
-            if (
-                is_active is not None and not is_active[b, i]
-            ):  # None is compiled apart, without the test
+            # None is compiled apart, without the test.
+            if is_active is not None and not is_active[b, i]:
                 continue
             timestamp[b, i, i] = now[b]
             for axis in range(2):

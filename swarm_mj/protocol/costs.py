@@ -1,6 +1,7 @@
 """The costs (II-C, IV-A): age of information (Eq. 10), velocity variance (Eq. 17), packets."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -94,23 +95,25 @@ def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets
         The counts, per mission.
     """
     first, second = (_count(phase.recipient, phase.heard) for phase in phases)
-    none = np.full(first.shape[1], np.nan)
+    none = np.full(len(first.sent), np.nan)
     if is_broadcast:
-        sent, _, _, heard, receptions = first + second
-        attempted = delivered = overheard = answered = none
-    else:
-        heard = receptions = none
-        sent, delivered, overheard, _, _ = first
-        _, answered, overheard_responses, _, _ = second
-        attempted, overheard = sent, overheard + overheard_responses
+        return Packets(
+            sent=first.sent + second.sent,
+            attempted=none,
+            delivered=none,
+            overheard=none,
+            answered=none,
+            heard=first.heard + second.heard,
+            receptions=first.receptions + second.receptions,
+        )
     return Packets(
-        sent=sent,
-        attempted=attempted,
-        delivered=delivered,
-        overheard=overheard,
-        answered=answered,
-        heard=heard,
-        receptions=receptions,
+        sent=first.sent,
+        attempted=first.sent,
+        delivered=first.delivered,
+        overheard=first.overheard + second.overheard,
+        answered=second.delivered,
+        heard=none,
+        receptions=none,
     )
 
 
@@ -191,31 +194,41 @@ def _mean_age(
     return age, is_complete
 
 
-@compiled()
-def _count(
-    recipient: Int[np.ndarray, "B N"], heard: Int[np.ndarray, "B N"]
-) -> Float[np.ndarray, "5 B"]:
-    """Counts one phase's packets; whoever addresses itself sends nothing.
+class _Counts(NamedTuple):
+    """One phase's packets."""
 
-    Rows are packets sent, receptions by the addressee, receptions by another, packets that
-    somebody decoded, and all receptions.
-    """
+    sent: Float[np.ndarray, "B"]
+    delivered: Float[np.ndarray, "B"]  # decoded by the addressee
+    overheard: Float[np.ndarray, "B"]  # receptions by another
+    heard: Float[np.ndarray, "B"]  # decoded by somebody
+    receptions: Float[np.ndarray, "B"]
+
+
+def _count(recipient: Int[np.ndarray, "B N"], heard: Int[np.ndarray, "B N"]) -> _Counts:
+    """Counts one phase's packets; whoever addresses itself sends nothing."""
+    counts = _Counts(*np.zeros((5, len(recipient))))
+    _add_counts(recipient, heard, counts)
+    return counts
+
+
+@compiled()
+def _add_counts(
+    recipient: Int[np.ndarray, "B N"], heard: Int[np.ndarray, "B N"], counts: _Counts
+) -> None:
     num_missions, num_robots = recipient.shape
-    counts = np.zeros((5, num_missions))
     is_heard = np.empty(num_robots, dtype=np.bool_)
     for b in range(num_missions):
         is_heard[:] = False
         for i in range(num_robots):
-            counts[0, b] += recipient[b, i] != i
+            counts.sent[b] += recipient[b, i] != i
             sender = heard[b, i]
             if sender != i:
                 is_meant = recipient[b, sender] == i
-                counts[1, b] += is_meant
-                counts[2, b] += not is_meant
-                counts[3, b] += not is_heard[sender]
-                counts[4, b] += 1
+                counts.delivered[b] += is_meant
+                counts.overheard[b] += not is_meant
+                counts.heard[b] += not is_heard[sender]
+                counts.receptions[b] += 1
                 is_heard[sender] = True
-    return counts
 
 
 @compiled()

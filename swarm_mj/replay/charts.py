@@ -13,7 +13,7 @@ from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet
 
 TREE_WIDTH, TREE_HEIGHT = 600.0, 400.0  # of the tree's view, in its own units
-RATE_WINDOWS = 10  # packets are counted over the last second
+RATE_WINDOWS = 10  # that packets are counted over
 
 
 def draw_tree(sheet: Sheet, colours: UInt8[np.ndarray, "T N 3"]) -> None:
@@ -50,7 +50,7 @@ def draw_age_matrix(sheet: Sheet, full_scale: float) -> None:
 
 
 def draw_plots(sheet: Sheet, packets: dict[str, Links]) -> None:
-    """Age of information, packets per second and velocity variance over the mission."""
+    """Age of information, packets and velocity variance over the mission."""
     log = sheet.log
     style = {"colors": [palette.MEAN_AGE], "widths": [2.0]}
     sheet.fixed("plots/age/mean", rr.Measurements.from_fields(names=["team, mean ± std"], **style))
@@ -120,7 +120,7 @@ def radio_states(log: Log) -> tuple[dict[str, palette.Colour], Int[np.ndarray, "
 
 
 def rate(per_window: Int[np.ndarray, "T"]) -> np.ndarray:
-    """Packets in the last second, at each window."""
+    """Packets in the last `RATE_WINDOWS` windows, at each window."""
     return np.convolve(per_window, np.ones(RATE_WINDOWS))[: len(per_window)]
 
 

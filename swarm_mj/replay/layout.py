@@ -8,13 +8,13 @@ import rerun.blueprint as rrb
 
 from swarm_mj.replay import legend, palette
 from swarm_mj.replay.arena import square_m
-from swarm_mj.replay.charts import TREE_HEIGHT, TREE_WIDTH, packet_counts, rate
+from swarm_mj.replay.charts import RATE_WINDOWS, TREE_HEIGHT, TREE_WIDTH, packet_counts, rate
 from swarm_mj.replay.frame import Frame
 from swarm_mj.replay.links import Links
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import TIMELINE
 
-WINDOWS_PER_SECOND = 30.0  # three times as fast as the mission
+WINDOWS_PER_SECOND = 30.0  # windows of 100 ms: three times as fast as the mission
 # Curves that would dwarf the others; the viewer can show them.
 HIDDEN = {"age": "worst", "radio": "overheard"}
 MARGIN = 1.06  # of the map, around what it must show
@@ -69,7 +69,7 @@ def _charts(log: Log, packets: dict[str, Links]) -> list[rrb.View | rrb.Containe
     """The ego robot's tree and the ages of all pairs; below them the plots."""
     ego = f"r{log.ego}"
     ages = [log.age_mean + log.age_std, np.mean(log.ego_age, axis=1)]
-    radio = "Packets per second: " + (
+    radio = f"Packets in {RATE_WINDOWS} windows: " + (
         "sent (grey), heard by anyone (blue)"
         if log.is_broadcast
         else "delivered (green), lost (orange), answered (blue)"

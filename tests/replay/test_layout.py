@@ -12,8 +12,8 @@ EVERYWHERE = {
     "Radio of every robot",
     "About this mission",
 }
-OF_ADDRESSED = "Packets per second: delivered (green), lost (orange), answered (blue)"
-OF_BROADCASTS = "Packets per second: sent (grey), heard by anyone (blue)"
+OF_ADDRESSED = "Packets in 10 windows: delivered (green), lost (orange), answered (blue)"
+OF_BROADCASTS = "Packets in 10 windows: sent (grey), heard by anyone (blue)"
 OF_FLOCKS = "Velocity variance [m²/s²]"
 
 

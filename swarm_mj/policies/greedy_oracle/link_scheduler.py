@@ -5,9 +5,9 @@ gains, interference and responses included, until none does. The gain of a windo
 receivers i and subjects k of how much T^{i,k} rises: the fall of the age of information times N²
 (Eq. 10). Squared rises look further ahead: they prefer what is stalest to many small refreshments.
 
-Where positions are only believed, a packet decodes with a probability, and timestamps are expected
-ones. Index order: `i` sends, `j` receives. Times are in slots, float32, which keeps them exact
-for 8 million windows.
+Over uncertain links a packet decodes with a probability, and timestamps are expected ones. Index
+order: `i` sends, `j` receives. Times are in slots, float32, which keeps them exact for 8 million
+windows.
 """
 
 from typing import NamedTuple
@@ -245,7 +245,7 @@ def _pair_gains(
 
 
 # Adding in any order lets the compiler use its vectors. Whole slots add up exactly; squares and
-# expected ones to rounding, so robots that plan alike need machines alike.
+# expected ones to rounding.
 @compiled(fastmath={"reassoc", "nnan", "nsz"})
 def _gain(
     newer: Float32[np.ndarray, "N"], older: Float32[np.ndarray, "N"], is_squared: bool

@@ -5,10 +5,10 @@ that also hold the same snapshot of the team therefore agree on a schedule witho
 may transmit in every slot, and nobody answers. Time is divided into epochs:
 
 1. In the first two, the discovery, robots transmit in turns (`discovery.py`).
-2. At the start of every later epoch, each robot takes a snapshot of the team from its own buffer.
-   Packets carry the best snapshot for the next epoch and the one that the sender flies by. A robot
-   that decodes a better one takes it over and passes it on. The best has most robots heard of
-   lately, then the least age, then the lower identity. So a connected team soon holds one snapshot.
+2. At the start of every epoch but the first, each robot takes a snapshot of the team from its own
+   buffer. Packets carry the best snapshot for the next epoch and the one that the sender flies by.
+   A robot that decodes a better one takes it over and passes it on. The best has most robots heard
+   of lately, then the least age, then the lower identity. So a connected team soon holds one.
 3. In the next epoch every robot runs the same scheduler (`broadcast_scheduler.py`) on the best
    snapshot it holds, and transmits when the schedule says so. The timestamps at the start are those
    that the last schedule leads to, so nobody needs to report what it decoded.
