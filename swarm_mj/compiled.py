@@ -82,7 +82,7 @@ class _WatchesImports:
     _py_file: str
 
     def get_source_stamp(self) -> bytes:
-        """The name is numba's."""
+        """The digest of the function's file; numba asks by this name."""
         return digest(Path(self._py_file))
 
 

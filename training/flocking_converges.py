@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from swarm_mj.cli import script
+from swarm_mj.cli.flight_table import AGREED
 from swarm_mj.cli.progress import WorkBar
 from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.fields import setting
@@ -32,7 +33,7 @@ class Settings:
     first_seed: int = setting(0, "of the first mission")
     num_missions: int = setting(100, "for each policy and boundary", low=1, high=10_000)
     agreed_share: float = setting(
-        0.01, "a flock with less of its first variance left has agreed", low=0.0, high=1.0
+        AGREED, "a flock with less of its first variance left has agreed", low=0.0, high=1.0
     )
 
 

@@ -130,7 +130,7 @@ def _short(policy: str) -> str:
 
 
 def _compile_ahead(options: Options, mission: Mission) -> None:
-    """Flies such a mission in small, with both its halves, so that compiling is not timed."""
+    """Flies a small mission of this kind, beyond half-way, so that compiling is not timed."""
     smallest = replace(mission, num_robots=3, range_ratio=10.0, num_windows=COMPILING_WINDOWS)
     for _ in rollout(Swarm(smallest, [0]), _make_policy(options, smallest)):
         pass

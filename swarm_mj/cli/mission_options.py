@@ -7,18 +7,18 @@ from itertools import product
 from typing import Any
 
 from swarm_mj.cli.options import add_option, flag_of, nested
-from swarm_mj.fields import as_typed
+from swarm_mj.fields import FieldOf, as_typed
 from swarm_mj.mission import PRESETS, Mission, paper
 
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]
 
 
-def one_mission() -> Any:  # noqa: ANN401 - a dataclass field takes the type of its attribute
+def one_mission() -> FieldOf:
     """A field that is a mission."""
     return nested(_add, lambda given: missions_of(given)[0])
 
 
-def several_missions() -> Any:  # noqa: ANN401 - as above
+def several_missions() -> FieldOf:
     """A field that is missions: options take several values, and those multiply."""
     return nested(partial(_add, is_many=True), missions_of)
 
@@ -34,7 +34,7 @@ def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
     return tuple(make_mission(**dict(zip(swept, each, strict=True))) for each in product(*values))
 
 
-def make_mission(**given: Any) -> Mission:  # noqa: ANN401 - fields of a mission
+def make_mission(**given: Any) -> Mission:
     """A mission of the preset and task that are given, or usual, changed by the other fields."""
     preset, task = (given.pop(name, getattr(Mission(), name)) for name in ("preset", "task"))
     replace(Mission(), preset=preset, task=task)  # refuses what is unknown

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeVar, get_origin
 
 from swarm_mj.cli import BAD_INPUT
-from swarm_mj.fields import as_typed, check, kind_of, range_of
+from swarm_mj.fields import FieldOf, as_typed, check, kind_of, range_of
 
 Options = TypeVar("Options")
 MANY = 10**9  # from here on, the end of a range is only there to catch slips
@@ -39,7 +39,7 @@ class _Formatter(argparse.HelpFormatter):
 
 def nested(
     add: Callable[[argparse.ArgumentParser], None], build: Callable[[dict[str, Any]], Any]
-) -> Any:  # noqa: ANN401 - a dataclass field takes the type of its attribute
+) -> FieldOf:
     """A field of several options, which `add` declares; `build` makes it of those given."""
     return field(metadata={"add": add, "build": build})
 

@@ -1,4 +1,4 @@
-"""`swarm-mj train`: trains a communication policy by PPO on the physics scene."""
+"""`swarm-mj train`: trains a communication policy by PPO in simulated missions."""
 
 import math
 import os

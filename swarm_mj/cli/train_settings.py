@@ -19,7 +19,6 @@ from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.policy_config import PolicyConfig
 
-USUAL_GROUPS = 4  # of missions that end at different times
 SHARE_OF_MEMORY = 0.5  # that a run's arrays may take
 PARTS = {"": Training, "network.": GnnShape, "ppo.": PpoSettings, "mission.": Mission}
 HEADINGS = {"": "run", "network.": "network", "ppo.": "PPO", "mission.": "missions"}
@@ -157,7 +156,7 @@ def _missions(asked: int | None, usual: int, num_sizes: int) -> int:
 def _groups(missions: int, num_sizes: int) -> int:
     """Into how many groups the missions are shared out evenly, sizes in turn."""
     able = [n for n in range(num_sizes, missions + 1, num_sizes) if missions % n == 0]
-    return min(able, key=lambda n: (abs(n - USUAL_GROUPS), -n), default=1)
+    return min(able, key=lambda n: (abs(n - Training.groups), -n), default=1)
 
 
 def _check(training: Training) -> None:

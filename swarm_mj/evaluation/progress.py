@@ -74,7 +74,7 @@ def _line(content: dict[str, Any]) -> bytes:
     return json.dumps(content, allow_nan=False).encode() + b"\n"
 
 
-def _difference(name: str, before: Any, now: Any) -> str:  # noqa: ANN401 - anything in JSON
+def _difference(name: str, before: object, now: object) -> str:
     """Where two pieces of JSON first differ, in words; empty if nowhere."""
     if isinstance(before, dict) and isinstance(now, dict):
         keys = dict.fromkeys([*now, *before])

@@ -45,12 +45,12 @@ def spread(samples: Float[np.ndarray, "n"]) -> Spread:
 
 
 def standard_deviation(samples: Float[np.ndarray, "n"]) -> float | None:
-    """Of the sample, n - 1 in the denominator; None of fewer than two."""
+    """The standard deviation of the sample, n - 1 in the denominator; None of fewer than two."""
     return float(np.std(samples, ddof=1)) if samples.size > 1 else None
 
 
 def standard_error(samples: Float[np.ndarray, "n"]) -> float | None:
-    """Of the mean, std / sqrt(n); None of fewer than two samples."""
+    """The mean's standard error, std / sqrt(n); None of fewer than two samples."""
     std = standard_deviation(samples)
     return None if std is None else std / math.sqrt(samples.size)
 

@@ -32,7 +32,7 @@ class GnnActorCritic(ActorCriticPolicy):
         shape: GnnShape,
         shares_trunk: bool,
         silence_logit: float,
-        **others: Any,  # noqa: ANN401 - ActorCriticPolicy's own
+        **others: Any,
     ) -> None:
         self._shape, self._shares_trunk = shape, shares_trunk
         self._silence_logit = silence_logit
@@ -123,7 +123,7 @@ class TeamActorCritic(GnnActorCritic):
     own node; the authors' code sums the scalars of all nodes of all robots' graphs.
     """
 
-    def __init__(self, *spaces_and_schedule: Any, sums_nodes: bool, **others: Any) -> None:  # noqa: ANN401 - GnnActorCritic's
+    def __init__(self, *spaces_and_schedule: Any, sums_nodes: bool, **others: Any) -> None:
         self._sums_nodes = sums_nodes
         super().__init__(*spaces_and_schedule, **others)
 
@@ -152,13 +152,13 @@ def gumbel_sample(logits: Float[Tensor, "*rows N"]) -> Int[Tensor, "*rows"]:
 def log_probability(
     logits: Float[Tensor, "E *robots N"], actions: Int[Tensor, "E *robots"]
 ) -> Float[Tensor, "E"]:
-    """Of each environment's actions, by Boltzmann distributions; summed over its robots."""
+    """The log-probability of each environment's actions, summed over its robots."""
     chosen = logits.log_softmax(-1).gather(-1, actions[..., None]).squeeze(-1)
     return chosen.flatten(1).sum(1) if chosen.dim() > 1 else chosen
 
 
 def entropy(logits: Float[Tensor, "E *robots N"]) -> Float[Tensor, "E"]:
-    """Of each environment's Boltzmann distributions [nats]; summed over its robots."""
+    """The entropy of each environment's Boltzmann distributions, summed over its robots [nats]."""
     log_p = logits.log_softmax(-1)
     each = -(log_p.exp() * log_p).sum(-1)
     return each.flatten(1).sum(1) if each.dim() > 1 else each

@@ -47,7 +47,7 @@ def held_out_missions(training: Training) -> list[Mission]:
 def evaluate(
     training: Training,
     network: AggregationGnn,
-    on_window: Callable[[float], None] = lambda share: None,  # noqa: ARG005
+    on_window: Callable[[float], None] = lambda _share: None,
 ) -> HeldOut:
     """What the held-out missions cost; draws nothing from the generators of the training.
 
@@ -113,7 +113,7 @@ def _mean(by_size: Sequence[Float[np.ndarray, "windows B"]]) -> float:
 
 
 def _standard_error(by_size: Sequence[Float[np.ndarray, "B"]]) -> float | None:
-    """Of the mean over sizes; sizes differ, but they are not drawn."""
+    """The standard error of the mean over sizes; sizes differ, but they are not drawn."""
     errors = [standard_error(each) for each in by_size]
     known = [error for error in errors if error is not None]
     return math.hypot(*known) / len(known) if len(known) == len(errors) else None

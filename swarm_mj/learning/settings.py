@@ -94,7 +94,7 @@ class Training:
     )
     network: GnnShape = ROBOTS_NETWORK  # that acts
     shares_trunk: bool = True  # whether values come from its last stage but one number
-    silence_logit: float = 7.0  # what silence has ahead, but in a robot's own turn
+    silence_logit: float = 7.0  # what silence has ahead, but in a robot's own turn: e^7 to 1
     reward: Reward = setting(
         "aoi", "the cost to lower; velocity-variance needs --arm team", choices=get_args(Reward)
     )

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
-from swarm_mj.fields import check, setting
+from swarm_mj.fields import FieldOf, check, setting
 
 Task = Literal["stationary", "random-walk", "flocking"]
 PhysicsMode = Literal["exact", "contact"]
@@ -32,12 +32,12 @@ def _quantity(
     low: float,
     high: float,
     help: str = "",
-) -> Any:  # noqa: ANN401 - a dataclass field takes the type of its attribute
+) -> FieldOf:
     """A number of the mission: name in words, unit, source, range; with help, an option."""
     return setting(default, help, label=label, unit=unit, source=source, low=low, high=high)
 
 
-def _choice(default: str, label: str, source: str, choices: object, help: str = "") -> Any:  # noqa: ANN401 - as above
+def _choice(default: str, label: str, source: str, choices: object, help: str = "") -> FieldOf:
     """One of several names, given as a `Literal`."""
     return setting(default, help, label=label, source=source, choices=get_args(choices))
 
@@ -141,7 +141,7 @@ class Mission:
         return self.boundary == "reflect"
 
 
-def paper(task: Task = "flocking", **overrides: Any) -> Mission:  # noqa: ANN401 - Mission's own fields
+def paper(task: Task = "flocking", **overrides: Any) -> Mission:
     """The paper's text, taken literally.
 
     Args:
@@ -159,7 +159,7 @@ def paper(task: Task = "flocking", **overrides: Any) -> Mission:  # noqa: ANN401
     return replace(Mission(task=task, boundary=boundary), **overrides)
 
 
-def reference(task: Task = "flocking", **overrides: Any) -> Mission:  # noqa: ANN401 - as above
+def reference(task: Task = "flocking", **overrides: Any) -> Mission:
     """What the authors' published code does; the setting of the published numbers.
 
     Args:

@@ -79,7 +79,7 @@ def _is_text(key: str, value: object, name: str) -> bool:
     return key.rpartition(".")[2] == name and isinstance(value, str)
 
 
-def _text(value: Any) -> str:  # noqa: ANN401 - anything in JSON
+def _text(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     return _one_line(value if isinstance(value, str) else json.dumps(value))

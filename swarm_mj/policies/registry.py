@@ -44,7 +44,7 @@ def _planner(mission: Mission) -> Planner:
 
 
 # What makes each policy, given the mission and, for these four, a transmission probability.
-HAVE_PROBABILITY = {"random-flooding", "mst", "aloha", "gossip"}
+HAVE_PROBABILITY = ("random-flooding", "mst", "aloha", "gossip")
 RULES: dict[str, Callable[..., Policy]] = {
     "random-flooding": lambda mission, probability: RandomFlooding(
         probability, names_addressee=mission.half_duplex == "eavesdroppers"

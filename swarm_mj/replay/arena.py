@@ -98,7 +98,7 @@ def draw_radio(sheet: Sheet, packets: dict[str, Links], range_m: float) -> None:
 
 
 def _draw_arrows(sheet: Sheet, fate: str, links: Links, share: float, aside_m: float) -> None:
-    """Packets as arrows, so much of the way to their receivers and so far to its left."""
+    """Packets as arrows: this share of the way to the receiver, this far to the left of it [m]."""
     start, end = ends(sheet.log, links)
     way = end - start
     length = np.linalg.norm(way, axis=1, keepdims=True)

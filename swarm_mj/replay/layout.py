@@ -56,7 +56,7 @@ def _drawing(
     name: str,
     x_range: tuple[float, float],
     y_range: tuple[float, float],
-    **options: Any,  # noqa: ANN401 - any of the view's
+    **options: Any,
 ) -> rrb.Spatial2DView:
     """A part of the plane; the look does not depend on the viewer's theme."""
     bounds = rrb.VisualBounds2D(x_range=x_range, y_range=y_range)

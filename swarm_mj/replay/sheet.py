@@ -25,7 +25,7 @@ class Sheet:
         self.log = log
         self.frame = frame
 
-    def fixed(self, path: str, *archetypes: Any) -> None:  # noqa: ANN401 - any rerun archetype
+    def fixed(self, path: str, *archetypes: Any) -> None:
         """Draws something that never changes. It would hide the same component drawn in time."""
         self._recording.log(path, *archetypes, static=True)
 
@@ -43,7 +43,7 @@ class Sheet:
         ]
         self._recording.send_columns(path, indexes=times, columns=list(columns))
 
-    def fixed_layer(self, path: str, **fields: Any) -> None:  # noqa: ANN401 - any of rerun's
+    def fixed_layer(self, path: str, **fields: Any) -> None:
         """Draws things of a layer that never change, by the fields of the layer's archetype."""
         layer = LAYERS[path]
         self.fixed(path, layer.kind.from_fields(**layer.style, **fields))

@@ -90,13 +90,13 @@ def test_iv_c_grids_are_the_authors_where_the_published_numbers_are(tool):
         assert min(tool.grid_of(policy, "paper")) == 0.01
     for policy in ("aloha", "gossip"):
         assert tool.grid_of(policy, "paper") == tool.grid_of(policy, "reference")
-    for one in tool.searches(tool.TUNED_POLICIES, 500):
+    for one in tool.searches(tool.HAVE_PROBABILITY, 500):
         assert list(one.grid) == sorted(set(one.grid))
 
 
 def test_every_policy_with_a_probability_is_tuned(tool):
     parameters = {name: make_policy(name, paper()).parameters for name in POLICIES}
-    assert list(tool.TUNED_POLICIES) == [n for n in POLICIES if "probability" in parameters[n]]
+    assert list(tool.HAVE_PROBABILITY) == [n for n in POLICIES if "probability" in parameters[n]]
 
 
 def test_a_row_says_what_was_measured(tool, monkeypatch):

@@ -7,6 +7,7 @@ from typing import Literal
 
 from swarm_mj.evaluation.published import SWEEPS, points
 from swarm_mj.mission import PRESETS, Mission, Task
+from swarm_mj.policies.registry import WITHOUT_PAYLOAD
 
 FLOCK = "fig2"  # a mission's start and end, drawn by `flock`; the others are below
 FORMATS = ("svg", "png", "pdf")
@@ -26,11 +27,11 @@ DRAWN = (
     "gossip",
     "spatial-tdma",
     "planner",
-    "planner --payload none",
+    WITHOUT_PAYLOAD,
     "gnn",
     "greedy-oracle",
 )
-PAPER_ONLY = ("planner", "planner --payload none", "gnn")
+PAPER_ONLY = ("planner", WITHOUT_PAYLOAD, "gnn")
 Scale = Literal["linear", "log"]
 
 

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from swarm_mj.io.atomic import atomic_write
+from swarm_mj.policies.registry import WITHOUT_PAYLOAD
 
 WIDTH_IN = 7.5  # shown at 900 pixels, a point of type is 1.7 pixels
 DPI = 240
@@ -80,7 +81,7 @@ LOOKS = {
     "tdma": Look(label="TDMA", colour="#0072b2", marker="D", size=4.0),
     "spatial-tdma": Look(label="spatial TDMA", colour="#332288", marker="h", size=5.5),
     "planner": Look(label="planner", colour="#80391e", marker="d"),
-    "planner --payload none": Look(label="planner, no payload", colour="#a6d854", marker="<"),
+    WITHOUT_PAYLOAD: Look(label="planner, no payload", colour="#a6d854", marker="<"),
     "gnn": Look(label="gnn (T, M, P only)", colour="#d55e00", marker="*", size=8.0),
     "greedy-oracle": Look(label="greedy oracle", colour="#000000", marker=".", size=5.0, width=0.8),
     "GNN": Look(label="GNN", colour="#cc79a7", marker="X"),
