@@ -10,10 +10,11 @@ ARGS ?=
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
 	@echo "make test    set up if needed and run the tests"
-	@echo "make attack  ten minutes of faults: full disks, kills, damaged files; tried and held"
+	@echo "make attack  run the fault tests for ten minutes and count what held"
 	@echo "make check   formatter, linter and type checker"
+	@echo "make format  let the formatter and the linter mend what they can"
 	@echo "make bench   time the simulation on this machine"
-	@echo "make figures remake the paper's figures; evaluates what training/results/ lacks"
+	@echo "make figures remake all figures; evaluates what training/results/ lacks of the paper's"
 	@echo "make picture remake the README's picture (needs a Vulkan driver)"
 	@echo "make setup   create .venv from pinned constraints; PYTHON=python3.12 chooses another"
 	@echo "make lock    write tools/hashes.txt anew from the pinned constraints"
@@ -81,6 +82,7 @@ figures: setup
 	  $(BIN)/swarm-mj figures training/results/$$preset-*.csv --out assets/figures/$$preset --force \
 	    || exit; \
 	done
+	$(BIN)/python training/learning_figure.py
 
 picture: setup
 	$(BIN)/swarm-mj fly --record replays/readme.rrd --force

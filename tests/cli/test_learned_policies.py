@@ -4,12 +4,10 @@ import json
 import re
 
 import pytest
-import torch
 from tiny_policies import save_tiny
 
 from swarm_mj.cli import main
 from swarm_mj.evaluation.batch import fly_batch
-from swarm_mj.evaluation.jobs import run_jobs
 from swarm_mj.evaluation.results import read_results
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import paper
@@ -154,14 +152,6 @@ def test_weights_that_change_amid_an_evaluation_are_noticed(runs):
     with pytest.raises(ValueError, match="policy runs/y has changed since the evaluation began"):
         fly_batch(study.batches[0])
     assert study.config("runs/y", mission) == before
-
-
-def num_threads(_piece):
-    return torch.get_num_threads()
-
-
-def test_jobs_start_no_threads_of_torchs():
-    assert [threads for _, threads in run_jobs(num_threads, range(2), 2)] == [1, 1]
 
 
 def test_figures_take_results_of_learned_policies(tmp_path):

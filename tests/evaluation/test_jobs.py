@@ -38,6 +38,12 @@ def surroundings(_piece):
     return signal.getsignal(signal.SIGINT), {name: os.environ.get(name) for name in ONE_THREAD}
 
 
+def num_threads(_piece):
+    import torch  # takes its time to import, in every job of every test above
+
+    return torch.get_num_threads()
+
+
 def sleep(piece):
     time.sleep(piece)
 
@@ -85,6 +91,10 @@ def test_jobs_hear_no_ctrl_c_and_start_no_threads(monkeypatch):
     assert found == [(signal.SIG_IGN, ONE_THREAD)] * 2
     assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
     assert dict(os.environ) == before
+
+
+def test_jobs_start_no_threads_of_torchs():
+    assert [threads for _, threads in run_jobs(num_threads, range(2), 2)] == [1, 1]
 
 
 def test_breaking_off_ends_the_jobs_at_once():

@@ -1,30 +1,19 @@
 import copy
 import inspect
-import math
 
 import numpy as np
 import pytest
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies.aloha import Aloha
-from swarm_mj.policies.gossip import InnovationGossip
-from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
-from swarm_mj.policies.planner.policy import Planner
-from swarm_mj.policies.planner.without_payload import PlannerWithoutPayload
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.registry import POLICIES, make_policy
-from swarm_mj.policies.round_robin import RoundRobin
-from swarm_mj.policies.spatial_tdma import SpatialTdma
-from swarm_mj.policies.tdma import Tdma
-from swarm_mj.policies.tuning import tuned_probability
-from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.swarm import Swarm
 
 MISSION = paper("flocking", num_robots=8)
 CENTRALISED = ["round-robin", "mst", "greedy-oracle", "oracle-lookahead"]
 DECENTRALISED = [name for name in POLICIES if name not in CENTRALISED]
-# What robots learn from their packets' payload is in no view: test_planner.py holds them to Eq. 9.
+# What robots learn from payload is in no view: planner/test_policy.py holds them to Eq. 9.
 PAYLOAD = {"planner": "snapshots"}  # what packets carry beyond T, M and P
 VIEWED = [name for name in DECENTRALISED if name not in PAYLOAD]
 ROW = 3  # the robot whose knowledge the law keeps
@@ -152,96 +141,3 @@ def test_policy_must_say_whom_it_addresses(kind):
 def test_policy_starts_without_ado():
     """A policy that neither draws nor remembers needs no start of its own."""
     assert Policy().start(4, generators()) is None
-
-
-def test_alg1_silence_is_addressing_oneself():
-    views = LocalViews(buffers=real_views([1, 2])[0].buffers, now=np.zeros(2), phases=())
-    assert views.num_robots == 8
-    np.testing.assert_array_equal(views.silence, [range(8)] * 2)
-
-
-@pytest.mark.parametrize(
-    ("name", "kind", "probability"),
-    [
-        ("random-flooding", RandomFlooding, 0.2),
-        ("mst", MinimumSpanningTree, 0.2),
-        ("round-robin", RoundRobin, None),
-        ("aloha", Aloha, 0.2),
-        ("gossip", InnovationGossip, 0.2),
-        ("tdma", Tdma, None),
-        ("spatial-tdma", SpatialTdma, None),
-        ("planner", Planner, None),
-        ("planner --payload none", PlannerWithoutPayload, None),
-    ],
-)
-def test_policies_by_name(name, kind, probability):
-    assert type(make_policy(name, MISSION)) is kind
-    assert type(make_policy(name, MISSION, probability)) is kind
-
-
-SCHEDULES = ["round-robin", "tdma", "spatial-tdma", "planner", "planner --payload none"]
-TUNED = ["random-flooding", "mst", "aloha", "gossip"]
-
-
-@pytest.mark.parametrize("name", TUNED)
-def test_probability_reaches_the_policy(name):
-    """At 0 nobody transmits, at 1 nearly everybody does who has anything new to tell."""
-    num_sending = []
-    for probability in (0.0, 1.0):
-        swarm = Swarm(MISSION, [1])
-        policy = make_policy(name, MISSION, probability)
-        swarm.exchange(swarm.views.silence)
-        swarm.buffers.timestamp[:] = 1.0
-        swarm.start(policy)
-        num_sending.append(np.sum(swarm.decide(policy) != swarm.views.silence))
-    assert num_sending[0] == 0
-    assert num_sending[1] >= 5
-
-
-@pytest.mark.parametrize(
-    ("mission", "is_recomputed", "root_transmits"),
-    [
-        (paper("random-walk", num_robots=8), False, False),
-        (reference("random-walk", num_robots=8), True, True),
-        (reference("stationary", num_robots=8), False, True),
-    ],
-)
-def test_iv_c_tree_is_the_presets(mission, is_recomputed, root_transmits):
-    """The named policy decides as the one built by hand with the preset's two differences."""
-    named = make_policy("mst", mission, 1.0)
-    by_hand = MinimumSpanningTree(1.0, is_recomputed=is_recomputed, root_transmits=root_transmits)
-    for seed in range(5):
-        swarm = Swarm(mission, [seed])
-        named.start(8, generators(1))
-        by_hand.start(8, generators(1))
-        for _ in range(2):
-            np.testing.assert_array_equal(swarm.decide(named), swarm.decide(by_hand))
-            swarm._physics.place(swarm.states.position_m[:, ::-1], swarm.states.velocity_mps)
-
-
-def test_unknown_policy_is_a_clear_error():
-    with pytest.raises(ValueError, match=r"one of random-flooding, round-robin, mst.*not 'rumour'"):
-        make_policy("rumour", MISSION)
-
-
-@pytest.mark.parametrize("name", TUNED)
-@pytest.mark.parametrize("probability", [-0.1, 1.5, math.inf])
-def test_bad_probability_is_a_clear_error(name, probability):
-    with pytest.raises(ValueError, match="probability must be from 0 to 1"):
-        make_policy(name, MISSION, probability)
-
-
-@pytest.mark.parametrize("name", TUNED)
-@pytest.mark.parametrize("preset", [paper, reference])
-def test_probability_is_tuned_by_default_and_named(name, preset):
-    mission = preset("random-walk", num_robots=20)
-    parameters = make_policy(name, mission).parameters
-    assert parameters == {"probability": tuned_probability(name, mission)}
-    assert make_policy(name, mission, 0.17).parameters == {"probability": 0.17}
-
-
-@pytest.mark.parametrize("name", SCHEDULES)
-def test_a_schedule_has_no_probability(name):
-    assert make_policy(name, MISSION).parameters == {}
-    with pytest.raises(ValueError, match=f"{name} takes no transmission probability"):
-        make_policy(name, MISSION, 0.5)

@@ -29,6 +29,15 @@ def test_a_team_that_leaves_the_area_a_little_is_shown_with_it(two_way):
     assert not shown.moves
 
 
+@pytest.mark.parametrize(("farthest_m", "moves"), [(150.0, False), (150.1, True)])
+def test_a_team_within_one_and_a_half_times_the_area_is_shown_with_it(two_way, farthest_m, moves):
+    """An area of half side 100 m; one robot stands as far out, in one window."""
+    position_m = np.zeros_like(two_way.log.position_m)
+    position_m[3, 5, 1] = -farthest_m
+    shown = frame(replace(two_way.log, position_m=position_m), 100.0)
+    assert shown.moves == moves
+
+
 def test_a_team_that_flies_off_is_followed(two_way):
     log = moved(two_way.log, by_m=(9000.0, -500.0))
     shown = frame(log, two_way.mission.half_side_m)

@@ -1,0 +1,49 @@
+"""What the benchmark prints, and what it refuses."""
+
+from functools import partial
+
+import pytest
+
+from swarm_mj.benchmark import learning
+from swarm_mj.cli import main
+
+
+def test_bench_prints_the_whole_and_its_parts(swarm_mj):
+    short = ("--seconds", 0.1, "--episodes", 1, "--no-learning")
+    done = swarm_mj("bench", "--missions", 1, 3, *short)
+    assert done.returncode == 0, done.stderr
+    for row in ("windows per second", "plain mj_step", "radio and buffers", "move", "decide"):
+        assert row in done.stdout
+    for row in (
+        "Evaluation: 1 random walks",
+        "random-flooding, round-robin, mst; 2 jobs",
+        "greedy-oracle",
+    ):
+        assert row in done.stdout
+    assert "Learning" not in done.stdout
+
+
+def test_bench_times_learning_and_leaves_the_evaluation_out(monkeypatch, capsys):
+    """In teams of 4, for speed."""
+    monkeypatch.setattr(learning, "learning_rows", partial(learning.learning_rows, num_robots=4))
+    assert main(["bench", "--missions", "1", "--seconds", "0.1", "--episodes", "0"]) == 0
+    printed = capsys.readouterr().out
+    assert "Evaluation" not in printed
+    for row in ("forward and backward", "training, arm robot", "training, arm team", "decision"):
+        assert row in printed
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        (["--missions", "0"], "missions must be a whole number from 1 to 10000, not 0"),
+        (["--threads", "0"], "threads must be a whole number from 1 to 256, not 0"),
+        (["--episodes", "-1"], "episodes must be a whole number from 0 to 10000, not -1"),
+        (["--jobs", "0"], "jobs must be a whole number from 1 to 256, not 0"),
+        (["--seconds", "nan"], "seconds must be a number from 0.1 to 600 [s], not nan"),
+    ],
+)
+def test_bench_refuses_bad_input(swarm_mj, options, complaint):
+    done = swarm_mj("bench", *options)
+    assert done.returncode == 2
+    assert complaint in done.stderr

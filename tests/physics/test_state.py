@@ -1,0 +1,39 @@
+"""True states: of one shape, and of robots that are all on unless it is said who is."""
+
+import numpy as np
+import pytest
+from jaxtyping import TypeCheckError
+
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.protocol.buffers import empty_buffers, observe_self
+
+PLACES = np.arange(12.0).reshape(2, 3, 2)  # of 2 missions of 3 robots
+
+
+def observed(**who):
+    """What robots know about themselves at t = 4 and t = 7, from buffers that were empty."""
+    buffers = empty_buffers(2, 3)
+    states = RobotStates(position_m=PLACES, velocity_mps=PLACES, **who)
+    observe_self(buffers, states, np.array([4.0, 7.0]))
+    return np.diagonal(buffers.timestamp, axis1=1, axis2=2).tolist()
+
+
+def test_everyone_is_active_unless_it_is_said_who_is():
+    assert observed() == [[4.0, 4.0, 4.0], [7.0, 7.0, 7.0]]
+    is_active = np.array([[True, False, True], [False, False, True]])
+    assert observed(is_active=is_active) == [[4.0, 0.0, 4.0], [0.0, 0.0, 7.0]]
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"velocity_mps": np.zeros((2, 4, 2))},  # of another team
+        {"velocity_mps": np.zeros((1, 3, 2))},  # of fewer missions
+        {"position_m": np.zeros((2, 3, 3))},  # in space
+        {"is_active": np.ones((3, 2), dtype=bool)},  # robots first
+        {"is_active": np.ones((2, 3))},  # a number
+    ],
+)
+def test_all_is_of_the_same_robots_in_the_plane(other):
+    with pytest.raises(TypeCheckError):
+        RobotStates(**({"position_m": PLACES, "velocity_mps": PLACES} | other))

@@ -1,0 +1,220 @@
+"""Policies by their names, and directories in their place."""
+
+import math
+import os
+
+import numpy as np
+import pytest
+from tiny_policies import save_tiny
+
+from swarm_mj.io.assets import asset
+from swarm_mj.mission import paper, reference
+from swarm_mj.policies.aloha import Aloha
+from swarm_mj.policies.gnn import LearnedPolicy
+from swarm_mj.policies.gossip import InnovationGossip
+from swarm_mj.policies.greedy_oracle.policy import GreedyOracle, LookaheadOracle
+from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
+from swarm_mj.policies.planner.policy import Planner
+from swarm_mj.policies.planner.without_payload import PlannerWithoutPayload
+from swarm_mj.policies.random_flooding import RandomFlooding
+from swarm_mj.policies.registry import (
+    POLICIES,
+    is_directory,
+    is_learned,
+    make_policy,
+    normalised,
+    with_payload,
+)
+from swarm_mj.policies.round_robin import RoundRobin
+from swarm_mj.policies.spatial_tdma import SpatialTdma
+from swarm_mj.policies.tdma import Tdma
+from swarm_mj.policies.tuning import tuned_probability
+from swarm_mj.swarm import Swarm
+
+MISSION = paper("flocking", num_robots=8)
+SCHEDULES = ["round-robin", "tdma", "spatial-tdma", "planner", "planner --payload none"]
+TUNED = ["random-flooding", "mst", "aloha", "gossip"]
+here = pytest.mark.usefixtures("folder")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A working directory with policies, two of them under names of others."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("runs/x/policy", "mine", "mst", "all"):
+        save_tiny(tmp_path / name, "paper")
+
+
+@here
+@pytest.mark.parametrize(
+    "name",
+    ["runs/x/policy", "./runs/x/policy/", "mine", "mine/", "./mst", "mst/", "runs/../mine", "all"],
+)
+def test_a_directory_is_a_learned_policy(tmp_path, name):
+    for typed in (name, normalised(name), str(tmp_path / name)):
+        assert is_directory(typed)
+        assert is_learned(typed)
+        assert isinstance(make_policy(typed, MISSION), LearnedPolicy)
+
+
+@here
+def test_a_name_is_a_name_whatever_lies_about():
+    assert not any(map(is_directory, POLICIES))
+    assert make_policy("mst", MISSION).parameters["probability"] > 0.0
+    assert [normalised(name) for name in POLICIES] == list(POLICIES)
+
+
+@here
+@pytest.mark.parametrize(
+    ("typed", "expected"),
+    [
+        ("runs/x/policy", "runs/x/policy"),
+        ("./runs//x/policy/", "runs/x/policy"),
+        ("mine/", "mine"),
+        ("./mine", "mine"),
+        ("./mst", "./mst"),
+        ("mst/", "./mst"),
+        ("gone/", "./gone"),
+        ("rumour", "rumour"),
+        ("", ""),
+    ],
+)
+def test_names_are_as_typed_but_for_what_leads_nowhere_else(typed, expected):
+    assert normalised(typed) == expected.replace("/", os.sep)
+
+
+@pytest.mark.parametrize("name", ["rumour", ""])
+def test_what_is_neither_a_name_nor_a_directory(name):
+    with pytest.raises(ValueError, match=f"or a directory with a learned policy, not '{name}'"):
+        make_policy(name, MISSION)
+
+
+@here
+def test_a_path_that_leads_nowhere():
+    with pytest.raises(ValueError, match="policy runs/y does not exist; name a directory"):
+        make_policy("runs/y", MISSION)
+
+
+@here
+def test_a_learned_policy_has_no_probability():
+    with pytest.raises(ValueError, match="mine takes no transmission probability; leave out"):
+        make_policy("mine", MISSION, 0.1)
+
+
+@here
+def test_only_a_learned_policy_is_made_deterministic():
+    for name in ("mine", "gnn"):
+        policy = make_policy(name, MISSION, is_deterministic=True)
+        assert policy.parameters["is_deterministic"] is True
+    for name in POLICIES:
+        if name != "gnn":
+            with pytest.raises(ValueError, match=f"{name} draws from no network"):
+                make_policy(name, MISSION, is_deterministic=True)
+
+
+@here
+def test_the_shipped_policy_is_the_network_in_assets(tmp_path):
+    save_tiny(tmp_path / "gnn", "paper")  # a folder of the same name is another policy
+    shipped = make_policy("gnn", MISSION)
+    assert is_learned("gnn")
+    assert shipped.parameters == make_policy(str(asset("policies/gnn")), MISSION).parameters
+    assert shipped.parameters != make_policy("./gnn", MISSION).parameters
+    assert shipped.payload == "none"
+    with pytest.raises(ValueError, match="gnn takes no transmission probability; leave out"):
+        make_policy("gnn", MISSION, 0.1)
+
+
+def test_ii_b_the_planner_can_go_without_payload():
+    """A name typed with the option is the name of a policy of its own; others carry nothing."""
+    assert with_payload(["tdma", "planner"], "none") == ["tdma", "planner --payload none"]
+    assert with_payload(["planner --payload none"], "none") == ["planner --payload none"]
+    assert with_payload(["tdma"], "snapshots") == ["tdma"]
+    with pytest.raises(ValueError, match="packets of tdma, mst carry none; leave out --payload"):
+        with_payload(["tdma", "mst"], "none")
+    with pytest.raises(ValueError, match="payload must be one of snapshots, none, not 'all'"):
+        with_payload(["planner"], "all")
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "probability"),
+    [
+        ("random-flooding", RandomFlooding, 0.2),
+        ("mst", MinimumSpanningTree, 0.2),
+        ("round-robin", RoundRobin, None),
+        ("aloha", Aloha, 0.2),
+        ("gossip", InnovationGossip, 0.2),
+        ("tdma", Tdma, None),
+        ("spatial-tdma", SpatialTdma, None),
+        ("planner", Planner, None),
+        ("planner --payload none", PlannerWithoutPayload, None),
+        ("greedy-oracle", GreedyOracle, None),
+        ("oracle-lookahead", LookaheadOracle, None),
+    ],
+)
+def test_policies_by_name(name, kind, probability):
+    assert type(make_policy(name, MISSION)) is kind
+    assert type(make_policy(name, MISSION, probability)) is kind
+
+
+@pytest.mark.parametrize("name", TUNED)
+def test_probability_reaches_the_policy(name):
+    """At 0 nobody transmits, at 1 nearly everybody does who has anything new to tell."""
+    num_sending = []
+    for probability in (0.0, 1.0):
+        swarm = Swarm(MISSION, [1])
+        policy = make_policy(name, MISSION, probability)
+        swarm.exchange(swarm.views.silence)
+        swarm.buffers.timestamp[:] = 1.0
+        swarm.start(policy)
+        num_sending.append(np.sum(swarm.decide(policy) != swarm.views.silence))
+    assert num_sending[0] == 0
+    assert num_sending[1] >= 5
+
+
+@pytest.mark.parametrize(
+    ("mission", "is_recomputed", "root_transmits"),
+    [
+        (paper("random-walk", num_robots=8), False, False),
+        (reference("random-walk", num_robots=8), True, True),
+        (reference("stationary", num_robots=8), False, True),
+    ],
+)
+def test_iv_c_tree_is_the_presets(mission, is_recomputed, root_transmits):
+    """The named policy decides as the one built by hand with the preset's two differences."""
+    named = make_policy("mst", mission, 1.0)
+    by_hand = MinimumSpanningTree(1.0, is_recomputed=is_recomputed, root_transmits=root_transmits)
+    for seed in range(5):
+        swarm = Swarm(mission, [seed])
+        for policy in (named, by_hand):
+            policy.start(8, [np.random.default_rng(9)])
+        for _ in range(2):
+            np.testing.assert_array_equal(swarm.decide(named), swarm.decide(by_hand))
+            swarm._physics.place(swarm.states.position_m[:, ::-1], swarm.states.velocity_mps)
+
+
+def test_unknown_policy_is_a_clear_error():
+    with pytest.raises(ValueError, match=r"one of random-flooding, round-robin, mst.*not 'rumour'"):
+        make_policy("rumour", MISSION)
+
+
+@pytest.mark.parametrize("name", TUNED)
+@pytest.mark.parametrize("probability", [-0.1, 1.5, math.inf])
+def test_bad_probability_is_a_clear_error(name, probability):
+    with pytest.raises(ValueError, match="probability must be from 0 to 1"):
+        make_policy(name, MISSION, probability)
+
+
+@pytest.mark.parametrize("name", TUNED)
+@pytest.mark.parametrize("preset", [paper, reference])
+def test_probability_is_tuned_by_default_and_named(name, preset):
+    mission = preset("random-walk", num_robots=20)
+    parameters = make_policy(name, mission).parameters
+    assert parameters == {"probability": tuned_probability(name, mission)}
+    assert make_policy(name, mission, 0.17).parameters == {"probability": 0.17}
+
+
+@pytest.mark.parametrize("name", SCHEDULES)
+def test_a_schedule_has_no_probability(name):
+    assert make_policy(name, MISSION).parameters == {}
+    with pytest.raises(ValueError, match=f"{name} takes no transmission probability"):
+        make_policy(name, MISSION, 0.5)
