@@ -10,6 +10,7 @@ from tiny_policies import tiny_config, tiny_network
 from swarm_mj.cli import main, parse
 from swarm_mj.cli.train import BUDGETS, asked_limits
 from swarm_mj.cli.train_settings import asked_settings, check_memory, refuse_others, rollout_bytes
+from swarm_mj.gnn.packet_memory import empty_memory
 from swarm_mj.learning.run_folder import Limits
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import make_model
@@ -168,6 +169,15 @@ def test_the_estimate_of_memory_is_of_the_arrays_that_are_made(arm):
     buffer = make_model(training)[0].rollout_buffer
     made = sum(rows.nbytes for rows in buffer.observations.values())
     assert made < rollout_bytes(training) < 2.0 * made
+
+
+def test_the_estimate_of_memory_counts_what_robots_remember_of_packets():
+    """In teams of 40 more than the one graph a robot by which the estimate exceeds the rollout."""
+    training = asked("--robots", 40, "--missions", 4)
+    buffer = make_model(training)[0].rollout_buffer
+    made = sum(rows.nbytes for rows in buffer.observations.values())
+    made += sum(array.nbytes for array in empty_memory(4, 40))
+    assert made < rollout_bytes(training)
 
 
 def test_rollouts_may_take_half_of_the_memory():

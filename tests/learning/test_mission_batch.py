@@ -109,3 +109,27 @@ def test_a_mission_of_one_window_starts_anew_every_window():
     assert transition.last_graphs is not None
     assert not transition.is_cut
     assert not set(before) & set(batch.history.seeds)
+
+
+def test_credit_is_what_silence_would_have_cost_the_team():
+    """Beside teams that fly alike until the last window, in which one robot each is silent.
+
+    How much T falls short there, summed over pairs; T of robots themselves is always now.
+    """
+    batch, rng = batches_of(num_missions=2, num_batches=1)[0], np.random.default_rng(3)
+    recipients = [random_recipients(rng, batch) for _ in range(10)]
+    for recipient in recipients:
+        transition = batch.step(recipient, with_credit=True)
+
+    def known(last):
+        """The sum of T after the same windows but for the last one."""
+        swarm = Swarm(MISSION, batch.history.seeds)
+        for recipient in [*recipients[:-1], last]:
+            swarm.exchange(recipient)
+        return swarm.buffers.timestamp.sum(axis=(1, 2))
+
+    for i in range(MISSION.num_robots):
+        without = recipients[-1].copy()
+        without[:, i] = i
+        np.testing.assert_allclose(transition.credit[:, i], known(recipients[-1]) - known(without))
+    assert np.any(transition.credit > 0.0)

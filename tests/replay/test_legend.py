@@ -5,20 +5,26 @@ import pytest
 from reading import static
 from rerun.chunk import RrdReader
 
+from swarm_mj.replay.legend import HEIGHT, WIDTH
+
 ADDRESSED = {"delivered", "lost", "answered", "overheard"}
 BROADCAST = {"transmits", "is heard by"}
 ALWAYS = {"radio range", "r4's tree"}
 MOVING = {"heading", "r4's belief"}
 
 
-def texts(path):
-    """All texts of the legend."""
-    entities = {
+def labels(path):
+    """The entities of all samples' texts."""
+    return {
         chunk.entity_path
         for chunk in RrdReader(path).stream()
         if chunk.entity_path.startswith("/legend/") and chunk.entity_path.endswith("/text")
     }
-    return {str(text) for entity in entities for text in static(path, entity, "Points2D:labels")}
+
+
+def texts(path):
+    """All texts of the legend."""
+    return {str(text) for of in labels(path) for text in static(path, of, "Points2D:labels")}
 
 
 def test_of_addressed_packets(replay):
@@ -31,6 +37,14 @@ def test_of_broadcasts(flood_replay):
 
 def test_of_a_team_at_rest(still_replay):
     assert texts(still_replay) == ADDRESSED | ALWAYS
+
+
+@pytest.mark.parametrize("name", ["replay", "flood_replay", "still_replay"])
+def test_texts_stand_within_the_view_and_none_on_another(name, request):
+    path = request.getfixturevalue(name)
+    places = np.array([static(path, of, "Points2D:positions") for of in labels(path)])
+    assert np.all((places > 0.0) & (places < [WIDTH, HEIGHT]))
+    assert len(np.unique(places, axis=0)) == len(texts(path))
 
 
 def test_the_ramp_says_whose_knowledge_and_where_it_ends(replay, two_way):

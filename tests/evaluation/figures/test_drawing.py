@@ -50,6 +50,14 @@ def test_the_published_curve_is_dashed_and_hollow_in_the_same_colour():
     assert ours.get_markerfacecolor() == ours.get_color() == theirs.get_color()
 
 
+def test_a_logarithmic_axis_leaves_the_same_room_at_both_ends_by_hand():
+    """Error bars from 1 to 1e6, and at each end 6 % of these six decades."""
+    ours = sweep("random-flooding", "range_ratio", {0.2: (1e6 - 1e5, 1e5), 1.0: (1.5, 0.5)})
+    (axes,) = draw(FIG4, ours).axes
+    assert axes.get_yscale() == "log"
+    np.testing.assert_allclose(np.log10(axes.get_ylim()), [-0.36, 6.36])
+
+
 def test_all_published_curves_are_there_even_where_ours_are_missing():
     (axes,) = draw(FIG5, [result("tdma", "random-walk")]).axes
     assert set(bars(axes)) == {

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.quiver import Quiver
 
-from swarm_mj.evaluation.figures.flock import draw_flock, fly_flock
+from swarm_mj.evaluation.figures import flock
+from swarm_mj.evaluation.figures.flock import Snapshot, draw_flock, fly_flock
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.rollout import rollout
@@ -60,6 +61,22 @@ def test_both_panels_show_the_same_square_with_units_and_the_caption_says_what_w
     assert bar.get_ylabel().endswith("[m/s]")
     caption = drawing.texts[-1].get_text()
     assert "fig2, preset paper: 40 robots, policy round-robin, seed 3, 500 windows" in caption
+
+
+def test_variances_are_told_with_two_digits_by_hand(monkeypatch):
+    """Two robots, 3.5 m/s off their mean: 12.25 m²/s². Then 0.00035 m/s: 1.225e-7 m²/s²."""
+    teams = [
+        Snapshot(
+            time_s=0.0,
+            position_m=np.array([[-100.0, 0.0], [100.0, 0.0]]),
+            velocity_mps=np.array([[1.0 - apart_mps, 0.0], [1.0 + apart_mps, 0.0]]),
+        )
+        for apart_mps in (3.5, 0.00035)
+    ]
+    monkeypatch.setattr(flock, "fly_flock", lambda *_: teams)
+    left, right, _ = draw_flock("paper", "round-robin", 3).axes
+    assert left.get_title("left").endswith("velocity variance 12 m²/s²")
+    assert right.get_title("left").endswith(r"velocity variance 1.2$\times$10$^{-7}$ m²/s²")
 
 
 def test_an_unknown_policy_is_refused():
