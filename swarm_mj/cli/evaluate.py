@@ -1,7 +1,9 @@
 """`swarm-mj evaluate`: policies over the same missions, with error bars."""
 
-from contextlib import closing
+from collections.abc import Callable
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
@@ -22,6 +24,7 @@ from swarm_mj.evaluation.results import write_csv, write_json
 from swarm_mj.evaluation.study import Study
 from swarm_mj.evaluation.summary import Evaluated, summarise
 from swarm_mj.fields import same_as, setting
+from swarm_mj.io.owned import owned
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import POLICIES, normalised, with_payload
 
@@ -72,16 +75,27 @@ class Options(PolicyOptions):
 def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
     study = options.study
+    outputs = {"--json": options.json, "--csv": options.csv}
+    check_outputs(outputs, must_be_new=not options.force)
+    with ExitStack() as stack:
+        for path in filter(None, outputs.values()):
+            stack.enter_context(owned(path))
+        return _evaluate(options, study)
+
+
+def _evaluate(options: Options, study: Study) -> int:
+    """Flies what is left of a study, and writes what it came to."""
     kept = _progress_file(options)
     console = Console(stderr=True, highlight=False)
     header = study.header()
     costs: dict[int, BatchCosts] = {}
     if kept and options.resume and kept.exists():
-        costs = progress.resume(kept, header)
+        costs = progress.resume(kept, header, study.batches)
     elif kept:
         progress.start(kept, header)
     try:
-        _fly(study, costs, options.jobs, kept, console)
+        keep = partial(progress.append, kept, header) if kept else None
+        _fly(study, costs, options.jobs, keep, console)
     except KeyboardInterrupt:
         hint = "the same command with --resume continues" if kept else "nothing was kept"
         flown, total = _num_flown(study, costs), study.episodes * len(study.pairs)
@@ -97,8 +111,7 @@ def run(options: Options) -> int:
 
 
 def _progress_file(options: Options) -> Path | None:
-    """The progress file, or None without outputs; raises ValueError for what cannot be written."""
-    check_outputs({"--json": options.json, "--csv": options.csv}, must_be_new=not options.force)
+    """The progress file, or None without outputs; raises ValueError if it may not be replaced."""
     output = options.json or options.csv
     if output is None:
         if options.resume:
@@ -118,9 +131,13 @@ def _num_flown(study: Study, costs: dict[int, BatchCosts]) -> int:
 
 
 def _fly(
-    study: Study, costs: dict[int, BatchCosts], num_jobs: int, kept: Path | None, console: Console
+    study: Study,
+    costs: dict[int, BatchCosts],
+    num_jobs: int,
+    keep: Callable[[int, BatchCosts], None] | None,
+    console: Console,
 ) -> None:
-    """Flies the batches that `costs` lacks, into `costs` and the progress file."""
+    """Flies the batches that `costs` lacks, into `costs` and where they are kept."""
     left = [index for index in range(len(study.batches)) if index not in costs]
     total, done = study.episodes * len(study.pairs), _num_flown(study, costs)
     bar = WorkBar("Flying", total, "missions", completed=done, console=console)
@@ -130,8 +147,8 @@ def _fly(
             index = left[which]
             with deferred_interrupt() as is_interrupted:
                 costs[index] = batch_costs
-                if kept:
-                    progress.append(kept, index, batch_costs)
+                if keep:
+                    keep(index, batch_costs)
             if is_interrupted() or was_pressed():
                 raise KeyboardInterrupt
             bar.move_to(_num_flown(study, costs))

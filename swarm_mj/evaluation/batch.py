@@ -1,10 +1,11 @@
 """A batch of missions: one policy in one regime, flown side by side, and what each cost."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from msgspec import Meta
 
 from swarm_mj.compiled import compiled
 from swarm_mj.evaluation.lower_bound import ConnectivityFloor
@@ -22,6 +23,9 @@ PACKETS = {  # totals, and what `protocol.costs.Packets` calls them
     "packets_heard": "heard",
     "receptions": "receptions",
 }
+# What is allowed where costs are read back; rounding may leave a little less than nothing.
+Cost = Annotated[float, Meta(ge=-1e-6, le=1e30)]
+Count = Annotated[int, Meta(ge=0, le=2**53)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,18 +44,23 @@ class Batch:
 class BatchCosts:
     """What every mission of a batch cost: one number a mission, in the order of the seeds."""
 
-    aoi: list[float]  # Eq. 10, mean over windows [windows]
-    aoi_steady: list[float]  # as above, over the second half of the mission
-    aoi_floor: list[float]  # the connectivity floor, mean over windows [windows]
-    velocity_variance: list[float]  # Eq. 17, mean over windows [m²/s²]
-    hops: list[float]  # depth of the parent trees, mean over windows
-    complete_window: list[int | None]  # everyone had first heard of everyone
-    packets_sent: list[int]  # requests or broadcasts
-    packets_delivered: list[int | None]  # requests that their addressee decoded; None: broadcasts
-    packets_heard: list[int | None]  # broadcasts that somebody decoded; None: addressed packets
-    receptions: list[int | None]  # times that a robot decoded a broadcast; None: as above
-    ages: list[int]  # of all missions: how often a robot's knowledge of another had each age,
+    aoi: list[Cost]  # Eq. 10, mean over windows [windows]
+    aoi_steady: list[Cost]  # as above, over the second half of the mission
+    aoi_floor: list[Cost]  # the connectivity floor, mean over windows [windows]
+    velocity_variance: list[Cost]  # Eq. 17, mean over windows [m²/s²]
+    hops: list[Cost]  # depth of the parent trees, mean over windows
+    complete_window: list[Count | None]  # everyone had first heard of everyone
+    packets_sent: list[Count]  # requests or broadcasts
+    packets_delivered: list[Count | None]  # requests that their addressee decoded; None: broadcasts
+    packets_heard: list[Count | None]  # broadcasts that somebody decoded; None: addressed packets
+    receptions: list[Count | None]  # times that a robot decoded a broadcast; None: as above
+    ages: list[Count]  # of all missions: how often a robot's knowledge of another had each age,
     # in slots, from 0 to the mission's length
+
+
+def num_ages(mission: Mission) -> int:
+    """How many different ages there can be, in slots."""
+    return round(mission.num_windows / SLOT_WINDOWS) + 1
 
 
 def fly_batch(batch: Batch) -> BatchCosts:
@@ -91,7 +100,7 @@ class Tally:
         self._num_steady = mission.num_windows - mission.num_windows // 2
         self._sums = {name: np.zeros(num_missions) for name in (*MEANS, "aoi_steady", *PACKETS)}
         self._complete = np.full(num_missions, np.inf)
-        self._ages = np.zeros(round(mission.num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
+        self._ages = np.zeros(num_ages(mission), dtype=np.int64)
 
     def add(self, flown: WindowRecord) -> None:
         """Adds a window; the swarm stands at its end."""

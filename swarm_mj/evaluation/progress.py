@@ -1,17 +1,24 @@
 """The progress file: batches already flown, so that an interruption loses no more than one.
 
-Whole lines of JSON: first what the batches depend on, then one batch a line as it gets done. JSON
-gives floats back as they were, so a resumed evaluation ends in the same files.
+Whole lines, each a digest and JSON: first what the batches depend on, then one batch a line as it
+gets done. A line's digest is of the first line's JSON and its own, so a line of another evaluation
+is told, and so is damage. JSON gives floats back as they were, so a resumed evaluation ends in the
+same files.
 """
 
+import hashlib
 import json
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-import msgspec
+from swarm_mj.evaluation.batch import Batch, BatchCosts, Count, num_ages
+from swarm_mj.io.reading import read_file, read_json
 
-from swarm_mj.evaluation.batch import BatchCosts
+DIGEST_DIGITS = 16
+NUMBER_BYTES = 32  # that a number takes, at most
+SPARE_BYTES = 1_000_000  # that a file of another evaluation may have more, to be told so
 
 
 def progress_path(output: Path) -> Path:
@@ -22,56 +29,94 @@ def progress_path(output: Path) -> Path:
 def start(path: Path, header: dict[str, Any]) -> None:
     """Begins a progress file, in place of any other; raises OSError if that cannot be."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(_line(header))
+    path.write_bytes(_line(b"", header))
 
 
-def append(path: Path, index: int, costs: BatchCosts) -> None:
+def append(path: Path, header: dict[str, Any], index: int, costs: BatchCosts) -> None:
     """Adds what a batch cost, by its index among the study's; raises OSError if that cannot be."""
+    line = _line(_json(header), {"batch": index, "costs": asdict(costs)})
     with path.open("ab") as file:
-        file.write(_line({"batch": index, "costs": asdict(costs)}))
+        file.write(line)
 
 
-def resume(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]:
-    """What an interrupted evaluation has flown, by the batches' indices.
+def resume(path: Path, header: dict[str, Any], batches: Sequence[Batch]) -> dict[int, BatchCosts]:
+    """What an interrupted evaluation of these batches has flown, by their indices.
 
     A line that was cut off is dropped from the file; it is begun anew if not even its header, what
     the batches depend on, was written.
 
     Raises:
-        ValueError: The batches depended on something else, or the file is none of this kind.
+        ValueError: The batches depended on something else, or the file is damaged or none of this
+            kind.
         OSError: The file cannot be read or written.
     """
-    whole, _, cut_off = path.read_bytes().rpartition(b"\n")
-    if not whole:
+    content = read_file(path, "progress", _most_bytes(header, batches))
+    whole, _, cut_off = content.rpartition(b"\n")
+    if not whole and _line(b"", header).startswith(cut_off):
         start(path, header)
         return {}
-    first, *lines = whole.split(b"\n")
+    damage = f"progress {path} is damaged; start over with --force instead of --resume"
+    first, *rest = whole.split(b"\n")
     try:
-        before = msgspec.json.decode(first, type=dict[str, Any])
-        batches = [msgspec.json.decode(line, type=_Batch) for line in lines]
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise ValueError(
-            f"progress {path} is damaged; start over with --force instead of --resume"
-        ) from error
+        first = _checked(b"", first)
+        before = read_json(first, dict)
+        flown = [read_json(_checked(first, line), _Flown) for line in rest]
+    except ValueError as error:
+        raise ValueError(damage) from error
     if difference := _difference("", before, header):
         raise ValueError(
             f"progress {path} is of another evaluation: {difference}; repeat that one, or start "
             "over with --force instead of --resume"
         )
+    if not all(each.batch < len(batches) and each.fits(batches[each.batch]) for each in flown):
+        raise ValueError(damage)
     if cut_off:
         path.write_bytes(whole + b"\n")
-    return {batch.batch: batch.costs for batch in batches}
+    return {each.batch: each.costs for each in flown}
 
 
-class _Batch(msgspec.Struct):
-    """A line of the file."""
+@dataclass(frozen=True, kw_only=True)
+class _Flown:
+    """A line of the file but the first."""
 
-    batch: int
+    batch: Count
     costs: BatchCosts
 
+    def fits(self, batch: Batch) -> bool:
+        """Whether there is a number of each kind for each mission, and one for each age."""
+        lengths = {name: len(numbers) for name, numbers in vars(self.costs).items()}
+        num_missions = len(batch.seeds)
+        expected = dict.fromkeys(lengths, num_missions) | {"ages": num_ages(batch.mission)}
+        return lengths == expected
 
-def _line(content: dict[str, Any]) -> bytes:
-    return json.dumps(content, allow_nan=False).encode() + b"\n"
+
+def _line(first: bytes, content: dict[str, Any]) -> bytes:
+    """A line; `first` is the JSON of the file's first."""
+    text = _json(content)
+    return _digest(first + text) + b" " + text + b"\n"
+
+
+def _checked(first: bytes, line: bytes) -> bytes:
+    """The JSON of a line; raises ValueError if its digest does not say so."""
+    digest, _, text = line.partition(b" ")
+    if digest != _digest(first + text):
+        raise ValueError("a line does not have its digest")
+    return text
+
+
+def _digest(text: bytes) -> bytes:
+    return hashlib.sha256(text).hexdigest()[:DIGEST_DIGITS].encode()
+
+
+def _json(content: dict[str, Any]) -> bytes:
+    return json.dumps(content, allow_nan=False).encode()
+
+
+def _most_bytes(header: dict[str, Any], batches: Sequence[Batch]) -> int:
+    """What the progress of these batches takes, and more."""
+    kinds = len(fields(BatchCosts))
+    numbers = sum(kinds * (1 + len(each.seeds)) + num_ages(each.mission) for each in batches)
+    return 2 * (len(_json(header)) + NUMBER_BYTES * numbers + SPARE_BYTES)
 
 
 def _difference(name: str, before: object, now: object) -> str:
@@ -85,4 +130,4 @@ def _difference(name: str, before: object, now: object) -> str:
         return next(filter(None, found), "")
     if isinstance(before, list) and isinstance(now, list):
         return f"it has {len(before)} {name}, not {len(now)}"
-    return "" if before == now else f"its {name} is {before!r}, not {now!r}"
+    return "" if before == now else f"its {name} is {before!r:.80}, not {now!r:.80}"

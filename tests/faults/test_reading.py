@@ -1,32 +1,9 @@
 """Files that others hand us, damaged or crafted: one line says so, and the exit code is 2."""
 
-import importlib.util
-from pathlib import Path
-
 import pytest
-from damage import damaged
+from damage import complaint, damaged, program
 
 from swarm_mj.cli import main
-
-ROOT = Path(__file__).parent.parent.parent
-BAD_INPUT = 2
-
-
-def program(folder, name):
-    """A program of `tools/` or `training/`, as a module."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / folder / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def complaint(capsys, code):
-    """What was said, if it is one line and nothing else."""
-    said = capsys.readouterr()
-    assert code == BAD_INPUT, said.err
-    assert len(said.err.splitlines()) == 1, said.err
-    assert not said.out
-    return said.err
 
 
 @pytest.fixture(scope="module")
