@@ -79,7 +79,7 @@ def summarise(flown: Sequence[WindowRecord]) -> Summary:
     """
     if not flown:
         raise ValueError("a summary needs at least 1 window flown, not 0")
-    variance = np.stack([window.costs.velocity_variance_m2ps2 for window in flown])
+    variance = [window.costs.velocity_variance_m2ps2 for window in flown]
     is_complete = np.stack([window.costs.is_complete for window in flown])
     first_complete = np.argmax(is_complete, axis=0) + 1.0
     packets = {
@@ -90,12 +90,17 @@ def summarise(flown: Sequence[WindowRecord]) -> Summary:
     num_sent = np.where(packets["sent"] > 0, packets["sent"], np.nan)
     return Summary(
         num_windows=len(flown),
-        aoi_mean=np.mean([window.costs.age_windows for window in flown], axis=0),
-        velocity_variance_mean=np.mean(variance, axis=0),
+        aoi_mean=_mean([window.costs.age_windows for window in flown]),
+        velocity_variance_mean=_mean(variance),
         velocity_variance_first=variance[0],
         velocity_variance_last=variance[-1],
-        hops_mean=np.mean([window.hops for window in flown], axis=0),
+        hops_mean=_mean([window.hops for window in flown]),
         complete_window=np.where(np.any(is_complete, axis=0), first_complete, np.nan),
         **{f"packets_{name}": count for name, count in packets.items()},
         hearers_per_packet=receptions / num_sent,
     )
+
+
+def _mean(windows: Sequence[Float[np.ndarray, "B"]]) -> Float[np.ndarray, "B"]:
+    """Over windows, each mission's in one row: NumPy adds rows alike, however many there are."""
+    return np.mean(np.ascontiguousarray(np.stack(windows, axis=1)), axis=1)

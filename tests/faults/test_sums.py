@@ -1,0 +1,29 @@
+"""A mission's numbers, alone and beside others."""
+
+import numpy as np
+import pytest
+from tries import tries
+
+from swarm_mj.mission import paper
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.rollout import rollout, summarise
+from swarm_mj.swarm import Swarm
+
+MISSION = paper("random-walk", num_robots=8, num_windows=150)
+MEANS = ("aoi_mean", "velocity_variance_mean", "hops_mean")
+
+
+def summary(seeds):
+    return summarise(list(rollout(Swarm(MISSION, seeds), make_policy("tdma", MISSION))))
+
+
+@pytest.mark.fault("same numbers alone and beside others")
+def test_a_summary_is_the_same_alone_and_beside_others(record_property):
+    """Fault 27: means differed in their last digits."""
+    seeds = range(tries(8))
+    record_property("tries", len(seeds) * len(MEANS))
+    together = summary(seeds)
+    for seed in seeds:
+        alone = summary([seed])
+        for name in MEANS:
+            assert getattr(alone, name)[0] == getattr(together, name)[seed], (name, seed)
