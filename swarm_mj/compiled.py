@@ -95,7 +95,13 @@ class BesideFile(_WatchesImports, caching.InTreeCacheLocator):
 
 
 class InUsersFolder(_WatchesImports, caching.UserWideCacheLocator):
-    """In the user's cache folder, if it can be written."""
+    """In the user's cache folder, if there is one that can be written."""
+
+    def ensure_cache_path(self) -> None:
+        """The name is numba's. A user without a home has `~/.cache`, in whatever folder this is."""
+        if not Path(self.get_cache_path()).is_absolute():
+            raise FileNotFoundError(self.get_cache_path())
+        super().ensure_cache_path()
 
 
 LOCATORS = ",".join(

@@ -2,7 +2,7 @@
 
 `swarm-mj fly | evaluate | train | figures | replay | scene | bench`.
 
-Exit codes: 0 done, 2 bad input, 130 interrupted.
+Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted.
 """
 
 import importlib
@@ -13,7 +13,7 @@ from typing import Any, NoReturn, TypeVar
 
 Options = TypeVar("Options")
 
-DONE, BAD_INPUT, INTERRUPTED = 0, 2, 130
+DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 COMMANDS = {  # each a module here, with its options, `Options`, and what it does, `run`
     "fly": "Fly one mission and record its replay.",
     "evaluate": "Fly policies over the same missions and say where they stand.",
@@ -95,11 +95,17 @@ def script(
 
 def _exit_code(name: str, work: Callable[[], int]) -> int:
     """Does the work; says what is wrong with the input, or that it was interrupted, in one line."""
+    from swarm_mj.cli.terminal import open_streams
+
+    open_streams()
     try:
         return work()
     except (ValueError, OSError) as error:
         sys.stderr.write(f"{name}: error: {error}\n")
         return BAD_INPUT
+    except MemoryError:
+        sys.stderr.write(f"{name}: error: this machine's memory does not suffice\n")
+        return FAILED
     except KeyboardInterrupt:
         sys.stderr.write(f"{name}: interrupted\n")
         return INTERRUPTED

@@ -1,5 +1,6 @@
 """`swarm-mj figures`: draws the paper's figures from result files."""
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,7 +37,8 @@ def run(options: Options) -> int:
     results = [result for path in options.results for result in read_results(path)]
     paths = {name: _paths(options, name) for name in dict.fromkeys(options.figure)}
     with Console(stderr=True).status("Drawing ...") as status:
-        # matplotlib takes its time to import
+        # matplotlib takes its time to import; a cache that it cannot keep is no news
+        logging.getLogger("matplotlib").setLevel(logging.ERROR)
         from swarm_mj.evaluation.figures.drawing import draw_figure
         from swarm_mj.evaluation.figures.style import save
 

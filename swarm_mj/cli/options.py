@@ -5,6 +5,7 @@ the last of `--robots 10 --robots 20`.
 """
 
 import argparse
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, Field, field, fields
 from functools import partial
@@ -55,9 +56,10 @@ def parse(kind: type[Options], arguments: Sequence[str], prog: str, summary: str
         summary: What it does.
 
     Raises:
-        ValueError: A value is not among the choices, or out of range.
+        ValueError: A value is not among the choices, or out of range, or no name of a file.
         SystemExit: The options cannot be read, or help was asked for.
     """
+    _check_names(arguments)
     parsed = vars(_parser_of(kind, prog, summary).parse_args(arguments))
     given: dict[str, Any] = {"typed": tuple(arguments), **parsed}
     values: dict[str, Any] = {}
@@ -70,6 +72,18 @@ def parse(kind: type[Options], arguments: Sequence[str], prog: str, summary: str
     options = kind(**values)
     check(options)
     return options
+
+
+def _check_names(arguments: Sequence[str]) -> None:
+    """Raises ValueError for a name that not all libraries could open, or none could find."""
+    for typed in arguments:
+        if any("\udc80" <= character <= "\udcff" for character in typed):
+            encoding = sys.getfilesystemencoding()
+            raise ValueError(f"{typed!a} has bytes that are no {encoding}; rename it")
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        raise ValueError("the current folder was deleted; change to another") from None
 
 
 def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:

@@ -1,5 +1,6 @@
 """What commands print, and how they name themselves."""
 
+import io
 import os
 import shutil
 import sys
@@ -7,6 +8,20 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
+
+
+def open_streams() -> None:
+    """Makes standard streams take whatever is printed, on any terminal, or on none.
+
+    Characters that a terminal does not know become `?`. Streams that were closed lead nowhere:
+    files opened later would else take their numbers, and with them what libraries complain of.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 - for good
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def plain_console(*, is_error: bool = False) -> Console:

@@ -1,6 +1,5 @@
 """A mission's numbers, alone and beside others."""
 
-import numpy as np
 import pytest
 from tries import tries
 

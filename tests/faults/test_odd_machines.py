@@ -1,0 +1,145 @@
+"""Terminals, folders and names that are not as they usually are."""
+
+import io
+import os
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+import swarm_mj
+from swarm_mj.cli import main
+from swarm_mj.replay.read import check_replay
+
+ROBOTS = ("--robots", "4", "--windows", "3")
+FLIGHT = ("fly", *ROBOTS, "--no-record")
+EVALUATION = ("evaluate", *ROBOTS, "--policy", "tdma", "--episodes", "2")
+BENCH = ("bench", "--help")
+RECORD = ("--record", "a.rrd")
+RESULTS = Path(swarm_mj.__file__).parent.parent / "training" / "results" / "paper-random-walk.csv"
+NOWHERE = "/proc/nowhere"  # nobody can make that
+NOT_UTF8 = os.fsdecode(b"a\xff")
+
+
+def python(*arguments, cwd, **environment):
+    """A finished process, of a user with no settings but these."""
+    bare = {"PATH": os.environ["PATH"], "PYTHONPATH": os.environ.get("PYTHONPATH", os.getcwd())}
+    return subprocess.run(
+        [sys.executable, *arguments],
+        cwd=cwd, env=bare | environment, capture_output=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def installation(tmp_path_factory):
+    """The package where no cache can be written: a file stands where each folder would."""
+    root = tmp_path_factory.mktemp("installed")
+    package = os.path.dirname(swarm_mj.__file__)
+    for folder, folders, files in os.walk(package):
+        folders[:] = [name for name in folders if name != "__pycache__"]
+        copy = root / "swarm_mj" / os.path.relpath(folder, package)
+        copy.mkdir(parents=True)
+        (copy / "__pycache__").touch()
+        for name in files:
+            (copy / name).symlink_to(os.path.join(folder, name))
+    (root / "assets").symlink_to(os.path.join(package, os.pardir, "assets"))
+    return root
+
+
+WITHOUT_A_USER = """
+import pwd, sys
+def unknown(number): raise KeyError(number)
+pwd.getpwuid = unknown
+from swarm_mj.cli import main
+sys.exit(main({arguments}))
+"""
+
+
+@pytest.mark.fault("odd machine: read-only, no home")
+@pytest.mark.parametrize("environment", [{"HOME": NOWHERE}, {}])
+def test_a_read_only_installation_without_a_home_works(installation, tmp_path, environment):
+    """Fault 23: even `--version` was a traceback."""
+    for arguments in (["--version"], ["scene", "--robots", "3"]):
+        code = WITHOUT_A_USER.format(arguments=arguments)
+        done = python("-c", code, cwd=tmp_path, PYTHONPATH=str(installation), **environment)
+        assert (done.returncode, done.stderr) == (0, b""), arguments
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.xml"]
+
+
+@pytest.mark.fault("odd machine: read-only, no home")
+def test_figures_need_no_folder_of_their_own(tmp_path):
+    """Fault 23, too: matplotlib complained in two lines."""
+    asked = ("figures", RESULTS, "--out", "figures", "--figure", "fig5", "--format", "png")
+    done = python("-m", "swarm_mj", *map(str, asked), cwd=tmp_path, HOME=NOWHERE)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.fault("odd machine: terminals")
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-16", "utf-8"])
+@pytest.mark.parametrize("command", [FLIGHT, EVALUATION, BENCH])
+def test_any_terminal_shows_what_it_can(monkeypatch, tmp_path, encoding, command):
+    """Fault 26: `±` and `²` failed in ASCII when all was flown."""
+    monkeypatch.chdir(tmp_path)
+    shown, told = (io.TextIOWrapper(io.BytesIO(), encoding=encoding) for _ in range(2))
+    monkeypatch.setattr(sys, "stdout", shown)
+    monkeypatch.setattr(sys, "stderr", told)
+    with suppress(SystemExit):  # of the help
+        assert main(list(command)) == 0
+    told.flush()
+    assert "error" not in told.buffer.getvalue().decode(encoding)
+    shown.flush()
+    text = shown.buffer.getvalue().decode(encoding)
+    assert "mission" in text or "windows" in text
+    assert ("²" in text) is (command is not BENCH and encoding != "ascii")
+
+
+@pytest.mark.fault("odd machine: terminals")
+def test_closed_streams_get_no_file_s_number(tmp_path):
+    """What libraries complain of would else stand in the replay."""
+    code = f"import os; from swarm_mj.cli import main; main({['fly', *ROBOTS, *RECORD]})"
+    check = "assert os.fstat(1).st_rdev == os.fstat(2).st_rdev == os.stat(os.devnull).st_rdev"
+    line = f'exec {sys.executable} -c "{code}; {check}" <&- >&- 2>&-'
+    done = subprocess.run(["sh", "-c", line], cwd=tmp_path, check=False)
+    assert done.returncode == 0
+    check_replay(tmp_path / "a.rrd")
+
+
+@pytest.mark.fault("odd machine: names")
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (*FLIGHT[:-1], "--record", f"{NOT_UTF8}.rrd"),
+        (*FLIGHT, "--json", f"{NOT_UTF8}.json"),
+        (*FLIGHT, "--policy", f"{NOT_UTF8}/policy"),
+        (*EVALUATION, "--csv", f"{NOT_UTF8}.csv"),
+        (*EVALUATION, "--policy", "tdma", f"./{NOT_UTF8}"),
+        ("train", "--out", NOT_UTF8, "--budget", "1"),
+        ("train", "--out", "a", "--init", NOT_UTF8),
+        ("figures", f"{NOT_UTF8}.csv", "--out", "figures"),
+        ("figures", "a.csv", "--out", NOT_UTF8),
+        ("scene", "--out", f"{NOT_UTF8}.xml"),
+        ("replay", f"{NOT_UTF8}.rrd"),
+    ],
+)
+def test_a_name_that_is_not_utf8_is_refused_before_the_work(
+    monkeypatch, tmp_path, capsys, arguments
+):
+    """Fault 26: replays failed when all was flown, tables when all was evaluated."""
+    monkeypatch.chdir(tmp_path)
+    assert main(list(arguments)) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "udcff" in line
+    assert "utf-8; rename it" in line
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.fault("odd machine: names")
+def test_a_deleted_folder_is_told_before_the_work(monkeypatch, tmp_path, capsys):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    assert main([*FLIGHT, "--json", str(tmp_path / "a.json")]) == 2
+    assert "the current folder was deleted" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
