@@ -64,7 +64,9 @@ lock: .venv/audit/ready
 
 audit: setup .venv/audit/ready
 	.venv/audit/bin/pip-licenses --python $(BIN)/python --order license
-	.venv/audit/bin/pip-audit --require-hashes --disable-pip --strict --requirement tools/hashes.txt
+	@.venv/audit/bin/pip-audit --require-hashes --disable-pip --strict --requirement tools/hashes.txt \
+	  || { echo "No complete audit: either this package index keeps no list of vulnerabilities," \
+	  "or one is named above."; exit 1; }
 
 .venv/audit/ready: Makefile
 	@$(PYTHON) -m venv .venv/audit

@@ -23,7 +23,6 @@ from swarm_mj.fields import setting
 
 RESULTS = Path("training/results/learning")
 SCHEDULES = ("tdma", "spatial-tdma")
-PURPLE = "#aa3377"
 TITLE = "Training the shipped gnn: mean over teams of 20, 40 and 80 robots at rest"
 SAID = (
     "Curve: 12 held-out missions a size, mean ± SEM. Levels: 8 missions a size from seed 3000. "
@@ -31,7 +30,7 @@ SAID = (
 )
 HEIGHT_IN = 3.1 + 0.45  # of the axes, of the caption below
 PALE, BAND = 0.85, 0.15  # of the line, of its standard error
-MOST_AGE = 1.25  # the axis ends above the highest level, by so much; the curve may begin above it
+HEADROOM = 1.05  # the axis ends above the highest age, by so much
 COLUMNS = ("minutes", "aoi", "aoi_sem")
 
 
@@ -81,17 +80,18 @@ def draw(curve: Mapping[str, np.ndarray], levels: Mapping[str, float]) -> Figure
         drawing = Figure(figsize=(WIDTH_IN, HEIGHT_IN), layout="constrained")
         axes = drawing.subplots()
         age, sem = curve["aoi"], curve["aoi_sem"]
-        axes.plot(curve["minutes"], age, color=PURPLE, alpha=PALE, label="gnn (T, M, P only)")
-        band = {"color": PURPLE, "alpha": BAND, "linewidth": 0.0}
+        colour = look_of("gnn").colour
+        axes.plot(curve["minutes"], age, color=colour, alpha=PALE, label="gnn (T, M, P only)")
+        band = {"color": colour, "alpha": BAND, "linewidth": 0.0}
         axes.fill_between(curve["minutes"], age - sem, age + sem, **band)
         for policy, level in levels.items():
             _draw_level(axes, policy, level)
         axes.set_title(TITLE, loc="left", color=INK)
         axes.set_xlabel("minutes of training")
         axes.set_ylabel("age of information [windows]")
-        axes.set_ylim(0.0, MOST_AGE * max(levels.values()))
+        axes.set_ylim(0.0, HEADROOM * max(*age, *levels.values()))
         axes.xaxis.set_major_formatter("{x:g}")
-        axes.legend(loc="lower right", frameon=False, fontsize=8)
+        axes.legend(loc="upper right", frameon=False, fontsize=8)
         drawing.supxlabel(SAID, x=0.01, ha="left", fontsize=7, color=FAINT, gid=CAPTION)
     return drawing
 

@@ -40,7 +40,7 @@ def run(options: Options) -> int:
 def _measure(options: Options, say: Callable[[str], None]) -> Iterator[Table]:
     columns = []
     for num_missions in options.missions:
-        say(f"Measuring {num_missions} missions side by side ...")
+        say(f"Measuring with {num_missions} side by side ...")
         rows = simulation_rows(num_missions, num_threads=options.threads, seconds=options.seconds)
         columns.append(list(rows))
     head = ("missions side by side", *map(str, options.missions))

@@ -9,20 +9,21 @@ from rich.table import Table
 
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
 
-MIN_WIDTH = 100  # of the console; narrower ones wrap lines rather than cut numbers off
+MIN_WIDTH = 100  # of a table; narrower consoles wrap its lines rather than cut numbers off
 NAME_WIDTH = 17  # of a policy that fits in there; a longer directory's name widens the table
 NONE = "-"
 
 
 def print_results(results: Sequence[Result]) -> None:
     """Prints a table per regime; results of a regime stand together."""
+    console = Console(highlight=False, markup=False)
     longest = max(len(line) for result in results for line in _name(result).splitlines())
-    width = max(MIN_WIDTH + max(0, longest - NAME_WIDTH), Console().width)
-    console = Console(highlight=False, markup=False, width=width)
+    width = max(MIN_WIDTH + max(0, longest - NAME_WIDTH), console.width)
+    wide = Console(highlight=False, markup=False, width=width)
     for regime, group in groupby(results, _regime):
         of_regime = sorted(group, key=lambda result: result.aoi_mean)
         console.print(regime)
-        console.print(_table(of_regime))
+        wide.print(_table(of_regime))
         console.print(_bound(of_regime))
         console.print()
     console.print(_legend(results))
@@ -33,26 +34,26 @@ def _regime(result: Result) -> str:
     fate = f", {result.switched_off:.0%} of the robots off half-way" if result.switched_off else ""
     return (
         f"{result.task}, preset {result.preset}: {result.num_robots} robots, range ratio "
-        f"{result.range_ratio:g}, velocity ratio {result.velocity_ratio:g}, boundary "
-        f"{result.boundary},\n{result.num_windows} windows of {result.physics} physics{fate}"
+        f"{result.range_ratio:g},\nvelocity ratio {result.velocity_ratio:g}, boundary "
+        f"{result.boundary}, {result.num_windows} windows of {result.physics} physics{fate}"
     )
 
 
 def _table(results: Sequence[Result]) -> Table:
-    """Two lines a policy; velocities only of teams that move."""
-    moves = results[0].task != "stationary"
+    """Two lines a policy; velocities only of flocks, which fly as they are told."""
+    flocks = results[0].task == "flocking"
     table = Table(box=SIMPLE_HEAD, show_edge=False, padding=0)
     table.add_column("policy", no_wrap=True)
     names = ["AoI ± SEM\n95 %", "median\np95", "difference\n95 %", "packets\nreached", "hearers"]
-    names += ["velocity\nvariance", "published\nvariance"] if moves else ["published"]
+    names += ["velocity\nvariance", "published\nAoI, var."] if flocks else ["published\nAoI"]
     for name in names:
         table.add_column(name, justify="right")
     for result in results:
-        table.add_row(_name(result), *_cells(result, moves=moves))
+        table.add_row(_name(result), *_cells(result, flocks=flocks))
     return table
 
 
-def _cells(r: Result, *, moves: bool) -> list[str]:
+def _cells(r: Result, *, flocks: bool) -> list[str]:
     return [
         f"{_with_error(r.aoi_mean, r.aoi_sem)}\n{_interval(r.aoi_ci_low, r.aoi_ci_high)}",
         f"{_number(r.aoi_median)}\n{_number(r.aoi_p95)}",
@@ -60,7 +61,7 @@ def _cells(r: Result, *, moves: bool) -> list[str]:
         f"{_interval(r.aoi_difference_ci_low, r.aoi_difference_ci_high)}",
         f"{_number(r.packets_per_window)}\n{_number(_reached(r), '.0%')}",
         _number(r.hearers_per_packet),
-        *([_number(r.velocity_variance_mean, ".4f")] if moves else []),
+        *([_number(r.velocity_variance_mean, ".4f")] if flocks else []),
         _published(r),
     ]
 
@@ -102,8 +103,10 @@ def _legend(results: Sequence[Result]) -> str:
         "Packets: sent in a window, and the share that reached its addressee or, of broadcasts, "
         "at least one robot; hearers: robots that decoded a broadcast, on average.",
     ]
-    if any(result.task != "stationary" for result in results):
-        sentences.append("Velocity variance [m²/s²].")
+    if any(result.task == "flocking" for result in results):
+        sentences.append("Velocity variance (var.): of the robots' velocities [m²/s²].")
+    if any(result.published_aoi_mean is not None for result in results):
+        sentences.append("Published: by the paper.")
     sentences.append(
         "Lower bound: the AoI if all robots with a path between them shared everything at once."
     )

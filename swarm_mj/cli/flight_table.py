@@ -8,6 +8,7 @@ from rich.table import Table
 
 from swarm_mj.cli.terminal import named_values
 from swarm_mj.mission import Mission
+from swarm_mj.mission.robot_failures import num_failures
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
 from swarm_mj.rollout import Summary
 
@@ -32,17 +33,19 @@ def flight_numbers(policy: Policy, summary: Summary) -> dict[str, Any]:
 
 
 def flight_table(title: str, mission: Mission, numbers: dict[str, Any], wall_s: float) -> Table:
-    """What a flight cost, by its `flight_numbers`, and took here [s]: at most 14 rows."""
+    """What a flight cost, by its `flight_numbers`, and took here [s]: at most 15 rows."""
     decider = "a centre that is told where all are"
+    hops, num_off = numbers["hops_mean"], num_failures(mission)
     rows = {
         f"windows of {mission.window_s:g} s flown": f"{numbers['num_windows']} in {wall_s:.2f} s",
         "age of information, mean": _windows(numbers["aoi_mean"], mission, 2),
         "everyone had heard of everyone": _windows(numbers["complete_window"], mission, 0, "after"),
-        "radio hops that news travelled, mean": f"{numbers['hops_mean']:.2f}",
+        "radio hops that news travelled, mean": f"{hops:.2f}" if hops else "-",
         **_packets(numbers),
         "packets carry": _payload(numbers["payload"]),
-        "who decides": decider if numbers["is_centralised"] else "each robot, by what it has heard",
+        "who decides": decider if numbers["is_centralised"] else "each robot by itself",
         **({} if mission.task == "stationary" else _velocities(mission, numbers)),
+        **({"robots switched off half-way": f"{num_off}, not counted then"} if num_off else {}),
     }
     return named_values(title, rows, caption=AGE)
 
@@ -95,5 +98,5 @@ def _velocities(mission: Mission, numbers: dict[str, Any]) -> dict[str, str]:
     if mission.task == "flocking" and left is not None:
         share = f"{left:.1%}" if left >= 0.001 else "under 0.1%"
         verdict = "yes" if left < AGREED else "no"
-        rows["  flock agreed on one velocity"] = f"{verdict}, {share} of the variance left"
+        rows[f"  flock agreed: under {AGREED:.0%} is left"] = f"{verdict}, {share}"
     return rows

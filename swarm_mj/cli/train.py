@@ -163,10 +163,12 @@ def _evaluated(training: Training, progress: Progress) -> dict[str, str]:
     best = progress.best
     if best is None:
         return {}
-    first, decisions = progress.curve[0], f"{best['decisions']:,.0f} decisions"
+    first, decisions = progress.curve[0], f"after {best['decisions']:,.0f} decisions"
+    if best is first:
+        decisions = "the untrained one"
     rows = {
         "held-out age, at first": f"{age_of(first)} windows",
-        "held-out age, best policy": f"{age_of(best)} windows, after {decisions}; chosen on these",
+        "held-out age, best policy": f"{age_of(best)} windows, {decisions}; chosen on these",
     }
     if training.reward == "velocity-variance":
         variances = ", ".join(f"{row['velocity_variance']:.4f}" for row in (first, best))

@@ -100,8 +100,8 @@ def with_payload(names: Sequence[str], payload: str) -> list[str]:
         return list(names)
     if not {"planner", WITHOUT_PAYLOAD} & set(names):
         raise ValueError(
-            f"payload must be that of policy planner, but packets of {', '.join(names)} carry "
-            "none; leave out --payload"
+            f"--payload says what the planner's packets carry, but not those of "
+            f"{', '.join(names)}; leave it out"
         )
     return [WITHOUT_PAYLOAD if name == "planner" else name for name in names]
 
