@@ -23,7 +23,9 @@ class Options:
         is_positional=True,
     )
     out: Path = setting(help="where to write", metavar="DIR")
-    figure: tuple[str, ...] = setting(FIGURES, "which to draw", choices=FIGURES, shown="all")
+    figure: tuple[str, ...] = setting(
+        FIGURES, "which to draw", choices=FIGURES, shown="all that have points"
+    )
     format: tuple[str, ...] = setting(("svg", "png"), "of the files", choices=FORMATS)
     force: bool = setting(False, "replace existing figures")
     flock_policy: str = setting(
@@ -39,6 +41,7 @@ def run(options: Options) -> int:
     with Console(stderr=True).status("Drawing ...") as status:
         # matplotlib takes its time to import; a cache that it cannot keep is no news
         logging.getLogger("matplotlib").setLevel(logging.ERROR)
+        from swarm_mj.evaluation.figures.curves import NoPointsError
         from swarm_mj.evaluation.figures.drawing import draw_figure
         from swarm_mj.evaluation.figures.style import save
 
@@ -46,13 +49,20 @@ def run(options: Options) -> int:
         drawn = {}
         for name in paths:
             status.update(f"Drawing {name} ...")
-            drawn[name] = draw_figure(name, results, flock_policy=policy, flock_seed=seed)
-        for name in paths:
+            try:
+                drawn[name] = draw_figure(name, results, flock_policy=policy, flock_seed=seed)
+            except NoPointsError:
+                is_last_hope = name == FIGURES[-1] and set(drawn) <= {FLOCK}
+                if options.figure != FIGURES or is_last_hope:
+                    raise
+        for name in drawn:
             status.update(f"Writing {name} ...")
             for path in paths[name]:
                 save(drawn[name], path)
-    written = " ".join(str(path) for name in paths for path in paths[name])
+    written = " ".join(str(path) for name in drawn for path in paths[name])
     plain_console().print(f"Wrote {written}")
+    if left_out := ", ".join(name for name in paths if name not in drawn):
+        plain_console().print(f"Left out {left_out}: the results hold no point of them")
     return 0
 
 

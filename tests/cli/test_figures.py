@@ -1,6 +1,7 @@
 """`swarm-mj figures` as a process: files in, figures out, or one clear line."""
 
 import runpy
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -79,6 +80,22 @@ def test_a_figure_without_points_is_named_with_its_command_and_none_is_written(s
     assert "swarm-mj evaluate --policy tdma " in line
     assert " greedy-oracle --task flocking --preset reference" in line
     assert [path.name for path in tmp_path.iterdir()] == ["some.csv"]
+
+
+def test_unasked_figures_without_points_are_left_out_unless_all_are(swarm_mj, tmp_path):
+    walks, rest = (
+        [one for one in SYNTHETIC["everything"]() if one.task == task]
+        for task in ("random-walk", "stationary")
+    )
+    write_csv(tmp_path / "rest.csv", rest)
+    done = swarm_mj("figures", "rest.csv", "--out", ".", "--format", "svg")
+    assert done.returncode == 0, done.stderr
+    assert "Wrote fig2.svg fig3.svg fig4.svg" in done.stdout
+    assert "Left out fig5, fig6: the results hold no point of them" in done.stdout
+    assert sorted(path.name for path in tmp_path.glob("*.svg")) == [f"fig{n}.svg" for n in (2, 3, 4)]
+    elsewhere = [replace(one, task="flocking", range_ratio=0.9) for one in walks]
+    write_csv(tmp_path / "none.csv", elsewhere)
+    assert "fig6 has no points" in refusal(swarm_mj("figures", "none.csv", "--out", "x"))
 
 
 @pytest.mark.parametrize(

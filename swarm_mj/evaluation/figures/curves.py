@@ -19,6 +19,10 @@ from swarm_mj.mission import PRESETS
 AGREED = ("episodes", "seed", "version")  # the commits stand in the caption
 
 
+class NoPointsError(ValueError):
+    """None of the results belongs to a figure."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Curve:
     """A cost of one method over a figure's x."""
@@ -62,7 +66,7 @@ def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
     found = [r for r in results if all(getattr(r, n) == value for n, value in wanted.items())]
     if not found:
         described = ", ".join(f"{name} {value}" for name, value in wanted.items())
-        raise ValueError(
+        raise NoPointsError(
             f"{figure.name} has no points: none of the {len(results)} results has {described}; "
             f"make them with `{figure.command(preset)}`, or choose others with --figure"
         )
