@@ -92,7 +92,9 @@ def test_unasked_figures_without_points_are_left_out_unless_all_are(swarm_mj, tm
     assert done.returncode == 0, done.stderr
     assert "Wrote fig2.svg fig3.svg fig4.svg" in done.stdout
     assert "Left out fig5, fig6: the results hold no point of them" in done.stdout
-    assert sorted(path.name for path in tmp_path.glob("*.svg")) == [f"fig{n}.svg" for n in (2, 3, 4)]
+    assert sorted(path.name for path in tmp_path.glob("*.svg")) == [
+        f"fig{n}.svg" for n in (2, 3, 4)
+    ]
     elsewhere = [replace(one, task="flocking", range_ratio=0.9) for one in walks]
     write_csv(tmp_path / "none.csv", elsewhere)
     assert "fig6 has no points" in refusal(swarm_mj("figures", "none.csv", "--out", "x"))
