@@ -8,6 +8,7 @@ from tiny_policies import save_tiny
 
 from swarm_mj.cli import main
 from swarm_mj.evaluation.batch import fly_batch
+from swarm_mj.evaluation.progress import progress_path, start
 from swarm_mj.evaluation.results import read_results
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import paper
@@ -127,13 +128,13 @@ def test_deterministic_learned_policies_fly_beside_others(tmp_path):
 def test_a_resumed_evaluation_is_of_the_same_weights(capsys, runs, tmp_path):
     """An evaluation that only began: its progress file holds what it depends on."""
     evaluated = ["evaluate", *SMALL, "--policy", "runs/y", "--episodes", "2", "--csv", "r.csv"]
-    progress = tmp_path / "r.csv.progress"
+    progress = progress_path(tmp_path / "r.csv")
     study = Study(
         policies=("runs/y",),
         regimes=(paper("flocking", num_robots=5, num_windows=12, range_ratio=0.5),),
         episodes=2,
     )
-    progress.write_text(json.dumps(study.header()) + "\n")
+    start(progress, study.header())
     save_tiny(runs / "y", "paper", seed=3)
     assert main([*evaluated, "--resume"]) == 2
     assert "is of another evaluation: its digest is" in capsys.readouterr().err
