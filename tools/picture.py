@@ -7,16 +7,13 @@ software one will do (Debian and Ubuntu: `apt-get install mesa-vulkan-drivers`).
 """
 
 import io
-import os
 import re
-import signal
-import socket
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -26,7 +23,9 @@ from rerun.experimental import ViewerClient
 
 from swarm_mj.cli import script
 from swarm_mj.fields import setting
+from swarm_mj.io.processes import running
 from swarm_mj.replay.read import check_replay, windows
+from swarm_mj.replay.view import LOOPBACK, VIEWER, free_ports, quiet_environment
 
 START_TIMEOUT_S = 60.0
 LOAD_TIMEOUT_S = 120.0
@@ -100,31 +99,23 @@ def _save_without_title_bar(png: bytes, out: Path, zoom: int) -> None:
 @contextmanager
 def _viewer(size: str) -> Iterator[ViewerClient]:
     """A headless viewer on a free port of this machine, gone afterwards."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    (port,) = free_ports(1)
     command = [
-        str(Path(sys.executable).with_name("rerun")),
-        *("--headless", "--hide-welcome-screen", "--bind", "127.0.0.1"),
+        *(*VIEWER, "--headless", "--hide-welcome-screen", "--bind", LOOPBACK),
         *("--port", str(port), "--window-size", size),
     ]
-    with tempfile.TemporaryFile("w+") as said:
-        # A group of its own: `rerun` is a script that starts the viewer as its child.
-        viewer = subprocess.Popen(
-            command, stdout=said, stderr=subprocess.STDOUT, start_new_session=True
-        )
+    with (
+        tempfile.TemporaryFile("w+") as said,
+        running(command, environment=quiet_environment(), output=said) as viewer,
+    ):
         try:
             yield _connect(viewer, port, said)
         except (RuntimeError, ConnectionError) as error:  # the client's, when the viewer is gone
             raise OSError(_complaint(said)) from error
-        finally:
-            with suppress(ProcessLookupError):  # it may have died of its own
-                os.killpg(viewer.pid, signal.SIGTERM)
-            viewer.wait()
 
 
 def _connect(viewer: subprocess.Popen, port: int, said: IO[str]) -> ViewerClient:
-    address = f"rerun+http://127.0.0.1:{port}/proxy"
+    address = f"rerun+http://{LOOPBACK}:{port}/proxy"
     clients: list[ViewerClient] = []
 
     def is_up() -> bool:

@@ -16,6 +16,7 @@ import numpy as np
 import torch
 
 from swarm_mj.cli import script
+from swarm_mj.cli.terminal import tell_cores
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.evaluation.jobs import run_jobs
 from swarm_mj.evaluation.study import Study
@@ -105,6 +106,7 @@ class Options:
 
 def run(options: Options) -> int:
     """Flies the policy and compares; returns 1 if the costs are too far apart."""
+    tell_cores(options.jobs)
     with tempfile.TemporaryDirectory() as scratch:
         folder = options.out or Path(scratch) / "policy"
         store(options.weights, folder)

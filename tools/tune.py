@@ -19,11 +19,11 @@ import numpy as np
 from rich.console import Console
 
 from swarm_mj.cli import script
-from swarm_mj.cli.interrupt import heard_interrupt
 from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import plain_console
 from swarm_mj.fields import same_as, setting
 from swarm_mj.io.atomic import atomic_write
+from swarm_mj.io.interrupt import heard_interrupt
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.registry import HAVE_PROBABILITY, make_policy

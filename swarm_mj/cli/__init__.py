@@ -2,7 +2,8 @@
 
 `swarm-mj fly | evaluate | train | figures | replay | scene | bench`.
 
-Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted.
+Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted by Ctrl-C, SIGTERM or a
+hang-up. A reader that closes the pipe, as `| head` does, and a terminal that is gone are no errors.
 """
 
 import importlib
@@ -10,6 +11,9 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
+
+from swarm_mj.io.interrupt import interruptible
+from swarm_mj.io.streams import lasting_streams
 
 Options = TypeVar("Options")
 
@@ -95,9 +99,11 @@ def script(
 
 def _exit_code(name: str, work: Callable[[], int]) -> int:
     """Does the work; says what is wrong with the input, or that it was interrupted, in one line."""
-    from swarm_mj.cli.terminal import open_streams
+    with lasting_streams(), interruptible():
+        return _told(name, work)
 
-    open_streams()
+
+def _told(name: str, work: Callable[[], int]) -> int:
     try:
         return work()
     except (ValueError, OSError) as error:

@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from swarm_mj.benchmark.simulation import Row, evaluation_rows, simulation_rows
+from swarm_mj.cli.terminal import tell_cores
 from swarm_mj.fields import setting
 
 
@@ -29,6 +30,7 @@ class Options:
 
 def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
+    tell_cores(options.jobs if options.episodes else 1)
     with Console(stderr=True).status("Measuring ...") as status:
         tables = list(_measure(options, status.update))
     console = Console(highlight=False)

@@ -11,11 +11,11 @@ from rich.console import Console
 
 from swarm_mj.cli import DONE, INTERRUPTED
 from swarm_mj.cli.evaluation_table import print_results
-from swarm_mj.cli.interrupt import deferred_interrupt, heard_interrupt
 from swarm_mj.cli.mission_options import several_missions
 from swarm_mj.cli.outputs import check_outputs
 from swarm_mj.cli.policy_options import NAMES, PolicyOptions
 from swarm_mj.cli.progress import WorkBar
+from swarm_mj.cli.terminal import tell_cores
 from swarm_mj.evaluation import progress
 from swarm_mj.evaluation.batch import BatchCosts, fly_batch
 from swarm_mj.evaluation.jobs import run_jobs
@@ -24,6 +24,7 @@ from swarm_mj.evaluation.results import write_csv, write_json
 from swarm_mj.evaluation.study import Study
 from swarm_mj.evaluation.summary import Evaluated, summarise
 from swarm_mj.fields import same_as, setting
+from swarm_mj.io.interrupt import deferred_interrupt, heard_interrupt
 from swarm_mj.io.owned import owned
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import POLICIES, normalised, with_payload
@@ -86,6 +87,7 @@ def run(options: Options) -> int:
 def _evaluate(options: Options, study: Study) -> int:
     """Flies what is left of a study, and writes what it came to."""
     kept = _progress_file(options)
+    tell_cores(options.jobs)
     console = Console(stderr=True, highlight=False)
     header = study.header()
     costs: dict[int, BatchCosts] = {}

@@ -12,7 +12,6 @@ from rich.console import Console
 
 from swarm_mj.cli import DONE, INTERRUPTED
 from swarm_mj.cli.flight_table import flight_numbers, flight_table
-from swarm_mj.cli.interrupt import deferred_interrupt
 from swarm_mj.cli.mission_options import one_mission
 from swarm_mj.cli.outputs import check_outputs
 from swarm_mj.cli.policy_options import NAMES, PolicyOptions
@@ -20,6 +19,7 @@ from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import plain_console, this_command
 from swarm_mj.fields import setting
 from swarm_mj.io.atomic import write_json
+from swarm_mj.io.interrupt import deferred_interrupt
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy

@@ -1,6 +1,5 @@
 """What commands print, and how they name themselves."""
 
-import io
 import os
 import shutil
 import sys
@@ -10,23 +9,18 @@ from rich.console import Console
 from rich.table import Table
 
 
-def open_streams() -> None:
-    """Makes standard streams take whatever is printed, on any terminal, or on none.
-
-    Characters that a terminal does not know become `?`. Streams that were closed lead nowhere:
-    files opened later would else take their numbers, and with them what libraries complain of.
-    """
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 - for good
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
-
-
 def plain_console(*, is_error: bool = False) -> Console:
     """A terminal that shows text as it is: no colours of its own, no broken lines, no markup."""
     return Console(stderr=is_error, highlight=False, soft_wrap=True, markup=False)
+
+
+def tell_cores(num_jobs: int) -> None:
+    """Says, in one line, if there are more jobs than cores to run them."""
+    cores = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    if num_jobs > cores:
+        plain_console(is_error=True).print(
+            f"{num_jobs} jobs share {cores} cores: those above {cores} cost memory and save no time"
+        )
 
 
 def named_values(title: str, rows: dict[str, str], caption: str | None = None) -> Table:

@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 from rich.console import Console
 
 from swarm_mj.cli import DONE, INTERRUPTED
-from swarm_mj.cli.interrupt import deferred_interrupt
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
 from swarm_mj.cli.outputs import check_outputs
@@ -24,6 +23,7 @@ from swarm_mj.cli.train_settings import (
     refuse_others,
 )
 from swarm_mj.fields import setting
+from swarm_mj.io.interrupt import deferred_interrupt
 from swarm_mj.learning.run_folder import SETTINGS, Limits, Progress, Run, check_new, read_run
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.stored import read_policy

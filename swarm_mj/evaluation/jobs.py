@@ -5,19 +5,21 @@ import signal
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnContext
-from multiprocessing.synchronize import Event
 from typing import Any, TypeVar
+
+from swarm_mj.io.interrupt import INTERRUPTS, deferred_interrupt
+from swarm_mj.io.processes import guard
 
 Piece = TypeVar("Piece")
 Product = TypeVar("Product")
 
-# Jobs share the machine's cores, so none starts threads of its own.
-ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
-
-POLL_S = 0.05  # how often a process that loads is looked at when all is broken off
+# Jobs share the machine's cores, so none starts threads of its own. And none draws: MuJoCo need not
+# look for a window system, which it does by a program that complains if it is left.
+SURROUNDINGS = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+SURROUNDINGS |= {"MUJOCO_GL": "disable"}
 
 
 def run_jobs(
@@ -25,7 +27,7 @@ def run_jobs(
 ) -> Generator[tuple[int, Product]]:
     """Does all pieces of work.
 
-    Ctrl-C reaches this process only; whoever breaks off ends the others, once they have loaded.
+    Ctrl-C reaches this process only; the others end with it, however it ends.
 
     Args:
         work: A function of a module, which other processes can import.
@@ -36,9 +38,12 @@ def run_jobs(
         A piece's index and its product, in the order in which they are done.
 
     Raises:
+        ValueError: There is no process to do it.
         OSError: A process ended before its work did.
         Exception: What `work` raised of the first piece that failed.
     """
+    if num_jobs < 1:
+        raise ValueError(f"work needs 1 process or more, not {num_jobs}")
     if min(num_jobs, len(pieces)) <= 1:
         yield from ((index, work(piece)) for index, piece in enumerate(pieces))
         return
@@ -46,9 +51,13 @@ def run_jobs(
     under_way: dict[Connection, int] = {}
     context = get_context("spawn")
     with ExitStack() as stack:
-        with _shielded():
-            each = (_worker(work, context) for _ in range(min(num_jobs, len(pieces))))
+        watch = stack.enter_context(guard())
+        resource_tracker.ensure_running()  # multiprocessing's own; to start it lifts all shields
+        with deferred_interrupt() as is_interrupted, _shielded():
+            each = (_worker(work, context, watch) for _ in range(min(num_jobs, len(pieces))))
             workers = [stack.enter_context(worker) for worker in each]
+        if is_interrupted():
+            raise KeyboardInterrupt
         for worker in workers:
             _hand_out(waiting, worker, under_way)
         while under_way:
@@ -84,26 +93,24 @@ def _receive(worker: Connection) -> Any:  # noqa: ANN401 - any product
 
 
 @contextmanager
-def _worker(work: Callable[[Any], Any], context: SpawnContext) -> Iterator[Any]:
+def _worker(
+    work: Callable[[Any], Any], context: SpawnContext, watch: Callable[[int], None]
+) -> Iterator[Any]:
     """A process that works until the block ends; yields the connection to it."""
     ours, theirs = context.Pipe()
-    is_loaded = context.Event()
-    process = context.Process(target=_serve, args=(work, theirs, is_loaded), daemon=True)
+    process = context.Process(target=_serve, args=(work, theirs), daemon=True)
     process.start()
     theirs.close()  # so that the process's end is heard
     try:
+        watch(process.ident or 0)
         yield ours
     finally:
-        # Libraries run programs of their own while they load, and complain if they are left.
-        while process.is_alive() and not is_loaded.wait(POLL_S):
-            pass
-        process.terminate()
+        process.kill()
         process.join()
 
 
-def _serve(work: Callable[[Any], Any], connection: Connection, is_loaded: Event) -> None:
+def _serve(work: Callable[[Any], Any], connection: Connection) -> None:
     """A process's life: works until nobody wants it any more."""
-    is_loaded.set()
     with suppress(EOFError, ConnectionError):
         while True:
             piece = connection.recv()
@@ -117,12 +124,12 @@ def _serve(work: Callable[[Any], Any], connection: Connection, is_loaded: Event)
 @contextmanager
 def _shielded() -> Iterator[None]:
     """Processes started within it hear no Ctrl-C, even as they load, and start no more threads."""
-    handler, before = signal.signal(signal.SIGINT, signal.SIG_IGN), dict(os.environ)
-    os.environ.update(ONE_THREAD)
+    mask, before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS), dict(os.environ)
+    os.environ.update(SURROUNDINGS)
     try:
         yield
     finally:
-        for name in ONE_THREAD.keys() - before.keys():
+        for name in SURROUNDINGS.keys() - before.keys():
             del os.environ[name]
         os.environ.update(before)
-        signal.signal(signal.SIGINT, handler)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)

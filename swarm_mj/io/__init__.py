@@ -1,1 +1,1 @@
-"""Files that appear whole, and where numbers come from."""
+"""Files that appear whole, processes and signals, and where numbers come from."""

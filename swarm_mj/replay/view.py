@@ -2,11 +2,25 @@
 
 import os
 import socket
-import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
+from swarm_mj.io.processes import running
+
 LOOPBACK = "127.0.0.1"
+# Light, unlike `python -m rerun`; and unlike `python -m rerun_cli` it tells the exit code.
+START = "import sys; from rerun_cli.__main__ import main; sys.exit(main())"
+VIEWER = (sys.executable, "-c", START)
+NOWHERE = f"http://{LOOPBACK}:9"  # a proxy that is not there
+# With CI set rerun does not count its users; its search for newer versions has no switch.
+REPLACED = ("CI", "FORCE_RERUN_ANALYTICS", "ALL_PROXY", "HTTPS_PROXY", "HTTP_PROXY", "NO_PROXY")
+
+
+def quiet_environment() -> dict[str, str]:
+    """This process's environment, in which rerun's viewer reaches this machine only."""
+    kept = {name: value for name, value in os.environ.items() if name.upper() not in REPLACED}
+    return kept | {"CI": "true", "ALL_PROXY": NOWHERE}
 
 
 def view_command(path: Path) -> list[str]:
@@ -21,33 +35,34 @@ def view_command(path: Path) -> list[str]:
             "there is no display (DISPLAY and WAYLAND_DISPLAY are unset); use "
             "`swarm-mj replay --web FILE`, or tools/picture.py for a picture"
         )
-    return [sys.executable, "-m", "rerun", str(path)]
+    return [*VIEWER, str(path)]
 
 
 def serve_command(path: Path) -> tuple[list[str], str]:
     """The command that serves a replay to this machine's browsers only, and the address to open."""
-    data_port, page_port = _free_ports()
+    data_port, page_port = free_ports(2)
     command = [
-        *(sys.executable, "-m", "rerun", "--serve-web", "--bind", LOOPBACK),
+        *(*VIEWER, "--serve-web", "--bind", LOOPBACK),
         *("--port", str(data_port), "--web-viewer-port", str(page_port), str(path)),
     ]
     source = f"rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{data_port}%2Fproxy"
-    return command, f"http://{LOOPBACK}:{page_port}/?url={source}"
+    # As in a notebook, the page counts no users.
+    return command, f"http://{LOOPBACK}:{page_port}/?url={source}&notebook=1"
 
 
 def run(command: list[str]) -> int:
     """Runs a viewer until it is closed; returns its exit code, 0 after Ctrl-C."""
-    viewer = subprocess.Popen(command)
     try:
-        return viewer.wait()
+        with running(command, environment=quiet_environment()) as viewer:
+            return viewer.wait()
     except KeyboardInterrupt:
-        viewer.terminate()
-        viewer.wait()
         return 0
 
 
-def _free_ports() -> tuple[int, int]:
-    with socket.socket() as first, socket.socket() as second:
-        first.bind((LOOPBACK, 0))
-        second.bind((LOOPBACK, 0))
-        return first.getsockname()[1], second.getsockname()[1]
+def free_ports(number: int) -> list[int]:
+    """Ports of this machine that nobody listens on."""
+    with ExitStack() as stack:
+        sockets = [stack.enter_context(socket.socket()) for _ in range(number)]
+        for each in sockets:
+            each.bind((LOOPBACK, 0))
+        return [each.getsockname()[1] for each in sockets]

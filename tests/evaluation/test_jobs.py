@@ -7,7 +7,8 @@ import time
 
 import pytest
 
-from swarm_mj.evaluation.jobs import ONE_THREAD, run_jobs
+from swarm_mj.evaluation.jobs import SURROUNDINGS, run_jobs
+from swarm_mj.io.interrupt import INTERRUPTS
 
 
 def square(piece):
@@ -35,7 +36,9 @@ def die_if(piece):
 
 
 def surroundings(_piece):
-    return signal.getsignal(signal.SIGINT), {name: os.environ.get(name) for name in ONE_THREAD}
+    for number in INTERRUPTS:
+        signal.raise_signal(number)
+    return {name: os.environ.get(name) for name in SURROUNDINGS}
 
 
 def num_threads(_piece):
@@ -88,8 +91,9 @@ def test_jobs_hear_no_ctrl_c_and_start_no_threads(monkeypatch):
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
     before = dict(os.environ)
     found = [product for _, product in run_jobs(surroundings, range(2), 2)]
-    assert found == [(signal.SIG_IGN, ONE_THREAD)] * 2
+    assert found == [SURROUNDINGS] * 2
     assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
+    assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == set()
     assert dict(os.environ) == before
 
 

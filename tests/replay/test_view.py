@@ -1,5 +1,6 @@
 """Opening replays: in a window where there is a display, else to a browser on this machine."""
 
+import os
 import subprocess
 import sys
 import urllib.request
@@ -7,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from swarm_mj.replay.view import LOOPBACK, run, serve_command, view_command
+from swarm_mj.replay.view import LOOPBACK, quiet_environment, run, serve_command, view_command
 
 FILE = Path("some where") / "mission.rrd"
 
@@ -31,15 +32,23 @@ def test_the_browser_s_server_binds_to_loopback_only():
     assert ports[0] in address
 
 
+def test_a_viewer_s_way_out_of_this_machine_is_closed(monkeypatch):
+    monkeypatch.setenv("https_proxy", "http://elsewhere:80")
+    monkeypatch.setenv("NO_PROXY", "*")
+    environment = quiet_environment()
+    proxies = {name: value for name, value in environment.items() if "PROXY" in name.upper()}
+    assert proxies == {"ALL_PROXY": "http://127.0.0.1:9"}
+    assert environment["CI"]
+    assert environment["PATH"] == os.environ["PATH"]
+
+
 def test_a_viewer_s_exit_code_is_ours():
     assert run([sys.executable, "-c", "raise SystemExit(3)"]) == 3
 
 
 def test_the_page_is_served(replay):
     command = [sys.executable, "-m", "swarm_mj", "replay", "--web", str(replay)]
-    server = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
-    )
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:
         address = ""
         for line in server.stdout:
@@ -50,5 +59,6 @@ def test_the_page_is_served(replay):
             assert page.status == 200
             assert b"rerun" in page.read().lower()
     finally:
-        subprocess.run(["pkill", "-TERM", "-g", str(server.pid)], check=False)
+        server.terminate()
         server.communicate(timeout=30)
+    assert server.returncode == 0

@@ -1,0 +1,64 @@
+"""Ctrl-C as a wish that work honours at its next whole step; SIGTERM and a hang-up are the same."""
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from types import FrameType
+
+INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Within it SIGTERM and a hang-up interrupt as Ctrl-C does, if they would end the process."""
+    heard = [number for number in INTERRUPTS if signal.getsignal(number) == signal.SIG_DFL]
+    for number in heard:
+        signal.signal(number, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for number in heard:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def deferred_interrupt() -> AbstractContextManager[Callable[[], bool]]:
+    """Within it the first Ctrl-C is only noted; a second one interrupts at once, as ever.
+
+    It yields whether Ctrl-C was pressed.
+    """
+    return _noted(is_deferred=True)
+
+
+def heard_interrupt() -> AbstractContextManager[Callable[[], bool]]:
+    """Within it Ctrl-C interrupts at once, as ever, but is noted, should a library swallow it.
+
+    An exception is lost if it comes while compiled code calls back into Python, as it does while
+    numba loads kernels. It yields whether Ctrl-C was pressed.
+    """
+    return _noted(is_deferred=False)
+
+
+@contextmanager
+def _noted(*, is_deferred: bool) -> Iterator[Callable[[], bool]]:
+    """Notes Ctrl-C; interrupts, too, unless it is the first and deferred.
+
+    A terminal that is closed hangs up more than once, so a hang-up is never the second.
+    """
+    was_pressed = False
+
+    def note(number: int, frame: FrameType | None) -> None:
+        nonlocal was_pressed
+        is_first, was_pressed = not was_pressed, True
+        if not (is_deferred and (is_first or number == signal.SIGHUP)):
+            signal.default_int_handler(number, frame)
+
+    before = {number: signal.getsignal(number) for number in INTERRUPTS}
+    # A job that its shell shields from Ctrl-C, or `nohup` from hang-ups, stays so.
+    heard = {number: handler for number, handler in before.items() if handler != signal.SIG_IGN}
+    for number in heard:
+        signal.signal(number, note)
+    try:
+        yield lambda: was_pressed
+    finally:
+        for number, handler in heard.items():
+            signal.signal(number, handler)

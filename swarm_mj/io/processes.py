@@ -1,0 +1,81 @@
+"""Processes that end when the one that started them ends, even if that one is killed."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from typing import IO
+
+# Reads until its pipe is closed: the kernel does so when the one who writes has ended.
+GUARD = """
+import os, signal, sys
+for number in [int(line) for line in sys.stdin]:
+    try:
+        os.kill(number, signal.SIGKILL)
+    except ProcessLookupError:
+        pass
+"""
+# Waits for its guard to know it; is gone if nobody is left to say so.
+GATE = 'read -r go && exec "$@"'
+
+
+@contextmanager
+def guard() -> Iterator[Callable[[int], None]]:
+    """A process that kills others, computing or not, if this one ends within the block.
+
+    Yields:
+        Takes the number of a process to be guarded, or minus that of a group. Processes that the
+        block is left with are its own to end.
+    """
+    command = [sys.executable, "-I", "-S", "-c", GUARD]
+    # A session of its own: what ends a terminal's processes does not end it.
+    with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True) as process:
+        assert process.stdin is not None
+
+        def watch(number: int) -> None:
+            assert process.stdin is not None
+            process.stdin.write(b"%d\n" % number)
+            process.stdin.flush()
+
+        try:
+            yield watch
+        finally:
+            process.kill()
+
+
+@contextmanager
+def running(
+    command: Sequence[str],
+    *,
+    environment: Mapping[str, str] | None = None,
+    output: IO[str] | None = None,
+) -> Iterator[subprocess.Popen[bytes]]:
+    """A program that ends, with all that it started, when the block or this process does.
+
+    Args:
+        command: The program and its arguments.
+        environment: Its variables; None is this process's.
+        output: Where all that it says goes; None is where this process's goes.
+    """
+    with (
+        guard() as watch,
+        subprocess.Popen(
+            ["sh", "-c", GATE, "sh", *command],
+            stdin=subprocess.PIPE,
+            stdout=output,
+            stderr=output,
+            env=environment,
+            start_new_session=True,
+        ) as process,
+    ):
+        assert process.stdin is not None
+        try:
+            watch(-process.pid)
+            process.stdin.write(b"go\n")
+            process.stdin.close()
+            yield process
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)

@@ -1,0 +1,68 @@
+"""What a program that was ended leaves running, by a mark in its environment that all inherit."""
+
+import os
+import signal
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+MARK = "SWARM_MJ_TEST_MARK"
+LIMIT_S = 3.0  # in which all must have ended
+SLACK_S = 3.0  # for machines that are shared
+
+needs_proc = pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="needs Linux")
+
+
+def left_over(mark):
+    """The processes with a mark, by their numbers."""
+    found = {}
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            is_marked = f"{MARK}={mark}".encode() in (process / "environ").read_bytes().split(b"\0")
+            if is_marked and (process / "stat").read_text().rpartition(")")[2].split()[0] != "Z":
+                found[int(process.name)] = (process / "cmdline").read_bytes().replace(b"\0", b" ")
+        except OSError:  # it has just ended
+            continue
+    return found
+
+
+def left_after_limit(mark):
+    """The processes with a mark once those that ought to end have had their time; ends them."""
+    deadline = time.monotonic() + LIMIT_S + SLACK_S
+    while (found := left_over(mark)) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    for number in found:
+        with suppress(ProcessLookupError):
+            os.kill(number, signal.SIGKILL)
+    return found
+
+
+# Runs `swarm-mj`, or a program by its path, and sends it signals after some time.
+SIGNALLED = f"""
+import os, runpy, signal, sys, threading
+if __name__ == "__main__":  # jobs import it
+    mark, numbers, delay, program = sys.argv[1:5]
+    os.environ["{MARK}"] = mark
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
+    def send():
+        for number in map(int, numbers.split()):
+            os.kill(os.getpid(), number)
+    timer = threading.Timer(float(delay), send)
+    timer.daemon = True
+    timer.start()
+    sys.argv = sys.argv[4:]
+    is_file = program.endswith(".py")
+    run = runpy.run_path if is_file else runpy.run_module
+    run(program, run_name="__main__")
+"""
+
+
+def signalled(forks, folder, numbers, delay_s, program, *arguments):
+    """Runs a program that is sent signals; returns it, finished, and its mark."""
+    script = folder / "signalled.py"
+    script.write_text(SIGNALLED)
+    mark = f"{os.getpid()}-{time.monotonic_ns()}"
+    sent = " ".join(str(int(number)) for number in numbers)
+    return forks.run(folder, script, mark, sent, delay_s, program, *arguments), mark

@@ -1,0 +1,205 @@
+"""Whatever a program starts ends with it, however the program ends, and sends nothing anywhere."""
+
+import json
+import random
+import re
+import signal
+import socket
+import sys
+import threading
+import urllib.request
+from pathlib import Path
+
+import pytest
+from left_over import left_after_limit, needs_proc, signalled
+from tries import tries
+
+from swarm_mj.io.processes import running
+from swarm_mj.replay.view import quiet_environment, serve_command
+
+ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL)
+ROOT = Path(__file__).parent.parent.parent
+HAS_VULKAN = any(Path("/usr/share/vulkan/icd.d").glob("*.json"))
+
+# Two processes that compute for half a minute without letting another thread of theirs run.
+BUSY = '''"""Computes."""
+import sys
+from dataclasses import dataclass
+from swarm_mj.cli import script
+from swarm_mj.evaluation.jobs import run_jobs
+@dataclass
+class Options:
+    pass
+def busy(piece):
+    return sum(range(10**9))
+if __name__ == "__main__":
+    sys.exit(script(Options, lambda _: len(list(run_jobs(busy, [1, 2], 2)))))
+'''
+
+
+@pytest.fixture(scope="module")
+def replay(forks, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("replay")
+    flown = forks.run(
+        folder, "swarm_mj", "fly", "--robots", 5, "--windows", 20, "--record", "a.rrd"
+    )
+    assert flown.returncode == 0, flown.stderr
+    return folder / "a.rrd"
+
+
+@needs_proc
+@pytest.mark.fault("orphans of killed programs")
+@pytest.mark.parametrize("end", ENDS)
+def test_jobs_that_compute_end_with_their_parent(forks, tmp_path, record_property, end):
+    """Fault 6."""
+    program = tmp_path / "busy.py"
+    program.write_text(BUSY)
+    rng, num_tries = random.Random(end), tries(2)
+    for _ in range(num_tries):
+        done, mark = signalled(forks, tmp_path, [end], rng.uniform(0.0, 1.0), program)
+        assert done.returncode == (-end if end == signal.SIGKILL else 130), done.stderr
+        assert left_after_limit(mark) == {}
+        assert "Traceback" not in done.stderr
+    record_property("tries", num_tries)
+
+
+@needs_proc
+@pytest.mark.fault("orphans of killed programs")
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGKILL])
+def test_an_evaluation_s_jobs_end_with_it(forks, tmp_path, record_property, end):
+    """Fault 6, as it was found."""
+    rng, num_tries = random.Random(end), tries(1)
+    for _ in range(num_tries):
+        done, mark = signalled(
+            forks, tmp_path, [end], rng.uniform(0.1, 4.0), "swarm_mj",
+            "evaluate", "--policy", "planner", "tdma", "--jobs", 2, "--episodes", 1000,
+        )  # fmt: skip
+        assert done.returncode == (-end if end == signal.SIGKILL else 130), done.stderr
+        assert left_after_limit(mark) == {}
+        assert "Traceback" not in done.stderr
+    record_property("tries", num_tries)
+
+
+@needs_proc
+@pytest.mark.fault("orphans of killed programs")
+@pytest.mark.parametrize("end", ENDS)
+def test_the_server_of_a_replay_ends_with_it(forks, replay, tmp_path, record_property, end):
+    """Fault 5: and its ports are free again."""
+    rng, num_tries = random.Random(end), tries(1)
+    for _ in range(num_tries):
+        done, mark = signalled(
+            forks, tmp_path, [end], rng.uniform(0.0, 2.0), "swarm_mj", "replay", "--web", replay
+        )
+        assert done.returncode in ({-end} if end == signal.SIGKILL else {0, 130}), done.stderr
+        assert left_after_limit(mark) == {}
+        for port in re.findall(r"127\.0\.0\.1(?::|%3A)(\d+)", done.stdout):
+            with socket.socket() as free:
+                free.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                free.bind(("127.0.0.1", int(port)))
+    record_property("tries", num_tries)
+
+
+@needs_proc
+@pytest.mark.skipif(not HAS_VULKAN, reason="no Vulkan driver on this machine")
+@pytest.mark.fault("orphans of killed programs")
+def test_a_picture_s_viewer_ends_with_it(forks, replay, tmp_path, record_property):
+    """Fault 5, of tools/picture.py."""
+    rng, num_tries = random.Random(5), tries(1)
+    for _ in range(num_tries):
+        tool, delay_s = ROOT / "tools" / "picture.py", rng.uniform(2.0, 6.0)
+        done, mark = signalled(forks, tmp_path, [signal.SIGKILL], delay_s, tool, replay)
+        assert done.returncode == -signal.SIGKILL, done.stderr
+        assert left_after_limit(mark) == {}
+    assert not (tmp_path / "replay.png").exists()
+    record_property("tries", num_tries)
+
+
+@pytest.fixture
+def asked():
+    """A proxy that refuses all: yields its address, and what it has been asked for."""
+    lines = []
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve():
+            while True:
+                try:
+                    connection = server.accept()[0]
+                except OSError:
+                    return
+                with connection:
+                    lines.append(connection.recv(4096).split(b"\r\n")[0].decode())
+
+        threading.Thread(target=serve, daemon=True).start()
+        yield f"http://127.0.0.1:{server.getsockname()[1]}", lines
+        server.shutdown(socket.SHUT_RDWR)
+
+
+@pytest.mark.fault("telemetry of dependencies")
+def test_a_server_tells_nobody_that_it_is_used(replay, tmp_path, monkeypatch, asked):
+    """Fault 4: it would, to a user who has run rerun before, once its page is opened."""
+    proxy, lines = asked
+    monkeypatch.setenv("FORCE_RERUN_ANALYTICS", "1")
+    config = tmp_path / "rerun" / "analytics.json"
+    config.parent.mkdir()
+    config.write_text(
+        json.dumps(
+            {
+                "analytics_enabled": True,
+                "analytics_id": "0",
+                "config_file_path": str(config),
+                "data_dir_path": str(tmp_path / "data"),
+            }
+        )
+    )
+    command, address = serve_command(replay)
+    environment = quiet_environment() | {"XDG_CONFIG_HOME": str(tmp_path), "ALL_PROXY": proxy}
+    with running(command, environment=environment) as server:
+        wait_for(address)
+        with urllib.request.urlopen(address.partition("?")[0] + "re_viewer_bg.wasm") as page:
+            assert page.status == 200
+        with pytest.raises(Exception, match="timed out"):
+            server.wait(timeout=4.0)  # it sends every other second
+    assert lines == []
+
+
+def wait_for(address):
+    """Waits until a page is served."""
+    for _ in range(600):
+        try:
+            urllib.request.urlopen(address).close()
+            return
+        except OSError:
+            threading.Event().wait(0.05)
+    raise AssertionError(f"nothing is served at {address}")
+
+
+@pytest.mark.fault("jobs beyond the machine")
+@pytest.mark.parametrize(
+    ("program", "arguments"),
+    [
+        ("swarm_mj", ("evaluate",)),
+        ("swarm_mj", ("bench", "--episodes", 0)),
+        ("tools/reference_policy.py", ("weights.npz",)),
+        ("training/paper_figures.py", ()),
+        ("training/robustness.py", ()),
+        ("training/shipped_gnn.py", ()),
+    ],
+)
+def test_no_program_takes_0_jobs(forks, tmp_path, program, arguments):
+    """Fault 20: it was unchecked where nothing was left to do."""
+    path = ROOT / program if program.endswith(".py") else program
+    done = forks.run(tmp_path, path, *arguments, "--jobs", 0)
+    assert done.returncode == 2
+    assert done.stderr.strip().endswith("jobs must be a whole number from 1 to 256, not 0")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.fault("jobs beyond the machine")
+def test_more_jobs_than_cores_are_told(forks, tmp_path):
+    """Fault 8: 256 jobs on two cores."""
+    small = ("--policy", "tdma", "--robots", 5, "--windows", 5, "--episodes", 1)
+    done = forks.run(tmp_path, "swarm_mj", "evaluate", *small, "--jobs", 256)
+    assert done.returncode == 0, done.stderr
+    (told,) = [line for line in done.stderr.splitlines() if "cores" in line]
+    assert told.startswith("256 jobs share ")
+    assert sys.platform != "linux" or "cost memory and save no time" in told
