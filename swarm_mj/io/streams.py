@@ -36,6 +36,8 @@ def _lasting(stream: Any) -> Any:  # noqa: ANN401 - a test's stream is of any ki
     try:
         file = io.BufferedWriter(_LastingFile(stream.fileno(), "wb", closefd=False))
     except (AttributeError, OSError):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
         return stream
     return io.TextIOWrapper(file, encoding=stream.encoding, errors="replace", line_buffering=True)
 

@@ -11,8 +11,8 @@ from swarm_mj.io.processes import guard, running
 # Starts a child of its own, says that it has, and waits for it.
 FAMILY = """
 import subprocess, sys
-child = subprocess.Popen([sys.executable, "-c", "print('up', flush=True); input()"])
-sys.exit(child.wait())
+child = "import time; print('up', flush=True); time.sleep(600)"
+sys.exit(subprocess.call([sys.executable, "-c", child]))
 """
 
 
