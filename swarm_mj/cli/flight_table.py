@@ -45,12 +45,9 @@ def flight_table(title: str, mission: Mission, numbers: dict[str, Any], wall_s: 
         "packets carry": _payload(numbers["payload"]),
         "who decides": decider if numbers["is_centralised"] else "each robot by itself",
         **({} if mission.task == "stationary" else _velocities(mission, numbers)),
-        **(
-            {"robots switched off half-way": f"{num_off}; not counted from then on"}
-            if num_off
-            else {}
-        ),
     }
+    if num_off:
+        rows["robots switched off half-way"] = f"{num_off}; not counted from then on"
     return named_values(title, rows, caption=AGE)
 
 

@@ -17,7 +17,7 @@ from swarm_mj.protocol.buffers import NEVER, Buffers
 class Motion(Protocol):
     """What the robots' controllers want in the next window."""
 
-    def __call__(self, buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N 2"]:
+    def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N 2"]:
         """The accelerations u [m/s²]; row [b, i] may use buffer and body [b, i] only."""
         ...
 
@@ -47,7 +47,7 @@ def initial_velocity(mission: Mission, rng: np.random.Generator) -> Float[np.nda
     return rng.uniform(-limit, limit, size=(mission.num_robots, 2))
 
 
-def stand(buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N 2"]:  # noqa: ARG001 - a Motion
+def stand(_buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N 2"]:
     """No acceleration."""
     return np.zeros_like(states.velocity_mps)
 
@@ -59,11 +59,7 @@ class RandomWalk:
         self._limit_mps2 = mission.max_acceleration_mps2
         self._stream = Stream(rngs, normal, (mission.num_robots, 2))
 
-    def __call__(
-        self,
-        buffers: Buffers,  # noqa: ARG002 - a Motion
-        states: RobotStates,  # noqa: ARG002 - a Motion
-    ) -> Float[np.ndarray, "B N 2"]:
+    def __call__(self, _buffers: Buffers, _states: RobotStates) -> Float[np.ndarray, "B N 2"]:
         """The next accelerations [m/s²]."""
         acceleration = self._stream.next() * (self._limit_mps2 / 3.0)
         return np.clip(acceleration, -self._limit_mps2, self._limit_mps2)

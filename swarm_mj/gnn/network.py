@@ -77,11 +77,11 @@ class Core(Perceptrons):
 class LinearCore(nn.Module):
     """The linear updates: edges copy their senders, nodes keep the mean, so GN(v) = A v."""
 
-    def update_edge(self, edge: Tensor, receiver: Tensor, sender: Tensor) -> Tensor:  # noqa: ARG002
+    def update_edge(self, _edge: Tensor, _receiver: Tensor, sender: Tensor) -> Tensor:
         """The sender."""
         return sender
 
-    def update_node(self, mean: Tensor, node: Tensor) -> Tensor:  # noqa: ARG002
+    def update_node(self, mean: Tensor, _node: Tensor) -> Tensor:
         """The mean."""
         return mean
 

@@ -96,7 +96,7 @@ class MissionsEnv(VecEnv):
         """The attribute of this object, once per environment."""
         return [getattr(self, attr_name) for _ in self._get_indices(indices)]
 
-    def set_attr(self, attr_name: str, value: object, indices: VecEnvIndices = None) -> None:  # noqa: ARG002 - VecEnv's
+    def set_attr(self, attr_name: str, *_: object, **__: object) -> None:
         """Environments have no attributes of their own; raises AttributeError."""
         raise AttributeError(f"no environment has its own {attr_name}")
 
