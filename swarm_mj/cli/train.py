@@ -1,6 +1,5 @@
 """`swarm-mj train`: trains a communication policy by PPO in simulated missions."""
 
-import math
 import os
 import shlex
 from dataclasses import dataclass, replace
@@ -22,14 +21,19 @@ from swarm_mj.cli.train_settings import (
     given_settings,
     refuse_others,
 )
-from swarm_mj.fields import setting
+from swarm_mj.fields import same_as, setting
 from swarm_mj.io.interrupt import deferred_interrupt
-from swarm_mj.learning.run_folder import SETTINGS, Limits, Progress, Run, check_new, read_run
+from swarm_mj.learning.run_folder import (
+    BUDGETS,
+    SETTINGS,
+    Limits,
+    Progress,
+    Run,
+    check_new,
+    read_run,
+)
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.stored import read_policy
-
-BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's way
-MANY_DECISIONS = 10**12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,23 +47,9 @@ class Options:
     )
     out: Path = setting(help="the run's folder", metavar="runs/NAME")
     resume: bool = setting(False, "go on with the run in OUT")
-    budget: int | None = setting(
-        None,
-        "stop after so many decisions of teams, in all",
-        low=1,
-        high=MANY_DECISIONS,
-        shown=f"{BUDGETS['robot']}, team: {BUDGETS['team']}; none with --minutes",
-    )
-    minutes: float | None = setting(
-        None, "stop after so long, in all, evaluations included; above 0"
-    )
-    replay_every: int | None = setting(
-        None,
-        "record the first held-out mission in OUT/replays whenever so many decisions are made",
-        label="replay-every",
-        low=1,
-        high=MANY_DECISIONS,
-    )
+    budget: int | None = same_as(Limits, "decisions")
+    minutes: float | None = same_as(Limits, "minutes")
+    replay_every: int | None = same_as(Limits, "replay_every")
     init: Path | None = setting(None, "begin with a stored policy", metavar="POLICY")
     settings: dict[str, Any] = nested(add_setting_options, given_settings)
     typed: tuple[str, ...] = ()
@@ -119,16 +109,9 @@ def _new_run(options: Options) -> Run:
 
 
 def asked_limits(limits: Limits, options: Options) -> Limits:
-    """When a run stops: as before, or usual, unless the options say otherwise.
-
-    Raises:
-        ValueError: The time is no positive number.
-    """
-    minutes = options.minutes
-    if minutes is not None and not (minutes > 0.0 and math.isfinite(minutes)):
-        raise ValueError(f"minutes must be a number above 0, not {minutes:g}")
-    if options.budget is not None or minutes is not None:
-        limits = replace(limits, decisions=options.budget, minutes=minutes)
+    """When a run stops: as before, or usual, unless the options say otherwise."""
+    if options.budget is not None or options.minutes is not None:
+        limits = replace(limits, decisions=options.budget, minutes=options.minutes)
     if options.replay_every is not None:
         limits = replace(limits, replay_every=options.replay_every)
     return limits

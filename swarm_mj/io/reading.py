@@ -72,7 +72,7 @@ def read_json(text: bytes | str, kind: type[Kind]) -> Kind:
     Raises:
         ValueError: It is no JSON, is nested too deep, or is not of the kind.
     """
-    return _decoded(text, kind, bases=())
+    return read_plain(_plain(text), kind)
 
 
 def read_document(text: bytes | str, name: str, version: int, kind: type[Kind]) -> Kind:
@@ -81,7 +81,8 @@ def read_document(text: bytes | str, name: str, version: int, kind: type[Kind]) 
     Raises:
         ValueError: It has another format, or a newer version of it; else as `read_json`.
     """
-    header = _decoded(text, _Header, bases=())
+    document = _plain(text)
+    header = read_plain(document, _Header)
     if header.format != name:
         raise ValueError(f'its format must be "{name}", not {header.format!r:.40}')
     if header.format_version > version:
@@ -89,7 +90,20 @@ def read_document(text: bytes | str, name: str, version: int, kind: type[Kind]) 
             f"its format_version is {header.format_version}, and this swarm_mj reads {version}; "
             "update it"
         )
-    return _decoded(text, kind, bases=(_Header,))
+    return read_plain(document, kind, bases=(_Header,))
+
+
+def read_plain(value: object, kind: type[Kind], bases: tuple[type, ...] = ()) -> Kind:
+    """Numbers, texts, lists and dicts as a dataclass, or another type that msgspec knows.
+
+    Raises:
+        ValueError: They are not of the kind.
+    """
+    try:
+        found = msgspec.convert(value, _strict(kind, bases), dec_hook=_made)
+        return msgspec.convert(found, kind, from_attributes=True, dec_hook=_made)
+    except msgspec.ValidationError as error:
+        raise ValueError(_in_a_line(error)) from error
 
 
 class _Header(msgspec.Struct):
@@ -99,15 +113,27 @@ class _Header(msgspec.Struct):
     format_version: Annotated[int, msgspec.Meta(ge=1)]
 
 
-def _decoded(text: bytes | str, kind: type[Kind], bases: tuple[type, ...]) -> Kind:
+def _plain(text: bytes | str) -> object:
+    """What is in a text of JSON, which is not nested without end."""
     try:
-        found = msgspec.json.decode(text, type=_strict(kind, bases))
-        _check_levels([msgspec.json.decode(text)])
-        return msgspec.convert(found, kind, from_attributes=True)
+        value = msgspec.json.decode(text)
+        _check_levels([value])
     except RecursionError as error:
         raise ValueError("it is nested too deep") from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise ValueError(" ".join(str(error)[:MOST_WORDS].split())) from error
+        raise ValueError(_in_a_line(error)) from error
+    return value
+
+
+def _in_a_line(error: Exception) -> str:
+    return " ".join(str(error)[:MOST_WORDS].split())
+
+
+def _made(kind: type[Any], value: object) -> object:
+    """A value of a type that msgspec does not know, such as a path; TypeError unless of a text."""
+    if not isinstance(value, str | kind):
+        raise TypeError(f"Expected `{kind.__name__}`, not {type(value).__name__}")
+    return kind(value)
 
 
 @cache

@@ -14,7 +14,6 @@ from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.learning import checkpoint
 from swarm_mj.learning.actor_critic import GnnActorCritic
-from swarm_mj.learning.checkpoint import missions_of
 from swarm_mj.learning.held_out import HeldOut, evaluate, record_replay
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
@@ -27,6 +26,7 @@ from swarm_mj.learning.run_folder import (
     write_curve,
 )
 from swarm_mj.learning.settings import HELD_OUT_SEED
+from swarm_mj.learning.vec_env import missions_of
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.policies.stored import save_policy
 
@@ -132,6 +132,8 @@ class TrainingCallback(BaseCallback):
         is_new = not progress.curve or progress.curve[-1]["decisions"] < decisions
         is_due = is_new and (is_last or decisions >= progress.next_evaluation)
         if is_due:
+            if not progress.curve:
+                self._save()  # from the first evaluation on, a run without one has lost it
             self._evaluate(decisions)
         every = self._limits.replay_every
         if every and decisions >= progress.next_replay and self._goes_on:
@@ -140,10 +142,13 @@ class TrainingCallback(BaseCallback):
             progress.next_replay = (decisions // every + 1) * every
         is_old = time.monotonic() - self._saved_s >= self._limits.checkpoint_every_s
         if is_old or is_due or is_last or not self._goes_on:
-            self._count_time()
-            kept = self._folder / CHECKPOINT
-            checkpoint.save(kept, self._training, self._ppo, self._rng, progress)
-            self._saved_s = time.monotonic()
+            self._save()
+
+    def _save(self) -> None:
+        self._count_time()
+        kept = self._folder / CHECKPOINT
+        checkpoint.save(kept, self._training, self._ppo, self._rng, self._progress)
+        self._saved_s = time.monotonic()
 
     def _count_time(self) -> None:
         """Moves the time since the last call into the progress."""

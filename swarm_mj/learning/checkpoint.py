@@ -17,12 +17,15 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 from swarm_mj.io.atomic import atomic_write
+from swarm_mj.io.reading import read_file
+from swarm_mj.learning.checkpoint_state import check_state
 from swarm_mj.learning.mission_batch import ActionHistory
-from swarm_mj.learning.run_folder import Accumulator, Progress
+from swarm_mj.learning.run_folder import Progress
 from swarm_mj.learning.settings import Training
-from swarm_mj.learning.vec_env import MissionsEnv
+from swarm_mj.learning.vec_env import missions_of
 
 CHECKPOINT_VERSION = 2
+SPARE_BYTES = 100_000_000  # the curve's, and what else does not depend on the settings
 
 
 def save(
@@ -66,33 +69,36 @@ def load(path: Path, training: Training, model: PPO, rng: np.random.Generator) -
         ValueError: The file is damaged, foreign, of a newer version or of other settings.
         OSError: The file cannot be read.
     """
-    state = _read(path)
+    state = _read(path, _most_bytes(model))
     try:
         if json.loads(state["training"]) != json.loads(json.dumps(asdict(training))):
             raise ValueError("it was made with other settings than the run's")
-        return _restore(state, model, rng)
-    except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
+        progress = check_state(state, model)
+        _restore(state, model, rng)
+    except Exception as error:  # generators of random numbers take states as they please
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ValueError(
-            f"checkpoint {path} is damaged, or another run's ({reason}); begin a new run with "
+            f"checkpoint {path} is damaged, or another run's ({reason:.200}); begin a new run with "
             "another --out"
         ) from error
+    return progress
 
 
-def missions_of(model: PPO) -> MissionsEnv:
-    """The environment inside what may be wrapped around it."""
-    env = model.get_env()
-    inner = env.unwrapped if env is not None else None
-    assert isinstance(inner, MissionsEnv)
-    return inner
+def _most_bytes(model: PPO) -> int:
+    """What a checkpoint of a model takes, and much more for its curve."""
+    weights = 3 * sum(weight.nbytes for weight in model.policy.parameters())  # and Adam's two
+    batches = missions_of(model).batches
+    decisions = sum(b.mission.num_windows * b.num_missions * b.mission.num_robots for b in batches)
+    return 2 * (weights + np.dtype(np.int16).itemsize * decisions) + SPARE_BYTES
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read(path: Path, most_bytes: int) -> dict[str, Any]:
     """Raises ValueError for what is no whole checkpoint of this version."""
-    content = io.BytesIO(path.read_bytes())
+    content = io.BytesIO(read_file(path, "checkpoint", most_bytes, folder=path.parent))
     try:
         with zipfile.ZipFile(content) as archive:
-            if archive.testzip() is not None:
+            is_plain = all(entry.compress_type == zipfile.ZIP_STORED for entry in archive.filelist)
+            if not is_plain or archive.testzip() is not None:
                 raise zipfile.BadZipFile
         content.seek(0)
         state = torch.load(content, map_location="cpu", weights_only=True)
@@ -100,17 +106,18 @@ def _read(path: Path) -> dict[str, Any]:
         raise ValueError(
             f"checkpoint {path} is damaged, or none; begin a new run with another --out"
         ) from error
-    if not isinstance(state, dict) or "version" not in state:
+    version = state.get("version") if isinstance(state, dict) else None
+    if not isinstance(version, int):
         raise ValueError(f"{path} is no checkpoint of swarm-mj train")
-    if state["version"] != CHECKPOINT_VERSION:
+    if version != CHECKPOINT_VERSION:
         raise ValueError(
-            f"checkpoint {path} has version {state['version']!r:.40}, and this swarm_mj reads "
+            f"checkpoint {path} has version {version!r:.40}, and this swarm_mj reads "
             f"{CHECKPOINT_VERSION}; resume with the version that wrote it"
         )
     return state
 
 
-def _restore(state: dict[str, Any], model: PPO, rng: np.random.Generator) -> Progress:
+def _restore(state: dict[str, Any], model: PPO, rng: np.random.Generator) -> None:
     model.set_parameters(state["parameters"], device=model.device)
     model.num_timesteps = state["num_timesteps"]
     model._n_updates = state["num_updates"]
@@ -127,9 +134,6 @@ def _restore(state: dict[str, Any], model: PPO, rng: np.random.Generator) -> Pro
         torch.cuda.set_rng_state(state["cuda_rng"], model.device)
     np.random.set_state(tuple(state["numpy_rng"]))  # noqa: NPY002 - as in `save`
     rng.bit_generator.state = state["seeds_rng"]
-    progress = state["progress"]
-    accumulator = Accumulator(**progress["since_evaluation"])
-    return Progress(**progress | {"since_evaluation": accumulator})
 
 
 def _normaliser_state(model: PPO) -> dict[str, Any] | None:

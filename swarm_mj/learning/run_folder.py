@@ -1,30 +1,67 @@
 """A run's folder: what is where, what was asked for, and how far the run has come."""
 
 import csv
-import json
+import math
+import os
 import shutil
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Annotated
 
-from swarm_mj.io.atomic import atomic_directory, atomic_write, present_folder, write_json
-from swarm_mj.learning.settings import Training, from_json
+from msgspec import Meta
+
+from swarm_mj.fields import check, setting
+from swarm_mj.io.atomic import atomic_write, write_json
+from swarm_mj.io.reading import read_document, read_file
+from swarm_mj.learning.settings import Training
 from swarm_mj.protocol.costs import WindowCosts
 
 SETTINGS, CHECKPOINT, CURVE = "settings.json", "checkpoint.pt", "curve.csv"
 INIT, POLICY, REPLAYS, TENSORBOARD = "init", "policy", "replays", "tensorboard"
 FORMAT = "swarm_mj training run"
 FORMAT_VERSION = 1
+MOST_BYTES = 1_000_000  # of the settings
+MANY_DECISIONS = 10**12
+BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's way
+
+
+# What is allowed where a run's progress is read back.
+Count = Annotated[int, Meta(ge=0, le=2**62)]
+Amount = Annotated[float, Meta(ge=0.0, le=1e30)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """How far a run goes, and what it leaves behind on the way."""
+    """How far a run goes, and what it leaves behind on the way.
 
-    decisions: int | None = None  # team decisions in all sessions together
-    minutes: float | None = None  # in all sessions together, evaluations included
-    replay_every: int | None = None  # team decisions between two replays
-    checkpoint_every_s: float = 10.0  # least time between two checkpoints
+    Raises:
+        ValueError: A number is out of range.
+    """
+
+    decisions: int | None = setting(
+        None,
+        "stop after so many decisions of teams, in all",
+        label="budget",
+        low=1,
+        high=MANY_DECISIONS,
+        shown=f"{BUDGETS['robot']}, team: {BUDGETS['team']}; none with --minutes",
+    )
+    minutes: float | None = setting(
+        None, "stop after so long, in all, evaluations included", low=1e-9, high=1e6
+    )
+    replay_every: int | None = setting(
+        None,
+        "record the first held-out mission in OUT/replays whenever so many decisions are made",
+        label="replay-every",
+        low=1,
+        high=MANY_DECISIONS,
+    )
+    # The least time between two checkpoints.
+    checkpoint_every_s: float = setting(10.0, low=0.0, high=1e6)
+
+    def __post_init__(self) -> None:
+        check(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,11 +78,11 @@ class Run:
 class Accumulator:
     """What the missions in training cost since the last evaluation."""
 
-    seconds: float = 0.0
-    decisions: int = 0  # of teams
-    age_windows: float = 0.0  # summed over the decisions
-    attempted: int = 0  # packets
-    delivered: int = 0
+    seconds: Amount = 0.0
+    decisions: Count = 0  # of teams
+    age_windows: Amount = 0.0  # summed over the decisions
+    attempted: Count = 0  # packets
+    delivered: Count = 0
 
     def add(self, batches: Iterable[WindowCosts]) -> None:
         """Adds a window of all missions, but no time."""
@@ -71,11 +108,11 @@ class Accumulator:
 class Progress:
     """Where a run stands."""
 
-    decisions: int = 0  # of teams, in all sessions
-    minutes: float = 0.0  # in all sessions, evaluations included
-    next_evaluation: int = 0  # team decisions
-    next_replay: int = 0  # team decisions
-    best_objective: float = float("inf")
+    decisions: Count = 0  # of teams, in all sessions
+    minutes: Amount = 0.0  # in all sessions, evaluations included
+    next_evaluation: Count = 0  # team decisions
+    next_replay: Count = 0  # team decisions
+    best_objective: Annotated[float, Meta(ge=0.0)] = math.inf
     curve: list[dict[str, float]] = field(default_factory=list)  # one row an evaluation
     since_evaluation: Accumulator = field(default_factory=Accumulator)
     optimiser: dict[str, float] = field(default_factory=dict)  # what PPO last logged of itself
@@ -110,24 +147,12 @@ def read_run(folder: Path) -> Run:
         OSError: The settings cannot be read.
     """
     path = folder / SETTINGS
-    if not path.is_file():
+    if not os.path.lexists(path):
         raise ValueError(f"{folder} holds no run to go on with; to begin one, leave out --resume")
+    text = read_file(path, "settings", MOST_BYTES, folder=folder)
     try:
-        document = json.loads(path.read_bytes())
-        if not isinstance(document, dict) or document.get("format") != FORMAT:
-            raise ValueError(f'the format must be "{FORMAT}"')
-        if document["format_version"] != FORMAT_VERSION:
-            raise ValueError(
-                f"the format_version is {document['format_version']!r:.40}, and this swarm_mj "
-                f"reads {FORMAT_VERSION}; resume with the version that wrote it"
-            )
-        return Run(
-            training=from_json(document["training"]),
-            limits=Limits(**document["limits"]),
-            command=str(document["command"]),
-            init=None if document["init"] is None else Path(document["init"]),
-        )
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        return read_document(text, FORMAT, FORMAT_VERSION, Run)
+    except ValueError as error:
         raise ValueError(f"settings {path} are damaged, or no run's: {error}") from error
 
 
@@ -143,22 +168,30 @@ def check_new(folder: Path) -> None:
         raise ValueError(
             f"{folder} holds a run; go on with it by --resume, or name another folder by --out"
         )
-    others = sorted(path.name for path in folder.glob("*") if not path.name.endswith(".part"))
+    left = (".part", ".lock")  # by a run that was killed while it began
+    others = sorted(path.name for path in folder.glob("*") if not path.name.endswith(left))
     if others:
         raise ValueError(f"{folder} holds {others[0]}, which is no run's; name another by --out")
 
 
-def own_init(folder: Path, init: Path) -> Path:
-    """A run's own copy of the policy that it begins with, made if it is not there.
+def check_begun(folder: Path) -> None:
+    """Passes if a run that has begun can go on in a folder.
 
     Raises:
-        OSError: The policy cannot be read, or the folder not be written.
+        ValueError: Its checkpoint is lost, or it has links that lead out of the folder, through
+            which others' files would be replaced.
     """
-    own = folder / INIT
-    if not own.exists():
-        with atomic_directory(own) as part:
-            shutil.copytree(present_folder(init), part, dirs_exist_ok=True)
-    return own
+    linked = (path for path in folder.rglob("*") if path.is_symlink())
+    for path in linked:
+        if not Path(os.path.realpath(path)).is_relative_to(folder.resolve()):
+            raise ValueError(f"{path} is a link that leads out of the run; copy what it leads to")
+    kept = folder / CHECKPOINT
+    has_begun = (folder / CURVE).exists() or (folder / POLICY).exists()
+    if has_begun and not kept.exists():
+        raise ValueError(
+            f"{folder} has lost its {CHECKPOINT}, so its run cannot go on; put it back, or begin "
+            "another run in another folder, by --out without --resume"
+        )
 
 
 def remove_parts(folder: Path) -> None:

@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
-from swarm_mj.fields import check, setting
-from swarm_mj.gnn.feature_sets import FEATURE_SETS, num_features
+from swarm_mj.fields import FieldOf, check, setting
+from swarm_mj.gnn.feature_sets import FEATURE_SETS, check_fit, num_features
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.mission import Mission
 
@@ -17,6 +17,18 @@ EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as sp
 MOST_ROBOTS = 200  # a team decision takes robots² nodes
 
 
+def _share(default: float) -> FieldOf:
+    return setting(default, low=0.0, high=1.0)
+
+
+def _positive(default: float) -> FieldOf:
+    return setting(default, low=1e-12, high=1e6)
+
+
+def _count(default: int, most: int) -> FieldOf:
+    return setting(default, low=1, high=most)
+
+
 @dataclass(frozen=True, kw_only=True)
 class PpoSettings:
     """PPO, in stable-baselines3's terms; the defaults are those of credit per robot."""
@@ -24,22 +36,22 @@ class PpoSettings:
     learning_rate: float = setting(
         1e-3, "of Adam, at the start", label="learning rate", low=1e-9, high=1.0
     )
-    decay: float = 0.95  # of the learning rate ...
-    decay_steps: int = 200  # ... in each of so many optimiser steps ...
-    least_share: float = 0.1  # ... but not below this share of it
-    num_steps: int = 32  # windows of each mission in a rollout
-    num_minibatches: int = 10  # that a rollout is shared out to
-    num_epochs: int = 2  # passes over a rollout
+    decay: float = _share(0.95)  # of the learning rate ...
+    decay_steps: int = _count(200, 10**9)  # ... in each of so many optimiser steps ...
+    least_share: float = _share(0.1)  # ... but not below this share of it
+    num_steps: int = _count(32, 100_000)  # windows of each mission in a rollout
+    num_minibatches: int = _count(10, 10**6)  # that a rollout is shared out to
+    num_epochs: int = _count(2, 1000)  # passes over a rollout
     discount: float = setting(
         0.0, "gamma; 0: a packet's credit is that of its own window alone", low=0.0, high=1.0
     )
-    gae_lambda: float = 0.9
-    clip: float = 0.2  # of the probability ratio
+    gae_lambda: float = _share(0.9)
+    clip: float = _positive(0.2)  # of the probability ratio
     clips_value: bool = False  # by the same number
     entropy: float = setting(0.002, "weight of the entropy bonus", low=0.0, high=10.0)
-    value: float = 0.5  # weight of the value's squared error
-    max_gradient_norm: float = 0.5
-    adam_epsilon: float = 1e-6
+    value: float = _share(0.5)  # weight of the value's squared error
+    max_gradient_norm: float = _positive(0.5)
+    adam_epsilon: float = _positive(1e-6)
 
     def __post_init__(self) -> None:
         check(self)
@@ -94,13 +106,15 @@ class Training:
     )
     network: GnnShape = ROBOTS_NETWORK  # that acts
     shares_trunk: bool = True  # whether values come from its last stage but one number
-    silence_logit: float = 7.0  # what silence has ahead, but in a robot's own turn: e^7 to 1
+    silence_logit: float = setting(
+        7.0, low=-100.0, high=100.0
+    )  # what silence has ahead, but in a robot's own turn: e^7 to 1
     reward: Reward = setting(
         "aoi", "the cost to lower; velocity-variance needs --arm team", choices=get_args(Reward)
     )
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)
-    groups: int = 4  # of missions that end at different times
+    groups: int = _count(4, 4096)  # of missions that end at different times
     seed: int = setting(0, "the same seed is the same policy", low=0, high=2**63 - 1)
     evaluate_every: int = setting(
         10_000,
@@ -120,6 +134,9 @@ class Training:
 
     def __post_init__(self) -> None:
         check(self)
+        check_fit(self.network, self.features)
+        if not self.robots:
+            raise ValueError("robots must have at least 1 size")
         if self.arm == "robot" and self.reward != "aoi":
             raise ValueError(f"reward {self.reward} is a team's; choose arm team, or reward aoi")
 
@@ -167,26 +184,3 @@ def _per_team(*, is_reference: bool) -> dict[str, Any]:
         "ppo": TEAM_REFERENCE if is_reference else TEAM_PAPER,
         "missions": 32,
     }
-
-
-def from_json(given: dict[str, Any]) -> Training:
-    """The settings whose `dataclasses.asdict` was written.
-
-    Raises:
-        ValueError: A key is missing or unknown, or a value is outside its range.
-    """
-    try:
-        parts = {
-            "mission": _made(Mission, given["mission"]),
-            "network": _made(GnnShape, given["network"]),
-            "ppo": _made(PpoSettings, given["ppo"]),
-            "robots": tuple(given["robots"]),
-        }
-        return _made(Training, given | parts)
-    except (KeyError, TypeError) as error:
-        raise ValueError(f"not the settings of this version's training runs: {error}") from error
-
-
-def _made(kind: type[Any], given: dict[str, Any]) -> Any:  # noqa: ANN401 - of this kind
-    """A dataclass of values by name; raises KeyError or TypeError unless they are all of them."""
-    return kind(**{spec.name: given[spec.name] for spec in fields(kind)} | given)

@@ -16,27 +16,32 @@ from stable_baselines3.common.buffers import DictRolloutBuffer
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
+from swarm_mj.gnn.network import AggregationGnn
+from swarm_mj.io.owned import owned
 from swarm_mj.learning import checkpoint
 from swarm_mj.learning.active_rollout_buffer import ActiveRolloutBuffer
 from swarm_mj.learning.actor_critic import GnnActorCritic, TeamActorCritic
 from swarm_mj.learning.callback import Listener, Stopped, TrainingCallback
-from swarm_mj.learning.checkpoint import missions_of
 from swarm_mj.learning.mission_batch import make_batches
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
     CURVE,
+    INIT,
+    SETTINGS,
     TENSORBOARD,
+    Limits,
     Progress,
     Run,
+    check_begun,
     check_new,
-    own_init,
     remove_parts,
     write_curve,
     write_run,
 )
 from swarm_mj.learning.settings import PpoSettings, Training
-from swarm_mj.learning.vec_env import RobotEnv, TeamEnv
-from swarm_mj.policies.stored import read_policy
+from swarm_mj.learning.vec_env import RobotEnv, TeamEnv, missions_of
+from swarm_mj.policies.policy_config import PolicyConfig
+from swarm_mj.policies.stored import read_policy, save_policy
 
 NO_BUDGET = 10**15  # team decisions
 
@@ -130,42 +135,63 @@ def train(run: Run, folder: Path, *, listener: Listener, is_resumed: bool = Fals
             or foreign, or training has diverged.
         OSError: The folder cannot be written.
     """
-    if not is_resumed:
+    if is_resumed:
+        check_begun(folder)
+    else:
         check_new(folder)
     model, rng = make_model(run.training)
-    progress = _begun(folder, run, model, rng)
-    model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))
-    callback = TrainingCallback(model, run, folder, progress, rng, listener)
-    env = missions_of(model)
-    wanted = -(-(run.limits.decisions or NO_BUDGET) // env.num_teams) * env.num_envs
-    try:
-        if wanted > model.num_timesteps:
-            model.learn(
-                wanted - model.num_timesteps,
-                callback=callback,
-                log_interval=NO_BUDGET,  # the callback dumps, with team decisions on the axis
-                reset_num_timesteps=model.num_timesteps == 0,
-            )
-        callback.init_callback(model)
-        callback.between_rollouts(is_last=True)
-    except Stopped:
-        pass
-    finally:
-        model.logger.close()
+    with owned(folder / SETTINGS):
+        progress = _begun(folder, run, model, rng)
+        model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))
+        callback = TrainingCallback(model, run, folder, progress, rng, listener)
+        try:
+            _learn(model, run.limits, callback)
+        except Stopped:
+            pass
+        finally:
+            model.logger.close()
     return progress
 
 
+def _learn(model: PPO, limits: Limits, callback: TrainingCallback) -> None:
+    env = missions_of(model)
+    wanted = -(-(limits.decisions or NO_BUDGET) // env.num_teams) * env.num_envs
+    if wanted > model.num_timesteps:
+        model.learn(
+            wanted - model.num_timesteps,
+            callback=callback,
+            log_interval=NO_BUDGET,  # the callback dumps, with team decisions on the axis
+            reset_num_timesteps=model.num_timesteps == 0,
+        )
+    callback.init_callback(model)
+    callback.between_rollouts(is_last=True)
+
+
 def _begun(folder: Path, run: Run, model: PPO, rng: np.random.Generator) -> Progress:
-    """Takes a run to its last checkpoint, or else to its beginning; then it can be resumed."""
-    kept = folder / CHECKPOINT
-    resumed = None
+    """Takes a run to its last checkpoint, or else to its beginning; then it can be resumed.
+
+    Nothing is written before all that is read has been checked.
+    """
+    kept, own, progress, init = folder / CHECKPOINT, folder / INIT, Progress(), None
     if kept.exists():
-        resumed = checkpoint.load(kept, run.training, model, rng)
+        progress = checkpoint.load(kept, run.training, model, rng)
+    elif run.init is not None:
+        init = _read_init(own if own.exists() else run.init, run.training)
     remove_parts(folder)
     write_run(folder, run)
-    if resumed is not None:
-        write_curve(folder / CURVE, resumed.curve)
-    elif run.init is not None:
+    if progress.curve:
+        write_curve(folder / CURVE, progress.curve)
+    if init is not None:
         assert isinstance(model.policy, GnnActorCritic)
-        model.policy.take_acting_network(read_policy(own_init(folder, run.init))[0])
-    return resumed or Progress()
+        model.policy.take_acting_network(init[0])
+        if not own.exists():
+            save_policy(own, *init)
+    return progress
+
+
+def _read_init(path: Path, training: Training) -> tuple[AggregationGnn, PolicyConfig]:
+    """The policy that a run begins with; raises ValueError if its network is not the run's."""
+    network, config = read_policy(path)
+    if config.network != training.network:
+        raise ValueError(f"policy {path} has another network than the run that begins with it")
+    return network, config

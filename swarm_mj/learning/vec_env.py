@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
@@ -178,6 +179,14 @@ class TeamEnv(MissionsEnv):
         if self._reward == "velocity-variance":
             return transition, -transition.costs.velocity_variance_m2ps2
         return transition, -transition.costs.age_windows / batch.mission.num_windows
+
+
+def missions_of(model: PPO) -> MissionsEnv:
+    """A model's environment, inside what may be wrapped around it."""
+    env = model.get_env()
+    inner = env.unwrapped if env is not None else None
+    assert isinstance(inner, MissionsEnv)
+    return inner
 
 
 def padded(graphs: Sequence[Graphs], num_nodes: int) -> Observation:

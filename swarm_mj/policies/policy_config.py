@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from swarm_mj.fields import check, setting
-from swarm_mj.gnn.feature_sets import num_features
+from swarm_mj.gnn.feature_sets import check_fit
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.io.reading import read_document
 
@@ -31,14 +31,7 @@ class PolicyConfig:
 
     def __post_init__(self) -> None:
         check(self)
-        expected = num_features(self.features)
-        if self.network.num_features != expected:
-            raise ValueError(
-                f"network.num_features is {self.network.num_features}, but the {self.features} "
-                f"features are {expected}"
-            )
-        if self.network.num_outputs not in (1, 2):
-            raise ValueError(f"network.num_outputs must be 1 or 2, not {self.network.num_outputs}")
+        check_fit(self.network, self.features)
 
 
 def to_json(config: PolicyConfig) -> str:

@@ -1,15 +1,24 @@
 """Runs that go on: from what is theirs, or not at all, and one process at a time."""
 
+import json
 import os
+import shutil
+from dataclasses import asdict
 
 import pytest
+import torch
 from damage import complaint, damaged, told_or_read
+from small_runs import run, small_training
+from tiny_policies import save_tiny
 
 from swarm_mj.cli import main
 from swarm_mj.evaluation import progress
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.evaluation.study import Study
 from swarm_mj.io.owned import owned
+from swarm_mj.learning import checkpoint
+from swarm_mj.learning.run_folder import CHECKPOINT, SETTINGS, read_run
+from swarm_mj.learning.train import make_model
 from swarm_mj.mission import paper
 
 EVALUATE = ["evaluate", "--policy", "tdma", "--robots", "3", "--windows", "2", "--episodes", "30"]
@@ -105,3 +114,235 @@ def test_crafted_progress_is_refused(evaluate, tmp_path, capsys, content):
     assert "progress" in complaint(capsys, evaluate(1000, "--resume"))
     assert path.exists()
     assert not (tmp_path / "o.csv").exists()
+
+
+# Training runs.
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    """A run of a few seconds, to copy."""
+    folder = tmp_path_factory.mktemp("run") / "run"
+    run(small_training(), folder, 64)
+    return folder
+
+
+@pytest.fixture
+def begun(trained, tmp_path):
+    """A copy of a run."""
+    return shutil.copytree(trained, tmp_path / "run")
+
+
+def contents(folder):
+    """All that is under a folder, by name."""
+    paths = [path for path in folder.rglob("*") if path.is_symlink() or not path.is_dir()]
+    return {p: p.read_bytes() if p.is_file() else os.lstat(p).st_mtime_ns for p in paths}
+
+
+def resume(folder):
+    return main(["train", "--out", str(folder), "--resume", "--budget", "96"])
+
+
+def refused(folder, capsys, *words):
+    """Passes if a run is refused in one line with these words, and nothing of it is touched."""
+    before = contents(folder)
+    said = complaint(capsys, resume(folder))
+    assert all(word in said for word in words), said
+    assert contents(folder) == before
+
+
+@pytest.mark.fault("what is resumed is one's own")
+@pytest.mark.parametrize("link", [None, "nowhere", "../elsewhere.pt"])
+def test_a_run_without_its_checkpoint_does_not_start_over(begun, capsys, link):
+    """Fault 3: it replaced the policy that it had trained."""
+    (begun / CHECKPOINT).unlink()
+    if link:
+        (begun / CHECKPOINT).symlink_to(link)
+    refused(begun, capsys, CHECKPOINT, "link" if link == "../elsewhere.pt" else "begin another run")
+
+
+@pytest.mark.fault("one output, one process")
+def test_a_second_training_of_one_run_is_refused(begun, capsys):
+    with owned(begun / SETTINGS):
+        refused(begun, capsys, f"is being written by process {os.getpid()}")
+
+
+@pytest.mark.fault("crafted files are refused")
+@pytest.mark.parametrize("name", ["policy", "curve.csv", "replays", "settings.json"])
+def test_a_run_is_not_written_through_links(begun, tmp_path, capsys, name):
+    """Fault 7, and more: a run from elsewhere would have others' files replaced."""
+    shutil.move(begun / name, tmp_path / "mine") if (begun / name).exists() else None
+    (begun / name).symlink_to(tmp_path / "mine")
+    refused(begun, capsys, name, "is a link that leads out")
+
+
+def begin_with(folder, init):
+    """Makes of a run one that has begun with a policy and was killed at once."""
+    for name in (CHECKPOINT, "curve.csv"):
+        (folder / name).unlink()
+    shutil.rmtree(folder / "policy")
+    settings = json.loads((folder / SETTINGS).read_text())
+    (folder / SETTINGS).write_text(json.dumps(settings | {"init": str(init)}))
+
+
+@pytest.mark.fault("crafted files are refused")
+def test_the_policy_a_run_begins_with_is_a_policy_and_no_other_folder(begun, tmp_path, capsys):
+    """Fault 7: the folder was copied with all that its links led to, then refused."""
+    home = tmp_path / "home"
+    home.mkdir()
+    (home / "secret").write_text("x")
+    begin_with(begun, home)
+    refused(begun, capsys, "config.json")
+    (home / "secret").unlink()
+    save_tiny(home)
+    refused(begun, capsys, "has another network than the run")
+    (home / "config.json").rename(home / "elsewhere.json")
+    (home / "config.json").symlink_to(tmp_path / "home" / ".." / "other.json")
+    shutil.copy(home / "elsewhere.json", tmp_path / "other.json")
+    refused(begun, capsys, "is a link that leads out")
+
+
+PPO = [
+    *({"num_steps": value} for value in (0, -1, 10**9, 2.5, "8", None, True)),
+    *({"num_minibatches": value} for value in (0, 10**9)),
+    *({"num_epochs": value} for value in (0, 10**9)),
+    *({name: 1e300} for name in ("clip", "value", "gae_lambda", "decay", "adam_epsilon")),
+    *({name: -1.0} for name in ("clip", "value", "gae_lambda", "decay", "adam_epsilon")),
+    {"decay_steps": 0},
+    {"wings": 2},
+]
+TRAINING = [
+    {"robots": []},
+    {"robots": [4, 10**9]},
+    {"features": "all"},
+    {"silence_logit": 1e300},
+    {"groups": 0},
+    {"groups": 3},
+    {"missions": 0},
+    {"threads": 10**9},
+    {"mission": None},
+    {"network": {}},
+]
+NETWORK = [{"num_features": 7}, {"num_outputs": 9}, {"latent": 10**9}, {"edges": "none"}]
+MISSION = [{"num_robots": 10**9}, {"task": "swim"}, {"range_ratio": 0.0}, {"num_windows": 10**9}]
+LIMITS = [
+    {"decisions": 0},
+    {"decisions": 1.5},
+    {"minutes": -1.0},
+    {"minutes": "inf"},
+    {"checkpoint_every_s": -1.0},
+    {"replay_every": 0},
+]
+WHOLE = [{"init": 5}, {"init": "\0"}, {"command": []}, {"format_version": 2}, {"training": []}]
+
+
+@pytest.mark.fault("crafted files are refused")
+@pytest.mark.parametrize("is_new", [True, False])
+def test_crafted_settings_are_refused(begun, capsys, record_property, is_new):
+    """Fault 22: some were noticed when half the run was rewritten, some never."""
+    if is_new:
+        begin_with(begun, "nothing")
+    sound = json.loads((begun / SETTINGS).read_text()) | {"init": None}
+    parts = {
+        ("training", "ppo"): PPO,
+        ("training",): TRAINING,
+        ("training", "network"): NETWORK,
+        ("training", "mission"): MISSION,
+        ("limits",): LIMITS,
+        (): WHOLE,
+    }
+    changes = [(place, change) for place, its in parts.items() for change in its]
+    for place, change in changes:
+        document = json.loads(json.dumps(sound))
+        part = document
+        for name in place:
+            part = part[name]
+        part.update(change)
+        (begun / SETTINGS).write_text(json.dumps(document))
+        refused(begun, capsys)
+    record_property("tries", len(changes))
+
+
+@pytest.mark.fault("crafted files are refused")
+@pytest.mark.parametrize("name", [SETTINGS, CHECKPOINT])
+def test_a_pipe_is_not_waited_for(begun, capsys, name):
+    """Fault 22."""
+    (begun / name).unlink()
+    os.mkfifo(begun / name)
+    refused(begun, capsys, "is a folder, a pipe or a device")
+
+
+def _step(state):
+    state["parameters"]["policy.optimizer"]["state"][0]["step"].fill_(-1.0)
+
+
+def _weights(state):
+    next(iter(state["parameters"]["policy"].values())).fill_(float("nan"))
+
+
+CRAFTED_STATES = [
+    _step,
+    _weights,
+    lambda s: s.clear(),
+    lambda s: s.update(parameters={"policy": {}, "policy.optimizer": {}}),
+    lambda s: s["parameters"]["policy.optimizer"]["state"][0].update(exp_avg=torch.zeros(3)),
+    lambda s: s["parameters"]["policy.optimizer"]["param_groups"][0].update(betas=1),
+    lambda s: s.update(num_timesteps="many"),
+    lambda s: s.update(num_timesteps=float("nan")),
+    lambda s: s.update(num_updates=-(10**30)),
+    lambda s: s.update(episode_starts=torch.zeros(3)),
+    lambda s: s["histories"][0].update(last_window=10**9),
+    lambda s: s["histories"][0].update(seeds=[-1]),
+    lambda s: s["histories"][0].update(seeds=None),
+    lambda s: s["histories"][-1]["recipients"].fill_(99),
+    lambda s: s["histories"][-1].update(recipients=torch.zeros(1).expand(10**9)),
+    lambda s: s.update(torch_rng=torch.zeros(5056, dtype=torch.uint8)),
+    lambda s: s["numpy_rng"].__setitem__(2, 10**6),
+    lambda s: s["seeds_rng"]["state"].update(state=-1),
+    lambda s: s["seeds_rng"].update(bit_generator="MT19937"),
+    lambda s: s.update(progress=None),
+    lambda s: s["progress"].update(curve=[{}]),
+    lambda s: s["progress"].update(next_evaluation=None),
+    lambda s: s["progress"]["since_evaluation"].update(seconds=float("nan")),
+    lambda s: s["progress"].update(optimiser={"train/entropy": "high"}),
+]
+
+
+@pytest.mark.fault("crafted files are refused")
+def test_crafted_checkpoints_are_refused(begun, capsys, record_property):
+    """Fault 22: some were noticed when the settings and the curve were rewritten."""
+    sound = (begun / CHECKPOINT).read_bytes()
+    for change in CRAFTED_STATES:
+        (begun / CHECKPOINT).write_bytes(sound)
+        state = torch.load(begun / CHECKPOINT, weights_only=True)
+        change(state)
+        torch.save(state, begun / CHECKPOINT)
+        refused(begun, capsys, "checkpoint")
+    record_property("tries", len(CRAFTED_STATES))
+
+
+@pytest.mark.fault("damaged files are told")
+def test_damaged_checkpoints_are_told_or_whole(begun, record_property):
+    """Fault 22: of a zip file's bits, those that say when it was made mean nothing."""
+    training = small_training()
+    model, rng = make_model(training)
+    path, num_tries = begun / CHECKPOINT, 0
+    whole = path.read_bytes()
+    progress = checkpoint.load(path, training, model, rng)
+    for content in damaged(whole):
+        path.write_bytes(content)
+        num_tries += 1
+        read = told_or_read(lambda: checkpoint.load(path, training, model, rng))
+        assert read is None or asdict(read) == asdict(progress)
+    record_property("tries", num_tries)
+
+
+@pytest.mark.fault("damaged files are told")
+def test_damaged_settings_are_told_or_sound(begun, record_property):
+    """Fault 22."""
+    path, num_tries = begun / SETTINGS, 0
+    for content in damaged(path.read_bytes()):
+        path.write_bytes(content)
+        num_tries += 1
+        told_or_read(lambda: read_run(begun))
+    record_property("tries", num_tries)

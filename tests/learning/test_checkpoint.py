@@ -10,6 +10,7 @@ import torch
 from small_runs import run, small_training
 
 from swarm_mj.learning.checkpoint import load, save
+from swarm_mj.learning.checkpoint_state import IN_A_ROW
 from swarm_mj.learning.run_folder import CHECKPOINT, Accumulator, Progress
 from swarm_mj.learning.train import make_model
 
@@ -103,7 +104,7 @@ def test_one_that_lacks_something_is_refused_in_one_line(kept, tmp_path, change)
 
 
 def test_progress_comes_back_to_the_last_bit(tmp_path):
-    row = {"decisions": 10.0, "aoi": 1 / 3, "objective": 0.2}
+    row = dict.fromkeys(sorted(IN_A_ROW), 1 / 3)
     progress = Progress(
         decisions=7,
         minutes=0.1 + 0.2,

@@ -49,7 +49,8 @@ def test_means_are_those_of_the_missions_flown_one_by_one(sizes):
 
 
 def test_eq17_flocks_are_judged_by_their_velocity_variance():
-    training = small_training("team", "flocking", reward="velocity-variance", features="extended")
+    its = {"features": "extended", "network": NETWORK.shape}
+    training = small_training("team", "flocking", reward="velocity-variance", **its)
     found = evaluate(training, NETWORK)
     variance = [
         flown(training, 5, HELD_OUT_SEED + b)[0].velocity_variance_mean[0] for b in range(2)

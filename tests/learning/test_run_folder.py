@@ -8,18 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from small_runs import small_training
-from tiny_policies import save_tiny
 
 from swarm_mj.learning.mission_batch import make_batches
 from swarm_mj.learning.run_folder import (
-    INIT,
+    CHECKPOINT,
+    CURVE,
+    POLICY,
     SETTINGS,
     Accumulator,
     Limits,
     Progress,
     Run,
+    check_begun,
     check_new,
-    own_init,
     read_run,
     remove_parts,
     write_curve,
@@ -68,16 +69,19 @@ def test_what_is_no_settings_is_refused(tmp_path, text):
         (lambda d: d.update(format_version=2), "format_version is 2, and this swarm_mj reads 1"),
         (
             lambda d: d["training"].update(seed="3"),
-            r"(?s)seed.*3",
+            r"Expected `int`, got `str` - at `.*seed`",
         ),
         (
             lambda d: d["training"].update(missions=True),
-            "missions must be a whole number from 1 to 4096, not True",
+            r"Expected `int`, got `bool` - at `.*missions`",
         ),
-        (lambda d: d["training"]["ppo"].update(clip=None), r"(?s)clip.*None"),
+        (
+            lambda d: d["training"]["ppo"].update(clip=None),
+            r"Expected `float`, got `null` - at `.*clip`",
+        ),
         (
             lambda d: d["training"].update(robots=["4"]),
-            r"(?s)robots.*'?4",
+            r"Expected `int`, got `str` - at `.*robots.*`",
         ),
         (lambda d: d["training"].pop("arm"), "arm"),
         (
@@ -126,14 +130,25 @@ def test_what_killed_sessions_left_is_removed_and_nothing_else(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {SETTINGS, ".policy.old", "notes.part"}
 
 
-def test_a_run_keeps_its_own_copy_of_the_policy_it_begins_with(tmp_path):
-    save_tiny(tmp_path / "given")
-    own = own_init(tmp_path / "run", tmp_path / "given")
-    assert own == tmp_path / "run" / INIT
-    before = (own / "model.safetensors").read_bytes()
-    save_tiny(tmp_path / "given", seed=2)
-    assert own_init(tmp_path / "run", tmp_path / "given") == own
-    assert (own / "model.safetensors").read_bytes() == before
+@pytest.mark.parametrize("name", [CURVE, POLICY])
+def test_a_run_that_lost_its_checkpoint_cannot_go_on(tmp_path, name):
+    write_run(tmp_path, RUN)
+    check_begun(tmp_path)  # it was killed before its first
+    (tmp_path / name).mkdir()
+    with pytest.raises(ValueError, match=r"has lost its checkpoint.pt, so its run cannot go on"):
+        check_begun(tmp_path)
+    (tmp_path / CHECKPOINT).touch()
+    check_begun(tmp_path)
+
+
+def test_links_out_of_a_run_are_refused(tmp_path):
+    write_run(tmp_path / "run", RUN)
+    (tmp_path / "run" / "replays").mkdir()
+    (tmp_path / "run" / "alias").symlink_to("replays")
+    check_begun(tmp_path / "run")
+    (tmp_path / "run" / "replays" / "a.rrd").symlink_to(tmp_path / "mine")
+    with pytest.raises(ValueError, match=r"a.rrd is a link that leads out of the run"):
+        check_begun(tmp_path / "run")
 
 
 def test_the_best_is_the_least_objective_and_the_first_of_equals():

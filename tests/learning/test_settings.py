@@ -9,7 +9,8 @@ from small_runs import small_training
 
 from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.network import AggregationGnn
-from swarm_mj.learning.settings import from_json, usual_settings
+from swarm_mj.io.reading import read_json
+from swarm_mj.learning.settings import Training, usual_settings
 from swarm_mj.mission import PRESETS, paper, reference
 
 ARMS = [(arm, preset) for arm in ("robot", "team") for preset in PRESETS]
@@ -18,7 +19,7 @@ ARMS = [(arm, preset) for arm in ("robot", "team") for preset in PRESETS]
 @pytest.mark.parametrize(("arm", "preset"), ARMS)
 def test_settings_come_back_from_json_as_they_were(arm, preset):
     training = usual_settings(arm, PRESETS[preset]("random-walk"), (10, 40), seed=2**62)
-    assert from_json(json.loads(json.dumps(asdict(training)))) == training
+    assert read_json(json.dumps(asdict(training)), Training) == training
 
 
 @pytest.mark.parametrize(("arm", "preset"), ARMS)
@@ -69,6 +70,9 @@ def test_silence_is_dropped_only_where_it_earns_nothing():
         ({"robots": (10, 1)}, "robots must be a whole number from 2 to 200, not 1"),
         ({"robots": (201,)}, "robots must be a whole number from 2 to 200, not 201"),
         ({"reward": "velocity-variance"}, "reward velocity-variance is a team's"),
+        ({"robots": ()}, "robots must have at least 1 size"),
+        ({"groups": 0}, "groups must be a whole number from 1 to 4096, not 0"),
+        ({"features": "paper"}, "num_features is 18, but the paper features are 8"),
     ],
 )
 def test_what_is_out_of_range_is_refused(changes, complaint):
@@ -102,5 +106,5 @@ def test_settings_of_another_version_are_refused(part):
     for change in (lambda its: its.popitem(), lambda its: its.update(wings=2)):
         given = json.loads(json.dumps(whole))
         change(given[part] if part else given)
-        with pytest.raises(ValueError, match="not the settings of this version's training runs"):
-            from_json(given)
+        with pytest.raises(ValueError, match=r"(missing required|unknown) field"):
+            read_json(json.dumps(given), Training)
