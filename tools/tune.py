@@ -8,7 +8,6 @@ of the best until both are worse; the authors' grid is flown whole, as they did.
 evaluation's. Ctrl-C leaves the table as it was.
 """
 
-import csv
 import math
 import sys
 from collections.abc import Iterator, Sequence
@@ -22,7 +21,7 @@ from swarm_mj.cli import script
 from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import plain_console
 from swarm_mj.fields import same_as, setting
-from swarm_mj.io.atomic import atomic_write
+from swarm_mj.io.atomic import write_csv
 from swarm_mj.io.interrupt import heard_interrupt
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import PRESETS, Mission
@@ -142,10 +141,8 @@ def _row(search: Search, probability: float, aoi: np.ndarray, seeds: Sequence[in
 
 def write_table(rows: Sequence[Tuned], path: Path) -> None:
     """Writes the table whole, or not at all."""
-    with atomic_write(path) as part, part.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, [field.name for field in fields(Tuned)], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(asdict(row) for row in rows)
+    names = [field.name for field in fields(Tuned)]
+    write_csv(path, names, (asdict(row) for row in rows))
 
 
 @dataclass(frozen=True, kw_only=True)

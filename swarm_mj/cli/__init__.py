@@ -18,6 +18,7 @@ from swarm_mj.io.streams import lasting_streams
 Options = TypeVar("Options")
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+WRONG_NAMES = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
 COMMANDS = {  # each a module here, with its options, `Options`, and what it does, `run`
     "fly": "Fly one mission and record its replay.",
     "evaluate": "Fly policies over the same missions and say where they stand.",
@@ -98,7 +99,7 @@ def script(
 
 
 def _exit_code(name: str, work: Callable[[], int]) -> int:
-    """Does the work; says what is wrong with the input, or that it was interrupted, in one line."""
+    """Does the work; says in one line what is wrong, or that it was interrupted."""
     with lasting_streams(), interruptible():
         return _told(name, work)
 
@@ -108,7 +109,7 @@ def _told(name: str, work: Callable[[], int]) -> int:
         return work()
     except (ValueError, OSError) as error:
         sys.stderr.write(f"{name}: error: {error}\n")
-        return BAD_INPUT
+        return BAD_INPUT if isinstance(error, (ValueError, *WRONG_NAMES)) else FAILED
     except MemoryError:
         sys.stderr.write(f"{name}: error: this machine's memory does not suffice\n")
         return FAILED

@@ -12,7 +12,7 @@ from rich.console import Console
 from swarm_mj.cli import DONE, INTERRUPTED
 from swarm_mj.cli.evaluation_table import print_results
 from swarm_mj.cli.mission_options import several_missions
-from swarm_mj.cli.outputs import check_outputs
+from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.policy_options import NAMES, PolicyOptions
 from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import tell_cores
@@ -27,7 +27,7 @@ from swarm_mj.fields import same_as, setting
 from swarm_mj.io.interrupt import deferred_interrupt, heard_interrupt
 from swarm_mj.io.owned import owned
 from swarm_mj.mission import Mission
-from swarm_mj.policies.registry import POLICIES, normalised, with_payload
+from swarm_mj.policies.registry import POLICIES, directories, normalised, with_payload
 
 OUTPUT = "output"  # a heading of the help
 DEFAULT_POLICIES = ("planner", *BASELINES)
@@ -38,8 +38,8 @@ class Options(PolicyOptions):
     """The options of `swarm-mj evaluate`."""
 
     EPILOG: ClassVar = (
-        "Exit codes: 0 done, 2 bad input, 130 interrupted (with --json or --csv, --resume "
-        "continues)."
+        "Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted (with --json or "
+        "--csv, --resume continues)."
     )
     policy: tuple[str, ...] = setting(
         DEFAULT_POLICIES,
@@ -76,10 +76,14 @@ class Options(PolicyOptions):
 def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
     study = options.study
-    outputs = {"--json": options.json, "--csv": options.csv}
-    check_outputs(outputs, must_be_new=not options.force)
+    check_outputs(
+        Output("--json", options.json, ".json"),
+        Output("--csv", options.csv, ".csv"),
+        inputs=directories(options.policy),
+        must_be_new=not options.force,
+    )
     with ExitStack() as stack:
-        for path in filter(None, outputs.values()):
+        for path in filter(None, (options.json, options.csv)):
             stack.enter_context(owned(path))
         return _evaluate(options, study)
 
@@ -120,6 +124,7 @@ def _progress_file(options: Options) -> Path | None:
             raise ValueError("--resume needs the --json or --csv of the run that was interrupted")
         return None
     kept = progress.progress_path(output)
+    check_outputs(Output("progress", kept))
     if kept.exists() and not (options.resume or options.force):
         raise ValueError(
             f"progress {kept} of an interrupted run exists; continue it with --resume, or start "

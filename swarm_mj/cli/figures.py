@@ -6,11 +6,12 @@ from pathlib import Path
 
 from rich.console import Console
 
-from swarm_mj.cli.outputs import check_outputs
+from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.terminal import plain_console
 from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS
 from swarm_mj.evaluation.results import read_results
 from swarm_mj.fields import setting
+from swarm_mj.policies.registry import directories
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,8 +37,8 @@ class Options:
 
 def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
+    paths = _paths(options)
     results = [result for path in options.results for result in read_results(path)]
-    paths = {name: _paths(options, name) for name in dict.fromkeys(options.figure)}
     with Console(stderr=True).status("Drawing ...") as status:
         # matplotlib takes its time to import; a cache that it cannot keep is no news
         logging.getLogger("matplotlib").setLevel(logging.ERROR)
@@ -66,9 +67,15 @@ def run(options: Options) -> int:
     return 0
 
 
-def _paths(options: Options, name: str) -> list[Path]:
-    """A figure's files; raises ValueError for those that cannot be written."""
-    paths = [options.out / f"{name}.{ending}" for ending in dict.fromkeys(options.format)]
-    for path in paths:
-        check_outputs({"figure": path}, must_be_new=not options.force)
+def _paths(options: Options) -> dict[str, list[Path]]:
+    """The files of each figure; raises ValueError for those that cannot be written."""
+    endings = dict.fromkeys(options.format)
+    paths = {
+        name: [options.out / f"{name}.{ending}" for ending in endings] for name in options.figure
+    }
+    check_outputs(
+        *(Output("figure", path) for own in paths.values() for path in own),
+        inputs=(*options.results, *directories([options.flock_policy])),
+        must_be_new=not options.force,
+    )
     return paths

@@ -13,7 +13,7 @@ from rich.console import Console
 from swarm_mj.cli import DONE, INTERRUPTED
 from swarm_mj.cli.flight_table import flight_numbers, flight_table
 from swarm_mj.cli.mission_options import one_mission
-from swarm_mj.cli.outputs import check_outputs
+from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.policy_options import NAMES, PolicyOptions
 from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import plain_console, this_command
@@ -23,7 +23,13 @@ from swarm_mj.io.interrupt import deferred_interrupt
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
-from swarm_mj.policies.registry import is_directory, make_policy, normalised, with_payload
+from swarm_mj.policies.registry import (
+    directories,
+    is_directory,
+    make_policy,
+    normalised,
+    with_payload,
+)
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import view_command
@@ -40,7 +46,8 @@ class Options(PolicyOptions):
     """The options of `swarm-mj fly`."""
 
     EPILOG: ClassVar = (
-        "Exit codes: 0 done, 2 bad input, 130 interrupted (what was flown is recorded)."
+        "Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted (what was flown is "
+        "recorded)."
     )
     policy: str = setting(
         "planner", f"{NAMES}, or a directory with a learned policy", convert=normalised
@@ -106,9 +113,12 @@ def _replay_path(options: Options) -> Path | None:
     if options.no_record and options.view:
         raise ValueError("--view needs a replay; leave out --no-record")
     path = None if options.no_record else options.record or _fresh_name(options)
-    if path and path.suffix != ".rrd":
-        raise ValueError(f"replay must be named *.rrd, not {path}")
-    check_outputs({"--record": path, "--json": options.json}, must_be_new=not options.force)
+    check_outputs(
+        Output("--record", path, ".rrd"),
+        Output("--json", options.json, ".json"),
+        inputs=directories([options.policy]),
+        must_be_new=not options.force,
+    )
     if options.view and path:
         view_command(path)  # complains now if there is no display
     return path

@@ -1,41 +1,73 @@
 """Files that commands write, checked before the work."""
 
+import errno
+import os
+from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
-from swarm_mj.io.atomic import temp_path
+from swarm_mj.io.atomic import check_writable
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # the machine's fault, not the name's
 
 
-def check_outputs(outputs: dict[str, Path | None], *, must_be_new: bool = False) -> None:
+class Output(NamedTuple):
+    """A file that will be written; None is not."""
+
+    what: str  # as it is called in a message
+    path: Path | None
+    suffix: str = ""  # that it must have, if any
+
+
+def check_outputs(*outputs: Output, inputs: Iterable[Path] = (), must_be_new: bool = False) -> None:
     """Passes if a command can write all its files; missing folders will be made.
 
     Args:
-        outputs: The files by what they are called in a message; None is not written.
+        *outputs: The files.
+        inputs: Files and folders that the command reads, so that none is lost.
         must_be_new: Whether existing files are refused.
 
     Raises:
-        ValueError: A file exists, is a folder, or its folder cannot be written; or two are the
-            same.
+        ValueError: A file exists, is a folder or an input, is named wrongly, or its folder cannot
+            be written; or two are the same.
+        OSError: There is no space left.
     """
-    named: dict[Path, str] = {}
-    for what, path in outputs.items():
-        if path is not None:
-            _check(path, what, must_be_new=must_be_new)
-            if path.resolve() in named:
-                raise ValueError(f"{named[path.resolve()]} and {what} name the same file, {path}")
-            named[path.resolve()] = what
+    named: dict[str, str] = {}
+    sources = {os.path.realpath(path) for path in inputs}
+    for what, path, suffix in outputs:
+        if path is None:
+            continue
+        target = os.path.realpath(path)
+        if target in named:
+            raise ValueError(f"{named[target]} and {what} name the same file, {path}")
+        named[target] = what
+        parts = {target, *map(str, Path(target).parents)}
+        if os.path.exists(target) and sources & parts:
+            raise ValueError(f"{what} {path} is an input, or part of one; name another")
+        _check(what, path, suffix, must_be_new=must_be_new)
 
 
-def _check(path: Path, what: str, *, must_be_new: bool) -> None:
+def _check(what: str, path: Path, suffix: str, *, must_be_new: bool) -> None:
     try:
-        if path.is_dir():
-            raise ValueError(f"{what} {path} is a folder; name a file")
-        if path.exists() and not path.is_file():
-            raise ValueError(f"{what} {path} is a device or a pipe; name a file")
-        if must_be_new and path.exists():
-            raise ValueError(f"{what} {path} exists; name another, or replace it with --force")
-        folder = next(parent for parent in path.absolute().parents if parent.exists())
-        probe = temp_path(folder / path.name)
-        probe.touch()
-        probe.unlink()
+        if _exists(path):
+            if path.is_dir():
+                raise ValueError(f"{what} {path} is a folder; name a file")
+            if not path.is_file():
+                raise ValueError(f"{what} {path} is a device or a pipe; name a file")
+            if must_be_new:
+                raise ValueError(f"{what} {path} exists; name another, or replace it with --force")
+        if suffix and path.suffix != suffix:
+            raise ValueError(f"{what} must be named *{suffix}, not {path}")
+        check_writable(path)
     except OSError as error:
-        raise ValueError(f"{what} {path} cannot be written: {error.strerror}") from error
+        complaint = f"{what} {path} cannot be written: {error.strerror}"
+        raise (OSError if error.errno in FULL else ValueError)(complaint) from error
+
+
+def _exists(path: Path) -> bool:
+    """Also if it cannot be looked at: then it raises OSError, as for links that lead in circles."""
+    try:
+        path.stat()
+    except FileNotFoundError:
+        return False
+    return True

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from swarm_mj.cli.mission_options import one_mission
-from swarm_mj.cli.outputs import check_outputs
+from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.terminal import plain_console, this_command
 from swarm_mj.fields import setting
 from swarm_mj.io.atomic import write_text
@@ -28,7 +28,7 @@ def run(options: Options) -> int:
     from swarm_mj.swarm import Swarm
 
     mission = options.mission
-    check_outputs({"scene": options.out}, must_be_new=not options.force)
+    check_outputs(Output("scene", options.out, ".xml"), must_be_new=not options.force)
     spec = compose(mission, start=Swarm(mission, [options.seed]).states)
     spec.compile()
     write_text(options.out, spec.to_xml())

@@ -11,7 +11,7 @@ from rich.console import Console
 from swarm_mj.cli import DONE, INTERRUPTED
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
-from swarm_mj.cli.outputs import check_outputs
+from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.terminal import named_values, plain_console, this_command
 from swarm_mj.cli.train_progress import Watch, age_of
 from swarm_mj.cli.train_settings import (
@@ -25,6 +25,8 @@ from swarm_mj.fields import same_as, setting
 from swarm_mj.io.interrupt import deferred_interrupt
 from swarm_mj.learning.run_folder import (
     BUDGETS,
+    CHECKPOINT,
+    CURVE,
     SETTINGS,
     Limits,
     Progress,
@@ -43,7 +45,8 @@ class Options:
     EPILOG: ClassVar = (
         "A run that was interrupted, or killed, goes on with --out OUT --resume and ends as if it "
         "had not been. OUT holds policy, the best so far; settings.json, curve.csv, tensorboard "
-        "and checkpoint.pt. Exit codes: 0 done, 2 bad input, 130 interrupted (--resume goes on)."
+        "and checkpoint.pt. Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted "
+        "(--resume goes on)."
     )
     out: Path = setting(help="the run's folder", metavar="runs/NAME")
     resume: bool = setting(False, "go on with the run in OUT")
@@ -83,7 +86,8 @@ def _asked_run(options: Options) -> Run:
     """What the options ask for; raises ValueError before anything is written."""
     run = _begun_run(options) if options.resume else _new_run(options)
     run = replace(run, limits=asked_limits(run.limits, options))
-    check_outputs({"run": options.out / SETTINGS})
+    written = (Output("run", options.out / name) for name in (SETTINGS, CHECKPOINT, CURVE))
+    check_outputs(*written, inputs=[options.init] if options.init else [])
     check_memory(run.training, _memory_bytes())
     return run
 

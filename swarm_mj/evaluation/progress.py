@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.evaluation.batch import Batch, BatchCosts, Count, num_ages
+from swarm_mj.io.atomic import append_bytes, write_bytes
 from swarm_mj.io.reading import read_file, read_json
 
 DIGEST_DIGITS = 16
@@ -28,15 +29,12 @@ def progress_path(output: Path) -> Path:
 
 def start(path: Path, header: dict[str, Any]) -> None:
     """Begins a progress file, in place of any other; raises OSError if that cannot be."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(_line(b"", header))
+    write_bytes(path, _line(b"", header))
 
 
 def append(path: Path, header: dict[str, Any], index: int, costs: BatchCosts) -> None:
     """Adds what a batch cost, by its index among the study's; raises OSError if that cannot be."""
-    line = _line(_json(header), {"batch": index, "costs": asdict(costs)})
-    with path.open("ab") as file:
-        file.write(line)
+    append_bytes(path, _line(_json(header), {"batch": index, "costs": asdict(costs)}))
 
 
 def resume(path: Path, header: dict[str, Any], batches: Sequence[Batch]) -> dict[int, BatchCosts]:
@@ -71,7 +69,7 @@ def resume(path: Path, header: dict[str, Any], batches: Sequence[Batch]) -> dict
     if not all(each.batch < len(batches) and each.fits(batches[each.batch]) for each in flown):
         raise ValueError(damage)
     if cut_off:
-        path.write_bytes(whole + b"\n")
+        write_bytes(path, whole + b"\n")
     return {each.batch: each.costs for each in flown}
 
 

@@ -127,10 +127,7 @@ def write_csv(path: Path, results: Sequence[Result]) -> None:
     Raises:
         OSError: The file cannot be written.
     """
-    with atomic.atomic_write(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(asdict(result) for result in results)
+    atomic.write_csv(path, COLUMNS, (asdict(result) for result in results))
 
 
 def write_json(

@@ -16,7 +16,7 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
-from swarm_mj.io.atomic import atomic_write
+from swarm_mj.io.atomic import write_bytes
 from swarm_mj.io.reading import read_file
 from swarm_mj.learning.checkpoint_state import check_state
 from swarm_mj.learning.mission_batch import ActionHistory
@@ -58,8 +58,7 @@ def save(
     }
     content = io.BytesIO()
     torch.save(state, content)
-    with atomic_write(path) as part:
-        part.write_bytes(content.getbuffer())
+    write_bytes(path, content.getbuffer())
 
 
 def load(path: Path, training: Training, model: PPO, rng: np.random.Generator) -> Progress:

@@ -1,6 +1,5 @@
 """A run's folder: what is where, what was asked for, and how far the run has come."""
 
-import csv
 import math
 import os
 import shutil
@@ -12,7 +11,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from swarm_mj.fields import check, setting
-from swarm_mj.io.atomic import atomic_write, write_json
+from swarm_mj.io.atomic import write_csv, write_json
 from swarm_mj.io.reading import read_document, read_file
 from swarm_mj.learning.settings import Training
 from swarm_mj.protocol.costs import WindowCosts
@@ -135,7 +134,6 @@ def write_run(folder: Path, run: Run) -> None:
         **asdict(run),
         "init": None if run.init is None else str(run.init.resolve()),
     }
-    folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / SETTINGS, document)
 
 
@@ -210,7 +208,4 @@ def write_curve(path: Path, curve: list[dict[str, float]]) -> None:
         OSError: The file cannot be written.
     """
     names = list(dict.fromkeys(name for row in curve for name in row))
-    with atomic_write(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, names)
-        writer.writeheader()
-        writer.writerows(curve)
+    write_csv(path, names, curve)

@@ -4,7 +4,7 @@ A learned policy has no name but that of the directory that holds it, except the
 """
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from swarm_mj.io.assets import asset
@@ -78,6 +78,11 @@ def is_learned(name: str) -> bool:
 def is_directory(name: str) -> bool:
     """Whether a policy's name is that of a directory: it has a separator, or there is one."""
     return name not in POLICIES and (_is_path(name) or os.path.isdir(name))
+
+
+def directories(names: Iterable[str]) -> list[Path]:
+    """The directories among policies' names."""
+    return [Path(name) for name in names if is_directory(name)]
 
 
 def normalised(name: str) -> str:

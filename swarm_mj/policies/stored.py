@@ -11,7 +11,7 @@ from torch import Tensor
 from swarm_mj.gnn.fast import FastAggregationGnn
 from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.network import AggregationGnn
-from swarm_mj.io.atomic import atomic_directory, present_folder
+from swarm_mj.io.atomic import present_folder, write_folder
 from swarm_mj.io.reading import check_size, read_file
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn import LearnedPolicy
@@ -47,9 +47,7 @@ def save_policy(
     for name in MAX_BYTES:
         check_size(name, len(contents[name]), MAX_BYTES[name])
     _check_replaceable(folder)
-    with atomic_directory(folder) as part:
-        for name, content in contents.items():
-            (part / name).write_bytes(content)
+    write_folder(folder, contents, check=read_policy)
 
 
 def load_policy(folder: Path, mission: Mission, *, is_deterministic: bool = False) -> LearnedPolicy:

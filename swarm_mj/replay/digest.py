@@ -6,6 +6,7 @@ the file is told: those before by their SHA-256, its own because they follow fro
 """
 
 import hashlib
+import io
 import os
 from pathlib import Path
 from typing import BinaryIO
@@ -20,18 +21,11 @@ SEAL_BYTES = HEADER_BYTES + len(END) + 8 + len(FIELD) + 32 + FOOTER_BYTES
 BLOCK_BYTES = 2**20
 
 
-def add_digest(path: Path) -> None:
-    """Adds the digest to a replay that rerun has written.
-
-    Raises:
-        OSError: rerun did not write its end, or the file cannot be written.
-    """
-    with path.open("r+b") as file:
-        seal = _seal(file, os.fstat(file.fileno()).st_size)
-        if not seal.endswith(FOOTER):
-            raise OSError(f"rerun did not write {path} to its end")
-        file.seek(0, os.SEEK_END)
-        file.write(seal)
+def with_digest(recorded: bytes) -> bytes:
+    """A recording of rerun's, and the digest; raises OSError if rerun did not write its end."""
+    if not recorded.endswith(FOOTER):
+        raise OSError("rerun did not record the replay to its end")
+    return recorded + _seal(io.BytesIO(recorded), len(recorded))
 
 
 def has_digest(path: Path) -> bool:
@@ -50,7 +44,7 @@ def has_digest(path: Path) -> bool:
         return seal.endswith(FOOTER) and file.read(SEAL_BYTES) == seal
 
 
-def _seal(file: BinaryIO, num_bytes: int) -> bytes:
+def _seal(file: BinaryIO | io.BytesIO, num_bytes: int) -> bytes:
     """What follows so many bytes of a replay."""
     digest = hashlib.sha256()
     file.seek(0)

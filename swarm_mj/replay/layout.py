@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import rerun as rr
 import rerun.blueprint as rrb
 
 from swarm_mj.replay import legend, palette
@@ -20,7 +21,20 @@ HIDDEN = {"age": "worst", "radio": "overheard"}
 MARGIN = 1.06  # of the map, around what it must show
 
 
-def layout(log: Log, frame: Frame, packets: dict[str, Links]) -> rrb.Blueprint:
+class Layout(rrb.Blueprint):
+    """A blueprint that can be closed; rerun would keep the stream that it makes of each."""
+
+    def _log_to_stream(self, stream: rr.RecordingStream) -> None:
+        self._stream = stream
+        super()._log_to_stream(stream)
+
+    def close(self) -> None:
+        """Lets go of it, once it was sent."""
+        self._stream.disconnect()
+        del self._stream
+
+
+def layout(log: Log, frame: Frame, packets: dict[str, Links]) -> Layout:
     """The blueprint of a replay: two tabs, the mission, and the radio of every robot."""
     reach, follows = MARGIN * frame.reach_m, ", follows the team" if frame.moves else ""
     name = f"Map, squares of {square_m(frame):g} m{follows}"
@@ -41,7 +55,7 @@ def layout(log: Log, frame: Frame, packets: dict[str, Links]) -> rrb.Blueprint:
         column_shares=[3, 1],
         name="Radio",
     )
-    return rrb.Blueprint(
+    return Layout(
         rrb.Tabs(mission, radio, active_tab=0),
         rrb.TimePanel(
             state="collapsed", timeline=TIMELINE, fps=WINDOWS_PER_SECOND, loop_mode="all"

@@ -3,15 +3,17 @@
 from pathlib import Path
 
 import rerun as rr
+import rerun_bindings as bindings
 
-from swarm_mj.io.atomic import atomic_write
+from swarm_mj.io.atomic import write_bytes
 from swarm_mj.mission import Mission
 from swarm_mj.replay import arena, charts, palette
-from swarm_mj.replay.digest import add_digest
+from swarm_mj.replay.digest import with_digest
 from swarm_mj.replay.frame import frame
 from swarm_mj.replay.layout import layout
 from swarm_mj.replay.legend import draw_legend
 from swarm_mj.replay.links import Links, fates
+from swarm_mj.replay.read import check_replay
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet
 
@@ -30,21 +32,22 @@ def write_replay(log: Log, mission: Mission, config: dict[str, object], path: Pa
     Raises:
         OSError: The file cannot be written.
     """
-    try:
-        with atomic_write(path) as part:
-            _write(log, mission, config, part, name=path.stem)
-            add_digest(part)
-    except RuntimeError as error:  # rerun's, when its writer fails
-        raise OSError(f"replay {path} could not be written: {error}") from error
+    # Rerun's own writer of files hides a full disk, or waits for space for good.
+    recorded = with_digest(_recorded(log, mission, config, path.stem))
+    bindings.flush_and_cleanup_orphaned_recordings()  # its threads, which would stay
+    write_bytes(path, recorded, check=check_replay)
 
 
-def _write(log: Log, mission: Mission, config: dict[str, object], path: Path, *, name: str) -> None:
-    path.touch()  # rerun reports a folder that cannot be written in its own log only
+def _recorded(log: Log, mission: Mission, config: dict[str, object], name: str) -> bytes:
+    """The bytes of a replay."""
     rr.set_strict_mode(True)  # bad data raises; otherwise a column is silently missing
     packets = fates(log)
     shown = frame(log, mission.half_side_m)
     with rr.RecordingStream(APPLICATION, send_properties=False) as recording:
-        recording.save(path, default_blueprint=layout(log, shown, packets))
+        stream = recording.binary_stream()
+        laid_out = layout(log, shown, packets)
+        recording.send_blueprint(laid_out, make_active=False)
+        laid_out.close()
         recording.set_log_tick_enabled(False)
         recording.set_log_time_enabled(False)
         recording.send_recording_name(name)
@@ -53,6 +56,7 @@ def _write(log: Log, mission: Mission, config: dict[str, object], path: Path, *,
         lines = [f"- **{key}**: {value}" for key, value in config.items()]
         about = "\n".join([f"# {name}", *lines])
         recording.log("about", rr.TextDocument(about, media_type="text/markdown"), static=True)
+    return stream.read() or b""
 
 
 def draw(sheet: Sheet, mission: Mission, packets: dict[str, Links]) -> None:

@@ -199,17 +199,18 @@ def test_robots_that_fail_are_another_regime_in_results_and_progress(
 
 @pytest.mark.parametrize("output", ["json", "csv"])
 def test_existing_results_need_force(swarm_mj, tmp_path, output):
-    arguments = ("evaluate", *SMALL, "--episodes", 2, f"--{output}", "out/r")
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "r").write_text("precious")
+    path = tmp_path / "out" / f"r.{output}"
+    arguments = ("evaluate", *SMALL, "--episodes", 2, f"--{output}", path)
+    path.parent.mkdir()
+    path.write_text("precious")
     refused = swarm_mj(*arguments)
     assert refused.returncode == 2
     assert "--force" in refused.stderr
-    assert (tmp_path / "out" / "r").read_text() == "precious"
-    assert files(tmp_path) == ["out/r"]
+    assert path.read_text() == "precious"
+    assert files(tmp_path) == [f"out/r.{output}"]
     assert swarm_mj(*arguments, "--force").returncode == 0
-    assert "aoi_mean" in (tmp_path / "out" / "r").read_text()
-    assert files(tmp_path) == ["out/r"]
+    assert "aoi_mean" in path.read_text()
+    assert files(tmp_path) == [f"out/r.{output}"]
 
 
 def test_one_mission_of_one_window_has_results(swarm_mj, tmp_path):
@@ -235,7 +236,8 @@ def test_one_mission_of_one_window_has_results(swarm_mj, tmp_path):
         (["--baseline", "magic"], "baseline must be one of the policies evaluated"),
         (["--range-ratio", "0.02", "--csv", "r.csv", "--jobs", "2"], "too sparse"),
         (["--resume"], "--resume needs the --json or --csv"),
-        (["--csv", "r", "--json", "./r"], "same file"),
+        (["--csv", "r.json", "--json", "./r.json"], "same file"),
+        (["--json", "o.json", "--csv", "o.json.progress"], "--csv must be named *.csv, not o.json"),
         (["--csv", "."], "is a folder"),
     ],
 )

@@ -146,6 +146,7 @@ def test_contact_physics_flies(swarm_mj, tmp_path, boundary):
         (["--range-ratio", "0.02"], "too sparse"),
         (["--record", "replay.txt"], "must be named *.rrd"),
         (["--json", "."], "is a folder"),
+        (["--json", "summary"], "--json must be named *.json, not summary"),
         (["--no-record", "--view"], "--view needs a replay"),
         (["--no-record", "--record", "a.rrd"], "not allowed with"),
         (["--wings", "2"], "unrecognized arguments: --wings 2"),
@@ -192,14 +193,14 @@ def test_the_summary_names_the_tuned_probability(swarm_mj, tmp_path):
     assert config["observer"] == 2
 
 
-@pytest.mark.parametrize("flag", ["--record", "--json"])
-def test_an_existing_file_needs_force(swarm_mj, tmp_path, flag):
-    path = tmp_path / "a.rrd"
+@pytest.mark.parametrize(("flag", "name"), [("--record", "a.rrd"), ("--json", "a.json")])
+def test_an_existing_file_needs_force(swarm_mj, tmp_path, flag, name):
+    path = tmp_path / name
     path.write_text("precious")
     refused = swarm_mj("fly", *SHORT, flag, path)
     assert refused.returncode == 2
     assert f"{flag} {path} exists; name another, or replace it with --force" in refused.stderr
-    assert files(tmp_path) == ["a.rrd"]
+    assert files(tmp_path) == [name]
     assert path.read_text() == "precious"
     assert swarm_mj("fly", *SHORT, flag, path, "--force").returncode == 0
     check_replay(path) if flag == "--record" else json.loads(path.read_text())

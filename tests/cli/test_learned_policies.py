@@ -55,9 +55,9 @@ def test_a_replay_is_named_after_the_policys_directory(tmp_path, monkeypatch, fo
 def test_the_mode_is_flown_on_request(runs):
     costs = {}
     for name, options in {"a": [], "b": ["--deterministic"], "c": ["--deterministic"]}.items():
-        flown = ["fly", *SMALL, "--policy", "runs/x/policy", "--no-record", "--json", name]
-        assert main([*flown, *options, "--seed", "2"]) == 0
-        costs[name] = json.loads((runs.parent / name).read_text())
+        flown = ["fly", *SMALL, "--policy", "runs/x/policy", "--no-record"]
+        assert main([*flown, *options, "--seed", "2", "--json", f"{name}.json"]) == 0
+        costs[name] = json.loads((runs.parent / f"{name}.json").read_text())
         del costs[name]["wall_seconds"]
     assert costs["b"] == costs["c"]
     assert costs["a"]["packets_attempted"] != costs["b"]["packets_attempted"]

@@ -1,47 +1,114 @@
 """Files and folders are replaced whole: a failure or a kill at any moment leaves one that is."""
 
 import json
+import os
+import resource
 import shutil
+import subprocess
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
-from swarm_mj.io.atomic import atomic_directory, atomic_write, present_folder, write_json
+from swarm_mj.io.atomic import (
+    append_bytes,
+    check_writable,
+    present_folder,
+    write_bytes,
+    write_csv,
+    write_folder,
+    write_json,
+    write_text,
+)
 
 
-def test_a_file_appears_when_it_is_whole(tmp_path):
-    path = tmp_path / "a" / "b.txt"
-    with atomic_write(path) as part:
-        part.write_text("text")
-        assert not path.exists()
-    assert path.read_text() == "text"
-    assert list(path.parent.iterdir()) == [path]
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
 
 
-@pytest.mark.parametrize("failure", [OSError, KeyboardInterrupt])
-def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path, failure):
-    path = tmp_path / "summary.json"
-    path.write_text("old")
+@contextmanager
+def full_disk(largest=0):
+    """Within it no file may be larger; the error is another than a full disk's, the way is not."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (largest, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
-    def write_half():
-        with atomic_write(path) as part:
-            part.write_text("ne")
-            raise failure
 
-    with pytest.raises(failure):
-        write_half()
-    assert path.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [path]
+def test_a_file_appears_in_folders_that_are_made(tmp_path):
+    write_text(tmp_path / "a" / "b.txt", "täxt")
+    assert (tmp_path / "a" / "b.txt").read_bytes() == "täxt".encode()
+    assert names(tmp_path / "a") == ["b.txt"]
+
+
+def test_a_file_that_fails_its_check_leaves_the_old_one(tmp_path):
+    path = tmp_path / "a"
+    seen = []
+
+    def refuse(part):
+        seen.append(part.read_bytes())
+        raise ValueError("it has no end")
+
+    write_bytes(path, b"old")
+    with pytest.raises(OSError, match=rf"{path} could not be written: it has no end"):
+        write_bytes(path, b"new", check=refuse)
+    assert seen == [b"new"]
+    assert path.read_bytes() == b"old"
+    assert names(tmp_path) == ["a"]
+
+
+def test_an_interrupt_leaves_the_old_file(tmp_path):
+    def interrupt(_part):
+        raise KeyboardInterrupt
+
+    write_bytes(tmp_path / "a", b"old")
+    with pytest.raises(KeyboardInterrupt):
+        write_bytes(tmp_path / "a", b"new", check=interrupt)
+    assert (tmp_path / "a").read_bytes() == b"old"
+    assert names(tmp_path) == ["a"]
+
+
+def test_a_full_disk_leaves_the_old_file_and_is_named(tmp_path):
+    path = tmp_path / "a"
+    write_bytes(path, b"old")
+    with full_disk(100), pytest.raises(OSError, match=rf"{path} could not .* File too large"):
+        write_bytes(path, bytes(101))
+    assert path.read_bytes() == b"old"
+    assert names(tmp_path) == ["a"]
+
+
+def test_a_full_disk_is_found_before_the_work(tmp_path):
+    check_writable(tmp_path / "a" / "b")
+    with full_disk(), pytest.raises(OSError, match="File too large"):
+        check_writable(tmp_path / "a" / "b")
+    assert names(tmp_path) == []
+
+
+def test_what_cannot_be_added_is_not_added_in_part(tmp_path):
+    path = tmp_path / "a"
+    path.write_bytes(b"12345\n")
+    append_bytes(path, b"67890\n")
+    with full_disk(15), pytest.raises(OSError, match=rf"{path} could not be written: File too"):
+        append_bytes(path, b"abcde\n")
+    assert path.read_bytes() == b"12345\n67890\n"
 
 
 def test_a_link_stays_and_its_file_is_replaced(tmp_path):
     (tmp_path / "real").write_text("old")
-    link = tmp_path / "link"
-    link.symlink_to(tmp_path / "real")
-    with atomic_write(link) as part:
-        part.write_text("new")
-    assert link.is_symlink()
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    write_text(tmp_path / "link", "new")
+    assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "real").read_text() == "new"
+
+
+def test_a_loop_of_links_is_one_error(tmp_path):
+    (tmp_path / "a").symlink_to("b")
+    (tmp_path / "b").symlink_to("a")
+    with pytest.raises(OSError, match="a/c could not be written: "):
+        write_text(tmp_path / "a" / "c", "new")
+    assert present_folder(tmp_path / "a") == tmp_path / "a"
 
 
 def test_what_json_cannot_say_is_not_written(tmp_path):
@@ -52,10 +119,13 @@ def test_what_json_cannot_say_is_not_written(tmp_path):
     assert json.loads((tmp_path / "a.json").read_text())["aoi"] == 1.5
 
 
+def test_rows_become_lines_of_csv(tmp_path):
+    write_csv(tmp_path / "a.csv", ["x", "y"], [{"x": 1, "y": None}, {"x": "a,b", "y": 0.1}])
+    assert (tmp_path / "a.csv").read_bytes() == b'x,y\n1,\n"a,b",0.1\n'
+
+
 def write(path, text):
-    with atomic_directory(path) as part:
-        for name in ("a", "b"):
-            (part / name).write_text(text)
+    write_folder(path, {"a": text.encode(), "b": text.encode()})
 
 
 def content(path):
@@ -69,36 +139,25 @@ def content(path):
     return first
 
 
-def test_a_folder_appears_when_it_is_whole(tmp_path):
-    path = tmp_path / "runs" / "x"
-    with atomic_directory(path) as part:
-        (part / "a").write_text("text")
-        assert not path.exists()
-    assert (path / "a").read_text() == "text"
-    assert list(path.parent.iterdir()) == [path]
-
-
 def test_a_folder_is_replaced_with_all_that_it_held(tmp_path):
     write(tmp_path / "x", "old")
     (tmp_path / "x" / "c").write_text("more")
     write(tmp_path / "x", "new")
     assert content(tmp_path / "x") == "new"
-    assert [path.name for path in tmp_path.iterdir()] == ["x"]
+    assert names(tmp_path) == ["x"]
 
 
-@pytest.mark.parametrize("failure", [OSError, KeyboardInterrupt])
+@pytest.mark.parametrize("failure", [ValueError, KeyboardInterrupt])
 def test_a_failure_leaves_the_old_folder_and_nothing_else(tmp_path, failure):
+    def fail(part):
+        assert content(part) == "new"
+        raise failure
+
     write(tmp_path / "x", "old")
-
-    def write_half():
-        with atomic_directory(tmp_path / "x") as part:
-            (part / "a").write_text("ne")
-            raise failure
-
-    with pytest.raises(failure):
-        write_half()
+    with pytest.raises((OSError, KeyboardInterrupt)):
+        write_folder(tmp_path / "x", {"a": b"new", "b": b"new"}, check=fail)
     assert content(tmp_path / "x") == "old"
-    assert [path.name for path in tmp_path.iterdir()] == ["x"]
+    assert names(tmp_path) == ["x"]
 
 
 class KilledError(BaseException):
@@ -126,7 +185,8 @@ def killed_before_step(monkeypatch, last):
 
     removed = shutil.rmtree
     monkeypatch.setattr(shutil, "rmtree", counted(emptied_first))
-    for name in ("mkdir", "rename", "write_text"):
+    monkeypatch.setattr(os, "fsync", counted(os.fsync))
+    for name in ("mkdir", "rename"):
         monkeypatch.setattr(Path, name, counted(getattr(Path, name)))
 
 
@@ -152,26 +212,33 @@ def test_a_kill_at_any_moment_leaves_the_old_folder_or_the_new_one(tmp_path, las
         assert not is_killed
     write(path, "newer")
     assert content(path) == "newer"
-    assert not (tmp_path / ".x.old").exists()
+    assert names(tmp_path) == ["x"]
 
 
 def test_a_first_folder_is_there_or_not(tmp_path):
-    for last in range(12):
+    for last in range(16):
         with pytest.MonkeyPatch.context() as patch:
             killed_before_step(patch, last)
             try:
                 write(tmp_path / f"{last}", "new")
             except KilledError:
                 assert content(tmp_path / f"{last}") in (None, "new")
-    assert content(tmp_path / "11") == "new"
+    assert content(tmp_path / "15") == "new"
 
 
-def test_leftovers_of_others_do_no_harm(tmp_path):
-    (tmp_path / ".x.1.part").mkdir()
+def test_what_the_dead_had_not_finished_is_removed_and_what_others_write_is_not(tmp_path):
+    ended = subprocess.Popen(["true"])
+    ended.wait()
+    (tmp_path / f".x.{ended.pid}.part").mkdir()
+    (tmp_path / f".x.{ended.pid}.part" / "a").touch()
+    (tmp_path / f".x.{os.getpid()}.part").mkdir()  # of a dead process that had this one's number
     (tmp_path / ".x.old").mkdir()
+    left = {f".x.{os.getppid()}.part", ".x.notes.part", ".y.part"}
+    for name in left:
+        (tmp_path / name).touch()
     write(tmp_path / "x", "new")
     assert content(tmp_path / "x") == "new"
-    assert sorted(path.name for path in tmp_path.iterdir()) == [".x.1.part", "x"]
+    assert set(names(tmp_path)) == {"x", *left}
 
 
 def test_a_link_stays_and_its_folder_is_replaced(tmp_path):

@@ -5,6 +5,7 @@ is solid and filled, what the paper published dashed and hollow, in the same col
 which no team could fly, is black and thin.
 """
 
+import io
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from swarm_mj.io.atomic import atomic_write
+from swarm_mj.io.atomic import write_bytes
 from swarm_mj.policies.registry import WITHOUT_PAYLOAD
 
 WIDTH_IN = 7.5  # shown at 900 pixels, a point of type is 1.7 pixels
@@ -126,5 +127,7 @@ def save(figure: Figure, path: Path) -> None:
         for text in figure.findobj(Text)
         if isinstance(text, Text) and text.get_gid() == CAPTION
     )
-    with styled(), atomic_write(path) as part:
-        figure.savefig(part, format=kind, metadata={field: caption, **undated})
+    drawn = io.BytesIO()
+    with styled():
+        figure.savefig(drawn, format=kind, metadata={field: caption, **undated})
+    write_bytes(path, drawn.getbuffer())

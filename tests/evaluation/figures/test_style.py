@@ -97,11 +97,11 @@ def test_a_failure_leaves_the_old_file(tmp_path, monkeypatch):
     (tmp_path / "fig4.png").write_bytes(b"old")
     drawing = draw(RESULT_FIGURES["fig4"], everything())
 
-    def half(path, **_options):
-        path.write_bytes(b"half")
+    def fail(file, **_options):
+        file.write(b"half")
         raise OSError("disk full")
 
-    monkeypatch.setattr(drawing, "savefig", half)
+    monkeypatch.setattr(drawing, "savefig", fail)
     with pytest.raises(OSError, match="disk full"):
         save(drawing, tmp_path / "fig4.png")
     assert [path.name for path in tmp_path.iterdir()] == ["fig4.png"]
