@@ -43,26 +43,28 @@ def left_after_limit(mark):
 SIGNALLED = f"""
 import os, runpy, signal, sys, threading
 if __name__ == "__main__":  # jobs import it
-    mark, numbers, delay, program = sys.argv[1:5]
+    mark, numbers, delay, ignored, program = sys.argv[1:6]
     os.environ["{MARK}"] = mark
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
+    for number in map(int, ignored.split()):
+        signal.signal(number, signal.SIG_IGN)
     def send():
         for number in map(int, numbers.split()):
             os.kill(os.getpid(), number)
     timer = threading.Timer(float(delay), send)
     timer.daemon = True
     timer.start()
-    sys.argv = sys.argv[4:]
+    sys.argv = sys.argv[5:]
     is_file = program.endswith(".py")
     run = runpy.run_path if is_file else runpy.run_module
     run(program, run_name="__main__")
 """
 
 
-def signalled(forks, folder, numbers, delay_s, program, *arguments):
+def signalled(forks, folder, numbers, delay_s, program, *arguments, ignored=()):
     """Runs a program that is sent signals; returns it, finished, and its mark."""
-    script = folder / "signalled.py"
+    script = folder.with_suffix(".py")
     script.write_text(SIGNALLED)
     mark = f"{os.getpid()}-{time.monotonic_ns()}"
-    sent = " ".join(str(int(number)) for number in numbers)
-    return forks.run(folder, script, mark, sent, delay_s, program, *arguments), mark
+    sent, kept_off = (" ".join(str(int(number)) for number in some) for some in (numbers, ignored))
+    return forks.run(folder, script, mark, sent, delay_s, kept_off, program, *arguments), mark
