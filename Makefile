@@ -89,7 +89,7 @@ figures: setup
 picture: setup
 	$(BIN)/swarm-mj fly --record replays/readme.rrd --force
 	$(BIN)/python tools/picture.py replays/readme.rrd --window 476 --size 1600x1066 --zoom 3 \
-	  --out assets/pictures/replay.png
+	  --out assets/pictures/replay.png --force
 
 clean:
 	rm -rf .venv replays build dist .pytest_cache .ruff_cache .hypothesis

@@ -22,7 +22,9 @@ from PIL import Image
 from rerun.experimental import ViewerClient
 
 from swarm_mj.cli import script
+from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.fields import setting
+from swarm_mj.io.atomic import write_bytes
 from swarm_mj.io.processes import running
 from swarm_mj.replay.read import check_replay, windows
 from swarm_mj.replay.view import LOOPBACK, VIEWER, free_ports, quiet_environment
@@ -42,12 +44,14 @@ class Options:
     replay: Path = setting(help="an .rrd file that `swarm-mj fly` recorded", is_positional=True)
     window: int | None = setting(None, "the window to show", shown="the middle one")
     out: Path = setting(Path("replay.png"), "the picture")
+    force: bool = setting(False, "replace an existing picture")
     size: str = setting("2560x1400", "in pixels", metavar="WIDTHxHEIGHT")
     zoom: int = setting(6, "steps by which texts are enlarged", low=0, high=40)
 
 
 def run(options: Options) -> int:
     """Takes the picture; returns the exit code."""
+    check_outputs(Output("picture", options.out, ".png"), must_be_new=not options.force)
     take_picture(options.replay, options.window, options.out, options.size, options.zoom)
     print(options.out)
     return 0
@@ -75,8 +79,6 @@ def take_picture(replay: Path, window: int | None, out: Path, size: str, zoom: i
     shown = int(flown[len(flown) // 2]) if window is None else window
     if not flown[0] <= shown <= flown[-1]:
         raise ValueError(f"window must be from {flown[0]} to {flown[-1]}, not {shown}")
-    if not out.parent.is_dir():
-        raise ValueError(f"folder of the picture does not exist: {out.parent}")
     with _viewer(size) as client:
         client.open(str(replay.resolve()))
         _wait(lambda: not client.get_state().loading, LOAD_TIMEOUT_S, "the viewer did not load it")
@@ -86,14 +88,17 @@ def take_picture(replay: Path, window: int | None, out: Path, size: str, zoom: i
         time.sleep(NOTICES_S)
         client.set_time("window", sequence=shown, play_state="paused")
         time.sleep(SETTLE_S)
-        _save_without_title_bar(client.take_screenshot(), out, zoom)
+        write_bytes(out, _without_title_bar(client.take_screenshot(), zoom))
 
 
-def _save_without_title_bar(png: bytes, out: Path, zoom: int) -> None:
+def _without_title_bar(png: bytes, zoom: int) -> bytes:
     """Crops the window's empty title bar off."""
+    cropped = io.BytesIO()
     with Image.open(io.BytesIO(png)) as picture:
         top = round(TITLE_BAR_POINTS * (1.0 + ZOOM_STEP * zoom))
-        picture.crop((0, top, picture.width, picture.height)).save(out, optimize=True)
+        box = (0, top, picture.width, picture.height)
+        picture.crop(box).save(cropped, format="png", optimize=True)
+    return cropped.getvalue()
 
 
 @contextmanager

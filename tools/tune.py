@@ -18,6 +18,7 @@ import numpy as np
 from rich.console import Console
 
 from swarm_mj.cli import script
+from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import plain_console
 from swarm_mj.fields import same_as, setting
@@ -161,8 +162,7 @@ class Options:
 def run(options: Options) -> int:
     """Tunes and writes the table; returns the exit code."""
     console = plain_console(is_error=True)
-    if options.out.is_dir():
-        raise ValueError(f"{options.out} is a folder; name a file")
+    check_outputs(Output("table", options.out, ".csv"))
     policies = [name for name in HAVE_PROBABILITY if name in options.policy]
     kept = [] if len(policies) == len(HAVE_PROBABILITY) else read_table(options.out)
     seeds = range(options.seed, options.seed + options.episodes)

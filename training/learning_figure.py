@@ -17,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from swarm_mj.cli import script
+from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.evaluation.figures.style import CAPTION, FAINT, INK, WIDTH_IN, look_of, save, styled
 from swarm_mj.evaluation.results import read_results
 from swarm_mj.fields import setting
@@ -43,9 +44,11 @@ class LearningFigure:
 
     def __call__(self) -> int:
         """Draws it."""
+        paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
+        check_outputs(*(Output("figure", path) for path in paths))
         figure = draw(read_curve(self.results / "rest-curve.csv"), self._levels())
-        for kind in ("svg", "png"):
-            save(figure, self.out.with_suffix(f".{kind}"))
+        for path in paths:
+            save(figure, path)
         return 0
 
     def _levels(self) -> dict[str, float]:

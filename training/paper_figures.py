@@ -16,10 +16,12 @@ from pathlib import Path
 
 from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import script
+from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.evaluation.figures.contents import RESULT_FIGURES, ResultFigure
 from swarm_mj.evaluation.progress import progress_path
 from swarm_mj.evaluation.results import read_results
 from swarm_mj.fields import setting
+from swarm_mj.io.atomic import write_bytes
 from swarm_mj.io.provenance import commit
 from swarm_mj.mission import PRESETS
 
@@ -79,6 +81,8 @@ def evaluate(settings: Settings, jobs: int, *, force: bool) -> int:
         for preset in settings.presets
         for name in settings.figures
     ]
+    places = (settings.results, settings.drafts)
+    check_outputs(*(Output("results", place / part.name) for part in parts for place in places))
     if force:
         _remove(settings, parts)
     missing = [part for part in parts if not (settings.results / part.name).exists()]
@@ -87,9 +91,10 @@ def evaluate(settings: Settings, jobs: int, *, force: bool) -> int:
             code = swarm_mj(part.command(settings, jobs))
             if code != 0:
                 return code
-    settings.results.mkdir(parents=True, exist_ok=True)
     for part in missing:
-        (settings.drafts / part.name).replace(settings.results / part.name)
+        draft = settings.drafts / part.name
+        write_bytes(settings.results / part.name, draft.read_bytes())
+        draft.unlink()
     return 0
 
 

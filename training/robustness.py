@@ -14,6 +14,7 @@ from pathlib import Path
 
 from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import script
+from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.fields import setting
 
 RESULTS = Path(__file__).resolve().parent / "results" / "robustness"
@@ -47,12 +48,13 @@ class Settings:
 
 def answer(settings: Settings) -> int:
     """Flies what is missing, or all by force; returns the exit code."""
-    for name, options in QUESTIONS.items():
-        path = settings.results / f"{name}.csv"
+    paths = {name: settings.results / f"{name}.csv" for name in QUESTIONS}
+    check_outputs(*(Output("results", path) for path in paths.values()))
+    for name, path in paths.items():
         if path.exists() and not settings.force:
             continue
         policies = [*settings.policies, *(() if name in WITHOUT_ORACLE else ("greedy-oracle",))]
-        how = f"{options} --seed {settings.first_seed} --jobs {settings.jobs}".split()
+        how = f"{QUESTIONS[name]} --seed {settings.first_seed} --jobs {settings.jobs}".split()
         code = swarm_mj(["evaluate", "--policy", *policies, *how, "--csv", str(path), "--force"])
         if code != 0:
             return code

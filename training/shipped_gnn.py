@@ -8,7 +8,6 @@ neither has seen. The one trained at rest cost less in six of seven regimes: it 
 `assets/policies/gnn`.
 """
 
-import shutil
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +15,9 @@ from pathlib import Path
 
 from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import script
+from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.fields import setting
+from swarm_mj.io.atomic import write_bytes
 
 RESULTS = Path("training/results/learning")
 CANDIDATES = {
@@ -48,6 +49,9 @@ class ShippedGnn:
 
     def __call__(self) -> int:
         """Trains, then compares; returns the exit code."""
+        curves = [self._curve(name) for name in CANDIDATES]
+        compared = [self._compared(name) for name in REGIMES]
+        check_outputs(*(Output("results", path) for path in (*curves, *compared)))
         try:
             policies = [self._train(name, missions) for name, missions in CANDIDATES.items()]
             for name, missions in REGIMES.items():
@@ -62,16 +66,20 @@ class ShippedGnn:
         resume = ["--resume"] if (folder / "settings.json").exists() else []
         options = f"{missions} {TRAINING} --minutes {self.minutes:g}".split()
         _run(["train", *options, "--out", str(folder), *resume])
-        self.results.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(folder / "curve.csv", self.results / f"{name}-curve.csv")
+        write_bytes(self._curve(name), (folder / "curve.csv").read_bytes())
         return str(folder / "policy")
 
     def _compare(self, name: str, policies: Sequence[str], missions: str) -> None:
         """Flies the candidates and the schedules of TDMA on the same missions."""
         how = f"--seed {FIRST_SEED} --episodes {self.episodes} --jobs {self.jobs} {missions}"
-        csv = str(self.results / f"candidates-{name}.csv")
         command = ["evaluate", "--policy", *policies, "spatial-tdma", "tdma"]
-        _run([*command, *how.split(), "--csv", csv, "--force"])
+        _run([*command, *how.split(), "--csv", str(self._compared(name)), "--force"])
+
+    def _curve(self, name: str) -> Path:
+        return self.results / f"{name}-curve.csv"
+
+    def _compared(self, name: str) -> Path:
+        return self.results / f"candidates-{name}.csv"
 
 
 def _run(arguments: Sequence[str]) -> None:

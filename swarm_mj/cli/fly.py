@@ -79,19 +79,20 @@ def run(options: Options) -> int:
     flown = _fly(swarm, policy, recorder, console)
     wall_s = time.perf_counter() - start_s
     was_interrupted = len(flown) < mission.num_windows
-    with deferred_interrupt(), console.status("Writing ..."):
-        config, numbers = _config(options, policy), flight_numbers(policy, summarise(flown))
-        if path and recorder:
-            from swarm_mj.replay.write import write_replay  # rerun takes its time to import
-
-            known = {key: value for key, value in config.items() if value is not None}
-            write_replay(recorder.log(), mission, known, path)
-        if options.json:
-            took = {"wall_seconds": wall_s, "interrupted": was_interrupted}
-            replay = {"replay": str(path) if path else None}
-            write_json(options.json, {"config": config} | numbers | took | replay)
     out = plain_console()
-    out.print(flight_table(_title(options), mission, numbers, wall_s))
+    with deferred_interrupt():
+        config, numbers = _config(options, policy), flight_numbers(policy, summarise(flown))
+        out.print(flight_table(_title(options), mission, numbers, wall_s))
+        with console.status("Writing ..."):  # which may fail
+            if path and recorder:
+                from swarm_mj.replay.write import write_replay  # rerun takes its time to import
+
+                known = {key: value for key, value in config.items() if value is not None}
+                write_replay(recorder.log(), mission, known, path)
+            if options.json:
+                took = {"wall_seconds": wall_s, "interrupted": was_interrupted}
+                replay = {"replay": str(path) if path else None}
+                write_json(options.json, {"config": config} | numbers | took | replay)
     if path:
         out.print(f"Open the replay:  {this_command()} replay {shlex.quote(str(path))}")
     if was_interrupted:

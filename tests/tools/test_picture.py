@@ -46,7 +46,8 @@ def test_a_picture_shows_something(picture, replay, tmp_path):
         (["--window", "31"], "window must be from 1 to 30, not 31"),
         (["--window", "0"], "window must be from 1 to 30, not 0"),
         (["--size", "big"], "size must be WIDTHxHEIGHT"),
-        (["--out", "missing/a.png"], "does not exist: missing"),
+        (["--out", "a.jpg"], "picture must be named *.png, not a.jpg"),
+        (["--out", "."], "picture . is a folder"),
     ],
 )
 def test_bad_input_is_one_clear_line(picture, replay, tmp_path, arguments, complaint):

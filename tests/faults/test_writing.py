@@ -1,0 +1,347 @@
+"""What is written is whole or was never there: full disks, kills, links and inputs as outputs."""
+
+import os
+import resource
+import signal
+import subprocess
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny_policies import save_tiny
+from tries import tries
+
+from swarm_mj.cli import main
+from swarm_mj.mission import paper
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.replay.read import check_replay
+from swarm_mj.replay.recorder import Recorder
+from swarm_mj.replay.write import write_replay
+from swarm_mj.rollout import rollout
+from swarm_mj.swarm import Swarm
+
+ROOT = Path(__file__).parent.parent.parent
+SMALL = ("--robots", "5", "--windows", "12", "--range-ratio", "0.5")
+ENDS_S = 10.0  # the longest that a writer that cannot write may take to say so
+
+
+def names(folder):
+    """All that a folder holds, hidden files included."""
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+
+
+@contextmanager
+def no_larger_files(num_bytes):
+    """Within it, writing beyond so many bytes fails as it does on a full disk, but with EFBIG."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (num_bytes, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """The current folder, which is empty."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def small_disk(tmp_path_factory):
+    """A file system of 256 kB."""
+    place = tmp_path_factory.mktemp("disk")
+    command = ["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", place]
+    if subprocess.run(command, capture_output=True, check=False).returncode != 0:
+        pytest.skip("this machine's user may not mount file systems")
+    yield place
+    subprocess.run(["umount", place], check=True)
+
+
+@pytest.fixture(scope="module")
+def flown():
+    """A small flight's log and its mission."""
+    mission = paper("flocking", num_robots=12, num_windows=60)
+    swarm = Swarm(mission, [1])
+    recorder = Recorder(swarm)
+    for window in rollout(swarm, make_policy("planner", mission)):
+        recorder.add(window)
+    return recorder.log(), mission
+
+
+def said_in_one_line(capsys, path, reason):
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1, lines
+    assert str(path) in lines[0], lines[0]
+    assert reason in lines[0], lines[0]
+
+
+@pytest.mark.fault("replays on full disks")
+def test_a_replay_on_a_full_disk_leaves_the_old_one(flown, small_disk, record_property):
+    """Faults 1 and 2: wherever the disk is full, at once or after some of the replay."""
+    log, mission = flown
+    path, filler = small_disk / "a.rrd", small_disk / "filler"
+    write_replay(log, mission, {"seed": 1}, small_disk.parent / "whole.rrd")
+    needed = (small_disk.parent / "whole.rrd").stat().st_size
+    path.write_bytes(b"old")
+    free = os.statvfs(small_disk).f_bavail * 4096
+    assert needed > 10_000
+    num_tries = tries(12)
+    for kept in np.linspace(0, 160_000, num_tries).astype(int):
+        filler.write_bytes(bytes(max(0, free - kept)))
+        start_s = time.monotonic()
+        if kept > needed + 8192:
+            write_replay(log, mission, {"seed": 1}, path)
+            check_replay(path)
+            path.write_bytes(b"old")
+        else:
+            with pytest.raises(OSError, match=r"a\.rrd could not be written: No space left"):
+                write_replay(log, mission, {"seed": 1}, path)
+        assert time.monotonic() - start_s < ENDS_S
+        assert path.read_bytes() == b"old"
+        assert names(small_disk) == ["a.rrd", "filler"]
+    filler.unlink()
+    record_property("tries", num_tries)
+
+
+@pytest.mark.fault("replays on full disks")
+def test_a_flight_whose_replay_finds_no_place_says_so(here, capsys):
+    """Fault 1: exit code 1, one line, the old replay and the table of what was flown."""
+    assert main(["fly", *SMALL, "--record", "a.rrd"]) == 0
+    old = Path("a.rrd").read_bytes()
+    capsys.readouterr()
+    with no_larger_files(len(old) // 2):
+        assert main(["fly", *SMALL, "--seed", "2", "--record", "a.rrd", "--force"]) == 1
+    printed = capsys.readouterr()
+    assert (
+        printed.err.strip().splitlines()[-1].endswith("a.rrd could not be written: File too large")
+    )
+    assert "age of information" in printed.out.lower()
+    assert "Open the replay" not in printed.out
+    assert Path("a.rrd").read_bytes() == old
+    assert names(here) == ["a.rrd"]
+
+
+WRITTEN = {  # what writes a kind of file, and the file
+    "replay": (["fly", *SMALL, "--record", "a.rrd"], "a.rrd"),
+    "summary": (["fly", *SMALL, "--no-record", "--json", "a.json"], "a.json"),
+    "scene": (["scene", "--robots", "5", "--range-ratio", "0.5", "--out", "a.xml"], "a.xml"),
+    "csv": (["evaluate", *SMALL, "--policy", "tdma", "--episodes", "2", "--csv", "a.csv"], "a.csv"),
+    "json": (
+        ["evaluate", *SMALL, "--policy", "tdma", "--episodes", "2", "--json", "a.json"],
+        "a.json",
+    ),
+    "svg": (["figures", "{results}", "--figure", "fig5", "--format", "svg", "--out", "."], "fig5"),
+    "png": (["figures", "{results}", "--figure", "fig5", "--format", "png", "--out", "."], "fig5"),
+}
+
+
+@pytest.mark.fault("outputs on full disks")
+@pytest.mark.parametrize("kind", WRITTEN)
+def test_no_kind_of_output_is_left_in_part(here, capsys, kind, record_property):
+    """Fault 1, of all kinds: nothing is there, and no work is done if not a page can be written."""
+    arguments, name = WRITTEN[kind]
+    results = str(ROOT / "training" / "results" / "paper-random-walk.csv")
+    arguments = [argument.format(results=results) for argument in arguments]
+    limits = (0, 6000) if kind in ("replay", "svg", "png") else (0,)  # others are small
+    for most in limits:
+        with no_larger_files(most):
+            assert main(arguments) == 1
+        said_in_one_line(capsys, name, "File too large")
+        assert names(here) == []
+    record_property("tries", len(limits))
+
+
+@pytest.mark.fault("outputs on full disks")
+def test_a_training_on_a_full_disk_ends_and_goes_on(here, capsys):
+    """Fault 1, of checkpoints: one line, the last checkpoint stays, and the run ends as ever."""
+    run = ["--robots", "4", "--windows", "12", "--range-ratio", "1", "--missions", "4"]
+    run += ["--held-out", "2", "--evaluate-every", "128", "--latent", "4"]
+    assert main(["train", "--out", "r", *run, "--budget", "64"]) == 0
+    kept = (here / "r" / "checkpoint.pt").read_bytes()
+    capsys.readouterr()
+    with no_larger_files(len(kept) // 2):
+        assert main(["train", "--out", "r", "--resume", "--budget", "128"]) == 1
+    assert "could not be written: File too large" in capsys.readouterr().err.splitlines()[-1]
+    assert (here / "r" / "checkpoint.pt").read_bytes() == kept
+    assert not [name for name in names(here) if name.endswith(".part")]
+    assert main(["train", "--out", "r", "--resume", "--budget", "128"]) == 0
+
+
+@pytest.mark.fault("memory and threads of replays")
+def test_replays_leave_no_threads_and_no_memory(flown, tmp_path, record_property):
+    """Fault 10."""
+    log, mission = flown
+
+    def used():
+        lines = Path("/proc/self/status").read_text().splitlines()
+        fields = dict(line.split(":", 1) for line in lines)
+        return int(fields["Threads"]), int(fields["VmRSS"].split()[0]) / 1024
+
+    if not Path("/proc/self/status").exists():
+        pytest.skip("this machine does not tell its threads")
+    for _ in range(3):
+        write_replay(log, mission, {"seed": 1}, tmp_path / "a.rrd")
+    threads, mib = used()
+    num_tries = tries(20)
+    for _ in range(num_tries):
+        write_replay(log, mission, {"seed": 1}, tmp_path / "a.rrd")
+    more_threads, more_mib = np.subtract(used(), (threads, mib))
+    assert more_threads <= 0
+    assert more_mib < 20 + 0.2 * num_tries
+    record_property("tries", num_tries)
+
+
+# Writes a file, a folder and a line of progress, and dies before its Nth step on the disk.
+WRITE_AND_DIE = """
+import os, signal, sys
+from pathlib import Path
+from swarm_mj.io.atomic import append_bytes, write_bytes, write_folder
+last, folder = int(sys.argv[1]), sys.argv[2]
+steps = 0
+def die(event, arguments):
+    global steps
+    if event in ("open", "os.rename", "os.remove", "os.rmdir", "os.mkdir", "os.truncate"):
+        if folder in str(arguments[0]):
+            steps += 1
+            if steps > last:
+                os.kill(os.getpid(), signal.SIGKILL)
+sys.addaudithook(die)
+content = sys.argv[3].encode() * 5000
+write_bytes(Path(folder, "file"), content)
+write_folder(Path(folder, "folder"), {"a": content, "b": content})
+sys.exit(0)
+"""
+
+
+@pytest.mark.fault("kills at each step")
+def test_a_kill_at_any_step_leaves_what_was_or_what_is_new(forks, tmp_path, record_property):
+    """Fault 24: and the next to write there sweeps what is left."""
+    from swarm_mj.io.atomic import present_folder
+
+    program = tmp_path / "program.py"
+    program.write_text(WRITE_AND_DIE)
+    place = tmp_path / "place"
+    assert forks.run(tmp_path, program, 10**6, place, "old").returncode == 0
+    was, tried = "old", 0
+    for last in range(60):
+        new = f"{last:03}"
+        died = forks.run(tmp_path, program, last, place, new).returncode
+        tried += 1
+        now = (place / "file").read_text()
+        folder = present_folder(place / "folder")
+        a, b = ((folder / name).read_text() for name in "ab")
+        assert now in (new * 5000, was * 5000 if last == 0 else now[:3] * 5000)
+        assert a == b == a[:3] * 5000
+        was = now[:3]
+        if died == 0:
+            break
+    assert died == 0
+    assert names(place) == ["file", "folder", "folder/a", "folder/b"]
+    record_property("tries", tried)
+
+
+@pytest.mark.fault("kills at each step")
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_while_writing_leaves_no_part(forks, tmp_path, end, record_property):
+    """Fault 24: sent by the writer to itself in the middle of each kind of file."""
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import os, runpy, sys, swarm_mj.io.atomic as atomic\n"
+        "fsync = os.fsync\n"
+        "def told(number):\n"
+        f"    os.kill(os.getpid(), {int(end)})\n"
+        "    fsync(number)\n"
+        "import swarm_mj.cli.fly as fly\n"
+        "run = fly._fly\n"
+        "def flown(*arguments):\n"
+        "    done = run(*arguments)\n"
+        "    os.fsync = told\n"
+        "    return done\n"
+        "fly._fly = flown\n"
+        "from swarm_mj.cli import main\n"
+        "sys.exit(main(sys.argv[1:]))\n"
+    )
+    (tmp_path / "place").mkdir()
+    done = forks.run(tmp_path / "place", program, "fly", *SMALL, "--record", "a.rrd")
+    assert done.returncode in (0, 130), done.stderr
+    assert [name for name in names(tmp_path / "place") if name != "a.rrd"] == []
+    if (tmp_path / "place" / "a.rrd").exists():
+        check_replay(tmp_path / "place" / "a.rrd")
+    record_property("tries", 1)
+
+
+LOOPED = {  # programs and commands with an output that is a link to itself
+    "fly": ["swarm_mj", "fly", *SMALL, "--record", "loop.rrd", "--force"],
+    "summary": ["swarm_mj", "fly", *SMALL, "--no-record", "--json", "loop.json", "--force"],
+    "evaluate": ["swarm_mj", "evaluate", *SMALL, "--csv", "loop.csv", "--force"],
+    "progress": ["swarm_mj", "evaluate", *SMALL, "--json", "o.json", "--force"],
+    "figures": ["swarm_mj", "figures", "{results}", "--out", "loop", "--force"],
+    "scene": ["swarm_mj", "scene", "--out", "loop.xml", "--force"],
+    "train": ["swarm_mj", "train", "--out", "loop", "--budget", "1"],
+    "tune": [ROOT / "tools" / "tune.py", "--episodes", "2", "--windows", "3", "--out", "loop.csv"],
+    "learning figure": [ROOT / "training" / "learning_figure.py", "--out", "loop"],
+    "robustness": [ROOT / "training" / "robustness.py", "--results", "loop"],
+    "paper figures": [ROOT / "training" / "paper_figures.py", "--results", "loop"],
+    "shipped gnn": [ROOT / "training" / "shipped_gnn.py", "--results", "loop"],
+}
+
+
+@pytest.mark.fault("outputs that cannot be")
+@pytest.mark.parametrize("program", LOOPED)
+def test_links_that_lead_in_circles_are_told_before_the_work(forks, tmp_path, program):
+    """Faults 12, 19 and 21."""
+    endings = ("rrd", "json", "csv", "xml", "svg")
+    loops = ["loop", "o.json.progress", *(f"loop.{ending}" for ending in endings)]
+    for name in loops:
+        (tmp_path / name).symlink_to(name)
+    results = ROOT / "training" / "results" / "paper-random-walk.csv"
+    done = forks.run(tmp_path, *(str(each).format(results=results) for each in LOOPED[program]))
+    assert done.returncode == 2, done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    assert "Too many levels of symbolic links" in done.stderr
+    assert names(tmp_path) == sorted(loops)
+
+
+@pytest.mark.fault("outputs that cannot be")
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--json", "o.json", "--csv", "o.json.progress"], "must be named *.csv"),  # fault 13
+        (["--csv", "a.csv", "--policy", "p", "--force"], None),
+        (["--json", "p/config.json", "--policy", "./p", "--force"], "is an input, or part of one"),
+        (["--csv", "pipe.csv"], "is a device or a pipe"),
+    ],
+)
+def test_outputs_are_no_inputs_and_no_progress(here, capsys, arguments, complaint):
+    """Fault 13: two outputs are two files, and none is what is read."""
+    save_tiny(here / "p", "paper")
+    os.mkfifo(here / "pipe.csv")
+    before = (here / "p" / "config.json").read_bytes()
+    code = main(["evaluate", *SMALL, "--episodes", "2", *arguments])
+    assert code == (0 if complaint is None else 2)
+    if complaint:
+        said_in_one_line(capsys, "", complaint)
+        assert "o.json" not in names(here)
+    assert (here / "p" / "config.json").read_bytes() == before
+
+
+@pytest.mark.fault("outputs that cannot be")
+@pytest.mark.parametrize(
+    ("name", "complaint"),
+    [
+        ("old.png", "picture old.png exists; name another, or replace it with --force"),
+        ("a.jpg", "picture must be named *.png, not a.jpg"),
+        (".", "picture . is a folder"),
+    ],
+)
+def test_a_picture_s_output_is_checked_first(forks, tmp_path, name, complaint):
+    """Fault 21: before the replay is looked at, let alone the viewer started."""
+    (tmp_path / "old.png").write_bytes(b"old")
+    done = forks.run(tmp_path, ROOT / "tools" / "picture.py", "none.rrd", "--out", name)
+    assert done.returncode == 2
+    assert complaint in done.stderr
+    assert (tmp_path / "old.png").read_bytes() == b"old"
