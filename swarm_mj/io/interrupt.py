@@ -1,6 +1,7 @@
 """Ctrl-C as a wish that work honours at its next whole step; SIGTERM and a hang-up are the same."""
 
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from types import FrameType
@@ -33,7 +34,7 @@ def heard_interrupt() -> AbstractContextManager[Callable[[], bool]]:
     """Within it Ctrl-C interrupts at once, as ever, but is noted, should a library swallow it.
 
     An exception is lost if it comes while compiled code calls back into Python, as it does while
-    numba loads kernels. It yields whether Ctrl-C was pressed.
+    numba loads kernels; Python then prints it, but not here. It yields whether Ctrl-C was pressed.
     """
     return _noted(is_deferred=False)
 
@@ -55,10 +56,13 @@ def _noted(*, is_deferred: bool) -> Iterator[Callable[[], bool]]:
     before = {number: signal.getsignal(number) for number in INTERRUPTS}
     # A job that its shell shields from Ctrl-C, or `nohup` from hang-ups, stays so.
     heard = {number: handler for number, handler in before.items() if handler != signal.SIG_IGN}
+    hook = sys.unraisablehook
     for number in heard:
         signal.signal(number, note)
+    sys.unraisablehook = lambda lost: None if lost.exc_type is KeyboardInterrupt else hook(lost)
     try:
         yield lambda: was_pressed
     finally:
+        sys.unraisablehook = hook
         for number, handler in heard.items():
             signal.signal(number, handler)

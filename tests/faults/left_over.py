@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -37,6 +38,24 @@ def left_after_limit(mark):
         with suppress(ProcessLookupError):
             os.kill(number, signal.SIGKILL)
     return found
+
+
+def taken_after_limit(ports):
+    """The ports of this machine that still cannot be listened on."""
+    deadline = time.monotonic() + LIMIT_S + SLACK_S
+    while (taken := [port for port in ports if _is_taken(port)]) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return taken
+
+
+def _is_taken(port):
+    with socket.socket() as listening:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listening.bind(("127.0.0.1", port))
+        except OSError:
+            return True
+    return False
 
 
 # Runs `swarm-mj`, or a program by its path, and sends it signals after some time.

@@ -11,7 +11,7 @@ import urllib.request
 from pathlib import Path
 
 import pytest
-from left_over import left_after_limit, needs_proc, signalled
+from left_over import left_after_limit, needs_proc, signalled, taken_after_limit
 from tries import tries
 
 from swarm_mj.io.processes import running
@@ -91,10 +91,8 @@ def test_the_server_of_a_replay_ends_with_it(forks, replay, tmp_path, record_pro
         )
         assert done.returncode in ({-end} if end == signal.SIGKILL else {0, 130}), done.stderr
         assert left_after_limit(mark) == {}
-        for port in re.findall(r"127\.0\.0\.1(?::|%3A)(\d+)", done.stdout):
-            with socket.socket() as free:
-                free.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-                free.bind(("127.0.0.1", int(port)))
+        ports = re.findall(r"127\.0\.0\.1(?::|%3A)(\d+)", done.stdout)
+        assert taken_after_limit([*map(int, ports)]) == []
     record_property("tries", num_tries)
 
 

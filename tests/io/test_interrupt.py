@@ -1,7 +1,9 @@
 """Ctrl-C noted first, obeyed at once the second time, and as ever afterwards."""
 
 import contextlib
+import ctypes
 import signal
+import sys
 
 import pytest
 
@@ -64,3 +66,18 @@ def test_a_ctrl_c_that_a_library_swallowed_is_not_lost():
         with contextlib.suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
         assert was_pressed()
+
+
+def test_what_a_callback_swallowed_is_noted_and_not_printed(monkeypatch):
+    printed = []
+    monkeypatch.setattr(sys, "unraisablehook", printed.append)
+
+    @ctypes.CFUNCTYPE(None, ctypes.py_object)
+    def called_back(failure):
+        raise failure
+
+    with heard_interrupt():
+        called_back(KeyboardInterrupt())
+        assert printed == []
+        called_back(KeyError())
+    assert [lost.exc_type for lost in printed] == [KeyError]
