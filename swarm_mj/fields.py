@@ -49,7 +49,7 @@ def check(settings: Any) -> None:  # noqa: ANN401 - any dataclass
         if value is None and NoneType in get_args(spec.type):
             continue
         for each in value if isinstance(value, tuple) else (value,):
-            _check_value(spec, each)
+            check_value(spec, each)
 
 
 def kind_of(spec: Field[Any]) -> Any:  # noqa: ANN401 - a type
@@ -73,7 +73,8 @@ def as_typed(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
-def _check_value(spec: Field[Any], value: Any) -> None:  # noqa: ANN401 - any field's value
+def check_value(spec: Field[Any], value: Any) -> None:  # noqa: ANN401 - any field's value
+    """As `check`, for one value of a field."""
     allowed = spec.metadata
     label = allowed.get("label", spec.name)
     kind, described = KINDS.get(kind_of(spec), (object, ""))

@@ -6,9 +6,11 @@ Their weights (NumPy arrays by TensorFlow name) become a policy directory, which
 `reference` preset; its mean age of information is compared with theirs in standard errors.
 """
 
+import io
 import math
 import sys
 import tempfile
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,11 +26,13 @@ from swarm_mj.fields import setting
 from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.io.provenance import version
+from swarm_mj.io.reading import read_file
 from swarm_mj.mission import reference
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.policies.stored import save_policy
 
 TOO_FAR = 1
+MOST_BYTES = 10_000_000  # of the weights
 THEIR_AOI, THEIR_SEM = 37.5, 1.0  # over 100 episodes of their simulator [windows]
 MOST_STANDARD_ERRORS = 3.0
 SHAPE = GnnShape(num_features=7, num_outputs=2, edges="reference")
@@ -51,10 +55,14 @@ def network_of(path: Path) -> AggregationGnn:
     """The acting network of the authors' weights.
 
     Raises:
-        ValueError: The file holds other arrays.
+        ValueError: The file cannot be read, is damaged, or holds other arrays.
     """
+    content = io.BytesIO(read_file(path, "weights", MOST_BYTES))
     try:
-        with np.load(path, allow_pickle=False) as arrays:
+        with zipfile.ZipFile(content) as archive:
+            if sum(entry.file_size for entry in archive.filelist) > MOST_BYTES:
+                raise ValueError(f"its arrays may have up to {MOST_BYTES} bytes")
+        with np.load(content, allow_pickle=False) as arrays:
             names = {"output": f"policy/{OUTPUT}/"} | {
                 f"{ours}.{layer}": f"policy/{theirs}/mlp/linear_{layer}/"
                 for ours, theirs in PARTS.items()
@@ -66,8 +74,9 @@ def network_of(path: Path) -> AggregationGnn:
                 weights[f"{ours}.bias"] = torch.from_numpy(arrays[f"{theirs}b"])
         network = AggregationGnn(SHAPE)
         network.load_state_dict(weights)
-    except (KeyError, RuntimeError) as error:
-        raise ValueError(f"{path} does not hold the authors' weights: {error}") from error
+    except Exception as error:  # of a damaged file, NumPy, zipfile and zlib raise one each
+        reason = " ".join(str(error).split())
+        raise ValueError(f"{path} does not hold the authors' weights: {reason:.200}") from error
     return network
 
 

@@ -5,7 +5,6 @@
 Writes assets/figures/learning.svg and .png.
 """
 
-import csv
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,8 +20,11 @@ from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.evaluation.figures.style import CAPTION, FAINT, INK, WIDTH_IN, look_of, save, styled
 from swarm_mj.evaluation.results import read_results
 from swarm_mj.fields import setting
+from swarm_mj.io.reading import read_rows
 
-RESULTS = Path("training/results/learning")
+ROOT = Path(__file__).resolve().parent.parent
+RESULTS = ROOT / "training" / "results" / "learning"
+MOST_BYTES = 10_000_000
 SCHEDULES = ("tdma", "spatial-tdma")
 TITLE = "Training the shipped gnn: mean over teams of 20, 40 and 80 robots at rest"
 SAID = (
@@ -39,8 +41,17 @@ COLUMNS = ("minutes", "aoi", "aoi_sem")
 class LearningFigure:
     """Where the figure goes, and where its numbers are."""
 
-    out: Path = setting(Path("assets/figures/learning"), "the files, without their endings")
-    results: Path = setting(RESULTS, "where the experiment left them", metavar="DIR")
+    out: Path = setting(
+        ROOT / "assets" / "figures" / "learning",
+        "the files, without their endings",
+        shown="assets/figures/learning",
+    )
+    results: Path = setting(
+        RESULTS,
+        "where the experiment left them",
+        metavar="DIR",
+        shown="training/results/learning",
+    )
 
     def __call__(self) -> int:
         """Draws it."""
@@ -64,17 +75,16 @@ def read_curve(path: Path) -> dict[str, np.ndarray]:
     """The columns of a learning curve that are drawn, by their names.
 
     Raises:
-        ValueError: It is no learning curve.
-        OSError: It cannot be read.
+        ValueError: It cannot be read, or is no learning curve.
     """
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    _, rows = read_rows(path, "learning curve", MOST_BYTES)
     try:
-        if not rows:
-            raise KeyError(COLUMNS)
-        return {name: np.array([float(row[name]) for row in rows]) for name in COLUMNS}
-    except (KeyError, TypeError, ValueError) as error:
+        curve = {name: np.array([float(row[name]) for _, row in rows]) for name in COLUMNS}
+    except (KeyError, ValueError) as error:
         raise ValueError(f"{path} is no learning curve with {', '.join(COLUMNS)}") from error
+    if not rows or not all(np.all(np.isfinite(numbers)) for numbers in curve.values()):
+        raise ValueError(f"{path} is no learning curve: it needs finite numbers, a row or more")
+    return curve
 
 
 def draw(curve: Mapping[str, np.ndarray], levels: Mapping[str, float]) -> Figure:

@@ -19,7 +19,8 @@ from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.fields import setting
 from swarm_mj.io.atomic import write_bytes
 
-RESULTS = Path("training/results/learning")
+ROOT = Path(__file__).resolve().parent.parent
+RESULTS = ROOT / "training" / "results" / "learning"
 CANDIDATES = {
     "rest": "--task stationary --robots 20 40 80",
     "walk": "--task random-walk --robots 10 20 40 80",
@@ -43,8 +44,15 @@ class ShippedGnn:
 
     minutes: float = setting(30.0, "of training, each candidate", low=0.01, high=10_000.0)
     episodes: int = setting(8, "missions of the comparison", low=1, high=100_000)
-    runs: Path = setting(Path("runs"), "where runs are kept, to go on with", metavar="DIR")
-    results: Path = setting(RESULTS, "where curves and evaluations go", metavar="DIR")
+    runs: Path = setting(
+        ROOT / "runs", "where runs are kept, to go on with", metavar="DIR", shown="runs"
+    )
+    results: Path = setting(
+        RESULTS,
+        "where curves and evaluations go",
+        metavar="DIR",
+        shown="training/results/learning",
+    )
     jobs: int = setting(2, "processes of the comparison", low=1, high=256)
 
     def __call__(self) -> int:

@@ -20,6 +20,16 @@ MANY = 10**9  # from here on, the end of a range is only there to catch slips
 METAVARS: dict[Any, str] = {int: "N", float: "X", str: "NAME", Path: "FILE"}
 
 
+def _path(text: str) -> Path:
+    """What was typed as a path; nothing at all would be the current folder."""
+    if not text:
+        raise argparse.ArgumentTypeError("name a file or a folder, not ''")
+    return Path(text)
+
+
+CONVERT: dict[Any, Callable[[str], Any]] = {Path: _path}
+
+
 class Parser(argparse.ArgumentParser):
     """Complains in one line."""
 
@@ -135,7 +145,7 @@ def add_option(
         group.add_argument(flag_of(spec), dest=dest, action="store_true", help=text)
         return
     how: dict[str, Any] = {
-        "type": spec.metadata.get("convert") or kind_of(spec),
+        "type": spec.metadata.get("convert") or CONVERT.get(kind_of(spec), kind_of(spec)),
         "metavar": _metavar(spec),
         "help": text,
     }

@@ -1,15 +1,15 @@
 """Results of evaluations as files: one row per policy and regime, as CSV or JSON."""
 
-import csv
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, asdict, dataclass, fields
 from pathlib import Path
 from types import NoneType
 from typing import Any, get_args
 
-from swarm_mj.fields import kind_of
+from swarm_mj.fields import check_value, kind_of
 from swarm_mj.io import atomic
+from swarm_mj.io.reading import read_rows
+from swarm_mj.mission import Mission
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +94,10 @@ def carries_more(result: Result) -> bool:
 
 COLUMNS = tuple(spec.name for spec in fields(Result))
 NEEDED = tuple(spec.name for spec in fields(Result) if spec.default is MISSING)
-NUMBERS = {int: "a whole number", float: "a finite number", str: "a text"}
+REPEATED = {spec.name: spec for spec in fields(Mission) if spec.name in COLUMNS}
+MOST_BYTES, MOST_CHARACTERS = 100_000_000, 10_000  # of a file, of a cell
+LEAST, MOST, MOST_WHOLE = -1e-6, 1e9, 2**63  # rounding may leave a little less than nothing
+NUMBERS = {int: "a whole number", float: "a finite number from 0 to 1e9", str: "a text"}
 WAY_OUT = "make them with `swarm-mj evaluate --csv FILE`"
 
 
@@ -104,21 +107,19 @@ def read_results(path: Path) -> list[Result]:
     Columns that no result has are passed over, and those with a default may be missing.
 
     Raises:
-        ValueError: The file is no CSV, lacks columns or rows, or a cell is not what it must be.
-        OSError: The file cannot be read.
+        ValueError: The file cannot be read, is no CSV, lacks columns or rows, or a cell is not what
+            it must be.
     """
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            reader = csv.DictReader(file, strict=True)
-            missing = [name for name in NEEDED if name not in (reader.fieldnames or ())]
-            if missing:
-                raise ValueError(f"results {path} lack the columns {', '.join(missing)}; {WAY_OUT}")
-            results = [_result(f"{path}, line {reader.line_num}", row) for row in reader]
-    except (csv.Error, UnicodeDecodeError) as error:
-        raise ValueError(f"results {path} are no CSV ({error}); {WAY_OUT}") from error
-    if not results:
-        raise ValueError(f"results {path} have no rows; {WAY_OUT}")
-    return results
+        names, rows = read_rows(path, "results file", MOST_BYTES)
+        missing = [name for name in NEEDED if name not in names]
+        if missing:
+            raise ValueError(f"results file {path} lacks the columns {', '.join(missing)}")
+        if not rows:
+            raise ValueError(f"results file {path} has no rows")
+        return [_result(f"results file {path}, line {line}", row) for line, row in rows]
+    except ValueError as error:
+        raise ValueError(f"{error}; {WAY_OUT}") from error
 
 
 def write_csv(path: Path, results: Sequence[Result]) -> None:
@@ -148,23 +149,37 @@ def write_json(
     atomic.write_json(path, {"results": objects})
 
 
-def _result(place: str, row: dict[str, Any]) -> Result:
+def _result(place: str, row: dict[str, str]) -> Result:
     """One row; `place` says which, for the message."""
-    if None in row or None in row.values():
-        raise ValueError(f"results {place}: as many cells as columns are needed; {WAY_OUT}")
     given = (spec for spec in fields(Result) if spec.name in row)
-    return Result(**{spec.name: _value(place, spec, row[spec.name]) for spec in given})
+    try:
+        return Result(**{spec.name: _value(spec, row[spec.name]) for spec in given})
+    except ValueError as error:
+        raise ValueError(f"{place}: {error}") from error
 
 
-def _value(place: str, spec: Field[Any], text: str) -> Any:  # noqa: ANN401 - any field's value
-    """A cell as its field's type."""
+def _value(spec: Field[Any], text: str) -> Any:  # noqa: ANN401 - any field's value
+    """A cell as its field's type; raises ValueError if it is not, or out of its range."""
     if text == "" and NoneType in get_args(spec.type):
         return None
     kind = kind_of(spec)
+    value = _text(text) if kind is str else _number(spec, kind, text)
+    if value is None:
+        raise ValueError(f"{spec.name} must be {NUMBERS[kind]}, not {text!r:.60}")
+    if spec.name in REPEATED:
+        check_value(REPEATED[spec.name], value)
+    return value
+
+
+def _text(text: str) -> str | None:
+    return text if 0 < len(text) <= MOST_CHARACTERS else None
+
+
+def _number(spec: Field[Any], kind: type, text: str) -> int | float | None:
+    """What a cell says, if it is a number that such a cost or count can be."""
+    low = -MOST if "difference" in spec.name else LEAST
     try:
         value = kind(text)
     except ValueError:
-        value = math.nan
-    if text == "" or (isinstance(value, float) and not math.isfinite(value)):
-        raise ValueError(f"results {place}: {spec.name} must be {NUMBERS[kind]}, not {text!r}")
-    return value
+        return None
+    return value if low <= value <= (MOST if kind is float else MOST_WHOLE) else None

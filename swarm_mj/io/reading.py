@@ -1,9 +1,12 @@
 """The one way of reading what others wrote: nothing is believed that was not checked.
 
-Files are regular, and no larger than expected; JSON has the keys of a dataclass, all of them and no
-others, its numbers are finite, and it is not nested without end. Ranges are the dataclass's own.
+Files are regular, and no larger than expected. The rows of a table have as many cells as it has
+columns. JSON has the keys of a dataclass, all of them and no others, its numbers are finite, and it
+is not nested without end. Ranges are the dataclass's own.
 """
 
+import csv
+import io
 import os
 import stat
 from collections.abc import Iterable
@@ -15,6 +18,8 @@ from typing import Annotated, Any, BinaryIO, TypeVar
 import msgspec
 
 Kind = TypeVar("Kind")
+
+Row = tuple[int, dict[str, str]]
 
 MOST_LEVELS = 20  # lists and objects within each other
 MOST_WORDS = 160  # characters of what msgspec says
@@ -64,6 +69,25 @@ def check_size(what: str, size: int, most_bytes: int) -> None:
     """Raises ValueError for a file that is too large to be read, or to be written."""
     if size > most_bytes:
         raise ValueError(f"{what} may have up to {most_bytes} bytes, not {size}")
+
+
+def read_rows(path: Path, what: str, most_bytes: int) -> tuple[list[str], list[Row]]:
+    """A CSV file: the names of its columns, and its rows with the lines that they end on.
+
+    Raises:
+        ValueError: It cannot be read or is too large, is no CSV, or a row has more cells, or fewer,
+            than there are columns.
+    """
+    content = read_file(path, what, most_bytes)
+    try:
+        reader = csv.DictReader(io.StringIO(content.decode(), newline=""), strict=True)
+        rows = [(reader.line_num, row) for row in reader]
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise ValueError(f"{what} {path} is no CSV ({error})") from error
+    for line, row in rows:
+        if None in row or None in row.values():
+            raise ValueError(f"{what} {path}, line {line}: as many cells as columns are needed")
+    return list(reader.fieldnames or ()), rows
 
 
 def read_json(text: bytes | str, kind: type[Kind]) -> Kind:

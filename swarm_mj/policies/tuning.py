@@ -3,20 +3,27 @@
 `tuned.csv` beside this file holds one row per policy and regime; `tools/tune.py` wrote it.
 """
 
-import csv
 import math
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from swarm_mj.fields import check, check_value, setting
+from swarm_mj.io.reading import read_rows
 from swarm_mj.mission import Mission
 
 TABLE = Path(__file__).with_name("tuned.csv")
+MOST_BYTES = 10_000_000
+REGIME = ("preset", "task", "num_robots", "range_ratio", "velocity_ratio")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Tuned:
-    """The best probability of a policy in one regime: a row of the table, its columns in order."""
+    """The best probability of a policy in one regime: a row of the table, its columns in order.
+
+    Raises:
+        ValueError: There is no such regime, or a number is out of range.
+    """
 
     policy: str  # a name among `POLICIES`
     preset: str
@@ -24,13 +31,18 @@ class Tuned:
     num_robots: int
     range_ratio: float  # of 1 km
     velocity_ratio: float  # of 1 km in 50 s; means nothing to a stationary team
-    probability: float  # the least mean age of a grid's
-    aoi_mean: float  # with it, over the episodes (Eq. 10) [windows]
-    aoi_sem: float  # standard error of that mean [windows]
+    probability: float = setting(low=0.0, high=1.0)  # the least mean age of a grid's
+    aoi_mean: float = setting(low=0.0, high=1e9)  # with it, over the episodes (Eq. 10) [windows]
+    aoi_sem: float = setting(low=0.0, high=1e9)  # standard error of that mean [windows]
     episodes: int  # missions flown with every probability of the grid
     first_seed: int  # of these, the others follow one by one
     version: str  # of the code that tuned it
     commit: str
+
+    def __post_init__(self) -> None:
+        check(self)
+        for name in REGIME:
+            check_value(Mission.__dataclass_fields__[name], getattr(self, name))
 
 
 def tuned_probability(policy_name: str, mission: Mission) -> float:
@@ -56,14 +68,19 @@ def read_table(path: Path) -> list[Tuned]:
     """The rows of a table.
 
     Raises:
-        OSError: The file cannot be read.
-        ValueError: A column is missing or unknown, or a number is none.
+        ValueError: The file cannot be read, a column is missing or unknown, or a value is none.
     """
-    with path.open(encoding="utf-8", newline="") as file:
-        reader, kinds = csv.DictReader(file), Tuned.__annotations__
-        if reader.fieldnames != list(kinds):
-            raise ValueError(f"columns of {path} must be {', '.join(kinds)}")
-        return [Tuned(**{name: kind(row[name]) for name, kind in kinds.items()}) for row in reader]
+    names, rows = read_rows(path, "table", MOST_BYTES)
+    kinds = Tuned.__annotations__
+    if names != list(kinds):
+        raise ValueError(f"columns of {path} must be {', '.join(kinds)}")
+    tuned = []
+    for line, row in rows:
+        try:
+            tuned.append(Tuned(**{name: kind(row[name]) for name, kind in kinds.items()}))
+        except ValueError as error:
+            raise ValueError(f"table {path}, line {line}: {error}") from error
+    return tuned
 
 
 @cache

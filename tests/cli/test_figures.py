@@ -103,9 +103,9 @@ def test_unasked_figures_without_points_are_left_out_unless_all_are(swarm_mj, tm
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("", "lack the columns policy, task"),
-        ("policy,task\nmst,stationary\n", "lack the columns preset"),
-        (",".join(COLUMNS) + "\n", "have no rows"),
+        ("", "lacks the columns policy, task"),
+        ("policy,task\nmst,stationary\n", "lacks the columns preset"),
+        (",".join(COLUMNS) + "\n", "has no rows"),
         ("\x00\xff", "bad.csv"),
     ],
 )

@@ -11,16 +11,23 @@ import pytest
 
 from swarm_mj.evaluation.results import COLUMNS, Result, read_results, write_csv, write_json
 
-TEXTS = {"policy": "mst", "task": "flocking", "config": '{"a": "b, \\"c\\""}'}
+TEXTS = {
+    "policy": "mst",
+    "task": "flocking",
+    "preset": "reference",
+    "boundary": "none",
+    "physics": "contact",
+    "config": '{"a": "b, \\"c\\""}',
+}
 
 
 def some_result(**overrides):
-    """A number of its own in every field: 1/7, 2/7, ..."""
+    """A number of its own in every field: 1/300, 2/300, ..."""
     values = {}
     for position, spec in enumerate(fields(Result), start=1):
         kinds = get_args(spec.type) or (spec.type,)
         text = TEXTS.get(spec.name, f"some {spec.name}")
-        values[spec.name] = {str: text, int: position, float: position / 7.0}[kinds[0]]
+        values[spec.name] = {str: text, int: position, float: position / 300.0}[kinds[0]]
     return Result(**values | overrides)
 
 
@@ -43,7 +50,7 @@ def test_columns_stand_in_the_order_of_the_fields(tmp_path):
     assert header == ",".join(COLUMNS)
     assert header.startswith("policy,task,preset,num_robots,range_ratio,velocity_ratio,boundary")
     assert header.endswith("published_velocity_variance_sem,version,commit,config")
-    assert row.startswith(f"mst,flocking,some preset,4,{5 / 7!r},")
+    assert row.startswith(f"mst,flocking,reference,4,{5 / 300!r},")
 
 
 def test_json_is_the_same_with_each_missions_costs(tmp_path):
@@ -83,12 +90,19 @@ def with_cells(path, **cells):
 @pytest.mark.parametrize(
     ("cells", "complaint"),
     [
-        ({"aoi_mean": "old"}, "line 3: aoi_mean must be a finite number, not 'old'"),
-        ({"aoi_mean": ""}, "line 3: aoi_mean must be a finite number, not ''"),
-        ({"aoi_mean": "nan"}, "aoi_mean must be a finite number, not 'nan'"),
-        ({"aoi_sem": "inf"}, "aoi_sem must be a finite number, not 'inf'"),
+        ({"aoi_mean": "old"}, "line 3: aoi_mean must be a finite number from 0 to 1e9, not 'old'"),
+        ({"aoi_mean": ""}, "line 3: aoi_mean must be a finite number from 0 to 1e9, not ''"),
+        ({"aoi_mean": "nan"}, "aoi_mean must be a finite number from 0 to 1e9, not 'nan'"),
+        ({"aoi_sem": "inf"}, "aoi_sem must be a finite number from 0 to 1e9, not 'inf'"),
         ({"episodes": "100.0"}, "episodes must be a whole number, not '100.0'"),
         ({"policy": ""}, "policy must be a text, not ''"),
+        ({"aoi_median": "-1"}, "aoi_median must be a finite number from 0 to 1e9, not '-1'"),
+        ({"seed": "-1"}, "seed must be a whole number, not '-1'"),
+        ({"seed": "9" * 30}, "seed must be a whole number, not '999"),
+        ({"config": "x" * 10_001}, "config must be a text"),
+        ({"task": "swim"}, "line 3: task must be one of stationary, random-walk, flocking"),
+        ({"preset": "mine"}, "preset must be one of paper, reference, not 'mine'"),
+        ({"range_ratio": "0"}, r"range ratio must be a number from 0.01 to 10 \[of 1 km\], not 0"),
     ],
 )
 def test_cells_that_are_not_what_they_must_be(tmp_path, cells, complaint):
@@ -122,7 +136,7 @@ def test_files_from_before_robots_could_be_switched_off_are_read(tmp_path):
 def test_missing_columns_are_named(tmp_path):
     without = [name for name in COLUMNS if name not in ("aoi_sem", "task")]
     (tmp_path / "r.csv").write_text(",".join(without) + "\n")
-    with pytest.raises(ValueError, match=r"r\.csv lack the columns task, aoi_sem; make them with"):
+    with pytest.raises(ValueError, match=r"r\.csv lacks the columns task, aoi_sem; make them with"):
         read_results(tmp_path / "r.csv")
 
 
@@ -135,7 +149,7 @@ def test_rows_need_as_many_cells_as_columns(tmp_path, cells):
 
 def test_a_file_without_rows_is_no_result(tmp_path):
     (tmp_path / "r.csv").write_text(",".join(COLUMNS) + "\n")
-    with pytest.raises(ValueError, match="have no rows"):
+    with pytest.raises(ValueError, match="has no rows"):
         read_results(tmp_path / "r.csv")
 
 
@@ -156,7 +170,7 @@ def test_a_file_that_was_cut_off_is_refused(tmp_path):
 
 
 def test_a_missing_file_says_so(tmp_path):
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(ValueError, match=r"there is no results file .*none\.csv"):
         read_results(tmp_path / "none.csv")
 
 

@@ -2,6 +2,7 @@
 
 import importlib.util
 import random
+import sys
 from pathlib import Path
 
 from tries import tries
@@ -26,6 +27,7 @@ def program(folder, name):
     """A program of `tools/` or `training/`, as a module."""
     spec = importlib.util.spec_from_file_location(name, ROOT / folder / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # where `swarm_mj.cli.script` looks for it
     spec.loader.exec_module(module)
     return module
 

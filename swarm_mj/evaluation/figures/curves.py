@@ -6,17 +6,18 @@ from dataclasses import asdict, dataclass
 from itertools import groupby
 from typing import Any
 
-import msgspec
 import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.evaluation.figures.contents import OPTIONS, ResultFigure
 from swarm_mj.evaluation.published import points
 from swarm_mj.evaluation.results import Result, carries_more
+from swarm_mj.io.reading import read_json
 from swarm_mj.mission import PRESETS
 
 # A figure compares policies, so all else is the same.
 AGREED = ("episodes", "seed", "version")  # the commits stand in the caption
+MOST_HOPS = 1000  # a receptive field
 
 
 class NoPointsError(ValueError):
@@ -137,16 +138,19 @@ def _x(figure: ResultFigure, result: Result) -> float | None:
     if figure.sweeps_missions:
         return float(getattr(result, figure.x_name))
     x = _config(result).get(figure.x_name)
-    if x is not None and not isinstance(x, int | float):
-        raise ValueError(f"{figure.x_name} of {result.policy} must be a number, not {x!r}")
+    if x is not None and not (isinstance(x, int | float) and 0 <= x <= MOST_HOPS):
+        raise ValueError(
+            f"{figure.x_name} of {result.policy} must be a number from 0 to {MOST_HOPS}, not "
+            f"{x!r:.60}"
+        )
     return None if x is None else float(x)
 
 
 def _config(result: Result) -> dict[str, Any]:
     """What a result says it was made with; raises ValueError unless it is a JSON object."""
     try:
-        return msgspec.json.decode(result.config, type=dict[str, Any])
-    except msgspec.DecodeError as error:
+        return read_json(result.config, dict)
+    except ValueError as error:
         raise ValueError(
             f"config of {result.policy} must be a JSON object, not {result.config!r:.60}; make "
             "the results with `swarm-mj evaluate --csv FILE`"

@@ -97,7 +97,12 @@ LOOKS = {
 
 def look_of(method: str) -> Look:
     """A policy's or a published method's look; one that has none yet is grey, under its name."""
-    return LOOKS.get(method, Look(label=method, colour=FAINT, marker="d"))
+    return LOOKS.get(method, Look(label=as_it_is(method), colour=FAINT, marker="d"))
+
+
+def as_it_is(text: str) -> str:
+    """A text of others as matplotlib draws it as it is: dollars do not begin a formula."""
+    return text.replace("$", r"\$")
 
 
 def styled() -> AbstractContextManager[None]:
@@ -107,7 +112,7 @@ def styled() -> AbstractContextManager[None]:
 
 def write_caption(figure: Figure, x: float, y: float, text: str) -> None:
     """Writes where a figure's numbers come from, small, from a place on the figure on."""
-    figure.text(x, y, text, fontsize=7, color=FAINT, gid=CAPTION)
+    figure.text(x, y, as_it_is(text), fontsize=7, color=FAINT, gid=CAPTION)
 
 
 def save(figure: Figure, path: Path) -> None:

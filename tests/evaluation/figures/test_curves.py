@@ -66,7 +66,9 @@ def test_a_policy_with_receptive_fields_has_a_curve_over_them():
     np.testing.assert_array_equal(curve.x, [1.0, 3.0])
     np.testing.assert_array_equal(curve.mean, [30.0, 20.0])
     assert not curve.is_level
-    with pytest.raises(ValueError, match="receptive_field of learned must be a number, not 'wide'"):
+    with pytest.raises(
+        ValueError, match="receptive_field of learned must be a number from 0 to 1000"
+    ):
         found(FIG3, [result("learned", config={"receptive_field": "wide"})])
 
 
