@@ -269,7 +269,7 @@ def test_a_pipe_is_not_waited_for(begun, capsys, name):
     """Fault 22."""
     (begun / name).unlink()
     os.mkfifo(begun / name)
-    refused(begun, capsys, "is a folder, a pipe or a device")
+    refused(begun, capsys, "pipe")
 
 
 def _step(state):
