@@ -9,8 +9,10 @@ from typing import ClassVar
 
 from rich.console import Console
 
-from swarm_mj.cli import DONE, INTERRUPTED
+from swarm_mj.cli import DONE, FAILED, INTERRUPTED
+from swarm_mj.cli.estimates import YES, check_fits, study_needs
 from swarm_mj.cli.evaluation_table import print_results
+from swarm_mj.cli.machine import memory_errors
 from swarm_mj.cli.mission_options import several_missions
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.policy_options import NAMES, PolicyOptions
@@ -54,6 +56,7 @@ class Options(PolicyOptions):
     json: Path | None = setting(None, "write all figures and each mission's costs", group=OUTPUT)
     csv: Path | None = setting(None, "write all figures, one row a result", group=OUTPUT)
     force: bool = setting(False, "replace existing results and progress", group=OUTPUT)
+    yes: bool = setting(False, YES, group=OUTPUT)
     resume: bool = setting(False, "continue where an interruption broke off", group=OUTPUT)
 
     @property
@@ -82,6 +85,9 @@ def run(options: Options) -> int:
         inputs=directories(options.policy),
         must_be_new=not options.force,
     )
+    way_out = "choose fewer --jobs, --robots, --windows or --episodes"
+    needs, output = study_needs(study, options.jobs), options.json or options.csv
+    check_fits(needs, output, way_out, is_forced=options.yes)
     with ExitStack() as stack:
         for path in filter(None, (options.json, options.csv)):
             stack.enter_context(owned(path))
@@ -101,12 +107,15 @@ def _evaluate(options: Options, study: Study) -> int:
         progress.start(kept, header)
     try:
         keep = partial(progress.append, kept, header) if kept else None
-        _fly(study, costs, options.jobs, keep, console)
-    except KeyboardInterrupt:
+        with memory_errors():
+            _fly(study, costs, options.jobs, keep, console)
+    except (KeyboardInterrupt, MemoryError) as error:
+        is_memory = isinstance(error, MemoryError)
         hint = "the same command with --resume continues" if kept else "nothing was kept"
         flown, total = _num_flown(study, costs), study.episodes * len(study.pairs)
-        console.print(f"Interrupted after {flown} of {total} missions; {hint}.")
-        return INTERRUPTED
+        ending = "Out of memory" if is_memory else "Interrupted"
+        console.print(f"{ending} after {flown} of {total} missions; {hint}.")
+        return FAILED if is_memory else INTERRUPTED
     with deferred_interrupt():
         evaluated = summarise(study, costs, header)
         _write(options, evaluated)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from swarm_mj.cli.estimates import YES, check_fits, figures_needs
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.terminal import plain_console
 from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS
@@ -29,6 +30,7 @@ class Options:
     )
     format: tuple[str, ...] = setting(("svg", "png"), "of the files", choices=FORMATS)
     force: bool = setting(False, "replace existing figures")
+    yes: bool = setting(False, YES)
     flock_policy: str = setting(
         "mst", "who talks to whom in it", metavar="POLICY", group=f"the mission flown for {FLOCK}"
     )
@@ -38,6 +40,8 @@ class Options:
 def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
     paths = _paths(options)
+    needs = figures_needs(options.results, sum(map(len, paths.values())))
+    check_fits(needs, options.out, "draw fewer results at once", is_forced=options.yes)
     results = [result for path in options.results for result in read_results(path)]
     with Console(stderr=True).status("Drawing ...") as status:
         # matplotlib takes its time to import; a cache that it cannot keep is no news

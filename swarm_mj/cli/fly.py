@@ -3,6 +3,7 @@
 import os
 import shlex
 import time
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -10,8 +11,10 @@ from typing import Any, ClassVar
 
 from rich.console import Console
 
-from swarm_mj.cli import DONE, INTERRUPTED
+from swarm_mj.cli import DONE, FAILED, INTERRUPTED
+from swarm_mj.cli.estimates import YES, check_fits, flight_needs, replay_memory
 from swarm_mj.cli.flight_table import flight_numbers, flight_table
+from swarm_mj.cli.machine import free_memory, memory_errors
 from swarm_mj.cli.mission_options import one_mission
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.policy_options import NAMES, PolicyOptions
@@ -38,6 +41,8 @@ from swarm_mj.swarm import Swarm
 
 REPLAYS = Path("replays")
 OUTPUT = "output"  # a heading of the help
+ENDINGS = {INTERRUPTED: "Interrupted", FAILED: "Out of memory"}
+WINDOWS_BETWEEN_LOOKS = 50  # at the memory that is left
 COMPILING_WINDOWS = 10  # in which three robots do all that a flight does, schedules included
 
 
@@ -60,6 +65,7 @@ class Options(PolicyOptions):
     no_record: bool = setting(False, "record no replay", group=OUTPUT)
     json: Path | None = setting(None, "write a summary", group=OUTPUT)
     force: bool = setting(False, "replace existing files", group=OUTPUT)
+    yes: bool = setting(False, YES, group=OUTPUT)
     observer: int = setting(0, "the robot whose knowledge the replay shows", group=OUTPUT)
     view: bool = setting(False, "open the replay afterwards", group=OUTPUT)
 
@@ -68,17 +74,19 @@ def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
     options = replace(options, policy=with_payload([options.policy], options.payload)[0])
     mission = options.mission
-    policy = _make_policy(options, mission)
     path = _replay_path(options)
+    needs = flight_needs(mission, options.policy, is_recorded=path is not None)
+    way_out = "choose fewer --robots or --windows" + (", or --no-record" if path else "")
+    check_fits(needs, path, way_out, is_forced=options.yes)
+    policy = _make_policy(options, mission)
     console = Console(stderr=True, highlight=False)
     with console.status("Preparing the swarm (compiles once, then it is cached) ..."):
         _compile_ahead(options, mission)
         swarm = Swarm(mission, [options.seed])
         recorder = _recorder(options, swarm, policy) if path else None
     start_s = time.perf_counter()
-    flown = _fly(swarm, policy, recorder, console)
+    flown, code = _fly(swarm, policy, recorder, console)
     wall_s = time.perf_counter() - start_s
-    was_interrupted = len(flown) < mission.num_windows
     out = plain_console()
     with deferred_interrupt():
         config, numbers = _config(options, policy), flight_numbers(policy, summarise(flown))
@@ -90,14 +98,14 @@ def run(options: Options) -> int:
                 known = {key: value for key, value in config.items() if value is not None}
                 write_replay(recorder.log(), mission, known, path)
             if options.json:
-                took = {"wall_seconds": wall_s, "interrupted": was_interrupted}
+                took = {"wall_seconds": wall_s, "interrupted": code != DONE}
                 replay = {"replay": str(path) if path else None}
                 write_json(options.json, {"config": config} | numbers | took | replay)
     if path:
         out.print(f"Open the replay:  {this_command()} replay {shlex.quote(str(path))}")
-    if was_interrupted:
-        console.print(f"Interrupted after {len(flown)} of {mission.num_windows} windows.")
-        return INTERRUPTED
+    if code != DONE:
+        console.print(f"{ENDINGS[code]} after {len(flown)} of {mission.num_windows} windows.")
+        return code
     return run_viewer(view_command(path)) if options.view and path else DONE
 
 
@@ -154,20 +162,30 @@ def _recorder(options: Options, swarm: Swarm, policy: Policy) -> Recorder:
 
 def _fly(
     swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Console
-) -> list[WindowRecord]:
-    """Flies with a progress bar; Ctrl-C ends the flight after a whole window."""
+) -> tuple[list[WindowRecord], int]:
+    """Flies with a progress bar; returns what was flown, and the exit code.
+
+    Ctrl-C ends the flight after a whole window, and so does a lack of memory, while there is enough
+    to write what was flown.
+    """
     flown: list[WindowRecord] = []
     bar = WorkBar("Flying", swarm.mission.num_windows, "windows", console=console)
-    with deferred_interrupt() as is_interrupted, bar:
+    with suppress(MemoryError), memory_errors(), deferred_interrupt() as is_interrupted, bar:
         for window in rollout(swarm, policy):
-            flown.append(window)
             if recorder:
                 recorder.add(window)
+            flown.append(window)
             bar.text = f"age {float(window.costs.age_windows[0]):.1f}"
             bar.advance()
             if is_interrupted():
-                break
-    return flown
+                return flown, INTERRUPTED
+            is_time = recorder and len(flown) % WINDOWS_BETWEEN_LOOKS == 0
+            if is_time and free_memory() < replay_memory(swarm.mission, len(flown)):
+                return flown, FAILED
+        return flown, DONE
+    if not flown:
+        raise MemoryError
+    return flown, FAILED
 
 
 def _config(options: Options, policy: Policy) -> dict[str, Any]:

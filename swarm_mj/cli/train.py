@@ -1,6 +1,5 @@
 """`swarm-mj train`: trains a communication policy by PPO in simulated missions."""
 
-import os
 import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -8,7 +7,9 @@ from typing import Any, ClassVar
 
 from rich.console import Console
 
-from swarm_mj.cli import DONE, INTERRUPTED
+from swarm_mj.cli import DONE, FAILED, INTERRUPTED
+from swarm_mj.cli.estimates import YES, check_fits, training_needs
+from swarm_mj.cli.machine import memory_errors
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
 from swarm_mj.cli.outputs import Output, check_outputs
@@ -17,7 +18,6 @@ from swarm_mj.cli.train_progress import Watch, age_of
 from swarm_mj.cli.train_settings import (
     add_setting_options,
     asked_settings,
-    check_memory,
     given_settings,
     refuse_others,
 )
@@ -54,6 +54,7 @@ class Options:
     minutes: float | None = same_as(Limits, "minutes")
     replay_every: int | None = same_as(Limits, "replay_every")
     init: Path | None = setting(None, "begin with a stored policy", metavar="POLICY")
+    yes: bool = setting(False, YES)
     settings: dict[str, Any] = nested(add_setting_options, given_settings)
     typed: tuple[str, ...] = ()
 
@@ -65,16 +66,17 @@ def run(options: Options) -> int:
         asked = _asked_run(options)
         from swarm_mj.learning.train import train  # stable-baselines3 takes its time to import
     try:
-        with deferred_interrupt() as is_interrupted:
+        with memory_errors(), deferred_interrupt() as is_interrupted:
             watch = Watch(console, asked.limits, is_interrupted)
             with watch:
                 progress = train(asked, options.out, listener=watch, is_resumed=options.resume)
             is_over = not watch.has_stopped
             _print(options.out, asked, progress, is_over=is_over)
-    except KeyboardInterrupt:
-        go_on = _resume_command(options.out)
-        console.print(f"Broken off; the last checkpoint is kept.\nGo on:    {go_on}", markup=False)
-        return INTERRUPTED
+    except (KeyboardInterrupt, MemoryError) as error:
+        is_memory, go_on = isinstance(error, MemoryError), _resume_command(options.out)
+        ending = "Out of memory" if is_memory else "Broken off"
+        console.print(f"{ending}; the last checkpoint is kept.\nGo on:    {go_on}", markup=False)
+        return FAILED if is_memory else INTERRUPTED
     if not watch.has_begun:
         console.print("Nothing was left to train: raise --budget or --minutes, which count in all.")
     if not is_over:
@@ -88,7 +90,8 @@ def _asked_run(options: Options) -> Run:
     run = replace(run, limits=asked_limits(run.limits, options))
     written = (Output("run", options.out / name) for name in (SETTINGS, CHECKPOINT, CURVE))
     check_outputs(*written, inputs=[options.init] if options.init else [])
-    check_memory(run.training, _memory_bytes())
+    needs, way_out = training_needs(run.training, run.limits), "choose fewer --missions or --robots"
+    check_fits(needs, options.out, way_out, is_forced=options.yes)
     return run
 
 
@@ -119,14 +122,6 @@ def asked_limits(limits: Limits, options: Options) -> Limits:
     if options.replay_every is not None:
         limits = replace(limits, replay_every=options.replay_every)
     return limits
-
-
-def _memory_bytes() -> int | None:
-    """This machine's memory, if it tells."""
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, OSError, ValueError):
-        return None
 
 
 def _print(out: Path, asked: Run, progress: Progress, *, is_over: bool) -> None:

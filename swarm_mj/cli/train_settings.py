@@ -19,7 +19,6 @@ from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.policy_config import PolicyConfig
 
-SHARE_OF_MEMORY = 0.5  # that a run's arrays may take
 PARTS = {"": Training, "network.": GnnShape, "ppo.": PpoSettings, "mission.": Mission}
 HEADINGS = {"": "run", "network.": "network", "ppo.": "PPO", "mission.": "missions"}
 NOT_TRAINED = ("num_robots", "physics", "switched_off")  # team sizes are the run's own
@@ -100,30 +99,6 @@ def refuse_others(given: dict[str, Any], training: Training, whose: str) -> None
         if value != stored:
             typed = f"{flag_of(SPECS[place])} {as_typed(value)}"
             raise ValueError(f"{typed} is not what {whose} has, {as_typed(stored)}; leave it out")
-
-
-def check_memory(training: Training, total_bytes: int | None) -> None:
-    """Passes if a run's arrays leave enough of the machine's memory, if it is known, for the rest.
-
-    Raises:
-        ValueError: They would take too large a share.
-    """
-    needed = rollout_bytes(training)
-    if total_bytes is not None and needed > SHARE_OF_MEMORY * total_bytes:
-        raise ValueError(
-            f"rollouts of {training.missions} missions of up to {max(training.robots)} robots take "
-            f"{needed / 1e9:.1f} GB, more than half of this machine's {total_bytes / 1e9:.1f} GB; "
-            "choose fewer --missions or --robots"
-        )
-
-
-def rollout_bytes(training: Training) -> int:
-    """What a run's largest arrays take: the rollout, and what robots remember of packets."""
-    nodes = max(training.robots)
-    rows = training.missions * nodes  # a graph each
-    graph = nodes * (4 * training.network.num_features + 4 + 1)  # features, parent, may address
-    remembered = 4 * nodes**2 if training.features in ("local", "extended") else 0
-    return rows * (graph * (training.ppo.num_steps + 1) + remembered)
 
 
 def _part(part: str, given: dict[str, Any]) -> dict[str, Any]:

@@ -9,11 +9,9 @@ from tiny_policies import tiny_config, tiny_network
 
 from swarm_mj.cli import main, parse
 from swarm_mj.cli.train import BUDGETS, asked_limits
-from swarm_mj.cli.train_settings import asked_settings, check_memory, refuse_others, rollout_bytes
-from swarm_mj.gnn.packet_memory import empty_memory
+from swarm_mj.cli.train_settings import asked_settings, refuse_others
 from swarm_mj.learning.run_folder import Limits
 from swarm_mj.learning.settings import usual_settings
-from swarm_mj.learning.train import make_model
 from swarm_mj.mission import paper
 
 
@@ -161,29 +159,3 @@ def test_a_run_that_goes_on_stops_as_before_or_as_asked_now():
     assert asked_limits(stored, options()) == stored
     moved = asked_limits(stored, options("--minutes", 2.0, "--replay-every", 9))
     assert moved == Limits(decisions=None, minutes=2.0, replay_every=9)
-
-
-@pytest.mark.parametrize("arm", ["robot", "team"])
-def test_the_estimate_of_memory_is_of_the_arrays_that_are_made(arm):
-    training = asked("--arm", arm, "--robots", 6, "--range-ratio", 0.5, "--missions", 4)
-    buffer = make_model(training)[0].rollout_buffer
-    made = sum(rows.nbytes for rows in buffer.observations.values())
-    assert made < rollout_bytes(training) < 2.0 * made
-
-
-def test_the_estimate_of_memory_counts_what_robots_remember_of_packets():
-    """In teams of 40 more than the one graph a robot by which the estimate exceeds the rollout."""
-    training = asked("--robots", 40, "--missions", 4)
-    buffer = make_model(training)[0].rollout_buffer
-    made = sum(rows.nbytes for rows in buffer.observations.values())
-    made += sum(array.nbytes for array in empty_memory(4, 40))
-    assert made < rollout_bytes(training)
-
-
-def test_rollouts_may_take_half_of_the_memory():
-    training = asked("--robots", 100)
-    needed = rollout_bytes(training)
-    check_memory(training, 2 * needed)
-    check_memory(training, None)
-    with pytest.raises(ValueError, match="choose fewer --missions or --robots"):
-        check_memory(training, 2 * needed - 2)

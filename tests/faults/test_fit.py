@@ -1,0 +1,184 @@
+"""What does not fit the machine: refused before the work, or ended with what was done."""
+
+import json
+from itertools import chain, repeat
+from pathlib import Path
+
+import pytest
+
+from swarm_mj.cli import estimates, fly, main
+from swarm_mj.replay.read import check_replay
+from swarm_mj.replay.recorder import Recorder
+from swarm_mj.swarm import Swarm
+
+FACTOR = 2.0  # by which estimates and peaks may differ
+SMALL = ("--robots", "4", "--windows", "120")
+PEAKS = Path(__file__).with_name("peaks.py")
+TDMA = ("--policy", "tdma")
+MEASURED = [
+    ("fly", "--robots", "800", "--windows", "3", *TDMA, "--no-record"),
+    ("fly", "--robots", "300", "--windows", "100", *TDMA, "--record", "0.rrd"),
+    ("fly", "--robots", "4", "--windows", "1000", *TDMA, "--record", "1.rrd"),
+    ("evaluate", "--robots", "150", "--windows", "2", "--episodes", "25", *TDMA),
+    ("evaluate", "--robots", "100", "--windows", "2", "--episodes", "25", "--policy", "gnn"),
+    (
+        *("train", "--out", "a", "--arm", "team", "--robots", "10", "--windows", "8"),
+        *("--budget", "128", "--held-out", "1"),
+    ),
+    (
+        *("train", "--out", "b", "--robots", "50", "--windows", "16", "--missions", "4"),
+        *("--budget", "128", "--held-out", "1"),
+    ),
+]
+
+
+@pytest.mark.fault("memory: estimates")
+def test_estimates_are_near_the_peaks(forks, tmp_path, record_property):
+    """Fault 8: nothing was estimated. The measured processes have loaded torch already."""
+    record_property("tries", len(MEASURED))
+    (tmp_path / "lines.json").write_text(json.dumps(MEASURED))
+    done = forks.run(tmp_path, PEAKS)
+    assert done.returncode == 0, done.stderr
+    for index, line in enumerate(MEASURED):
+        estimate, peak, file = json.loads((tmp_path / f"{index}.json").read_text())
+        estimate -= estimates.TORCH if line[0] == "train" or "gnn" in line else 0.0
+        assert peak / FACTOR < estimate < FACTOR * peak, line
+        if "--record" in line:
+            size = (tmp_path / line[-1]).stat().st_size
+            assert size / FACTOR < file < 2.0 * FACTOR * size, line  # equal ages take no room
+
+
+LONG = ("--robots", "1000", "--windows", "100000")
+
+
+@pytest.fixture
+def small_machine(monkeypatch):
+    """4 GB of memory and 0.1 GB of disk, on which nothing may fly."""
+    monkeypatch.setattr(estimates, "free_memory", lambda: 4e9)
+    monkeypatch.setattr(estimates, "free_room", lambda _: 1e8)
+    monkeypatch.setattr(Swarm, "__init__", lambda *_, **__: pytest.fail("the work began"))
+
+
+@pytest.mark.usefixtures("small_machine")
+@pytest.mark.fault("memory: refused before the work")
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("fly", *LONG), "102 GB of memory, and 4 GB are free; choose fewer --robots or --windows"),
+        (("fly", "--robots", "100", "--windows", "100000"), "GB of memory, and 4 GB are free"),
+        (("fly", "--windows", "100000", "--robots", "10"), "0.21 GB on disk, and 0.1 GB fit at"),
+        (("fly", "--policy", "gnn", "--robots", "1000", "--no-record"), "are free"),
+        (("evaluate", "--jobs", "256", "--robots", "1000"), "choose fewer --jobs, --robots,"),
+        (("evaluate", "--episodes", "100000", "--windows", "100000", "--policy", "tdma"), "free"),
+        (("train", "--out", "a", "--robots", "200", "--missions", "1024"), "fewer --missions"),
+        (("train", "--out", "a", "--replay-every", "1"), "GB on disk"),
+    ],
+)
+def test_what_cannot_fit_is_refused_with_numbers(monkeypatch, tmp_path, capsys, arguments, says):
+    """Fault 8: 53 GB of memory and a file of 12 GB were simply begun."""
+    monkeypatch.chdir(tmp_path)
+    assert main(list(arguments)) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "this takes about" in line
+    assert says in line
+    assert line.endswith("or try it with --yes")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.fault("memory: refused before the work")
+def test_yes_begins_all_the_same(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(estimates, "free_memory", lambda: 1.0)
+    flight = ["fly", "--robots", "4", "--windows", "3", "--no-record"]
+    assert main(flight) == 2
+    assert main([*flight, "--yes"]) == 0
+
+
+def flown_short(tmp_path, capsys):
+    """How many windows a flight kept that ran out of memory."""
+    flight = [
+        "fly",
+        *SMALL,
+        "--record",
+        str(tmp_path / "a.rrd"),
+        "--json",
+        str(tmp_path / "a.json"),
+    ]
+    assert main(flight) == 1
+    check_replay(tmp_path / "a.rrd")
+    kept = json.loads((tmp_path / "a.json").read_text())["num_windows"]
+    assert f"Out of memory after {kept} of 120 windows." in capsys.readouterr().err
+    return kept
+
+
+@pytest.mark.fault("memory: what was flown is kept")
+def test_a_flight_ends_while_what_was_flown_can_be_written(monkeypatch, tmp_path, capsys):
+    """Fault 8: others may take the memory that was free when it began."""
+    free = chain([1e12], repeat(0))
+    monkeypatch.setattr(fly, "free_memory", lambda: next(free))
+    assert flown_short(tmp_path, capsys) == 100
+
+
+@pytest.mark.fault("memory: what was flown is kept")
+@pytest.mark.parametrize("error", [MemoryError(), RuntimeError("can't allocate memory: 8 bytes")])
+def test_a_memory_error_keeps_what_was_flown(monkeypatch, tmp_path, capsys, error):
+    """Fault 8: it was a traceback and the flight was lost."""
+    add = Recorder.add
+
+    def add_some(self, window):
+        if len(self._rows) == 30:
+            raise error
+        add(self, window)
+
+    monkeypatch.setattr(Recorder, "add", add_some)
+    assert flown_short(tmp_path, capsys) == 30
+
+
+LIMITED = """
+import resource, sys
+from swarm_mj.cli import main
+from swarm_mj.cli.machine import psutil
+most = psutil.Process().memory_info().vms + int(sys.argv[1])
+resource.setrlimit(resource.RLIMIT_AS, (most, most))
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+@pytest.fixture
+def limited(forks, tmp_path):
+    """Runs a command that may ask for so many more bytes than are loaded."""
+    (tmp_path / "limited.py").write_text(LIMITED)
+    return lambda more, *line: forks.run(tmp_path, tmp_path / "limited.py", int(more), *line)
+
+
+@pytest.mark.fault("memory: under ulimit -v")
+@pytest.mark.parametrize(
+    ("more", "line"),
+    [
+        (2e9, ("fly", *SMALL, "--record", "a.rrd")),
+        (1e9, ("fly", *SMALL, "--policy", "gnn", "--no-record")),
+        (3e8, ("evaluate", *SMALL, "--policy", "tdma")),
+        (1e9, ("train", "--out", "a", "--robots", "4")),
+    ],
+)
+def test_what_ulimit_does_not_allow_is_refused(limited, tmp_path, more, line):
+    """Libraries that cannot get their memory abort, or hang."""
+    done = limited(more, *line)
+    assert done.returncode == 2
+    assert "of address space, and" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["limited.py"]
+
+
+@pytest.mark.fault("memory: under ulimit -v")
+def test_an_evaluation_that_runs_out_of_memory_is_resumed(limited, forks, tmp_path):
+    """Fault 8: it was a traceback, and nobody was told that it could go on."""
+    study = ("evaluate", "--robots", "4", "400", "--windows", "3", "--episodes", "5")
+    study += ("--policy", "tdma", "--range-ratio", "3")
+    broken = limited(60e6, *study, "--csv", "a.csv", "--yes")
+    assert broken.returncode == 1, broken.stderr
+    assert broken.stderr.splitlines() == [
+        "Out of memory after 5 of 10 missions; the same command with --resume continues."
+    ]
+    assert forks.run(tmp_path, "swarm_mj", *study, "--csv", "a.csv", "--resume").returncode == 0
+    assert forks.run(tmp_path, "swarm_mj", *study, "--csv", "b.csv").returncode == 0
+    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
