@@ -7,14 +7,17 @@ holds estimates against peaks; they are meant to be right within a factor of 2, 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from swarm_mj.cli.machine import free_addresses, free_memory, free_room
 from swarm_mj.evaluation.study import Study
-from swarm_mj.learning.run_folder import Limits
-from swarm_mj.learning.settings import Training
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import is_learned
 from swarm_mj.replay.recorder import AGE_BYTES, MAX_AGE_MATRIX_BYTES
+
+if TYPE_CHECKING:  # they load torch, which flights may do without
+    from swarm_mj.learning.run_folder import Limits
+    from swarm_mj.learning.settings import Training
 
 GB = 1e9
 YES = "start even though memory or disk may not suffice"  # the help of --yes
@@ -87,7 +90,7 @@ def study_needs(study: Study, num_jobs: int) -> Needs:
     )
 
 
-def training_needs(training: Training, limits: Limits) -> Needs:
+def training_needs(training: "Training", limits: "Limits") -> Needs:
     """Of `train`: a rollout and the passes over it, held-out missions, checkpoints, replays."""
     missions = [replace(training.mission, num_robots=size) for size in training.robots]
     largest, rollout = max(missions, key=lambda each: each.num_robots), rollout_bytes(training)
@@ -132,7 +135,7 @@ def replay_file(mission: Mission) -> float:
     return 0.5e6 + (500.0 + 150.0 * mission.num_robots) * mission.num_windows + 0.25 * matrices
 
 
-def rollout_bytes(training: Training) -> int:
+def rollout_bytes(training: "Training") -> int:
     """What a run's largest arrays take: the rollout, and what robots remember of packets."""
     nodes = max(training.robots)
     rows = training.missions * nodes  # a graph each
@@ -141,7 +144,7 @@ def rollout_bytes(training: Training) -> int:
     return rows * (graph * (training.ppo.num_steps + 1) + remembered)
 
 
-def passes_bytes(training: Training) -> float:
+def passes_bytes(training: "Training") -> float:
     """What a minibatch leaves behind in the networks on its way to the gradient."""
     nodes, ppo, shape = max(training.robots), training.ppo, training.network
     rows = training.missions * nodes * ppo.num_steps / ppo.num_minibatches
@@ -153,4 +156,4 @@ def passes_bytes(training: Training) -> float:
 
 
 def _in_gb(size: float) -> str:
-    return f"{size / GB:.3g} GB"
+    return f"{float(f'{size / GB:.3g}'):,g} GB"

@@ -69,7 +69,7 @@ REFUSED = [
         "missions must be a multiple of the 3 team sizes, such as 15, 18, not 16",
     ),
     ((*NEW, "--arm", "team", "--preset", "reference", "--missions", "1"), "is too small for 4"),
-    ((*NEW, "--missions", "4096", "--robots", "200"), "more than half of this machine's"),
+    ((*NEW, "--missions", "4096", "--robots", "200"), "GB of memory, and"),
     ((*NEW, "--learning-rate", "0"), "learning rate must be a number from 1e-09 to 1, not 0"),
     ((*NEW, "--learning-rate", "nan"), "not nan"),
     ((*NEW, "--entropy", "-1"), "entropy must be a number from 0 to 10, not -1"),

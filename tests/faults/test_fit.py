@@ -5,6 +5,7 @@ from itertools import chain, repeat
 from pathlib import Path
 
 import pytest
+from tries import tries
 
 from swarm_mj.cli import estimates, fly, main
 from swarm_mj.replay.read import check_replay
@@ -19,7 +20,6 @@ MEASURED = [
     ("fly", "--robots", "800", "--windows", "3", *TDMA, "--no-record"),
     ("fly", "--robots", "300", "--windows", "100", *TDMA, "--record", "0.rrd"),
     ("fly", "--robots", "4", "--windows", "1000", *TDMA, "--record", "1.rrd"),
-    ("evaluate", "--robots", "150", "--windows", "2", "--episodes", "25", *TDMA),
     ("evaluate", "--robots", "100", "--windows", "2", "--episodes", "25", "--policy", "gnn"),
     (
         *("train", "--out", "a", "--arm", "team", "--robots", "10", "--windows", "8"),
@@ -29,17 +29,19 @@ MEASURED = [
         *("train", "--out", "b", "--robots", "50", "--windows", "16", "--missions", "4"),
         *("--budget", "128", "--held-out", "1"),
     ),
+    ("evaluate", "--robots", "150", "--windows", "2", "--episodes", "25", *TDMA),
 ]
 
 
 @pytest.mark.fault("memory: estimates")
 def test_estimates_are_near_the_peaks(forks, tmp_path, record_property):
     """Fault 8: nothing was estimated. The measured processes have loaded torch already."""
-    record_property("tries", len(MEASURED))
-    (tmp_path / "lines.json").write_text(json.dumps(MEASURED))
+    lines = MEASURED[: tries(5)]
+    record_property("tries", len(lines))
+    (tmp_path / "lines.json").write_text(json.dumps(lines))
     done = forks.run(tmp_path, PEAKS)
     assert done.returncode == 0, done.stderr
-    for index, line in enumerate(MEASURED):
+    for index, line in enumerate(lines):
         estimate, peak, file = json.loads((tmp_path / f"{index}.json").read_text())
         estimate -= estimates.TORCH if line[0] == "train" or "gnn" in line else 0.0
         assert peak / FACTOR < estimate < FACTOR * peak, line
@@ -182,3 +184,19 @@ def test_an_evaluation_that_runs_out_of_memory_is_resumed(limited, forks, tmp_pa
     assert forks.run(tmp_path, "swarm_mj", *study, "--csv", "a.csv", "--resume").returncode == 0
     assert forks.run(tmp_path, "swarm_mj", *study, "--csv", "b.csv").returncode == 0
     assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
+
+
+@pytest.mark.fault("memory: nothing leaks")
+def test_replays_of_a_training_leave_no_threads(forks, tmp_path, record_property):
+    """Fault 10: each left 4 threads and 3.7 MB."""
+    num_replays = tries(8)
+    record_property("tries", num_replays)
+    run = ("train", "--out", "a", "--robots", "4", "--windows", "8", "--missions", "1")
+    often = ("--held-out", "1", "--replay-every", "1", "--budget", str(32 * (num_replays - 1)))
+    done = forks.run(tmp_path, Path(__file__).with_name("leaks.py"), *run, *often)
+    assert done.returncode == 0, done.stderr
+    held = json.loads((tmp_path / "held.json").read_text())
+    assert len(held) == num_replays
+    threads, resident = zip(*held[1:], strict=True)  # the first one loads the recorder
+    assert threads[-1] <= threads[0]
+    assert resident[-1] - resident[0] < 1e6 * len(held)
