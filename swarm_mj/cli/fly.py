@@ -22,7 +22,7 @@ from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import plain_console, this_command
 from swarm_mj.fields import setting
 from swarm_mj.io.atomic import write_json
-from swarm_mj.io.interrupt import deferred_interrupt
+from swarm_mj.io.interrupt import deferred_interrupt, heard_interrupt
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
@@ -80,10 +80,13 @@ def run(options: Options) -> int:
     check_fits(needs, path, way_out, is_forced=options.yes)
     policy = _make_policy(options, mission)
     console = Console(stderr=True, highlight=False)
-    with console.status("Preparing the swarm (compiles once, then it is cached) ..."):
+    preparing = console.status("Preparing the swarm (compiles once, then it is cached) ...")
+    with preparing, heard_interrupt() as was_pressed:
         _compile_ahead(options, mission)
         swarm = Swarm(mission, [options.seed])
         recorder = _recorder(options, swarm, policy) if path else None
+        if was_pressed():
+            raise KeyboardInterrupt
     start_s = time.perf_counter()
     flown, code = _fly(swarm, policy, recorder, console)
     wall_s = time.perf_counter() - start_s

@@ -2,12 +2,14 @@
 
 import random
 import signal
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from left_over import signalled
 from tries import tries
 
+from swarm_mj.cli import main
 from swarm_mj.replay.read import check_replay
 
 RESULTS = Path(__file__).parent.parent.parent / "training" / "results" / "paper-random-walk.csv"
@@ -54,6 +56,20 @@ def test_a_flight_leaves_a_whole_replay(forks, tmp_path, record_property, wishes
         if left:
             check_replay(folder / "a.rrd")
     record_property("tries", tries(1))
+
+
+@pytest.mark.fault("signals")
+def test_a_signal_that_a_library_swallows_while_it_loads_is_not_lost(tmp_path, monkeypatch):
+    """As numba may, when it loads a kernel."""
+
+    def swallow(*_arguments):
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("swarm_mj.cli.fly._compile_ahead", swallow)
+    assert main(["fly", "--robots", "3", "--windows", "3"]) == 130
+    assert files(tmp_path) == []
 
 
 @pytest.mark.fault("signals")
