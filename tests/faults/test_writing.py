@@ -114,7 +114,7 @@ def test_a_flight_whose_replay_finds_no_place_says_so(here, capsys):
     old = Path("a.rrd").read_bytes()
     capsys.readouterr()
     with no_larger_files(len(old) // 2):
-        assert main(["fly", *SMALL, "--seed", "2", "--record", "a.rrd", "--force"]) == 1
+        assert main(["fly", *SMALL, "--seed", "2", "--record", "a.rrd", "--force", "--yes"]) == 1
     printed = capsys.readouterr()
     assert (
         printed.err.strip().splitlines()[-1].endswith("a.rrd could not be written: File too large")
@@ -125,8 +125,9 @@ def test_a_flight_whose_replay_finds_no_place_says_so(here, capsys):
     assert names(here) == ["a.rrd"]
 
 
-WRITTEN = {  # what writes a kind of file, and the file
-    "replay": (["fly", *SMALL, "--record", "a.rrd"], "a.rrd"),
+# What writes a kind of file, whatever is estimated, and the file.
+WRITTEN = {
+    "replay": (["fly", *SMALL, "--record", "a.rrd", "--yes"], "a.rrd"),
     "summary": (["fly", *SMALL, "--no-record", "--json", "a.json"], "a.json"),
     "scene": (["scene", "--robots", "5", "--range-ratio", "0.5", "--out", "a.xml"], "a.xml"),
     "csv": (["evaluate", *SMALL, "--policy", "tdma", "--episodes", "2", "--csv", "a.csv"], "a.csv"),
@@ -134,8 +135,14 @@ WRITTEN = {  # what writes a kind of file, and the file
         ["evaluate", *SMALL, "--policy", "tdma", "--episodes", "2", "--json", "a.json"],
         "a.json",
     ),
-    "svg": (["figures", "{results}", "--figure", "fig5", "--format", "svg", "--out", "."], "fig5"),
-    "png": (["figures", "{results}", "--figure", "fig5", "--format", "png", "--out", "."], "fig5"),
+    "svg": (
+        ["figures", "{results}", "--figure", "fig5", "--format", "svg", "--out", ".", "--yes"],
+        "fig5",
+    ),
+    "png": (
+        ["figures", "{results}", "--figure", "fig5", "--format", "png", "--out", ".", "--yes"],
+        "fig5",
+    ),
 }
 
 
@@ -164,7 +171,7 @@ def test_a_training_on_a_full_disk_ends_and_goes_on(here, capsys):
     kept = (here / "r" / "checkpoint.pt").read_bytes()
     capsys.readouterr()
     with no_larger_files(len(kept) // 2):
-        assert main(["train", "--out", "r", "--resume", "--budget", "128"]) == 1
+        assert main(["train", "--out", "r", "--resume", "--budget", "128", "--yes"]) == 1
     assert "could not be written: File too large" in capsys.readouterr().err.splitlines()[-1]
     assert (here / "r" / "checkpoint.pt").read_bytes() == kept
     assert not [name for name in names(here) if name.endswith(".part")]
