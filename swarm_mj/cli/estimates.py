@@ -155,5 +155,5 @@ def passes_bytes(training: "Training") -> float:
     return 4.0 * kept * rows * nodes * shape.latent * layers * networks
 
 
-def _in_gb(size: float) -> str:
+def _in_gb(size: int | float) -> str:
     return f"{float(f'{size / GB:.3g}'):,g} GB"

@@ -34,7 +34,7 @@ def _regime(result: Result) -> str:
     fate = f", {result.switched_off:.0%} of the robots off half-way" if result.switched_off else ""
     return (
         f"{result.task}, preset {result.preset}: {result.num_robots} robots, range ratio "
-        f"{result.range_ratio:g},\nvelocity ratio {result.velocity_ratio:g}, boundary "
+        f"{result.range_ratio:g}, velocity ratio {result.velocity_ratio:g},\nboundary "
         f"{result.boundary}, {result.num_windows} windows of {result.physics} physics{fate}"
     )
 
