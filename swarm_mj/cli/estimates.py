@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swarm_mj.cli.machine import free_addresses, free_memory, free_room
+from swarm_mj.cli.machine import free_addresses, free_memory, free_room, largest_file
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import is_learned
@@ -32,6 +32,7 @@ class Needs:
     memory: float
     addresses: float = ADDRESSES  # of these, beyond the memory
     file: float = 0.0  # all that it writes
+    largest_file: float | None = None  # the largest file of these; None is all in one
 
 
 def check_fits(needs: Needs, output: Path | None, way_out: str, *, is_forced: bool) -> None:
@@ -53,6 +54,10 @@ def check_fits(needs: Needs, output: Path | None, way_out: str, *, is_forced: bo
         has.append(("of address space", asked, addresses, "are left by ulimit -v"))
     if output is not None:
         has.append(("on disk", needs.file, free_room(output), f"fit at {output}"))
+        most = largest_file()
+        if most is not None:
+            largest = needs.file if needs.largest_file is None else needs.largest_file
+            has.append(("in one file", largest, most, "are allowed by ulimit -f"))
     for what, needed, free, where in has:
         if needed > free and not is_forced:
             raise ValueError(
@@ -106,6 +111,7 @@ def training_needs(training: "Training", limits: "Limits") -> Needs:
         memory=memory + replay_memory(missions[0], missions[0].num_windows),
         addresses=ADDRESSES + OF_TORCH + OF_RERUN,
         file=file + num_replays * replay_file(missions[0]),
+        largest_file=max(file, replay_file(missions[0])),
     )
 
 

@@ -53,8 +53,12 @@ class Options(PolicyOptions):
     baseline: str | None = same_as(Study, "baseline")
     jobs: int = setting(1, "processes", low=1, high=256)
     missions: tuple[Mission, ...] = several_missions()
-    json: Path | None = setting(None, "write all figures and each mission's costs", group=OUTPUT)
-    csv: Path | None = setting(None, "write all figures, one row a result", group=OUTPUT)
+    json: Path | None = setting(
+        None, "write all figures and each mission's costs", group=OUTPUT, metavar="FILE.json"
+    )
+    csv: Path | None = setting(
+        None, "write all figures, one row a result", group=OUTPUT, metavar="FILE.csv"
+    )
     force: bool = setting(False, "replace existing results and progress", group=OUTPUT)
     yes: bool = setting(False, YES, group=OUTPUT)
     resume: bool = setting(False, "continue where an interruption broke off", group=OUTPUT)
@@ -133,7 +137,8 @@ def _progress_file(options: Options) -> Path | None:
             raise ValueError("--resume needs the --json or --csv of the run that was interrupted")
         return None
     kept = progress.progress_path(output)
-    check_outputs(Output("progress", kept))
+    outputs = Output("--json", options.json), Output("--csv", options.csv)
+    check_outputs(Output("progress", kept), *outputs)  # also against a link to the progress
     if kept.exists() and not (options.resume or options.force):
         raise ValueError(
             f"progress {kept} of an interrupted run exists; continue it with --resume, or start "

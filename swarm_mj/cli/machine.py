@@ -1,5 +1,6 @@
 """What this machine has left: memory, addresses, and room for a file."""
 
+import os
 import resource
 import shutil
 from collections.abc import Iterator
@@ -11,8 +12,12 @@ import psutil
 CONTROL_GROUPS = Path("/sys/fs/cgroup")
 # Of both versions: what a group may have, what it has, and what of that is files it can give back.
 GROUP_FILES = {
-    "": ("memory.max", "memory.current", "inactive_file"),
-    "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
+    "": ("memory.max", "memory.current", ("inactive_file", "active_file", "slab_reclaimable")),
+    "memory": (
+        "memory.limit_in_bytes",
+        "memory.usage_in_bytes",
+        ("total_inactive_file", "total_active_file"),
+    ),
 }
 
 
@@ -32,11 +37,16 @@ def free_addresses() -> int | None:
 
 
 def free_room(path: Path) -> int:
-    """How large a file there can get, whose folder may not be made yet: the disk's, or a limit."""
-    folder = next(each for each in (path.absolute(), *path.absolute().parents) if each.is_dir())
+    """What the disk has left for files there, whose folder may not be made yet."""
+    target = Path(os.path.realpath(path))
+    folder = next(each for each in (target, *target.parents) if each.is_dir())
+    return shutil.disk_usage(folder).free
+
+
+def largest_file() -> int | None:
+    """How large a file may get under `ulimit -f`; None without a limit."""
     limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
-    free = shutil.disk_usage(folder).free
-    return free if limit == resource.RLIM_INFINITY else min(free, limit)
+    return None if limit == resource.RLIM_INFINITY else limit
 
 
 @contextmanager
@@ -57,15 +67,17 @@ def _allowed_by_groups() -> Iterator[int]:
         _, kind, path = line.split(":", 2)
         if kind in GROUP_FILES:
             root = CONTROL_GROUPS / kind
-            for folder in {root / path.removeprefix("/"), root}:
-                yield from _left(folder, *GROUP_FILES[kind])
+            group = root / path.removeprefix("/")
+            for folder in (group, *group.parents):  # a limit may be a parent's
+                if folder.is_relative_to(root):
+                    yield from _left(folder, *GROUP_FILES[kind])
 
 
-def _left(folder: Path, most: str, used: str, files: str) -> Iterator[int]:
+def _left(folder: Path, most: str, used: str, files: tuple[str, ...]) -> Iterator[int]:
     """What one group has left, if it has a limit: this is no number, or huge, without one."""
     try:
         stat = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())
         left = int((folder / most).read_text()) - int((folder / used).read_text())
-        yield left + int(stat.get(files, 0))
+        yield left + sum(int(stat.get(name, 0)) for name in files)
     except (OSError, ValueError):
         return

@@ -86,14 +86,14 @@ def parse(kind: type[Options], arguments: Sequence[str], prog: str, summary: str
 
 def _check_names(arguments: Sequence[str]) -> None:
     """Raises ValueError for a name that not all libraries could open, or none could find."""
-    for typed in arguments:
-        if any("\udc80" <= character <= "\udcff" for character in typed):
-            encoding = sys.getfilesystemencoding()
-            raise ValueError(f"{typed!a} has bytes that are no {encoding}; rename it")
     try:
-        Path.cwd()
+        names = (*arguments, str(Path.cwd()))
     except FileNotFoundError:
         raise ValueError("the current folder was deleted; change to another") from None
+    for name in names:
+        if any("\udc80" <= character <= "\udcff" for character in name):
+            encoding = sys.getfilesystemencoding()
+            raise ValueError(f"{name!a} has bytes that are no {encoding}; rename it")
 
 
 def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:

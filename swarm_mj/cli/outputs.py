@@ -16,7 +16,7 @@ class Output(NamedTuple):
 
     what: str  # as it is called in a message
     path: Path | None
-    suffix: str = ""  # that it must have, if any
+    suffix: str = ""  # that it must have, if any; of several, apart by |
 
 
 def check_outputs(*outputs: Output, inputs: Iterable[Path] = (), must_be_new: bool = False) -> None:
@@ -56,8 +56,9 @@ def _check(what: str, path: Path, suffix: str, *, must_be_new: bool) -> None:
                 raise ValueError(f"{what} {path} is a device or a pipe; name a file")
             if must_be_new:
                 raise ValueError(f"{what} {path} exists; name another, or replace it with --force")
-        if suffix and path.suffix != suffix:
-            raise ValueError(f"{what} must be named *{suffix}, not {path}")
+        if suffix and path.suffix.lower() not in suffix.split("|"):
+            ways = " or ".join(f"*{ending}" for ending in suffix.split("|"))
+            raise ValueError(f"{what} must be named {ways}, not {path}")
         check_writable(path)
     except OSError as error:
         complaint = f"{what} {path} cannot be written: {error.strerror}"

@@ -28,7 +28,7 @@ def run(options: Options) -> int:
     from swarm_mj.swarm import Swarm
 
     mission = options.mission
-    check_outputs(Output("scene", options.out, ".xml"), must_be_new=not options.force)
+    check_outputs(Output("scene", options.out, ".xml|.mjcf"), must_be_new=not options.force)
     spec = compose(mission, start=Swarm(mission, [options.seed]).states)
     spec.compile()
     write_text(options.out, spec.to_xml())

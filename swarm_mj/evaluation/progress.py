@@ -53,7 +53,10 @@ def resume(path: Path, header: dict[str, Any], batches: Sequence[Batch]) -> dict
     if not whole and _line(b"", header).startswith(cut_off):
         start(path, header)
         return {}
-    damage = f"progress {path} is damaged; start over with --force instead of --resume"
+    damage = (
+        f"progress {path} is damaged, or of another version; start over with --force instead of "
+        "--resume"
+    )
     first, *rest = whole.split(b"\n")
     try:
         first = _checked(b"", first)

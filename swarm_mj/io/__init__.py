@@ -1,1 +1,1 @@
-"""Files that appear whole, processes and signals, and where numbers come from."""
+"""Files written whole and read with care, locks, processes and signals, and the code's version."""

@@ -80,7 +80,7 @@ def read_rows(path: Path, what: str, most_bytes: int) -> tuple[list[str], list[R
     """
     content = read_file(path, what, most_bytes)
     try:
-        reader = csv.DictReader(io.StringIO(content.decode(), newline=""), strict=True)
+        reader = csv.DictReader(io.StringIO(content.decode("utf-8-sig"), newline=""), strict=True)
         rows = [(reader.line_num, row) for row in reader]
     except (csv.Error, UnicodeDecodeError) as error:
         raise ValueError(f"{what} {path} is no CSV ({error})") from error

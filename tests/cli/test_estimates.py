@@ -29,10 +29,11 @@ LONG = paper("random-walk", num_robots=1000, num_windows=100_000)
 def machine(monkeypatch):
     """8 GB of memory, 2 GB of disk, and addresses without a limit."""
 
-    def set_to(memory=8e9, addresses=None, room=2e9):
+    def set_to(memory=8e9, addresses=None, room=2e9, most=None):
         monkeypatch.setattr(estimates, "free_memory", lambda: memory)
         monkeypatch.setattr(estimates, "free_addresses", lambda: addresses)
         monkeypatch.setattr(estimates, "free_room", lambda _: room)
+        monkeypatch.setattr(estimates, "largest_file", lambda: most)
 
     set_to()
     return set_to
@@ -57,6 +58,10 @@ def test_a_refusal_names_need_limit_and_way_out(machine, tmp_path):
     assert line.startswith("this takes about 53.2 GB of memory, and 8 GB are free; fly less")
     line = refusal(Needs(memory=1e9, file=12e9), tmp_path)
     assert f"about 12 GB on disk, and 2 GB fit at {tmp_path}; fly less" in line
+    machine(most=1e9)
+    check_fits(Needs(memory=1e9, file=1.5e9, largest_file=1e9), tmp_path, "", is_forced=False)
+    line = refusal(Needs(memory=1e9, file=1.5e9), tmp_path)
+    assert "about 1.5 GB in one file, and 1 GB are allowed by ulimit -f" in line
     machine(addresses=1.5e9)
     line = refusal(Needs(memory=1e9, addresses=3e9))
     assert "about 4 GB of address space, and 1.5 GB are left by ulimit -v" in line

@@ -249,3 +249,10 @@ def test_bad_input_is_one_clear_line(capsys, monkeypatch, tmp_path, options, com
     assert complaint in printed.err
     assert len(printed.err.strip().splitlines()) == 1
     assert printed.out == ""
+
+
+def test_a_link_to_the_progress_file_is_no_output(swarm_mj, tmp_path):
+    (tmp_path / "l.csv").symlink_to(tmp_path / "p.json.progress")
+    done = swarm_mj("evaluate", *SMALL, "--json", "p.json", "--csv", "l.csv", "--force")
+    assert done.returncode == 2
+    assert "progress and --csv name the same file" in done.stderr

@@ -2,6 +2,7 @@
 
 import resource
 import shutil
+from types import SimpleNamespace
 
 import psutil
 import pytest
@@ -68,11 +69,20 @@ def test_addresses_are_what_ulimit_leaves(limits):
     assert machine.free_addresses() == pytest.approx(10**15 - used, abs=1e8)
 
 
-def test_a_file_may_be_as_large_as_the_disk_and_the_limit_allow(limits, tmp_path):
+def test_files_may_take_what_the_disk_has_and_one_what_the_limit_allows(limits, tmp_path):
     file = tmp_path / "not" / "yet" / "made.rrd"
     assert machine.free_room(file) == pytest.approx(shutil.disk_usage(tmp_path).free, rel=0.1)
+    assert machine.largest_file() is None
     limits[resource.RLIMIT_FSIZE] = (4096, 4096)
-    assert machine.free_room(file) == 4096
+    assert machine.largest_file() == 4096
+
+
+def test_the_disk_is_the_one_where_a_link_leads(tmp_path, monkeypatch):
+    (tmp_path / "far").mkdir()
+    (tmp_path / "link.rrd").symlink_to(tmp_path / "far" / "there.rrd")
+    free = {tmp_path: 1, tmp_path / "far": 2}
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=free[folder]))
+    assert machine.free_room(tmp_path / "link.rrd") == 2
 
 
 @pytest.mark.parametrize(

@@ -99,7 +99,9 @@ def test_another_evaluations_progress_is_refused_and_kept(tmp_path, changes, com
 def test_damage_before_the_last_line_is_told(tmp_path, line):
     path = some_progress(tmp_path / "p", 0)
     path.write_bytes(path.read_bytes() + line.encode("latin-1") + b"\n")
-    with pytest.raises(ValueError, match="is damaged; start over with --force"):
+    with pytest.raises(
+        ValueError, match="is damaged, or of another version; start over with --force"
+    ):
         progress.resume(path, HEADER, BATCHES)
 
 
@@ -109,7 +111,9 @@ def test_a_line_of_another_evaluation_is_told(tmp_path):
     progress.start(other, HEADER | {"seed": 2000})
     progress.append(other, HEADER | {"seed": 2000}, 1, some_costs(0.5))
     mine.write_bytes(mine.read_bytes() + other.read_bytes().splitlines(keepends=True)[1])
-    with pytest.raises(ValueError, match="is damaged; start over with --force"):
+    with pytest.raises(
+        ValueError, match="is damaged, or of another version; start over with --force"
+    ):
         progress.resume(mine, HEADER, BATCHES)
 
 
@@ -130,7 +134,9 @@ def test_costs_that_no_batch_has_are_told(tmp_path, index, changes):
     costs = some_costs(0.5)
     vars(costs).update(changes)
     progress.append(path, HEADER, index, costs)
-    with pytest.raises(ValueError, match="is damaged; start over with --force"):
+    with pytest.raises(
+        ValueError, match="is damaged, or of another version; start over with --force"
+    ):
         progress.resume(path, HEADER, BATCHES)
 
 
