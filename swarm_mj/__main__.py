@@ -1,7 +1,5 @@
 """`python -m swarm_mj` is `swarm-mj`."""
 
-import sys
+from swarm_mj.cli import end_process
 
-from swarm_mj.cli import main
-
-sys.exit(main())
+end_process()

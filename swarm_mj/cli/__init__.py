@@ -7,8 +7,10 @@ hang-up. A reader that closes the pipe, as `| head` does, and a terminal that is
 """
 
 import importlib
+import os
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
@@ -77,6 +79,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return run(options)
 
     return _exit_code("swarm-mj", work)
+
+
+def end_process() -> NoReturn:
+    """Runs this process's command line as `main` does, and ends the process with its exit code.
+
+    It ends at once when it was interrupted: compiled code that was broken off while it loaded may
+    crash if Python then takes its libraries down one by one.
+    """
+    code = main()
+    if code == INTERRUPTED:
+        with suppress(OSError, ValueError):  # of streams that lead nowhere any more
+            sys.stdout.flush()
+            sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 def script(
