@@ -117,13 +117,18 @@ def script(
 
 def _exit_code(name: str, work: Callable[[], int]) -> int:
     """Does the work; says in one line what is wrong, or that it was interrupted."""
-    with lasting_streams(), interruptible():
-        return _told(name, work)
+    with lasting_streams() as failure, interruptible():
+        code = _told(name, work)
+        if lost := failure():
+            sys.stderr.write(f"{name}: error: not all output was written: {lost.strerror}\n")
+        return code or (FAILED if lost else DONE)
 
 
 def _told(name: str, work: Callable[[], int]) -> int:
     try:
         return work()
+    except SystemExit as end:  # of help, or of a line that cannot be read
+        return int(end.code or DONE)
     except (ValueError, OSError) as error:
         sys.stderr.write(f"{name}: error: {error}\n")
         return BAD_INPUT if isinstance(error, (ValueError, *WRONG_NAMES)) else FAILED

@@ -93,17 +93,13 @@ def run(options: Options) -> int:
     out = plain_console()
     with deferred_interrupt():
         config, numbers = _config(options, policy), flight_numbers(policy, summarise(flown))
-        out.print(flight_table(_title(options), mission, numbers, wall_s))
-        with console.status("Writing ..."):  # which may fail
-            if path and recorder:
-                from swarm_mj.replay.write import write_replay  # rerun takes its time to import
-
-                known = {key: value for key, value in config.items() if value is not None}
-                write_replay(recorder.log(), mission, known, path)
-            if options.json:
-                took = {"wall_seconds": wall_s, "interrupted": code != DONE}
-                replay = {"replay": str(path) if path else None}
-                write_json(options.json, {"config": config} | numbers | took | replay)
+        took = {"wall_seconds": wall_s, "interrupted": code != DONE}
+        summary = {"config": config} | numbers | took | {"replay": str(path) if path else None}
+        try:  # either may fail
+            with console.status("Writing ..."):
+                _write(options, summary, path, recorder)
+        finally:
+            out.print(flight_table(_title(options), mission, numbers, wall_s))
     if path:
         out.print(f"Open the replay:  {this_command()} replay {shlex.quote(str(path))}")
     if code != DONE:
@@ -189,6 +185,21 @@ def _fly(
     if not flown:
         raise MemoryError
     return flown, FAILED
+
+
+def _write(
+    options: Options, summary: dict[str, Any], path: Path | None, recorder: Recorder | None
+) -> None:
+    """Writes both files, the replay even if the summary fails."""
+    try:
+        if options.json:
+            write_json(options.json, summary)
+    finally:
+        if path and recorder:
+            from swarm_mj.replay.write import write_replay  # rerun takes its time to import
+
+            config = {key: value for key, value in summary["config"].items() if value is not None}
+            write_replay(recorder.log(), options.mission, config, path)
 
 
 def _config(options: Options, policy: Policy) -> dict[str, Any]:

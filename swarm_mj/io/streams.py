@@ -4,16 +4,19 @@ import errno
 import io
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
 GONE = (errno.EPIPE, errno.EIO)  # a pipe's reader has closed it; the terminal is closed
 
 
 @contextmanager
-def lasting_streams() -> Iterator[None]:
+def lasting_streams() -> Iterator[Callable[[], OSError | None]]:
     """Within it, what this process says after its reader has gone is dropped, and work goes on.
+
+    So it does on a full disk, but that is a failure: what is yielded writes all that was said so
+    far, and returns the first failure, if there was one.
 
     Characters that a terminal does not know become `?`. Streams that were closed lead nowhere:
     files opened later would else take their numbers, and with them what libraries complain of.
@@ -22,33 +25,47 @@ def lasting_streams() -> Iterator[None]:
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 - for good
     before = sys.stdout, sys.stderr
-    sys.stdout, sys.stderr = map(_lasting, before)
+    failures: list[OSError] = []
+    lasting = [_lasting(stream, failures) for stream in before]
+
+    def failure() -> OSError | None:
+        for stream in lasting:
+            stream.flush()
+        return failures[0] if failures else None
+
+    sys.stdout, sys.stderr = lasting
     try:
-        yield
+        yield failure
     finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
         sys.stdout, sys.stderr = before
+        failure()
 
 
-def _lasting(stream: Any) -> Any:  # noqa: ANN401 - a test's stream is of any kind
-    """A stream to the same file; the stream itself if it leads to none."""
+def _lasting(stream: Any, failures: list[OSError]) -> Any:  # noqa: ANN401 - of any kind
+    """A stream to the same file; the stream itself if it leads to none, or not only there."""
+    if not isinstance(stream, io.TextIOWrapper):  # a notebook's has its server's file number
+        return stream
+    with suppress(OSError):
+        stream.flush()
     try:
-        file = io.BufferedWriter(_LastingFile(stream.fileno(), "wb", closefd=False))
-    except (AttributeError, OSError):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
+        file = io.BufferedWriter(_LastingFile(stream.fileno(), failures))
+    except OSError:
+        stream.reconfigure(errors="replace")
         return stream
     return io.TextIOWrapper(file, encoding=stream.encoding, errors="replace", line_buffering=True)
 
 
 class _LastingFile(io.FileIO):
+    def __init__(self, number: int, failures: list[OSError]) -> None:
+        super().__init__(number, "wb", closefd=False)
+        self._failures = failures
+
     def write(self, data: Any, /) -> int | None:  # noqa: ANN401 - any buffer
         try:
             return super().write(data)
         except OSError as error:
             if error.errno not in GONE:
-                raise
+                self._failures.append(error)
             with open(os.devnull, "wb") as nowhere:  # from here on libraries write there, too
                 os.dup2(nowhere.fileno(), self.fileno())
             return super().write(data)

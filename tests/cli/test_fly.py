@@ -10,9 +10,11 @@ import time
 import numpy as np
 import pytest
 
+from swarm_mj.cli import fly, main
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tuning import tuned_probability
+from swarm_mj.replay import write
 from swarm_mj.replay.read import check_replay, windows
 from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
@@ -259,6 +261,22 @@ def test_ctrl_c_leaves_a_readable_replay_of_what_was_flown(tmp_path):
     assert summary["num_windows"] == len(flown)
     assert files(tmp_path) == ["cut.json", "cut.rrd", "under-way"]
     assert f"{len(flown)} in" in output
+
+
+@pytest.mark.parametrize("lost", ["a.rrd", "a.json"])
+def test_a_file_that_fails_takes_nothing_else_with_it(tmp_path, monkeypatch, capsys, lost):
+    def fails(*_):
+        raise OSError(f"{lost} could not be written: No space left on device")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(
+        *{"a.rrd": (write, "write_replay"), "a.json": (fly, "write_json")}[lost], fails
+    )
+    assert main(["fly", *SHORT, "--record", "a.rrd", "--json", "a.json"]) == 1
+    assert files(tmp_path) == sorted({"a.json", "a.rrd"} - {lost})
+    said = capsys.readouterr()
+    assert "flocking, planner, 6 robots" in said.out
+    assert said.err == f"swarm-mj: error: {lost} could not be written: No space left on device\n"
 
 
 def test_the_same_seed_is_the_same_mission(swarm_mj, tmp_path):

@@ -24,10 +24,7 @@ for arguments in json.load(sys.stdin):
     out, err = io.StringIO(), io.StringIO()
     before = files()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        try:
-            code = main(["train", *arguments])
-        except SystemExit as end:
-            code = end.code
+        code = main(["train", *arguments])
     ends.append([code, out.getvalue(), err.getvalue(), before == files()])
 json.dump(ends, sys.stdout)
 """

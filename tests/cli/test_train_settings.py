@@ -29,8 +29,7 @@ def asked(*arguments):
 
 
 def test_the_defaults_that_the_help_shows_are_the_usual_settings(capsys):
-    with pytest.raises(SystemExit):
-        main(["train", "--help"])
+    main(["train", "--help"])
     shown = " ".join(capsys.readouterr().out.split())
     robot, team = (usual_settings(arm, paper("stationary"), (40,)) for arm in ("robot", "team"))
     for text in (

@@ -198,11 +198,7 @@ def test_weights_of_others_are_arrays_and_no_bombs(tmp_path, capsys, record_prop
 def test_options_that_name_nothing_are_refused(command, tmp_path, monkeypatch, capsys):
     """Faults 17, 25: a run began in the current folder."""
     monkeypatch.chdir(tmp_path)
-    try:
-        code = main(command)
-    except SystemExit as end:
-        code = end.code
-    complaint(capsys, code)
+    complaint(capsys, main(command))
     assert list(tmp_path.iterdir()) == []
 
 

@@ -18,6 +18,7 @@ WISHES = ((signal.SIGTERM,), HUNG_UP)
 FLIGHT = ("fly", "--robots", 6, "--windows", 1500, "--record", "a.rrd", "--json", "a.json")
 SMALL = ("--policy", "tdma", "mst", "--robots", 10, "--windows", 50, "--episodes", 50)
 EVALUATION = ("evaluate", *SMALL, "--json", "r.json", "--csv", "r.csv")
+BRIEF_EVALUATION = tuple(5 if value == 50 else value for value in EVALUATION)
 TRAINING = (
     *("train", "--out", "run", "--robots", 3, "--windows", 20, "--missions", 4, "--latent", 4),
     *("--held-out", 2, "--evaluate-every", 128),
@@ -143,4 +144,37 @@ def test_a_reader_that_goes_away_is_no_error(forks, tmp_path, kind, arguments, l
     script = tmp_path.with_suffix(".py")
     script.write_text(UNREAD)
     assert forks.run(tmp_path, script, *kind, *arguments).returncode == 0
+    assert files(tmp_path) == left
+
+
+# Runs `swarm-mj` with some of its standard streams on a full disk.
+FULL = """
+import os, sys
+from swarm_mj.cli import main
+if __name__ == "__main__":
+    for number in sys.argv[1]:
+        os.dup2(os.open("/dev/full", os.O_WRONLY), int(number))
+    sys.exit(main(sys.argv[2:]))
+"""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+@pytest.mark.fault("streams on a full disk")
+@pytest.mark.parametrize(
+    ("numbers", "arguments", "left"),
+    [
+        ("1", BRIEF_EVALUATION, ["r.csv", "r.json"]),
+        ("1", (*FLIGHT[:4], 50, *FLIGHT[5:]), ["a.json", "a.rrd"]),
+        ("12", (*FLIGHT[:4], 50, *FLIGHT[5:]), ["a.json", "a.rrd"]),
+        ("1", ("--version",), []),
+    ],
+)
+def test_streams_on_a_full_disk_end_no_work(forks, tmp_path, numbers, arguments, left):
+    """It was two tracebacks and exit 120, and a flight was lost."""
+    script = tmp_path.with_suffix(".py")
+    script.write_text(FULL)
+    done = forks.run(tmp_path, script, numbers, *arguments)
+    assert done.returncode == 1
+    told = "swarm-mj: error: not all output was written: No space left on device"
+    assert done.stderr.splitlines() == ([] if "2" in numbers else [told])
     assert files(tmp_path) == left
