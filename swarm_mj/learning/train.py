@@ -135,12 +135,11 @@ def train(run: Run, folder: Path, *, listener: Listener, is_resumed: bool = Fals
             or foreign, or training has diverged.
         OSError: The folder cannot be written.
     """
-    if is_resumed:
-        check_begun(folder)
-    else:
-        check_new(folder)
-    model, rng = make_model(run.training)
+    check_folder = check_begun if is_resumed else check_new
+    check_folder(folder)
     with owned(folder / SETTINGS):
+        check_folder(folder)  # a run may have begun, or come further, meanwhile
+        model, rng = make_model(run.training)
         progress = _begun(folder, run, model, rng)
         model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))
         callback = TrainingCallback(model, run, folder, progress, rng, listener)

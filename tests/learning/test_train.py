@@ -8,7 +8,9 @@ import torch
 from small_runs import run, small_training
 from tiny_policies import save_tiny
 
-from swarm_mj.learning.run_folder import INIT, SETTINGS
+from swarm_mj.io.owned import owned
+from swarm_mj.learning import train
+from swarm_mj.learning.run_folder import CHECKPOINT, INIT, SETTINGS
 from swarm_mj.learning.train import make_model
 from swarm_mj.learning.vec_env import missions_of
 from swarm_mj.policies.stored import read_policy
@@ -145,3 +147,22 @@ def test_threads_are_torchs():
         assert torch.get_num_threads() == 2
     finally:
         torch.set_num_threads(before)
+
+
+def test_a_run_that_is_owned_is_refused_before_its_missions_are_made(tmp_path, monkeypatch):
+    monkeypatch.setattr(train, "make_model", lambda _: pytest.fail("made"))
+    with owned(tmp_path / SETTINGS), pytest.raises(ValueError, match="being written by process"):
+        run(small_training(), tmp_path)
+
+
+def test_a_run_that_appears_meanwhile_is_not_continued(tmp_path, monkeypatch):
+    """Another process begins and ends one between the look into the folder and owning it."""
+
+    def owned_late(path):
+        for name in (SETTINGS, CHECKPOINT):
+            path.with_name(name).touch()
+        return owned(path)
+
+    monkeypatch.setattr(train, "owned", owned_late)
+    with pytest.raises(ValueError, match="holds a run; go on with it by --resume"):
+        run(small_training(), tmp_path)
