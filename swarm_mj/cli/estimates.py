@@ -61,7 +61,7 @@ def check_fits(needs: Needs, output: Path | None, way_out: str, *, is_forced: bo
     for what, needed, free, where in has:
         if needed > free and not is_forced:
             raise ValueError(
-                f"this takes about {_in_gb(needed)} {what}, and {_in_gb(free)} {where}; {way_out}, "
+                f"this takes about {in_gb(needed)} {what}, and {in_gb(free)} {where}; {way_out}, "
                 "or try it with --yes"
             )
 
@@ -161,5 +161,6 @@ def passes_bytes(training: "Training") -> float:
     return 4.0 * kept * rows * nodes * shape.latent * layers * networks
 
 
-def _in_gb(size: int | float) -> str:
+def in_gb(size: int | float) -> str:
+    """A size as messages name it."""
     return f"{float(f'{size / GB:.3g}'):,g} GB"

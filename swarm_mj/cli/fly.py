@@ -1,5 +1,6 @@
 """`swarm-mj fly`: flies one mission, records its replay and says what it cost."""
 
+import gc
 import os
 import shlex
 import time
@@ -12,7 +13,7 @@ from typing import Any, ClassVar
 from rich.console import Console
 
 from swarm_mj.cli import DONE, FAILED, INTERRUPTED
-from swarm_mj.cli.estimates import YES, check_fits, flight_needs, replay_memory
+from swarm_mj.cli.estimates import YES, check_fits, flight_needs, in_gb, replay_memory
 from swarm_mj.cli.flight_table import flight_numbers, flight_table
 from swarm_mj.cli.machine import free_memory, memory_errors
 from swarm_mj.cli.mission_options import one_mission
@@ -41,8 +42,8 @@ from swarm_mj.swarm import Swarm
 
 REPLAYS = Path("replays")
 OUTPUT = "output"  # a heading of the help
-ENDINGS = {INTERRUPTED: "Interrupted", FAILED: "Out of memory"}
 WINDOWS_BETWEEN_LOOKS = 50  # at the memory that is left
+SECOND_LOOK_S = 0.5  # later, as what others have just freed may still be counted
 COMPILING_WINDOWS = 10  # in which three robots do all that a flight does, schedules included
 
 
@@ -88,7 +89,7 @@ def run(options: Options) -> int:
         if was_pressed():
             raise KeyboardInterrupt
     start_s = time.perf_counter()
-    flown, code = _fly(swarm, policy, recorder, console)
+    flown, code, ending = _fly(swarm, policy, recorder, console, looks=not options.yes)
     wall_s = time.perf_counter() - start_s
     out = plain_console()
     with deferred_interrupt():
@@ -103,7 +104,7 @@ def run(options: Options) -> int:
     if path:
         out.print(f"Open the replay:  {this_command()} replay {shlex.quote(str(path))}")
     if code != DONE:
-        console.print(f"{ENDINGS[code]} after {len(flown)} of {mission.num_windows} windows.")
+        console.print(f"{ending} after {len(flown)} of {mission.num_windows} windows.")
         return code
     return run_viewer(view_command(path)) if options.view and path else DONE
 
@@ -160,12 +161,12 @@ def _recorder(options: Options, swarm: Swarm, policy: Policy) -> Recorder:
 
 
 def _fly(
-    swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Console
-) -> tuple[list[WindowRecord], int]:
-    """Flies with a progress bar; returns what was flown, and the exit code.
+    swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Console, *, looks: bool
+) -> tuple[list[WindowRecord], int, str]:
+    """Flies with a progress bar; returns what was flown, the exit code, and why it ended early.
 
     Ctrl-C ends the flight after a whole window, and so does a lack of memory, while there is enough
-    to write what was flown.
+    to write what was flown, if somebody looks.
     """
     flown: list[WindowRecord] = []
     bar = WorkBar("Flying", swarm.mission.num_windows, "windows", console=console)
@@ -177,14 +178,29 @@ def _fly(
             bar.text = f"age {float(window.costs.age_windows[0]):.1f}"
             bar.advance()
             if is_interrupted():
-                return flown, INTERRUPTED
-            is_time = recorder and len(flown) % WINDOWS_BETWEEN_LOOKS == 0
-            if is_time and free_memory() < replay_memory(swarm.mission, len(flown)):
-                return flown, FAILED
-        return flown, DONE
+                return flown, INTERRUPTED, "Interrupted"
+            is_time = looks and len(flown) % WINDOWS_BETWEEN_LOOKS == 0
+            if recorder and is_time and (short := _shortage(swarm.mission, len(flown), recorder)):
+                return flown, FAILED, short
+        return flown, DONE, ""
     if not flown:
         raise MemoryError
-    return flown, FAILED
+    return flown, FAILED, "Out of memory"
+
+
+def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | None:
+    """What to say if memory does not suffice to write what was flown, at a second look either."""
+    needed = replay_memory(mission, num_windows) - recorder.num_bytes
+    if free_memory() >= needed:
+        return None
+    gc.collect()
+    time.sleep(SECOND_LOOK_S)
+    if (free := free_memory()) >= needed:
+        return None
+    return (
+        f"Memory ran short ({in_gb(free)} are free, writing the replay takes {in_gb(needed)}; "
+        "--yes flies on all the same)"
+    )
 
 
 def _write(

@@ -104,6 +104,12 @@ class Recorder:
         # Copies: the swarm writes its arrays in place, and a view would keep a whole matrix.
         self._rows.append({name: np.array(value) for name, value in shown.items()})
 
+    @property
+    def num_bytes(self) -> int:
+        """What is recorded so far takes of memory; every window takes the same."""
+        row = sum(value.nbytes for value in self._rows[0].values()) if self._rows else 0
+        return len(self._rows) * row + sum(age.nbytes for age in self._age)
+
     def log(self) -> Log:
         """Everything recorded so far; raises ValueError if that is nothing."""
         if not self._rows:
