@@ -2,9 +2,11 @@
 
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from types import FrameType
+from typing import Any
 
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -12,7 +14,7 @@ INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 @contextmanager
 def interruptible() -> Iterator[None]:
     """Within it SIGTERM and a hang-up interrupt as Ctrl-C does, if they would end the process."""
-    heard = [number for number in INTERRUPTS if signal.getsignal(number) == signal.SIG_DFL]
+    heard = [number for number, handler in _handlers().items() if handler == signal.SIG_DFL]
     for number in heard:
         signal.signal(number, signal.default_int_handler)
     try:
@@ -53,9 +55,10 @@ def _noted(*, is_deferred: bool) -> Iterator[Callable[[], bool]]:
         if not (is_deferred and (is_first or number == signal.SIGHUP)):
             signal.default_int_handler(number, frame)
 
-    before = {number: signal.getsignal(number) for number in INTERRUPTS}
     # A job that its shell shields from Ctrl-C, or `nohup` from hang-ups, stays so.
-    heard = {number: handler for number, handler in before.items() if handler != signal.SIG_IGN}
+    heard = {
+        number: handler for number, handler in _handlers().items() if handler != signal.SIG_IGN
+    }
     hook = sys.unraisablehook
     for number in heard:
         signal.signal(number, note)
@@ -66,3 +69,14 @@ def _noted(*, is_deferred: bool) -> Iterator[Callable[[], bool]]:
         sys.unraisablehook = hook
         for number, handler in heard.items():
             signal.signal(number, handler)
+
+
+def _handlers() -> dict[signal.Signals, Any]:
+    """Who hears what interrupts, as far as this thread may replace them and put them back.
+
+    Only the main thread may; and nobody can put back a handler that is not Python's.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return {}
+    handlers = {number: signal.getsignal(number) for number in INTERRUPTS}
+    return {number: handler for number, handler in handlers.items() if handler is not None}

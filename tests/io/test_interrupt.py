@@ -4,6 +4,7 @@ import contextlib
 import ctypes
 import signal
 import sys
+import threading
 
 import pytest
 
@@ -81,3 +82,25 @@ def test_what_a_callback_swallowed_is_noted_and_not_printed(monkeypatch):
         assert printed == []
         called_back(KeyError())
     assert [lost.exc_type for lost in printed] == [KeyError]
+
+
+def test_another_thread_works_without_hearing():
+    said = []
+
+    def work():
+        with interruptible(), deferred_interrupt() as is_interrupted, heard_interrupt():
+            said.append(is_interrupted())
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert said == [False]
+
+
+def test_a_handler_that_is_not_python_s_stays(monkeypatch):
+    replaced = []
+    monkeypatch.setattr(signal, "getsignal", lambda _: None)
+    monkeypatch.setattr(signal, "signal", lambda *change: replaced.append(change))
+    with interruptible(), deferred_interrupt():
+        pass
+    assert replaced == []
