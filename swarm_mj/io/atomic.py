@@ -2,11 +2,12 @@
 
 What is written stands beside its place until it is on the disk and checked; then it takes the place
 in one step. Whoever fails or is interrupted leaves the place as it was. Whoever is killed leaves
-that, too, and an unfinished part beside it, which the next to write there removes.
+that, too, and an unfinished part beside it, which the next of its machine to write there removes.
 """
 
 import csv
 import glob
+import hashlib
 import io
 import json
 import os
@@ -14,9 +15,10 @@ import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 Check = Callable[[Path], object]  # raises ValueError for what is not whole
+PIECE_BYTES = 2**20  # read back at a time
 PAGE = bytes(4096)  # a full disk takes an empty file, but not this
 
 
@@ -28,7 +30,7 @@ def write_bytes(path: Path, content: bytes | memoryview, check: Check | None = N
     Raises:
         OSError: The file could not be written, or not whole; the message names it.
     """
-    with _named(path), _part(path, Path.touch) as (target, part):
+    with _named(path), _part(path) as (target, part):
         _fill(part, content)
         if check:
             check(part)
@@ -42,7 +44,8 @@ def write_folder(path: Path, contents: Mapping[str, bytes], check: Check | None 
     No folder takes another's place in one step, so the old one first steps aside. Whoever is killed
     between the two steps leaves it there, where `present_folder` finds it.
     """
-    with _named(path), _part(path, Path.mkdir) as (target, part):
+    with _named(path), _part(path) as (target, part):
+        part.mkdir()
         for name, content in contents.items():
             _fill(part / name, content)
         _flush(part)
@@ -80,7 +83,7 @@ def append_bytes(path: Path, content: bytes) -> None:
     with _named(path):
         size = path.stat().st_size
         try:
-            with path.open("ab") as file:
+            with path.open("a+b") as file:
                 _write(file, content)
         except BaseException:
             os.truncate(path, size)
@@ -95,7 +98,7 @@ def check_writable(path: Path) -> None:
     """
     target = Path(os.path.realpath(path))
     folder = next(parent for parent in target.parents if parent.exists())
-    with _part(folder / target.name, Path.touch) as (_, part):
+    with _part(folder / target.name) as (_, part):
         _fill(part, PAGE)
 
 
@@ -116,25 +119,29 @@ def _named(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _part(path: Path, make: Callable[[Path], None]) -> Iterator[tuple[Path, Path]]:
-    """A file or folder to write until it is whole; yields its place and itself, gone afterwards."""
+def _part(path: Path) -> Iterator[tuple[Path, Path]]:
+    """A file or folder to make until it is whole; yields its place and itself, gone afterwards."""
     target = Path(os.path.realpath(path))
     target.parent.mkdir(parents=True, exist_ok=True)
     _sweep(target)
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    part = target.with_name(f".{target.name}.{_machine()}.{os.getpid()}.part")
     try:
-        make(part)
         yield target, part
     finally:
         _remove(part)
 
 
 def _sweep(target: Path) -> None:
-    """Removes what processes that were killed had not finished writing."""
-    for part in target.parent.glob(f".{glob.escape(target.name)}.*.part"):
+    """Removes what processes of this machine that were killed had not finished writing."""
+    for part in target.parent.glob(f".{glob.escape(target.name)}.{_machine()}.*.part"):
         pid = part.name.split(".")[-2]
         if pid.isdecimal() and (int(pid) == os.getpid() or not _is_alive(int(pid))):
             _remove(part)
+
+
+def _machine() -> str:
+    """Where processes have their numbers; others, containers too, may share the disk."""
+    return hashlib.sha256(os.fsencode(os.uname().nodename)).hexdigest()[:8]
 
 
 def _is_alive(pid: int) -> bool:
@@ -155,23 +162,31 @@ def _remove(part: Path) -> None:
 
 
 def _fill(path: Path, content: bytes | memoryview) -> None:
-    with path.open("wb") as file:
+    with path.open("x+b") as file:  # follows no link
         _write(file, content)
 
 
-def _write(file: io.BufferedWriter, content: bytes | memoryview) -> None:
-    """Writes as far as the disk; raises OSError if that cannot be."""
+def _write(file: BinaryIO, content: bytes | memoryview) -> None:
+    """Writes as far as the disk; raises OSError if that cannot be, or something else is there."""
+    start = file.tell()
     file.write(content)
     file.flush()
     os.fsync(file.fileno())
+    file.seek(start)
+    for at in range(0, len(content), PIECE_BYTES):
+        piece = bytes(content[at : at + PIECE_BYTES])
+        if file.read(len(piece)) != piece:
+            raise OSError("the disk gives back something else")
 
 
 def _flush(folder: Path) -> None:
     """Has the disk know the names in a folder, where it can be asked to."""
-    descriptor = os.open(folder, os.O_RDONLY)
     with suppress(OSError):
-        os.fsync(descriptor)
-    os.close(descriptor)
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def _replace(target: Path, part: Path) -> None:

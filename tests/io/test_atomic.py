@@ -1,5 +1,6 @@
 """Files and folders are replaced whole: a failure or a kill at any moment leaves one that is."""
 
+import errno
 import json
 import os
 import resource
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from swarm_mj.io import atomic
 from swarm_mj.io.atomic import (
     append_bytes,
     check_writable,
@@ -226,19 +228,92 @@ def test_a_first_folder_is_there_or_not(tmp_path):
     assert content(tmp_path / "15") == "new"
 
 
+@pytest.fixture
+def machine(monkeypatch):
+    """Gives this machine another name, as each container has its own."""
+    system = os.uname()
+
+    def rename(name):
+        renamed = os.uname_result((system[0], name, *system[2:]))
+        monkeypatch.setattr(os, "uname", lambda: renamed)
+
+    return rename
+
+
+def parts_of_a_write(path):
+    """The names beside a file while it is being written."""
+    seen = []
+    write_bytes(path, b"new", check=lambda part: seen.extend(names(part.parent)))
+    return [name for name in seen if name.endswith(".part")]
+
+
 def test_what_the_dead_had_not_finished_is_removed_and_what_others_write_is_not(tmp_path):
     ended = subprocess.Popen(["true"])
     ended.wait()
-    (tmp_path / f".x.{ended.pid}.part").mkdir()
-    (tmp_path / f".x.{ended.pid}.part" / "a").touch()
-    (tmp_path / f".x.{os.getpid()}.part").mkdir()  # of a dead process that had this one's number
+    (mine,) = parts_of_a_write(tmp_path / "x")
+    dead, alive = (mine.replace(str(os.getpid()), str(n)) for n in (ended.pid, os.getppid()))
+    (tmp_path / "x").unlink()
+    (tmp_path / dead).mkdir()
+    (tmp_path / dead / "a").touch()
+    (tmp_path / mine).mkdir()  # of a dead process that had this one's number
     (tmp_path / ".x.old").mkdir()
-    left = {f".x.{os.getppid()}.part", ".x.notes.part", ".y.part"}
+    left = {alive, ".x.notes.part", ".y.part"}
     for name in left:
         (tmp_path / name).touch()
     write(tmp_path / "x", "new")
     assert content(tmp_path / "x") == "new"
     assert set(names(tmp_path)) == {"x", *left}
+
+
+def test_what_another_machine_writes_is_left_alone(tmp_path, machine):
+    """Even by a process of the same number: all containers' first have the number 1."""
+
+    def write_elsewhere(part):
+        machine("elsewhere")
+        write_bytes(tmp_path / "x", b"theirs")
+        assert part.read_bytes() == b"mine"
+
+    machine("here")
+    write_bytes(tmp_path / "x", b"mine", check=write_elsewhere)
+    assert (tmp_path / "x").read_bytes() == b"mine"
+    assert names(tmp_path) == ["x"]
+
+
+def test_a_link_in_the_part_s_place_is_not_written_through(tmp_path, monkeypatch):
+    """It was put there after the last look."""
+    (mine,) = parts_of_a_write(tmp_path / "x")
+    (tmp_path / "precious").write_text("x")
+    monkeypatch.setattr(atomic, "_sweep", lambda _: (tmp_path / mine).symlink_to("precious"))
+    with pytest.raises(OSError, match="x could not be written: File exists"):
+        write_bytes(tmp_path / "x", b"newer")
+    assert (tmp_path / "precious").read_text() == "x"
+    assert (tmp_path / "x").read_bytes() == b"new"
+
+
+@pytest.mark.parametrize("add", [write_bytes, append_bytes])
+def test_a_disk_that_holds_something_else_is_told(tmp_path, monkeypatch, add):
+    def spoil(number):
+        os.ftruncate(number, os.fstat(number).st_size - 1)
+
+    path = tmp_path / "x"
+    write_bytes(path, b"old")
+    monkeypatch.setattr(os, "fsync", spoil)
+    with pytest.raises(OSError, match="x could not be written: the disk gives back something"):
+        add(path, bytes(3 * 2**20))
+    assert path.read_bytes() == b"old"
+    assert names(tmp_path) == ["x"]
+
+
+def test_a_folder_that_cannot_be_listed_is_written(tmp_path, monkeypatch):
+    def refuse(path, *arguments, **options):
+        if path == tmp_path:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)
+        return opened(path, *arguments, **options)
+
+    opened = os.open
+    monkeypatch.setattr(os, "open", refuse)
+    write_bytes(tmp_path / "x", b"new")
+    assert (tmp_path / "x").read_bytes() == b"new"
 
 
 def test_a_link_stays_and_its_folder_is_replaced(tmp_path):
