@@ -17,7 +17,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 from swarm_mj.io.atomic import write_bytes
-from swarm_mj.io.reading import read_file
+from swarm_mj.io.reading import read_file, read_json
 from swarm_mj.learning.checkpoint_state import check_state
 from swarm_mj.learning.mission_batch import ActionHistory
 from swarm_mj.learning.run_folder import Progress
@@ -70,7 +70,7 @@ def load(path: Path, training: Training, model: PPO, rng: np.random.Generator) -
     """
     state = _read(path, _most_bytes(model))
     try:
-        if json.loads(state["training"]) != json.loads(json.dumps(asdict(training))):
+        if read_json(state["training"], Training) != training:
             raise ValueError("it was made with other settings than the run's")
         progress = check_state(state, model)
         _restore(state, model, rng)

@@ -2,7 +2,6 @@
 
 import math
 import os
-import shutil
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -190,15 +189,6 @@ def check_begun(folder: Path) -> None:
             f"{folder} has lost its {CHECKPOINT}, so its run cannot go on; put it back, or begin "
             "another run in another folder, by --out without --resume"
         )
-
-
-def remove_parts(folder: Path) -> None:
-    """Removes what killed sessions of a run had not finished writing."""
-    for part in folder.glob(".*.part"):
-        if part.is_dir():
-            shutil.rmtree(part, ignore_errors=True)
-        else:
-            part.unlink(missing_ok=True)
 
 
 def write_curve(path: Path, curve: list[dict[str, float]]) -> None:

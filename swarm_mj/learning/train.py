@@ -34,7 +34,6 @@ from swarm_mj.learning.run_folder import (
     Run,
     check_begun,
     check_new,
-    remove_parts,
     write_curve,
     write_run,
 )
@@ -176,7 +175,6 @@ def _begun(folder: Path, run: Run, model: PPO, rng: np.random.Generator) -> Prog
         progress = checkpoint.load(kept, run.training, model, rng)
     elif run.init is not None:
         init = _read_init(own if own.exists() else run.init, run.training)
-    remove_parts(folder)
     write_run(folder, run)
     if progress.curve:
         write_curve(folder / CURVE, progress.curve)

@@ -22,7 +22,6 @@ from swarm_mj.learning.run_folder import (
     check_begun,
     check_new,
     read_run,
-    remove_parts,
     write_curve,
     write_run,
 )
@@ -117,17 +116,6 @@ def test_runs_begin_in_folders_of_their_own(tmp_path):
     write_run(tmp_path / "run", RUN)
     with pytest.raises(ValueError, match="holds a run; go on with it by --resume"):
         check_new(tmp_path / "run")
-
-
-def test_what_killed_sessions_left_is_removed_and_nothing_else(tmp_path):
-    write_run(tmp_path, RUN)
-    (tmp_path / ".checkpoint.pt.12.part").write_text("half")
-    (tmp_path / ".policy.12.part").mkdir()
-    (tmp_path / ".policy.12.part" / "config.json").touch()
-    (tmp_path / ".policy.old").mkdir()  # may be the only whole version
-    (tmp_path / "notes.part").touch()
-    remove_parts(tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == {SETTINGS, ".policy.old", "notes.part"}
 
 
 @pytest.mark.parametrize("name", [CURVE, POLICY])
