@@ -41,6 +41,7 @@ from swarm_mj.rollout import WindowRecord, rollout, summarise
 from swarm_mj.swarm import Swarm
 
 REPLAYS = Path("replays")
+OTHERWISE = "name another place with --record, or leave it out with --no-record"
 OUTPUT = "output"  # a heading of the help
 WINDOWS_BETWEEN_LOOKS = 50  # at the memory that is left
 SECOND_LOOK_S = 0.5  # later, as what others have just freed may still be counted
@@ -122,8 +123,9 @@ def _replay_path(options: Options) -> Path | None:
     if options.no_record and options.view:
         raise ValueError("--view needs a replay; leave out --no-record")
     path = None if options.no_record else options.record or _fresh_name(options)
+    what, way_out = ("--record", "") if options.record else ("the replay", OTHERWISE)
     check_outputs(
-        Output("--record", path, ".rrd"),
+        Output(what, path, ".rrd", way_out),
         Output("--json", options.json, ".json"),
         inputs=directories([options.policy]),
         must_be_new=not options.force,

@@ -17,6 +17,7 @@ class Output(NamedTuple):
     what: str  # as it is called in a message
     path: Path | None
     suffix: str = ""  # that it must have, if any; of several, apart by |
+    way_out: str = ""  # what to do if it cannot be written
 
 
 def check_outputs(*outputs: Output, inputs: Iterable[Path] = (), must_be_new: bool = False) -> None:
@@ -34,7 +35,7 @@ def check_outputs(*outputs: Output, inputs: Iterable[Path] = (), must_be_new: bo
     """
     named: dict[str, str] = {}
     sources = {os.path.realpath(path) for path in inputs}
-    for what, path, suffix in outputs:
+    for what, path, suffix, way_out in outputs:
         if path is None:
             continue
         target = os.path.realpath(path)
@@ -44,10 +45,10 @@ def check_outputs(*outputs: Output, inputs: Iterable[Path] = (), must_be_new: bo
         parts = {target, *map(str, Path(target).parents)}
         if os.path.exists(target) and sources & parts:
             raise ValueError(f"{what} {path} is an input, or part of one; name another")
-        _check(what, path, suffix, must_be_new=must_be_new)
+        _check(what, path, suffix, way_out, must_be_new=must_be_new)
 
 
-def _check(what: str, path: Path, suffix: str, *, must_be_new: bool) -> None:
+def _check(what: str, path: Path, suffix: str, way_out: str, *, must_be_new: bool) -> None:
     try:
         if _exists(path):
             if path.is_dir():
@@ -61,7 +62,7 @@ def _check(what: str, path: Path, suffix: str, *, must_be_new: bool) -> None:
             raise ValueError(f"{what} must be named {ways}, not {path}")
         check_writable(path)
     except OSError as error:
-        complaint = f"{what} {path} cannot be written: {error.strerror}"
+        complaint = f"{what} {path} cannot be written: {error.strerror}{way_out and f'; {way_out}'}"
         raise (OSError if error.errno in FULL else ValueError)(complaint) from error
 
 

@@ -171,6 +171,17 @@ def test_an_output_below_a_file_is_refused_before_the_flight(swarm_mj, tmp_path)
     assert (tmp_path / "file").read_text() == "kept"
 
 
+def test_a_replay_that_nobody_named_has_a_way_out(swarm_mj, tmp_path):
+    (tmp_path / "replays").write_text("a file")
+    done = swarm_mj("fly", *SHORT)
+    assert done.returncode == 2
+    assert "error: the replay replays/flocking-planner-seed1-" in done.stderr
+    assert done.stderr.endswith(
+        "name another place with --record, or leave it out with --no-record\n"
+    )
+    assert files(tmp_path) == ["replays"]
+
+
 def test_replay_and_summary_need_names_of_their_own(swarm_mj, tmp_path):
     done = swarm_mj("fly", *SHORT, "--record", "a.rrd", "--json", "./a.rrd")
     assert done.returncode == 2
