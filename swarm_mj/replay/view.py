@@ -51,10 +51,10 @@ def serve_command(path: Path) -> tuple[list[str], str]:
 
 
 def run(command: list[str]) -> int:
-    """Runs a viewer until it is closed; returns its exit code, 0 after Ctrl-C."""
+    """Runs a viewer until it is closed; returns 1 if it failed, 0 after Ctrl-C."""
     try:
         with running(command, environment=quiet_environment()) as viewer:
-            return viewer.wait()
+            return int(viewer.wait() != 0)  # its own codes, or a signal's, mean nothing here
     except KeyboardInterrupt:
         return 0
 

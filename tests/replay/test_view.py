@@ -42,8 +42,11 @@ def test_a_viewer_s_way_out_of_this_machine_is_closed(monkeypatch):
     assert environment["PATH"] == os.environ["PATH"]
 
 
-def test_a_viewer_s_exit_code_is_ours():
-    assert run([sys.executable, "-c", "raise SystemExit(3)"]) == 3
+@pytest.mark.parametrize(
+    ("end", "code"), [("sys.exit()", 0), ("sys.exit(101)", 1), ("os.kill(os.getpid(), 9)", 1)]
+)
+def test_a_viewer_that_fails_is_a_machine_that_fails(end, code):
+    assert run([sys.executable, "-c", f"import os, sys; {end}"]) == code
 
 
 def test_the_page_is_served(replay):
