@@ -117,16 +117,21 @@ def script(
 
 def _exit_code(name: str, work: Callable[[], int]) -> int:
     """Does the work; says in one line what is wrong, or that it was interrupted."""
-    with lasting_streams() as failure, interruptible():
-        code = _told(name, work)
+    with lasting_streams() as failure, interruptible() as was_interrupted:
+        code = _told(name, work, was_interrupted)
         if lost := failure():
             sys.stderr.write(f"{name}: error: not all output was written: {lost.strerror}\n")
         return code or (FAILED if lost else DONE)
 
 
-def _told(name: str, work: Callable[[], int]) -> int:
+def _told(name: str, work: Callable[[], int], was_interrupted: Callable[[], bool]) -> int:
     try:
-        return work()
+        try:
+            return work()
+        except (ValueError, OSError) as error:  # perhaps what a library made of a Ctrl-C
+            if was_interrupted():
+                raise KeyboardInterrupt from error
+            raise
     except SystemExit as end:  # of help, or of a line that cannot be read
         return int(end.code or DONE)
     except (ValueError, OSError) as error:

@@ -12,16 +12,27 @@ INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextmanager
-def interruptible() -> Iterator[None]:
-    """Within it SIGTERM and a hang-up interrupt as Ctrl-C does, if they would end the process."""
-    heard = [number for number, handler in _handlers().items() if handler == signal.SIG_DFL]
-    for number in heard:
-        signal.signal(number, signal.default_int_handler)
+def interruptible() -> Iterator[Callable[[], bool]]:
+    """Within it SIGTERM and a hang-up interrupt as Ctrl-C does, if they would end the process.
+
+    It yields whether one did, for a library may turn the exception into another.
+    """
+    was_interrupted = False
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        nonlocal was_interrupted
+        was_interrupted = True
+        signal.default_int_handler(number, frame)
+
+    usual = (signal.SIG_DFL, signal.default_int_handler)
+    before = {number: handler for number, handler in _handlers().items() if handler in usual}
+    for number in before:
+        signal.signal(number, interrupt)
     try:
-        yield
+        yield lambda: was_interrupted
     finally:
-        for number in heard:
-            signal.signal(number, signal.SIG_DFL)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def deferred_interrupt() -> AbstractContextManager[Callable[[], bool]]:
