@@ -57,7 +57,8 @@ def test_jobs_that_compute_end_with_their_parent(forks, tmp_path, record_propert
     rng, num_tries = random.Random(end), tries(2)
     for _ in range(num_tries):
         done, mark = signalled(forks, tmp_path, [end], rng.uniform(0.0, 1.0), program)
-        assert done.returncode == (-end if end == signal.SIGKILL else 130), done.stderr
+        # A signal in the first moment, before anything has begun, ends a process as usual.
+        assert done.returncode in ((-end,) if end == signal.SIGKILL else (130, -end)), done.stderr
         assert left_after_limit(mark) == {}
         assert "Traceback" not in done.stderr
     record_property("tries", num_tries)
