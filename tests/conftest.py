@@ -41,3 +41,10 @@ def forks(tmp_path_factory):
     programs = Forks(tmp_path_factory.mktemp("said"))
     yield programs
     programs.close()
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty folder, and this process in it."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path

@@ -30,13 +30,6 @@ def files(folder):
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """An empty folder, and this process in it."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """A folder with a finished run in `runs/whole`, and the process that made it."""

@@ -1,15 +1,14 @@
 """What is written is whole or was never there: full disks, kills, links and inputs as outputs."""
 
 import os
-import resource
 import signal
 import subprocess
 import time
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
+from file_limits import no_larger_files
 from tiny_policies import save_tiny
 from tries import tries
 
@@ -30,24 +29,6 @@ ENDS_S = 10.0  # the longest that a writer that cannot write may take to say so
 def names(folder):
     """All that a folder holds, hidden files included."""
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
-
-
-@contextmanager
-def no_larger_files(num_bytes):
-    """Within it, writing beyond so many bytes fails as it does on a full disk, but with EFBIG."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (num_bytes, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """The current folder, which is empty."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 @pytest.fixture(scope="module")

@@ -3,13 +3,12 @@
 import errno
 import json
 import os
-import resource
 import shutil
 import subprocess
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from file_limits import no_larger_files
 
 from swarm_mj.io import atomic
 from swarm_mj.io.atomic import (
@@ -26,17 +25,6 @@ from swarm_mj.io.atomic import (
 
 def names(folder):
     return sorted(path.name for path in folder.iterdir())
-
-
-@contextmanager
-def full_disk(largest=0):
-    """Within it no file may be larger; the error is another than a full disk's, the way is not."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (largest, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def test_a_file_appears_in_folders_that_are_made(tmp_path):
@@ -75,7 +63,7 @@ def test_an_interrupt_leaves_the_old_file(tmp_path):
 def test_a_full_disk_leaves_the_old_file_and_is_named(tmp_path):
     path = tmp_path / "a"
     write_bytes(path, b"old")
-    with full_disk(100), pytest.raises(OSError, match=rf"{path} could not .* File too large"):
+    with no_larger_files(100), pytest.raises(OSError, match=rf"{path} could not .* File too large"):
         write_bytes(path, bytes(101))
     assert path.read_bytes() == b"old"
     assert names(tmp_path) == ["a"]
@@ -83,7 +71,7 @@ def test_a_full_disk_leaves_the_old_file_and_is_named(tmp_path):
 
 def test_a_full_disk_is_found_before_the_work(tmp_path):
     check_writable(tmp_path / "a" / "b")
-    with full_disk(), pytest.raises(OSError, match="File too large"):
+    with no_larger_files(), pytest.raises(OSError, match="File too large"):
         check_writable(tmp_path / "a" / "b")
     assert names(tmp_path) == []
 
@@ -92,7 +80,10 @@ def test_what_cannot_be_added_is_not_added_in_part(tmp_path):
     path = tmp_path / "a"
     path.write_bytes(b"12345\n")
     append_bytes(path, b"67890\n")
-    with full_disk(15), pytest.raises(OSError, match=rf"{path} could not be written: File too"):
+    with (
+        no_larger_files(15),
+        pytest.raises(OSError, match=rf"{path} could not be written: File too"),
+    ):
         append_bytes(path, b"abcde\n")
     assert path.read_bytes() == b"12345\n67890\n"
 
