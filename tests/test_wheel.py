@@ -1,8 +1,10 @@
-"""The package as a wheel, installed elsewhere: it brings its assets along, and flies."""
+"""The package as built: an index would take it; installed elsewhere, it has assets and flies."""
 
 import os
 import subprocess
 import sys
+import tarfile
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -11,12 +13,19 @@ ROOT = Path(__file__).parent.parent
 
 
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory):
-    """A folder with the wheel's contents only."""
-    dist, target = tmp_path_factory.mktemp("dist"), tmp_path_factory.mktemp("site")
-    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(dist)]
+def built(tmp_path_factory):
+    """The source distribution, and the wheel that was built from nothing else."""
+    dist = tmp_path_factory.mktemp("dist")
+    build = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(dist)]
     subprocess.run([*build, str(ROOT)], check=True, capture_output=True)
-    (wheel,) = dist.glob("*.whl")
+    return *dist.glob("*.tar.gz"), *dist.glob("*.whl")
+
+
+@pytest.fixture(scope="module")
+def installed(built, tmp_path_factory):
+    """A folder with the wheel's contents only."""
+    _, wheel = built
+    target = tmp_path_factory.mktemp("site")
     install = [sys.executable, "-m", "pip", "install", "--no-deps", "--target", str(target)]
     subprocess.run([*install, str(wheel)], check=True, capture_output=True)
     return target
@@ -32,6 +41,25 @@ def run(installed, tmp_path, *arguments):
         text=True,
         check=False,
     )
+
+
+def test_an_index_would_take_both(built):
+    check = [sys.executable, "-m", "twine", "check", "--strict", *map(str, built)]
+    done = subprocess.run(check, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert done.stdout.count("PASSED") == 2
+
+
+def test_both_bring_what_they_need(built):
+    source, wheel = built
+    with tarfile.open(source) as archive:
+        sources = {name.partition("/")[2] for name in archive.getnames()}
+    assert {"LICENSE", "README.md", "CITATION.cff", "tests/conftest.py", "docs/code.md"} <= sources
+    with zipfile.ZipFile(wheel) as archive:
+        names = {name.removeprefix("swarm_mj/") for name in archive.namelist()}
+    assets = {f"assets/{name}" for name in ("arena.xml", "robot.xml", "policies/gnn/config.json")}
+    assert {"py.typed", "policies/tuned.csv", "evaluation/published.csv"} | assets <= names
+    assert not any(name.startswith(("tests/", "tools/", "training/")) for name in names)
 
 
 def test_assets_come_from_the_wheel(installed, tmp_path):
