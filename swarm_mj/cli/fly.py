@@ -1,10 +1,8 @@
 """`swarm-mj fly`: flies one mission, records its replay and says what it cost."""
 
-import gc
 import os
 import shlex
 import time
-from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -12,10 +10,10 @@ from typing import Any, ClassVar
 
 from rich.console import Console
 
-from swarm_mj.cli import DONE, FAILED, INTERRUPTED
-from swarm_mj.cli.estimates import YES, check_fits, flight_needs, in_gb, replay_memory
+from swarm_mj.cli import DONE
+from swarm_mj.cli.estimates import YES, check_fits, flight_needs
+from swarm_mj.cli.flight import fly_swarm
 from swarm_mj.cli.flight_table import flight_numbers, flight_table
-from swarm_mj.cli.machine import free_memory, memory_errors
 from swarm_mj.cli.mission_options import one_mission
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.policy_options import NAMES, PolicyOptions
@@ -37,14 +35,12 @@ from swarm_mj.policies.registry import (
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import view_command
-from swarm_mj.rollout import WindowRecord, rollout, summarise
+from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
 REPLAYS = Path("replays")
 OTHERWISE = "name another place with --record, or leave it out with --no-record"
 OUTPUT = "output"  # a heading of the help
-WINDOWS_BETWEEN_LOOKS = 50  # at the memory that is left
-SECOND_LOOK_S = 0.5  # later, as what others have just freed may still be counted
 COMPILING_WINDOWS = 10  # in which three robots do all that a flight does, schedules included
 
 
@@ -90,7 +86,9 @@ def run(options: Options) -> int:
         if was_pressed():
             raise KeyboardInterrupt
     start_s = time.perf_counter()
-    flown, code, ending = _fly(swarm, policy, recorder, console, looks=not options.yes)
+    bar = WorkBar("Flying", mission.num_windows, "windows", console=console)
+    way_on = None if options.yes else "; --yes flies on all the same"
+    flown, code, ending = fly_swarm(swarm, policy, recorder, bar, way_on=way_on)
     wall_s = time.perf_counter() - start_s
     out = plain_console()
     with deferred_interrupt():
@@ -160,49 +158,6 @@ def _compile_ahead(options: Options, mission: Mission) -> None:
 def _recorder(options: Options, swarm: Swarm, policy: Policy) -> Recorder:
     is_broadcast = policy.window(swarm.mission).is_broadcast
     return Recorder(swarm, ego=options.observer, is_broadcast=is_broadcast)
-
-
-def _fly(
-    swarm: Swarm, policy: Policy, recorder: Recorder | None, console: Console, *, looks: bool
-) -> tuple[list[WindowRecord], int, str]:
-    """Flies with a progress bar; returns what was flown, the exit code, and why it ended early.
-
-    Ctrl-C ends the flight after a whole window, and so does a lack of memory, while there is enough
-    to write what was flown, if somebody looks.
-    """
-    flown: list[WindowRecord] = []
-    bar = WorkBar("Flying", swarm.mission.num_windows, "windows", console=console)
-    with suppress(MemoryError), memory_errors(), deferred_interrupt() as is_interrupted, bar:
-        for window in rollout(swarm, policy):
-            if recorder:
-                recorder.add(window)
-            flown.append(window)
-            bar.text = f"age {float(window.costs.age_windows[0]):.1f}"
-            bar.advance()
-            if is_interrupted():
-                return flown, INTERRUPTED, "Interrupted"
-            is_time = looks and len(flown) % WINDOWS_BETWEEN_LOOKS == 0
-            if recorder and is_time and (short := _shortage(swarm.mission, len(flown), recorder)):
-                return flown, FAILED, short
-        return flown, DONE, ""
-    if not flown:
-        raise MemoryError
-    return flown, FAILED, "Out of memory"
-
-
-def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | None:
-    """What to say if memory does not suffice to write what was flown, at a second look either."""
-    needed = replay_memory(mission, num_windows) - recorder.num_bytes
-    if free_memory() >= needed:
-        return None
-    gc.collect()
-    time.sleep(SECOND_LOOK_S)
-    if (free := free_memory()) >= needed:
-        return None
-    return (
-        f"Memory ran short ({in_gb(free)} are free, writing the replay takes {in_gb(needed)}; "
-        "--yes flies on all the same)"
-    )
 
 
 def _write(

@@ -234,15 +234,15 @@ def test_viewing_needs_a_display_and_says_so_first(tmp_path):
 FLY_AND_TELL = """
 import signal, sys
 from pathlib import Path
-from swarm_mj.cli import fly, main
+from swarm_mj.cli import flight, main
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
-windows = fly.rollout
+windows = flight.rollout
 def told(*arguments):
     for count, window in enumerate(windows(*arguments)):
         if count == 40:
             Path("under-way").touch()
         yield window
-fly.rollout = told
+flight.rollout = told
 sys.exit(main(sys.argv[1:]))
 """
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from tries import tries
 
-from swarm_mj.cli import estimates, evaluate, fly, main
+from swarm_mj.cli import estimates, evaluate, flight, main
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.replay.read import check_replay
 from swarm_mj.replay.recorder import Recorder
@@ -118,7 +118,7 @@ def flown_short(tmp_path, capsys, ending="Out of memory"):
 def test_a_flight_ends_while_what_was_flown_can_be_written(monkeypatch, tmp_path, capsys):
     """Fault 8: others may take the memory that was free when it began."""
     free = chain([1e12], repeat(0))
-    monkeypatch.setattr(fly, "free_memory", lambda: next(free))
+    monkeypatch.setattr(flight, "free_memory", lambda: next(free))
     ending = (
         "Memory ran short (0 GB are free, writing the replay takes 0.102 GB; "
         "--yes flies on all the same)"
@@ -131,7 +131,7 @@ def test_a_flight_ends_while_what_was_flown_can_be_written(monkeypatch, tmp_path
 def test_a_flight_goes_on_when_memory_comes_back_or_nobody_minds(monkeypatch, tmp_path, free, yes):
     """It ended at the first look, and despite --yes."""
     left = iter(free)
-    monkeypatch.setattr(fly, "free_memory", lambda: next(left))
+    monkeypatch.setattr(flight, "free_memory", lambda: next(left))
     assert main(["fly", *SMALL, "--record", str(tmp_path / "a.rrd"), *yes]) == 0
     assert list(left) == []
 

@@ -1,0 +1,79 @@
+"""The flight itself, of `swarm-mj fly` and of `swarm_mj.fly` alike: it ends early without loss.
+
+Ctrl-C ends it after a whole window, and so does a lack of memory while there is enough to write
+what was flown.
+"""
+
+import gc
+import time
+from contextlib import suppress
+from typing import NamedTuple
+
+from swarm_mj.cli import DONE, FAILED, INTERRUPTED
+from swarm_mj.cli.estimates import in_gb, replay_memory
+from swarm_mj.cli.machine import free_memory, memory_errors
+from swarm_mj.cli.progress import WorkBar
+from swarm_mj.io.interrupt import deferred_interrupt
+from swarm_mj.mission import Mission
+from swarm_mj.policies.policy import Policy
+from swarm_mj.replay.recorder import Recorder
+from swarm_mj.rollout import WindowRecord, rollout
+from swarm_mj.swarm import Swarm
+
+WINDOWS_BETWEEN_LOOKS = 50  # at the memory that is left
+SECOND_LOOK_S = 0.5  # later, as what others have just freed may still be counted
+
+
+class Flown(NamedTuple):
+    """What was flown, and how it ended."""
+
+    windows: list[WindowRecord]
+    code: int  # an exit code
+    ending: str  # why it ended early; empty if it did not
+
+
+def fly_swarm(
+    swarm: Swarm, policy: Policy, recorder: Recorder | None, bar: WorkBar, *, way_on: str | None
+) -> Flown:
+    """Flies a swarm's missions.
+
+    Args:
+        swarm: At the start of its missions.
+        policy: Who addresses whom.
+        recorder: Takes each window, if there is one.
+        bar: Shows how far it is.
+        way_on: Said to who would fly on when memory runs short; None does so without a look.
+
+    Raises:
+        ValueError: As `rollout` does.
+        MemoryError: Memory did not suffice for one window.
+    """
+    flown: list[WindowRecord] = []
+    with suppress(MemoryError), memory_errors(), deferred_interrupt() as is_interrupted, bar:
+        for window in rollout(swarm, policy):
+            if recorder:
+                recorder.add(window)
+            flown.append(window)
+            bar.text = f"age {float(window.costs.age_windows[0]):.1f}"
+            bar.advance()
+            if is_interrupted():
+                return Flown(flown, INTERRUPTED, "Interrupted")
+            is_time = way_on is not None and len(flown) % WINDOWS_BETWEEN_LOOKS == 0
+            if recorder and is_time and (short := _shortage(swarm.mission, len(flown), recorder)):
+                return Flown(flown, FAILED, f"Memory ran short ({short}{way_on})")
+        return Flown(flown, DONE, "")
+    if not flown:
+        raise MemoryError
+    return Flown(flown, FAILED, "Out of memory")
+
+
+def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | None:
+    """What to say if memory does not suffice to write what was flown, at a second look either."""
+    needed = replay_memory(mission, num_windows) - recorder.num_bytes
+    if free_memory() >= needed:
+        return None
+    gc.collect()
+    time.sleep(SECOND_LOOK_S)
+    if (free := free_memory()) >= needed:
+        return None
+    return f"{in_gb(free)} are free, writing the replay takes {in_gb(needed)}"
