@@ -7,10 +7,13 @@ from numbers import Integral
 import numpy as np
 from jaxtyping import Float, Int
 
-from swarm_mj.control.motion import initial_velocity, motion_of
+from swarm_mj.control.controller import Controller
+from swarm_mj.control.motion import controller_of, initial_velocity
 from swarm_mj.mission import Mission
+from swarm_mj.mission.batched_rng import Started
 from swarm_mj.mission.placement import connected_positions
 from swarm_mj.mission.robot_failures import draw_survivors, failure_window
+from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
@@ -36,6 +39,8 @@ class Swarm:
         seeds: Sequence[int],
         *,
         channel: Channel | None = None,
+        controller: Controller | None = None,
+        scene: Scene | None = None,
         num_threads: int = 1,
     ) -> None:
         """Places the robots and starts all missions.
@@ -44,15 +49,21 @@ class Swarm:
             mission: The numbers of every mission.
             seeds: One per mission; its length is B.
             channel: Who decodes whom; the mission's `FreeSpaceRadio` unless given.
+            controller: What drives the robots; that of the mission's task unless given.
+            scene: What changes the arena before it is compiled; nothing unless given. All missions
+                stand in the same arena.
             num_threads: MuJoCo's own.
 
         Raises:
-            ValueError: No seed, a negative one, or no connected team could be drawn.
+            ValueError: No seed, a negative one, no connected team could be drawn, or the scene
+                changed the robots.
         """
         _check_seeds(seeds)
         self.mission = mission
         self.channel = radio_of(mission) if channel is None else channel
-        self._physics = Physics(mission, len(seeds), num_threads=num_threads)
+        self.controller = controller_of(mission) if controller is None else controller
+        self.scene = scene
+        self._physics = Physics(mission, len(seeds), scene=scene, num_threads=num_threads)
         self._num_missions = len(seeds)
         self.restart(seeds)
 
@@ -66,7 +77,8 @@ class Swarm:
             ValueError: Not as many seeds, a negative one, or no connected team could be drawn.
         """
         _check_seeds(seeds, self._num_missions)
-        placement, motion, policy, outage = zip(*(_streams(seed) for seed in seeds), strict=True)
+        streams = zip(*(_streams(seed) for seed in seeds), strict=True)
+        placement, motion, policy, outage, channel = streams
         mission = self.mission
         position_m = [
             connected_positions(mission.num_robots, mission.half_side_m, mission.range_m, rng)
@@ -74,7 +86,9 @@ class Swarm:
         ]
         velocity_mps = [initial_velocity(mission, rng) for rng in placement]
         self._physics.place(np.stack(position_m), np.stack(velocity_mps))
-        self._motion = motion_of(mission, motion)
+        for part, rngs in ((self.controller, motion), (self.channel, channel)):
+            if isinstance(part, Started):
+                part.start(mission.num_robots, rngs)
         self._policy_rngs = policy
         self._survivors = draw_survivors(mission, outage)
         self.now = np.zeros(len(seeds))  # t [windows]
@@ -116,8 +130,9 @@ class Swarm:
         raise TypeError("a policy must be a DecentralisedPolicy or a CentralisedPolicy")
 
     def move(self) -> RobotStates:
-        """Moves the robots through one window, by their motion and the physics."""
-        return self._physics.step(self._motion(self.buffers, self.states))
+        """Moves the robots through one window, by their controller and the physics."""
+        wanted_mps2 = self.controller(self._read_only, self.states)
+        return self._physics.step(np.asarray(wanted_mps2, dtype=np.float64))
 
     def step(self, policy: Policy) -> WindowCosts:
         """One window: the policy decides, the robots move, then they talk."""
@@ -181,5 +196,8 @@ def _check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
 
 
 def _streams(seed: int) -> list[np.random.Generator]:
-    """Placement, motion, policy and outages draw apart, so policies meet equal missions."""
-    return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)]
+    """Placement, motion, policy, outages and channel draw apart, so policies meet equal missions.
+
+    Only add to the end: a stream's place is what it draws from.
+    """
+    return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(5)]

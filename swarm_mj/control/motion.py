@@ -1,41 +1,24 @@
 """What the robots do (IV-A): stand still, walk at random, or flock on what they have heard."""
 
 from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.compiled import compiled
+from swarm_mj.control.controller import Controller
 from swarm_mj.mission import FlockingSet, Mission
 from swarm_mj.mission.batched_rng import Stream, normal
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import NEVER, Buffers
 
 
-@runtime_checkable
-class Motion(Protocol):
-    """What the robots' controllers want in the next window."""
-
-    def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N 2"]:
-        """The accelerations u [m/s²]; row [b, i] may use buffer and body [b, i] only."""
-        ...
-
-
-def motion_of(mission: Mission, rngs: Sequence[np.random.Generator]) -> Motion:
-    """The motion of a mission's task.
-
-    Args:
-        mission: Its task and bounds.
-        rngs: One generator per mission side by side.
-
-    Returns:
-        The motion.
-    """
+def controller_of(mission: Mission) -> Controller:
+    """The controller of a mission's task, to be started if it is `Started`."""
     if mission.task == "stationary":
         return stand
     if mission.task == "random-walk":
-        return RandomWalk(mission, rngs)
+        return RandomWalk(mission)
     return Flocking(mission)
 
 
@@ -55,9 +38,12 @@ def stand(_buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N 2"]:
 class RandomWalk:
     """u ~ N(0, A_max / 3), a standard deviation per axis, clipped to plus or minus A_max (IV-A)."""
 
-    def __init__(self, mission: Mission, rngs: Sequence[np.random.Generator]) -> None:
+    def __init__(self, mission: Mission) -> None:
         self._limit_mps2 = mission.max_acceleration_mps2
-        self._stream = Stream(rngs, normal, (mission.num_robots, 2))
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Gives every robot its own stream of numbers; arguments as in `Started.start`."""
+        self._stream = Stream(rngs, normal, (num_robots, 2))
 
     def __call__(self, _buffers: Buffers, _states: RobotStates) -> Float[np.ndarray, "B N 2"]:
         """The next accelerations [m/s²]."""

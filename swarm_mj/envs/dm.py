@@ -15,25 +15,35 @@ from dm_control.rl import control
 from dm_env import specs
 from jaxtyping import Int
 
+from swarm_mj.control.controller import Controller
 from swarm_mj.mission import Mission
-from swarm_mj.physics.scene import compose
+from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.protocol.buffers import check_robots
 from swarm_mj.protocol.costs import age_of_information
+from swarm_mj.radio.free_space import Channel
 from swarm_mj.swarm import Swarm
 
 _Task: Any = control.Task  # untyped: pyright reads its abstract methods as returning None
 
 
-def make_environment(mission: Mission, seed: int = 0) -> control.Environment:
+def make_environment(
+    mission: Mission,
+    seed: int = 0,
+    *,
+    channel: Channel | None = None,
+    controller: Controller | None = None,
+    scene: Scene | None = None,
+) -> control.Environment:
     """One mission as an environment of dm_control, and so of dm_env.
 
     A step is a window, an episode is a mission: the first one with the seed given, the next one
-    with `seed + 1`, and so on.
+    with `seed + 1`, and so on. The parts are those of `Swarm`.
 
     Raises:
         ValueError: The seed is negative, or no connected team could be drawn.
     """
-    return control.Environment(SwarmPhysics(mission, seed), SwarmTask(seed))
+    swarm = Swarm(mission, [seed], channel=channel, controller=controller, scene=scene)
+    return control.Environment(SwarmPhysics(swarm, seed), SwarmTask(seed))
 
 
 class SwarmPhysics(mujoco.Physics):
@@ -42,10 +52,11 @@ class SwarmPhysics(mujoco.Physics):
     Its qpos and qvel are p and v of Eq. 15. A copy of it is a still, to be looked at only.
     """
 
-    def __init__(self, mission: Mission, seed: int) -> None:
-        """Compiles the scene and starts a mission with these numbers and this seed."""
-        super().__init__(wrapper.MjData(wrapper.MjModel(compose(mission).compile())))
-        self.swarm = Swarm(mission, [seed])
+    def __init__(self, swarm: Swarm, seed: int) -> None:
+        """Compiles the scene of a swarm and starts a mission with this seed."""
+        model = compose(swarm.mission, scene=swarm.scene).compile()
+        super().__init__(wrapper.MjData(wrapper.MjModel(model)))
+        self.swarm = swarm
         self.restart(seed)
 
     def restart(self, seed: int) -> None:

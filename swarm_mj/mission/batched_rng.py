@@ -1,6 +1,7 @@
 """Random numbers drawn ahead: one stream per mission, so that batches do not change a mission."""
 
 from collections.abc import Callable, Sequence
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -10,6 +11,21 @@ BLOCK = 64  # draws made at once: enough to make the loop over missions cheap
 Draw = Callable[[np.random.Generator, tuple[int, ...]], np.ndarray]
 uniform: Draw = np.random.Generator.random  # on [0, 1)
 normal: Draw = np.random.Generator.standard_normal
+
+
+@runtime_checkable
+class Started(Protocol):
+    """A part of the swarm that draws or remembers, and so is told when missions begin."""
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator], /) -> None:
+        """Forgets earlier missions.
+
+        Args:
+            num_robots: N.
+            rngs: One generator per mission, the part's own; whoever draws for mission b from the
+                b-th alone gives a mission the same course whatever missions stand beside it.
+        """
+        ...
 
 
 class Stream:

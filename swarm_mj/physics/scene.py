@@ -1,12 +1,16 @@
 """The scene: the arena and N robots, composed from the MJCF files in `assets/`."""
 
 import math
+from collections.abc import Callable
 
+from mujoco._enums import mjtDisableBit
 from mujoco._specs import MjSpec
 
 from swarm_mj.io.assets import asset
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 from swarm_mj.physics.state import RobotStates
+
+Scene = Callable[[MjSpec, Mission], None]  # changes the arena before it is compiled
 
 CONTACT_STEP_S = 0.01  # longest step of the `contact` physics: ten per window of 100 ms
 ROBOT_RADIUS_M = 0.5  # assets/robot.xml
@@ -39,7 +43,9 @@ def num_substeps(mission: Mission) -> int:
     return math.ceil(mission.window_s / longest_s - 1e-9)
 
 
-def compose(mission: Mission, start: RobotStates | None = None) -> MjSpec:
+def compose(
+    mission: Mission, start: RobotStates | None = None, *, scene: Scene | None = None
+) -> MjSpec:
     """The arena at the mission's size with its N robots, ready to compile.
 
     Args:
@@ -47,9 +53,14 @@ def compose(mission: Mission, start: RobotStates | None = None) -> MjSpec:
         start: Where the robots of the first mission stand and how fast they are when a viewer
             opens the model, for a file that is to be looked at. Without it, all stand at the
             origin until `Physics.place` puts them elsewhere.
+        scene: Changes the arena, which then holds the robots. What it adds stops robots in
+            `contact` physics only; `exact` physics knows no collisions, so there it is only seen.
 
     Returns:
         The editable model; with a start, also its keyframe `start`.
+
+    Raises:
+        ValueError: The scene added, took away or renamed joints or actuators.
     """
     spec = MjSpec.from_file(str(asset("arena.xml")))
     spec.option.timestep = timestep_s(mission)
@@ -60,9 +71,34 @@ def compose(mission: Mission, start: RobotStates | None = None) -> MjSpec:
     for i in range(mission.num_robots):
         frame = spec.worldbody.add_frame(pos=[0.0, 0.0, 1.0])
         spec.attach(robot.copy(), frame=frame, prefix=f"r{i}/")
+    if scene is not None:
+        _change(spec, mission, scene)
     if start is not None:
         _place_robots(spec, mission, start)
     return spec
+
+
+def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
+    """Lets a scene change the arena, but neither how the robots move nor how time is cut."""
+    before = _movable(spec)
+    scene(spec, mission)
+    if _movable(spec) != before:
+        raise ValueError(
+            "a scene may add bodies, geoms and sites, but no joints or actuators, and must leave "
+            "the robots' own"
+        )
+    spec.option.timestep = timestep_s(mission)
+    if mission.physics == "exact":
+        spec.option.disableflags |= int(mjtDisableBit.mjDSBL_CONTACT)
+        return
+    spec.option.disableflags &= ~int(mjtDisableBit.mjDSBL_CONTACT)
+    for i in range(mission.num_robots):
+        spec.geom(f"r{i}/hull").conaffinity = 1  # it meets what the scene adds, but no robot
+
+
+def _movable(spec: MjSpec) -> list[str]:
+    """What moves, in MuJoCo's order."""
+    return [part.name for part in (*spec.joints, *spec.actuators)]
 
 
 def _place_robots(spec: MjSpec, mission: Mission, start: RobotStates) -> None:

@@ -16,7 +16,7 @@ from mujoco import batch
 
 from swarm_mj.compiled import compiled
 from swarm_mj.mission import Mission
-from swarm_mj.physics.scene import ROBOT_MASS_KG, compose, num_substeps, timestep_s
+from swarm_mj.physics.scene import ROBOT_MASS_KG, Scene, compose, num_substeps, timestep_s
 from swarm_mj.physics.state import RobotStates
 
 OPEN, MIRROR, CLIP = 0, 1, 2  # what happens at the boundary
@@ -25,16 +25,24 @@ OPEN, MIRROR, CLIP = 0, 1, 2  # what happens at the boundary
 class Physics:
     """B MuJoCo worlds of N robots."""
 
-    def __init__(self, mission: Mission, num_missions: int, *, num_threads: int = 1) -> None:
+    def __init__(
+        self,
+        mission: Mission,
+        num_missions: int,
+        *,
+        scene: Scene | None = None,
+        num_threads: int = 1,
+    ) -> None:
         """Compiles the scene and makes the worlds.
 
         Args:
             mission: The scene, its bounds and the physics mode.
             num_missions: B.
+            scene: What changes the arena, as in `compose`.
             num_threads: MuJoCo's own; 1 is fastest when the other cores are busy.
         """
         self._mission = mission
-        self._model = compose(mission).compile()
+        self._model = compose(mission, scene=scene).compile()
         self._batch = batch.Batch(self._model, num_missions, num_threads)
         shape = (num_missions, mission.num_robots, 2)
         self._qpos = self._batch.bind("qpos").reshape(shape)

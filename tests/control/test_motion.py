@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from swarm_mj.control.motion import RandomWalk, flocking, initial_velocity, motion_of
+from swarm_mj.control.motion import RandomWalk, controller_of, flocking, initial_velocity
 from swarm_mj.mission import paper, reference
+from swarm_mj.mission.batched_rng import Started
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import empty_buffers
 
@@ -18,6 +19,14 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 def generators(num_missions, seed=0):
     return [np.random.default_rng((seed, b)) for b in range(num_missions)]
+
+
+def started(mission, num_missions):
+    """The controller of a mission's task, ready."""
+    controller = controller_of(mission)
+    if isinstance(controller, Started):
+        controller.start(mission.num_robots, generators(num_missions))
+    return controller
 
 
 def overheard_team(seed, num_missions=2, num_robots=5):
@@ -37,7 +46,8 @@ def bodies_of(velocity_mps):
 
 def walked(mission, num_missions, num_windows, seed=0):
     """A random walk's accelerations [window, mission, robot, axis]."""
-    walk = RandomWalk(mission, generators(num_missions, seed))
+    walk = RandomWalk(mission)
+    walk.start(mission.num_robots, generators(num_missions, seed))
     shape = (num_missions, mission.num_robots, 2)
     buffers = empty_buffers(num_missions, mission.num_robots)
     return np.stack([walk(buffers, bodies_of(np.zeros(shape))) for _ in range(num_windows)])
@@ -152,7 +162,7 @@ def test_flocking_is_clipped(preset):
     buffers.timestamp[...] = 1.0
     buffers.velocity_mps[0, :, 1] = [1000.0, -1000.0]
     buffers.velocity_mps[0, :, 0] = 1e-9
-    u = motion_of(mission, generators(1))(buffers, bodies_of(np.zeros((1, 2, 2))))
+    u = started(mission, 1)(buffers, bodies_of(np.zeros((1, 2, 2))))
     np.testing.assert_array_equal(u[0], [[limit, -limit]] * 2)
 
 
@@ -161,14 +171,14 @@ def test_flocking_set_is_the_presets(preset, counts_unheard):
     """A velocity without a timestamp counts in the authors' code only."""
     buffers = empty_buffers(1, 2)
     buffers.velocity_mps[...] = 1.0
-    controller = motion_of(preset("flocking", num_robots=2), generators(1))
+    controller = started(preset("flocking", num_robots=2), 1)
     u = controller(buffers, bodies_of(np.zeros((1, 2, 2))))
     np.testing.assert_array_equal(u, 1.0 if counts_unheard else 0.0)
 
 
 def test_stationary_robots_do_not_accelerate():
     buffers, velocity_mps = overheard_team(0)
-    stand = motion_of(paper("stationary", num_robots=5), generators(2))
+    stand = started(paper("stationary", num_robots=5), 2)
     np.testing.assert_array_equal(stand(buffers, bodies_of(velocity_mps)), np.zeros((2, 5, 2)))
 
 
@@ -179,14 +189,14 @@ def test_iv_a_a_controller_knows_its_own_robot_only(task, preset):
     mission = preset(task, num_robots=5)
     mine, mine_mps = overheard_team(1)
     theirs, theirs_mps = overheard_team(2)
-    before = motion_of(mission, generators(2))(mine, bodies_of(mine_mps))
+    before = started(mission, 2)(mine, bodies_of(mine_mps))
     for array, other in (
         (mine.timestamp, theirs.timestamp),
         (mine.velocity_mps, theirs.velocity_mps),
         (mine_mps, theirs_mps),
     ):
         array[:, [0, 1, 3, 4]] = other[:, [0, 1, 3, 4]]
-    after = motion_of(mission, generators(2))(mine, bodies_of(mine_mps))
+    after = started(mission, 2)(mine, bodies_of(mine_mps))
     np.testing.assert_array_equal(before[:, 2], after[:, 2])
 
 

@@ -233,3 +233,33 @@ def test_steps_fill_the_window(window_s, steps):
     contact = paper(window_s=window_s, physics="contact")
     assert num_substeps(contact) == steps
     assert steps * timestep_s(contact) == pytest.approx(window_s)
+
+
+def test_a_scene_is_part_of_the_model_and_of_the_file():
+    def pillar(spec, mission):
+        size = [mission.side_m / 100.0, 3.0, 0.0]
+        spec.worldbody.add_geom(name="pillar", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size)
+
+    mission = paper(num_robots=3)
+    assert compose(mission).geom("pillar") is None
+    spec = compose(mission, scene=pillar)
+    assert spec.compile().geom("pillar").size[0] == mission.side_m / 100.0
+    assert 'name="pillar"' in spec.to_xml()
+
+
+def test_a_scene_may_not_add_what_moves():
+    def ball(spec, _mission):
+        spec.worldbody.add_body(name="ball").add_freejoint(name="rolls")
+
+    with pytest.raises(ValueError, match="no joints or actuators"):
+        compose(paper(num_robots=3), scene=ball)
+
+
+def test_a_scene_changes_neither_the_time_nor_exact_physics():
+    def careless(spec, _mission):
+        spec.option.timestep = 1.0
+        spec.option.disableflags = 0
+
+    spec = compose(paper(num_robots=3), scene=careless)
+    assert spec.option.timestep == pytest.approx(0.1)
+    assert spec.option.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from mujoco import mjtGeom
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.physics.state import RobotStates
@@ -277,3 +278,35 @@ def test_eq15_contact_deviation_is_bounded_until_the_first_wall(ratio):
         assert np.abs(body.position_m - p)[is_untouched].max(initial=0.0) <= limit_m + 1e-9
         num_compared += is_untouched.sum()
     assert num_compared > 1000
+
+
+def wall_across(spec, _mission):
+    spec.worldbody.add_geom(name="across", type=mjtGeom.mjGEOM_BOX, size=[5.0, 500.0, 5.0])
+
+
+@pytest.mark.parametrize(("physics", "is_stopped"), [("exact", False), ("contact", True)])
+def test_what_a_scene_adds_stops_robots_in_contact_physics_only(physics, is_stopped):
+    """A wall 10 m thick through the middle; robots of 0.5 m start 20 m west of it at 3 m/s."""
+    mission = paper("random-walk", num_robots=2, physics=physics)
+    worlds = Physics(mission, 1, scene=wall_across)
+    worlds.place(np.array([[[-25.0, 0.0], [-25.0, 50.0]]]), np.array([[[3.0, 0.0]] * 2]))
+    for _ in range(200):  # 60 m if nothing stops them
+        states = worlds.step(np.array([[[20.0, 0.0]] * 2]))
+    expected = -5.0 - 0.5 if is_stopped else 35.0
+    np.testing.assert_allclose(states.position_m[0, :, 0], expected, atol=0.1)
+
+
+def test_robots_meet_what_a_scene_adds_but_no_other_robot():
+    """Two robots drive through each other, with and without a scene, on the same ways."""
+    mission = paper("random-walk", num_robots=2, physics="contact")
+    ends = []
+    for scene in (None, wall_across):
+        worlds = Physics(mission, 1, scene=scene)
+        worlds.place(
+            np.array([[[100.0, 0.0], [106.0, 0.0]]]), np.array([[[3.0, 0.0], [-3.0, 0.0]]])
+        )
+        for _ in range(20):
+            states = worlds.step(np.zeros((1, 2, 2)))
+        ends.append(states.position_m)
+    np.testing.assert_array_equal(*ends)
+    np.testing.assert_allclose(ends[0][0, :, 0], [106.0, 100.0], atol=1e-6)
