@@ -4,7 +4,9 @@ A dataclass of such fields is the settings, their documentation and, in `cli.opt
 line at once.
 """
 
+from collections.abc import Iterable
 from dataclasses import MISSING, Field, field, fields
+from difflib import get_close_matches
 from numbers import Integral, Real
 from types import NoneType
 from typing import Any, Literal, get_args, get_origin
@@ -73,13 +75,22 @@ def as_typed(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
+def did_you_mean(typed: object, known: Iterable[str]) -> str:
+    """The end of a complaint about an unknown name: the known one most like it, or nothing."""
+    names = {name.lstrip("-"): name for name in known}  # flags are not alike for their dashes
+    likely = get_close_matches(str(typed).lstrip("-"), names, n=1)
+    return f"; did you mean {names[likely[0]]}?" if likely else ""
+
+
 def check_value(spec: Field[Any], value: Any) -> None:  # noqa: ANN401 - any field's value
     """As `check`, for one value of a field."""
     allowed = spec.metadata
     label = allowed.get("label", spec.name)
     kind, described = KINDS.get(kind_of(spec), (object, ""))
     if "choices" in allowed and value not in allowed["choices"]:
-        raise ValueError(f"{label} must be one of {', '.join(allowed['choices'])}, not {value!r}")
+        known = allowed["choices"]
+        hint = did_you_mean(value, known)
+        raise ValueError(f"{label} must be one of {', '.join(known)}, not {value!r}{hint}")
     is_number = not isinstance(value, bool)  # Python's True is 1
     is_allowed = isinstance(value, kind) and (is_number or kind in (bool, object))
     limits = ""
