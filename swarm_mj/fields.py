@@ -77,9 +77,38 @@ def as_typed(value: object) -> str:
 
 def did_you_mean(typed: object, known: Iterable[str]) -> str:
     """The end of a complaint about an unknown name: the known one most like it, or nothing."""
-    names = {name.lstrip("-"): name for name in known}  # flags are not alike for their dashes
-    likely = get_close_matches(str(typed).lstrip("-"), names, n=1)
-    return f"; did you mean {names[likely[0]]}?" if likely else ""
+    likely = get_close_matches(str(typed), list(known), n=1)
+    return f"; did you mean {likely[0]}?" if likely else ""
+
+
+def check_names(what: str, given: Iterable[str], known: Iterable[str]) -> None:
+    """Passes if all keywords given are known; raises TypeError, as Python does, if one is not."""
+    known = list(known)
+    for name in given:
+        if name not in known:
+            hint = did_you_mean(name, known) or f"; it has {', '.join(known)}"
+            raise TypeError(f"{what} has no {name!r}{hint}")
+
+
+def check_kind(what: str, value: object, kind: type[Any], such_as: str) -> None:
+    """Passes if an argument is of the kind; raises TypeError, naming one that is, if not."""
+    if not isinstance(value, kind):
+        raise TypeError(
+            f"{what} must be of the type {kind.__name__}, such as {such_as}, not {_shown(value)}"
+        )
+
+
+def check_callable(what: str, value: object) -> None:
+    """Passes if an argument is None or can be called; raises TypeError if not, or for a class."""
+    if value is not None and (isinstance(value, type) or not callable(value)):
+        raise TypeError(f"{what} must be a function, or an object like one, not {_shown(value)}")
+
+
+def _shown(value: object) -> str:
+    """A wrong argument, and what to do about a class in place of its object."""
+    if isinstance(value, type):
+        return f"the class {value.__name__}; make an object of it, {value.__name__}(...)"
+    return f"{value!r:.80}"
 
 
 def check_value(spec: Field[Any], value: Any) -> None:  # noqa: ANN401 - any field's value
@@ -98,4 +127,5 @@ def check_value(spec: Field[Any], value: Any) -> None:  # noqa: ANN401 - any fie
         is_allowed = is_allowed and allowed["low"] <= value <= allowed["high"]
         limits = f" from {range_of(spec)}"
     if not is_allowed:
-        raise ValueError(f"{label} must be {described}{limits}, not {value}")
+        shown = repr(value) if isinstance(value, str) else value
+        raise ValueError(f"{label} must be {described}{limits}, not {shown}")

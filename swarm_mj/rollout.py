@@ -1,11 +1,12 @@
 """A flight: a policy on a swarm from the first window to the last, and what it cost."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
+from swarm_mj.fields import check_kind
 from swarm_mj.policies.policy import Policy
 from swarm_mj.protocol.costs import WindowCosts, mean_hops
 from swarm_mj.swarm import Swarm
@@ -56,7 +57,9 @@ def rollout(swarm: Swarm, policy: Policy) -> Iterator[WindowRecord]:
 
     Raises:
         ValueError: The swarm has flown already.
+        TypeError: The swarm or the policy is none.
     """
+    check_kind("swarm", swarm, Swarm, "Swarm(mission, [1])")
     if np.any(swarm.now > 0):
         raise ValueError(f"the swarm has flown {swarm.now[0]:g} windows already; restart it first")
     swarm.start(policy)
@@ -65,11 +68,11 @@ def rollout(swarm: Swarm, policy: Policy) -> Iterator[WindowRecord]:
         yield WindowRecord(costs=costs, hops=mean_hops(swarm.buffers, swarm.states.is_active))
 
 
-def summarise(flown: Sequence[WindowRecord]) -> Summary:
+def summarise(flown: Iterable[WindowRecord]) -> Summary:
     """The costs of the windows flown.
 
     Args:
-        flown: One or more windows, in order.
+        flown: One or more windows, in order; `rollout` itself will do.
 
     Returns:
         Means and totals, per mission.
@@ -77,6 +80,7 @@ def summarise(flown: Sequence[WindowRecord]) -> Summary:
     Raises:
         ValueError: No window was flown.
     """
+    flown = list(flown)
     if not flown:
         raise ValueError("a summary needs at least 1 window flown, not 0")
     variance = [window.costs.velocity_variance_m2ps2 for window in flown]

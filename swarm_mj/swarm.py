@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 
 from swarm_mj.control.controller import Controller
 from swarm_mj.control.motion import controller_of, initial_velocity
+from swarm_mj.fields import check_callable, check_kind
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.mission.placement import connected_positions
@@ -24,6 +25,7 @@ from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, RequestResponse, Windo
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.radio.mission_radio import radio_of
 
+MAX_THREADS = 1024
 MAX_SEED = 2**63 - 1  # the largest that a replay's properties keep
 
 
@@ -57,8 +59,16 @@ class Swarm:
         Raises:
             ValueError: No seed, a negative one, no connected team could be drawn, or the scene
                 changed the robots.
+            TypeError: The mission is none, or a part of one's own cannot be called.
         """
+        check_kind("mission", mission, Mission, 'paper("flocking")')
+        parts = {"channel": channel, "controller": controller, "scene": scene}
+        for what, part in parts.items():
+            check_callable(what, part)
         _check_seeds(seeds)
+        if not isinstance(num_threads, Integral) or not 1 <= num_threads <= MAX_THREADS:
+            limits = f"from 1 to {MAX_THREADS}"
+            raise ValueError(f"num_threads must be a whole number {limits}, not {num_threads!r}")
         self.mission = mission
         self.channel = radio_of(mission) if channel is None else channel
         self.controller = controller_of(mission) if controller is None else controller
@@ -109,7 +119,12 @@ class Swarm:
         return LocalViews(buffers=self._read_only, now=self.now, phases=self.phases)
 
     def start(self, policy: Policy) -> None:
-        """Gives a policy the missions' random streams and lets it forget earlier missions."""
+        """Gives a policy the missions' random streams and lets it forget earlier missions.
+
+        Raises:
+            TypeError: It is no policy.
+        """
+        check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
         policy.start(self.mission.num_robots, self._policy_rngs)
         self._started = policy
 
@@ -135,7 +150,12 @@ class Swarm:
         return self._physics.step(np.asarray(wanted_mps2, dtype=np.float64))
 
     def step(self, policy: Policy) -> WindowCosts:
-        """One window: the policy decides, the robots move, then they talk."""
+        """One window: the policy decides, the robots move, then they talk.
+
+        Raises:
+            TypeError: It is no policy.
+        """
+        check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
         return self._play(policy.window(self.mission), lambda: self.decide(policy))
 
     def exchange(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
@@ -189,6 +209,8 @@ class Swarm:
 
 def _check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
     """Raises ValueError unless there are seeds, as many as expected, and none is negative."""
+    if not hasattr(seeds, "__len__") or isinstance(seeds, str | bytes):
+        raise ValueError(f"seeds must be a list, one per mission, such as [1], not {seeds!r}")
     is_whole = all(isinstance(seed, Integral) and 0 <= seed <= MAX_SEED for seed in seeds)
     if not is_whole or len(seeds) != (expected or max(1, len(seeds))):
         count = "one or more" if expected is None else str(expected)

@@ -33,13 +33,12 @@ def test_sound_values_pass():
     [
         ({"litres": 3.1}, "volume must be a number from 0.1 to 3 [l], not 3.1"),
         ({"litres": float("nan")}, "volume must be a number from 0.1 to 3 [l], not nan"),
-        ({"litres": "1"}, "volume must be a number from 0.1 to 3 [l], not 1"),
+        ({"litres": "1"}, "volume must be a number from 0.1 to 3 [l], not '1'"),
         ({"litres": None}, "volume must be a number from 0.1 to 3 [l], not None"),
         ({"cups": (1, 7)}, "cups must be a whole number from 1 to 6, not 7"),
         ({"cups": (1.0,)}, "cups must be a whole number from 1 to 6, not 1.0"),
         ({"minutes": -1}, "minutes must be a whole number from 0 to 60, not -1"),
         ({"colour": "pink"}, "colour must be one of red, blue, not 'pink'"),
-        ({"colour": "bleu"}, "colour must be one of red, blue, not 'bleu'; did you mean blue?"),
         ({"is_on": 1}, "is_on must be True or False, not 1"),
     ],
 )

@@ -12,7 +12,7 @@ from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.protocol.buffers import empty_buffers, merge, record_attempt
 from swarm_mj.protocol.costs import mean_hops
-from swarm_mj.rollout import rollout
+from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
 NOW = np.ones(2)
@@ -152,3 +152,58 @@ def test_fast_robots_leave_the_area_by_no_more_than_their_radius(velocity_ratio,
         states = worlds.step(rng.normal(0.0, 20.0, (4, 5, 2)))
         worst = max(worst, float(np.max(np.abs(states.position_m))))
     assert limit < worst <= limit + 0.5
+
+
+# Arguments of another kind, which the checks of types in these tests would refuse in their words.
+OF_ANOTHER_KIND = {
+    "Mission(num_robot=3)": "Mission has no 'num_robot'; did you mean num_robots?",
+    "paper(robots=3)": "Mission has no 'robots'; ",
+    "reference('flok')": "'flok'; did you mean flocking?",
+    "paper(num_robots='20')": "number of robots must be a whole number from 2 to 1000 [robots], "
+    "not '20'",
+    "Swarm(mission, seeds=1)": "seeds must be a list, one per mission, such as [1], not 1",
+    "Swarm(mission, '12')": "seeds must be a list",
+    "Swarm('flocking', [1])": 'mission must be of the type Mission, such as paper("flocking")',
+    "Swarm(mission, [1], channel=3)": "channel must be a function, or an object like one, not 3",
+    "Swarm(mission, [1], controller=Tdma)": "not the class Tdma; make an object of it, Tdma(...)",
+    "Swarm(mission, [1], num_threads='2')": "num_threads must be a whole number from 1 to",
+    "Swarm(mission, [1]).restart(1)": "seeds must be a list",
+    "Swarm(mission, [1]).step('tdma')": 'policy must be of the type Policy, such as make_policy("',
+    "list(rollout(Swarm(mission, [1]), Tdma))": "not the class Tdma; make an object of it",
+    "list(rollout(mission, Tdma()))": "swarm must be of the type Swarm, such as Swarm(mission, [1]",
+    "make_policy('plannr', mission)": "not 'plannr'; did you mean planner?",
+    "make_policy(3, mission)": 'policy must be of the type str, such as "planner", not 3',
+    "make_policy('planner', 'flocking')": "mission must be of the type Mission",
+    "make_policy('aloha', mission, '0.3')": "probability must be from 0 to 1, not '0.3'",
+    "make_policy('tdma', mission, '0.3')": "tdma takes no transmission probability; leave out 0.3",
+}
+MISTAKES = f"""
+from swarm_mj.mission import Mission, paper, reference
+from swarm_mj.policies import make_policy
+from swarm_mj.policies.tdma import Tdma
+from swarm_mj.rollout import rollout, summarise
+from swarm_mj.swarm import Swarm
+mission = paper("stationary", num_robots=5, num_windows=5)
+for mistake, complaint in {OF_ANOTHER_KIND!r}.items():
+    try:
+        eval(mistake)
+    except (TypeError, ValueError) as error:
+        if complaint not in str(error) or "\\n" in str(error):
+            print(mistake, "->", error)
+    else:
+        print(mistake, "passed")
+"""
+
+
+def test_arguments_of_another_kind_are_refused_in_one_line(forks, tmp_path):
+    program = tmp_path / "mistakes.py"
+    program.write_text(MISTAKES)
+    done = forks.run(tmp_path, program)
+    assert (done.stdout, done.stderr) == ("", "")
+
+
+def test_a_flight_is_summarised_as_it_is_flown():
+    mission = small()
+    kept = summarise(list(rollout(Swarm(mission, [1, 2]), RandomFlooding(0.5))))
+    flown = summarise(rollout(Swarm(mission, [1, 2]), RandomFlooding(0.5)))
+    np.testing.assert_array_equal(flown.aoi_mean, kept.aoi_mean)

@@ -9,7 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
-from swarm_mj.fields import FieldOf, check, setting
+import numpy as np
+
+from swarm_mj.fields import FieldOf, check, check_names, setting
 
 Task = Literal["stationary", "random-walk", "flocking"]
 PhysicsMode = Literal["exact", "contact"]
@@ -48,6 +50,7 @@ class Mission:
 
     Raises:
         ValueError: A field is outside its range; the message names the value and the range.
+        TypeError: There is no such field; the message names the one most like it.
     """
 
     preset: str = _choice(
@@ -112,8 +115,16 @@ class Mission:
     tree_recomputed: bool = False  # IV-C; the code rebuilds the tree of a mobile team each window
     tree_root_transmits: bool = False  # IV-C; the code's root addresses the last robot
 
+    def __new__(cls, **given: Any) -> "Mission":
+        """Refuses unknown fields in our words; else as any class."""
+        check_names("Mission", given, cls.__dataclass_fields__)
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
         check(self)
+        for name, value in vars(self).items():
+            if isinstance(value, np.generic):  # which JSON does not know
+                object.__setattr__(self, name, value.item())
 
     @property
     def side_m(self) -> float:

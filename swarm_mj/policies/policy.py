@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from numbers import Real
 
 import numpy as np
 from jaxtyping import Bool, Int
@@ -17,13 +18,7 @@ Parameters = Mapping[str, bool | int | float | str]  # what a policy was made wi
 
 
 class Policy:
-    """Chooses whom every robot addresses next, and what a window looks like.
-
-    Attributes:
-        uses: What each robot decides by, or the centre, in a few words; empty if nobody said.
-    """
-
-    uses: str = ""
+    """Chooses whom every robot addresses next, and what a window looks like."""
 
     def window(self, mission: Mission) -> WindowProtocol:
         """What the robots do in a window: by Alg. 1 they request, and respond."""
@@ -114,8 +109,8 @@ class RandomTransmission(Policy):
         Raises:
             ValueError: The probability is not in [0, 1].
         """
-        if not 0.0 <= probability <= 1.0:
-            raise ValueError(f"transmission probability must be from 0 to 1, not {probability:g}")
+        if not isinstance(probability, Real) or not 0.0 <= float(probability) <= 1.0:
+            raise ValueError(f"transmission probability must be from 0 to 1, not {probability!r}")
         self._probability = probability
 
     @property

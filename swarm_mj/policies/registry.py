@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from swarm_mj.fields import check_kind, did_you_mean
 from swarm_mj.io.assets import asset
 from swarm_mj.mission import Mission
 from swarm_mj.policies.aloha import Aloha
@@ -136,7 +137,10 @@ def make_policy(
         ValueError: Unknown name, a directory without a sound policy, a probability that is out of
             range or not the policy's, or a policy that is not learned made deterministic.
         OSError: A learned policy cannot be read.
+        TypeError: The name or the mission is none.
     """
+    check_kind("policy", name, str, '"planner"')
+    check_kind("mission", mission, Mission, 'paper("flocking")')
     if is_learned(name):
         _refuse(probability, name)
         from swarm_mj.policies.stored import load_policy  # torch takes its time to import
@@ -146,7 +150,7 @@ def make_policy(
     if name not in RULES:
         raise ValueError(
             f"policy must be one of {', '.join(POLICIES)}, or a directory with a learned policy, "
-            f"not {name!r}"
+            f"not {name!r}{did_you_mean(name, POLICIES)}"
         )
     if is_deterministic:
         raise ValueError(f"{name} draws from no network's distribution; leave --deterministic out")
@@ -164,4 +168,4 @@ def _is_path(name: str) -> bool:
 def _refuse(probability: float | None, name: str) -> None:
     """Raises ValueError if a policy that has no probability is given one."""
     if probability is not None:
-        raise ValueError(f"{name} takes no transmission probability; leave out {probability:g}")
+        raise ValueError(f"{name} takes no transmission probability; leave out {probability}")

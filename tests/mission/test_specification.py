@@ -157,7 +157,7 @@ def test_values_outside_their_range_are_refused(spec, value):
     ],
 )
 def test_values_of_another_kind_are_refused(field, value, kind):
-    with pytest.raises(ValueError, match=f"must be {kind}.* not {value}"):
+    with pytest.raises(ValueError, match=f"must be {kind}.* not {value!r}"):
         Unchecked(**{field: value})
 
 
