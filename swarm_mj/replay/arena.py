@@ -9,12 +9,12 @@ from swarm_mj.replay import palette
 from swarm_mj.replay.frame import Frame
 from swarm_mj.replay.links import Links, ends, transmitters
 from swarm_mj.replay.sheet import Sheet
+from swarm_mj.replay.shots import LOST_SHARE
 
 SQUARE_M = 100.0
 MAX_SQUARES = 60  # across the ground; more would be too small to see
 TRAIL_WINDOWS = 150
 TRAIL_STRIDE = 15
-LOST_SHARE = 0.6  # a lost packet's arrow stops short of its receiver
 HEADING_SHARE = 0.06  # a heading's length, of half the map's width
 RING_SHARE = 0.014  # the radius of a ring around a believed position, likewise
 MIRROR = np.diag([1.0, -1.0, 1.0])  # rerun's 2D views have y down, the map has it up

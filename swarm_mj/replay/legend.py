@@ -7,10 +7,10 @@ import numpy as np
 import rerun as rr
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.arena import LOST_SHARE
 from swarm_mj.replay.layers import LAYERS, screen
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet
+from swarm_mj.replay.shots import LOST_SHARE
 
 WIDTH, HEIGHT = 100.0, 13.5  # of the view, in units of its own, y down
 LEFT, RAMP = 4.0, 31.0  # where the ramp of ages begins, and how long it is

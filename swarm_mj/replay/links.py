@@ -1,11 +1,32 @@
 """Packets of a log as lines between robots, sorted by window."""
 
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.replay.recorder import Log
+
+
+@runtime_checkable
+class Flown(Protocol):
+    """The packets of T windows: a log's, or a swarm's last ones."""
+
+    @property
+    def recipient(self) -> Int[np.ndarray, "T 2 N"]:
+        """S^i in both phases; itself: silent."""
+        ...
+
+    @property
+    def heard(self) -> Int[np.ndarray, "T 2 N"]:
+        """Whom robot j decoded in both phases; itself: nobody."""
+        ...
+
+    @property
+    def is_broadcast(self) -> bool:
+        """Whether packets have no addressee; otherwise the second phase answers the first."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,29 +44,29 @@ class Links:
         return np.bincount(self.row, minlength=self.num_windows)
 
 
-def fates(log: Log) -> dict[str, Links]:
+def fates(flown: Flown) -> dict[str, Links]:
     """Every packet by its fate.
 
     Addressed packets are delivered, lost, overheard, answered or unanswered. `lost` and
     `unanswered` ones end at the robot they were meant for, which did not decode them; a packet that
     k other robots overheard is k links. Broadcasts have no addressee: `heard` leads to each hearer.
     """
-    row, phase, hearer = np.nonzero(log.heard != np.arange(log.heard.shape[2]))
-    speaker = log.heard[row, phase, hearer]
+    row, phase, hearer = np.nonzero(flown.heard != np.arange(flown.heard.shape[2]))
+    speaker = flown.heard[row, phase, hearer]
     received = (row, speaker, hearer)
-    if log.is_broadcast:
-        return {"heard": _links(log, received, np.ones(len(row), dtype=bool))}
-    is_overheard = log.recipient[row, phase, speaker] != hearer
-    row, phase, sender = np.nonzero(_is_sent(log))
-    receiver = log.recipient[row, phase, sender]
-    is_decoded = log.heard[row, phase, receiver] == sender
+    if flown.is_broadcast:
+        return {"heard": _links(flown, received, np.ones(len(row), dtype=bool))}
+    is_overheard = flown.recipient[row, phase, speaker] != hearer
+    row, phase, sender = np.nonzero(_is_sent(flown))
+    receiver = flown.recipient[row, phase, sender]
+    is_decoded = flown.heard[row, phase, receiver] == sender
     sent, is_request = (row, sender, receiver), phase == 0
     return {
-        "delivered": _links(log, sent, is_request & is_decoded),
-        "lost": _links(log, sent, is_request & ~is_decoded),
-        "overheard": _links(log, received, is_overheard),
-        "answered": _links(log, sent, ~is_request & is_decoded),
-        "unanswered": _links(log, sent, ~is_request & ~is_decoded),
+        "delivered": _links(flown, sent, is_request & is_decoded),
+        "lost": _links(flown, sent, is_request & ~is_decoded),
+        "overheard": _links(flown, received, is_overheard),
+        "answered": _links(flown, sent, ~is_request & is_decoded),
+        "unanswered": _links(flown, sent, ~is_request & ~is_decoded),
     }
 
 
@@ -67,10 +88,10 @@ def ends(log: Log, links: Links) -> tuple[Float[np.ndarray, "L 2"], Float[np.nda
     return log.position_m[links.row, links.sender], log.position_m[links.row, links.receiver]
 
 
-def _is_sent(log: Log) -> Bool[np.ndarray, "T 2 N"]:
-    return log.recipient != np.arange(log.recipient.shape[2])
+def _is_sent(flown: Flown) -> Bool[np.ndarray, "T 2 N"]:
+    return flown.recipient != np.arange(flown.recipient.shape[2])
 
 
-def _links(log: Log, sent: tuple[np.ndarray, ...], chosen: np.ndarray) -> Links:
+def _links(flown: Flown, sent: tuple[np.ndarray, ...], chosen: np.ndarray) -> Links:
     row, sender, receiver = (column[chosen] for column in sent)
-    return Links(num_windows=len(log.window), row=row, sender=sender, receiver=receiver)
+    return Links(num_windows=len(flown.recipient), row=row, sender=sender, receiver=receiver)

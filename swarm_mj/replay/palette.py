@@ -62,6 +62,20 @@ def age_colours(
     return rgb.astype(np.uint8)
 
 
+def robot_colours(
+    age_windows: Float[np.ndarray, "*T N"],
+    full_scale: float,
+    is_known: Bool[np.ndarray, "*T N"],
+    is_on: Bool[np.ndarray, "*T N"],
+    ego: int,
+) -> UInt8[np.ndarray, "*T N 3"]:
+    """RGB of robots by the age of what the ego robot knows of them; it is white, dark ones off."""
+    colours = age_colours(age_windows, full_scale, is_known)
+    colours[..., ego, :] = EGO
+    colours[~is_on] = SWITCHED_OFF
+    return colours
+
+
 def nice_scale(age_windows: Float[np.ndarray, "..."]) -> float:
     """A round number of windows that 19 ages in 20 lie below."""
     return nice_top(max(1.0, float(np.percentile(age_windows, 95))))

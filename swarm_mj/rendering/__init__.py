@@ -1,0 +1,1 @@
+"""Pictures of the scene by MuJoCo's renderer, with or without a screen, and videos of them."""

@@ -1,0 +1,82 @@
+"""OpenGL without a screen: which of MuJoCo's back ends works here, and a context of it.
+
+MuJoCo settles on a back end when it is imported, and PyOpenGL when it is; both fail in many words
+where there is no driver. So a back end that may fail is tried in a process of its own first.
+"""
+
+import importlib
+import os
+import sys
+import tempfile
+from functools import cache
+from typing import Protocol, runtime_checkable
+
+from swarm_mj.io.processes import running
+
+CHOICE = "MUJOCO_GL"  # the variable by which people choose, and MuJoCo's renderer is told
+WITHOUT_SCREEN = ("egl", "osmesa")  # on Linux; EGL may have a graphics card, OSMesa never
+TRIAL = "from mujoco.egl import GLContext; GLContext(8, 8).make_current()"
+WAY_OUT = (
+    "rendering needs OpenGL; on Debian and Ubuntu, `apt-get install libosmesa6` draws without a "
+    "graphics card and a screen (`libegl1` with one)"
+)
+
+
+@runtime_checkable
+class Context(Protocol):
+    """What MuJoCo's back ends have in common."""
+
+    def make_current(self) -> None:
+        """Draws into this context from now on."""
+        ...
+
+    def free(self) -> None:
+        """Gives its memory back."""
+        ...
+
+
+def make_context(width: int, height: int) -> Context:
+    """A context to draw pictures of this size in.
+
+    Raises:
+        OSError: No OpenGL works here, or not the one that MUJOCO_GL names.
+    """
+    name = backend()
+    os.environ[CHOICE] = name  # MuJoCo's renderer reads it when it makes its first context
+    try:
+        return importlib.import_module(f"mujoco.{name}").GLContext(width, height)
+    except Exception as error:  # each back end has its own
+        raise OSError(f"{name} does not work here ({type(error).__name__}); {WAY_OUT}") from error
+
+
+def backend() -> str:
+    """The back end in use: the one that MUJOCO_GL names, or else the first that works here.
+
+    Raises:
+        OSError: MUJOCO_GL says that there is to be none.
+    """
+    chosen = os.environ.get(CHOICE, "").lower().strip()
+    if chosen in ("disable", "disabled", "off", "false", "0"):
+        raise OSError(f"{CHOICE}={chosen} switches rendering off; unset it")
+    if chosen in ("", "enable", "enabled", "on", "true", "1"):
+        return _default()
+    return "glfw" if chosen == "glx" else chosen
+
+
+@cache
+def _default() -> str:
+    if sys.platform == "darwin":
+        return "cgl"
+    preset = os.environ.get("PYOPENGL_PLATFORM", "").lower()  # of whoever has drawn already
+    if preset in WITHOUT_SCREEN:
+        return preset
+    return "egl" if _works(TRIAL) else "osmesa"
+
+
+def _works(trial: str) -> bool:
+    environment = {**os.environ, CHOICE: "egl"}
+    with (
+        tempfile.TemporaryFile("w+") as said,
+        running([sys.executable, "-c", trial], environment=environment, output=said) as child,
+    ):
+        return child.wait() == 0
