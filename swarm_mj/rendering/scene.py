@@ -4,20 +4,22 @@ import itertools
 
 import numpy as np
 from jaxtyping import Float, UInt8
-from mujoco._enums import mjtCamera, mjtCatBit, mjtFontScale, mjtFramebuffer, mjtGeom
+from mujoco._enums import mjtCamera, mjtCatBit, mjtFontScale, mjtFramebuffer, mjtGeom, mjtObj
 from mujoco._functions import (
     mj_camlight,
     mj_comPos,
     mj_kinematics,
+    mj_name2id,
     mjv_connector,
     mjv_initGeom,
     mjv_updateScene,
 )
 from mujoco._render import MjrContext, mjr_readPixels, mjr_render, mjr_setBuffer
+from mujoco._specs import MjSpec
 from mujoco._structs import MjData, MjModel, MjrRect, MjvCamera, MjvGeom, MjvOption, MjvScene
 
 from swarm_mj.mission import Mission
-from swarm_mj.physics.scene import compose
+from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.rendering.arcs import SEGMENTS, arcs
 from swarm_mj.rendering.camera import ELEVATION_DEG, FOV_Y_DEG, Camera, look_at
 from swarm_mj.rendering.contents import Contents
@@ -41,13 +43,16 @@ NO_TURN = np.eye(3).ravel()
 class SceneRenderer:
     """Draws pictures of one mission's scene, all of one size."""
 
-    def __init__(self, mission: Mission, width: int = 1280, height: int = 720) -> None:
+    def __init__(
+        self, mission: Mission, width: int = 1280, height: int = 720, *, scene: Scene | None = None
+    ) -> None:
         """Compiles the scene and starts OpenGL.
 
         Args:
             mission: Whose scene it is.
             width: Of the pictures [pixels].
             height: Of the pictures [pixels].
+            scene: What changes the arena, if anything does: `swarm.scene`.
 
         Raises:
             ValueError: The size is outside its range.
@@ -58,12 +63,12 @@ class SceneRenderer:
                 raise ValueError(f"{what} must be from 16 to {MAX_PIXELS} pixels, not {pixels}")
         self._width, self._height = width, height
         self._mission = mission
-        self._model = compose(mission).compile()
+        spec = compose(mission, scene=scene)
+        _prepare(spec, mission)
+        self._model = spec.compile()
         self._data = MjData(self._model)
+        self._floor = mj_name2id(self._model, mjtObj.mjOBJ_GEOM.value, "floor")
         _light(self._model, width, height)
-        self._model.mat("wall").rgba[3] = WALL_OPACITY
-        if not mission.has_walls:
-            _open_ground(self._model, mission.half_side_m)
         num_geoms = self._model.ngeom + mission.num_robots * (2 + 4 * SEGMENTS)
         self._scene = MjvScene(self._model, num_geoms)
         self._options = MjvOption()
@@ -121,9 +126,9 @@ class SceneRenderer:
         mj_kinematics(self._model, self._data)
         mj_comPos(self._model, self._data)
         mj_camlight(self._model, self._data)
-        if not self._mission.has_walls:
+        if not self._mission.has_walls and self._floor >= 0:
             whole_tiles_m = np.round(contents.centre_m / TILE_M) * TILE_M
-            self._data.geom("floor").xpos[:2] = whole_tiles_m
+            self._data.geom_xpos[self._floor, :2] = whole_tiles_m
 
     def _draw_robots(self, contents: Contents, camera: Camera) -> None:
         """A disc for each robot, as large on the picture whatever the area; and its heading."""
@@ -184,11 +189,20 @@ def _light(model: MjModel, width: int, height: int) -> None:
     model.light_dir[:] = (0.0, 0.0, -1.0)
 
 
-def _open_ground(model: MjModel, half_side_m: float) -> None:
-    """Widens the floor to all that a camera sees; where it is, so are its squares."""
-    half_m = float(np.ceil(GROUND * half_side_m / TILE_M) * TILE_M)
-    model.geom("floor").size[:] = (half_m, half_m, half_m / 10.0)  # drawn in 20 by 20 pieces
-    model.mat("floor").texrepeat[:] = 2.0 * half_m / TILE_M
+def _prepare(spec: MjSpec, mission: Mission) -> None:
+    """Makes walls translucent, and an open area's floor as wide as a camera sees.
+
+    A scene of one's own may have neither.
+    """
+    half_m = float(np.ceil(GROUND * mission.half_side_m / TILE_M) * TILE_M)
+    for material in spec.materials:
+        if material.name == "wall":
+            material.rgba[3] = WALL_OPACITY
+        elif material.name == "floor" and not mission.has_walls:
+            material.texrepeat = [2.0 * half_m / TILE_M] * 2
+    for geom in spec.geoms:
+        if geom.name == "floor" and not mission.has_walls:
+            geom.size = [half_m, half_m, half_m / 10.0]  # drawn in 20 by 20 pieces
 
 
 def _free_camera(camera: Camera) -> MjvCamera:
