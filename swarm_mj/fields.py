@@ -77,8 +77,9 @@ def as_typed(value: object) -> str:
 
 def did_you_mean(typed: object, known: Iterable[str]) -> str:
     """The end of a complaint about an unknown name: the known one most like it, or nothing."""
-    likely = get_close_matches(str(typed), list(known), n=1)
-    return f"; did you mean {likely[0]}?" if likely else ""
+    names = {name.lstrip("-"): name for name in known}  # flags are not alike for their dashes
+    likely = get_close_matches(str(typed).lstrip("-"), names, n=1)
+    return f"; did you mean {names[likely[0]]}?" if likely else ""
 
 
 def check_names(what: str, given: Iterable[str], known: Iterable[str]) -> None:

@@ -39,6 +39,7 @@ def test_sound_values_pass():
         ({"cups": (1.0,)}, "cups must be a whole number from 1 to 6, not 1.0"),
         ({"minutes": -1}, "minutes must be a whole number from 0 to 60, not -1"),
         ({"colour": "pink"}, "colour must be one of red, blue, not 'pink'"),
+        ({"colour": "bleu"}, "colour must be one of red, blue, not 'bleu'; did you mean blue?"),
         ({"is_on": 1}, "is_on must be True or False, not 1"),
     ],
 )

@@ -1,6 +1,6 @@
 """The command line, one file per command.
 
-`swarm-mj fly | evaluate | train | figures | replay | scene | bench`.
+`swarm-mj fly | evaluate | train | figures | replay | scene | policies | doctor | bench`.
 
 Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted by Ctrl-C, SIGTERM or a
 hang-up. A reader that closes the pipe, as `| head` does, and a terminal that is gone are no errors.
@@ -23,6 +23,7 @@ DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 WRONG_NAMES = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
 COMMANDS = {  # each a module here, with its options, `Options`, and what it does, `run`
     "fly": "Fly one mission and record its replay.",
+    "policies": "List the communication policies: what each knows and sends.",
     "evaluate": "Fly policies over the same missions and say where they stand.",
     "train": "Train a communication policy by PPO.",
     "figures": "Draw the paper's figures from results.",
@@ -50,25 +51,9 @@ def parse(arguments: Sequence[str]) -> tuple[Any, Any]:
             command = importlib.import_module(f"swarm_mj.cli.{arguments[0]}")
         prog, summary = f"swarm-mj {arguments[0]}", COMMANDS[arguments[0]]
         return command.run, options.parse(command.Options, arguments[1:], prog, summary)
-    _show_or_refuse(arguments)
+    from swarm_mj.cli.overview import show_or_refuse
 
-
-def _show_or_refuse(arguments: Sequence[str]) -> NoReturn:
-    """Shows the help or the version, or says what is wrong with a line without a command."""
-    from swarm_mj.cli.options import Parser
-    from swarm_mj.io.provenance import version
-
-    parser = Parser(
-        prog="swarm-mj",
-        description="Robot swarms on MuJoCo that share their state over a radio they compete for.",
-        epilog="`swarm-mj COMMAND --help` explains a command.",
-    )
-    parser.add_argument("--version", action="version", version=f"swarm-mj {version()}")
-    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for name, summary in COMMANDS.items():
-        commands.add_parser(name, help=summary)
-    parser.parse_args(arguments)
-    parser.error("name the command first")
+    show_or_refuse(arguments)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

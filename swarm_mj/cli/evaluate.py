@@ -15,7 +15,7 @@ from swarm_mj.cli.evaluation_table import print_results
 from swarm_mj.cli.machine import memory_errors
 from swarm_mj.cli.mission_options import several_missions
 from swarm_mj.cli.outputs import Output, check_outputs
-from swarm_mj.cli.policy_options import NAMES, PolicyOptions
+from swarm_mj.cli.policy_options import NAMED, NAMES, PolicyOptions
 from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import tell_cores
 from swarm_mj.evaluation import progress
@@ -47,6 +47,7 @@ class Options(PolicyOptions):
         DEFAULT_POLICIES,
         f"{NAMES}, all of these, or directories of learned policies",
         convert=normalised,
+        offers=("all", *NAMED),
     )
     episodes: int = same_as(Study, "episodes")
     seed: int = same_as(Study, "seed")

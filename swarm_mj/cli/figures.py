@@ -8,6 +8,7 @@ from rich.console import Console
 
 from swarm_mj.cli.estimates import YES, check_fits, figures_needs
 from swarm_mj.cli.outputs import Output, check_outputs
+from swarm_mj.cli.policy_options import NAMED
 from swarm_mj.cli.terminal import plain_console
 from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS
 from swarm_mj.evaluation.results import read_results
@@ -32,7 +33,11 @@ class Options:
     force: bool = setting(False, "replace existing figures")
     yes: bool = setting(False, YES)
     flock_policy: str = setting(
-        "mst", "who talks to whom in it", metavar="POLICY", group=f"the mission flown for {FLOCK}"
+        "mst",
+        "who talks to whom in it",
+        metavar="POLICY",
+        group=f"the mission flown for {FLOCK}",
+        offers=NAMED,
     )
     flock_seed: int = setting(1, "its seed", group=f"the mission flown for {FLOCK}")
 

@@ -16,7 +16,7 @@ from swarm_mj.cli.flight import fly_swarm
 from swarm_mj.cli.flight_table import flight_numbers, flight_table
 from swarm_mj.cli.mission_options import one_mission
 from swarm_mj.cli.outputs import Output, check_outputs
-from swarm_mj.cli.policy_options import NAMES, PolicyOptions
+from swarm_mj.cli.policy_options import NAMED, NAMES, PolicyOptions
 from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import plain_console, this_command
 from swarm_mj.fields import setting
@@ -53,7 +53,10 @@ class Options(PolicyOptions):
         "recorded)."
     )
     policy: str = setting(
-        "planner", f"{NAMES}, or a directory with a learned policy", convert=normalised
+        "planner",
+        f"{NAMES}, or a directory with a learned policy",
+        convert=normalised,
+        offers=NAMED,
     )
     seed: int = setting(1, "the same seed is the same mission")
     mission: Mission = one_mission()

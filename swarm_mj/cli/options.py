@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeVar, get_origin
 
 from swarm_mj.cli import BAD_INPUT
-from swarm_mj.fields import FieldOf, as_typed, check, kind_of, range_of
+from swarm_mj.fields import FieldOf, as_typed, check, did_you_mean, kind_of, range_of
 
 Options = TypeVar("Options")
 MANY = 10**9  # from here on, the end of a range is only there to catch slips
@@ -32,6 +32,15 @@ CONVERT: dict[Any, Callable[[str], Any]] = {Path: _path}
 
 class Parser(argparse.ArgumentParser):
     """Complains in one line."""
+
+    def known(self, arguments: Sequence[str]) -> argparse.Namespace:
+        """What was typed, all of it known; of what is not, the likely flag is named."""
+        parsed, left = self.parse_known_args(arguments)
+        if left:
+            flags = [flag for action in self._actions for flag in action.option_strings]
+            hint = did_you_mean(left[0].partition("=")[0], flags)
+            self.error(f"unrecognized arguments: {' '.join(left)}{hint}")
+        return parsed
 
     def error(self, message: str) -> NoReturn:
         """Prints the complaint and where to read on; exits with 2."""
@@ -70,7 +79,7 @@ def parse(kind: type[Options], arguments: Sequence[str], prog: str, summary: str
         SystemExit: The options cannot be read, or help was asked for.
     """
     _check_names(arguments)
-    parsed = vars(_parser_of(kind, prog, summary).parse_args(arguments))
+    parsed = vars(_parser_of(kind, prog, summary).known(arguments))
     given: dict[str, Any] = {"typed": tuple(arguments), **parsed}
     values: dict[str, Any] = {}
     for spec in fields(kind):  # pyright: ignore[reportArgumentType]
@@ -98,7 +107,7 @@ def _check_names(arguments: Sequence[str]) -> None:
 
 def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
     specs = fields(kind)
-    needed = [_metavar(spec) for spec in specs if spec.metadata.get("is_positional")]
+    needed = [_positional(spec) for spec in specs if spec.metadata.get("is_positional")]
     needed += [f"{flag_of(spec)} {_metavar(spec)}" for spec in specs if _is_required(spec)]
     parser = Parser(
         prog=prog,
@@ -108,8 +117,14 @@ def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
         formatter_class=partial(_Formatter, max_help_position=26),
         argument_default=argparse.SUPPRESS,
     )
+    declare(parser, kind)
+    return parser
+
+
+def declare(parser: argparse.ArgumentParser, kind: type[Any]) -> None:
+    """Declares the fields of a command's dataclass as options of a parser."""
     groups: dict[str, Any] = {"": parser}
-    for spec in specs:
+    for spec in fields(kind):
         if "add" in spec.metadata:
             spec.metadata["add"](parser)
         elif "help" in spec.metadata:
@@ -118,7 +133,6 @@ def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
                 groups[title] = parser.add_argument_group(title)
             default, is_required = _shown_default(spec), _is_required(spec)
             add_option(groups[title], spec, spec.name, default, is_required=is_required)
-    return parser
 
 
 def add_option(
@@ -151,10 +165,13 @@ def add_option(
     }
     if is_many or get_origin(spec.type) is tuple:
         how |= {"nargs": "+", "action": "extend"}
-    if spec.metadata.get("is_positional"):
-        group.add_argument(dest, **how)
+    if not spec.metadata.get("is_positional"):
+        added = group.add_argument(flag_of(spec), dest=dest, required=is_required, **how)
+    elif spec.default is MISSING:
+        added = group.add_argument(dest, **how)
     else:
-        group.add_argument(flag_of(spec), dest=dest, required=is_required, **how)
+        added = group.add_argument(dest, nargs="?", **how)
+    added.spec = spec  # for who completes what is typed
 
 
 def flag_of(spec: Field[Any]) -> str:
@@ -185,6 +202,10 @@ def _help(spec: Field[Any], default: str) -> str:
 
 def _metavar(spec: Field[Any]) -> str:
     return spec.metadata.get("metavar") or METAVARS.get(kind_of(spec), "VALUE")
+
+
+def _positional(spec: Field[Any]) -> str:
+    return _metavar(spec) if spec.default is MISSING else f"[{_metavar(spec)}]"
 
 
 def _is_required(spec: Field[Any]) -> bool:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from swarm_mj.fields import setting
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
 
-NAMES = f"who talks to whom: {', '.join(name for name in POLICIES if name != WITHOUT_PAYLOAD)}"
+NAMED = tuple(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes the other
+NAMES = f"who talks to whom: {', '.join(NAMED)}"
 HEADING = "policies"
 
 

@@ -57,6 +57,10 @@ class ExtendedFeatures(FeatureExtractor):
     """Features for learning in minutes; see `FEATURES`."""
 
     names: ClassVar[tuple[str, ...]] = tuple(FEATURES.values())
+    uses: ClassVar[str] = (
+        "its buffer, the packets it sent and received, and whose turn it is by the rule of "
+        "spatial-tdma, in the order of identities"
+    )
 
     def start(self, num_missions: int, num_robots: int) -> None:
         """Forgets the packets of earlier missions."""
@@ -100,6 +104,7 @@ class LocalFeatures(ExtendedFeatures):
     names: ClassVar[tuple[str, ...]] = tuple(
         name for name in ExtendedFeatures.names if "turn" not in name
     )
+    uses: ClassVar[str] = "its buffer, and the packets it sent and received"
 
     def graphs(self, views: LocalViews) -> Graphs:
         """What every robot's network sees now; must see every window."""

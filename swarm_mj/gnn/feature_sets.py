@@ -1,5 +1,6 @@
 """The one table of feature sets."""
 
+from swarm_mj.fields import did_you_mean
 from swarm_mj.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.gnn.graphs import FeatureExtractor, PaperFeatures, ReferenceFeatures
 from swarm_mj.gnn.shape import GnnShape
@@ -31,7 +32,10 @@ def num_features(features: str) -> int:
 
 def _feature_set(features: str) -> type[FeatureExtractor]:
     if features not in FEATURE_SETS:
-        raise ValueError(f"features must be one of {', '.join(FEATURE_SETS)}, not {features!r}")
+        hint = did_you_mean(features, FEATURE_SETS)
+        raise ValueError(
+            f"features must be one of {', '.join(FEATURE_SETS)}, not {features!r}{hint}"
+        )
     return FEATURE_SETS[features]
 
 

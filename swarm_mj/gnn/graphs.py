@@ -32,6 +32,7 @@ class FeatureExtractor(ABC):
     """Makes graphs of local views; one that remembers packets must see every window."""
 
     names: ClassVar[tuple[str, ...]]  # of the features, in order; there are F
+    uses: ClassVar[str] = "its buffer"  # what they are made of, in a few words
 
     def __init__(self, mission: Mission) -> None:
         """Takes the mission whose area, duration and range normalise the features."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
-from swarm_mj.fields import FieldOf, check, setting
+from swarm_mj.fields import FieldOf, check, check_value, setting
 from swarm_mj.gnn.feature_sets import FEATURE_SETS, check_fit, num_features
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.mission import Mission
@@ -159,8 +159,7 @@ def usual_settings(arm: str, mission: Mission, robots: Sequence[int], seed: int 
     Raises:
         ValueError: A value is unknown or outside its range.
     """
-    if arm not in get_args(CreditAssignment):
-        raise ValueError(f"arm must be one of {', '.join(get_args(CreditAssignment))}, not {arm!r}")
+    check_value(Training.__dataclass_fields__["arm"], arm)
     own = _per_team(is_reference=mission.preset == "reference") if arm == "team" else {}
     return Training(mission=mission, robots=tuple(robots), seed=seed, **own)
 

@@ -22,6 +22,8 @@ class Aloha(RandomTransmission, BroadcastPolicy):
     knows nothing. Uses the robot's own buffer, the team's size and the range.
     """
 
+    uses = "how many neighbours its buffer shows"
+
     def __init__(self, probability: float, *, range_m: float) -> None:
         """Prepares the policy.
 

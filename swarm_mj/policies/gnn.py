@@ -42,6 +42,7 @@ class LearnedPolicy(DecentralisedPolicy):
         self._extractor = extractor
         self._silence_logit = silence_logit
         self._is_deterministic = is_deterministic
+        self.uses = f"{extractor.uses}, by a trained graph neural network"
 
     @property
     def parameters(self) -> Parameters:

@@ -20,6 +20,8 @@ class InnovationGossip(RandomTransmission, BroadcastPolicy):
     robot's own buffer, and what it remembers of it.
     """
 
+    uses = "how much it has learned since it last transmitted"
+
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Gives every robot its own numbers, and all to tell; arguments as in `Policy.start`."""
         super().start(num_robots, rngs)

@@ -17,6 +17,8 @@ class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
     Centralised: the tree is built from all true positions at the start of the mission.
     """
 
+    uses = "the true positions at the start: a robot talks to its parent in their spanning tree"
+
     def __init__(
         self, probability: float, *, is_recomputed: bool = False, root_transmits: bool = False
     ) -> None:

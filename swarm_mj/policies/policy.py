@@ -18,7 +18,13 @@ Parameters = Mapping[str, bool | int | float | str]  # what a policy was made wi
 
 
 class Policy:
-    """Chooses whom every robot addresses next, and what a window looks like."""
+    """Chooses whom every robot addresses next, and what a window looks like.
+
+    Attributes:
+        uses: What each robot decides by, or the centre, in a few words; empty if nobody said.
+    """
+
+    uses: str = ""
 
     def window(self, mission: Mission) -> WindowProtocol:
         """What the robots do in a window: by Alg. 1 they request, and respond."""

@@ -21,6 +21,8 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
     name it. Uses no information but the team's size.
     """
 
+    uses = "nothing: it transmits with probability p"
+
     def __init__(self, probability: float, *, names_addressee: bool = False) -> None:
         """Prepares the policy.
 

@@ -14,6 +14,8 @@ class RoundRobin(CentralisedPolicy):
     Centralised: the base station is chosen anew in each window from all true positions.
     """
 
+    uses = "the true positions: a base near the middle talks to each robot in turn"
+
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """The base, for the one robot whose turn it is."""
         missions = np.arange(len(views.now))

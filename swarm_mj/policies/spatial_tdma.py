@@ -24,6 +24,8 @@ class SpatialTdma(BroadcastPolicy):
     own buffer, identity, the team's size, the order, the clock and the radio's range and threshold.
     """
 
+    uses = "as tdma, and the positions in its buffer: robots far enough apart share a slot"
+
     def __init__(self, *, range_m: float, threshold: float) -> None:
         """Prepares the policy.
 

@@ -19,6 +19,8 @@ class Tdma(BroadcastPolicy):
     all its robots: like the identities, it is granted before the mission (II-C).
     """
 
+    uses = "its identity, a common random order and the clock: one robot transmits per slot"
+
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draws every mission's order; arguments as in `Policy.start`."""
         self._order = draw_order(num_robots, rngs)

@@ -54,6 +54,8 @@ class GreedyOracle(_Oracle):
     where the authors' code would let that robot hear.
     """
 
+    uses = "all buffers and all true positions, at every moment"
+
     def _window(
         self, timestamp: Float[np.ndarray, "N N"], now: float, links: Links
     ) -> Int[np.ndarray, "N"]:
@@ -68,6 +70,8 @@ class LookaheadOracle(_Oracle):
     small refreshments, where a packet that waits for news would carry more. This one weighs rises
     of T squared and sees what a window leads to.
     """
+
+    uses = "as greedy-oracle, and it looks four windows ahead; slow"
 
     NUM_BRANCHES = 6  # first pairs tried
     NUM_WINDOWS = 4  # windows each is followed

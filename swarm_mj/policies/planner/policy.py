@@ -49,6 +49,11 @@ class Planner(BroadcastPolicy):
     team's size and area, the clock, the radio's numbers and common orders of turns.
     """
 
+    uses = (
+        "its buffer, the clock, common orders, the area, the radio exactly; and "
+        "snapshots of the team that packets carry"
+    )
+
     def __init__(
         self,
         radio: FreeSpaceRadio,

@@ -35,6 +35,11 @@ class PlannerWithoutPayload(BroadcastPolicy):
     common order of turns.
     """
 
+    uses = (
+        "as planner, without snapshots: robots at rest agree from their buffers alone, "
+        "others take the turns of spatial-tdma"
+    )
+
     def __init__(
         self, radio: FreeSpaceRadio, settings: PlannerSettings, turns: SpatialTdma
     ) -> None:

@@ -1,0 +1,133 @@
+"""`swarm-mj policies`: who talks when, what each policy knows, what its packets carry."""
+
+import inspect
+import json
+import shlex
+import sys
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from rich.console import Console
+from rich.table import Table
+
+from swarm_mj.cli import DONE
+from swarm_mj.cli.mission_options import mission_flags, one_mission
+from swarm_mj.cli.policy_options import NAMED
+from swarm_mj.cli.terminal import named_values, plain_console, this_command
+from swarm_mj.fields import as_typed, setting
+from swarm_mj.mission import Mission
+from swarm_mj.policies.policy import CentralisedPolicy, Policy
+from swarm_mj.policies.registry import POLICIES, make_policy, normalised
+
+WINDOWS = {
+    "broadcasts": "two broadcasts, which nobody answers",
+    "request": "a request to one robot, and its answer",
+}
+HEADINGS = {
+    False: "each robot decides by itself; it uses",
+    True: "a centre decides; it uses",
+}
+LEGEND = """\
+broadcasts: robots may transmit in both halves of a window, to all who hear; nobody answers.
+request: a robot addresses a teammate in the first half, which answers in the second.
+T, M, P: all that the sender knows of its teammates: when it was seen, the state, who told it.
+snapshots: two pictures of the whole team, on which robots agree to plan alike.
+p: the probability of a transmission, unless you give --probability; here that tuned for"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """The options of `swarm-mj policies`."""
+
+    EPILOG: ClassVar = "The probabilities p depend on the mission, so the options may name one."
+    name: str | None = setting(
+        None,
+        "say more of this one; a directory with a learned policy will do",
+        is_positional=True,
+        metavar="NAME",
+        convert=normalised,
+        offers=NAMED,
+    )
+    json: bool = setting(False, "print JSON in place of the table")
+    mission: Mission = one_mission()
+
+
+def run(options: Options) -> int:
+    """Runs the command; returns its exit code."""
+    names = POLICIES if options.name is None else (options.name,)
+    with Console(stderr=True).status("Loading ..."):
+        made = {name: make_policy(name, options.mission) for name in names}
+    facts = [facts_of(name, policy, options.mission) for name, policy in made.items()]
+    if options.json:
+        sys.stdout.write(json.dumps(facts if options.name is None else facts[0], indent=2) + "\n")
+    elif options.name is None:
+        _print_all(facts, options.mission)
+    else:
+        _print_one(facts[0], options.mission)
+    return DONE
+
+
+def facts_of(name: str, policy: Policy, mission: Mission) -> dict[str, Any]:
+    """What a policy says of itself, as `--json` has it."""
+    kind = type(policy)
+    is_broadcast = policy.window(mission).is_broadcast
+    return {
+        "name": name,
+        "is_centralised": isinstance(policy, CentralisedPolicy),
+        "window": "broadcasts" if is_broadcast else "request",
+        "uses": policy.uses,
+        "payload": policy.payload,
+        "probability": policy.parameters.get("probability"),
+        "parameters": dict(policy.parameters),
+        "class": f"{kind.__module__}.{kind.__qualname__}",
+        "description": inspect.getdoc(kind) or "",
+    }
+
+
+def _print_all(facts: list[dict[str, Any]], mission: Mission) -> None:
+    console = Console(highlight=False)
+    for is_centralised, heading in HEADINGS.items():
+        table = Table(show_lines=True)
+        for column in ("policy", heading, "packets\ncarry", "window"):
+            table.add_column(column)
+        for each in facts:
+            if each["is_centralised"] == is_centralised:
+                table.add_row(*_cells(each))
+        console.print(table)
+    plain = plain_console()
+    plain.print(f"{LEGEND} {_described(mission)}.")
+    plain.print(f"\nMore of one:  {this_command()} policies NAME")
+
+
+def _cells(each: dict[str, Any]) -> tuple[str, ...]:
+    probability = each["probability"]
+    name = each["name"].replace(" --", "\n  --")
+    name += "" if probability is None else f"\n  p = {as_typed(probability)}"
+    return name, each["uses"], "\n".join(_carried(each["payload"])), each["window"]
+
+
+def _carried(payload: str) -> tuple[str, ...]:
+    return ("T, M, P",) if payload == "none" else ("T, M, P", payload)
+
+
+def _print_one(each: dict[str, Any], mission: Mission) -> None:
+    """All of one policy, and how to fly it."""
+    rows = {
+        "who decides": "a centre" if each["is_centralised"] else "each robot by itself",
+        "what it uses": each["uses"],
+        "in a window": WINDOWS[each["window"]],
+        "packets carry": ", ".join(_carried(each["payload"])),
+        **{name: as_typed(value) for name, value in each["parameters"].items()},
+        "source": each["class"],
+    }
+    if each["probability"] is not None:
+        rows["probability"] += f", tuned for {_described(mission)}"
+    Console(highlight=False).print(named_values(each["name"], rows))
+    console = plain_console()
+    console.print(each["description"])
+    policy = each["name"] if each["name"] in POLICIES else shlex.quote(each["name"])
+    console.print(f"\nFly it:  {this_command()} fly --policy {policy} {mission_flags(mission)}")
+
+
+def _described(mission: Mission) -> str:
+    return f"{mission.task}, {mission.num_robots} robots, range ratio {mission.range_ratio:g}"

@@ -1,0 +1,102 @@
+"""The list of policies: what they say of themselves, on the terminal, as JSON, and on the pages."""
+
+import json
+from pathlib import Path
+
+import pytest
+from tiny_policies import save_tiny
+
+from swarm_mj.cli import main
+from swarm_mj.cli.policies import facts_of
+from swarm_mj.mission import paper
+from swarm_mj.policies.registry import POLICIES, make_policy
+from swarm_mj.policies.tuning import tuned_probability
+
+ROOT = Path(__file__).parents[2]
+MISSION = paper("flocking")
+CENTRALISED = {"round-robin", "mst", "greedy-oracle", "oracle-lookahead"}
+REQUEST = {"round-robin", "mst", "gnn", "greedy-oracle", "oracle-lookahead"}
+
+
+def printed(capsys, *arguments):
+    assert main(["policies", *arguments]) == 0
+    return capsys.readouterr().out
+
+
+def table_rows(page):
+    """Rows of the tables of policies on a page, by the head of their columns."""
+    head = None
+    for line in (ROOT / page).read_text().splitlines():
+        cells = [cell.strip().replace("`", "") for cell in line.strip().strip("|").split("|")]
+        if cells[0] == "policy":
+            head = cells
+        elif head and line.startswith("|") and cells[0] in POLICIES:
+            yield dict(zip(head, cells, strict=True))
+        elif not line.startswith("|"):
+            head = None
+
+
+def test_json_says_of_every_policy_what_it_is(capsys):
+    listed = {each["name"]: each for each in json.loads(printed(capsys, "--json"))}
+    assert tuple(listed) == POLICIES
+    assert {name for name, each in listed.items() if each["is_centralised"]} == CENTRALISED
+    assert {name for name, each in listed.items() if each["window"] == "request"} == REQUEST
+    assert {name for name, each in listed.items() if each["payload"] != "none"} == {"planner"}
+    assert all(each["uses"] and each["description"] for each in listed.values())
+    for name in ("random-flooding", "mst", "aloha", "gossip"):
+        assert listed[name]["probability"] == tuned_probability(name, MISSION)
+
+
+def test_probabilities_are_those_of_the_mission_named(capsys):
+    named = json.loads(printed(capsys, "aloha", "--json", "--task", "stationary", "--robots", "80"))
+    assert named["probability"] == tuned_probability("aloha", paper("stationary", num_robots=80))
+
+
+def test_the_table_fits_and_has_every_policy(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    shown = printed(capsys)
+    for name in POLICIES:
+        assert name.partition(" ")[0] in shown
+    assert max(len(line) for line in shown.splitlines() if line[0:1] in "│┃├") <= 80
+    assert f"p = {tuned_probability('mst', MISSION):g}" in shown
+
+
+def test_one_policy_is_explained_with_the_way_to_fly_it(capsys):
+    shown = printed(capsys, "spatial-tdma", "--task", "stationary")
+    assert "positions in its buffer" in shown
+    assert "TDMA in which robots far enough" in shown
+    assert "fly --policy spatial-tdma --task stationary" in shown
+
+
+def test_a_learned_policy_of_ones_own_is_explained_too(capsys, here):
+    save_tiny(here / "mine", "local")
+    shown = " ".join(printed(capsys, "mine").replace("│", " ").split())
+    assert "its buffer, and the packets it sent and received, by a trained graph" in shown
+    assert "receptive_field" in shown
+    assert "fly --policy mine" in shown
+
+
+def test_an_unknown_policy_is_refused(capsys):
+    assert main(["policies", "nobody"]) == 2
+    assert "nobody" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/policies.md"])
+def test_pages_say_what_packets_carry(page):
+    rows = list(table_rows(page))
+    for row in rows:
+        carried = next(cell for head, cell in row.items() if head.startswith("packets carry"))
+        has_payload = make_policy(row["policy"], MISSION).payload != "none"
+        assert ("snapshots" in carried) == has_payload, row
+        assert (carried == "nothing") != has_payload, row
+
+
+def test_the_page_of_policies_has_all_of_them_and_their_own_words():
+    rows = {row["policy"]: row for row in table_rows("docs/policies.md")}
+    assert set(rows) == set(POLICIES)
+    for name, row in rows.items():
+        facts = facts_of(name, make_policy(name, MISSION), MISSION)
+        told = row["what each robot uses"]
+        assert told.removeprefix("*centralised:* ") == facts["uses"], name
+        assert told.startswith("*centralised:*") == facts["is_centralised"]
+        assert row["window"].startswith("two") == (facts["window"] == "broadcasts")
