@@ -126,6 +126,10 @@ def test_imports_go_forward_only(room):
     [
         ("swarm_mj.policies", {"mujoco"}),
         (
+            "swarm_mj.envs.gymnasium_vector, swarm_mj.envs.pettingzoo",
+            {"torch", "stable_baselines3", "rerun", "dm_control", "matplotlib"},
+        ),
+        (
             "swarm_mj.rollout, swarm_mj.replay.recorder",
             {"torch", "stable_baselines3", "rerun", "dm_control"},
         ),

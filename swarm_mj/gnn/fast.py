@@ -26,7 +26,7 @@ class FastAggregationGnn(AggregationGnn):
         self, node: Float[Tensor, "R N F"], parent: Int[Tensor, "R N"]
     ) -> Float[Tensor, "R N O"]:
         """As `AggregationGnn.forward`, to which the linear variant and a depth of 1 are left."""
-        self.shape.check(node, parent)
+        self.check(node, parent)
         is_composed = self.shape.has_core and self.shape.depth > 1
         evaluate = Composed(self) if is_composed else super().forward
         num_chunks = -(-parent.numel() // NODES_AT_ONCE) if node.device.type == "cpu" else 1

@@ -138,7 +138,7 @@ class AggregationGnn(nn.Module):
         Raises:
             ValueError: Features of another number than the network's, or a parent that is no node.
         """
-        self.shape.check(node, parent)
+        self.check(node, parent)
         edges = edges_of(parent, self.shape.edges, node.dtype)
         v = self.encoder.node(node.flatten(0, 1))
         e = self.encoder.edge(edges.feature) if self.shape.has_core else edges.feature
@@ -147,3 +147,17 @@ class AggregationGnn(nn.Module):
             v, e = gn_block(self.core, v, e, edges)
             stages.append(self.decoder.node(v))
         return self.output(torch.cat(stages, dim=1)).view(*parent.shape, self.shape.num_outputs)
+
+    def check(self, node: Tensor, parent: Tensor) -> None:
+        """Raises ValueError on graphs that would give numbers without a meaning."""
+        num_features, num_nodes = node.shape[-1], parent.shape[-1]
+        if num_features != self.shape.num_features:
+            raise ValueError(
+                f"nodes must have the {self.shape.num_features} features that the network was made "
+                f"for, not {num_features}"
+            )
+        if parent.numel() and (highest := int(parent.max())) >= num_nodes:
+            raise ValueError(
+                f"a parent must be one of its graph's nodes, 0 to {num_nodes - 1}, or -1 for "
+                f"none, not {highest}"
+            )

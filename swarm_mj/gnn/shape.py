@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from torch import Tensor
-
 from swarm_mj.fields import check, setting
 
 Edges = Literal["paper", "reference", "both"]
@@ -41,17 +39,3 @@ class GnnShape:
     def has_core(self) -> bool:
         """Whether there is a GN block with something to learn."""
         return self.receptive_field > 0 and not self.is_linear
-
-    def check(self, node: Tensor, parent: Tensor) -> None:
-        """Raises ValueError on what would give numbers without a meaning."""
-        num_features, num_nodes = node.shape[-1], parent.shape[-1]
-        if num_features != self.num_features:
-            raise ValueError(
-                f"nodes must have the {self.num_features} features that the network was made for, "
-                f"not {num_features}"
-            )
-        if parent.numel() and (highest := int(parent.max())) >= num_nodes:
-            raise ValueError(
-                f"a parent must be one of its graph's nodes, 0 to {num_nodes - 1}, or -1 for "
-                f"none, not {highest}"
-            )

@@ -1,7 +1,6 @@
-"""The limits of a network's shape, and of what it is given."""
+"""The limits of a network's shape."""
 
 import pytest
-import torch
 
 from swarm_mj.gnn.shape import GnnShape
 
@@ -29,15 +28,3 @@ def test_a_shape_refuses_what_is_out_of_range(its, complaint):
 def test_only_a_block_that_is_applied_and_not_linear_learns(receptive_field, is_linear, has_core):
     shape = GnnShape(num_features=3, receptive_field=receptive_field, is_linear=is_linear)
     assert shape.has_core == has_core
-
-
-def test_it_checks_what_the_network_is_given():
-    shape = GnnShape(num_features=3)
-    node, parent = torch.zeros(2, 4, 3), torch.full((2, 4), -1)
-    shape.check(node, parent)
-    shape.check(node[:0], parent[:0])
-    with pytest.raises(ValueError, match="the 3 features that the network was made for, not 2"):
-        shape.check(node[..., :2], parent)
-    parent[1, 2] = 4
-    with pytest.raises(ValueError, match=r"one of its graph's nodes, 0 to 3, .* not 4"):
-        shape.check(node, parent)

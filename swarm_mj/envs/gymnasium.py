@@ -1,0 +1,79 @@
+"""The Gymnasium face: a team under one controller, whose action is whom each robot addresses."""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.utils import EzPickle
+
+from swarm_mj.envs.spaces import team_spaces
+from swarm_mj.envs.team import Info, Observation, Team, next_seed
+from swarm_mj.mission import Mission
+
+
+class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
+    """One mission; a step is a window, and it is cut off (truncated) after the last one.
+
+    `reset(seed=s)` begins the mission of seed s, the one that `swarm-mj fly --seed s` flies;
+    without a seed it begins another one, drawn from the last seed given.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as in Env
+
+    def __init__(
+        self,
+        mission: Mission | str = "flocking",
+        *,
+        render_mode: str | None = None,
+        **options: Any,
+    ) -> None:
+        """Takes a mission or its task, and options as `Team` does: any field of `Mission`, too.
+
+        Raises:
+            ValueError: A value is unknown or out of range.
+            TypeError: An option is unknown.
+        """
+        EzPickle.__init__(self, mission, render_mode=render_mode, **options)
+        self.team = Team(mission, **options)
+        check_paid_together(self.team)
+        self.render_mode = render_mode
+        self.observation_space, self.action_space = team_spaces(self.team)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, Info]:
+        """Begins a mission; `info` has its seed.
+
+        Raises:
+            ValueError: No connected team could be drawn.
+        """
+        super().reset(seed=seed, options=options)
+        begun = next_seed(self.np_random) if seed is None else seed
+        self.team.restart([begun])
+        return self._observation(), {"seed": begun}
+
+    def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, Info]:
+        """One window; `action[i]` is whom robot i addresses, itself for silence.
+
+        Returns:
+            What the robots see, the reward, False, whether the mission was cut off here, and what
+            the window cost.
+
+        Raises:
+            ValueError: The action is not one integer from 0 to N - 1 per robot.
+        """
+        reward = self.team.step(np.asarray(action)[np.newaxis])
+        info = {name: values[0].item() for name, values in self.team.infos().items()}
+        return self._observation(), float(reward[0, 0]), False, self.team.is_over, info
+
+    def _observation(self) -> Observation:
+        return {name: values[0] for name, values in self.team.observation.items()}
+
+
+def check_paid_together(team: Team) -> None:
+    """Raises ValueError if a reward is each robot's own where a team has one."""
+    if team.reward == "credit":
+        raise ValueError(
+            "reward credit is each robot's own, and this environment pays the team; choose reward "
+            "aoi, or an environment whose agents are robots (swarm_mj.envs.pettingzoo)"
+        )

@@ -1,0 +1,124 @@
+"""The PettingZoo face: every robot is an agent, `robot_0` to `robot_{N-1}`."""
+
+from typing import Any
+
+import numpy as np
+from gymnasium import Space
+from gymnasium.utils import EzPickle, seeding
+
+from swarm_mj.envs.spaces import robot_spaces
+from swarm_mj.envs.team import Info, Observation, Team, next_seed
+from swarm_mj.mission import Mission
+
+try:
+    from pettingzoo import ParallelEnv
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError(
+        "swarm_mj.envs.pettingzoo needs pettingzoo; install it by `pip install pettingzoo`"
+    ) from error
+
+Action = int | np.integer[Any]
+
+
+class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
+    """One mission; a step is a window, and all are cut off (truncated) after the last one.
+
+    A robot that is switched off is terminated, and drops out. `reset(seed=s)` begins the mission of
+    seed s; without a seed it begins another one, drawn from the last seed given.
+    """
+
+    metadata: dict[str, Any] = {"name": "swarm_mj_v0", "render_modes": []}  # noqa: RUF012 - as there
+
+    def __init__(
+        self,
+        mission: Mission | str = "flocking",
+        *,
+        render_mode: str | None = None,
+        **options: Any,
+    ) -> None:
+        """Takes a mission or its task, and options as `Team` does: any field of `Mission`, too.
+
+        Raises:
+            ValueError: A value is unknown or out of range.
+            TypeError: An option is unknown.
+        """
+        EzPickle.__init__(self, mission, render_mode=render_mode, **options)
+        self.team = Team(mission, **options)
+        self.render_mode = render_mode
+        self.possible_agents = [f"robot_{i}" for i in range(self.team.mission.num_robots)]
+        self.agents: list[str] = []
+        self._spaces = {agent: robot_spaces(self.team) for agent in self.possible_agents}
+        self._rng, _ = seeding.np_random()
+
+    def observation_space(self, agent: str) -> Space[Any]:
+        """What an agent sees; see `robot_spaces`."""
+        return self._spaces[agent][0]
+
+    def action_space(self, agent: str) -> Space[Any]:
+        """Whom an agent addresses; its own number is silence."""
+        return self._spaces[agent][1]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Observation], dict[str, Info]]:
+        """Begins a mission; every agent's info has its seed. There are no options.
+
+        Raises:
+            ValueError: No connected team could be drawn.
+        """
+        del options
+        if seed is not None:
+            self._rng, _ = seeding.np_random(seed)
+        begun = next_seed(self._rng) if seed is None else seed
+        self.team.restart([begun])
+        self.agents = list(self.possible_agents)
+        return self._observations(), {agent: {"seed": begun} for agent in self.agents}
+
+    def step(
+        self, actions: dict[str, Action]
+    ) -> tuple[
+        dict[str, Observation],
+        dict[str, float],
+        dict[str, bool],
+        dict[str, bool],
+        dict[str, Info],
+    ]:
+        """One window, in which each agent addresses a robot; agents that say nothing are silent.
+
+        Returns:
+            By agent: what it sees, its reward, whether it was switched off, whether the mission was
+            cut off, and what the window cost the team.
+
+        Raises:
+            ValueError: An action is no robot; nothing has moved.
+        """
+        recipient = self.team.flown.views.silence.copy()
+        for agent in self.agents:
+            i = self._robot(agent)
+            recipient[0, i] = actions.get(agent, i)
+        reward = self.team.step(recipient)[0]
+        costs = {name: values[0].item() for name, values in self.team.infos().items()}
+        is_active, is_over = self.team.is_active[0], self.team.is_over
+        seen = self._observations()
+        rewards = {agent: float(reward[self._robot(agent)]) for agent in self.agents}
+        ended = {agent: not is_active[self._robot(agent)] for agent in self.agents}
+        cut = dict.fromkeys(self.agents, is_over)
+        infos = {agent: dict(costs) for agent in self.agents}
+        self.agents = [] if is_over else [agent for agent in self.agents if not ended[agent]]
+        return seen, rewards, ended, cut, infos
+
+    def _robot(self, agent: str) -> int:
+        return int(agent.removeprefix("robot_"))
+
+    def _observations(self) -> dict[str, Observation]:
+        """What each agent sees."""
+        seen = self.team.observation
+        return {
+            agent: {name: values[0, self._robot(agent)] for name, values in seen.items()}
+            for agent in self.agents
+        }
+
+
+def parallel_env(mission: Mission | str = "flocking", **options: Any) -> SwarmParallelEnv:
+    """A mission as PettingZoo's `ParallelEnv`, by the name that is usual there; see the class."""
+    return SwarmParallelEnv(mission, **options)

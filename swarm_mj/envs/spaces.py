@@ -1,0 +1,48 @@
+"""What robots see and do, as Gymnasium's spaces; every face has the same."""
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector.utils import batch_space
+
+from swarm_mj.envs.team import Team
+from swarm_mj.mission import MISSION_DISTANCE_M, Mission
+from swarm_mj.protocol.buffers import NO_PARENT
+
+
+def robot_spaces(team: Team) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
+    """What one robot sees, and whom it addresses.
+
+    `observation` [N, F] is what it knows of every teammate, itself included: see `FEATURES` of the
+    feature set; all are normalised, and none has a unit. `action_mask` [N] is 1 for recipients
+    worth a thought; itself, which is silence, always is. `parent` [N] is the robot that a
+    teammate's news came over first, or -1.
+    """
+    num_robots = team.mission.num_robots
+    most = _largest_feature(team.mission)
+    seen: dict[str, spaces.Space] = {
+        "action_mask": spaces.Box(0, 1, (num_robots,), np.int8),
+        "observation": spaces.Box(-most, most, (num_robots, team.num_features), np.float32),
+    }
+    if team.with_parents:
+        seen["parent"] = spaces.Box(NO_PARENT, num_robots - 1, (num_robots,), np.int32)
+    return spaces.Dict(seen), spaces.Discrete(num_robots)
+
+
+def team_spaces(team: Team) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
+    """What all robots see, with a leading axis N, and whom each addresses."""
+    num_robots = team.mission.num_robots
+    seen, _ = robot_spaces(team)
+    return batch_space(seen, num_robots), spaces.MultiDiscrete([num_robots] * num_robots)
+
+
+def _largest_feature(mission: Mission) -> float:
+    """A bound on every number that a feature set makes of a mission.
+
+    Ages are shares of the mission or of 500 windows; positions and distances are those of robots
+    that fly straight on all the time, by the area or by 1 km; counts are by 10 at least.
+    """
+    flown_m = mission.max_velocity_mps * mission.window_s * mission.num_windows
+    lengths = (mission.side_m + 2.0 * flown_m) / min(mission.side_m, MISSION_DISTANCE_M)
+    return float(np.ceil(mission.num_robots + mission.num_windows / 500.0 + lengths))

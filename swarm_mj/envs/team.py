@@ -1,0 +1,193 @@
+"""Missions as other libraries play them: what robots see, what a window pays, and where it ends.
+
+All faces but dm_control's are made of this, so the same seeds and actions are the same missions
+through each of them.
+"""
+
+import copy
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from swarm_mj.control.controller import Controller
+from swarm_mj.gnn.feature_sets import make_extractor
+from swarm_mj.learning.credit import credits_of
+from swarm_mj.mission import PRESETS, Mission
+from swarm_mj.mission.batched_rng import Started
+from swarm_mj.physics.scene import Scene
+from swarm_mj.protocol.costs import WindowCosts
+from swarm_mj.radio.free_space import Channel
+from swarm_mj.swarm import Swarm
+
+REWARDS = ("aoi", "velocity-variance", "credit")
+Observation = dict[str, np.ndarray]
+Info = dict[str, Any]
+
+# Missions whose seeds are not given draw theirs from here on, so that none of an evaluation's come.
+FIRST_DRAWN_SEED, LAST_DRAWN_SEED = 2**40, 2**62
+PACKETS = ("sent", "delivered", "lost", "overheard", "answered")
+
+
+class Team:
+    """B missions that begin and end together, as environments show them.
+
+    Index order: `[b, i]` is robot `i` of mission `b`.
+    """
+
+    def __init__(
+        self,
+        mission: Mission | str = "flocking",
+        num_missions: int = 1,
+        *,
+        preset: str = "paper",
+        features: str = "extended",
+        reward: str = "aoi",
+        with_parents: bool = False,
+        channel: Channel | None = None,
+        controller: Controller | None = None,
+        scene: Scene | None = None,
+        **fields: Any,
+    ) -> None:
+        """Takes what to play; `restart` begins.
+
+        Args:
+            mission: The mission, or its task.
+            num_missions: B.
+            preset: Of a task's mission: "paper" or "reference".
+            features: What robots see of each teammate: the name of a feature set.
+            reward: "aoi", minus the age of information [windows]; "velocity-variance", minus the
+                variance of Eq. 17 [m²/s²]; or "credit", each robot's own: by how much the team's
+                age would be higher had it been silent in this window [windows].
+            with_parents: Whether robots see the parents P as well, for graph networks.
+            channel: As of `Swarm`; a copy of it is used, and so of the next two.
+            controller: As of `Swarm`.
+            scene: As of `Swarm`.
+            **fields: Any other field of `Mission`.
+
+        Raises:
+            ValueError: A value is unknown or out of range, or does not go with another.
+            TypeError: A field is not one of `Mission`'s.
+        """
+        self.mission = _mission_of(mission, preset, fields)
+        self.num_missions = num_missions
+        self.reward = _checked(reward, self.mission, channel)
+        self.with_parents = with_parents
+        self._extractor = make_extractor(features, self.mission)
+        self.num_features = len(self._extractor.names)  # F
+        self._parts = copy.deepcopy(
+            {"channel": channel, "controller": controller, "scene": scene}
+        )  # those that draw or remember do so for these missions only
+        self.swarm: Swarm | None = None  # made when it begins
+
+    def restart(self, seeds: Sequence[int]) -> None:
+        """Begins the missions of these seeds.
+
+        Raises:
+            ValueError: There are not B seeds, one is negative, or a team cannot be connected.
+        """
+        if self.swarm is None:
+            self.swarm = Swarm(self.mission, seeds, **self._parts)
+        else:
+            self.swarm.restart(seeds)
+        self.seeds = list(seeds)
+        self._extractor.start(self.num_missions, self.mission.num_robots)
+        self._see()
+
+    def step(self, recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B N"]:
+        """One window of Alg. 1, in which each robot addresses a recipient; itself is silence.
+
+        Returns:
+            What each robot is paid; all of a team alike, unless the reward is credit.
+
+        Raises:
+            ValueError: No mission has begun, or a recipient is no robot; nothing has moved.
+        """
+        swarm = self.flown
+        before, start = swarm.buffers.timestamp.copy(), swarm.now
+        self.costs: WindowCosts = swarm.exchange(recipient)
+        self._see()
+        if self.reward == "credit":
+            own = credits_of(before, swarm.states.position_m, recipient, swarm.channel, start)
+            return own / self.mission.num_robots**2
+        cost = self.costs.age_windows
+        if self.reward == "velocity-variance":
+            cost = self.costs.velocity_variance_m2ps2
+        return np.broadcast_to(-cost[:, None], recipient.shape)
+
+    @property
+    def flown(self) -> Swarm:
+        """The swarm that flies the missions; raises ValueError before they have begun."""
+        if self.swarm is None:
+            raise ValueError("no mission has begun; call reset() first")
+        return self.swarm
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the last window has been flown."""
+        return bool(self.flown.now[0] >= self.mission.num_windows)
+
+    @property
+    def is_active(self) -> Bool[np.ndarray, "B N"]:
+        """Which robots have not been switched off."""
+        is_active = self.flown.states.is_active
+        shape = (self.num_missions, self.mission.num_robots)
+        return np.ones(shape, dtype=np.bool_) if is_active is None else is_active
+
+    def infos(self) -> Info:
+        """What the last window cost, by name, [B] each: the numbers of `swarm-mj fly --json`."""
+        costs = self.costs
+        return {
+            "age_windows": costs.age_windows,
+            "velocity_variance_m2ps2": costs.velocity_variance_m2ps2,
+            "is_complete": costs.is_complete,
+            **{f"packets_{name}": getattr(costs.packets, name) for name in PACKETS},
+        }
+
+    def _see(self) -> None:
+        """Keeps what the robots see now in `observation`, new arrays of shape [B, N, ...].
+
+        A robot that was switched off may only be silent.
+        """
+        graphs = self._extractor.graphs(self.flown.views)
+        shape = (self.num_missions, self.mission.num_robots, self.mission.num_robots)
+        may_address = graphs.may_address.reshape(shape) & self.is_active[:, :, None]
+        may_address |= np.eye(self.mission.num_robots, dtype=np.bool_)
+        self.observation: Observation = {
+            "action_mask": may_address.astype(np.int8),
+            "observation": graphs.node.reshape(*shape, self.num_features),
+        }
+        if self.with_parents:
+            self.observation["parent"] = graphs.parent.reshape(shape).copy()
+
+
+def next_seed(rng: np.random.Generator) -> int:
+    """The seed of a mission for which none was given."""
+    return int(rng.integers(FIRST_DRAWN_SEED, LAST_DRAWN_SEED))
+
+
+def _mission_of(mission: Mission | str, preset: str, fields: dict[str, Any]) -> Mission:
+    """A mission as it is, or a task's, with other values of some fields."""
+    if isinstance(mission, Mission):
+        return replace(mission, **fields)
+    task = replace(Mission(), preset=preset, task=mission).task  # refuses what is unknown
+    return PRESETS[preset](task, **fields)
+
+
+def _checked(reward: str, mission: Mission, channel: Channel | None) -> str:
+    """The reward, if there is such a one for these missions; raises ValueError otherwise."""
+    if reward not in REWARDS:
+        raise ValueError(f"reward must be one of {', '.join(REWARDS)}, not {reward!r}")
+    if reward == "credit" and mission.switched_off > 0.0:
+        raise ValueError(
+            "reward credit needs robots that do not fail, but switched_off is "
+            f"{mission.switched_off:g}; set it to 0, or choose reward aoi"
+        )
+    if reward == "credit" and isinstance(channel, Started):
+        raise ValueError(
+            "reward credit replays each window, and this channel would draw other numbers; choose "
+            "reward aoi"
+        )
+    return reward

@@ -1,0 +1,82 @@
+import pickle
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env, data_equivalence
+
+from swarm_mj.envs.gymnasium import SwarmEnv
+from swarm_mj.envs.registration import register_environments
+from swarm_mj.mission import paper
+from swarm_mj.swarm import Swarm
+
+SMALL = {"num_robots": 5, "num_windows": 8, "range_ratio": 0.4}
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("Stationary", {}),
+        ("RandomWalk", {"features": "paper", "with_parents": True}),
+        ("Flocking", {"preset": "reference", "features": "reference"}),
+    ],
+)
+def test_gymnasiums_own_check(name, options):
+    register_environments()
+    env = gymnasium.make(f"swarm_mj/{name}-v0", **SMALL, **options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped)
+
+
+def test_an_episode_is_a_mission():
+    env = SwarmEnv("stationary", **SMALL)
+    for _ in range(2):
+        env.reset(seed=1)
+        ends = [env.step(np.arange(5))[2:4] for _ in range(8)]
+        assert ends == [(False, False)] * 7 + [(False, True)]
+
+
+def test_info_is_what_the_window_cost():
+    env, swarm = SwarmEnv("random-walk", **SMALL), Swarm(paper("random-walk", **SMALL), [4])
+    assert env.reset(seed=4)[1] == {"seed": 4}
+    for recipient in np.random.default_rng(1).integers(0, 5, (8, 5)):
+        *_, info = env.step(recipient)
+        costs = swarm.exchange(recipient[None])
+        assert info == {
+            "age_windows": costs.age_windows[0],
+            "velocity_variance_m2ps2": costs.velocity_variance_m2ps2[0],
+            "is_complete": costs.is_complete[0],
+            "packets_sent": costs.packets.sent[0],
+            "packets_delivered": costs.packets.delivered[0],
+            "packets_lost": costs.packets.lost[0],
+            "packets_overheard": costs.packets.overheard[0],
+            "packets_answered": costs.packets.answered[0],
+        }
+
+
+def test_missions_without_a_seed_differ():
+    env = SwarmEnv(**SMALL)
+    assert len({env.reset()[1]["seed"] for _ in range(4)}) == 4
+
+
+def test_a_mission_may_be_given_whole_and_changed():
+    env = gymnasium.make("swarm_mj/Flocking-v0", mission=paper("stationary", **SMALL), num_robots=3)
+    assert env.unwrapped.team.mission == paper("stationary", **{**SMALL, "num_robots": 3})
+
+
+def test_a_copy_by_pickle_flies_the_same():
+    env = SwarmEnv("flocking", features="paper", **SMALL)
+    copy = pickle.loads(pickle.dumps(env))
+    assert data_equivalence(env.reset(seed=2), copy.reset(seed=2), exact=True)
+
+
+def test_a_team_is_paid_together():
+    with pytest.raises(ValueError, match="whose agents are robots"):
+        SwarmEnv(reward="credit")
+
+
+def test_a_step_before_reset_is_refused():
+    with pytest.raises(ValueError, match="call reset"):
+        SwarmEnv(**SMALL).step(np.arange(5))

@@ -1,0 +1,155 @@
+"""The vector environment against Gymnasium's own, `SyncVectorEnv` over single environments."""
+
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import data_equivalence
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from swarm_mj.envs.gymnasium import SwarmEnv
+from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
+from swarm_mj.envs.registration import register_environments
+
+SMALL = {"num_robots": 5, "num_windows": 6, "range_ratio": 0.4}
+NUM_ENVS = 3
+EVERY_MODE = pytest.mark.parametrize("mode", list(AutoresetMode))
+
+
+def both(mode):
+    ours = SwarmVectorEnv(NUM_ENVS, "random-walk", autoreset_mode=mode, **SMALL)
+    makes = [lambda: SwarmEnv("random-walk", **SMALL)] * NUM_ENVS
+    return ours, SyncVectorEnv(makes, autoreset_mode=mode)
+
+
+def same(ours, theirs):
+    assert data_equivalence(ours, theirs, exact=True), (ours, theirs)
+
+
+def actions(num_steps):
+    rng = np.random.default_rng(3)
+    return rng.integers(0, SMALL["num_robots"], (num_steps, NUM_ENVS, SMALL["num_robots"]))
+
+
+def begin_what_is_over(envs, step):
+    """What a user does whose environments do not begin anew by themselves."""
+    ours, theirs = envs
+    if step is not None and ours.metadata["autoreset_mode"] == AutoresetMode.DISABLED:
+        is_over = step[2] | step[3]
+        if is_over.any():
+            same(*(env.reset(options={"reset_mask": is_over.copy()}) for env in (ours, theirs)))
+
+
+@EVERY_MODE
+def test_equals_gymnasiums_vector_of_single_environments(mode):
+    envs = both(mode)
+    ours, theirs = envs
+    assert ours.observation_space == theirs.observation_space
+    assert ours.action_space == theirs.action_space
+    assert ours.single_observation_space == theirs.single_observation_space
+    assert ours.single_action_space == theirs.single_action_space
+    same(ours.reset(seed=4), theirs.reset(seed=4))
+    num_ended, step = 0, None
+    for action in actions(20):
+        begin_what_is_over(envs, step)
+        step = ours.step(action)
+        same(step, theirs.step(action))
+        num_ended += step[3].sum()
+    assert num_ended >= 2 * NUM_ENVS
+
+
+@EVERY_MODE
+def test_reset_mask_begins_some_and_leaves_the_others(mode):
+    envs = both(mode)
+    ours, theirs = envs
+    same(ours.reset(seed=[7, 8, 9]), theirs.reset(seed=[7, 8, 9]))
+    step, num_alone = None, 0
+    masks = {2: [True, False, False], 4: [False, True, True], 5: [False, True, False]}
+    for t, action in enumerate(actions(30)):
+        begin_what_is_over(envs, step)
+        if t in masks:
+            options = [{"reset_mask": np.array(masks[t])} for _ in envs]
+            seeds = [t, None, 20]
+            same(
+                ours.reset(seed=seeds, options=options[0]),
+                theirs.reset(seed=seeds, options=options[1]),
+            )
+            assert "reset_mask" in options[0]  # it is the user's
+        step = ours.step(action)
+        same(step, theirs.step(action))
+        num_alone += step[3].sum() == 1
+    assert num_alone > 2  # they ended at different times
+    assert len(ours._groups) <= NUM_ENVS
+
+
+def test_made_by_name():
+    register_environments()
+    env = gymnasium.make_vec(
+        "swarm_mj/Flocking-v0",
+        num_envs=2,
+        vectorization_mode="vector_entry_point",
+        autoreset_mode="SameStep",
+        **SMALL,
+    )
+    assert isinstance(env, SwarmVectorEnv)
+    assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    assert (env.num_envs, env.single_action_space.shape) == (2, (5,))
+    assert gymnasium.make_vec("swarm_mj/Flocking-v0").metadata["autoreset_mode"] is (
+        AutoresetMode.NEXT_STEP
+    )
+
+
+def test_observations_are_the_users_own():
+    env = SwarmVectorEnv(2, **SMALL)
+    kept = [env.reset(seed=1)[0]]
+    held = [{name: each.copy() for name, each in kept[0].items()}]
+    for action in actions(3):
+        kept.append(env.step(action[:2])[0])
+        held.append({name: each.copy() for name, each in kept[-1].items()})
+    kept[-1]["observation"][:] = 9.0
+    after = env.step(actions(1)[0][:2])[0]
+    assert not np.any(after["observation"] == 9.0)
+    same(kept[:-1], held[:-1])
+
+
+def test_a_copy_by_pickle_flies_the_same():
+    env = SwarmVectorEnv(2, **SMALL)
+    copy = pickle.loads(pickle.dumps(env))
+    same(env.reset(seed=3), copy.reset(seed=3))
+
+
+def test_without_autoreset_an_ended_mission_is_refused():
+    env = SwarmVectorEnv(NUM_ENVS, autoreset_mode=AutoresetMode.DISABLED, **SMALL)
+    env.reset(seed=0)
+    *flown, late = actions(7)
+    for action in flown:
+        env.step(action)
+    with pytest.raises(ValueError, match=r"environment 0 is over.*reset_mask"):
+        env.step(late)
+
+
+@pytest.mark.parametrize(
+    ("seed", "options", "message"),
+    [
+        ([1, 2], {}, "seed must be one number, or 3"),
+        (None, {"reset_mask": [True, True]}, "reset_mask must be 3 bools"),
+        (None, {"reset_mask": np.zeros(3, dtype=bool)}, "not all False"),
+        (None, {"reset_mask": np.ones(3)}, "reset_mask must be 3 bools"),
+    ],
+)
+def test_refused_resets(seed, options, message):
+    env = SwarmVectorEnv(NUM_ENVS, **SMALL)
+    with pytest.raises(ValueError, match=message):
+        env.reset(seed=seed, options=options)
+
+
+def test_refused_actions():
+    env = SwarmVectorEnv(NUM_ENVS, **SMALL)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"shape \(3, 5\).* not \(5,\)"):
+        env.step(np.zeros(5, dtype=int))
+    with pytest.raises(ValueError, match="from 0 to 4, not 5"):
+        env.step(np.full((3, 5), 5))
+    with pytest.raises(ValueError, match="whose agents are robots"):
+        SwarmVectorEnv(2, reward="credit")

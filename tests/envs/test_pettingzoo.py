@@ -1,0 +1,112 @@
+import pickle
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pytest
+import supersuit
+from gymnasium import spaces
+from gymnasium.utils.env_checker import data_equivalence
+from pettingzoo.test import parallel_api_test, parallel_seed_test
+from stable_baselines3 import PPO
+
+from swarm_mj.envs.pettingzoo import parallel_env
+from swarm_mj.mission import paper
+from swarm_mj.swarm import Swarm
+
+SMALL = {"num_robots": 6, "num_windows": 12, "range_ratio": 0.4}
+FAILING = {**SMALL, "switched_off": 0.3}  # 2 of 6, at the start of the 7th window
+
+
+@pytest.mark.parametrize("options", [SMALL, {**FAILING, "with_parents": True}])
+def test_pettingzoos_own_checks(options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        parallel_api_test(parallel_env(**options), num_cycles=30)
+        parallel_seed_test(lambda: parallel_env(**options), num_cycles=5)
+
+
+def test_the_same_seed_is_the_same_episodes():
+    """Over whole episodes, of which the later ones have no seed of their own."""
+    first, second = parallel_env(**FAILING), parallel_env(**FAILING)
+    assert data_equivalence(first.reset(seed=3), second.reset(seed=3), exact=True)
+    for _ in range(2):
+        while first.agents:
+            actions = {agent: first.action_space(agent).sample() for agent in first.agents}
+            assert data_equivalence(first.step(actions), second.step(actions), exact=True)
+            assert first.agents == second.agents
+        assert data_equivalence(first.reset(), second.reset(), exact=True)
+    assert not data_equivalence(first.reset(), second.reset(seed=4), exact=True)
+
+
+def test_robots_that_fail_drop_out():
+    env, swarm = parallel_env(**FAILING), Swarm(paper("flocking", **FAILING), [2])
+    env.reset(seed=2)
+    for window in range(12):
+        before = list(env.agents)
+        seen, rewards, ended, cut, infos = env.step({agent: 0 for agent in env.agents})
+        swarm.exchange(np.zeros((1, 6), dtype=int))
+        for answer in (seen, rewards, ended, cut, infos):
+            assert list(answer) == before
+        fails = [agent for agent in before if ended[agent]]
+        assert len(fails) == (2 if window == 6 else 0)
+        assert set(cut.values()) == {window == 11}
+        if window >= 6:
+            alive = [f"robot_{i}" for i in np.flatnonzero(swarm.states.is_active[0])]
+            assert env.agents == ([] if window == 11 else alive)
+            for agent in fails:  # who may only be silent
+                assert np.flatnonzero(seen[agent]["action_mask"]) == [int(agent[6:])]
+
+
+def test_each_agent_sees_and_is_paid_its_own():
+    env = parallel_env("stationary", reward="credit", **SMALL)
+    seen, _ = env.reset(seed=2)
+    oneself = 0  # the first of the extended features
+    for i, agent in enumerate(env.agents):
+        assert np.flatnonzero(seen[agent]["observation"][:, oneself]) == [i]
+    rewards = env.step({agent: 1 if agent == "robot_0" else i for i, agent in enumerate(seen)})[1]
+    assert [agent for agent, reward in rewards.items() if reward != 0.0] == ["robot_0"]
+
+
+def test_agents_that_say_nothing_are_silent():
+    env = parallel_env(**SMALL)
+    env.reset(seed=0)
+    assert env.step({"robot_2": 3})[4]["robot_0"]["packets_sent"] == 1.0
+
+
+def test_a_copy_by_pickle_flies_the_same():
+    env = parallel_env(**FAILING)
+    copy = pickle.loads(pickle.dumps(env))
+    assert data_equivalence(env.reset(seed=3), copy.reset(seed=3), exact=True)
+
+
+def chained(env):
+    env = supersuit.pettingzoo_env_to_vec_env_v1(env)
+    return supersuit.concat_vec_envs_v1(env, 2, base_class="stable_baselines3")
+
+
+def learn(policy, env):
+    return PPO(policy, env, n_steps=8, batch_size=48, n_epochs=1).learn(200).num_timesteps >= 200
+
+
+def test_supersuits_chain_trains_on_what_agents_see():
+    assert learn("MultiInputPolicy", chained(parallel_env(**SMALL)))
+
+
+def test_supersuits_black_death_trains_where_robots_fail():
+    env = supersuit.observation_lambda_v0(
+        parallel_env(**FAILING),
+        lambda seen, _: seen["observation"],
+        lambda space: space["observation"],
+    )
+    env = supersuit.black_death_v3(env)
+    assert isinstance(env.observation_space("robot_0"), spaces.Box)
+    assert learn("MlpPolicy", chained(env))
+
+
+def test_without_pettingzoo_it_says_so():
+    code = "import sys; sys.modules['pettingzoo'] = None; import swarm_mj.envs.pettingzoo"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.endswith("needs pettingzoo; install it by `pip install pettingzoo`")

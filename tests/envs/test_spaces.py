@@ -1,0 +1,31 @@
+import numpy as np
+from gymnasium import spaces
+
+from swarm_mj.envs.spaces import robot_spaces, team_spaces
+from swarm_mj.envs.team import Team
+
+
+def test_a_robot_sees_a_row_of_what_the_team_sees():
+    team = Team("stationary", num_robots=4, features="paper", with_parents=True)
+    seen, action = robot_spaces(team)
+    assert action == spaces.Discrete(4)
+    assert {name: (each.shape, each.dtype) for name, each in seen.items()} == {
+        "action_mask": ((4,), np.int8),
+        "observation": ((4, 8), np.float32),
+        "parent": ((4,), np.int32),
+    }
+    all_seen, joint = team_spaces(team)
+    assert joint == spaces.MultiDiscrete([4, 4, 4, 4])
+    assert {name: each.shape for name, each in all_seen.items()} == {
+        "action_mask": (4, 4),
+        "observation": (4, 4, 8),
+        "parent": (4, 4),
+    }
+    team.restart([1])
+    now = {name: each[0] for name, each in team.observation.items()}
+    assert now in all_seen
+    assert {name: each[2] for name, each in now.items()} in seen
+
+
+def test_parents_are_seen_on_request_only():
+    assert set(robot_spaces(Team("stationary"))[0]) == {"action_mask", "observation"}

@@ -1,0 +1,174 @@
+"""What every face is made of: rewards by hand, masks, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from channels import to_nobody
+
+from swarm_mj.envs.spaces import robot_spaces
+from swarm_mj.envs.team import FIRST_DRAWN_SEED, Team, next_seed
+from swarm_mj.gnn.feature_sets import FEATURE_SETS, make_extractor
+from swarm_mj.mission import paper, reference
+from swarm_mj.swarm import Swarm
+
+SMALL = {"num_robots": 5, "num_windows": 10, "range_ratio": 0.4}
+
+
+def begun(*args, seeds=(1, 2), **options):
+    team = Team(*args, len(seeds), **{**SMALL, **options})
+    team.restart(seeds)
+    return team
+
+
+def recipients(num_windows, num_missions=2, num_robots=5):
+    return np.random.default_rng(5).integers(0, num_robots, (num_windows, num_missions, num_robots))
+
+
+def test_eq10_reward_is_minus_the_mean_age_over_all_pairs():
+    team = begun("random-walk")
+    for now, recipient in enumerate(recipients(10), start=1):
+        reward = team.step(recipient)
+        for b in range(2):
+            ages = [now - t for row in team.swarm.buffers.timestamp[b] for t in row]
+            assert reward[b] == pytest.approx([-sum(ages) / 25] * 5, rel=1e-14)
+
+
+def test_eq17_reward_is_minus_the_variance_of_velocities():
+    team = begun("flocking", reward="velocity-variance")
+    for recipient in recipients(5):
+        reward = team.step(recipient)
+        for b in range(2):
+            velocity = team.swarm.states.velocity_mps[b]
+            variance = sum(
+                ((velocity[:, axis] - velocity[:, axis].mean()) ** 2).mean() for axis in (0, 1)
+            )
+            assert reward[b] == pytest.approx([-variance] * 5, rel=1e-12)
+
+
+def test_credit_is_the_age_that_a_window_without_the_robot_would_have_left():
+    """Every robot's window is flown again by a team in which it alone is silent."""
+    team = begun("random-walk", reward="credit", seeds=(3,))
+    past = []
+    for recipient in recipients(6, 1):
+        reward = team.step(recipient)
+        ages = team.costs.age_windows[0]
+        for i in range(5):
+            twin = Swarm(team.mission, [3])
+            for each in past:
+                twin.exchange(each)
+            silent = recipient.copy()
+            silent[0, i] = i
+            assert reward[0, i] == pytest.approx(twin.exchange(silent).age_windows[0] - ages)
+        past.append(recipient)
+
+
+def test_what_is_seen_is_what_the_networks_see():
+    team = begun("stationary", features="paper", with_parents=True)
+    extractor = make_extractor("paper", team.mission)
+    for recipient in recipients(6):
+        team.step(recipient)
+        graphs = extractor.graphs(team.swarm.views)
+        np.testing.assert_array_equal(
+            team.observation["observation"].reshape(10, 5, 8), graphs.node
+        )
+        np.testing.assert_array_equal(team.observation["parent"].reshape(10, 5), graphs.parent)
+        assert np.all(team.observation["action_mask"] == 1)
+
+
+def test_masks_leave_out_teammates_believed_out_of_range():
+    """Beyond 1.2 ranges; whoever is unknown, and silence, may always be chosen."""
+    team = begun("stationary", num_robots=8, range_ratio=0.15, seeds=(1, 2, 3))
+    for recipient in recipients(60, 3, 8):
+        team.step(recipient)
+    buffers, num_masked = team.swarm.buffers, 0
+    for b, i, k in np.ndindex(3, 8, 8):
+        distance_m = np.hypot(*(buffers.position_m[b, i, k] - buffers.position_m[b, i, i]))
+        may = k == i or buffers.timestamp[b, i, k] == 0.0 or distance_m <= 1.2 * 150.0
+        assert team.observation["action_mask"][b, i, k] == may
+        num_masked += not may
+    assert num_masked > 0
+
+
+def test_a_robot_that_failed_may_only_be_silent():
+    team = begun("flocking", switched_off=0.4)
+    for recipient in recipients(6):
+        team.step(recipient)
+    failed = ~team.is_active
+    assert np.all(failed.sum(axis=1) == 2)
+    masks = team.observation["action_mask"]
+    np.testing.assert_array_equal(masks[failed], np.broadcast_to(np.eye(5), masks.shape)[failed])
+    assert masks[~failed].sum() > 6
+
+
+def test_a_part_of_ones_own_is_used_and_left_alone():
+    class Counting:
+        calls = 0
+
+        def __call__(self, position_m, recipient):
+            self.calls += 1
+            return to_nobody(position_m, recipient)
+
+    mission = paper("stationary", **SMALL)
+    mine = Counting()
+    team = Team(mission, channel=mine)
+    team.restart([1])
+    team.step(np.array([[1, 2, 3, 4, 0]]))
+    assert team.costs.packets.lost[0] == 5
+    assert (team.swarm.channel.calls, mine.calls) == (2, 0)
+
+
+@pytest.mark.parametrize("features", FEATURE_SETS)
+@pytest.mark.parametrize(
+    "mission",
+    [
+        paper("flocking", num_windows=40),
+        reference("random-walk", num_windows=40, window_s=10.0, velocity_ratio=5.0),
+        paper("flocking", num_windows=40, window_s=10.0, velocity_ratio=5.0, density_per_km2=1e4),
+    ],
+)
+def test_no_feature_leaves_its_bounds(mission, features):
+    team = Team(replace(mission, num_robots=4), 2, features=features)
+    seen, _ = robot_spaces(team)
+    team.restart([1, 2])
+    for recipient in recipients(40, 2, 4):
+        team.step(recipient)
+        most = np.abs(team.observation["observation"]).max()
+        assert most <= seen["observation"].high.max()
+
+
+def test_drawn_seeds_are_none_of_an_evaluations():
+    rng = np.random.default_rng(0)
+    assert min(next_seed(rng) for _ in range(1000)) >= FIRST_DRAWN_SEED == 2**40
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"reward": "age"}, "reward must be one of aoi, velocity-variance, credit, not 'age'"),
+        ({"reward": "credit", "switched_off": 0.2}, "switched_off is 0.2; set it to 0"),
+        ({"features": "mine"}, "features must be one of"),
+        ({"preset": "mine"}, "preset must be one of"),
+        ({"num_robots": 1}, "number of robots must be"),
+    ],
+)
+def test_refusals(options, message):
+    with pytest.raises(ValueError, match=message):
+        Team(**options)
+
+
+def test_credit_refuses_a_channel_that_draws():
+    class Noisy:
+        def start(self, num_robots, rngs):
+            pass
+
+        def __call__(self, position_m, recipient):
+            return to_nobody(position_m, recipient)
+
+    with pytest.raises(ValueError, match="would draw other numbers; choose reward aoi"):
+        Team(reward="credit", channel=Noisy())
+
+
+def test_before_it_has_begun():
+    with pytest.raises(ValueError, match="call reset"):
+        Team().step(np.zeros((1, 40), dtype=int))
