@@ -29,6 +29,7 @@ COMMANDS = {  # each a module here, with its options, `Options`, and what it doe
     "figures": "Draw the paper's figures from results.",
     "replay": "Open a replay in rerun's viewer.",
     "scene": "Write the scene of a mission as one MJCF file.",
+    "doctor": "Say what works on this machine, and how to mend what does not.",
     "bench": "Time the simulation and its parts.",
 }
 

@@ -14,9 +14,14 @@ def plain_console(*, is_error: bool = False) -> Console:
     return Console(stderr=is_error, highlight=False, soft_wrap=True, markup=False)
 
 
+def num_cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+
+
 def tell_cores(num_jobs: int) -> None:
     """Says, in one line, if there are more jobs than cores to run them."""
-    cores = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    cores = num_cores()
     if num_jobs > cores:
         plain_console(is_error=True).print(
             f"{num_jobs} jobs share {cores} cores: those above {cores} cost memory and save no time"

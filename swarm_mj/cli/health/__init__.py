@@ -1,0 +1,1 @@
+"""What `swarm-mj doctor` looks at: packages, rendering, the machine."""
