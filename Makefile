@@ -5,7 +5,7 @@ READY := .venv/ready
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: help setup fly bench check test attack lock audit format figures picture clean
+.PHONY: help setup fly bench check test attack lock audit format figures picture docs docs-serve clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
@@ -16,6 +16,7 @@ help:
 	@echo "make bench   time the simulation on this machine"
 	@echo "make figures remake all figures; evaluates what training/results/ lacks of the paper's"
 	@echo "make picture remake the README's picture (needs a Vulkan driver)"
+	@echo "make docs    build this documentation as a site; make docs-serve shows it while you write"
 	@echo "make setup   create .venv from pinned constraints; PYTHON=python3.12 chooses another"
 	@echo "make lock    write tools/hashes.txt anew from the pinned constraints"
 	@echo "make audit   list the licences of what is installed, and its known vulnerabilities"
@@ -85,12 +86,22 @@ figures: setup
 	    || exit; \
 	done
 	$(BIN)/python training/learning_figure.py
+	$(BIN)/python tools/diagrams.py
 
 picture: setup
 	$(BIN)/swarm-mj fly --record replays/readme.rrd --force
 	$(BIN)/python tools/picture.py replays/readme.rrd --window 476 --size 1600x1066 --zoom 3 \
 	  --out assets/pictures/replay.png --force
 
+# Material's own notice about a coming version of MkDocs would be the only warning.
+docs docs-serve: export NO_MKDOCS_2_WARNING = 1
+docs: setup
+	$(BIN)/mkdocs build --strict --quiet $(ARGS)
+	@echo "site/index.html"
+
+docs-serve: setup
+	$(BIN)/mkdocs serve $(ARGS)
+
 clean:
-	rm -rf .venv replays build dist .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv replays build dist site .pytest_cache .ruff_cache .hypothesis
 	find swarm_mj tests tools training -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,105 @@
+"""The documentation's site builds without a warning and loads nothing from elsewhere."""
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def site():
+    """The module that MkDocs calls."""
+    spec = importlib.util.spec_from_file_location("site_hook", ROOT / "tools" / "site.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)],
+        cwd=ROOT,
+        env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "WARNING" not in done.stderr
+    return folder
+
+
+class Loaded(HTMLParser):
+    """What a browser loads for a page, and where its links lead."""
+
+    def __init__(self):
+        super().__init__()
+        self.files, self.links = [], []
+
+    def handle_starttag(self, tag, attrs):
+        known = dict(attrs)
+        if tag in ("img", "script", "video", "source", "iframe") and known.get("src"):
+            self.files.append(known["src"])
+        if tag == "link" and known.get("rel") in ("stylesheet", "icon", "preconnect"):
+            self.files.append(known["href"])
+        if tag == "a" and known.get("href"):
+            self.links.append(known["href"])
+
+
+def test_every_page_loads_files_of_the_site_only(built):
+    pages = sorted(built.rglob("*.html"))
+    assert len(pages) >= 10
+    for page in (each for each in pages if each.name != "404.html"):
+        loaded = Loaded()
+        loaded.feed(page.read_text(encoding="utf-8"))
+        inside = [each for each in loaded.files if not each.startswith("data:")]
+        assert not [each for each in inside if ":" in each or each.startswith("//")]
+        local = [each for each in loaded.links if not re.match(r"[a-z]+:|#", each)]
+        for target in (*inside, *local):
+            path = page.parent / re.split(r"[?#]", target)[0]
+            assert path.exists(), f"{page.name}: {target}"
+
+
+def test_the_home_is_the_readme_and_pictures_come_along(built):
+    home = (built / "index.html").read_text(encoding="utf-8")
+    assert (ROOT / "README.md").read_text(encoding="utf-8").startswith("# swarm_mj")
+    assert "age of information" in home
+    assert (built / "repository/assets/figures/paper/fig5.png").stat().st_size > 10_000
+
+
+def test_every_equation_leads_to_its_code(built):
+    page = (built / "paper-map.html").read_text(encoding="utf-8")
+    assert all(f"<td>Eq. {n}</td>" in page for n in range(1, 18))
+    assert "interference_mw" in page  # the code itself is there
+
+
+def test_links_between_files_become_links_of_the_site(site):
+    text = """[a](docs/policies.md#list) ![b](assets/figures/learning.png) [c](https://x.org)
+```
+[f](no/link)
+```
+"""
+    linked, targets = site.site_links(text, "README.md", "index.md")
+    assert linked == text.replace("docs/", "").replace("(assets", "(repository/assets")
+    assert targets == {"assets/figures/learning.png"}
+    linked, targets = site.site_links("[a](../README.md) [b](code.md)", "docs/x.md", "x.md")
+    assert (linked, targets) == ("[a](index.md) [b](code.md)", set())
+
+
+def test_a_link_to_nothing_is_an_error(site):
+    with pytest.raises(FileNotFoundError, match=r"README\.md links to docs/none\.md"):
+        site.site_links("[a](docs/none.md)", "README.md", "index.md")
+
+
+def test_a_mission_s_fields_stand_with_units_and_defaults(site):
+    rows = site.mission_fields().splitlines()
+    assert "| `noise_dbm` | `-50` | noise power | -200 to 50 [dBm] | IV-B |" in rows

@@ -1,0 +1,145 @@
+"""What the documentation's site has beside the pages in `docs/`; `mkdocs.yml` names it as a hook.
+
+Pages and links are written for readers of the repository. The site's home is the README, and where
+a page links to another file of the repository, the site gets that file, too.
+"""
+
+import os
+import posixpath
+import re
+from dataclasses import fields
+from pathlib import Path
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
+import swarm_mj
+from swarm_mj.fields import as_typed, range_of
+from swarm_mj.mission import Mission
+
+ROOT = Path(__file__).parent.parent
+PAGES = {  # where they are on the site, and in the repository
+    "index.md": "README.md",
+    "changelog.md": "CHANGELOG.md",
+    "contributing.md": "CONTRIBUTING.md",
+}
+PLACES = {source: page for page, source in PAGES.items()}
+LINK = re.compile(r"(\]\(|src=\")(?![a-z]+:|#)([^)#\"\s]+)")
+FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
+MAP_LINE = re.compile(r"^    (I\S+)\s+(Eq\. \d+|Alg\. \d+)?\s+(\S.*?)\s{2,}(\S+)$", re.MULTILINE)
+
+
+def on_files(files: Files, *, config: MkDocsConfig) -> Files:
+    """Adds what stands elsewhere, and turns links between files into links of the site.
+
+    Args:
+        files: Those of `docs/`.
+        config: The site's.
+
+    Returns:
+        The same files and more.
+
+    Raises:
+        FileNotFoundError: A page links to what is not in the repository.
+    """
+    written = {page: (ROOT / source).read_text("utf-8") for page, source in PAGES.items()}
+    written["paper-map.md"] = paper_map()
+    for file in files.documentation_pages():
+        written[file.src_uri] = file.content_string
+    brought: set[str] = set()
+    for page, text in written.items():
+        source = PAGES.get(page, f"docs/{page}")
+        text = text.replace("<!-- fields of Mission -->", mission_fields())
+        linked, targets = site_links(text, source, page)
+        brought |= targets
+        _put(files, File.generated(config, page, content=linked))
+    for target in sorted(brought):
+        _put(files, File.generated(config, place_of(target), abs_src_path=str(ROOT / target)))
+    return files
+
+
+def mission_fields() -> str:
+    """The fields of `Mission` as a table."""
+    rows = ["| field | default | what it is | allowed | source |", "|---|---|---|---|---|"]
+    for spec in fields(Mission):
+        known = spec.metadata
+        if "choices" in known:
+            allowed = ", ".join(f"`{choice}`" for choice in known["choices"])
+        else:
+            allowed = range_of(spec) if "low" in known else "`True`, `False`"
+        meaning = known.get("help") or known.get("label") or spec.name.replace("_", " ")
+        source = known.get("source", "authors' code")
+        cells = (f"`{spec.name}`", f"`{as_typed(spec.default)}`", meaning, allowed, source)
+        rows.append(f"| {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def _put(files: Files, file: File) -> None:
+    """Adds a file in the place of its namesake."""
+    present = files.get_file_from_path(file.src_uri)
+    if present is not None:
+        files.remove(present)
+    files.append(file)
+
+
+def place_of(path: str) -> str:
+    """Where a file of the repository is on the site."""
+    if path in PLACES:
+        return PLACES[path]
+    # Pages of other folders are shown as they are written.
+    return path.removeprefix("docs/") if path.startswith("docs/") else f"repository/{path}"
+
+
+def site_links(text: str, source: str, page: str) -> tuple[str, set[str]]:
+    """A page with links of the site, and the files outside `docs/` that it links to.
+
+    Args:
+        text: The page, in Markdown.
+        source: Its path in the repository.
+        page: Its path on the site.
+
+    Returns:
+        The page with its links rewritten; paths in the repository.
+
+    Raises:
+        FileNotFoundError: It links to what is not in the repository.
+    """
+    targets: set[str] = set()
+
+    def rewritten(link: re.Match[str]) -> str:
+        target = posixpath.normpath(posixpath.join(posixpath.dirname(source), link[2]))
+        if not (ROOT / target).is_file():
+            raise FileNotFoundError(f"{source} links to {link[2]}, which is no file")
+        if target not in PLACES and not target.startswith("docs/"):
+            targets.add(target)
+        return link[1] + os.path.relpath(place_of(target), posixpath.dirname(page) or ".")
+
+    parts, end = [], 0
+    for fence in FENCE.finditer(text):  # what looks like a link there is code
+        parts += [LINK.sub(rewritten, text[end : fence.start()]), fence[0]]
+        end = fence.end()
+    return "".join([*parts, LINK.sub(rewritten, text[end:])]), targets
+
+
+def paper_map() -> str:
+    """The page that leads from the paper's equations to the code, made from the package's map."""
+    entries = MAP_LINE.findall(swarm_mj.__doc__ or "")
+    rows = [
+        f"| {section} | {item} | {what} | [`{target}`][swarm_mj.{target}] |"
+        for section, item, what, target in entries
+    ]
+    elsewhere = set(
+        re.findall(r"^::: (\S+)", (ROOT / "docs/api.md").read_text("utf-8"), re.MULTILINE)
+    )
+    targets = dict.fromkeys(f"swarm_mj.{target}" for *_, target in entries)
+    shown = [f"::: {target}\n" for target in targets if target not in elsewhere]
+    return "\n".join([MAP_INTRODUCTION, *rows, "\n## The code\n", *shown])
+
+
+MAP_INTRODUCTION = """# From the paper to the code
+
+Where each section, equation and algorithm of [the paper](https://arxiv.org/abs/2103.05091) is in
+the code. A name leads to its description; open "Source code" there to read the code itself.
+
+| section | equation | what it says | code |
+|---|---|---|---|"""
