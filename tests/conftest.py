@@ -43,6 +43,17 @@ def forks(tmp_path_factory):
     programs.close()
 
 
+@pytest.fixture(scope="session")
+def opengl():
+    """Skips the test where there is no OpenGL to draw pictures with."""
+    from swarm_mj.rendering.opengl import make_context  # types are checked in what is loaded later
+
+    try:
+        make_context(8, 8).free()
+    except OSError as error:
+        pytest.skip(str(error))
+
+
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     """An empty folder, and this process in it."""

@@ -5,7 +5,9 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.utils import EzPickle
+from jaxtyping import UInt8
 
+from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.envs.spaces import team_spaces
 from swarm_mj.envs.team import Info, Observation, Team, next_seed
 from swarm_mj.mission import Mission
@@ -18,7 +20,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
     without a seed it begins another one, drawn from the last seed given.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as in Env
+    metadata: dict[str, Any] = dict(RENDERING)  # noqa: RUF012 - as in Env
 
     def __init__(
         self,
@@ -36,6 +38,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
         self.team = Team(mission, **options)
         check_paid_together(self.team)
+        self._screen = Screen(render_mode)
         self.render_mode = render_mode
         self.observation_space, self.action_space = team_spaces(self.team)
 
@@ -65,6 +68,18 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         reward = self.team.step(np.asarray(action)[np.newaxis])
         info = {name: values[0].item() for name, values in self.team.infos().items()}
         return self._observation(), float(reward[0, 0]), False, self.team.is_over, info
+
+    def render(self) -> UInt8[np.ndarray, "H W 3"] | None:
+        """The mission as it is now, in the render mode "rgb_array".
+
+        Raises:
+            OSError: No OpenGL works here; it says what to install.
+        """
+        return self._screen.picture(self.team) if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Gives back what pictures took."""
+        self._screen.close()
 
     def _observation(self) -> Observation:
         return {name: values[0] for name, values in self.team.observation.items()}

@@ -12,9 +12,10 @@ import numpy as np
 from gymnasium.utils import EzPickle, seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space, create_empty_array
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, UInt8
 
 from swarm_mj.envs.gymnasium import check_paid_together
+from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.envs.spaces import team_spaces
 from swarm_mj.envs.team import Info, Observation, Team, next_seed
 from swarm_mj.mission import Mission
@@ -38,7 +39,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
     `options={"reset_mask": mask}`, which begins the missions where the mask is True.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as in VectorEnv
+    metadata: dict[str, Any] = dict(RENDERING)  # noqa: RUF012 - as in VectorEnv
 
     def __init__(
         self,
@@ -66,6 +67,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         self.num_envs = num_envs
         self._mode = AutoresetMode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self._mode}
+        self._screen = Screen(render_mode)
         self.render_mode = render_mode
         self._mission: Mission | str = mission
         self._options = options
@@ -129,6 +131,25 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
             ended = np.flatnonzero(is_over)
             self._begin(ended, [None] * ended.size, infos)
         return self._copied(), reward, np.zeros_like(is_over), is_over, infos
+
+    def render(self) -> tuple[UInt8[np.ndarray, "H W 3"], ...] | None:
+        """Every mission as it is now, in the render mode "rgb_array".
+
+        Raises:
+            OSError: No OpenGL works here; it says what to install.
+        """
+        if self.render_mode != "rgb_array":
+            return None
+        places = {
+            int(env): (group.team, int(row))
+            for group in self._groups
+            for row, env in zip(group.rows, group.envs, strict=True)
+        }
+        return tuple(self._screen.picture(*places[env]) for env in range(self.num_envs))
+
+    def close_extras(self, **_: Any) -> None:
+        """Gives back what pictures took."""
+        self._screen.close()
 
     def _make_team(self, num_missions: int) -> Team:
         return Team(self._mission, num_missions, **self._options)

@@ -5,7 +5,9 @@ from typing import Any
 import numpy as np
 from gymnasium import Space
 from gymnasium.utils import EzPickle, seeding
+from jaxtyping import UInt8
 
+from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.envs.spaces import robot_spaces
 from swarm_mj.envs.team import Info, Observation, Team, next_seed
 from swarm_mj.mission import Mission
@@ -27,7 +29,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
     seed s; without a seed it begins another one, drawn from the last seed given.
     """
 
-    metadata: dict[str, Any] = {"name": "swarm_mj_v0", "render_modes": []}  # noqa: RUF012 - as there
+    metadata: dict[str, Any] = {"name": "swarm_mj_v0", **RENDERING}  # noqa: RUF012 - as there
 
     def __init__(
         self,
@@ -44,6 +46,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         """
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
         self.team = Team(mission, **options)
+        self._screen = Screen(render_mode)
         self.render_mode = render_mode
         self.possible_agents = [f"robot_{i}" for i in range(self.team.mission.num_robots)]
         self.agents: list[str] = []
@@ -106,6 +109,18 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         infos = {agent: dict(costs) for agent in self.agents}
         self.agents = [] if is_over else [agent for agent in self.agents if not ended[agent]]
         return seen, rewards, ended, cut, infos
+
+    def render(self) -> UInt8[np.ndarray, "H W 3"] | None:
+        """The mission as it is now, in the render mode "rgb_array".
+
+        Raises:
+            OSError: No OpenGL works here; it says what to install.
+        """
+        return self._screen.picture(self.team) if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Gives back what pictures took."""
+        self._screen.close()
 
     def _robot(self, agent: str) -> int:
         return int(agent.removeprefix("robot_"))

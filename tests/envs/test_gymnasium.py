@@ -22,9 +22,11 @@ SMALL = {"num_robots": 5, "num_windows": 8, "range_ratio": 0.4}
         ("Flocking", {"preset": "reference", "features": "reference"}),
     ],
 )
+@pytest.mark.usefixtures("opengl")
 def test_gymnasiums_own_check(name, options):
     register_environments()
     env = gymnasium.make(f"swarm_mj/{name}-v0", **SMALL, **options)
+    env.unwrapped.metadata = {**env.metadata, "render_modes": ["rgb_array"]}  # no window opens here
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env.unwrapped)

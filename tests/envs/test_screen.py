@@ -1,0 +1,79 @@
+"""Pictures of environments: of the right mission, at the right moment."""
+
+import numpy as np
+import pytest
+
+from swarm_mj.envs.gymnasium import SwarmEnv
+from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
+from swarm_mj.envs.pettingzoo import parallel_env
+from swarm_mj.envs.screen import HEIGHT, WIDTH, Screen
+from swarm_mj.mission import paper
+from swarm_mj.rendering.contents import contents_of
+from swarm_mj.rendering.scene import SceneRenderer
+from swarm_mj.swarm import Swarm
+
+MISSION = paper("random-walk", num_robots=6, range_ratio=0.4, num_windows=9)
+pytestmark = pytest.mark.usefixtures("opengl")
+
+
+def recipients(num_windows):
+    return np.random.default_rng(1).integers(0, 6, (num_windows, 2, 6))
+
+
+@pytest.fixture(scope="module")
+def pictures():
+    """Of the missions of seeds 3 and 4 after each window, drawn without any environment."""
+    swarm = Swarm(MISSION, [3, 4])
+    with SceneRenderer(MISSION, WIDTH, HEIGHT) as renderer:
+        drawn = [[renderer.frame(contents_of(swarm, b)) for b in (0, 1)]]
+        for recipient in recipients(5):
+            swarm.exchange(recipient)
+            drawn.append([renderer.frame(contents_of(swarm, b)) for b in (0, 1)])
+    return drawn
+
+
+def test_pictures_differ(pictures):
+    flat = [picture.tobytes() for pair in pictures for picture in pair]
+    assert len(set(flat)) == len(flat)
+
+
+def test_a_single_environment_is_drawn(pictures):
+    env = SwarmEnv(MISSION, render_mode="rgb_array")
+    env.reset(seed=3)
+    for recipient, pair in zip(recipients(5), pictures[1:], strict=True):
+        env.step(recipient[0])
+        np.testing.assert_array_equal(env.render(), pair[0])
+    env.close()
+
+
+def test_agents_are_drawn(pictures):
+    env = parallel_env(MISSION, render_mode="rgb_array")
+    env.reset(seed=4)
+    np.testing.assert_array_equal(env.render(), pictures[0][1])
+    env.close()
+
+
+def test_every_mission_of_a_vector_is_drawn(pictures):
+    """Also of those that began later than the others."""
+    env = SwarmVectorEnv(3, MISSION, render_mode="rgb_array")
+    env.reset(seed=[3, 4, 5])
+    for recipient in recipients(2):
+        env.step(np.concatenate([recipient, recipient[:1]]))
+    env.reset(seed=[None, 4, None], options={"reset_mask": np.array([False, True, False])})
+    drawn = env.render()
+    assert len(drawn) == 3
+    np.testing.assert_array_equal(drawn[0], pictures[2][0])
+    np.testing.assert_array_equal(drawn[1], pictures[0][1])
+    env.close()
+
+
+def test_without_a_mode_there_is_no_picture():
+    for env in (SwarmEnv(MISSION), parallel_env(MISSION), SwarmVectorEnv(2, MISSION)):
+        env.reset(seed=1)
+        assert env.render() is None
+        env.close()
+
+
+def test_a_mode_that_there_is_not():
+    with pytest.raises(ValueError, match="render_mode must be one of human, rgb_array, not 'ansi'"):
+        Screen("ansi")
