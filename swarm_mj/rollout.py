@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.fields import check_kind
 from swarm_mj.policies.policy import Policy
-from swarm_mj.protocol.costs import WindowCosts, mean_hops
+from swarm_mj.protocol.costs import TaskCost, WindowCosts, mean_hops
 from swarm_mj.swarm import Swarm
 
 
@@ -33,6 +34,11 @@ class Summary:
     velocity_variance_mean: Float[np.ndarray, "B"]  # Eq. 17 [m²/s²]
     velocity_variance_first: Float[np.ndarray, "B"]  # after the first window [m²/s²]
     velocity_variance_last: Float[np.ndarray, "B"]  # after the last window [m²/s²]
+    task_cost_name: str | None = None  # as the controller calls it; None if it has none
+    task_cost_unit: str | None = None
+    task_cost_mean: Float[np.ndarray, "B"] | None = None
+    task_cost_first: Float[np.ndarray, "B"] | None = None  # after the first window
+    task_cost_last: Float[np.ndarray, "B"] | None = None  # after the last window
     hops_mean: Float[np.ndarray, "B"]  # depth of the parent trees [hops]
     complete_window: Float[np.ndarray, "B"]  # everyone had first heard of everyone, or nan
     packets_sent: Float[np.ndarray, "B"]  # requests or broadcasts
@@ -98,11 +104,26 @@ def summarise(flown: Iterable[WindowRecord]) -> Summary:
         velocity_variance_mean=_mean(variance),
         velocity_variance_first=variance[0],
         velocity_variance_last=variance[-1],
+        **_task_costs([window.costs.task_cost for window in flown]),
         hops_mean=_mean([window.hops for window in flown]),
         complete_window=np.where(np.any(is_complete, axis=0), first_complete, np.nan),
         **{f"packets_{name}": count for name, count in packets.items()},
         hearers_per_packet=receptions / num_sent,
     )
+
+
+def _task_costs(windows: Sequence[TaskCost | None]) -> dict[str, Any]:
+    """What the task cost over windows; nothing if it has no cost."""
+    costs = [cost for cost in windows if cost is not None]
+    if not costs:
+        return {}
+    return {
+        "task_cost_name": costs[0].name,
+        "task_cost_unit": costs[0].unit,
+        "task_cost_mean": _mean([cost.value for cost in costs]),
+        "task_cost_first": costs[0].value,
+        "task_cost_last": costs[-1].value,
+    }
 
 
 def _mean(windows: Sequence[Float[np.ndarray, "B"]]) -> Float[np.ndarray, "B"]:

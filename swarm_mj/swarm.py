@@ -7,7 +7,7 @@ from numbers import Integral
 import numpy as np
 from jaxtyping import Float, Int
 
-from swarm_mj.control.controller import Controller
+from swarm_mj.control.controller import Controller, Costed
 from swarm_mj.control.motion import controller_of, initial_velocity
 from swarm_mj.fields import check_callable, check_kind
 from swarm_mj.mission import Mission
@@ -19,7 +19,7 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.protocol.buffers import Buffers, check_robots, empty_buffers, observe_self
-from swarm_mj.protocol.costs import WindowCosts, window_costs
+from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, RequestResponse, WindowProtocol
 from swarm_mj.radio.free_space import Channel
@@ -72,6 +72,7 @@ class Swarm:
         self.mission = mission
         self.channel = radio_of(mission) if channel is None else channel
         self.controller = controller_of(mission) if controller is None else controller
+        self._costed = self.controller if isinstance(self.controller, Costed) else None
         self.scene = scene
         self._physics = Physics(mission, len(seeds), scene=scene, num_threads=num_threads)
         self._num_missions = len(seeds)
@@ -183,8 +184,26 @@ class Swarm:
         self.phases = window(self.buffers, decide_after, self.move, self.channel, start)
         self.now = start + 1.0
         return window_costs(
-            self.buffers, self.states, self.phases, self.now, is_broadcast=window.is_broadcast
+            self.buffers,
+            self.states,
+            self.phases,
+            self.now,
+            is_broadcast=window.is_broadcast,
+            task_cost=self._task_cost(),
         )
+
+    def _task_cost(self) -> TaskCost | None:
+        """What the task costs now, if the controller says so."""
+        controller = self._costed
+        if controller is None:
+            return None
+        value = np.asarray(controller.cost(self.states), dtype=np.float64)
+        if value.shape != self.now.shape or not np.all(value >= 0.0):
+            raise ValueError(
+                f"a controller's cost must be {len(self.now)} numbers of 0 or more, one a mission, "
+                f"not {np.array2string(value, threshold=8)}"
+            )
+        return TaskCost(name=controller.cost_name, unit=controller.cost_unit, value=value)
 
     def _decide_after(
         self,

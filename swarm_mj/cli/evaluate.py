@@ -181,6 +181,7 @@ def _write(options: Options, evaluated: list[Evaluated]) -> None:
     if options.json:
         missions = [
             {"episode_aoi": each.aoi, "episode_velocity_variance": each.velocity_variance}
+            | ({} if each.task_cost is None else {"episode_task_cost": each.task_cost})
             for each in evaluated
         ]
         write_json(options.json, results, missions)

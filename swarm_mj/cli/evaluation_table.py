@@ -1,12 +1,13 @@
 """Results on the terminal: one table per regime, the freshest knowledge first."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import groupby
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
 
 MIN_WIDTH = 100  # of a table; narrower consoles wrap its lines rather than cut numbers off
@@ -40,30 +41,50 @@ def _regime(result: Result) -> str:
 
 
 def _table(results: Sequence[Result]) -> Table:
-    """Two lines a policy; velocities only of flocks, which fly as they are told."""
-    flocks = results[0].task == "flocking"
+    """Two lines a policy."""
+    columns = COLUMNS | _columns_of(results[0])
     table = Table(box=SIMPLE_HEAD, show_edge=False, padding=0)
     table.add_column("policy", no_wrap=True)
-    names = ["AoI ± SEM\n95 %", "median\np95", "difference\n95 %", "packets\nreached", "hearers"]
-    names += ["velocity\nvariance", "published\nAoI, var."] if flocks else ["published\nAoI"]
-    for name in names:
+    for name in columns:
         table.add_column(name, justify="right")
     for result in results:
-        table.add_row(_name(result), *_cells(result, flocks=flocks))
+        table.add_row(_name(result), *(cell(result) for cell in columns.values()))
     return table
 
 
-def _cells(r: Result, *, flocks: bool) -> list[str]:
-    return [
-        f"{_with_error(r.aoi_mean, r.aoi_sem)}\n{_interval(r.aoi_ci_low, r.aoi_ci_high)}",
-        f"{_number(r.aoi_median)}\n{_number(r.aoi_p95)}",
+COLUMNS: dict[str, Callable[[Result], str]] = {
+    "AoI ± SEM\n95 %": lambda r: (
+        f"{_with_error(r.aoi_mean, r.aoi_sem)}\n{_interval(r.aoi_ci_low, r.aoi_ci_high)}"
+    ),
+    "median\np95": lambda r: f"{_number(r.aoi_median)}\n{_number(r.aoi_p95)}",
+    "difference\n95 %": lambda r: (
         f"{_number(r.aoi_difference_mean)}\n"
-        f"{_interval(r.aoi_difference_ci_low, r.aoi_difference_ci_high)}",
-        f"{_number(r.packets_per_window)}\n{_number(_reached(r), '.0%')}",
-        _number(r.hearers_per_packet),
-        *([_number(r.velocity_variance_mean, ".4f")] if flocks else []),
-        _published(r),
-    ]
+        f"{_interval(r.aoi_difference_ci_low, r.aoi_difference_ci_high)}"
+    ),
+    "packets\nreached": lambda r: f"{_number(r.packets_per_window)}\n{_number(_reached(r), '.0%')}",
+    "hearers": lambda r: _number(r.hearers_per_packet),
+}
+
+
+def _columns_of(result: Result) -> dict[str, Callable[[Result], str]]:
+    """A task's own columns: what it costs, if anything, or else what the paper says."""
+    if _has_own_cost(result):
+        return {
+            "task cost\nat the end": lambda r: (
+                f"{_number(r.task_cost_mean)}\n{_number(r.task_cost_last_mean)}"
+            )
+        }
+    if result.task == "flocking":
+        return {
+            "velocity\nvariance": lambda r: _number(r.velocity_variance_mean, ".4f"),
+            "published\nAoI, var.": _published,
+        }
+    return {"published\nAoI": _published}
+
+
+def _has_own_cost(result: Result) -> bool:
+    """Whether the task costs something else than the paper's velocity variance."""
+    return result.task_cost_name not in (None, Flocking.cost_name)
 
 
 def _name(result: Result) -> str:
@@ -103,6 +124,9 @@ def _legend(results: Sequence[Result]) -> str:
         "Packets: sent in a window, and the share that reached its addressee or, of broadcasts, "
         "at least one robot; hearers: robots that decoded a broadcast, on average.",
     ]
+    for result in filter(_has_own_cost, results):
+        cost = f"Task cost: {result.task_cost_name} [{result.task_cost_unit}], mean over windows."
+        sentences += [] if cost in sentences else [cost]
     if any(result.task == "flocking" for result in results):
         sentences.append("Velocity variance (var.): of the robots' velocities [m²/s²].")
     if any(result.published_aoi_mean is not None for result in results):

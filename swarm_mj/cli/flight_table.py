@@ -7,6 +7,7 @@ from typing import Any
 from rich.table import Table
 
 from swarm_mj.cli.terminal import named_values
+from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
 from swarm_mj.mission.robot_failures import num_failures
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
@@ -20,7 +21,9 @@ def flight_numbers(policy: Policy, summary: Summary) -> dict[str, Any]:
     """The summary of the one mission flown, and what flew it; what does not exist is None."""
     numbers: dict[str, Any] = {"num_windows": summary.num_windows}
     for name, value in asdict(summary).items():
-        if name != "num_windows":
+        if value is None or isinstance(value, str):
+            numbers[name] = value
+        elif name != "num_windows":
             is_count = name.startswith("packets_") or name == "complete_window"
             number = float(value[0])
             numbers[name] = None if math.isnan(number) else int(number) if is_count else number
@@ -44,7 +47,7 @@ def flight_table(title: str, mission: Mission, numbers: dict[str, Any], wall_s: 
         **_packets(numbers),
         "packets carry": _payload(numbers["payload"]),
         "who decides": decider if numbers["is_centralised"] else "each robot by itself",
-        **({} if mission.task == "stationary" else _velocities(mission, numbers)),
+        **_task_costs(mission, numbers),
     }
     if num_off:
         rows["robots switched off half-way"] = f"{num_off}; not counted from then on"
@@ -86,6 +89,18 @@ def _payload(payload: str) -> str:
     """What packets carry; T, M and P are the paper's names for what a robot knows (II-B)."""
     states = "known states (T, M, P)"
     return states if payload == "none" else f"{states} and {payload}"
+
+
+def _task_costs(mission: Mission, numbers: dict[str, Any]) -> dict[str, str]:
+    """What the task cost; of the paper's moving teams, the velocity variance."""
+    name, unit = numbers["task_cost_name"], numbers["task_cost_unit"]
+    if name in (None, Flocking.cost_name):
+        return {} if mission.task == "stationary" else _velocities(mission, numbers)
+    first, last = numbers["task_cost_first"], numbers["task_cost_last"]
+    return {
+        f"{name}, mean": f"{numbers['task_cost_mean']:.2f} {unit}",
+        "  first to last window": f"{first:.2f} to {last:.2f} {unit}",
+    }
 
 
 def _velocities(mission: Mission, numbers: dict[str, Any]) -> dict[str, str]:

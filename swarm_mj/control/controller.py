@@ -30,3 +30,33 @@ class Controller(Protocol):
             The accelerations; the physics clips them to plus or minus A_max.
         """
         ...
+
+
+@runtime_checkable
+class Costed(Protocol):
+    """A controller that says what its task costs, beside the age of information."""
+
+    cost_name: str  # such as "formation error"
+    cost_unit: str  # such as "m"
+
+    def cost(self, states: RobotStates, /) -> Float[np.ndarray, "B"]:
+        """What the task costs while the robots are like this, per mission; 0 or more."""
+        ...
+
+
+STIFFNESS_PER_S2 = 0.25  # k: a robot begins to brake V_max c / k before its target, 12 m by default
+DAMPING_PER_S = 1.0  # c: critical, 2 sqrt(k)
+
+
+def steer(target_m: Float[np.ndarray, "B N 2"], states: RobotStates) -> Float[np.ndarray, "B N 2"]:
+    """Accelerations towards targets, critically damped: k (target - p) - c v [m/s²].
+
+    Args:
+        target_m: Where each robot wants to be [m].
+        states: The robots' own states.
+
+    Returns:
+        The accelerations, not yet clipped.
+    """
+    apart_m = target_m - states.position_m
+    return STIFFNESS_PER_S2 * apart_m - DAMPING_PER_S * states.velocity_mps

@@ -1,30 +1,35 @@
-"""What the robots do (IV-A): stand still, walk at random, or flock on what they have heard."""
+"""What the robots do (IV-A): stand still, walk at random, or flock on what they have heard.
 
-from collections.abc import Sequence
+`formation` and `coverage` are tasks of ours, each in a module of its own.
+"""
+
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.compiled import compiled
 from swarm_mj.control.controller import Controller
-from swarm_mj.mission import FlockingSet, Mission
+from swarm_mj.control.coverage import Coverage
+from swarm_mj.control.formation import Formation
+from swarm_mj.mission import FlockingSet, Mission, Task
 from swarm_mj.mission.batched_rng import Stream, normal
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import NEVER, Buffers
+from swarm_mj.protocol.costs import velocity_variance
 
 
 def controller_of(mission: Mission) -> Controller:
     """The controller of a mission's task, to be started if it is `Started`."""
-    if mission.task == "stationary":
-        return stand
-    if mission.task == "random-walk":
-        return RandomWalk(mission)
-    return Flocking(mission)
+    return CONTROLLERS[mission.task](mission)
 
 
 def initial_velocity(mission: Mission, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
-    """Velocities at the start [m/s]: uniform in plus or minus V_max per axis, 0 when stationary."""
-    if mission.task == "stationary":
+    """Velocities at the start [m/s]: uniform in plus or minus V_max per axis, or 0.
+
+    The paper's moving teams start moving (IV-A).
+    """
+    if mission.task not in ("random-walk", "flocking"):
         return np.zeros((mission.num_robots, 2))
     limit = mission.max_velocity_mps
     return rng.uniform(-limit, limit, size=(mission.num_robots, 2))
@@ -54,6 +59,9 @@ class RandomWalk:
 class Flocking:
     """Velocity consensus by `flocking`, clipped to plus or minus A_max (IV-A)."""
 
+    cost_name = "velocity variance"
+    cost_unit = "m²/s²"
+
     def __init__(self, mission: Mission) -> None:
         self._limit_mps2 = mission.max_acceleration_mps2
         self._flocking_set: FlockingSet = mission.flocking_set
@@ -62,6 +70,19 @@ class Flocking:
         """The next accelerations [m/s²]."""
         acceleration = flocking(buffers, states.velocity_mps, self._flocking_set)
         return np.clip(acceleration, -self._limit_mps2, self._limit_mps2)
+
+    def cost(self, states: RobotStates, /) -> Float[np.ndarray, "B"]:
+        """The velocity variance of the active robots [m²/s²]."""
+        return velocity_variance(states.velocity_mps, states.is_active)
+
+
+CONTROLLERS: dict[Task, Callable[[Mission], Controller]] = {
+    "stationary": lambda _: stand,
+    "random-walk": RandomWalk,
+    "flocking": Flocking,
+    "formation": Formation,
+    "coverage": Coverage,
+}
 
 
 def flocking(

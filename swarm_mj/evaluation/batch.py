@@ -49,6 +49,8 @@ class BatchCosts:
     aoi_floor: list[Cost]  # the connectivity floor, mean over windows [windows]
     velocity_variance: list[Cost]  # Eq. 17, mean over windows [m²/s²]
     hops: list[Cost]  # depth of the parent trees, mean over windows
+    task_cost: list[Cost | None]  # mean over windows; None if the controller has none
+    task_cost_last: list[Cost | None]  # as above, after the last window
     complete_window: list[Count | None]  # everyone had first heard of everyone
     packets_sent: list[Count]  # requests or broadcasts
     packets_delivered: list[Count | None]  # requests that their addressee decoded; None: broadcasts
@@ -99,6 +101,7 @@ class Tally:
         self._floor = ConnectivityFloor(num_missions, mission.num_robots, mission.range_m)
         self._num_steady = mission.num_windows - mission.num_windows // 2
         self._sums = {name: np.zeros(num_missions) for name in (*MEANS, "aoi_steady", *PACKETS)}
+        self._task_cost, self._last_task_cost = np.full((2, num_missions), np.nan)
         self._complete = np.full(num_missions, np.inf)
         self._ages = np.zeros(num_ages(mission), dtype=np.int64)
 
@@ -116,6 +119,9 @@ class Tally:
         }
         for name, total in self._sums.items():
             total += added[name]
+        if costs.task_cost is not None:
+            self._last_task_cost = costs.task_cost.value
+            self._task_cost = np.nan_to_num(self._task_cost) + costs.task_cost.value
         complete = np.where(costs.is_complete, swarm.now, np.inf)
         np.minimum(self._complete, complete, out=self._complete)
         count_ages(swarm.buffers.timestamp, swarm.now, self._ages, is_active)
@@ -128,9 +134,16 @@ class Tally:
             **{name: (sums[name] / num_windows).tolist() for name in MEANS},
             **packets,
             aoi_steady=(sums["aoi_steady"] / self._num_steady).tolist(),
+            task_cost=_finite(self._task_cost / num_windows),
+            task_cost_last=_finite(self._last_task_cost),
             complete_window=_whole(self._complete),
             ages=self._ages.tolist(),
         )
+
+
+def _finite(costs: Float[np.ndarray, "B"]) -> list[float | None]:
+    """Costs; what does not apply is None."""
+    return [float(cost) if np.isfinite(cost) else None for cost in costs]
 
 
 def _whole(counts: Float[np.ndarray, "B"]) -> list[int | None]:

@@ -91,6 +91,8 @@ def published(policy: str, mission: Mission) -> dict[str, Point]:
         The points by cost, `aoi` and `velocity_variance`; empty where the paper has none, as where
         the regime is not its preset's in all that its figure does not sweep.
     """
+    if mission.task not in SWEEPS:
+        return {}
     sweep = SWEEPS[mission.task]
     free = {name: getattr(mission, name) for name in {sweep.x_name, *sweep.irrelevant}}
     if mission != PRESETS[mission.preset](mission.task, **free):

@@ -58,6 +58,14 @@ class Result:
     velocity_variance_ci_high: float | None
     velocity_variance_median: float
 
+    # What the task costs, as its controller calls it; none of the older files has these.
+    task_cost_name: str | None = None
+    task_cost_unit: str | None = None
+    task_cost_mean: float | None = None
+    task_cost_sem: float | None = None
+    task_cost_last_mean: float | None = None  # after the last window
+    task_cost_last_sem: float | None = None
+
     packets_per_window: float  # requests or broadcasts, no responses
     delivery_ratio: float | None  # of requests: decoded by their addressee
     heard_ratio: float | None = None  # of broadcasts: decoded by at least one robot
@@ -73,6 +81,10 @@ class Result:
     velocity_variance_difference_mean: float | None
     velocity_variance_difference_ci_low: float | None
     velocity_variance_difference_ci_high: float | None
+
+    task_cost_difference_mean: float | None = None
+    task_cost_difference_ci_low: float | None = None
+    task_cost_difference_ci_high: float | None = None
 
     published_aoi_mean: float | None  # the paper's value where the regime is one of its own
     published_aoi_sem: float | None

@@ -6,6 +6,8 @@ from functools import cached_property
 from itertools import product
 from typing import Any
 
+from swarm_mj.control.controller import Costed
+from swarm_mj.control.motion import controller_of
 from swarm_mj.evaluation.batch import Batch
 from swarm_mj.fields import check, setting
 from swarm_mj.io.provenance import code_digest, commit, version
@@ -99,6 +101,13 @@ class Study:
         """A policy as it is evaluated in a regime."""
         is_deterministic = self.is_deterministic and is_learned(policy)
         return make_policy(policy, regime, self.probability, is_deterministic=is_deterministic)
+
+    def task_cost(self, regime: Mission) -> tuple[str, str] | None:
+        """What a regime's controller calls its task's cost, and the unit; None if it has none."""
+        controller = controller_of(regime)
+        if not isinstance(controller, Costed):
+            return None
+        return controller.cost_name, controller.cost_unit
 
     def config(self, policy: str, regime: Mission) -> dict[str, Any]:
         """All that a policy's missions in a regime depend on, but for their seeds."""

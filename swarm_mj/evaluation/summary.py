@@ -30,6 +30,7 @@ class Evaluated:
     result: Result
     aoi: list[float]  # Eq. 10, mean over windows [windows]
     velocity_variance: list[float]  # Eq. 17, mean over windows [m²/s²]
+    task_cost: list[float] | None  # mean over windows; None if the controller has none
 
 
 def summarise(
@@ -57,6 +58,7 @@ def summarise(
             result=Result(
                 **_regime(study, policy, regime),
                 **_costs(own),
+                **_task_costs(own, study.task_cost(regime)),
                 **_packets(own, regime),
                 **_completeness(own),
                 **_differences(own, merged[regime, study.compared_to]),
@@ -68,6 +70,7 @@ def summarise(
             ),
             aoi=own.aoi,
             velocity_variance=own.velocity_variance,
+            task_cost=_known(own.task_cost),
         )
         for (regime, policy), own in merged.items()
     ]
@@ -110,6 +113,23 @@ def _costs(costs: BatchCosts) -> dict[str, Any]:
     return {name: value for name, value in columns.items() if name in COLUMNS}
 
 
+def _task_costs(costs: BatchCosts, label: tuple[str, str] | None) -> dict[str, Any]:
+    """What the task cost over missions, and what its controller calls that."""
+    if label is None:
+        return {}
+    columns: dict[str, Any] = {"task_cost_name": label[0], "task_cost_unit": label[1]}
+    for name in ("task_cost", "task_cost_last"):
+        samples = np.array(_known(getattr(costs, name)))
+        columns |= {f"{name}_mean": float(np.mean(samples)), f"{name}_sem": standard_error(samples)}
+    return columns
+
+
+def _known(costs: Sequence[float | None]) -> list[float] | None:
+    """Every mission's cost; None unless all have one."""
+    known = [cost for cost in costs if cost is not None]
+    return known if len(known) == len(costs) else None
+
+
 def _packets(costs: BatchCosts, regime: Mission) -> dict[str, Any]:
     """How many were sent, and what became of them."""
     sent = sum(costs.packets_sent)
@@ -142,10 +162,11 @@ def _completeness(costs: BatchCosts) -> dict[str, Any]:
 def _differences(costs: BatchCosts, baseline: BatchCosts) -> dict[str, Any]:
     """Paired: the same missions, mission by mission; None of the baseline to itself."""
     differences: dict[str, Any] = {}
-    for cost in COSTS:
+    for cost in (*COSTS, "task_cost"):
         mean, low, high = None, None, None
-        if costs is not baseline:
-            difference = np.array(getattr(costs, cost)) - np.array(getattr(baseline, cost))
+        own, its = _known(getattr(costs, cost)), _known(getattr(baseline, cost))
+        if costs is not baseline and own is not None and its is not None:
+            difference = np.array(own) - np.array(its)
             mean, (low, high) = float(np.mean(difference)), bootstrap_interval(difference)
         found = {"mean": mean, "ci_low": low, "ci_high": high}
         differences |= {f"{cost}_difference_{name}": value for name, value in found.items()}

@@ -13,7 +13,7 @@ import numpy as np
 
 from swarm_mj.fields import FieldOf, check, check_names, setting
 
-Task = Literal["stationary", "random-walk", "flocking"]
+Task = Literal["stationary", "random-walk", "flocking", "formation", "coverage"]
 PhysicsMode = Literal["exact", "contact"]
 Boundary = Literal["reflect", "none"]
 WallHit = Literal["mirror", "clip"]

@@ -140,6 +140,15 @@ def mean_hops(
 
 
 @dataclass(frozen=True, kw_only=True)
+class TaskCost:
+    """What the robots' task costs, as their controller measures it."""
+
+    name: str  # such as "formation error"
+    unit: str  # such as "m"
+    value: Float[np.ndarray, "B"]
+
+
+@dataclass(frozen=True, kw_only=True)
 class WindowCosts:
     """What one window cost, in every mission."""
 
@@ -147,6 +156,7 @@ class WindowCosts:
     is_complete: Bool[np.ndarray, "B"]  # whether everyone has heard of everyone
     velocity_variance_m2ps2: Float[np.ndarray, "B"]  # Eq. 17
     packets: Packets
+    task_cost: TaskCost | None = None  # after the window; None if the controller has none
 
 
 def window_costs(
@@ -156,6 +166,7 @@ def window_costs(
     now: Float[np.ndarray, "B"],
     *,
     is_broadcast: bool,
+    task_cost: TaskCost | None = None,
 ) -> WindowCosts:
     """Everything one window cost the active robots; arguments as in the functions above."""
     age, is_complete = age_of_information(buffers, now, states.is_active)
@@ -164,6 +175,7 @@ def window_costs(
         is_complete=is_complete,
         velocity_variance_m2ps2=velocity_variance(states.velocity_mps, states.is_active),
         packets=count_packets(phases, is_broadcast=is_broadcast),
+        task_cost=task_cost,
     )
 
 

@@ -6,6 +6,7 @@ import rerun as rr
 from jaxtyping import Int, UInt8
 
 from swarm_mj.mission.geometry import ROOT, spanning_tree
+from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay import palette
 from swarm_mj.replay.dendrogram import dendrogram
 from swarm_mj.replay.links import Links, broadcast_counts, transmitters
@@ -50,7 +51,7 @@ def draw_age_matrix(sheet: Sheet, full_scale: float) -> None:
 
 
 def draw_plots(sheet: Sheet, packets: dict[str, Links]) -> None:
-    """Age of information, packets and velocity variance over the mission."""
+    """Age of information, packets and the task's cost over the mission."""
     log = sheet.log
     style = {"colors": [palette.MEAN_AGE], "widths": [2.0]}
     sheet.fixed("plots/age/mean", rr.Measurements.from_fields(names=["team, mean ± std"], **style))
@@ -59,11 +60,17 @@ def draw_plots(sheet: Sheet, packets: dict[str, Links]) -> None:
     _plot(sheet, "plots/age/worst", "worst pair", palette.WORST_AGE, log.age_max)
     own_mean = np.mean(log.ego_age, axis=1)
     _plot(sheet, "plots/age/ego", f"r{log.ego}, mean", palette.EGO, own_mean)
-    if log.has_motion:
-        variance = log.velocity_variance_m2ps2
-        _plot(sheet, "plots/flock/variance", "velocity variance", palette.VARIANCE, variance)
+    if (cost := shown_cost(log)) is not None:
+        _plot(sheet, "plots/task/cost", cost.name, palette.VARIANCE, cost.value)
     for name, (colour, per_window) in packet_counts(log, packets).items():
         _plot(sheet, f"plots/radio/{name}", name, colour, rate(per_window))
+
+
+def shown_cost(log: Log) -> TaskCost | None:
+    """What is plotted of the task: its cost or else, of robots that move, the velocity variance."""
+    if log.task_cost is not None or not log.has_motion:
+        return log.task_cost
+    return TaskCost(name="velocity variance", unit="m²/s²", value=log.velocity_variance_m2ps2)
 
 
 def packet_counts(

@@ -9,7 +9,14 @@ import rerun.blueprint as rrb
 
 from swarm_mj.replay import legend, palette
 from swarm_mj.replay.arena import square_m
-from swarm_mj.replay.charts import RATE_WINDOWS, TREE_HEIGHT, TREE_WIDTH, packet_counts, rate
+from swarm_mj.replay.charts import (
+    RATE_WINDOWS,
+    TREE_HEIGHT,
+    TREE_WIDTH,
+    packet_counts,
+    rate,
+    shown_cost,
+)
 from swarm_mj.replay.frame import Frame
 from swarm_mj.replay.links import Links
 from swarm_mj.replay.recorder import Log
@@ -102,8 +109,9 @@ def _charts(log: Log, packets: dict[str, Links]) -> list[rrb.View | rrb.Containe
         _plot("age", f"Age of information [windows]: team ± std (green), {ego} (white)", ages),
         _plot("radio", radio, rates),
     ]
-    if log.has_motion:
-        charts.append(_plot("flock", "Velocity variance [m²/s²]", [log.velocity_variance_m2ps2]))
+    if (cost := shown_cost(log)) is not None:
+        name = f"{cost.name[:1].upper()}{cost.name[1:]} [{cost.unit}]"
+        charts.append(_plot("task", name, [cost.value]))
     return charts
 
 

@@ -1,10 +1,11 @@
 """What a flight leaves for its replay: one mission's windows as plain arrays."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.rollout import WindowRecord
 from swarm_mj.swarm import Swarm
 
@@ -39,6 +40,7 @@ class Log:
     age_std: Float[np.ndarray, "T"]  # over all pairs of different robots that are on [windows]
     age_max: Float[np.ndarray, "T"]  # the worst pair's [windows]
     velocity_variance_m2ps2: Float[np.ndarray, "T"]  # Eq. 17
+    task_cost: TaskCost | None = None  # one value a window; None if the controller has none
 
     @property
     def has_motion(self) -> bool:
@@ -75,6 +77,7 @@ class Recorder:
         self._is_broadcast = is_broadcast
         self._rows: list[dict[str, np.ndarray]] = []
         self._age: list[np.ndarray] = []
+        self._task_costs: list[TaskCost] = []
 
     def add(self, flown: WindowRecord) -> None:
         """Records the window that was just flown."""
@@ -101,6 +104,8 @@ class Recorder:
             "age_max": np.max(others),
             "velocity_variance_m2ps2": flown.costs.velocity_variance_m2ps2[0],
         }
+        if flown.costs.task_cost is not None:
+            self._task_costs.append(flown.costs.task_cost)
         # Copies: the swarm writes its arrays in place, and a view would keep a whole matrix.
         self._rows.append({name: np.array(value) for name, value in shown.items()})
 
@@ -124,5 +129,13 @@ class Recorder:
             age_window=age_window,
             # An interrupt between the two appends of `add` leaves one matrix too many.
             age=np.stack(self._age[: len(age_window)]),
+            task_cost=self._task_cost(len(window)),
             **columns,
+        )
+
+    def _task_cost(self, num_windows: int) -> TaskCost | None:
+        """What the task cost in each window of the mission recorded."""
+        costs = self._task_costs[:num_windows]
+        return (
+            replace(costs[0], value=np.array([cost.value[0] for cost in costs])) if costs else None
         )

@@ -77,7 +77,10 @@ def test_results_are_what_the_library_computes(whole):
         np.testing.assert_allclose(row["episode_aoi"], summary.aoi_mean)
         np.testing.assert_allclose(row["episode_velocity_variance"], summary.velocity_variance_mean)
         assert result.aoi_mean == pytest.approx(summary.aoi_mean.mean())
-        assert list(row) == [*COLUMNS, "episode_aoi", "episode_velocity_variance"]
+        np.testing.assert_allclose(row["episode_task_cost"], summary.task_cost_mean)
+        assert result.task_cost_last_mean == pytest.approx(summary.task_cost_last.mean())
+        episodes = ["episode_aoi", "episode_velocity_variance", "episode_task_cost"]
+        assert list(row) == [*COLUMNS, *episodes]
         assert {name: row[name] for name in COLUMNS} == {n: getattr(result, n) for n in COLUMNS}
 
 

@@ -10,11 +10,12 @@ from swarm_mj.evaluation.results import Result
 
 
 def some_result(policy, aoi_mean, **overrides):
-    """A result whose other numbers are 1."""
+    """A result whose other numbers are 1; its task has no cost of its own."""
     values = {
         spec.name: {str: "paper", int: 1, float: 1.0}[(get_args(spec.type) or (spec.type,))[0]]
         for spec in fields(Result)
     }
+    values["task_cost_name"] = None
     return Result(**values | {"policy": policy, "aoi_mean": aoi_mean} | overrides)
 
 
@@ -138,3 +139,12 @@ def test_the_lower_bound_stands_below(printed):
     lines = printed([some_result("a", 1.0), some_result("b", 2.0, aoi_floor_mean=1.75)], 100)
     assert "lower bound (connectivity): 1.00 to 1.75, by policy" in lines
     assert "lower bound (connectivity): 1.00" in printed([some_result("a", 1.0)], 100)
+
+
+def test_a_tasks_own_cost_has_a_column_and_a_sentence(printed):
+    cost = {"task_cost_name": "formation error", "task_cost_unit": "m", "task_cost_mean": 321.5}
+    found = some_result("mst", 1.0, task="formation", task_cost_last_mean=12.25, **cost)
+    text = "\n".join(printed([found], 100))
+    assert "321.50" in text
+    assert "12.25" in text
+    assert "Task cost: formation error [m], mean over windows." in text

@@ -1,5 +1,7 @@
 """The table of one flight, from numbers made up by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rich.console import Console
@@ -36,7 +38,7 @@ def summary(**numbers):
         **{
             name: np.array([known[name]]) if name in known else NAN
             for name in Summary.__dataclass_fields__
-            if name != "num_windows"
+            if name != "num_windows" and not name.startswith("task_cost")
         },
     )
 
@@ -135,3 +137,18 @@ def test_numbers_for_a_file():
     numbers = flight_numbers(make_policy("mst", paper()), still)
     assert numbers["velocity_variance_left"] is None
     assert (numbers["payload"], numbers["is_centralised"]) == ("none", True)
+
+
+def test_a_task_with_a_cost_of_its_own_shows_that_instead_of_velocities():
+    its = replace(
+        summary(**ADDRESSED),
+        task_cost_name="formation error",
+        task_cost_unit="m",
+        task_cost_mean=np.array([200.0]),
+        task_cost_first=np.array([300.25]),
+        task_cost_last=np.array([100.5]),
+    )
+    rows, text = shown("mst", "formation", its)
+    assert rows["formation error, mean"] == "200.00 m"
+    assert rows["first to last window"] == "300.25 to 100.50 m"
+    assert "velocity" not in text

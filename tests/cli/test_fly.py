@@ -132,7 +132,10 @@ def test_contact_physics_flies(swarm_mj, tmp_path, boundary):
             "switched off must be a number from 0 to 0.9 [of the team], not 1",
         ),
         (["--switched-off", "-0.1"], "not -0.1"),
-        (["--task", "swim"], "task must be one of stationary, random-walk, flocking, not 'swim'"),
+        (
+            ["--task", "swim"],
+            "task must be one of stationary, random-walk, flocking, formation, coverage, not",
+        ),
         (["--policy", "magic"], "policy must be one of random-flooding, round-robin, mst"),
         (["--preset", "mine"], "preset must be one of paper, reference, not 'mine'"),
         (["--physics", "quantum"], "physics must be one of exact, contact, not 'quantum'"),

@@ -83,4 +83,7 @@ def test_unknown_names_are_refused_by_name(swarm_mj, command):
     """As a process: the type checker of these tests would come first."""
     done = swarm_mj(command, "--task", "swim")
     assert done.returncode == 2
-    assert "task must be one of stationary, random-walk, flocking, not 'swim'" in done.stderr
+    assert (
+        "task must be one of stationary, random-walk, flocking, formation, coverage, not 'swim'"
+        in done.stderr
+    )

@@ -40,7 +40,7 @@ REFUSED = [
         "depends on who talks only if the robots flock; add --task flocking",
     ),
     ((*NEW, "--edges", "none"), "edges"),
-    ((*NEW, "--task", "swim"), "task must be one of stationary, random-walk, flocking, not 'swim'"),
+    ((*NEW, "--task", "swim"), "task must be one of stationary, random-walk, flocking, formation"),
     ((*NEW, "--preset", "mine"), "preset must be one of paper, reference, not 'mine'"),
     ((*NEW, "--boundary", "torus"), "boundary must be one of reflect, none, not 'torus'"),
     ((*NEW, "--robots", "1"), "a whole number from 2 to 1000 [robots], not 1"),

@@ -12,7 +12,7 @@ from swarm_mj.mission.batched_rng import Started
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import empty_buffers
 
-TASKS = ["stationary", "random-walk", "flocking"]
+TASKS = ["stationary", "random-walk", "flocking", "formation", "coverage"]
 FLOCKING_SETS = ["heard", "moving"]
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -36,6 +36,7 @@ def overheard_team(seed, num_missions=2, num_robots=5):
     shape = buffers.timestamp.shape
     buffers.timestamp[...] = rng.integers(0, 4, size=shape) / 2.0  # 0 is never
     buffers.velocity_mps[...] = rng.normal(scale=3.0, size=(*shape, 2))
+    buffers.position_m[...] = rng.normal(scale=100.0, size=(*shape, 2))
     buffers.velocity_mps[rng.random((*shape, 2)) < 0.3] = 0.0
     return buffers, rng.normal(scale=3.0, size=(num_missions, num_robots, 2))
 
@@ -189,14 +190,17 @@ def test_iv_a_a_controller_knows_its_own_robot_only(task, preset):
     mission = preset(task, num_robots=5)
     mine, mine_mps = overheard_team(1)
     theirs, theirs_mps = overheard_team(2)
-    before = started(mission, 2)(mine, bodies_of(mine_mps))
+    mine_m, theirs_m = 10.0 * mine_mps, 10.0 * theirs_mps
+    before = started(mission, 2)(mine, RobotStates(position_m=mine_m, velocity_mps=mine_mps))
     for array, other in (
         (mine.timestamp, theirs.timestamp),
+        (mine.position_m, theirs.position_m),
         (mine.velocity_mps, theirs.velocity_mps),
+        (mine_m, theirs_m),
         (mine_mps, theirs_mps),
     ):
         array[:, [0, 1, 3, 4]] = other[:, [0, 1, 3, 4]]
-    after = started(mission, 2)(mine, bodies_of(mine_mps))
+    after = started(mission, 2)(mine, RobotStates(position_m=mine_m, velocity_mps=mine_mps))
     np.testing.assert_array_equal(before[:, 2], after[:, 2])
 
 
@@ -211,7 +215,8 @@ def test_initial_velocity_is_uniform_per_axis(task):
     assert abs(np.corrcoef(velocity_mps.T)[0, 1]) < 5 / math.sqrt(1000)
 
 
-def test_initial_velocity_of_a_stationary_team_is_zero():
-    mission = paper("stationary", num_robots=7)
+@pytest.mark.parametrize("task", ["stationary", "formation", "coverage"])
+def test_initial_velocity_of_other_teams_is_zero(task):
+    mission = paper(task, num_robots=7)
     velocity_mps = initial_velocity(mission, np.random.default_rng(0))
     np.testing.assert_array_equal(velocity_mps, np.zeros((7, 2)))

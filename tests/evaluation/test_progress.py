@@ -21,6 +21,8 @@ def some_costs(number):
         aoi_floor=[0.0, 1.0 / 3.0],
         velocity_variance=[1e22, 5e-324],
         hops=[1.0, 2.0],
+        task_cost=[None, 0.5],
+        task_cost_last=[None, 1e9],
         complete_window=[None, 7],
         packets_sent=[1, 2],
         packets_delivered=[0, None],

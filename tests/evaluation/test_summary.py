@@ -31,6 +31,8 @@ def costs(aoi, **overrides):
         "aoi_floor": [age / 4.0 for age in aoi],
         "velocity_variance": [age / 10.0 for age in aoi],
         "hops": [1.0] * n,
+        "task_cost": [age / 10.0 for age in aoi],
+        "task_cost_last": [age / 20.0 for age in aoi],
         "complete_window": [None] * n,
         "packets_sent": [1000] * n,
         "packets_delivered": [250] * n,
@@ -206,3 +208,19 @@ def test_merging_joins_lists_and_adds_ages():
     assert merged.aoi == [40.0, 46.0, 43.0]
     assert merged.complete_window == [30, None, 40]
     assert (merged.ages[0], merged.ages[10], merged.ages[301]) == (100, 5, 5)
+
+
+def test_a_tasks_cost_is_named_and_compared():
+    mst, round_robin = results(two_policies(paper("coverage", num_robots=5)))
+    assert (mst.task_cost_name, mst.task_cost_unit) == ("distance to the nearest robot", "m")
+    assert mst.task_cost_mean == pytest.approx((4.0 + 4.6 + 4.3) / 3)
+    assert mst.task_cost_last_mean == pytest.approx(4.3 / 2)
+    assert mst.task_cost_sem == pytest.approx(0.3 / 3**0.5)
+    assert round_robin.task_cost_difference_mean == pytest.approx((0.1 + 0.2 + 0.6) / 3)
+    assert mst.published_aoi_mean is None
+
+
+def test_a_task_without_a_cost_has_none():
+    mst, _ = results()
+    assert mst.task_cost_name is None
+    assert mst.task_cost_mean is None

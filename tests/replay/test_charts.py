@@ -87,7 +87,7 @@ def test_the_matrix_holds_every_pair_s_age(replay, two_way):
 
 
 def test_plots_are_the_costs(replay, two_way):
-    shown = column(replay, "/plots/flock/variance", "Scalars:scalars").flatten().to_numpy()
+    shown = column(replay, "/plots/task/cost", "Scalars:scalars").flatten().to_numpy()
     np.testing.assert_allclose(shown, two_way.log.velocity_variance_m2ps2, rtol=1e-12)
     values = column(replay, "/plots/age/mean", "Measurements:values").flatten().to_numpy()
     np.testing.assert_allclose(values, two_way.log.age_mean, rtol=1e-6)

@@ -30,7 +30,7 @@ ENTITIES = {
     "/ages",
     "/plots/age/mean",
     "/plots/age/ego",
-    "/plots/flock/variance",
+    "/plots/task/cost",
     "/plots/radio/delivered",
     "/state/r000",
     "/about",
@@ -99,5 +99,5 @@ def test_a_broadcast_has_no_arrow_and_no_verdict(flood_replay):
 def test_a_team_at_rest_has_no_velocities(still_replay):
     found = entities(still_replay)
     assert not found & {"/arena/heading", "/arena/trail", "/arena/belief/ring"}
-    assert not any(path.startswith("/plots/flock") for path in found)
+    assert not any(path.startswith("/plots/task") for path in found)
     assert {"/plots/age/mean", "/arena/tree", "/arena/radio/delivered"} <= found
