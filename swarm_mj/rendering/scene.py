@@ -20,11 +20,11 @@ from mujoco._structs import MjData, MjModel, MjrRect, MjvCamera, MjvGeom, MjvOpt
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene, compose
-from swarm_mj.rendering.arcs import SEGMENTS, arcs
 from swarm_mj.rendering.camera import ELEVATION_DEG, FOV_Y_DEG, Camera, look_at
 from swarm_mj.rendering.contents import Contents
 from swarm_mj.rendering.opengl import make_context
 from swarm_mj.replay import palette
+from swarm_mj.replay.arcs import SEGMENTS, arcs
 
 MAX_PIXELS = 4096  # of a picture's side
 BEACONS = 2  # the group of the robots' own markers, assets/robot.xml: too small from afar

@@ -15,6 +15,7 @@ SQUARE_M = 100.0
 MAX_SQUARES = 60  # across the ground; more would be too small to see
 TRAIL_WINDOWS = 150
 TRAIL_STRIDE = 15
+TRAIL_EVERY = 5  # windows; in between, the last one is shown
 HEADING_SHARE = 0.06  # a heading's length, of half the map's width
 RING_SHARE = 0.014  # the radius of a ring around a believed position, likewise
 MIRROR = np.diag([1.0, -1.0, 1.0])  # rerun's 2D views have y down, the map has it up
@@ -28,7 +29,7 @@ def draw_area(sheet: Sheet, mission: Mission) -> None:
         sheet.timed("arena", rr.Transform3D.columns(translation=away, mat3x3=mirrors))
     else:
         sheet.fixed("arena", rr.Transform3D(mat3x3=MIRROR))
-    sheet.fixed_layer("arena/area/grid", strips=_grid(sheet.frame))
+    sheet.fixed_layer("arena/area/grid", strips=grid(sheet.frame))
     half = mission.half_side_m
     outline = [(-half, -half), (half, -half), (half, half), (-half, half), (-half, -half)]
     name = "walls" if mission.has_walls else "outline"
@@ -41,10 +42,19 @@ def square_m(frame: Frame) -> float:
     return SQUARE_M * 10.0 ** max(0, int(np.ceil(np.log10(across_m / SQUARE_M / MAX_SQUARES))))
 
 
+def grid(frame: Frame) -> list[list[tuple[float, float]]]:
+    """Lines at whole squares, over all the ground that the map ever shows."""
+    square = square_m(frame)
+    x_low, y_low = np.floor((np.min(frame.centre_m, axis=0) - frame.reach_m) / square)
+    x_high, y_high = np.ceil((np.max(frame.centre_m, axis=0) + frame.reach_m) / square)
+    xs, ys = np.arange(x_low, x_high + 1) * square, np.arange(y_low, y_high + 1) * square
+    return [[(x, ys[0]), (x, ys[-1])] for x in xs] + [[(xs[0], y), (xs[-1], y)] for y in ys]
+
+
 def draw_robots(sheet: Sheet, colours: UInt8[np.ndarray, "T N 3"]) -> None:
     """Robots in their colours, or off; the ego robot's ring; headings and trails."""
     log = sheet.log
-    shown = np.where(log.is_on[..., None], colours, np.array(palette.SWITCHED_OFF, np.uint8))
+    shown = palette.with_switched_off(colours, log.is_on)
     names = [f"r{i}" for i in range(log.parent.shape[1])]
     sheet.fixed("arena/robots", rr.Points2D.from_fields(labels=names, show_labels=False))
     where = log.position_m.reshape(-1, 2)
@@ -107,15 +117,6 @@ def _draw_arrows(sheet: Sheet, fate: str, links: Links, share: float, aside_m: f
     sheet.layer(f"arena/radio/{fate}", links.row, origins=origins, vectors=vectors)
 
 
-def _grid(frame: Frame) -> list[list[tuple[float, float]]]:
-    """Lines at whole squares, over all the ground that the map ever shows."""
-    square = square_m(frame)
-    x_low, y_low = np.floor((np.min(frame.centre_m, axis=0) - frame.reach_m) / square)
-    x_high, y_high = np.ceil((np.max(frame.centre_m, axis=0) + frame.reach_m) / square)
-    xs, ys = np.arange(x_low, x_high + 1) * square, np.arange(y_low, y_high + 1) * square
-    return [[(x, ys[0]), (x, ys[-1])] for x in xs] + [[(xs[0], y), (xs[-1], y)] for y in ys]
-
-
 def _draw_headings(sheet: Sheet) -> None:
     """A line into the direction of flight; all have one length, for agreement is in directions."""
     velocity = sheet.log.velocity_mps.reshape(-1, 2)
@@ -126,11 +127,14 @@ def _draw_headings(sheet: Sheet) -> None:
 
 
 def _draw_trails(sheet: Sheet) -> None:
+    """Where robots were; drawn anew every few windows only, for trails would be half the file."""
     log = sheet.log
-    rows = np.arange(len(log.window))
+    rows = np.arange(0, len(log.window), TRAIL_EVERY)
     past = range(0, TRAIL_WINDOWS + 1, TRAIL_STRIDE)
     trail = np.stack([log.position_m[np.maximum(0, rows - ago)] for ago in past], axis=2)
-    sheet.layer("arena/trail", strips=trail.reshape(-1, len(past), 2))
+    sheet.fixed_layer("arena/trail")
+    columns = rr.LineStrips2D.columns(strips=trail.reshape(-1, len(past), 2))
+    sheet.timed("arena/trail", columns.partition([trail.shape[1]] * len(rows)), log.window[rows])
 
 
 def _draw_ego(sheet: Sheet) -> None:

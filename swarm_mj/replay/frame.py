@@ -5,8 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from swarm_mj.replay.recorder import Log
-
 NEAR = 1.5  # times the area: robots that stay within it are shown around the area
 
 
@@ -23,14 +21,14 @@ class Frame:
         return bool(np.any(self.centre_m))
 
 
-def frame(log: Log, half_side_m: float) -> Frame:
+def frame(position_m: Float[np.ndarray, "T N 2"], half_side_m: float) -> Frame:
     """The smallest square that holds the area and all ways, or else all robots at any time.
 
     It follows the team if robots go far beyond the area, which is centred on the origin.
     """
-    farthest_m = float(np.max(np.abs(log.position_m)))
+    farthest_m = float(np.max(np.abs(position_m)))
     if farthest_m <= NEAR * half_side_m:
-        centre_m = np.zeros((len(log.window), 2))
+        centre_m = np.zeros((len(position_m), 2))
         return Frame(centre_m=centre_m, reach_m=max(half_side_m, farthest_m))
-    low_m, high_m = np.min(log.position_m, axis=1), np.max(log.position_m, axis=1)
+    low_m, high_m = np.min(position_m, axis=1), np.max(position_m, axis=1)
     return Frame(centre_m=(low_m + high_m) / 2.0, reach_m=float(np.max(high_m - low_m)) / 2.0)

@@ -42,7 +42,7 @@ class Layout(rrb.Blueprint):
 
 
 def layout(log: Log, frame: Frame, packets: dict[str, Links]) -> Layout:
-    """The blueprint of a replay: two tabs, the mission, and the radio of every robot."""
+    """The blueprint of a replay: tabs of the mission, its scene, and the radio of every robot."""
     reach, follows = MARGIN * frame.reach_m, ", follows the team" if frame.moves else ""
     name = f"Map, squares of {square_m(frame):g} m{follows}"
     shown = _drawing("/", name, (-reach, reach), (-reach, reach), contents=["/arena/**"])
@@ -63,7 +63,7 @@ def layout(log: Log, frame: Frame, packets: dict[str, Links]) -> Layout:
         name="Radio",
     )
     return Layout(
-        rrb.Tabs(mission, radio, active_tab=0),
+        rrb.Tabs(mission, _space(frame), radio, active_tab=0),
         rrb.TimePanel(
             state="collapsed", timeline=TIMELINE, fps=WINDOWS_PER_SECOND, loop_mode="all"
         ),
@@ -83,6 +83,24 @@ def _drawing(
     bounds = rrb.VisualBounds2D(x_range=x_range, y_range=y_range)
     return rrb.Spatial2DView(
         origin=origin, name=name, background=palette.BACKGROUND, visual_bounds=bounds, **options
+    )
+
+
+def _space(frame: Frame) -> rrb.Spatial3DView:
+    """MuJoCo's scene, seen from the south and above."""
+    reach = frame.reach_m
+    eye = rrb.EyeControls3D(
+        position=(0.0, -1.35 * reach, 1.75 * reach),
+        look_target=(0.0, -0.12 * reach, 0.0),
+        eye_up=(0.0, 0.0, 1.0),
+    )
+    return rrb.Spatial3DView(
+        origin="/",
+        contents=["/scene/**"],
+        name="Scene in 3-D, colours as on the map",
+        background=palette.BACKGROUND,
+        line_grid=False,
+        eye_controls=eye,
     )
 
 

@@ -72,8 +72,14 @@ def robot_colours(
     """RGB of robots by the age of what the ego robot knows of them; it is white, dark ones off."""
     colours = age_colours(age_windows, full_scale, is_known)
     colours[..., ego, :] = EGO
-    colours[~is_on] = SWITCHED_OFF
-    return colours
+    return with_switched_off(colours, is_on)
+
+
+def with_switched_off(
+    colours: UInt8[np.ndarray, "*T N 3"], is_on: Bool[np.ndarray, "*T N"]
+) -> UInt8[np.ndarray, "*T N 3"]:
+    """The same colours, but dark for robots that are off."""
+    return np.where(is_on[..., None], colours, np.array(SWITCHED_OFF, np.uint8))
 
 
 def nice_scale(age_windows: Float[np.ndarray, "..."]) -> float:

@@ -1,13 +1,20 @@
-"""Reads a replay back: whether it is whole, and which windows it holds."""
+"""Reads a replay back: whether it is whole, which windows it holds, and what a video shows."""
 
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Int
+import pyarrow as pa
+from jaxtyping import Float, Int, UInt8
 from rerun.chunk import RrdReader
 
+from swarm_mj.io.reading import read_json
+from swarm_mj.replay.arcs import SEGMENTS
 from swarm_mj.replay.digest import has_digest
+from swarm_mj.replay.footage import Facts, Footage
 from swarm_mj.replay.sheet import TIMELINE
+from swarm_mj.replay.shots import LOOKS, Shots, in_order
+
+FACTS = "footage"  # the recording's property that holds them
 
 
 def check_replay(path: Path) -> None:
@@ -26,10 +33,97 @@ def check_replay(path: Path) -> None:
 
 def windows(path: Path) -> Int[np.ndarray, "T"]:
     """The numbers of a whole replay's windows, in order; 1 is a mission's first."""
-    chunks = RrdReader(path).stream().filter(content="/arena/robots")
-    found = [
-        chunk.to_record_batch().column(TIMELINE).to_numpy(zero_copy_only=False)
-        for chunk in chunks
+    return _timed(path, "/arena/robots", TIMELINE).to_numpy(zero_copy_only=False).astype(np.int64)
+
+
+def read_footage(path: Path) -> Footage:
+    """What a video shows of a whole replay.
+
+    Raises:
+        ValueError: The file is no whole replay, or of an earlier version of swarm-mj.
+        OSError: The disk fails.
+    """
+    check_replay(path)
+    try:
+        facts = _facts(path)
+        shape = (-1, facts.mission.num_robots)
+        position_m = _numbers(path, "/scene/robots", "Cylinders3D:centers").reshape(*shape, 3)
+        return Footage(
+            facts=facts,
+            window=windows(path),
+            position_m=position_m[..., :2],
+            velocity_mps=_headings(path, position_m),
+            colour=_colours(path).reshape(*shape, 3),
+            shots=_shots(path),
+            age_mean=_numbers(path, "/plots/age/mean", "Measurements:values"),
+        )
+    except (KeyError, ValueError, pa.ArrowException) as error:
+        raise ValueError(
+            f"{path} does not hold what a video shows, as replays of an earlier swarm-mj; record "
+            "it again"
+        ) from error
+
+
+def _facts(path: Path) -> Facts:
+    chunks = RrdReader(path).stream().filter(content=f"/__properties/{FACTS}")
+    (text,) = (chunk.to_record_batch().column("json")[0].as_py()[0] for chunk in chunks)
+    return read_json(text, Facts)
+
+
+def _headings(path: Path, position_m: Float[np.ndarray, "T N 3"]) -> Float[np.ndarray, "T N 2"]:
+    """Directions of flight; teams at rest have none."""
+    if not _has(path, "/scene/heading"):
+        return np.zeros((*position_m.shape[:2], 2))
+    ends = _numbers(path, "/scene/heading", "LineStrips3D:strips").reshape(*position_m.shape[:2], 6)
+    return ends[..., 3:5] - ends[..., :2]
+
+
+def _colours(path: Path) -> UInt8[np.ndarray, "K 3"]:
+    rgba = _flat(_timed(path, "/scene/robots", "Cylinders3D:colors")).to_numpy()
+    return np.stack([(rgba >> shift) & 255 for shift in (24, 16, 8)], axis=-1).astype(np.uint8)
+
+
+def _shots(path: Path) -> Shots:
+    rows, starts, ends, colours = [], [], [], []
+    for fate, (colour, _) in LOOKS.items():
+        entity = f"/scene/packets/{fate}"
+        if not _has(path, entity):
+            continue
+        strips = _timed(path, entity, "LineStrips3D:strips")
+        points = _flat(strips).to_numpy().reshape(-1, SEGMENTS + 1, 3).astype(float)
+        per_window = np.diff(strips.offsets.to_numpy())
+        rows.append(np.repeat(np.arange(len(per_window)), per_window))
+        starts.append(points[:, 0, :2])
+        ends.append(points[:, -1, :2])
+        colours.append(np.tile(np.array(colour, dtype=np.uint8), (len(points), 1)))
+    return in_order(rows, starts, ends, colours)
+
+
+def _has(path: Path, entity: str) -> bool:
+    return any(not chunk.is_static for chunk in RrdReader(path).stream().filter(content=entity))
+
+
+def _numbers(path: Path, entity: str, component: str) -> Float[np.ndarray, "K"]:
+    return _flat(_timed(path, entity, component)).to_numpy().astype(float)
+
+
+def _flat(column: pa.Array) -> pa.Array:
+    """All numbers of nested lists in one row."""
+    while pa.types.is_list(column.type) or pa.types.is_fixed_size_list(column.type):
+        column = column.flatten()
+    return column
+
+
+def _timed(path: Path, entity: str, component: str) -> pa.Array:
+    """A component's values in all windows, in order."""
+    batches = [
+        chunk.to_record_batch()
+        for chunk in RrdReader(path).stream().filter(content=entity)
         if not chunk.is_static
     ]
-    return np.sort(np.concatenate(found)).astype(np.int64)
+    table = pa.concat_tables(
+        pa.Table.from_batches([batch]).select(list({TIMELINE, component}))
+        for batch in batches
+        if component in batch.schema.names
+    )
+    return table.sort_by(TIMELINE).column(component).combine_chunks()

@@ -1,5 +1,6 @@
 """Packets as they are drawn in space: from where to where, and in which colour."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,18 +32,35 @@ class Shots:
     colour: UInt8[np.ndarray, "L 3"]
 
 
+def ends_of(
+    fate: str, links: Links, position_m: Float[np.ndarray, "T N 2"]
+) -> tuple[Float[np.ndarray, "L 2"], Float[np.ndarray, "L 2"]]:
+    """From where to where packets with this fate are drawn [m]."""
+    start = position_m[links.row, links.sender]
+    return start, start + LOOKS[fate][1] * (position_m[links.row, links.receiver] - start)
+
+
 def shots(packets: dict[str, Links], position_m: Float[np.ndarray, "T N 2"]) -> Shots:
     """Packets of all fates, sorted by window; a packet that was lost stops on its way."""
     rows, starts, ends, colours = [], [], [], []
-    for fate, (colour, share) in LOOKS.items():
+    for fate, (colour, _) in LOOKS.items():
         if fate not in packets:
             continue
-        links = packets[fate]
-        start = position_m[links.row, links.sender]
-        rows.append(links.row)
+        start, end = ends_of(fate, packets[fate], position_m)
+        rows.append(packets[fate].row)
         starts.append(start)
-        ends.append(start + share * (position_m[links.row, links.receiver] - start))
+        ends.append(end)
         colours.append(np.tile(np.array(colour, dtype=np.uint8), (len(start), 1)))
+    return in_order(rows, starts, ends, colours)
+
+
+def in_order(
+    rows: Sequence[np.ndarray],
+    starts: Sequence[np.ndarray],
+    ends: Sequence[np.ndarray],
+    colours: Sequence[np.ndarray],
+) -> Shots:
+    """Packets of several fates, sorted by window."""
     row = np.concatenate(rows)
     order = np.argsort(row, kind="stable")
     start_m, end_m, colour = (np.concatenate(each)[order] for each in (starts, ends, colours))

@@ -1,5 +1,7 @@
 """Writes a log as a rerun recording, its layout inside."""
 
+import json
+from dataclasses import asdict
 from pathlib import Path
 
 import rerun as rr
@@ -7,20 +9,30 @@ import rerun_bindings as bindings
 
 from swarm_mj.io.atomic import write_bytes
 from swarm_mj.mission import Mission
+from swarm_mj.physics.scene import Scene
 from swarm_mj.replay import arena, charts, palette
 from swarm_mj.replay.digest import with_digest
+from swarm_mj.replay.footage import facts_of
 from swarm_mj.replay.frame import frame
 from swarm_mj.replay.layout import layout
 from swarm_mj.replay.legend import draw_legend
 from swarm_mj.replay.links import Links, fates
-from swarm_mj.replay.read import check_replay
+from swarm_mj.replay.read import FACTS, check_replay
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet
+from swarm_mj.replay.space import draw_space
 
 APPLICATION = "swarm_mj"
 
 
-def write_replay(log: Log, mission: Mission, config: dict[str, object], path: Path) -> None:
+def write_replay(
+    log: Log,
+    mission: Mission,
+    config: dict[str, object],
+    path: Path,
+    *,
+    scene: Scene | None = None,
+) -> None:
     """Writes a replay; the file appears under its name only when it is whole.
 
     Args:
@@ -28,21 +40,24 @@ def write_replay(log: Log, mission: Mission, config: dict[str, object], path: Pa
         mission: Its numbers.
         config: Kept in the file as recording properties; values are numbers, texts or booleans.
         path: The file, replaced if it exists; missing folders are made.
+        scene: What changes the arena, if anything does.
 
     Raises:
         OSError: The file cannot be written.
     """
     # Rerun's own writer of files hides a full disk, or waits for space for good.
-    recorded = with_digest(_recorded(log, mission, config, path.stem))
+    recorded = with_digest(_recorded(log, mission, config, path.stem, scene))
     bindings.flush_and_cleanup_orphaned_recordings()  # its threads, which would stay
     write_bytes(path, recorded, check=check_replay)
 
 
-def _recorded(log: Log, mission: Mission, config: dict[str, object], name: str) -> bytes:
+def _recorded(
+    log: Log, mission: Mission, config: dict[str, object], name: str, scene: Scene | None
+) -> bytes:
     """The bytes of a replay."""
     rr.set_strict_mode(True)  # bad data raises; otherwise a column is silently missing
     packets = fates(log)
-    shown = frame(log, mission.half_side_m)
+    shown = frame(log.position_m, mission.half_side_m)
     with rr.RecordingStream(APPLICATION, send_properties=False) as recording:
         stream = recording.binary_stream()
         laid_out = layout(log, shown, packets)
@@ -52,14 +67,23 @@ def _recorded(log: Log, mission: Mission, config: dict[str, object], name: str) 
         recording.set_log_time_enabled(False)
         recording.send_recording_name(name)
         recording.send_property("mission", rr.AnyValues(drop_untyped_nones=True, **config))
-        draw(Sheet(recording, log, shown, mission.window_s), mission, packets)
+        facts = facts_of(log, mission, str(config.get("policy", "")), _seed(config))
+        recording.send_property(FACTS, rr.AnyValues(json=json.dumps(asdict(facts))))
+        draw(Sheet(recording, log, shown, mission.window_s), mission, packets, scene)
         lines = [f"- **{key}**: {value}" for key, value in config.items()]
         about = "\n".join([f"# {name}", *lines])
         recording.log("about", rr.TextDocument(about, media_type="text/markdown"), static=True)
     return stream.read() or b""
 
 
-def draw(sheet: Sheet, mission: Mission, packets: dict[str, Links]) -> None:
+def _seed(config: dict[str, object]) -> int:
+    seed = config.get("seed", 0)
+    return seed if isinstance(seed, int) else 0
+
+
+def draw(
+    sheet: Sheet, mission: Mission, packets: dict[str, Links], scene: Scene | None = None
+) -> None:
     """Draws every layer of a replay; `packets` by their fate."""
     log = sheet.log
     full_scale = palette.nice_scale(log.age)
@@ -71,6 +95,7 @@ def draw(sheet: Sheet, mission: Mission, packets: dict[str, Links]) -> None:
         arena.draw_beliefs(sheet)
     arena.draw_tree_on_map(sheet)
     arena.draw_radio(sheet, packets, mission.range_m)
+    draw_space(sheet, mission, packets, colours, scene)
     draw_legend(sheet, full_scale)
     charts.draw_tree(sheet, colours)
     charts.draw_age_matrix(sheet, full_scale)

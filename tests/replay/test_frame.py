@@ -17,14 +17,14 @@ def moved(log, *, by_m):
 def test_a_team_that_stays_is_shown_with_the_area(two_way):
     half_side_m = two_way.mission.half_side_m
     assert np.max(np.abs(two_way.log.position_m)) <= half_side_m  # the boundary reflects
-    shown = frame(two_way.log, half_side_m)
+    shown = frame(two_way.log.position_m, half_side_m)
     assert shown.reach_m == half_side_m
     assert not shown.moves
 
 
 def test_a_team_that_leaves_the_area_a_little_is_shown_with_it(two_way):
     log = moved(two_way.log, by_m=(0.0, 100.0))
-    shown = frame(log, two_way.mission.half_side_m)
+    shown = frame(log.position_m, two_way.mission.half_side_m)
     assert shown.reach_m == np.max(np.abs(log.position_m)) > two_way.mission.half_side_m
     assert not shown.moves
 
@@ -34,13 +34,13 @@ def test_a_team_within_one_and_a_half_times_the_area_is_shown_with_it(two_way, f
     """An area of half side 100 m; one robot stands as far out, in one window."""
     position_m = np.zeros_like(two_way.log.position_m)
     position_m[3, 5, 1] = -farthest_m
-    shown = frame(replace(two_way.log, position_m=position_m), 100.0)
+    shown = frame(position_m, 100.0)
     assert shown.moves == moves
 
 
 def test_a_team_that_flies_off_is_followed(two_way):
     log = moved(two_way.log, by_m=(9000.0, -500.0))
-    shown = frame(log, two_way.mission.half_side_m)
+    shown = frame(log.position_m, two_way.mission.half_side_m)
     assert shown.moves
     for here, centre in zip(log.position_m, shown.centre_m, strict=True):
         assert np.max(np.abs(here - centre)) <= shown.reach_m + 1e-6

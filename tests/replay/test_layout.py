@@ -9,6 +9,7 @@ EVERYWHERE = {
     "Tree of r4, in hops",
     "Age of information, all pairs",
     "Age of information [windows]: team ± std (green), r4 (white)",
+    "Scene in 3-D, colours as on the map",
     "Radio of every robot",
     "About this mission",
 }
@@ -47,7 +48,7 @@ def test_views_are_of_what_the_mission_has(replay_name, names, request):
 
 def test_the_look_does_not_depend_on_the_viewer_s_theme(replay):
     for kind, name, said in views(replay):
-        if kind == "2D":
+        if kind in ("2D", "3D"):
             assert "Background" in said, name
         if kind == "TimeSeries":
             assert {"PlotBackground", "ScalarAxis", "PlotLegend"} <= said, name

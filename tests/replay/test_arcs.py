@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from swarm_mj.rendering.arcs import RISE, SEGMENTS, arcs
+from swarm_mj.replay.arcs import RISE, SEGMENTS, arcs
 
 
 def test_an_arc_starts_and_ends_at_its_ends_and_is_highest_in_the_middle():

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-SEGMENTS = 8  # straight pieces of an arc
+SEGMENTS = 6  # straight pieces of an arc
 RISE = 0.22  # of an arc's top, by its span
 
 

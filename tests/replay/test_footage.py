@@ -1,0 +1,57 @@
+"""What a video shows is the same from a log and from its replay."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swarm_mj.replay import palette
+from swarm_mj.replay.footage import footage_of
+from swarm_mj.replay.read import read_footage
+from swarm_mj.replay.write import write_replay
+
+RECORDED = ["two_way", "flooded", "still", "failing"]
+
+
+@pytest.mark.parametrize("name", RECORDED)
+def test_a_replay_holds_what_a_video_shows(name, request, tmp_path):
+    recorded = request.getfixturevalue(name)
+    log, mission = recorded.log, recorded.mission
+    write_replay(log, mission, {"seed": 5, "policy": "mst"}, tmp_path / "a.rrd")
+    read, made = read_footage(tmp_path / "a.rrd"), footage_of(log, mission, "mst", 5)
+    assert read.facts == made.facts
+    np.testing.assert_array_equal(read.window, made.window)
+    np.testing.assert_allclose(read.position_m, made.position_m, rtol=1e-6, atol=1e-4)
+    np.testing.assert_array_equal(read.colour, made.colour)
+    np.testing.assert_allclose(read.age_mean, made.age_mean)
+    speed = np.maximum(np.linalg.norm(made.velocity_mps, axis=2, keepdims=True), 1e-9)
+    length = np.maximum(np.linalg.norm(read.velocity_mps, axis=2, keepdims=True), 1e-9)
+    headings = read.velocity_mps / length, made.velocity_mps / speed
+    np.testing.assert_allclose(*headings, atol=1e-3)
+    np.testing.assert_array_equal(read.shots.row, made.shots.row)
+    np.testing.assert_array_equal(read.shots.colour, made.shots.colour)
+    for end in ("start_m", "end_m"):
+        shown, expected = (getattr(each.shots, end) for each in (read, made))
+        np.testing.assert_allclose(shown, expected, rtol=1e-5, atol=1e-2)
+
+
+def test_colours_are_by_age_white_for_the_observer_and_dark_for_the_fallen(failing):
+    log = failing.log
+    footage = footage_of(log, failing.mission, "mst", 5)
+    is_dark = np.all(footage.colour == palette.SWITCHED_OFF, axis=2)
+    np.testing.assert_array_equal(is_dark, ~log.is_on)
+    np.testing.assert_array_equal(footage.colour[:, log.ego][log.is_on[:, log.ego]], 255)
+
+
+def test_a_damaged_replay_is_refused(replay, tmp_path):
+    cut = tmp_path / "cut.rrd"
+    cut.write_bytes(replay.read_bytes()[:-7])
+    with pytest.raises(ValueError, match="no whole replay"):
+        read_footage(cut)
+
+
+def test_a_replay_without_facts_is_refused_in_one_line(two_way, tmp_path, monkeypatch):
+    monkeypatch.setattr("swarm_mj.replay.write.FACTS", "other")
+    write_replay(two_way.log, two_way.mission, {"seed": 5}, tmp_path / "old.rrd")
+    with pytest.raises(ValueError, match=r"old\.rrd does not hold .*; record it again"):
+        read_footage(Path(tmp_path / "old.rrd"))

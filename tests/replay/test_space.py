@@ -1,0 +1,83 @@
+"""The scene in three dimensions, read back from the file, against the flight and MuJoCo's model."""
+
+import numpy as np
+from mujoco import mjtGeom
+from reading import column, counts, rows, static
+from rerun.chunk import RrdReader
+
+from swarm_mj.replay.arcs import SEGMENTS
+from swarm_mj.replay.links import fates
+from swarm_mj.replay.write import write_replay
+
+
+def test_bodies_stand_where_the_robots_are(replay, two_way):
+    where = rows(replay, "/scene/robots", "Cylinders3D:centers", 12, 3)
+    np.testing.assert_allclose(where[..., :2], two_way.log.position_m, rtol=1e-6, atol=1e-4)
+    assert np.all(where[..., 2] > 0.0)
+    radii = static(replay, "/scene/robots", "Cylinders3D:radii")
+    assert len(radii) == 12
+    assert np.argmax(radii) == two_way.log.ego
+    on_map = column(replay, "/arena/robots", "Points2D:colors").flatten().to_numpy()
+    in_space = column(replay, "/scene/robots", "Cylinders3D:colors").flatten().to_numpy()
+    np.testing.assert_array_equal(in_space, on_map)
+
+
+def test_a_window_s_arcs_are_its_packets(replay, two_way):
+    links = fates(two_way.log)["delivered"]
+    entity = "/scene/packets/delivered"
+    per_window = counts(replay, entity, "LineStrips3D:strips")
+    np.testing.assert_array_equal(per_window, two_way.counted("delivered"))
+    points = column(replay, entity, "LineStrips3D:strips").flatten().flatten().flatten()
+    points = points.to_numpy().reshape(-1, SEGMENTS + 1, 3)
+    start = two_way.log.position_m[links.row, links.sender]
+    end = two_way.log.position_m[links.row, links.receiver]
+    np.testing.assert_allclose(points[:, 0, :2], start, rtol=1e-5, atol=1e-2)
+    np.testing.assert_allclose(points[:, -1, :2], end, rtol=1e-5, atol=1e-2)
+    assert np.all(points[:, SEGMENTS // 2, 2] > points[:, 0, 2])
+
+
+def test_walls_and_floor_are_the_model_s(replay, two_way):
+    half = two_way.mission.half_side_m
+    east = static(replay, "/scene/area/wall_east", "Boxes3D:half_sizes")
+    np.testing.assert_allclose(east, [2.0, half + 4.0, 5.0], rtol=1e-6)
+    floor = static(replay, "/scene/area/floor", "Boxes3D:half_sizes")
+    np.testing.assert_allclose(floor[:2], half)
+
+
+def test_a_scene_of_one_s_own_is_drawn_whatever_its_geoms(two_way, tmp_path):
+    turned = [np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0]  # lies along x
+
+    def town(spec, _mission):
+        add = spec.worldbody.add_geom
+        add(name="house", type=mjtGeom.mjGEOM_BOX, pos=[50, 60, 10], size=[5, 6, 10])
+        add(name="ball", type=mjtGeom.mjGEOM_SPHERE, pos=[0, 0, 4], size=[4, 0, 0])
+        add(name="pipe", type=mjtGeom.mjGEOM_CAPSULE, pos=[9, 9, 2], size=[2, 7, 0], quat=turned)
+        add(name="tower", type=mjtGeom.mjGEOM_CYLINDER, pos=[1, 2, 8], size=[3, 8, 0])
+        spec.add_mesh(name="tent", uservert=[0, 0, 0, 8, 0, 0, 0, 8, 0, 0, 0, 8])
+        add(name="camp", type=mjtGeom.mjGEOM_MESH, meshname="tent", pos=[-40, -40, 0])
+
+    path = tmp_path / "town.rrd"
+    write_replay(two_way.log, two_way.mission, {"seed": 5}, path, scene=town)
+    kinds = {
+        chunk.entity_path.removeprefix("/scene/area/"): name.split(":")[0]
+        for chunk in RrdReader(path).stream()
+        if chunk.entity_path.startswith("/scene/area/")
+        for name in chunk.to_record_batch().schema.names
+        if name.split(":")[-1] in ("half_sizes", "lengths")
+    }
+    walls = {f"wall_{side}": "Boxes3D" for side in ("east", "west", "north", "south")}
+    solids = {"floor": "Boxes3D", "house": "Boxes3D", "camp": "Boxes3D", "ball": "Ellipsoids3D"}
+    assert kinds == walls | solids | {"pipe": "Capsules3D", "tower": "Cylinders3D"}
+    np.testing.assert_allclose(static(path, "/scene/area/house", "Boxes3D:half_sizes"), [5, 6, 10])
+    start = static(path, "/scene/area/pipe", "Capsules3D:translations")
+    np.testing.assert_allclose(start, [2.0, 9.0, 2.0], atol=1e-6)  # 7 m west of its middle
+    ball = static(path, "/scene/area/ball", "Ellipsoids3D:half_sizes")
+    np.testing.assert_array_equal(ball, [4, 4, 4])
+    tent = static(path, "/scene/area/camp", "Boxes3D:half_sizes")
+    assert np.all(tent > 0.0)
+
+
+def test_a_team_at_rest_has_no_headings(still_replay):
+    entities = {chunk.entity_path for chunk in RrdReader(still_replay).stream()}
+    assert "/scene/robots" in entities
+    assert "/scene/heading" not in entities
