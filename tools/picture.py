@@ -25,6 +25,7 @@ from swarm_mj.cli import script
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.fields import setting
 from swarm_mj.io.atomic import write_bytes
+from swarm_mj.io.owned import owned
 from swarm_mj.io.processes import running
 from swarm_mj.replay.read import check_replay, windows
 from swarm_mj.replay.view import LOOPBACK, VIEWER, free_ports, quiet_environment
@@ -52,7 +53,8 @@ class Options:
 def run(options: Options) -> int:
     """Takes the picture; returns the exit code."""
     check_outputs(Output("picture", options.out, ".png"), must_be_new=not options.force)
-    take_picture(options.replay, options.window, options.out, options.size, options.zoom)
+    with owned(options.out):
+        take_picture(options.replay, options.window, options.out, options.size, options.zoom)
     print(options.out)
     return 0
 

@@ -13,6 +13,7 @@ import tempfile
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -106,6 +107,10 @@ def costs_of(folder: Path, episodes: int, seed: int, num_jobs: int) -> list[floa
 class Options:
     """Whose weights, and on which missions."""
 
+    EPILOG: ClassVar = (
+        "Exit codes: 0 the costs agree, 1 they are too far apart, or the machine failed, 2 bad "
+        "input."
+    )
     weights: Path = setting(help="the authors' .npz", is_positional=True)
     out: Path | None = setting(None, "keep the policy directory here", metavar="DIR")
     episodes: int = setting(100, "missions", low=2, high=100_000)

@@ -24,6 +24,7 @@ from swarm_mj.cli.terminal import plain_console
 from swarm_mj.fields import same_as, setting
 from swarm_mj.io.atomic import write_csv
 from swarm_mj.io.interrupt import heard_interrupt
+from swarm_mj.io.owned import owned
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.registry import HAVE_PROBABILITY, make_policy
@@ -163,6 +164,11 @@ def run(options: Options) -> int:
     """Tunes and writes the table; returns the exit code."""
     console = plain_console(is_error=True)
     check_outputs(Output("table", options.out, ".csv"))
+    with owned(options.out):
+        return _tune(options, console)
+
+
+def _tune(options: Options, console: Console) -> int:
     policies = [name for name in HAVE_PROBABILITY if name in options.policy]
     kept = [] if len(policies) == len(HAVE_PROBABILITY) else read_table(options.out)
     seeds = range(options.seed, options.seed + options.episodes)

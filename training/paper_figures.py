@@ -19,10 +19,11 @@ from swarm_mj.cli import script
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.evaluation.figures.contents import RESULT_FIGURES, ResultFigure
 from swarm_mj.evaluation.progress import progress_path
-from swarm_mj.evaluation.results import read_results
+from swarm_mj.evaluation.results import MOST_BYTES, read_results
 from swarm_mj.fields import setting
 from swarm_mj.io.atomic import write_bytes
 from swarm_mj.io.provenance import commit
+from swarm_mj.io.reading import read_file
 from swarm_mj.mission import PRESETS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -93,7 +94,7 @@ def evaluate(settings: Settings, jobs: int, *, force: bool) -> int:
                 return code
     for part in missing:
         draft = settings.drafts / part.name
-        write_bytes(settings.results / part.name, draft.read_bytes())
+        write_bytes(settings.results / part.name, read_file(draft, "draft", MOST_BYTES))
         draft.unlink()
     return 0
 

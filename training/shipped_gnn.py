@@ -18,6 +18,7 @@ from swarm_mj.cli import script
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.fields import setting
 from swarm_mj.io.atomic import write_bytes
+from swarm_mj.io.reading import read_file
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "training" / "results" / "learning"
@@ -32,6 +33,7 @@ REGIMES = {
 }
 TRAINING = "--entropy 0.01 --evaluate-every 25000 --seed 1"
 FIRST_SEED = 3000  # of the comparison: neither the training's nor the final evaluation's
+MOST_BYTES = 10_000_000  # of a curve
 
 
 class Failed(Exception):  # noqa: N818 - as KeyboardInterrupt
@@ -74,7 +76,7 @@ class ShippedGnn:
         resume = ["--resume"] if (folder / "settings.json").exists() else []
         options = f"{missions} {TRAINING} --minutes {self.minutes:g}".split()
         _run(["train", *options, "--out", str(folder), *resume])
-        write_bytes(self._curve(name), (folder / "curve.csv").read_bytes())
+        write_bytes(self._curve(name), read_file(folder / "curve.csv", "curve", MOST_BYTES))
         return str(folder / "policy")
 
     def _compare(self, name: str, policies: Sequence[str], missions: str) -> None:

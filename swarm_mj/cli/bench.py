@@ -31,6 +31,7 @@ class Options:
 def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
     tell_cores(options.jobs if options.episodes else 1)
+    tell_cores(options.threads, "threads")
     with Console(stderr=True).status("Measuring ...") as status:
         tables = list(_measure(options, status.update))
     console = Console(highlight=False)

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 from swarm_mj.io.atomic import check_writable
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # the machine's fault, not the name's
+# The machine's fault, not the name's: the disk is full, fails, or takes nothing.
+MACHINES_FAULT = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
 class Output(NamedTuple):
@@ -31,7 +32,7 @@ def check_outputs(*outputs: Output, inputs: Iterable[Path] = (), must_be_new: bo
     Raises:
         ValueError: A file exists, is a folder or an input, is named wrongly, or its folder cannot
             be written; or two are the same.
-        OSError: There is no space left.
+        OSError: The disk is full, fails, or is read-only.
     """
     named: dict[str, str] = {}
     sources = {os.path.realpath(path) for path in inputs}
@@ -63,7 +64,7 @@ def _check(what: str, path: Path, suffix: str, way_out: str, *, must_be_new: boo
         check_writable(path)
     except OSError as error:
         complaint = f"{what} {path} cannot be written: {error.strerror}{way_out and f'; {way_out}'}"
-        raise (OSError if error.errno in FULL else ValueError)(complaint) from error
+        raise (OSError if error.errno in MACHINES_FAULT else ValueError)(complaint) from error
 
 
 def _exists(path: Path) -> bool:

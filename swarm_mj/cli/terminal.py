@@ -19,12 +19,12 @@ def num_cores() -> int:
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
-def tell_cores(num_jobs: int) -> None:
-    """Says, in one line, if there are more jobs than cores to run them."""
+def tell_cores(number: int, what: str = "jobs") -> None:
+    """Says, in one line, if there are more jobs than cores to run them, or more threads."""
     cores = num_cores()
-    if num_jobs > cores:
+    if number > cores:
         plain_console(is_error=True).print(
-            f"{num_jobs} jobs share {cores} cores: those above {cores} cost memory and save no time"
+            f"{number} {what} share {cores} cores: those above {cores} cost memory and save no time"
         )
 
 

@@ -13,7 +13,7 @@ from swarm_mj.cli.machine import memory_errors
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
 from swarm_mj.cli.outputs import Output, check_outputs
-from swarm_mj.cli.terminal import named_values, plain_console, this_command
+from swarm_mj.cli.terminal import named_values, plain_console, tell_cores, this_command
 from swarm_mj.cli.train_progress import Watch, age_of
 from swarm_mj.cli.train_settings import (
     add_setting_options,
@@ -64,6 +64,7 @@ def run(options: Options) -> int:
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     with console.status("Preparing ..."):
         asked = _asked_run(options)
+        tell_cores(asked.training.threads, "threads")
         from swarm_mj.learning.train import train  # stable-baselines3 takes its time to import
     try:
         with memory_errors(), deferred_interrupt() as is_interrupted:

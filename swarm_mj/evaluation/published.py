@@ -10,7 +10,6 @@ to is the one that evaluations sweep. Fig. 5's curves fit random walks, not stat
 40 robots cost what random walks of 40 cost at range ratio 0.25 and velocity ratio 0.15.
 """
 
-import csv
 import math
 from dataclasses import dataclass
 from functools import cache
@@ -18,8 +17,10 @@ from pathlib import Path
 
 import msgspec
 
+from swarm_mj.io.reading import read_rows
 from swarm_mj.mission import PRESETS, Mission
 
+MOST_BYTES = 1_000_000  # of the table
 METHODS = {
     "random flooding": "random-flooding",
     "round robin": "round-robin",
@@ -77,11 +78,10 @@ SWEEPS = {
 @cache
 def points() -> tuple[Point, ...]:
     """All points of all curves, in the order of the file."""
-    with Path(__file__).with_suffix(".csv").open(newline="", encoding="utf-8") as file:
-        return tuple(
-            msgspec.convert(row | {"cost": COSTS[row["cost"]]}, Point, strict=False)
-            for row in csv.DictReader(file)
-        )
+    _, rows = read_rows(Path(__file__).with_suffix(".csv"), "table", MOST_BYTES)
+    return tuple(
+        msgspec.convert(row | {"cost": COSTS[row["cost"]]}, Point, strict=False) for _, row in rows
+    )
 
 
 def published(policy: str, mission: Mission) -> dict[str, Point]:

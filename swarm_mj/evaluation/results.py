@@ -109,7 +109,7 @@ NEEDED = tuple(spec.name for spec in fields(Result) if spec.default is MISSING)
 REPEATED = {spec.name: spec for spec in fields(Mission) if spec.name in COLUMNS}
 MOST_BYTES, MOST_CHARACTERS = 100_000_000, 10_000  # of a file, of a cell
 LEAST, MOST, MOST_WHOLE = -1e-6, 1e9, 2**63  # rounding may leave a little less than nothing
-NUMBERS = {int: "a whole number", float: "a finite number from 0 to 1e9", str: "a text"}
+NUMBERS = {int: "a whole number", float: "a finite number from {low} to 1e9", str: "a text"}
 WAY_OUT = "make them with `swarm-mj evaluate --csv FILE`"
 
 
@@ -177,7 +177,8 @@ def _value(spec: Field[Any], text: str) -> Any:  # noqa: ANN401 - any field's va
     kind = kind_of(spec)
     value = _text(text) if kind is str else _number(spec, kind, text)
     if value is None:
-        raise ValueError(f"{spec.name} must be {NUMBERS[kind]}, not {text!r:.60}")
+        described = NUMBERS[kind].format(low="-1e9" if _least(spec) == -MOST else "0")
+        raise ValueError(f"{spec.name} must be {described}, not {text!r:.60}")
     if spec.name in REPEATED:
         check_value(REPEATED[spec.name], value)
     return value
@@ -189,9 +190,13 @@ def _text(text: str) -> str | None:
 
 def _number(spec: Field[Any], kind: type, text: str) -> int | float | None:
     """What a cell says, if it is a number that such a cost or count can be."""
-    low = -MOST if "difference" in spec.name else LEAST
     try:
         value = kind(text)
     except ValueError:
         return None
-    return value if low <= value <= (MOST if kind is float else MOST_WHOLE) else None
+    return value if _least(spec) <= value <= (MOST if kind is float else MOST_WHOLE) else None
+
+
+def _least(spec: Field[Any]) -> float:
+    """A difference may be less than nothing."""
+    return -MOST if "difference" in spec.name else LEAST

@@ -27,6 +27,7 @@ from swarm_mj.learning.run_folder import (
     CHECKPOINT,
     CURVE,
     INIT,
+    POLICY,
     SETTINGS,
     TENSORBOARD,
     Limits,
@@ -40,7 +41,7 @@ from swarm_mj.learning.run_folder import (
 from swarm_mj.learning.settings import PpoSettings, Training
 from swarm_mj.learning.vec_env import RobotEnv, TeamEnv, missions_of
 from swarm_mj.policies.policy_config import PolicyConfig
-from swarm_mj.policies.stored import read_policy, save_policy
+from swarm_mj.policies.stored import check_replaceable, read_policy, save_policy
 
 NO_BUDGET = 10**15  # team decisions
 
@@ -138,6 +139,7 @@ def train(run: Run, folder: Path, *, listener: Listener, is_resumed: bool = Fals
     check_folder(folder)
     with owned(folder / SETTINGS):
         check_folder(folder)  # a run may have begun, or come further, meanwhile
+        check_replaceable(folder / POLICY)
         model, rng = make_model(run.training)
         progress = _begun(folder, run, model, rng)
         model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))

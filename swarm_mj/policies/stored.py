@@ -46,7 +46,7 @@ def save_policy(
     }
     for name in MAX_BYTES:
         check_size(name, len(contents[name]), MAX_BYTES[name])
-    _check_replaceable(folder)
+    check_replaceable(folder)
     write_folder(folder, contents, check=read_policy)
 
 
@@ -91,7 +91,7 @@ def read_policy(folder: Path) -> tuple[AggregationGnn, PolicyConfig]:
 
 
 def _read(folder: Path, name: str) -> bytes:
-    return read_file(folder / name, "file", MAX_BYTES[name], folder=folder)
+    return read_file(folder / name, "file", MAX_BYTES[name])
 
 
 def _network(config: PolicyConfig, data: bytes) -> AggregationGnn:
@@ -126,9 +126,14 @@ def _check_tensors(tensors: Mapping[str, Tensor], network: AggregationGnn) -> No
             raise ValueError(f"tensor {name} has numbers that are not finite")
 
 
-def _check_replaceable(folder: Path) -> None:
-    """Raises ValueError if something else than a policy would be lost."""
+def check_replaceable(folder: Path) -> None:
+    """Passes if a policy may take a folder's place; what file browsers hide in it may be lost.
+
+    Raises:
+        ValueError: Something else would be lost.
+    """
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"policy {folder} is a file; name another place, or remove it")
-    for name in sorted({path.name for path in folder.glob("*")} - {WEIGHTS, CONFIG, CARD}):
+    names = {path.name for path in folder.glob("*") if not path.name.startswith(".")}
+    for name in sorted(names - {WEIGHTS, CONFIG, CARD}):
         raise ValueError(f"{folder} holds {name}, which is no policy's; name another directory")

@@ -1,5 +1,6 @@
 """Reads a replay back: whether it is whole, which windows it holds, and what a video shows."""
 
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,7 @@ def check_replay(path: Path) -> None:
     if not has_digest(path):
         raise ValueError(
             f"{path} is no whole replay: damaged, truncated, or not recorded by this version of "
-            f"swarm-mj; record it again, or see by `rerun {path}` what rerun makes of it"
+            f"swarm-mj; record it again, or see what `rerun {shlex.quote(str(path))}` makes of it"
         )
 
 

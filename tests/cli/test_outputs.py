@@ -71,10 +71,11 @@ def test_a_file_has_the_ending_that_its_readers_look_for(tmp_path):
     check_outputs(Output("summary", tmp_path / "a.json", ".json"), Output("none", None, ".csv"))
 
 
-def test_a_full_disk_is_the_machines_fault(tmp_path, monkeypatch):
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS])
+def test_a_full_or_read_only_disk_is_the_machines_fault(tmp_path, monkeypatch, number):
     def full(_path):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr("swarm_mj.cli.outputs.check_writable", full)
-    with pytest.raises(OSError, match=r"summary .* cannot be written: No space left on device"):
+    with pytest.raises(OSError, match=rf"summary .* cannot be written: {os.strerror(number)}"):
         check_outputs(Output("summary", tmp_path / "a"))

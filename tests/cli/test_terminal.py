@@ -6,6 +6,7 @@ import sys
 import pytest
 from rich.console import Console
 
+from swarm_mj.cli import terminal
 from swarm_mj.cli.terminal import named_values, plain_console, this_command
 
 
@@ -18,6 +19,14 @@ def test_text_is_shown_as_it_is(capsys, monkeypatch, is_error):
     plain_console(is_error=is_error).print(text)
     printed = capsys.readouterr()
     assert (printed.out, printed.err) == (("", text + "\n") if is_error else (text + "\n", ""))
+
+
+def test_more_threads_than_cores_are_told(capsys, monkeypatch):
+    monkeypatch.setattr(terminal, "num_cores", lambda: 2)
+    terminal.tell_cores(2, "threads")
+    assert capsys.readouterr().err == ""
+    terminal.tell_cores(3, "threads")
+    assert capsys.readouterr().err.startswith("3 threads share 2 cores: those above 2")
 
 
 def test_values_stand_beside_their_names_under_the_title():

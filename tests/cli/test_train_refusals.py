@@ -110,6 +110,7 @@ REFUSED = [
         "Expected `int`, got `str` - at `$.training.seed`",
     ),
     (("--out", "cut-checkpoint", "--resume"), "checkpoint.pt is damaged, or none; begin a new"),
+    (("--out", "strange", "--resume"), "policy holds thesis.tex, which is no policy's"),
     (("--out", "mixed-up", "--resume"), "it was made with other settings than the run's"),
 ]
 
@@ -134,11 +135,14 @@ def prepare(folder):
         ),
         "cut-checkpoint/settings.json": as_bytes(settings),
         "cut-checkpoint/checkpoint.pt": checkpoint[:-40],
+        "strange/settings.json": as_bytes(settings),
+        "strange/checkpoint.pt": checkpoint,
+        "strange/policy/thesis.tex": b"precious",
         "mixed-up/settings.json": as_bytes(other),
         "mixed-up/checkpoint.pt": checkpoint,
     }
     for name, content in made.items():
-        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).parent.mkdir(exist_ok=True, parents=True)
         (folder / name).write_bytes(content)
 
 

@@ -94,6 +94,10 @@ def with_cells(path, **cells):
         ({"aoi_mean": ""}, "line 3: aoi_mean must be a finite number from 0 to 1e9, not ''"),
         ({"aoi_mean": "nan"}, "aoi_mean must be a finite number from 0 to 1e9, not 'nan'"),
         ({"aoi_sem": "inf"}, "aoi_sem must be a finite number from 0 to 1e9, not 'inf'"),
+        (
+            {"aoi_difference_mean": "x"},
+            "aoi_difference_mean must be a finite number from -1e9 to 1e9",
+        ),
         ({"episodes": "100.0"}, "episodes must be a whole number, not '100.0'"),
         ({"policy": ""}, "policy must be a text, not ''"),
         ({"aoi_median": "-1"}, "aoi_median must be a finite number from 0 to 1e9, not '-1'"),

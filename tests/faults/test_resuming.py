@@ -196,10 +196,10 @@ def test_the_policy_a_run_begins_with_is_a_policy_and_no_other_folder(begun, tmp
     (home / "secret").unlink()
     save_tiny(home)
     refused(begun, capsys, "has another network than the run")
-    (home / "config.json").rename(home / "elsewhere.json")
-    (home / "config.json").symlink_to(tmp_path / "home" / ".." / "other.json")
-    shutil.copy(home / "elsewhere.json", tmp_path / "other.json")
-    refused(begun, capsys, "is a link that leads out")
+    (tmp_path / "mine").write_text("a secret")
+    (home / "config.json").unlink()
+    (home / "config.json").symlink_to(tmp_path / "mine")
+    refused(begun, capsys, "config.json: JSON is malformed")
 
 
 PPO = [

@@ -278,6 +278,28 @@ def test_what_is_no_policy_is_not_replaced(policy):
         save_tiny(policy / CARD)
 
 
+def test_what_file_browsers_hide_keeps_no_policy_from_its_place(policy):
+    (policy / ".DS_Store").touch()
+    save_tiny(policy, "reference")
+    assert read_policy(policy)[1].features == "reference"
+
+
+def test_files_may_be_links_as_in_caches_and_symlink_installs(policy, tmp_path):
+    (tmp_path / "cache").mkdir()
+    for name in (CONFIG, WEIGHTS):
+        (policy / name).rename(tmp_path / "cache" / name)
+        (policy / name).symlink_to(f"../cache/{name}")
+    assert read_policy(policy)[1] == read_policy(tmp_path / "cache")[1]
+
+
+@pytest.mark.parametrize("kind", ["/dev/zero", "pipe", "nowhere", CONFIG])
+def test_links_must_lead_to_files(policy, tmp_path, kind):
+    os.mkfifo(tmp_path / "pipe")
+    (policy / CONFIG).unlink()
+    (policy / CONFIG).symlink_to(kind if kind != "pipe" else tmp_path / "pipe")
+    refused(policy, "name a file|no file|in a circle|Too many levels")
+
+
 def test_loading_needs_no_training_library(policy):
     code = (
         "import sys; from pathlib import Path; from swarm_mj.mission import paper;"

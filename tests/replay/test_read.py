@@ -22,6 +22,12 @@ def test_what_is_no_whole_replay_is_refused(replay, tmp_path, change):
         check_replay(other)
 
 
+def test_the_command_named_can_be_pasted(tmp_path):
+    (tmp_path / "a b.rrd").write_bytes(b"{}")
+    with pytest.raises(ValueError, match=r"`rerun '/.*a b\.rrd'`"):
+        check_replay(tmp_path / "a b.rrd")
+
+
 def test_no_replay_is_no_crash(tmp_path):
     with pytest.raises(ValueError, match="there is no replay"):
         check_replay(tmp_path / "missing.rrd")

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from swarm_mj.io.owned import owned
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.policies.tuning import read_table
@@ -130,6 +131,13 @@ def test_tables_are_read_as_they_were_written(tool, monkeypatch, tmp_path):
     rows = [tool.tune(search(tool, (p,)), range(3), p) for p in (0.1, 0.2)]
     tool.write_table(rows, tmp_path / "a.csv")
     assert read_table(tmp_path / "a.csv") == rows
+
+
+def test_a_table_that_another_writes_is_left_alone(run, tmp_path):
+    with owned(tmp_path / "a.csv"):
+        done = run("--policy", "mst", *QUICK, "--out", "a.csv")
+    assert done.returncode == 2
+    assert "is being written by process" in done.stderr
 
 
 def test_one_policy_alone_keeps_the_rows_of_the_others(tool, run, tmp_path):
