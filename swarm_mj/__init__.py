@@ -37,5 +37,75 @@ Around the paper: `compiled` and `fields` (how functions are compiled, how optio
 `rollout` (a policy from the first window to the last), more `policies` than the paper's,
 `evaluation` (V: policies on the same missions, and Figs. 2 to 6), `replay` and
 `rendering` (what is seen), `envs` (other libraries' faces), `benchmark` (speed), `cli` (the command
-line).
+line), `api` (Python in five lines; its names stand here as well).
 """
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from swarm_mj.api.evaluate import Evaluation, evaluate
+    from swarm_mj.api.fly import fly
+    from swarm_mj.api.run import Run
+    from swarm_mj.mission import Mission, paper, reference
+    from swarm_mj.policies import (
+        POLICIES,
+        BroadcastPolicy,
+        CentralisedPolicy,
+        DecentralisedPolicy,
+        LocalViews,
+        Policy,
+        make_policy,
+    )
+    from swarm_mj.rollout import rollout, summarise
+    from swarm_mj.swarm import Swarm
+
+    __version__: str
+
+__all__ = [
+    "POLICIES",
+    "BroadcastPolicy",
+    "CentralisedPolicy",
+    "DecentralisedPolicy",
+    "Evaluation",
+    "LocalViews",
+    "Mission",
+    "Policy",
+    "Run",
+    "Swarm",
+    "evaluate",
+    "fly",
+    "make_policy",
+    "paper",
+    "reference",
+    "rollout",
+    "summarise",
+]
+
+# Where each name is; a module is imported when a name of it is first asked for.
+_HOMES = {
+    "api.evaluate": ("Evaluation", "evaluate"),
+    "api.fly": ("fly",),
+    "api.run": ("Run",),
+    "mission": ("Mission", "paper", "reference"),
+    "policies": (
+        *("POLICIES", "BroadcastPolicy", "CentralisedPolicy", "DecentralisedPolicy"),
+        *("LocalViews", "Policy", "make_policy"),
+    ),
+    "rollout": ("rollout", "summarise"),
+    "swarm": ("Swarm",),
+}
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - any of the names
+    """A name of `__all__`, or the version, when it is first asked for."""
+    if name == "__version__":
+        return import_module("swarm_mj.io.provenance").version()
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(f"swarm_mj.{home}"), name)
+    raise AttributeError(f"module 'swarm_mj' has no attribute {name!r}", name=name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, "__version__"})

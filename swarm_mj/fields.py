@@ -91,11 +91,15 @@ def check_names(what: str, given: Iterable[str], known: Iterable[str]) -> None:
             raise TypeError(f"{what} has no {name!r}{hint}")
 
 
-def check_kind(what: str, value: object, kind: type[Any], such_as: str) -> None:
-    """Passes if an argument is of the kind; raises TypeError, naming one that is, if not."""
-    if not isinstance(value, kind):
+def check_kind(
+    what: str, value: object, kinds: type[Any] | tuple[type[Any], ...], such_as: str
+) -> None:
+    """Passes if an argument is of a kind; raises TypeError, naming one that is, if not."""
+    if not isinstance(value, kinds):
+        allowed = kinds if isinstance(kinds, tuple) else (kinds,)
+        names = " or ".join(kind.__name__ for kind in allowed)
         raise TypeError(
-            f"{what} must be of the type {kind.__name__}, such as {such_as}, not {_shown(value)}"
+            f"{what} must be of the type {names}, such as {such_as}, not {_shown(value)}"
         )
 
 

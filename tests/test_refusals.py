@@ -171,6 +171,14 @@ OF_ANOTHER_KIND = {
     "Swarm(mission, [1]).step('tdma')": 'policy must be of the type Policy, such as make_policy("',
     "list(rollout(Swarm(mission, [1]), Tdma))": "not the class Tdma; make an object of it",
     "list(rollout(mission, Tdma()))": "swarm must be of the type Swarm, such as Swarm(mission, [1]",
+    "swarm_mj.fly('floking')": "not 'floking'; did you mean flocking?",
+    "swarm_mj.fly(policy=3)": 'policy must be of the type str or Path, such as "planner", not 3',
+    "swarm_mj.fly(policy=Tdma)": "not the class Tdma; make an object of it, Tdma(...)",
+    "swarm_mj.fly(seed='1', record=False)": "seeds must be one or more integers",
+    "swarm_mj.fly(observer='r1', num_windows=3)": "observer must be from 0 to 39",
+    "swarm_mj.evaluate([3])": "each of the policies must be of the type str or Path",
+    "swarm_mj.evaluate(Tdma())": "policies must be a list of names, not <swarm_mj",
+    "swarm_mj.evaluate([Tdma()])": "each of the policies must be of the type str or Path",
     "make_policy('plannr', mission)": "not 'plannr'; did you mean planner?",
     "make_policy(3, mission)": 'policy must be of the type str, such as "planner", not 3',
     "make_policy('planner', 'flocking')": "mission must be of the type Mission",
@@ -178,6 +186,7 @@ OF_ANOTHER_KIND = {
     "make_policy('tdma', mission, '0.3')": "tdma takes no transmission probability; leave out 0.3",
 }
 MISTAKES = f"""
+import swarm_mj
 from swarm_mj.mission import Mission, paper, reference
 from swarm_mj.policies import make_policy
 from swarm_mj.policies.tdma import Tdma

@@ -35,7 +35,14 @@ class Needs:
     largest_file: float | None = None  # the largest file of these; None is all in one
 
 
-def check_fits(needs: Needs, output: Path | None, way_out: str, *, is_forced: bool) -> None:
+def check_fits(
+    needs: Needs,
+    output: Path | None,
+    way_out: str,
+    *,
+    is_forced: bool,
+    way_on: str = ", or try it with --yes",
+) -> None:
     """Passes if a command's needs will be met, or nobody minds.
 
     Args:
@@ -43,6 +50,7 @@ def check_fits(needs: Needs, output: Path | None, way_out: str, *, is_forced: bo
         output: Where it writes, if it does.
         way_out: What to choose instead.
         is_forced: Whether `--yes` was given.
+        way_on: How to start all the same, if there is a way.
 
     Raises:
         ValueError: Memory, addresses or the disk will not suffice; it says by how much.
@@ -61,8 +69,8 @@ def check_fits(needs: Needs, output: Path | None, way_out: str, *, is_forced: bo
     for what, needed, free, where in has:
         if needed > free and not is_forced:
             raise ValueError(
-                f"this takes about {in_gb(needed)} {what}, and {in_gb(free)} {where}; {way_out}, "
-                "or try it with --yes"
+                f"this takes about {in_gb(needed)} {what}, and {in_gb(free)} {where}; "
+                f"{way_out}{way_on}"
             )
 
 

@@ -1,6 +1,6 @@
 """`swarm-mj evaluate`: policies over the same missions, with error bars."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from functools import partial
@@ -113,7 +113,7 @@ def _evaluate(options: Options, study: Study) -> int:
     try:
         keep = partial(progress.append, kept, header) if kept else None
         with memory_errors():
-            _fly(study, costs, options.jobs, keep, console)
+            fly_study(study, costs, options.jobs, keep, study_bar(study, costs, console))
     except (KeyboardInterrupt, MemoryError) as error:
         is_memory = isinstance(error, MemoryError)
         hint = "the same command with --resume continues" if kept else "nothing was kept"
@@ -148,21 +148,31 @@ def _progress_file(options: Options) -> Path | None:
     return kept
 
 
-def _num_flown(study: Study, costs: dict[int, BatchCosts]) -> int:
+def _num_flown(study: Study, costs: Mapping[int, BatchCosts]) -> int:
     return sum(len(study.batches[index].seeds) for index in costs)
 
 
-def _fly(
+def study_bar(
+    study: Study, costs: Mapping[int, BatchCosts], console: Console, *, after_s: float = 0.0
+) -> WorkBar:
+    """A bar of the missions of a study, as far as they are flown; arguments as of `WorkBar`."""
+    total, done = study.episodes * len(study.pairs), _num_flown(study, costs)
+    return WorkBar("Flying", total, "missions", completed=done, console=console, after_s=after_s)
+
+
+def fly_study(
     study: Study,
     costs: dict[int, BatchCosts],
     num_jobs: int,
     keep: Callable[[int, BatchCosts], None] | None,
-    console: Console,
+    bar: WorkBar,
 ) -> None:
-    """Flies the batches that `costs` lacks, into `costs` and where they are kept."""
+    """Flies the batches that `costs` lacks, into `costs` and where they are kept.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C was pressed; `costs` has all batches that were flown.
+    """
     left = [index for index in range(len(study.batches)) if index not in costs]
-    total, done = study.episodes * len(study.pairs), _num_flown(study, costs)
-    bar = WorkBar("Flying", total, "missions", completed=done, console=console)
     flown = run_jobs(fly_batch, [study.batches[index] for index in left], num_jobs)
     with bar, closing(flown), heard_interrupt() as was_pressed:
         for which, batch_costs in flown:
@@ -176,14 +186,18 @@ def _fly(
             bar.move_to(_num_flown(study, costs))
 
 
-def _write(options: Options, evaluated: list[Evaluated]) -> None:
-    results = [each.result for each in evaluated]
+def _write(options: Options, evaluated: Sequence[Evaluated]) -> None:
     if options.json:
-        missions = [
-            {"episode_aoi": each.aoi, "episode_velocity_variance": each.velocity_variance}
-            | ({} if each.task_cost is None else {"episode_task_cost": each.task_cost})
-            for each in evaluated
-        ]
-        write_json(options.json, results, missions)
+        write_evaluated(options.json, evaluated)
     if options.csv:
-        write_csv(options.csv, results)
+        write_csv(options.csv, [each.result for each in evaluated])
+
+
+def write_evaluated(path: Path, evaluated: Sequence[Evaluated]) -> None:
+    """Writes results and what each mission cost, as JSON."""
+    missions = [
+        {"episode_aoi": each.aoi, "episode_velocity_variance": each.velocity_variance}
+        | ({} if each.task_cost is None else {"episode_task_cost": each.task_cost})
+        for each in evaluated
+    ]
+    write_json(path, [each.result for each in evaluated], missions)

@@ -17,10 +17,10 @@ NONE = "-"
 
 def print_results(results: Sequence[Result]) -> None:
     """Prints a table per regime; results of a regime stand together."""
-    console = Console(highlight=False, markup=False)
+    console = Console(highlight=False, markup=False, force_jupyter=False)
     longest = max(len(line) for result in results for line in _name(result).splitlines())
     width = max(MIN_WIDTH + max(0, longest - NAME_WIDTH), console.width)
-    wide = Console(highlight=False, markup=False, width=width)
+    wide = Console(highlight=False, markup=False, width=width, force_jupyter=False)
     for regime, group in groupby(results, _regime):
         of_regime = sorted(group, key=lambda result: result.aoi_mean)
         console.print(regime)

@@ -7,13 +7,15 @@ what was flown.
 import gc
 import time
 from contextlib import suppress
-from typing import NamedTuple
+from dataclasses import asdict
+from typing import Any, NamedTuple
 
 from swarm_mj.cli import DONE, FAILED, INTERRUPTED
 from swarm_mj.cli.estimates import in_gb, replay_memory
 from swarm_mj.cli.machine import free_memory, memory_errors
 from swarm_mj.cli.progress import WorkBar
 from swarm_mj.io.interrupt import deferred_interrupt
+from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
 from swarm_mj.replay.recorder import Recorder
@@ -65,6 +67,21 @@ def fly_swarm(
     if not flown:
         raise MemoryError
     return Flown(flown, FAILED, "Out of memory")
+
+
+def flight_config(
+    mission: Mission, policy_name: str, policy: Policy, *, seed: int, observer: int
+) -> dict[str, Any]:
+    """Everything that makes a flight again."""
+    return {
+        **asdict(mission),
+        "policy": policy_name,
+        **policy.parameters,
+        "seed": seed,
+        "observer": observer,
+        "version": version(),
+        "commit": commit(),
+    }
 
 
 def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | None:

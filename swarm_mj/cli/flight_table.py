@@ -1,6 +1,7 @@
 """The numbers of one flight: for the terminal and for `--json`."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -35,8 +36,21 @@ def flight_numbers(policy: Policy, summary: Summary) -> dict[str, Any]:
     }
 
 
+def flight_title(mission: Mission, policy: str, seed: int) -> str:
+    """What was flown, in a line."""
+    team = f"{mission.num_robots} robots"
+    if mission.switched_off:
+        team += f", {mission.switched_off:.0%} of them off half-way"
+    return f"{mission.task}, {policy}, {team}, seed {seed}"
+
+
 def flight_table(title: str, mission: Mission, numbers: dict[str, Any], wall_s: float) -> Table:
     """What a flight cost, by its `flight_numbers`, and took here [s]: at most 15 rows."""
+    return named_values(title, flight_rows(mission, numbers, wall_s), caption=AGE)
+
+
+def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> dict[str, str]:
+    """The rows of `flight_table`: names and values, as they are shown."""
     decider = "a centre that is told where all are"
     hops, num_off = numbers["hops_mean"], num_failures(mission)
     rows = {
@@ -51,7 +65,7 @@ def flight_table(title: str, mission: Mission, numbers: dict[str, Any], wall_s: 
     }
     if num_off:
         rows["robots switched off half-way"] = f"{num_off}; not counted from then on"
-    return named_values(title, rows, caption=AGE)
+    return rows
 
 
 def _windows(value: float | int | None, mission: Mission, digits: int, word: str = "") -> str:
@@ -61,7 +75,7 @@ def _windows(value: float | int | None, mission: Mission, digits: int, word: str
     return f"{word} {value:.{digits}f} windows ({value * mission.window_s:.2g} s)".strip()
 
 
-def _packets(numbers: dict[str, Any]) -> dict[str, str]:
+def _packets(numbers: Mapping[str, Any]) -> dict[str, str]:
     """What became of them: broadcasts are heard or not, addressed packets delivered or lost."""
     sent, per_window = numbers["packets_sent"], numbers["packets_sent"] / numbers["num_windows"]
     total = f"{sent} ({per_window:.1f} a window)"
@@ -91,7 +105,7 @@ def _payload(payload: str) -> str:
     return states if payload == "none" else f"{states} and {payload}"
 
 
-def _task_costs(mission: Mission, numbers: dict[str, Any]) -> dict[str, str]:
+def _task_costs(mission: Mission, numbers: Mapping[str, Any]) -> dict[str, str]:
     """What the task cost; of the paper's moving teams, the velocity variance."""
     name, unit = numbers["task_cost_name"], numbers["task_cost_unit"]
     if name in (None, Flocking.cost_name):
@@ -103,7 +117,7 @@ def _task_costs(mission: Mission, numbers: dict[str, Any]) -> dict[str, str]:
     }
 
 
-def _velocities(mission: Mission, numbers: dict[str, Any]) -> dict[str, str]:
+def _velocities(mission: Mission, numbers: Mapping[str, Any]) -> dict[str, str]:
     """Velocity variances; of a flock also whether it agreed on a velocity."""
     first, last = numbers["velocity_variance_first"], numbers["velocity_variance_last"]
     rows = {

@@ -3,7 +3,7 @@
 import os
 import shlex
 import time
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any, ClassVar
@@ -12,8 +12,8 @@ from rich.console import Console
 
 from swarm_mj.cli import DONE
 from swarm_mj.cli.estimates import YES, check_fits, flight_needs
-from swarm_mj.cli.flight import fly_swarm
-from swarm_mj.cli.flight_table import flight_numbers, flight_table
+from swarm_mj.cli.flight import flight_config, fly_swarm
+from swarm_mj.cli.flight_table import flight_numbers, flight_table, flight_title
 from swarm_mj.cli.mission_options import one_mission
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.policy_options import NAMED, NAMES, PolicyOptions
@@ -22,7 +22,6 @@ from swarm_mj.cli.terminal import plain_console, this_command
 from swarm_mj.fields import setting
 from swarm_mj.io.atomic import write_json
 from swarm_mj.io.interrupt import deferred_interrupt, heard_interrupt
-from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import (
@@ -93,16 +92,19 @@ def run(options: Options) -> int:
     way_on = None if options.yes else "; --yes flies on all the same"
     flown, code, ending = fly_swarm(swarm, policy, recorder, bar, way_on=way_on)
     wall_s = time.perf_counter() - start_s
-    out = plain_console()
+    out, title = plain_console(), flight_title(mission, options.policy, options.seed)
     with deferred_interrupt():
-        config, numbers = _config(options, policy), flight_numbers(policy, summarise(flown))
+        config = flight_config(
+            mission, options.policy, policy, seed=options.seed, observer=options.observer
+        )
+        numbers = flight_numbers(policy, summarise(flown))
         took = {"wall_seconds": wall_s, "interrupted": code != DONE}
         summary = {"config": config} | numbers | took | {"replay": str(path) if path else None}
         try:  # either may fail
             with console.status("Writing ..."):
                 _write(options, summary, path, recorder)
         finally:
-            out.print(flight_table(_title(options), mission, numbers, wall_s))
+            out.print(flight_table(title, mission, numbers, wall_s))
     if path:
         out.print(f"Open the replay:  {this_command()} replay {shlex.quote(str(path))}")
     if code != DONE:
@@ -176,24 +178,3 @@ def _write(
 
             config = {key: value for key, value in summary["config"].items() if value is not None}
             write_replay(recorder.log(), options.mission, config, path)
-
-
-def _config(options: Options, policy: Policy) -> dict[str, Any]:
-    """Everything that makes this flight again."""
-    return {
-        **asdict(options.mission),
-        "policy": options.policy,
-        **policy.parameters,
-        "seed": options.seed,
-        "observer": options.observer,
-        "version": version(),
-        "commit": commit(),
-    }
-
-
-def _title(options: Options) -> str:
-    mission = options.mission
-    team = f"{mission.num_robots} robots"
-    if mission.switched_off:
-        team += f", {mission.switched_off:.0%} of them off half-way"
-    return f"{mission.task}, {options.policy}, {team}, seed {options.seed}"

@@ -1,6 +1,7 @@
 """The one bar of all long work: what is under way, how far it is, how long it will take."""
 
 from collections.abc import Callable
+from threading import Timer
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TimeRemainingColumn
@@ -26,10 +27,12 @@ class WorkBar:
         completed: float | int = 0,
         console: Console | None = None,
         shows_time_left: bool = True,
+        after_s: float = 0.0,
     ) -> None:
         """Prepares the bar, on standard error unless told otherwise.
 
-        Without a unit, it shows no numbers; the time left is by the speed so far.
+        Without a unit, it shows no numbers; the time left is by the speed so far. Work that is done
+        in less than `after_s` shows no bar [s].
         """
         self.what, self.text = what, ""
         self._unit = unit
@@ -39,13 +42,21 @@ class WorkBar:
         self._bar = Progress(
             *columns, *times, console=console, transient=True, disable=not console.is_terminal
         )
+        self._timer = Timer(after_s, self._bar.start) if after_s > 0.0 else None
         self._id = self._bar.add_task("", total=total, completed=int(completed))
 
     def __enter__(self) -> "WorkBar":
-        self._bar.start()
+        if self._timer is None or self._bar.disable:
+            self._bar.start()
+        else:
+            self._timer.daemon = True
+            self._timer.start()
         return self
 
     def __exit__(self, *error: object) -> None:
+        if self._timer is not None and self._timer.is_alive():
+            self._timer.cancel()
+            self._timer.join()
         self._bar.stop()
 
     def advance(self, done: int = 1) -> None:

@@ -1,6 +1,7 @@
 """What a flight leaves for its replay: one mission's windows as plain arrays."""
 
 from dataclasses import dataclass, replace
+from numbers import Integral
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -68,8 +69,8 @@ class Recorder:
             ValueError: There is no such robot.
         """
         num_robots = swarm.mission.num_robots
-        if not 0 <= ego < num_robots:
-            raise ValueError(f"observer must be from 0 to {num_robots - 1}, not {ego}")
+        if not isinstance(ego, Integral) or not 0 <= ego < num_robots:
+            raise ValueError(f"observer must be from 0 to {num_robots - 1}, not {ego!r}")
         matrices_bytes = AGE_BYTES * num_robots**2 * swarm.mission.num_windows
         self._stride = max(1, int(np.ceil(matrices_bytes / MAX_AGE_MATRIX_BYTES)))
         self._swarm = swarm

@@ -1,0 +1,1 @@
+"""Python in five lines: `fly` and `evaluate`, and what they give back."""

@@ -1,0 +1,113 @@
+"""Charts of what Python flew: one mission over time, and policies beside each other."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import matplotlib.pyplot as plt
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from swarm_mj.evaluation.figures.style import FAINT, as_it_is, look_of, styled
+from swarm_mj.evaluation.results import Result
+
+if TYPE_CHECKING:
+    from swarm_mj.api.run import Run
+
+Course = Float[np.ndarray, "T"]
+
+WIDTH_IN, PANEL_IN, ROW_IN, HEAD_IN = 7.5, 2.1, 0.32, 1.1
+TITLE_PT = 10.0
+LEAST_SHARE = 1e-6  # of the largest velocity variance; below it a flock flies as one
+LABELS = {
+    "aoi": "age of information\n[windows]",
+    "velocity_variance": "velocity variance\n[m²/s²]",
+}
+
+
+def draw_run(run: "Run") -> Figure:
+    """A mission's costs over its windows, one above the other."""
+    columns, moves = run.columns(), run.mission.task != "stationary"
+    colour = look_of(run.config["policy"]).colour
+    with styled():
+        figure, axes = _panels(2 if moves else 1)
+        figure.suptitle(as_it_is(run.title), x=0.01, ha="left", fontsize=TITLE_PT)
+        _draw_age(axes[0], columns, colour)
+        if moves:
+            _draw_variance(axes[1], columns, colour)
+        axes[-1].set_xlabel(f"window of {run.mission.window_s:g} s")
+    return _kept(figure)
+
+
+def draw_evaluation(results: Sequence[Result]) -> Figure:
+    """Policies below each other, the lowest age first; of flocks, the velocity variance beside."""
+    shown = sorted(results, key=lambda result: result.aoi_mean)
+    flocks, first = shown[0].task == "flocking", shown[0]
+    costs = ["aoi", "velocity_variance"] if flocks else ["aoi"]
+    with styled():
+        figure, axes = plt.subplots(
+            *(1, len(costs)),
+            sharey=True,
+            squeeze=False,
+            layout="constrained",
+            figsize=(WIDTH_IN, HEAD_IN + ROW_IN * len(shown)),
+        )
+        about = f"{first.task}, {first.num_robots} robots, {first.episodes} missions from seed "
+        figure.suptitle(f"{about}{first.seed}", x=0.01, ha="left", fontsize=TITLE_PT)
+        for each, cost in zip(axes[0], costs, strict=True):
+            for place, result in enumerate(shown):
+                _draw_mean(each, place, result, cost)
+            each.set_xlabel(LABELS[cost].replace("\n", " "))
+            each.grid(visible=False, axis="y")
+            each.set_xlim(left=0.0)
+        axes[0, 0].set_yticks(range(len(shown)), [look_of(r.policy).label for r in shown])
+        axes[0, 0].set_ylim(len(shown) - 0.5, -0.5)
+    return _kept(figure)
+
+
+def _draw_age(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
+    if "aoi_worst" in columns:
+        axes.plot(columns["window"], columns["aoi_worst"], color=FAINT, lw=0.8, label="worst pair")
+    axes.plot(columns["window"], columns["aoi"], color=colour, label="mean over all pairs")
+    axes.set_ylabel(LABELS["aoi"])
+    axes.set_ylim(bottom=0.0)
+    axes.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+
+
+def _draw_variance(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
+    """Down to what nobody would call a difference any more."""
+    variance = columns["velocity_variance"]
+    axes.semilogy(columns["window"], variance, color=colour)
+    axes.set_ylabel(LABELS["velocity_variance"])
+    axes.set_ylim(bottom=max(float(np.min(variance)), LEAST_SHARE * float(np.max(variance))) / 2.0)
+
+
+def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:
+    """A policy's mean with its 95 % interval, if there is one."""
+    look, mean = look_of(result.policy), getattr(result, f"{cost}_mean")
+    ends = [getattr(result, f"{cost}_ci_{end}") for end in ("low", "high")]
+    if None not in ends:
+        axes.hlines(place, *ends, color=look.colour, linewidth=3.0, alpha=0.45)
+    axes.plot(mean, place, color=look.colour, marker=look.marker, markersize=look.size + 2.0)
+
+
+def _panels(number: int) -> tuple[Figure, list[Axes]]:
+    """A figure of so many panels above each other."""
+    figure, axes = plt.subplots(
+        *(number, 1),
+        sharex=True,
+        squeeze=False,
+        layout="constrained",
+        figsize=(WIDTH_IN, HEAD_IN + number * PANEL_IN),
+    )
+    for each in axes[:, 0]:
+        each.margins(x=0.01)
+    return figure, list(axes[:, 0])
+
+
+def _kept(figure: Figure) -> Figure:
+    """The figure, which notebooks would else show twice: as open, and as a cell's result."""
+    if "inline" in str(plt.get_backend()):
+        plt.close(figure)
+    return figure

@@ -1,0 +1,204 @@
+"""`swarm_mj.evaluate`: policies on the same missions, as `swarm-mj evaluate` compares them."""
+
+import io
+from collections.abc import Iterable, Sequence
+from contextlib import redirect_stdout
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+
+from swarm_mj.api.fly import BAR_AFTER_S, mission_of
+from swarm_mj.api.numbers import Numbers
+from swarm_mj.cli.estimates import check_fits, study_needs
+from swarm_mj.cli.evaluate import (
+    DEFAULT_POLICIES,
+    Options,
+    fly_study,
+    study_bar,
+    write_evaluated,
+)
+from swarm_mj.cli.evaluation_table import print_results
+from swarm_mj.cli.machine import memory_errors
+from swarm_mj.cli.outputs import Output, check_outputs
+from swarm_mj.evaluation.batch import BatchCosts
+from swarm_mj.evaluation.results import write_csv
+from swarm_mj.evaluation.study import Study
+from swarm_mj.evaluation.summary import Evaluated, summarise
+from swarm_mj.fields import check_kind, check_value
+from swarm_mj.io.packages import need
+from swarm_mj.mission import Mission
+from swarm_mj.policies.registry import normalised
+
+if TYPE_CHECKING:  # each takes its time to import
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+KEYWORDS = (
+    *("policies", "num_missions", "seed", "baseline", "probability", "is_deterministic"),
+    "num_jobs",
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Evaluation:
+    """What policies cost on the same missions.
+
+    Attributes:
+        mission: The missions' numbers.
+        results: What each policy cost, in the order in which they were named.
+    """
+
+    mission: Mission
+    results: Sequence[Evaluated]
+
+    def __repr__(self) -> str:
+        """The table that `swarm-mj evaluate` prints."""
+        with redirect_stdout(io.StringIO()) as text:
+            print_results([each.result for each in self.results])
+        return text.getvalue().rstrip()
+
+    def _repr_html_(self) -> str:
+        """The main columns of `to_dataframe`, for notebooks."""
+        shown = ["aoi_mean", "aoi_sem", "aoi_ci_low", "aoi_ci_high", "packets_per_window"]
+        return self.to_dataframe().set_index("policy")[shown].to_html()
+
+    @property
+    def summary(self) -> Numbers:
+        """What each policy cost, by its name: `summary["tdma"].aoi_mean` [windows].
+
+        The names are the columns of `swarm-mj evaluate --csv`.
+        """
+        rows = (asdict(each.result) for each in self.results)
+        return Numbers({row["policy"]: Numbers(row) for row in rows})
+
+    def to_dataframe(self, *, by_mission: bool = False) -> "DataFrame":
+        """One row per policy, with the columns of `swarm-mj evaluate --csv`.
+
+        Args:
+            by_mission: Whether to have one row per policy and mission instead: `policy`, `seed`,
+                `aoi` [windows], `velocity_variance` [m²/s²].
+
+        Raises:
+            ModuleNotFoundError: pandas is not installed.
+        """
+        need("pandas", "a table")
+        from pandas import DataFrame
+
+        if not by_mission:
+            return DataFrame([asdict(each.result) for each in self.results])
+        return DataFrame(
+            [
+                {"policy": each.result.policy, "seed": each.result.seed + index, "aoi": aoi}
+                | {"velocity_variance": each.velocity_variance[index]}
+                for each in self.results
+                for index, aoi in enumerate(each.aoi)
+            ]
+        )
+
+    def plot(self) -> "Figure":
+        """Draws the age of information of each policy, lowest first, with its 95 % interval.
+
+        Returns:
+            A matplotlib figure, as of `Run.plot`.
+
+        Raises:
+            ModuleNotFoundError: matplotlib is not installed.
+        """
+        need("matplotlib", "a chart")
+        from swarm_mj.api.charts import draw_evaluation
+
+        return draw_evaluation([each.result for each in self.results])
+
+    def save(self, path: str | Path) -> Path:
+        """Writes what `swarm-mj evaluate` does, replacing the file if it exists.
+
+        Args:
+            path: Ends in .csv, one row per policy, or .json, with what each mission cost.
+
+        Returns:
+            The path.
+
+        Raises:
+            ValueError: The name has another ending.
+            OSError: The file cannot be written.
+        """
+        path = Path(path)
+        check_outputs(Output("the file", path, ".csv|.json"))
+        if path.suffix.lower() == ".csv":
+            write_csv(path, [each.result for each in self.results])
+        else:
+            write_evaluated(path, self.results)
+        return path
+
+
+def evaluate(
+    policies: str | Path | Sequence[str | Path] = DEFAULT_POLICIES,
+    task: str | Mission = "flocking",
+    *,
+    num_missions: int = 100,
+    seed: int = 1000,
+    baseline: str | None = None,
+    probability: float | None = None,
+    is_deterministic: bool = False,
+    num_jobs: int = 1,
+    **mission_fields: Any,
+) -> Evaluation:
+    """Flies each policy over the same missions, and says what each cost on average.
+
+    The same arguments give the same numbers as `swarm-mj evaluate` does. On a terminal, a bar shows
+    how far it is.
+
+    Args:
+        policies: Names of `POLICIES`, or folders of learned ones.
+        task: What the robots do, by name; or a mission of one's own.
+        num_missions: So many for each policy.
+        seed: Of the first mission; the others follow one by one.
+        baseline: The policy that the others are compared to, mission by mission; the first unless
+            given.
+        probability: Of a transmission, for the policies that have one; tuned unless given.
+        is_deterministic: Whether learned policies take their most probable recipient, not a draw.
+        num_jobs: Processes. With more than one, a script must guard what it runs by
+            `if __name__ == "__main__":`, as Python's multiprocessing says.
+        **mission_fields: Any field of `Mission`, such as `num_robots=20`.
+
+    Returns:
+        What was found.
+
+    Raises:
+        ValueError: A value is unknown or out of range, or memory does not suffice.
+        TypeError: An argument is of the wrong kind, or has a name that is not known.
+        ModuleNotFoundError: SciPy is not installed, which finds intervals.
+        KeyboardInterrupt: Ctrl-C was pressed; nothing is kept.
+    """
+    need("scipy", "an evaluation")
+    mission = mission_of(task, mission_fields, known=KEYWORDS)
+    check_value(Options.__dataclass_fields__["jobs"], num_jobs)
+    study = Study(
+        policies=_names(policies),
+        regimes=(mission,),
+        episodes=num_missions,
+        seed=seed,
+        probability=probability,
+        is_deterministic=is_deterministic,
+        baseline=baseline,
+    )
+    way_out = "choose fewer num_jobs, num_robots, num_windows or num_missions"
+    check_fits(study_needs(study, num_jobs), None, way_out, is_forced=False, way_on="")
+    costs: dict[int, BatchCosts] = {}
+    console = Console(stderr=True, highlight=False, force_jupyter=False)
+    bar = study_bar(study, costs, console, after_s=BAR_AFTER_S)
+    with memory_errors():
+        fly_study(study, costs, num_jobs, None, bar)
+    return Evaluation(mission=mission, results=summarise(study, costs, study.header()))
+
+
+def _names(policies: str | Path | Sequence[str | Path]) -> tuple[str, ...]:
+    """Policies' names, one or several."""
+    if not isinstance(policies, str | Path | Iterable):
+        raise TypeError(f"policies must be a list of names, not {policies!r:.80}")
+    named = [policies] if isinstance(policies, str | Path) else list(policies)
+    for name in named:
+        check_kind("each of the policies", name, (str, Path), '"planner"')
+    return tuple(dict.fromkeys(normalised(str(name)) for name in named))

@@ -1,0 +1,145 @@
+"""`swarm_mj.fly`: one mission from Python, flown as `swarm-mj fly` flies it."""
+
+import time
+import warnings
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from swarm_mj.api.numbers import Numbers
+from swarm_mj.api.run import Run
+from swarm_mj.cli import DONE, INTERRUPTED
+from swarm_mj.cli.estimates import check_fits, flight_needs
+from swarm_mj.cli.flight import flight_config, fly_swarm
+from swarm_mj.cli.flight_table import flight_numbers
+from swarm_mj.cli.mission_options import make_mission
+from swarm_mj.cli.progress import WorkBar
+from swarm_mj.control.controller import Controller
+from swarm_mj.fields import check_kind, check_names
+from swarm_mj.mission import Mission
+from swarm_mj.physics.scene import Scene
+from swarm_mj.policies.policy import Policy
+from swarm_mj.policies.registry import make_policy, normalised
+from swarm_mj.radio.free_space import Channel
+from swarm_mj.replay.recorder import Recorder
+from swarm_mj.rollout import summarise
+from swarm_mj.swarm import Swarm
+
+BAR_AFTER_S = 2.0  # shorter work shows no bar
+MISSION_FIELDS = tuple(spec.name for spec in fields(Mission) if spec.name != "task")
+KEYWORDS = ("policy", "seed", "probability", "is_deterministic", "record", "observer")
+PARTS = ("channel", "controller", "scene")
+
+
+def fly(
+    task: str | Mission = "flocking",
+    *,
+    policy: str | Path | Policy = "planner",
+    seed: int = 1,
+    probability: float | None = None,
+    is_deterministic: bool = False,
+    record: bool = True,
+    observer: int = 0,
+    channel: Channel | None = None,
+    controller: Controller | None = None,
+    scene: Scene | None = None,
+    **mission_fields: Any,
+) -> Run:
+    """Flies one mission, from the first window to the last.
+
+    The same arguments give the same numbers as `swarm-mj fly` does. On a terminal, a bar shows how
+    far it is. Ctrl-C ends the flight after a whole window and keeps what was flown.
+
+    Args:
+        task: What the robots do, by name; or a mission of one's own.
+        policy: Who transmits when: a name of `POLICIES`, the folder of a learned one, or an object.
+        seed: The same seed is the same mission.
+        probability: Of a transmission, for the named policies that have one; tuned unless given.
+        is_deterministic: Whether a learned policy takes its most probable recipient, not a draw.
+        record: Whether to keep what a replay and a video show; without it less memory is needed.
+        observer: The robot whose knowledge the replay shows.
+        channel: Who decodes whom; the mission's radio unless given.
+        controller: What drives the robots; that of the task unless given.
+        scene: What changes the arena; nothing unless given.
+        **mission_fields: Any field of `Mission`, such as `num_robots=20` or `preset="reference"`.
+
+    Returns:
+        What was flown.
+
+    Raises:
+        ValueError: A value is unknown or out of range, or memory does not suffice.
+        TypeError: An argument is of the wrong kind, or has a name that is not known.
+        KeyboardInterrupt: Ctrl-C was pressed before the first window was flown.
+    """
+    mission = mission_of(task, mission_fields, known=(*KEYWORDS, *PARTS))
+    chosen, name = _policy_of(policy, mission, probability, is_deterministic=is_deterministic)
+    needs, way_out = flight_needs(mission, name, is_recorded=record), "choose fewer num_robots or "
+    way_out += "num_windows" + (", or record=False" if record else "")
+    check_fits(needs, None, way_out, is_forced=False, way_on="")
+    swarm = Swarm(mission, [seed], channel=channel, controller=controller, scene=scene)
+    is_broadcast = chosen.window(mission).is_broadcast
+    recorder = Recorder(swarm, ego=observer, is_broadcast=is_broadcast) if record else None
+    start_s = time.perf_counter()
+    bar = quiet_bar("Flying", mission.num_windows, "windows")
+    flown, code, ending = fly_swarm(swarm, chosen, recorder, bar, way_on="")
+    wall_s = time.perf_counter() - start_s
+    if code != DONE:
+        said = f"{ending} after {len(flown)} of {mission.num_windows} windows; these are kept"
+        warnings.warn(said, stacklevel=2)
+    took = {"wall_seconds": wall_s, "interrupted": code == INTERRUPTED}
+    return Run(
+        mission=mission,
+        config=flight_config(mission, name, chosen, seed=seed, observer=observer),
+        summary=Numbers(flight_numbers(chosen, summarise(flown)) | took),
+        windows=tuple(flown),
+        log=recorder.log() if recorder else None,
+    )
+
+
+def mission_of(
+    task: str | Mission, mission_fields: Mapping[str, Any], known: tuple[str, ...]
+) -> Mission:
+    """The mission that arguments name.
+
+    Raises:
+        ValueError: A value is unknown or out of range.
+        TypeError: A field is none, nor among the other names that are `known`.
+    """
+    check_names("it", mission_fields, (*MISSION_FIELDS, *known))
+    if not isinstance(task, Mission):
+        return make_mission(task=task, **mission_fields)
+    if mission_fields:
+        raise TypeError(
+            f"{', '.join(mission_fields)} change the mission of a task, not one that is given; use "
+            "dataclasses.replace(mission, ...)"
+        )
+    return task
+
+
+def quiet_bar(what: str, total: int, unit: str) -> WorkBar:
+    """A bar for a terminal, once the work takes its time; notebooks show none."""
+    console = Console(stderr=True, highlight=False, force_jupyter=False)
+    return WorkBar(what, total, unit, console=console, after_s=BAR_AFTER_S)
+
+
+def _policy_of(
+    policy: str | Path | Policy,
+    mission: Mission,
+    probability: float | None,
+    *,
+    is_deterministic: bool,
+) -> tuple[Policy, str]:
+    """A policy and its name: what was given, or its class's."""
+    if not isinstance(policy, Policy):
+        check_kind("policy", policy, (str, Path), '"planner"')
+        name = normalised(str(policy))
+        made = make_policy(name, mission, probability, is_deterministic=is_deterministic)
+        return made, name
+    if probability is not None or is_deterministic:
+        raise TypeError(
+            "probability and is_deterministic change policies by name; make it with them"
+        )
+    return policy, type(policy).__name__

@@ -1,0 +1,42 @@
+"""Numbers by name: `numbers.aoi_mean`, `numbers["aoi_mean"]`, and a table of all when shown."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from swarm_mj.fields import did_you_mean
+
+
+class Numbers(Mapping[str, Any]):
+    """A mapping that cannot be changed, whose keys are attributes as well."""
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        """Takes the values by their names."""
+        self._values = dict(values)
+
+    def __getitem__(self, name: str) -> Any:  # noqa: ANN401 - any value
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any value
+        values = self.__dict__.get("_values", {})  # an unpickled one has none yet
+        if name not in values:
+            raise AttributeError(f"there is no {name!r} here{did_you_mean(name, values)}")
+        return values[name]
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._values]
+
+    def __repr__(self) -> str:
+        """A line for each name; numbers within numbers are set in."""
+        width = max((len(name) for name in self), default=0)
+        lines = []
+        for name, value in self.items():
+            shown = f"{value:.6g}" if isinstance(value, float) else str(value)
+            nested = f"{name}\n  " + shown.replace("\n", "\n  ")
+            lines.append(nested if isinstance(value, Numbers) else f"{name:{width}}  {shown}")
+        return "\n".join(lines)

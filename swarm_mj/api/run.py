@@ -1,0 +1,173 @@
+"""What `swarm_mj.fly` gives back: numbers, a table, a chart, files, a video."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float
+
+from swarm_mj.api.numbers import Numbers
+from swarm_mj.cli.flight_table import flight_rows, flight_title
+from swarm_mj.cli.outputs import Output, check_outputs
+from swarm_mj.fields import as_typed
+from swarm_mj.io.atomic import write_csv, write_json
+from swarm_mj.io.packages import need
+from swarm_mj.mission import Mission
+from swarm_mj.replay.recorder import Log
+from swarm_mj.rollout import WindowRecord
+
+if TYPE_CHECKING:  # each takes its time to import, and flights do without
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+PACKETS = ("sent", "attempted", "delivered", "lost", "overheard", "answered", "heard", "receptions")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Run:
+    """One mission flown.
+
+    Attributes:
+        mission: Its numbers.
+        config: Everything that makes this flight again: mission, policy, seed, version and commit.
+        summary: What it cost, by the names that `swarm-mj fly --json` uses: `summary.aoi_mean` is
+            the age of information [windows].
+        windows: What each window cost.
+        log: What a replay shows; None if nothing was recorded.
+    """
+
+    mission: Mission
+    config: Mapping[str, Any]
+    summary: Numbers
+    windows: Sequence[WindowRecord]
+    log: Log | None
+
+    def __repr__(self) -> str:
+        age, window_s = self.summary.aoi_mean, self.mission.window_s
+        return (
+            f"<Run {self.title}: age of information {age:.2f} windows ({age * window_s:.2g} s) "
+            f"over {len(self.windows)} windows>"
+        )
+
+    def _repr_html_(self) -> str:
+        """The numbers as a table, for notebooks."""
+        rows = flight_rows(self.mission, self.summary, self.summary.wall_seconds)
+        lines = "".join(
+            f"<tr><th style='text-align:left'>{escape(name)}</th>"
+            f"<td style='text-align:left'>{escape(value)}</td></tr>"
+            for name, value in rows.items()
+        )
+        return f"<table><caption>{escape(self.title)}</caption>{lines}</table>"
+
+    @property
+    def title(self) -> str:
+        """What was flown, in a line."""
+        return flight_title(self.mission, self.config["policy"], self.config["seed"])
+
+    def columns(self) -> dict[str, Float[np.ndarray, "T"]]:
+        """The flight window by window, column by column: all that `to_dataframe` has."""
+        window = np.arange(1.0, len(self.windows) + 1.0)
+        worst = {"aoi_worst": self.log.age_max} if self.log else {}
+        packets = {
+            f"packets_{name}": self._course(
+                lambda each, name=name: getattr(each.costs.packets, name)
+            )
+            for name in PACKETS
+        }
+        return {
+            "window": window,
+            "seconds": np.round(window * self.mission.window_s, 9),
+            "aoi": self._course(lambda each: each.costs.age_windows),
+            **worst,
+            "velocity_variance": self._course(lambda each: each.costs.velocity_variance_m2ps2),
+            "hops": self._course(lambda each: each.hops),
+            "is_complete": self._course(lambda each: each.costs.is_complete),
+            **packets,
+        }
+
+    def to_dataframe(self) -> "DataFrame":
+        """One row per window, at its end; what does not apply to the policy's packets is nan.
+
+        Returns:
+            A pandas table with the columns `window` (1 is the first), `seconds`, `aoi` (age of
+            information, mean over pairs of robots [windows]), `aoi_worst` (the worst pair's, if the
+            flight was recorded), `velocity_variance` [m²/s²], `hops` (mean over the news known),
+            `is_complete` (everyone has heard of everyone; 0 or 1) and `packets_...` in that window.
+
+        Raises:
+            ModuleNotFoundError: pandas is not installed.
+        """
+        need("pandas", "a table")
+        from pandas import DataFrame
+
+        whole = {"window": int, "is_complete": bool}
+        return DataFrame(self.columns()).astype(whole)
+
+    def plot(self) -> "Figure":
+        """Draws the age of information over time and, of teams that move, the velocity variance.
+
+        Returns:
+            A matplotlib figure; a notebook shows it where it is the cell's result, `savefig` keeps
+            it, and `matplotlib.pyplot.show()` opens it in a window.
+
+        Raises:
+            ModuleNotFoundError: matplotlib is not installed.
+        """
+        need("matplotlib", "a chart")
+        from swarm_mj.api.charts import draw_run
+
+        return draw_run(self)
+
+    def save(self, path: str | Path) -> Path:
+        """Writes the flight, replacing the file if it exists.
+
+        Args:
+            path: By its ending, a replay for `swarm-mj replay` (.rrd), the summary as `swarm-mj fly
+                --json` writes it (.json), or one row per window (.csv).
+
+        Returns:
+            The path.
+
+        Raises:
+            ValueError: The name has another ending, or nothing was recorded that a replay shows.
+            OSError: The file cannot be written.
+            ModuleNotFoundError: The package that writes replays is not installed.
+        """
+        path = Path(path)
+        check_outputs(Output("the file", path, "|".join(WRITERS)))
+        WRITERS[path.suffix.lower()](self, path)
+        return path
+
+    def _course(
+        self, of: Callable[[WindowRecord], Float[np.ndarray, "B"]]
+    ) -> Float[np.ndarray, "T"]:
+        """A cost of the mission, window by window."""
+        return np.array([float(of(window)[0]) for window in self.windows])
+
+
+def _write_replay(run: Run, path: Path) -> None:
+    if run.log is None:
+        raise ValueError("nothing was recorded that a replay could show; fly with record=True")
+    need("rerun", "a replay")
+    from swarm_mj.replay.write import write_replay  # rerun takes its time to import
+
+    config = {name: value for name, value in run.config.items() if value is not None}
+    write_replay(run.log, run.mission, config, path)
+
+
+def _write_summary(run: Run, path: Path) -> None:
+    write_json(path, {"config": dict(run.config)} | dict(run.summary) | {"replay": None})
+
+
+def _write_windows(run: Run, path: Path) -> None:
+    columns = run.columns()
+    rows = np.stack(list(columns.values()), axis=1).tolist()
+    texts = ([None if math.isnan(value) else as_typed(value) for value in row] for row in rows)
+    write_csv(path, list(columns), (dict(zip(columns, row, strict=True)) for row in texts))
+
+
+WRITERS = {".rrd": _write_replay, ".json": _write_summary, ".csv": _write_windows}

@@ -1,0 +1,48 @@
+"""Packages that not everyone has installed: which one is missing, and how to get it.
+
+A plain `pip install swarm_mj` brings them all; its core, which flies, does without them.
+"""
+
+import re
+from importlib import metadata
+from importlib.util import find_spec
+
+# Modules that are named otherwise than the packages that bring them.
+BROUGHT_BY = {"PIL": "pillow", "dm_control": "dm-control", "rerun": "rerun-sdk"}
+
+
+def need(module: str, what: str, way_out: str = "") -> None:
+    """Passes if a module can be imported.
+
+    Args:
+        module: Its name, as it is imported.
+        what: What needs it.
+        way_out: How to do without it, if one can.
+
+    Raises:
+        ModuleNotFoundError: It is not installed; the message says how to install it.
+    """
+    if find_spec(module) is None:
+        raise ModuleNotFoundError(missing(module, what, way_out), name=module)
+
+
+def missing(module: str, what: str, way_out: str = "") -> str:
+    """What to say of a module that is not installed; arguments as of `need`."""
+    package = BROUGHT_BY.get(module, module.replace("_", "-"))
+    instead = f", or {way_out}" if way_out else ""
+    return (
+        f"{what} needs {package}, which is not installed; pip install '{_wanted(package)}'{instead}"
+    )
+
+
+def _wanted(package: str) -> str:
+    """A package with the versions that fit, as pip takes it; without, if none are known."""
+    try:
+        wanted = metadata.requires("swarm_mj") or []
+    except metadata.PackageNotFoundError:  # a checkout that was never installed
+        wanted = []
+    for requirement in wanted:
+        name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
+        if name.replace("_", "-").lower() == package:
+            return requirement.partition(";")[0].strip()
+    return package

@@ -1,0 +1,56 @@
+"""Charts show the numbers that they are drawn from."""
+
+import matplotlib.pyplot as plt
+import pytest
+
+import swarm_mj
+from swarm_mj.api import charts
+
+SHORT = {"num_robots": 6, "num_windows": 20}
+
+
+@pytest.fixture(autouse=True)
+def _closed():
+    plt.switch_backend("Agg")
+    yield
+    plt.close("all")
+
+
+def test_a_flight_is_drawn_window_by_window():
+    run = swarm_mj.fly("flocking", policy="tdma", **SHORT)
+    age, variance = run.plot().axes
+    worst, mean = age.lines
+    assert list(mean.get_ydata()) == list(run.to_dataframe().aoi)
+    assert list(worst.get_ydata()) == list(run.log.age_max)
+    assert list(variance.lines[0].get_xdata()) == list(range(1, 21))
+    assert variance.get_yscale() == "log"
+
+
+def test_a_team_at_rest_has_no_velocities_and_what_was_not_recorded_no_worst_pair():
+    (age,) = swarm_mj.fly("stationary", policy="tdma", record=False, **SHORT).plot().axes
+    assert len(age.lines) == 1
+
+
+def test_policies_stand_below_each_other_the_lowest_age_first():
+    found = swarm_mj.evaluate(["round-robin", "tdma"], "random-walk", num_missions=4, **SHORT)
+    (axes,) = found.plot().axes
+    by_age = sorted(found.results, key=lambda each: each.result.aoi_mean)
+    labels = [charts.look_of(each.result.policy).label for each in by_age]
+    assert [label.get_text() for label in axes.get_yticklabels()] == labels
+    assert [line.get_xdata()[0] for line in axes.lines] == [r.result.aoi_mean for r in by_age]
+    assert len(axes.collections) == 2  # intervals
+
+
+def test_one_mission_has_no_interval_and_flocks_have_velocities():
+    age, variance = swarm_mj.evaluate("tdma", num_missions=1, **SHORT).plot().axes
+    assert len(age.collections) == 0
+    assert len(variance.lines) == 1
+
+
+def test_a_notebook_shows_a_chart_once(monkeypatch):
+    run = swarm_mj.fly("stationary", policy="tdma", **SHORT)
+    run.plot()
+    assert len(plt.get_fignums()) == 1
+    monkeypatch.setattr(plt, "get_backend", lambda: "module://matplotlib_inline.backend_inline")
+    run.plot()
+    assert len(plt.get_fignums()) == 1

@@ -1,0 +1,83 @@
+"""Python finds what `swarm-mj evaluate` finds, to the last digit."""
+
+import numpy as np
+import pytest
+
+import swarm_mj
+from swarm_mj.api import evaluate as module
+from swarm_mj.cli import main
+
+SHORT = {"num_robots": 6, "num_windows": 20, "range_ratio": 0.5}
+OPTIONS = ("--robots", "6", "--windows", "20", "--range-ratio", "0.5")
+
+
+@pytest.fixture(scope="module")
+def found():
+    return swarm_mj.evaluate(
+        ["tdma", "round-robin"], task="random-walk", num_missions=3, seed=2000, **SHORT
+    )
+
+
+@pytest.mark.parametrize("ending", ["csv", "json"])
+def test_it_is_what_the_command_line_finds(here, found, ending):
+    line = ["evaluate", "--policy", "tdma", "round-robin", "--task", "random-walk", *OPTIONS]
+    assert main([*line, "--episodes", "3", "--seed", "2000", f"--{ending}", f"told.{ending}"]) == 0
+    found.save(f"ours.{ending}")
+    assert (here / f"ours.{ending}").read_text() == (here / f"told.{ending}").read_text()
+
+
+def test_each_policy_has_its_numbers(found):
+    assert list(found.summary) == ["tdma", "round-robin"]
+    by_mission = found.to_dataframe(by_mission=True)
+    assert list(by_mission.seed) == [2000, 2001, 2002] * 2
+    means = by_mission.groupby("policy").aoi.mean()
+    for policy in found.summary:
+        assert found.summary[policy].aoi_mean == pytest.approx(means[policy])
+    assert found.to_dataframe().aoi_mean.tolist() == [
+        found.summary[policy].aoi_mean for policy in found.summary
+    ]
+
+
+def test_it_agrees_with_flights_one_by_one(found):
+    ages = [
+        swarm_mj.fly("random-walk", policy="tdma", seed=seed, record=False, **SHORT)
+        for seed in (2000, 2001, 2002)
+    ]
+    mean = np.mean([run.summary.aoi_mean for run in ages])
+    assert found.summary.tdma.aoi_mean == pytest.approx(mean)
+
+
+def test_it_shows_itself_as_the_table(found):
+    assert repr(found).startswith("random-walk, preset paper: 6 robots")
+    assert "round-robin" in repr(found)
+    assert "round-robin" in found._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "keywords", "complaint"),
+    [
+        (["tdmaa"], {}, "did you mean tdma?"),
+        ([], {}, "an evaluation needs at least 1 policy"),
+        (["tdma"], {"num_mission": 3}, "it has no 'num_mission'; did you mean num_missions?"),
+        (["tdma"], {"num_missions": 0}, "must be a whole number from 1 to 100000, not 0"),
+        (["tdma"], {"num_jobs": 0}, "jobs must be a whole number from 1 to 256, not 0"),
+        (["tdma"], {"baseline": "mst"}, "baseline must be one of the policies evaluated"),
+    ],
+)
+def test_what_is_wrong_is_told(arguments, keywords, complaint):
+    with pytest.raises((TypeError, ValueError)) as refused:
+        swarm_mj.evaluate(arguments, **keywords)
+    assert complaint in str(refused.value)
+
+
+def test_other_endings_are_refused(found, tmp_path):
+    with pytest.raises(ValueError, match=r"must be named \*.csv or \*.json"):
+        found.save(tmp_path / "a.rrd")
+
+
+def test_what_is_not_installed_is_told_before_the_work(monkeypatch):
+    monkeypatch.setattr("swarm_mj.io.packages.find_spec", lambda _module: None)
+    with pytest.raises(
+        ModuleNotFoundError, match=r"an evaluation needs scipy, .* pip install 'scipy"
+    ):
+        module.evaluate("tdma", num_missions=1, **SHORT)

@@ -1,0 +1,110 @@
+"""Python flies what the command line flies, to the last digit."""
+
+import json
+import math
+import signal
+
+import pytest
+
+import swarm_mj
+from swarm_mj.api import fly as module
+from swarm_mj.cli import flight, main
+from swarm_mj.mission import paper
+from swarm_mj.policies.policy import DecentralisedPolicy
+
+SHORT = {"num_robots": 6, "num_windows": 20, "range_ratio": 0.5}
+OPTIONS = ("--robots", "6", "--windows", "20", "--range-ratio", "0.5")
+
+
+class Silent(DecentralisedPolicy):
+    """Nobody ever transmits."""
+
+    def recipients(self, views):
+        return views.silence
+
+
+@pytest.mark.parametrize(
+    ("keywords", "options"),
+    [
+        ({"policy": "planner"}, ()),
+        ({"task": "random-walk", "policy": "mst", "seed": 7}, ("--policy", "mst", "--seed", "7")),
+        (
+            {"task": "stationary", "policy": "aloha", "probability": 0.2, "preset": "reference"},
+            ("--policy", "aloha", "--probability", "0.2", "--preset", "reference"),
+        ),
+        ({"switched_off": 0.3, "record": False, "observer": 2}, ("--switched-off", "0.3")),
+    ],
+)
+def test_it_is_what_the_command_line_flies(here, keywords, options):
+    run = swarm_mj.fly(**(SHORT | keywords))
+    task = keywords.get("task", "flocking")
+    observer = str(keywords.get("observer", 0))
+    line = ["fly", "--task", task, *OPTIONS, *options, "--observer", observer]
+    assert main([*line, "--no-record", "--json", "told.json"]) == 0
+    told = json.loads((here / "told.json").read_text())
+    run.save("ours.json")
+    ours = json.loads((here / "ours.json").read_text())
+    assert ours.keys() == told.keys()
+    del ours["wall_seconds"], told["wall_seconds"]
+    assert ours == told
+
+
+def test_a_mission_and_a_policy_of_ones_own_fly():
+    mission = paper("stationary", **SHORT)
+    run = swarm_mj.fly(mission, policy=Silent(), record=False)
+    assert run.mission is mission
+    assert run.config["policy"] == "Silent"
+    # Nobody speaks, so after w windows each pair but one's own is w old: on average 10.5.
+    assert run.summary.aoi_mean == pytest.approx(10.5 * 5 / 6)
+
+
+def test_parts_of_ones_own_reach_the_swarm():
+    """Nobody decodes anybody on a deaf channel, though all packets are sent."""
+    deaf = lambda _position_m, recipient: (recipient * 0) + range(recipient.shape[1])  # noqa: E731
+    run = swarm_mj.fly("stationary", policy="tdma", channel=deaf, **SHORT)
+    assert run.summary.packets_sent == 40
+    assert run.summary.packets_heard == 0
+
+
+def test_ctrl_c_keeps_what_was_flown(monkeypatch):
+    windows = flight.rollout
+
+    def pressed(*arguments):
+        for count, window in enumerate(windows(*arguments), start=1):
+            if count == 5:
+                signal.raise_signal(signal.SIGINT)
+            yield window
+
+    monkeypatch.setattr(flight, "rollout", pressed)
+    with pytest.warns(UserWarning, match="Interrupted after 5 of 20 windows; these are kept"):
+        run = swarm_mj.fly(**SHORT)
+    assert run.summary.interrupted is True
+    assert run.summary.num_windows == len(run.windows) == len(run.log.window) == 5
+    assert math.isfinite(run.summary.aoi_mean)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "complaint"),
+    [
+        ({"num_robot": 20}, "it has no 'num_robot'; did you mean num_robots?"),
+        ({"polcy": "tdma"}, "it has no 'polcy'; did you mean policy?"),
+        ({"policy": "tdmaa"}, "not 'tdmaa'; did you mean tdma?"),
+        ({"seed": -1}, "seeds must be one or more integers from 0"),
+        ({"observer": 6}, "observer must be from 0 to 5, not 6"),
+        ({"policy": "tdma", "probability": 0.5}, "tdma takes no transmission probability"),
+        ({"policy": Silent(), "probability": 0.5}, "change policies by name"),
+        ({"task": paper(), "num_robots": 6}, "use dataclasses.replace"),
+        ({"num_windows": 10**9}, "number of windows must be a whole number from 1 to 100000"),
+    ],
+)
+def test_what_is_wrong_is_told(keywords, complaint):
+    mission = {} if isinstance(keywords.get("task"), swarm_mj.Mission) else SHORT
+    with pytest.raises((TypeError, ValueError)) as refused:
+        swarm_mj.fly(**(mission | keywords))
+    assert complaint in str(refused.value)
+
+
+def test_memory_is_looked_at_before_the_work(monkeypatch):
+    monkeypatch.setattr("swarm_mj.cli.estimates.free_memory", lambda: 1e6)
+    with pytest.raises(ValueError, match="choose fewer num_robots or num_windows, or record=False"):
+        module.fly(**SHORT)

@@ -1,0 +1,85 @@
+"""What a flight gives back, against plain loops over its windows and the files of the replay."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import swarm_mj
+from swarm_mj.replay.read import windows
+
+SHORT = {"num_robots": 6, "num_windows": 20, "range_ratio": 0.5}
+
+
+@pytest.fixture(scope="module")
+def run():
+    return swarm_mj.fly("flocking", policy="tdma", seed=3, **SHORT)
+
+
+@pytest.fixture(scope="module")
+def unrecorded():
+    return swarm_mj.fly("stationary", policy="mst", seed=3, record=False, **SHORT)
+
+
+def test_the_table_has_a_row_per_window(run):
+    table = run.to_dataframe()
+    assert list(table.window) == list(range(1, 21))
+    assert list(table.seconds) == pytest.approx([0.1 * window for window in range(1, 21)])
+    assert table.aoi.mean() == pytest.approx(run.summary.aoi_mean)
+    assert table.velocity_variance.iloc[0] == run.summary.velocity_variance_first
+    assert table.velocity_variance.iloc[-1] == run.summary.velocity_variance_last
+    assert table.packets_sent.sum() == run.summary.packets_sent == 40
+    assert table.packets_delivered.isna().all()  # broadcasts have no addressee
+    first = int(np.argmax(table.is_complete)) + 1
+    assert first == run.summary.complete_window
+
+
+def test_the_worst_age_is_that_of_the_recorded_matrices(run):
+    table = run.to_dataframe()
+    assert list(table.aoi_worst) == [matrix.max() for matrix in run.log.age]
+
+
+def test_without_a_record_the_worst_age_is_not_known(unrecorded):
+    assert unrecorded.log is None
+    assert "aoi_worst" not in unrecorded.to_dataframe()
+
+
+def test_a_replay_is_saved_whole(run, tmp_path):
+    assert run.save(str(tmp_path / "a.rrd")) == tmp_path / "a.rrd"
+    assert list(windows(tmp_path / "a.rrd")) == list(range(1, 21))
+
+
+def test_a_csv_has_the_table(run, tmp_path):
+    table = run.to_dataframe()
+    with run.save(tmp_path / "a.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == list(table.columns)
+    assert [float(row["aoi"]) for row in rows] == list(table.aoi)
+    assert rows[4]["window"] == "5"
+    assert rows[4]["seconds"] == "0.5"
+    assert rows[4]["packets_delivered"] == ""
+
+
+def test_a_summary_is_saved_and_replaced(run, tmp_path):
+    (tmp_path / "a.json").write_text("old")
+    saved = json.loads(run.save(tmp_path / "a.json").read_text())
+    assert saved["config"]["num_robots"] == 6
+    assert saved["config"]["policy"] == "tdma"
+    assert saved["aoi_mean"] == run.summary.aoi_mean
+
+
+def test_other_endings_and_what_was_not_recorded_are_refused(run, unrecorded, tmp_path):
+    with pytest.raises(ValueError, match=r"must be named \*.rrd or \*.json or \*.csv, not"):
+        run.save(tmp_path / "a.mp3")
+    with pytest.raises(ValueError, match="fly with record=True"):
+        unrecorded.save(tmp_path / "a.rrd")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_it_shows_itself_in_a_line_and_as_a_table(run):
+    assert repr(run).startswith("<Run flocking, tdma, 6 robots, seed 3: age of information ")
+    assert "\n" not in repr(run)
+    html = run._repr_html_()
+    assert html.count("<tr>") >= 8
+    assert f"{run.summary.aoi_mean:.2f} windows" in html
