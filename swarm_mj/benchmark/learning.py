@@ -36,13 +36,14 @@ def learning_rows(
     for num_missions in (1, 32):
         yield from _network_rows(mission, num_missions, seconds)
     for arm in ("robot", "team"):
-        yield Row(f"training, arm {arm}", _training_per_s(arm, mission, threads, seconds), "{:.1f}")
+        per_s = _training_per_s(arm, mission, threads, seconds)
+        yield Row(f"train --arm {arm}: team decisions", per_s, "{:.1f} / s")
     robot = usual_settings("robot", mission, (num_robots,))
-    own = {"arm robot's": (robot.network, robot.features), "the paper's": (SHAPE, "paper")}
+    own = {"--arm robot": (robot.network, robot.features), "the paper": (SHAPE, "paper")}
     for name, (shape, features) in own.items():
         node, parent = (rows[:1] for rows in _graphs(mission, features, 1))
         decision_us = _forward_us(FastAggregationGnn(shape), node, parent, seconds=seconds / 2)
-        yield Row(f"one robot's decision, {name} network, µs", decision_us, "{:.0f}")
+        yield Row(f"one robot's decision, network of {name}", decision_us, "{:.0f} µs")
 
 
 def _network_rows(mission: Mission, num_missions: int, seconds: float) -> Iterator[Row]:
@@ -63,10 +64,11 @@ def _network_rows(mission: Mission, num_missions: int, seconds: float) -> Iterat
     backward_us = microseconds(learn, seconds)
     layer_us = _forward_us(layer, rows, seconds=seconds / 2)
     missions = f"{num_missions} mission{'s' if num_missions > 1 else ''}"
+    whose = f"the paper's network, {missions}"
     forward_per_s, backward_per_s = (1e6 * num_missions / us for us in (forward_us, backward_us))
-    yield Row(f"the paper's network, {missions}, forward", forward_per_s, "{:.0f}")
-    yield Row("  in 64 x 64 layers over as many nodes", forward_us / layer_us, "{:.1f} x")
-    yield Row("  forward and backward", backward_per_s, "{:.0f}")
+    yield Row(f"{whose}: team decisions", forward_per_s, "{:.0f} / s")
+    yield Row("  one takes as long as so many 64 x 64 layers", forward_us / layer_us, "{:.1f}")
+    yield Row("  with gradients, as in training", backward_per_s, "{:.0f} / s")
 
 
 def _forward_us(network: torch.nn.Module, *inputs: torch.Tensor, seconds: float) -> float:

@@ -39,12 +39,16 @@ DENSE = replace(MISSION, range_ratio=1.0)
 PLAN_SIZES = (40, 80, 200)  # robots
 
 
+PLAIN_STEP = "one plain MuJoCo step of 40 robots"  # measured again and again
+IN_STEPS = "  that is so many plain MuJoCo steps"
+
+
 class Row(NamedTuple):
     """A line of a table."""
 
     name: str
     value: float
-    form: str = "{:.2f}"  # of the value
+    form: str = "{:.2f} µs"  # of the value, with its unit
     ends_section: bool = False
 
 
@@ -61,23 +65,23 @@ def simulation_rows(
     recipient = swarm.decide(policy)
     phases = window(swarm.buffers, swarm.states, recipient, swarm.channel, swarm.now)
     parts = {
-        "decide": lambda: swarm.decide(policy),
-        "move": swarm.move,
-        "radio and buffers": _talk(swarm, recipient),
-        "costs": lambda: window_costs(
+        "  the policy decides": lambda: swarm.decide(policy),
+        "  MuJoCo moves the robots": swarm.move,
+        "  the radio delivers, buffers merge": _talk(swarm, recipient),
+        "  costs are measured": lambda: window_costs(
             swarm.buffers, swarm.states, phases, swarm.now, is_broadcast=False
         ),
-        "radio alone": lambda: swarm.channel(swarm.states.position_m, recipient),
-        "hops (flights only)": lambda: mean_hops(swarm.buffers),
+        "the radio alone": lambda: swarm.channel(swarm.states.position_m, recipient),
+        "hops of news are counted (fly only)": lambda: mean_hops(swarm.buffers),
     }
     window_us = microseconds(lambda: swarm.step(policy), seconds) / num_missions
-    step_us = microseconds(_plain_steps(MISSION), seconds / 4)
-    yield Row("windows per second", 1e6 / window_us, "{:,.0f}")
-    yield Row("one window, µs", window_us)
-    yield Row("  in plain mj_steps", window_us / step_us, "{:.2f} x")
-    yield Row("plain mj_step, µs", step_us, ends_section=True)
+    step_us = plain_step_us(seconds / 4)
+    yield Row("windows simulated per second", 1e6 / window_us, "{:,.0f}")
+    yield Row("time of one window of one mission", window_us)
+    yield Row(IN_STEPS, window_us / step_us, "{:.2f}")
+    yield Row(PLAIN_STEP, step_us, ends_section=True)
     for name, part in parts.items():
-        yield Row(f"{name}, µs", microseconds(part, seconds / 4) / num_missions)
+        yield Row(name, microseconds(part, seconds / 4) / num_missions)
 
 
 def evaluation_rows(num_episodes: int, *, num_jobs: int = 2, seconds: float = 2.0) -> Iterator[Row]:
@@ -89,23 +93,23 @@ def evaluation_rows(num_episodes: int, *, num_jobs: int = 2, seconds: float = 2.
     for policy in (*BASELINES, "greedy-oracle"):  # compiles, if it never has
         _flying_s(policy, num_episodes=1, mission=replace(MISSION, num_windows=1))
     baselines_s = _flying_s(*BASELINES, num_episodes=num_episodes, num_jobs=num_jobs)
-    step_us = microseconds(_plain_steps(MISSION), seconds / 4)
+    step_us = plain_step_us(seconds / 4)
     num_windows = len(BASELINES) * num_episodes * MISSION.num_windows
-    yield Row(f"{', '.join(BASELINES)}; {num_jobs} jobs, s", baselines_s, "{:.1f}")
-    yield Row(
-        "  one window, in plain mj_steps", 1e6 * baselines_s / num_windows / step_us, "{:.2f} x"
-    )
+    yield Row(f"{', '.join(BASELINES)}, --jobs {num_jobs}", baselines_s, "{:.1f} s")
+    window_us = 1e6 * baselines_s / num_windows
+    yield Row("  one window of one mission, with start-up", window_us)
+    yield Row(IN_STEPS, window_us / step_us, "{:.2f}")
     num_oracles = min(num_episodes, ORACLE_EPISODES)
     oracle_s = _flying_s("greedy-oracle", num_episodes=num_oracles)
-    yield Row("greedy-oracle, one episode, s", oracle_s / num_oracles)
+    yield Row("greedy-oracle, one mission", oracle_s / num_oracles, "{:.2f} s")
     for size in PLAN_SIZES:
         plan_ms = microseconds(_planning(replace(MISSION, num_robots=size)), seconds / 4) / 1000.0
         num_halves = 2 * regular_length(size, PlannerSettings().epochs)
-        yield Row(f"planner, one robot's plan of an epoch, {size} robots, ms", plan_ms, "{:.1f}")
-        yield Row("  for each half window, ms", plan_ms / num_halves)
+        yield Row(f"planner, {size} robots: one robot's plan", plan_ms, "{:.1f} ms")
+        yield Row("  for each of its slots of 50 ms", plan_ms / num_halves, "{:.2f} ms")
     dense_ms = microseconds(_planning(DENSE), seconds / 4) / 1000.0
-    yield Row("  of 40 robots at range ratio 1, ms", dense_ms, "{:.1f}")
-    yield Row("plain mj_step, µs", step_us)
+    yield Row("planner, 40 robots that hear 1 km far", dense_ms, "{:.1f} ms")
+    yield Row(PLAIN_STEP, step_us)
 
 
 def _flying_s(
@@ -156,6 +160,11 @@ def _talk(swarm: Swarm, recipient: Int[np.ndarray, "B N"]) -> Callable[[], objec
         now[:] += 1.0
 
     return talk
+
+
+def plain_step_us(seconds: float) -> float:
+    """One mj_step of the scene of 40 robots, in about so many seconds [µs]."""
+    return microseconds(_plain_steps(MISSION), seconds)
 
 
 def _plain_steps(mission: Mission) -> Callable[[], None]:

@@ -1,14 +1,28 @@
 """`swarm-mj bench`: how fast the simulation and evaluations are on this machine."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.benchmark.simulation import Row, evaluation_rows, simulation_rows
-from swarm_mj.cli.terminal import tell_cores
+from swarm_mj.benchmark.simulation import (
+    PLAIN_STEP,
+    Row,
+    evaluation_rows,
+    plain_step_us,
+    simulation_rows,
+)
+from swarm_mj.cli.terminal import plain_console, tell_cores
 from swarm_mj.fields import setting
+
+BUSY = 0.3  # the spread from which on numbers say little
+LEGEND = """\
+window: 100 ms of a mission. The indented rows below the line are its parts.
+plain MuJoCo step: mj_step of the same scene, without radio: the yardstick.
+plan: what the planner's robots compute once in an epoch of half as many windows as robots.
+team decision: the network decides for all robots of a team, in one window."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,38 +48,63 @@ def run(options: Options) -> int:
     tell_cores(options.threads, "threads")
     with Console(stderr=True).status("Measuring ...") as status:
         tables = list(_measure(options, status.update))
+        steps_us = [row.value for each in tables for row in each.rows if row.name == PLAIN_STEP]
+        steps_us.append(plain_step_us(options.seconds / 4))
     console = Console(highlight=False)
-    for table in tables:
-        console.print(table)
+    for each in tables:
+        console.print(each.drawn())
+    plain_console().print(f"{LEGEND}\n{noise(steps_us)}")
     return 0
 
 
-def _measure(options: Options, say: Callable[[str], None]) -> Iterator[Table]:
+def noise(steps_us: Sequence[float]) -> str:
+    """How far one number wanders that should always be the same."""
+    least, most = min(steps_us), max(steps_us)
+    spread = most / least - 1.0
+    busy = "; the machine was busy, so measure again when it is not" if spread > BUSY else ""
+    return (
+        f"noise: the plain step was measured {len(steps_us)} times, from {least:.2f} to {most:.2f} "
+        f"µs. Other numbers, too, may be off by {spread:.0%}{busy}."
+    )
+
+
+class _Measured(NamedTuple):
+    """A table: rows of the same names, each with a value from every column."""
+
+    title: str
+    columns: Sequence[Sequence[Row]]
+    head: Sequence[str] = ("", "")
+
+    @property
+    def rows(self) -> Iterator[Row]:
+        return (row for column in self.columns for row in column)
+
+    def drawn(self) -> Table:
+        table = Table(title=self.title, title_justify="left", show_header=any(self.head))
+        for index, name in enumerate(self.head):
+            table.add_column(name, justify="right" if index else "left")
+        for rows in zip(*self.columns, strict=True):
+            values = (row.form.format(row.value) for row in rows)
+            table.add_row(rows[0].name, *values, end_section=rows[0].ends_section)
+        return table
+
+
+def _measure(options: Options, say: Callable[[str], None]) -> Iterator[_Measured]:
     columns = []
     for num_missions in options.missions:
         say(f"Measuring with {num_missions} side by side ...")
         rows = simulation_rows(num_missions, num_threads=options.threads, seconds=options.seconds)
         columns.append(list(rows))
     head = ("missions side by side", *map(str, options.missions))
-    yield _table("Random walk of 40 robots, round robin", *columns, head=head)
+    yield _Measured("Simulation: 40 robots walk at random, policy round-robin", columns, head)
     if options.episodes:
         say(f"Measuring an evaluation of {options.episodes} missions ...")
         rows = evaluation_rows(options.episodes, num_jobs=options.jobs, seconds=options.seconds)
-        yield _table(f"Evaluation: {options.episodes} random walks of 40 robots", rows)
+        title = f"Evaluation: {options.episodes} random walks of 40 robots, 500 windows each"
+        yield _Measured(title, [list(rows)])
     if not options.no_learning:
         say("Measuring networks and training (a minute or two) ...")
         from swarm_mj.benchmark import learning  # torch takes its time to import
 
         rows = learning.learning_rows(threads=options.threads, seconds=options.seconds)
-        yield _table("Learning: 40 stationary robots, team decisions per second", rows)
-
-
-def _table(title: str, *columns: Iterable[Row], head: Sequence[str] = ("", "")) -> Table:
-    """Rows of the same names, each with a value from every column."""
-    table = Table(title=title, title_justify="left", show_header=any(head))
-    for index, name in enumerate(head):
-        table.add_column(name, justify="right" if index else "left")
-    for rows in zip(*columns, strict=True):
-        values = (row.form.format(row.value) for row in rows)
-        table.add_row(rows[0].name, *values, end_section=rows[0].ends_section)
-    return table
+        yield _Measured("Learning: 40 robots at rest", [list(rows)])

@@ -13,7 +13,7 @@ def rows():
 def test_networks_are_timed_alone_and_by_the_batch(rows):
     for first, missions in ((0, "1 mission"), (3, "32 missions")):
         forward, layers, backward = rows[first : first + 3]
-        assert forward.name == f"the paper's network, {missions}, forward"
+        assert forward.name == f"the paper's network, {missions}: team decisions"
         assert 0.0 < backward.value < forward.value
         assert layers.value > 1.0
 
@@ -21,7 +21,7 @@ def test_networks_are_timed_alone_and_by_the_batch(rows):
 def test_both_arms_train_and_both_networks_decide(rows):
     named = {row.name: row.value for row in rows}
     for name in (
-        *("training, arm robot", "training, arm team"),
-        *(f"one robot's decision, {whose} network, µs" for whose in ("arm robot's", "the paper's")),
+        *("train --arm robot: team decisions", "train --arm team: team decisions"),
+        *(f"one robot's decision, network of {whose}" for whose in ("--arm robot", "the paper")),
     ):
         assert named[name] > 0.0

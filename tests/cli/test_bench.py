@@ -6,21 +6,23 @@ import pytest
 
 from swarm_mj.benchmark import learning
 from swarm_mj.cli import main
+from swarm_mj.cli.bench import noise
 
 
 def test_bench_prints_the_whole_and_its_parts(swarm_mj):
     short = ("--seconds", 0.1, "--episodes", 1, "--no-learning")
     done = swarm_mj("bench", "--missions", 1, 3, *short)
     assert done.returncode == 0, done.stderr
-    for row in ("windows per second", "plain mj_step", "radio and buffers", "move", "decide"):
+    for row in ("windows simulated per second", "plain MuJoCo step", "radio delivers", "decides"):
         assert row in done.stdout
     for row in (
         "Evaluation: 1 random walks",
-        "random-flooding, round-robin, mst; 2 jobs",
+        "random-flooding, round-robin, mst, --jobs 2",
         "greedy-oracle",
     ):
         assert row in done.stdout
     assert "Learning" not in done.stdout
+    assert "noise: the plain step was measured 4 times, from" in done.stdout.splitlines()[-1]
 
 
 def test_bench_times_learning_and_leaves_the_evaluation_out(monkeypatch, capsys):
@@ -29,8 +31,17 @@ def test_bench_times_learning_and_leaves_the_evaluation_out(monkeypatch, capsys)
     assert main(["bench", "--missions", "1", "--seconds", "0.1", "--episodes", "0"]) == 0
     printed = capsys.readouterr().out
     assert "Evaluation" not in printed
-    for row in ("forward and backward", "training, arm robot", "training, arm team", "decision"):
+    for row in ("with gradients", "train --arm robot", "train --arm team", "decision"):
         assert row in printed
+
+
+def test_noise_is_the_spread_of_what_should_be_the_same():
+    assert noise([4.0, 4.4, 4.2]).startswith(
+        "noise: the plain step was measured 3 times, from 4.00 to 4.40 µs. Other numbers, too, may "
+        "be off by 10%"
+    )
+    assert noise([4.0, 4.4]).endswith("10%.")
+    assert noise([4.0, 6.0]).endswith("50%; the machine was busy, so measure again when it is not.")
 
 
 @pytest.mark.parametrize(
