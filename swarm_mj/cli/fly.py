@@ -155,7 +155,13 @@ def _short(policy: str) -> str:
 
 def _compile_ahead(options: Options, mission: Mission) -> None:
     """Flies a small mission of this kind, beyond half-way, so that compiling is not timed."""
-    smallest = replace(mission, num_robots=3, range_ratio=10.0, num_windows=COMPILING_WINDOWS)
+    is_bound = is_directory(options.policy)  # perhaps to teams of one size
+    smallest = replace(
+        mission,
+        num_robots=mission.num_robots if is_bound else 3,
+        range_ratio=10.0,
+        num_windows=COMPILING_WINDOWS,
+    )
     for _ in rollout(Swarm(smallest, [0]), _make_policy(options, smallest)):
         pass
 

@@ -4,20 +4,30 @@ An environment is one robot, or one team. All missions begin and end together.
 """
 
 from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import stable_baselines3
 from gymnasium.utils import seeding
 from jaxtyping import Bool
-from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.torch_layers import CombinedExtractor
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize, is_vecenv_wrapped
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
+from torch import nn
 
 from swarm_mj.envs.gymnasium import check_paid_together
 from swarm_mj.envs.spaces import robot_spaces, team_spaces
 from swarm_mj.envs.team import Observation, Team, next_seed
+from swarm_mj.io.provenance import version
 from swarm_mj.mission import Mission
+from swarm_mj.policies.mlp import MlpShape
+from swarm_mj.policies.mlp_folder import MlpConfig, save_mlp
 
 AGENTS = ("robot", "team")  # what an environment is
+ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}  # of networks that can be stored as policies
 
 
 def make_vec_env(
@@ -152,3 +162,93 @@ class SwarmVecEnv(VecEnv):
         if self.agent == "team":
             return seen
         return {name: values.reshape(-1, *values.shape[2:]) for name, values in seen.items()}
+
+
+def save_policy(model: BaseAlgorithm, folder: Path | str) -> None:
+    """Stores a trained actor as a policy that `swarm-mj fly --policy FOLDER` flies.
+
+    The folder holds the network's weights, no code and no pickle; the model itself is not kept.
+
+    Args:
+        model: PPO, A2C or MaskablePPO with its own "MultiInputPolicy", trained on an environment
+            of `make_vec_env` whose agents are robots. A model that was loaded needs it again:
+            `PPO.load(path, env=env)`.
+        folder: What is there is replaced if it is a policy.
+
+    Raises:
+        ValueError: The model is another, or the folder holds other files than a policy's.
+        OSError: The folder cannot be written.
+    """
+    team = _trained_on(model)
+    layers = _actor(model)
+    activation, hidden = _shape_of(layers)
+    weights = {
+        f"{n}.{name}": tensor.detach().cpu().numpy().copy()
+        for n, layer in enumerate(each for each in layers if isinstance(each, nn.Linear))
+        for name, tensor in layer.named_parameters()
+    }
+    network = MlpShape(
+        num_robots=team.mission.num_robots,
+        features=team.features,
+        hidden=hidden,
+        activation=activation,
+        obeys_mask=hasattr(model.policy.action_dist, "apply_masking"),
+    )
+    training = {
+        "algorithm": f"{type(model).__name__} of stable-baselines3 {stable_baselines3.__version__}",
+        "timesteps": model.num_timesteps,
+        "reward": team.reward,
+        **{f"mission.{name}": value for name, value in asdict(team.mission).items()},
+    }
+    save_mlp(
+        Path(folder), weights, MlpConfig(network=network, training=training, version=version())
+    )
+
+
+def _trained_on(model: BaseAlgorithm) -> Team:
+    """The missions that a model was trained on; raises ValueError if a policy cannot be made."""
+    env = model.get_env()
+    inner = env.unwrapped if env is not None else None
+    if (
+        env is None
+        or not isinstance(inner, SwarmVecEnv)
+        or inner.agent != "robot"
+        or inner.team.with_parents
+    ):
+        raise ValueError(
+            "a policy is made of a model on make_vec_env's robots, without parents; train on that, "
+            "or load the model with it: PPO.load(path, env=env)"
+        )
+    if is_vecenv_wrapped(env, VecNormalize):
+        raise ValueError(
+            "a policy cannot be made of a model behind VecNormalize, whose averages it would need; "
+            "train without it: observations are normalised already"
+        )
+    return inner.team
+
+
+def _actor(model: BaseAlgorithm) -> list[nn.Module]:
+    """The layers that lead to a decision; raises ValueError if they are not plain ones."""
+    policy: Any = model.policy
+    own = ("mlp_extractor.policy_net.", "action_net.", "mlp_extractor.value_net.", "value_net.")
+    is_plain = type(getattr(policy, "features_extractor", None)) is CombinedExtractor
+    others = [name for name, _ in policy.named_parameters() if not name.startswith(own)]
+    if not is_plain or others:
+        raise ValueError(
+            f'a policy is made of the actor of "MultiInputPolicy" alone, not of '
+            f"{type(policy).__name__}'s {others[0] if others else 'own features extractor'}"
+        )
+    return [*policy.mlp_extractor.policy_net, policy.action_net]
+
+
+def _shape_of(layers: list[nn.Module]) -> tuple[Any, tuple[int, ...]]:
+    """The activation between layers, and the widths of all but the last."""
+    *hidden, _ = [each.out_features for each in layers if isinstance(each, nn.Linear)]
+    between = {type(each) for each in layers} - {nn.Linear}
+    names = {kind: name for name, kind in ACTIVATIONS.items()}
+    if len(between) > 1 or not between <= set(names):
+        raise ValueError(
+            f"a policy's activation must be one of {', '.join(ACTIVATIONS)}, not "
+            f"{' and '.join(sorted(kind.__name__ for kind in between))}"
+        )
+    return names[between.pop()] if between else "tanh", tuple(hidden)

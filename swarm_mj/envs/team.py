@@ -75,6 +75,7 @@ class Team:
         self.num_missions = num_missions
         self.reward = _checked(reward, self.mission, channel)
         self.with_parents = with_parents
+        self.features = features
         self._extractor = make_extractor(features, self.mission)
         self.num_features = len(self._extractor.names)  # F
         self._parts = copy.deepcopy(

@@ -117,6 +117,11 @@ def read_document(text: bytes | str, name: str, version: int, kind: type[Kind]) 
     return read_plain(document, kind, bases=(_Header,))
 
 
+def format_of(text: bytes | str) -> str:
+    """The `format` that a JSON object begins with; raises ValueError if it has none."""
+    return read_plain(_plain(text), _Header).format
+
+
 def read_plain(value: object, kind: type[Kind], bases: tuple[type, ...] = ()) -> Kind:
     """Numbers, texts, lists and dicts as a dataclass, or another type that msgspec knows.
 

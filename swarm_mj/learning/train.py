@@ -41,7 +41,8 @@ from swarm_mj.learning.run_folder import (
 from swarm_mj.learning.settings import PpoSettings, Training
 from swarm_mj.learning.vec_env import RobotEnv, TeamEnv, missions_of
 from swarm_mj.policies.policy_config import PolicyConfig
-from swarm_mj.policies.stored import check_replaceable, read_policy, save_policy
+from swarm_mj.policies.policy_folder import check_replaceable
+from swarm_mj.policies.stored import read_policy, save_policy
 
 NO_BUDGET = 10**15  # team decisions
 

@@ -1,6 +1,7 @@
 """A policy on disk: a folder of its weights, what they belong to, and a card for its reader."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 import torch
@@ -11,16 +12,22 @@ from torch import Tensor
 from swarm_mj.gnn.fast import FastAggregationGnn
 from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.network import AggregationGnn
-from swarm_mj.io.atomic import present_folder, write_folder
-from swarm_mj.io.reading import check_size, read_file
+from swarm_mj.io.reading import format_of
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn import LearnedPolicy
+from swarm_mj.policies.mlp import MlpPolicy
+from swarm_mj.policies.mlp_folder import MLP_FORMAT, load_mlp
 from swarm_mj.policies.model_card import model_card
 from swarm_mj.policies.policy_config import PolicyConfig, from_json, to_json
-
-WEIGHTS, CONFIG, CARD = "model.safetensors", "config.json", "README.md"
-MAX_BYTES = {WEIGHTS: 64_000_000, CONFIG: 1_000_000}
-WAY_OUT = "copy it again, or make one with `swarm-mj train`"
+from swarm_mj.policies.policy_folder import (
+    CARD,
+    CONFIG,
+    WAY_OUT,
+    WEIGHTS,
+    present_policy,
+    read_part,
+    write_policy,
+)
 
 
 def save_policy(
@@ -44,13 +51,12 @@ def save_policy(
         CONFIG: to_json(config).encode(),
         CARD: (model_card(config) if card is None else card).encode(),
     }
-    for name in MAX_BYTES:
-        check_size(name, len(contents[name]), MAX_BYTES[name])
-    check_replaceable(folder)
-    write_folder(folder, contents, check=read_policy)
+    write_policy(folder, contents, check=read_policy)
 
 
-def load_policy(folder: Path, mission: Mission, *, is_deterministic: bool = False) -> LearnedPolicy:
+def load_policy(
+    folder: Path, mission: Mission, *, is_deterministic: bool = False
+) -> LearnedPolicy | MlpPolicy:
     """A policy, ready to fly a mission, which may be of another kind than it was trained on.
 
     The mission's area, duration and range normalise what the robots see. A deterministic policy
@@ -60,6 +66,8 @@ def load_policy(folder: Path, mission: Mission, *, is_deterministic: bool = Fals
         ValueError: There is none, or it is damaged, foreign, oversized or of a newer version.
         OSError: It cannot be read.
     """
+    if _is_mlp(folder):
+        return load_mlp(folder, mission, is_deterministic=is_deterministic)
     network, config = read_policy(folder)
     return LearnedPolicy(
         network,
@@ -69,29 +77,23 @@ def load_policy(folder: Path, mission: Mission, *, is_deterministic: bool = Fals
     )
 
 
+def _is_mlp(folder: Path) -> bool:
+    """Whether a folder says that its network is no GNN, but a plain one."""
+    with suppress(ValueError):  # what is wrong is said when it is read
+        return format_of(read_part(present_policy(folder), CONFIG)) == MLP_FORMAT
+    return False
+
+
 def read_policy(folder: Path) -> tuple[AggregationGnn, PolicyConfig]:
     """A policy's network, with its weights, and its config; errors as of `load_policy`."""
-    present = present_folder(folder)
-    if not present.exists():
-        raise ValueError(
-            f"policy {folder} does not exist; name a directory that `swarm-mj train` wrote, such "
-            "as runs/NAME/policy"
-        )
-    if not present.is_dir():
-        raise ValueError(f"policy {folder} is a file; name the directory that holds the policy")
-    if not (present / CONFIG).exists() and (present / "policy" / CONFIG).exists():
-        raise ValueError(f"{folder} is a run; name the policy in it, {folder / 'policy'}")
+    present = present_policy(folder)
     name = CONFIG
     try:
-        config = from_json(_read(present, name))
+        config = from_json(read_part(present, name))
         name = WEIGHTS
-        return _network(config, _read(present, name)), config
+        return _network(config, read_part(present, name)), config
     except ValueError as error:
         raise ValueError(f"{folder / name}: {error}; {WAY_OUT}") from error
-
-
-def _read(folder: Path, name: str) -> bytes:
-    return read_file(folder / name, "file", MAX_BYTES[name])
 
 
 def _network(config: PolicyConfig, data: bytes) -> AggregationGnn:
@@ -124,16 +126,3 @@ def _check_tensors(tensors: Mapping[str, Tensor], network: AggregationGnn) -> No
             raise ValueError(f"tensor {name} must be {wanted}, not {given}")
         if not torch.isfinite(tensor).all():
             raise ValueError(f"tensor {name} has numbers that are not finite")
-
-
-def check_replaceable(folder: Path) -> None:
-    """Passes if a policy may take a folder's place; what file browsers hide in it may be lost.
-
-    Raises:
-        ValueError: Something else would be lost.
-    """
-    if folder.exists() and not folder.is_dir():
-        raise ValueError(f"policy {folder} is a file; name another place, or remove it")
-    names = {path.name for path in folder.glob("*") if not path.name.startswith(".")}
-    for name in sorted(names - {WEIGHTS, CONFIG, CARD}):
-        raise ValueError(f"{folder} holds {name}, which is no policy's; name another directory")

@@ -12,6 +12,7 @@ from swarm_mj.envs.dm import make_environment
 from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
 from swarm_mj.envs.pettingzoo import parallel_env
+from swarm_mj.envs.registration import register_environments
 from swarm_mj.envs.sb3 import make_vec_env
 from swarm_mj.mission import paper
 from swarm_mj.swarm import Swarm
@@ -51,8 +52,8 @@ class Made(Single):
     """By its name in Gymnasium's registry, in all of its wrappers."""
 
     def make(self, mission, seed):
-        name = "swarm_mj.envs:swarm_mj/Flocking-v0"
-        env = gymnasium.make(name, mission=mission)
+        register_environments()
+        env = gymnasium.make("swarm_mj/Flocking-v0", mission=mission)
         env.reset(seed=seed)
         return env
 

@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 import torch
-from sb3_contrib import MaskablePPO
+from sb3_contrib import MaskablePPO, RecurrentPPO
 from sb3_contrib.common.maskable.utils import get_action_masks, is_masking_supported
-from stable_baselines3 import A2C
-from stable_baselines3.common.vec_env import VecMonitor
+from stable_baselines3 import A2C, PPO
+from stable_baselines3.common.torch_layers import CombinedExtractor
+from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
+from torch import nn
 
-from swarm_mj.envs.sb3 import make_vec_env
+from swarm_mj.envs.sb3 import make_vec_env, save_policy
+from swarm_mj.policies.registry import make_policy
 
 torch.set_num_threads(1)
 SMALL = {"num_robots": 4, "num_windows": 6, "range_ratio": 0.4}
@@ -130,3 +133,88 @@ def test_what_environments_do_not_have():
         env.set_attr("wind", 3)
     assert not any(env.env_is_wrapped(VecMonitor))
     assert env.get_attr("render_mode") == [None] * 4
+
+
+# A trained network as a policy.
+
+
+def trained(algorithm=MaskablePPO, env=None, **options):
+    env = env or make_vec_env("stationary", 2, seed=1, **SMALL)
+    policy = options.pop("policy", "MultiInputPolicy")
+    return algorithm(policy, env, n_steps=8, seed=1, **options).learn(64)
+
+
+@pytest.mark.parametrize("algorithm", [MaskablePPO, A2C, PPO])
+@pytest.mark.parametrize("net_arch", [[], [8], [16, 8]])
+def test_a_stored_actor_decides_as_the_trained_one(tmp_path, algorithm, net_arch):
+    activation = nn.ReLU if net_arch == [8] else nn.Tanh
+    kwargs = {"net_arch": net_arch, "activation_fn": activation}
+    model = trained(algorithm, policy_kwargs=kwargs)
+    save_policy(model, tmp_path / "policy")
+    env = make_vec_env("stationary", 2, seed=7, **SMALL)
+    env.reset()
+    policy = make_policy(str(tmp_path / "policy"), env.team.mission)
+    for action in actions(env, 5):
+        seen, *_ = env.step(action)
+        masks = {"action_masks": env.action_masks()} if algorithm is MaskablePPO else {}
+        with torch.no_grad():
+            tensors = {name: torch.as_tensor(each) for name, each in seen.items()}
+            expected = model.policy.get_distribution(tensors, **masks).distribution.probs.numpy()
+        team = env.team.observation
+        logits = policy.logits(team["action_mask"].astype(bool), team["observation"])
+        odds = np.exp(logits - logits.max(axis=2, keepdims=True))
+        found = (odds / odds.sum(axis=2, keepdims=True)).reshape(expected.shape)
+        np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+def test_a_stored_actor_flies_from_the_command_line(here, forks):
+    model = trained(env=VecMonitor(make_vec_env("stationary", 2, seed=1, **SMALL)))
+    save_policy(model, "runs/sb3")
+    mission = ("--task", "stationary", "--robots", 4, "--windows", 20)
+    done = forks.run(here, "swarm_mj", "fly", "--policy", "runs/sb3", *mission, "--no-record")
+    assert (done.returncode, done.stderr) == (0, "")
+    many = ("--policy", "runs/sb3", "tdma", "--episodes", 2, "--jobs", 1)
+    done = forks.run(here, "swarm_mj", "evaluate", *many, *mission, "--csv", "e.csv")
+    assert done.returncode == 0, done.stderr
+    assert "runs/sb3" in (here / "e.csv").read_text()
+    done = forks.run(here, "swarm_mj", "fly", "--policy", "runs/sb3", "--robots", 5)
+    assert done.returncode == 2
+    assert "flies teams of 4 robots" in done.stderr
+
+
+def test_a_model_read_back_is_stored_with_its_environment(tmp_path):
+    model = trained(PPO)
+    model.save(tmp_path / "model.zip")
+    with pytest.raises(ValueError, match=r"load the model with it"):
+        save_policy(PPO.load(tmp_path / "model.zip"), tmp_path / "policy")
+    env = make_vec_env("stationary", 1, **SMALL)
+    save_policy(PPO.load(tmp_path / "model.zip", env=env), tmp_path / "policy")
+    assert (tmp_path / "policy" / "config.json").exists()
+
+
+class Halved(CombinedExtractor):
+    def forward(self, observations):
+        return 0.5 * super().forward(observations)
+
+
+@pytest.mark.parametrize(
+    ("model", "message"),
+    [
+        (lambda: trained(PPO, make_vec_env(agent="team", **SMALL)), "make_vec_env's robots"),
+        (lambda: trained(PPO, make_vec_env(with_parents=True, **SMALL)), "without parents"),
+        (lambda: trained(PPO, VecNormalize(make_vec_env(**SMALL))), "behind VecNormalize"),
+        (
+            lambda: trained(PPO, policy_kwargs={"features_extractor_class": Halved}),
+            "own features extractor",
+        ),
+        (lambda: trained(PPO, policy_kwargs={"activation_fn": nn.ELU}), "tanh, relu, not ELU"),
+        (
+            lambda: trained(RecurrentPPO, policy="MultiInputLstmPolicy"),
+            "RecurrentMultiInputActorCriticPolicy's lstm_actor",
+        ),
+    ],
+)
+def test_models_that_no_policy_can_be_made_of(tmp_path, model, message):
+    with pytest.raises(ValueError, match=message):
+        save_policy(model(), tmp_path / "policy")
+    assert not (tmp_path / "policy").exists()
