@@ -1,6 +1,6 @@
 """The documentation's site builds without a warning and loads nothing from elsewhere."""
 
-import importlib.util
+import json
 import os
 import re
 import subprocess
@@ -9,17 +9,9 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from documentation import mission_fields, site_links
 
 ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture(scope="module")
-def site():
-    """The module that MkDocs calls."""
-    spec = importlib.util.spec_from_file_location("site_hook", ROOT / "tools" / "site.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(scope="module")
@@ -76,30 +68,38 @@ def test_the_home_is_the_readme_and_pictures_come_along(built):
     assert (built / "repository/assets/figures/paper/fig5.png").stat().st_size > 10_000
 
 
+def test_the_tour_shows_what_its_cells_show(built):
+    page = (built / "tour.html").read_text(encoding="utf-8")
+    assert "<td style='text-align:left'>10.54 windows" in page  # of the default flight
+    assert page.count("data:image/png;base64,") == 2
+    notebook = json.loads((ROOT / "docs/tour.ipynb").read_text(encoding="utf-8"))
+    assert not any(cell.get("outputs") for cell in notebook["cells"])  # they are made when shown
+
+
 def test_every_equation_leads_to_its_code(built):
     page = (built / "paper-map.html").read_text(encoding="utf-8")
     assert all(f"<td>Eq. {n}</td>" in page for n in range(1, 18))
     assert "interference_mw" in page  # the code itself is there
 
 
-def test_links_between_files_become_links_of_the_site(site):
+def test_links_between_files_become_links_of_the_site():
     text = """[a](docs/policies.md#list) ![b](assets/figures/learning.png) [c](https://x.org)
 ```
 [f](no/link)
 ```
 """
-    linked, targets = site.site_links(text, "README.md", "index.md")
+    linked, targets = site_links(text, "README.md", "index.md")
     assert linked == text.replace("docs/", "").replace("(assets", "(repository/assets")
     assert targets == {"assets/figures/learning.png"}
-    linked, targets = site.site_links("[a](../README.md) [b](code.md)", "docs/x.md", "x.md")
+    linked, targets = site_links("[a](../README.md) [b](code.md)", "docs/x.md", "x.md")
     assert (linked, targets) == ("[a](index.md) [b](code.md)", set())
 
 
-def test_a_link_to_nothing_is_an_error(site):
+def test_a_link_to_nothing_is_an_error():
     with pytest.raises(FileNotFoundError, match=r"README\.md links to docs/none\.md"):
-        site.site_links("[a](docs/none.md)", "README.md", "index.md")
+        site_links("[a](docs/none.md)", "README.md", "index.md")
 
 
-def test_a_mission_s_fields_stand_with_units_and_defaults(site):
-    rows = site.mission_fields().splitlines()
+def test_a_mission_s_fields_stand_with_units_and_defaults():
+    rows = mission_fields().splitlines()
     assert "| `noise_dbm` | `-50` | noise power | -200 to 50 [dBm] | IV-B |" in rows

@@ -6,12 +6,14 @@ a page links to another file of the repository, the site gets that file, too.
 
 import os
 import posixpath
+import pydoc
 import re
 from dataclasses import fields
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from notebook_page import page_of
 
 import swarm_mj
 from swarm_mj.fields import as_typed, range_of
@@ -44,17 +46,22 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
     """
     written = {page: (ROOT / source).read_text("utf-8") for page, source in PAGES.items()}
     written["paper-map.md"] = paper_map()
+    written["tour.md"] = page_of(ROOT / "docs/tour.ipynb")
     for file in files.documentation_pages():
         written[file.src_uri] = file.content_string
     brought: set[str] = set()
     for page, text in written.items():
-        source = PAGES.get(page, f"docs/{page}")
+        source = PAGES.get(page, f"docs/{page}")  # where its links start
         text = text.replace("<!-- fields of Mission -->", mission_fields())
         linked, targets = site_links(text, source, page)
         brought |= targets
         _put(files, File.generated(config, page, content=linked))
     for target in sorted(brought):
-        _put(files, File.generated(config, place_of(target), abs_src_path=str(ROOT / target)))
+        if target.endswith(".py"):
+            code = f"# `{target}`\n\n```python\n{(ROOT / target).read_text('utf-8')}```\n"
+            _put(files, File.generated(config, place_of(target), content=code))
+        else:
+            _put(files, File.generated(config, place_of(target), abs_src_path=str(ROOT / target)))
     return files
 
 
@@ -86,8 +93,9 @@ def place_of(path: str) -> str:
     """Where a file of the repository is on the site."""
     if path in PLACES:
         return PLACES[path]
-    # Pages of other folders are shown as they are written.
-    return path.removeprefix("docs/") if path.startswith("docs/") else f"repository/{path}"
+    if path.startswith("docs/"):
+        return path.removeprefix("docs/")
+    return f"repository/{path}.md" if path.endswith(".py") else f"repository/{path}"
 
 
 def site_links(text: str, source: str, page: str) -> tuple[str, set[str]]:
@@ -128,12 +136,22 @@ def paper_map() -> str:
         f"| {section} | {item} | {what} | [`{target}`][swarm_mj.{target}] |"
         for section, item, what, target in entries
     ]
-    elsewhere = set(
-        re.findall(r"^::: (\S+)", (ROOT / "docs/api.md").read_text("utf-8"), re.MULTILINE)
-    )
+    elsewhere = {home_of(name) for name in names_of((ROOT / "docs/api.md").read_text("utf-8"))}
     targets = dict.fromkeys(f"swarm_mj.{target}" for *_, target in entries)
     shown = [f"::: {target}\n" for target in targets if target not in elsewhere]
     return "\n".join([MAP_INTRODUCTION, *rows, "\n## The code\n", *shown])
+
+
+def names_of(page: str) -> list[str]:
+    """The names that a page explains from their docstrings."""
+    return re.findall(r"^::: (\S+)$", page, re.MULTILINE)
+
+
+def home_of(name: str) -> str:
+    """A name by the module in which it is defined: it may be imported from elsewhere, too."""
+    found = pydoc.locate(name)
+    defined = getattr(found, "__qualname__", None)
+    return f"{found.__module__}.{defined}" if defined else name
 
 
 MAP_INTRODUCTION = """# From the paper to the code

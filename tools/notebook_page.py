@@ -1,0 +1,60 @@
+"""A notebook as a page of the documentation, with what its cells show when they are run now."""
+
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from nbclient import NotebookClient
+
+TIMEOUT_S = 110  # of a cell
+
+
+@cache
+def page_of(path: Path) -> str:
+    """A notebook in Markdown; it is run once a process.
+
+    Args:
+        path: The notebook.
+
+    Returns:
+        Its texts, its code and what the code shows.
+
+    Raises:
+        CellExecutionError: A cell fails.
+        CellTimeoutError: A cell takes too long.
+    """
+    notebook = nbformat.read(path, as_version=4)
+    with tempfile.TemporaryDirectory() as folder:
+        client = NotebookClient(
+            notebook,
+            timeout=TIMEOUT_S,
+            extra_arguments=["--log-level=ERROR"],
+            resources={"metadata": {"path": folder}},
+        )
+        client.execute()
+    return "\n\n".join(part for cell in notebook.cells for part in _parts(cell))
+
+
+def _parts(cell: Any) -> list[str]:  # noqa: ANN401 - a notebook's node
+    if cell.cell_type == "markdown":
+        return [cell.source]
+    outputs = [each for each in cell.outputs if each.get("name") != "stderr"]  # progress bars
+    return [f"```python\n{cell.source}\n```", *map(_shown, outputs)]
+
+
+def _shown(output: Any) -> str:  # noqa: ANN401 - a notebook's node
+    """An output in the richest form that a page can have."""
+    if output.output_type == "stream":
+        return FORMS["text/plain"](output.text)
+    best = next(form for form in FORMS if form in output.data)
+    return FORMS[best](output.data[best])
+
+
+FORMS: dict[str, Callable[[str], str]] = {  # the first that there is, is shown
+    "text/html": lambda html: f'<div class="output">\n{html}\n</div>',
+    "image/png": lambda png: f'<img alt="" src="data:image/png;base64,{"".join(png.split())}">',
+    "text/plain": lambda text: f"```text\n{text}\n```",
+}
