@@ -123,6 +123,17 @@ def training_needs(training: "Training", limits: "Limits") -> Needs:
     )
 
 
+def video_needs(width: int, height: int, num_pictures: float, suffix: str) -> Needs:
+    """Of `replay --video`: a GIF's pictures are kept until the last one is drawn."""
+    pixels = width * height
+    kept = num_pictures if suffix == ".gif" else 0.0
+    return Needs(
+        memory=2.0 * LIBRARIES + (100.0 + 2.0 * kept) * pixels,
+        addresses=ADDRESSES + OF_RERUN,
+        file=0.1e6 + 0.05 * num_pictures * pixels,
+    )
+
+
 def figures_needs(results: Iterable[Path], num_files: int) -> Needs:
     """Of `figures`: the results as objects, and pictures of 1 MB at most."""
     read = sum(path.stat().st_size for path in results if path.is_file())

@@ -1,31 +1,116 @@
-"""`swarm-mj replay`: opens a recorded mission."""
+"""`swarm-mj replay`: opens recorded missions, or makes a video of them."""
 
+import re
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
+from swarm_mj.cli.estimates import YES, check_fits, video_needs
+from swarm_mj.cli.outputs import Output, check_outputs
+from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import plain_console
 from swarm_mj.fields import setting
+from swarm_mj.io.atomic import write_bytes
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
+
+VIDEO = "video"  # a heading of the help
+SUFFIXES = ".mp4|.gif"
+SIZES = {".mp4": "1280x720", ".gif": "830x520"}
+RATES = {".mp4": 25, ".gif": 15}  # pictures per second
+LONGEST_S, SHORTEST_S = 10.0, 1.0  # of a video, unless told otherwise
+PIXELS = (160, 3840)  # of a side
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """The options of `swarm-mj replay`."""
 
-    file: Path = setting(help="an .rrd file that `swarm-mj fly` recorded", is_positional=True)
+    file: tuple[Path, ...] = setting(
+        help=".rrd files that `swarm-mj fly` recorded", is_positional=True
+    )
     web: bool = setting(
         False, "serve it to a browser, on this machine's loopback address only, until Ctrl-C"
     )
+    video: Path | None = setting(
+        None,
+        "make a video instead, of one mission or of two side by side: FILE.mp4 or FILE.gif",
+        group=VIDEO,
+    )
+    size: str | None = setting(
+        None, "in pixels", group=VIDEO, metavar="WIDTHxHEIGHT", shown="1280x720; GIF: 830x520"
+    )
+    seconds: float | None = setting(
+        None,
+        "in which the whole mission is shown",
+        group=VIDEO,
+        unit="s",
+        low=0.1,
+        high=600.0,
+        shown=f"the mission's own time, {LONGEST_S:g} at most",
+    )
+    fps: int | None = setting(
+        None, "pictures per second", group=VIDEO, low=1, high=60, shown="25; GIF: 15"
+    )
+    force: bool = setting(False, "replace an existing video", group=VIDEO)
+    yes: bool = setting(False, YES, group=VIDEO)
 
 
 def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
+    if options.video is not None:
+        return _make_video(options, options.video)
+    if options.size or options.seconds or options.fps or options.force:
+        raise ValueError("--size, --seconds, --fps and --force are of videos; name one by --video")
     from swarm_mj.replay.read import check_replay  # rerun takes its time to import
 
-    check_replay(options.file)
+    for file in options.file:
+        check_replay(file)
     if not options.web:
-        return run_viewer(view_command(options.file))
-    command, address = serve_command(options.file)
+        return run_viewer(view_command(*options.file))
+    command, address = serve_command(*options.file)
     plain_console().print(f"Open {address}\nCtrl-C ends it.")
     return run_viewer(command)
+
+
+def _make_video(options: Options, video: Path) -> int:
+    if options.web:
+        raise ValueError("--web is not allowed with --video; leave one out")
+    check_outputs(
+        Output("video", video, SUFFIXES), inputs=options.file, must_be_new=not options.force
+    )
+    suffix = video.suffix.lower()
+    width, height = _size(options.size or SIZES[suffix], suffix)
+    fps = options.fps or RATES[suffix]
+    needs = video_needs(width, height, (options.seconds or LONGEST_S) * fps, suffix)
+    check_fits(needs, video, "choose a smaller --size or fewer --seconds", is_forced=options.yes)
+
+    from swarm_mj.rendering.movie import MOST_MISSIONS, Style  # rerun and MuJoCo take their time
+    from swarm_mj.rendering.video import check_video, make_video
+    from swarm_mj.replay.read import read_footage
+
+    if len(options.file) > MOST_MISSIONS:
+        raise ValueError(f"a video shows 1 or {MOST_MISSIONS} replays, not {len(options.file)}")
+    footages = [read_footage(file) for file in options.file]
+    flown_s = max(len(each.window) * each.facts.mission.window_s for each in footages)
+    seconds = options.seconds or min(LONGEST_S, max(SHORTEST_S, flown_s))
+    style = Style(width=width, height=height, seconds=seconds, fps=fps)
+    with WorkBar("Rendering", style.num_frames, "pictures") as bar:
+        content = make_video(footages, suffix, style, bar.advance)
+    write_bytes(video, content, check=lambda part: check_video(part, suffix, style))
+    shown = f"{style.num_frames / fps:.3g} s, {style.num_frames} pictures of {width} by {height}"
+    name = shlex.quote(str(video))
+    plain_console().print(f"Wrote {name}: {shown}, {len(content) / 1e6:.1f} MB")
+    return 0
+
+
+def _size(text: str, suffix: str) -> tuple[int, int]:
+    """Width and height, as typed."""
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)
+    width, height = (int(number) for number in match.groups()) if match else (0, 0)
+    low, high = PIXELS
+    if not (low <= width <= high and low <= height <= high):
+        raise ValueError(f"size must be WIDTHxHEIGHT from {low}x{low} to {high}x{high}, not {text}")
+    if suffix == ".mp4" and (width % 2 or height % 2):
+        raise ValueError(f"size of an MP4 must be even numbers, not {text}")
+    return width, height

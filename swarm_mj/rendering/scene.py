@@ -35,6 +35,7 @@ AMBIENT, SUN = 0.5, 0.5
 WALL_OPACITY = 0.3  # a wall in front hides no robot
 # Sizes on the picture, of its height, whatever the size of the area.
 ROBOT, OBSERVER, HEADING, LINE = 0.0085, 0.0115, 0.022, 0.0025
+SMALLEST = 520  # [pixels] in height: robots are not drawn smaller than on such a picture
 ROBOT_HEIGHT = 0.6  # of a marker, by its radius
 SLICES, STACKS = 14, 5  # of round things
 NO_TURN = np.eye(3).ravel()
@@ -62,6 +63,7 @@ class SceneRenderer:
             if not 16 <= pixels <= MAX_PIXELS:
                 raise ValueError(f"{what} must be from 16 to {MAX_PIXELS} pixels, not {pixels}")
         self._width, self._height = width, height
+        self._enlarged = max(1.0, SMALLEST / height)
         self._mission = mission
         spec = compose(mission, scene=scene)
         _prepare(spec, mission)
@@ -132,7 +134,7 @@ class SceneRenderer:
 
     def _draw_robots(self, contents: Contents, camera: Camera) -> None:
         """A disc for each robot, as large on the picture whatever the area; and its heading."""
-        picture_m = camera.pixel_m * camera.height
+        picture_m = self._enlarged * camera.pixel_m * camera.height
         speed = np.linalg.norm(contents.velocity_mps, axis=1, keepdims=True)
         way_m = HEADING * picture_m * contents.velocity_mps / np.maximum(speed, 1e-9)
         for i, (where, way) in enumerate(zip(contents.position_m, way_m, strict=True)):
@@ -145,7 +147,7 @@ class SceneRenderer:
 
     def _draw_links(self, contents: Contents, camera: Camera) -> None:
         """Packets as arcs."""
-        base_m = ROBOT * camera.pixel_m * camera.height
+        base_m = self._enlarged * ROBOT * camera.pixel_m * camera.height
         for points, colour in zip(
             arcs(contents.start_m, contents.end_m, base_m), contents.link_colour, strict=True
         ):
@@ -162,7 +164,7 @@ class SceneRenderer:
     def _add_line(self, start: np.ndarray, end: np.ndarray, colour: np.ndarray) -> None:
         geom, kind = self._next_geom(), mjtGeom.mjGEOM_LINE.value
         mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), NO_TURN, _rgba(colour))
-        mjv_connector(geom, kind, LINE * self._height, start, end)
+        mjv_connector(geom, kind, self._enlarged * LINE * self._height, start, end)
 
     def _next_geom(self) -> MjvGeom:
         """A geom more in the scene; there is room for all that a window can have."""

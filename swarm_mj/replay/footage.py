@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from swarm_mj.mission import Mission
 from swarm_mj.replay import palette
@@ -33,7 +33,8 @@ class Footage:
     window: Int[np.ndarray, "T"]  # 1 is the mission's first
     position_m: Float[np.ndarray, "T N 2"]  # p [m]
     velocity_mps: Float[np.ndarray, "T N 2"]  # of any length: only its direction is shown
-    colour: UInt8[np.ndarray, "T N 3"]
+    age: Float[np.ndarray, "T N"]  # of what the observer knows [windows]; nan: nothing
+    is_on: Bool[np.ndarray, "T N"]  # whether a robot was switched on
     shots: Shots
     age_mean: Float[np.ndarray, "T"]  # Eq. 10 [windows]
 
@@ -41,6 +42,12 @@ class Footage:
     def frame(self) -> Frame:
         """The part of the ground that is shown."""
         return frame(self.position_m, self.facts.mission.half_side_m)
+
+    def colours(self, full_scale: float | None = None) -> UInt8[np.ndarray, "T N 3"]:
+        """The robots' colours, by the replay's own scale of ages unless one is given [windows]."""
+        scale = self.facts.full_scale if full_scale is None else full_scale
+        is_known, age = ~np.isnan(self.age), np.nan_to_num(self.age)
+        return palette.robot_colours(age, scale, is_known, self.is_on, self.facts.observer)
 
 
 def facts_of(log: Log, mission: Mission, policy: str, seed: int) -> Facts:
@@ -64,14 +71,13 @@ def footage_of(log: Log, mission: Mission, policy: str, seed: int) -> Footage:
         policy: Its name, for the title.
         seed: The mission's.
     """
-    facts = facts_of(log, mission, policy, seed)
-    age, is_known = log.ego_age, log.is_known
     return Footage(
-        facts=facts,
+        facts=facts_of(log, mission, policy, seed),
         window=log.window,
         position_m=log.position_m,
         velocity_mps=log.velocity_mps,
-        colour=palette.robot_colours(age, facts.full_scale, is_known, log.is_on, log.ego),
+        age=log.known_age,
+        is_on=log.is_on,
         shots=shots(fates(log), log.position_m),
         age_mean=log.age_mean,
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, Int
 from rerun.chunk import RrdReader
 
 from swarm_mj.io.reading import read_json
@@ -54,7 +54,8 @@ def read_footage(path: Path) -> Footage:
             window=windows(path),
             position_m=position_m[..., :2],
             velocity_mps=_headings(path, position_m),
-            colour=_colours(path).reshape(*shape, 3),
+            age=_numbers(path, "/scene/robots", "age").reshape(shape),
+            is_on=_numbers(path, "/scene/robots", "is_on").reshape(shape) > 0.0,
             shots=_shots(path),
             age_mean=_numbers(path, "/plots/age/mean", "Measurements:values"),
         )
@@ -79,11 +80,6 @@ def _headings(path: Path, position_m: Float[np.ndarray, "T N 3"]) -> Float[np.nd
     return ends[..., 3:5] - ends[..., :2]
 
 
-def _colours(path: Path) -> UInt8[np.ndarray, "K 3"]:
-    rgba = _flat(_timed(path, "/scene/robots", "Cylinders3D:colors")).to_numpy()
-    return np.stack([(rgba >> shift) & 255 for shift in (24, 16, 8)], axis=-1).astype(np.uint8)
-
-
 def _shots(path: Path) -> Shots:
     rows, starts, ends, colours = [], [], [], []
     for fate, (colour, _) in LOOKS.items():
@@ -105,7 +101,7 @@ def _has(path: Path, entity: str) -> bool:
 
 
 def _numbers(path: Path, entity: str, component: str) -> Float[np.ndarray, "K"]:
-    return _flat(_timed(path, entity, component)).to_numpy().astype(float)
+    return _flat(_timed(path, entity, component)).to_numpy(zero_copy_only=False).astype(float)
 
 
 def _flat(column: pa.Array) -> pa.Array:

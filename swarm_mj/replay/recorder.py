@@ -49,6 +49,11 @@ class Log:
         return bool(np.any(self.velocity_mps))
 
     @property
+    def known_age(self) -> Float[np.ndarray, "T N"]:
+        """The ego robot's ages, nan of robots that it has not heard of [windows]."""
+        return np.where(self.is_known, self.ego_age, np.nan)
+
+    @property
     def is_other_known(self) -> Bool[np.ndarray, "T N"]:
         """Whether the ego robot has heard of j, which is not itself."""
         return self.is_known & (np.arange(self.is_known.shape[1]) != self.ego)

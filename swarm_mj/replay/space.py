@@ -70,6 +70,10 @@ def _draw_bodies(sheet: Sheet, colours: UInt8[np.ndarray, "T N 3"]) -> None:
     where = _lifted(log.position_m, height_m / 2.0)
     columns = rr.Cylinders3D.columns(centers=where, colors=shown.reshape(-1, 3))
     sheet.timed("scene/robots", columns.partition([num_robots] * num_windows))
+    # For those who point at a robot, and for videos.
+    age = log.known_age.astype(np.float32).ravel()
+    known = rr.AnyValues.columns(age=age, is_on=log.is_on.ravel())
+    sheet.timed("scene/robots", known.partition([num_robots] * num_windows))
     if log.has_motion:
         speed = np.linalg.norm(log.velocity_mps, axis=2, keepdims=True)
         way = HEADING_SHARE * sheet.frame.reach_m * log.velocity_mps / np.maximum(speed, 1e-9)

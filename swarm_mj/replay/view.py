@@ -23,8 +23,8 @@ def quiet_environment() -> dict[str, str]:
     return kept | {"CI": "true", "ALL_PROXY": NOWHERE}
 
 
-def view_command(path: Path) -> list[str]:
-    """The command that opens a replay in a window.
+def view_command(*paths: Path) -> list[str]:
+    """The command that opens replays in a window.
 
     Raises:
         ValueError: There is no display to open a window on.
@@ -35,15 +35,15 @@ def view_command(path: Path) -> list[str]:
             "there is no display (DISPLAY and WAYLAND_DISPLAY are unset); use "
             "`swarm-mj replay --web FILE`, or tools/picture.py for a picture"
         )
-    return [*VIEWER, str(path)]
+    return [*VIEWER, *map(str, paths)]
 
 
-def serve_command(path: Path) -> tuple[list[str], str]:
-    """The command that serves a replay to this machine's browsers only, and the address to open."""
+def serve_command(*paths: Path) -> tuple[list[str], str]:
+    """The command that serves replays to this machine's browsers only, and the address to open."""
     data_port, page_port = free_ports(2)
     command = [
         *(*VIEWER, "--serve-web", "--bind", LOOPBACK),
-        *("--port", str(data_port), "--web-viewer-port", str(page_port), str(path)),
+        *("--port", str(data_port), "--web-viewer-port", str(page_port), *map(str, paths)),
     ]
     source = f"rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{data_port}%2Fproxy"
     # As in a notebook, the page counts no users.

@@ -22,7 +22,8 @@ def test_a_replay_holds_what_a_video_shows(name, request, tmp_path):
     assert read.facts == made.facts
     np.testing.assert_array_equal(read.window, made.window)
     np.testing.assert_allclose(read.position_m, made.position_m, rtol=1e-6, atol=1e-4)
-    np.testing.assert_array_equal(read.colour, made.colour)
+    np.testing.assert_array_equal(read.age, made.age)
+    np.testing.assert_array_equal(read.is_on, log.is_on)
     np.testing.assert_allclose(read.age_mean, made.age_mean)
     speed = np.maximum(np.linalg.norm(made.velocity_mps, axis=2, keepdims=True), 1e-9)
     length = np.maximum(np.linalg.norm(read.velocity_mps, axis=2, keepdims=True), 1e-9)
@@ -38,9 +39,9 @@ def test_a_replay_holds_what_a_video_shows(name, request, tmp_path):
 def test_colours_are_by_age_white_for_the_observer_and_dark_for_the_fallen(failing):
     log = failing.log
     footage = footage_of(log, failing.mission, "mst", 5)
-    is_dark = np.all(footage.colour == palette.SWITCHED_OFF, axis=2)
+    is_dark = np.all(footage.colours() == palette.SWITCHED_OFF, axis=2)
     np.testing.assert_array_equal(is_dark, ~log.is_on)
-    np.testing.assert_array_equal(footage.colour[:, log.ego][log.is_on[:, log.ego]], 255)
+    np.testing.assert_array_equal(footage.colours()[:, log.ego][log.is_on[:, log.ego]], 255)
 
 
 def test_a_damaged_replay_is_refused(replay, tmp_path):

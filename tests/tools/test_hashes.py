@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 TOOLS = Path(__file__).parents[2] / "tools"
-BY_PLATFORM = {"colorama", "setuptools"}  # wanted on Windows, or by some Pythons only
+BY_PLATFORM = {"appnope", "pywin32-ctypes", "setuptools"}  # of macOS, of Windows, of some Pythons
 
 
 def name_of(pin):

@@ -1,0 +1,153 @@
+"""What stands around the scene in a video: titles, a legend, and the course of the age."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from jaxtyping import Float
+from PIL import Image, ImageDraw, ImageFont
+
+from swarm_mj.replay import palette
+from swarm_mj.replay.footage import Footage
+from swarm_mj.replay.palette import Colour
+
+CURVES: tuple[Colour, ...] = (palette.MEAN_AGE, palette.VARIANCE)  # of one flight, and a second
+FAINT = 0.45  # what is still to come, and texts that matter less
+NUM_SHADES = 48
+
+
+@dataclass(frozen=True)
+class Box:
+    """A part of the picture [pixels]."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+    @property
+    def width(self) -> int:
+        """From left to right."""
+        return self.right - self.left
+
+    @property
+    def height(self) -> int:
+        """From top to bottom."""
+        return self.bottom - self.top
+
+
+@cache
+def font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    """Pillow's own font, in pixels."""
+    return ImageFont.load_default(size)
+
+
+def draw_title(
+    draw: ImageDraw.ImageDraw, footage: Footage, row: int, box: Box, size: int, curve: Colour
+) -> None:
+    """Policy, mission and time above a scene, and its mean age in the colour of its curve."""
+    facts = footage.facts
+    mission = facts.mission
+    left, top, pad = box.left, box.top, size // 2
+    draw.text((left + pad, top + pad), facts.policy, palette.TEXT, font(round(1.3 * size)))
+    about = f"{mission.task}, {mission.num_robots} robots, seed {facts.seed}"
+    draw.text((left + pad, top + pad + 1.7 * size), about, palette.SENT, font(round(0.8 * size)))
+    now = footage.window[row]
+    time = f"{now * mission.window_s:.1f} s, window {now}"
+    age = f"age {footage.age_mean[row]:.1f}"
+    right = box.right - pad
+    draw.text((right, top + pad), age, curve, font(round(1.3 * size)), anchor="ra")
+    draw.text(
+        (right, top + pad + 1.7 * size), time, palette.SENT, font(round(0.8 * size)), anchor="ra"
+    )
+
+
+def draw_legend(
+    draw: ImageDraw.ImageDraw, footages: Sequence[Footage], full_scale: float, box: Box, size: int
+) -> None:
+    """The ramp of ages, and what the colours of packets mean."""
+    small = font(round(0.8 * size))
+    who = " and ".join(dict.fromkeys(f"r{each.facts.observer}" for each in footages))
+    draw.text((box.left, box.top), f"age of what {who} (white) knows", palette.TEXT, small)
+    y, high = box.top + 1.25 * size, 0.55 * size
+    edges = np.linspace(box.left, box.right, NUM_SHADES + 1)
+    shades = palette.age_colours(
+        np.linspace(0.0, full_scale, NUM_SHADES), full_scale, np.ones(NUM_SHADES, dtype=bool)
+    )
+    for k, colour in enumerate(shades.tolist()):
+        draw.rectangle((edges[k], y, edges[k + 1], y + high), tuple(colour))
+    y += 1.3 * high
+    draw.text((box.left, y), "0", palette.SENT, small)
+    draw.text((box.right, y), f"{full_scale:g} windows or more", palette.SENT, small, anchor="ra")
+    samples = {"never heard of": palette.UNKNOWN} | _packet_colours(footages)
+    column = box.width / 2
+    for k, (text, colour) in enumerate(samples.items()):
+        x, line = box.left + (k % 2) * column, y + (1.35 + 1.1 * (k // 2)) * size
+        middle, radius = line + 0.45 * size, 0.3 * size
+        if colour == palette.UNKNOWN:  # of a robot; the others are packets'
+            box_of = (x + 0.5 * size - radius, middle - radius, x + 0.5 * size + radius)
+            draw.ellipse((*box_of, middle + radius), colour)
+        else:
+            draw.line((x, middle, x + size, middle), colour, max(2, size // 6))
+        draw.text((x + 1.3 * size, line), text, palette.SENT, small)
+
+
+def _packet_colours(footages: Sequence[Footage]) -> dict[str, Colour]:
+    """What packets of these missions may look like."""
+    colours: dict[str, Colour] = {}
+    if any(each.facts.is_broadcast for each in footages):
+        colours["packet heard"] = palette.BROADCAST
+    if not all(each.facts.is_broadcast for each in footages):
+        colours |= {"delivered": palette.DELIVERED, "lost": palette.LOST}
+        colours |= {"answered": palette.ANSWERED, "overheard": palette.OVERHEARD}
+    return colours
+
+
+class AgePlot:
+    """The mean age over the mission, of one flight or two, on a common axis."""
+
+    def __init__(self, footages: Sequence[Footage], box: Box, size: int) -> None:
+        """Prepares the curves."""
+        self._box, self._size = box, size
+        self._inner = Box(
+            box.left + 2 * size, round(box.top + 1.4 * size), box.right, box.bottom - size
+        )
+        self._end_s = max(each.window[-1] * each.facts.mission.window_s for each in footages)
+        self._top = palette.nice_top(max(float(np.max(each.age_mean)) for each in footages))
+        self._curves = [self._curve(each) for each in footages]
+
+    def draw_axes(self, draw: ImageDraw.ImageDraw) -> None:
+        """What does not change: title, numbers, and the whole curves, faintly."""
+        small, inner = font(round(0.8 * self._size)), self._inner
+        title = "mean age of information [windows]"
+        draw.text((inner.left, self._box.top), title, palette.TEXT, small)
+        draw.rectangle((inner.left, inner.top, inner.right, inner.bottom), palette.GRID)
+        for y, value in ((inner.top, f"{self._top:g}"), (inner.bottom, "0")):
+            draw.text((inner.left - 4, y), value, palette.SENT, small, anchor="rm")
+        below = inner.bottom + 2
+        draw.text((inner.left, below), "0", palette.SENT, small)
+        draw.text((inner.right, below), f"{self._end_s:g} s", palette.SENT, small, anchor="ra")
+        for curve, colour in zip(self._curves, CURVES, strict=False):
+            draw.line([tuple(point) for point in curve.tolist()], palette.dim(colour, FAINT), 1)
+
+    def draw_until(self, draw: ImageDraw.ImageDraw, rows: Sequence[int]) -> None:
+        """The curves so far, and where they are now."""
+        radius, width = max(2.0, self._size / 5), max(2, self._size // 8)
+        for curve, colour, row in zip(self._curves, CURVES, rows, strict=False):
+            points = [tuple(point) for point in curve[: row + 1].tolist()]
+            if row > 0:
+                draw.line(points, colour, width, joint="curve")
+            x, y = points[-1]
+            draw.ellipse((x - radius, y - radius, x + radius, y + radius), colour)
+
+    def _curve(self, footage: Footage) -> Float[np.ndarray, "T 2"]:
+        """A flight's ages as points of the picture."""
+        inner, seconds = self._inner, footage.window * footage.facts.mission.window_s
+        x = inner.left + inner.width * seconds / self._end_s
+        return np.stack([x, inner.bottom - inner.height * footage.age_mean / self._top], axis=1)
+
+
+def blank(width: int, height: int) -> Image.Image:
+    """An empty picture."""
+    return Image.new("RGB", (width, height), palette.BACKGROUND)

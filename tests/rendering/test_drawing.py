@@ -1,0 +1,84 @@
+"""What stands around the scene, found again in the picture."""
+
+import numpy as np
+from PIL import ImageDraw
+
+from swarm_mj.mission import paper
+from swarm_mj.rendering.drawing import AgePlot, Box, blank, draw_legend, draw_title
+from swarm_mj.replay import palette
+from swarm_mj.replay.footage import Facts, Footage
+from swarm_mj.replay.shots import Shots
+
+BOX = Box(20, 10, 380, 150)
+
+
+def footage(age_mean, *, is_broadcast=False):
+    """A mission whose team stands still."""
+    num = len(age_mean)
+    facts = Facts(
+        mission=paper("stationary", num_robots=2),
+        policy="mst",
+        seed=3,
+        observer=0,
+        is_broadcast=is_broadcast,
+        full_scale=10.0,
+    )
+    nobody = np.zeros((0, 2))
+    packets = Shots(
+        row=np.zeros(0, dtype=int),
+        start_m=nobody,
+        end_m=nobody,
+        colour=np.zeros((0, 3), dtype=np.uint8),
+    )
+    return Footage(
+        facts=facts,
+        window=np.arange(1, num + 1),
+        position_m=np.zeros((num, 2, 2)),
+        velocity_mps=np.zeros((num, 2, 2)),
+        age=np.zeros((num, 2)),
+        is_on=np.ones((num, 2), dtype=bool),
+        shots=packets,
+        age_mean=np.array(age_mean, dtype=float),
+    )
+
+
+def has(picture, colour, tolerance=6):
+    return np.abs(np.asarray(picture).astype(int) - colour).max(axis=2) <= tolerance
+
+
+def test_a_constant_age_is_a_line_at_its_height():
+    """10 of an axis to 10 is on top, 0 at the bottom."""
+    heights = []
+    for age in (10.0, 5.0, 0.001):
+        picture = blank(400, 160)
+        plot = AgePlot([footage([age] * 5 + [10.0])], BOX, 10)
+        plot.draw_until(ImageDraw.Draw(picture), [4])
+        rows, _ = np.nonzero(has(picture, palette.MEAN_AGE, 40))
+        heights.append(np.median(rows))
+    top, middle, bottom = heights
+    assert top < middle < bottom
+    np.testing.assert_allclose(middle, (top + bottom) / 2, atol=2)
+
+
+def test_the_legend_names_what_is_drawn_only():
+    samples = {}
+    for is_broadcast in (True, False):
+        picture = blank(400, 160)
+        seen = footage([1.0], is_broadcast=is_broadcast)
+        draw_legend(ImageDraw.Draw(picture), [seen], 10.0, BOX, 12)
+        samples[is_broadcast] = picture
+        assert np.any(has(picture, palette.UNKNOWN))
+        assert np.any(has(picture, (253, 231, 37)))  # the ramp's fresh end
+    assert np.any(has(samples[False], palette.LOST))
+    assert not np.any(has(samples[True], palette.LOST))
+
+
+def test_the_title_stays_in_its_part_of_the_picture():
+    picture = blank(400, 160)
+    draw_title(
+        ImageDraw.Draw(picture), footage([1.0, 2.0]), 1, Box(100, 0, 400, 160), 12, (255, 0, 0)
+    )
+    pixels = np.asarray(picture)
+    assert np.all(pixels[:, :100] == palette.BACKGROUND)
+    assert np.any(has(picture, palette.TEXT))
+    assert np.any(has(picture, (255, 0, 0)))
