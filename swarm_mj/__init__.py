@@ -41,6 +41,7 @@ line), `api` (Python in five lines; its names stand here as well).
 """
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -109,3 +110,7 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 - any of the names
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__, "__version__"})
+
+
+if find_spec("gymnasium"):  # whose `make` then knows the environments; else nobody asks for them
+    import_module("swarm_mj.envs.registration").register_environments()

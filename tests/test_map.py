@@ -130,8 +130,16 @@ def test_imports_go_forward_only(room):
             {"torch", "stable_baselines3", "rerun", "dm_control", "matplotlib"},
         ),
         (
-            "swarm_mj.rollout, swarm_mj.replay.recorder",
-            {"torch", "stable_baselines3", "rerun", "dm_control"},
+            "swarm_mj.api.fly, swarm_mj.cli.fly",
+            {
+                "torch",
+                "stable_baselines3",
+                "rerun",
+                "dm_control",
+                "matplotlib",
+                "pandas",
+                "pyarrow",
+            },
         ),
     ],
 )

@@ -21,7 +21,7 @@ def test_every_name_is_there():
 
 def test_type_checkers_are_told_of_the_same_names():
     tree = ast.parse(Path(swarm_mj.__file__).read_text())
-    (block,) = (node for node in tree.body if isinstance(node, ast.If))
+    block = next(node for node in tree.body if isinstance(node, ast.If))
     told = {
         (node.module.removeprefix("swarm_mj."), alias.name)
         for node in block.body

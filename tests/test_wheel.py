@@ -1,13 +1,20 @@
 """The package as built: an index would take it; installed elsewhere, it has assets and flies."""
 
+import json
 import os
+import shutil
 import subprocess
 import sys
 import tarfile
+import tomllib
 import zipfile
+from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+
+from swarm_mj.io.packages import CORE
 
 ROOT = Path(__file__).parent.parent
 
@@ -77,3 +84,90 @@ def test_it_flies_the_shipped_network_and_leaves_a_replay(installed, tmp_path):
     done = run(installed, tmp_path, "-m", "swarm_mj", *command)
     assert done.returncode == 0, done.stderr
     assert len(list((tmp_path / "replays").glob("*.rrd"))) == 1
+
+
+def test_the_core_is_a_part_of_all_with_the_same_versions():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    core = project["dependency-groups"]["core"]
+    assert set(core) <= set(project["project"]["dependencies"])
+    assert tuple(Requirement(each).name for each in core) == CORE
+
+
+def with_what_they_need(names, extras=("",)):
+    """Packages and all that they bring along, as pip would install them."""
+    for name in names:
+        yield name
+        for each in map(Requirement, metadata.requires(name) or ()):
+            if each.marker is None or any(each.marker.evaluate({"extra": e}) for e in extras):
+                yield from with_what_they_need([each.name], ("", *each.extras))
+
+
+@pytest.fixture(scope="module")
+def core(installed, tmp_path_factory):
+    """Runs Python where nothing is installed but the wheel, the core and what that needs."""
+    packages, wheel = tmp_path_factory.mktemp("core"), tmp_path_factory.mktemp("wheel")
+    for name in set(with_what_they_need(CORE)):
+        for top in {file.parts[0] for file in metadata.files(name)} - {"..", "__pycache__"}:
+            (packages / top).symlink_to(metadata.distribution(name).locate_file(top))
+    shutil.copytree(installed, wheel, dirs_exist_ok=True)
+    for compiled in (ROOT / "swarm_mj").rglob(
+        "*.nb?"
+    ):  # of the same sources: to compile takes long
+        place = wheel / compiled.relative_to(ROOT)
+        place.parent.mkdir(exist_ok=True)
+        shutil.copy(compiled, place)
+
+    def run(folder, *arguments):
+        return subprocess.run(
+            [sys.executable, "-S", *arguments],  # without this Python's own site-packages
+            cwd=folder,
+            env=os.environ | {"PYTHONPATH": f"{wheel}{os.pathsep}{packages}"},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    return run
+
+
+FLY_IN_THE_CORE = """
+import json, sys
+import swarm_mj
+run = swarm_mj.fly(record=False)
+told = []
+for work in (run.to_dataframe, run.plot, lambda: swarm_mj.evaluate("tdma"),
+             lambda: swarm_mj.fly(policy="gnn")):
+    try:
+        work()
+    except ModuleNotFoundError as error:
+        told.append(str(error))
+names = {name.partition(".")[0] for name in sys.modules} - set(sys.stdlib_module_names)
+print(json.dumps([run.summary.num_windows, told, sorted(names)]))
+"""
+
+
+def test_the_core_flies_the_default_and_says_what_it_lacks(core, tmp_path):
+    done = core(tmp_path, "-c", FLY_IN_THE_CORE)
+    assert done.returncode == 0, done.stderr
+    num_windows, told, modules = json.loads(done.stdout)
+    assert num_windows == 500
+    for package, complaint in zip(("pandas", "matplotlib", "scipy", "torch"), told, strict=True):
+        assert f"needs {package}, which is not installed; pip install '{package}>=" in complaint
+    brought_along = {"cython_runtime", "glfw", "llvmlite", "swarm_mj", "typing_extensions"}
+    public = {name for name in modules if not name.startswith("_")}
+    assert public <= {*CORE, *brought_along}
+
+
+def test_the_core_flies_on_the_command_line_but_records_nothing(core, tmp_path):
+    refused = core(tmp_path, "-m", "swarm_mj", "fly")
+    assert refused.returncode == 1
+    assert "a replay needs rerun-sdk, which is not installed; pip install 'rerun" in refused.stderr
+    assert refused.stderr.endswith("or fly without one: --no-record\n")
+    assert list(tmp_path.iterdir()) == []
+    done = core(tmp_path, "-m", "swarm_mj", "fly", "--no-record")
+    assert done.returncode == 0, done.stderr
+    assert "flocking, planner, 40 robots, seed 1" in done.stdout
+    lacking = core(tmp_path, "-m", "swarm_mj", "replay", "a.rrd")
+    assert lacking.returncode == 1
+    assert lacking.stderr.count("\n") == 1
+    assert "is not installed; pip install" in lacking.stderr

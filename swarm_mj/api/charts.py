@@ -9,6 +9,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.figures.style import FAINT, as_it_is, look_of, styled
 from swarm_mj.evaluation.results import Result
 
@@ -28,13 +29,16 @@ LABELS = {
 
 def draw_run(run: "Run") -> Figure:
     """A mission's costs over its windows, one above the other."""
-    columns, moves = run.columns(), run.mission.task != "stationary"
-    colour = look_of(run.config["policy"]).colour
+    columns, colour = run.columns(), look_of(run.config["policy"]).colour
+    has_own_cost = run.task_cost is not None and run.task_cost[0] != Flocking.cost_name
+    moves = bool(np.any(columns["velocity_variance"]))
     with styled():
-        figure, axes = _panels(2 if moves else 1)
+        figure, axes = _panels(2 if has_own_cost or moves else 1)
         figure.suptitle(as_it_is(run.title), x=0.01, ha="left", fontsize=TITLE_PT)
         _draw_age(axes[0], columns, colour)
-        if moves:
+        if has_own_cost:
+            _draw_task(axes[1], columns, colour, run.task_cost)
+        elif moves:
             _draw_variance(axes[1], columns, colour)
         axes[-1].set_xlabel(f"window of {run.mission.window_s:g} s")
     return _kept(figure)
@@ -81,6 +85,14 @@ def _draw_variance(axes: Axes, columns: Mapping[str, Course], colour: str) -> No
     axes.semilogy(columns["window"], variance, color=colour)
     axes.set_ylabel(LABELS["velocity_variance"])
     axes.set_ylim(bottom=max(float(np.min(variance)), LEAST_SHARE * float(np.max(variance))) / 2.0)
+
+
+def _draw_task(
+    axes: Axes, columns: Mapping[str, Course], colour: str, cost: tuple[str, str] | None
+) -> None:
+    axes.plot(columns["window"], columns["task_cost"], color=colour)
+    axes.set_ylabel("{}\n[{}]".format(*cost or ("task cost", "")))
+    axes.set_ylim(bottom=0.0)
 
 
 def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:

@@ -68,10 +68,17 @@ class Run:
         """What was flown, in a line."""
         return flight_title(self.mission, self.config["policy"], self.config["seed"])
 
+    @property
+    def task_cost(self) -> tuple[str, str] | None:
+        """What the robots' task costs, such as a formation error, and its unit; None if nothing."""
+        cost = self.windows[0].costs.task_cost
+        return None if cost is None else (cost.name, cost.unit)
+
     def columns(self) -> dict[str, Float[np.ndarray, "T"]]:
         """The flight window by window, column by column: all that `to_dataframe` has."""
         window = np.arange(1.0, len(self.windows) + 1.0)
         worst = {"aoi_worst": self.log.age_max} if self.log else {}
+        task = {} if self.task_cost is None else {"task_cost": self._course(_task_cost)}
         packets = {
             f"packets_{name}": self._course(
                 lambda each, name=name: getattr(each.costs.packets, name)
@@ -84,6 +91,7 @@ class Run:
             "aoi": self._course(lambda each: each.costs.age_windows),
             **worst,
             "velocity_variance": self._course(lambda each: each.costs.velocity_variance_m2ps2),
+            **task,
             "hops": self._course(lambda each: each.hops),
             "is_complete": self._course(lambda each: each.costs.is_complete),
             **packets,
@@ -95,8 +103,9 @@ class Run:
         Returns:
             A pandas table with the columns `window` (1 is the first), `seconds`, `aoi` (age of
             information, mean over pairs of robots [windows]), `aoi_worst` (the worst pair's, if the
-            flight was recorded), `velocity_variance` [m²/s²], `hops` (mean over the news known),
-            `is_complete` (everyone has heard of everyone; 0 or 1) and `packets_...` in that window.
+            flight was recorded), `velocity_variance` [m²/s²], `task_cost` (where the task has one;
+            `summary.task_cost_name` says which), `hops` (mean over the news known), `is_complete`
+            (everyone has heard of everyone) and `packets_...` in that window.
 
         Raises:
             ModuleNotFoundError: pandas is not installed.
@@ -108,7 +117,9 @@ class Run:
         return DataFrame(self.columns()).astype(whole)
 
     def plot(self) -> "Figure":
-        """Draws the age of information over time and, of teams that move, the velocity variance.
+        """Draws the age of information over time and, below, what the task costs.
+
+        Of flocks and random walks that is the velocity variance.
 
         Returns:
             A matplotlib figure; a notebook shows it where it is the cell's result, `savefig` keeps
@@ -147,6 +158,11 @@ class Run:
     ) -> Float[np.ndarray, "T"]:
         """A cost of the mission, window by window."""
         return np.array([float(of(window)[0]) for window in self.windows])
+
+
+def _task_cost(window: WindowRecord) -> Float[np.ndarray, "B"]:
+    cost = window.costs.task_cost
+    return np.array([np.nan]) if cost is None else cost.value
 
 
 def _write_replay(run: Run, path: Path) -> None:

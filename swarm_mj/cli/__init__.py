@@ -123,9 +123,22 @@ def _told(name: str, work: Callable[[], int], was_interrupted: Callable[[], bool
     except (ValueError, OSError) as error:
         sys.stderr.write(f"{name}: error: {error}\n")
         return BAD_INPUT if isinstance(error, (ValueError, *WRONG_NAMES)) else FAILED
+    except ModuleNotFoundError as error:
+        sys.stderr.write(f"{name}: error: {_missing(error)}\n")
+        return FAILED
     except MemoryError:
         sys.stderr.write(f"{name}: error: this machine's memory does not suffice\n")
         return FAILED
     except KeyboardInterrupt:
         sys.stderr.write(f"{name}: interrupted\n")
         return INTERRUPTED
+
+
+def _missing(error: ModuleNotFoundError) -> str:
+    """What to say of a package that is not installed; raises the error again if it is our own."""
+    from swarm_mj.io.packages import missing
+
+    module = (error.name or "").partition(".")[0]
+    if module == "swarm_mj":
+        raise error
+    return missing(module, "this") if str(error).startswith("No module named") else str(error)

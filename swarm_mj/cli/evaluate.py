@@ -28,6 +28,7 @@ from swarm_mj.evaluation.summary import Evaluated, summarise
 from swarm_mj.fields import same_as, setting
 from swarm_mj.io.interrupt import deferred_interrupt, heard_interrupt
 from swarm_mj.io.owned import owned
+from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import POLICIES, directories, normalised, with_payload
 
@@ -83,6 +84,7 @@ class Options(PolicyOptions):
 
 def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
+    need("scipy", "an evaluation")
     study = options.study
     check_outputs(
         Output("--json", options.json, ".json"),

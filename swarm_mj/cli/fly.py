@@ -22,6 +22,7 @@ from swarm_mj.cli.terminal import plain_console, this_command
 from swarm_mj.fields import setting
 from swarm_mj.io.atomic import write_json
 from swarm_mj.io.interrupt import deferred_interrupt, heard_interrupt
+from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import (
@@ -75,6 +76,8 @@ def run(options: Options) -> int:
     options = replace(options, policy=with_payload([options.policy], options.payload)[0])
     mission = options.mission
     path = _replay_path(options)
+    if path:
+        need("rerun", "a replay", "fly without one: --no-record")
     needs = flight_needs(mission, options.policy, is_recorded=path is not None)
     way_out = "choose fewer --robots or --windows" + (", or --no-record" if path else "")
     check_fits(needs, path, way_out, is_forced=options.yes)

@@ -15,9 +15,10 @@ from swarm_mj.cli.mission_options import mission_flags, one_mission
 from swarm_mj.cli.policy_options import NAMED
 from swarm_mj.cli.terminal import named_values, plain_console, this_command
 from swarm_mj.fields import as_typed, setting
+from swarm_mj.io.packages import is_installed, missing
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
-from swarm_mj.policies.registry import POLICIES, make_policy, normalised
+from swarm_mj.policies.registry import POLICIES, is_learned, make_policy, normalised
 
 WINDOWS = {
     "broadcasts": "two broadcasts, which nobody answers",
@@ -55,6 +56,9 @@ class Options:
 def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
     names = POLICIES if options.name is None else (options.name,)
+    if options.name is None and not is_installed("torch"):
+        names = [name for name in names if not is_learned(name)]
+        plain_console(is_error=True).print(missing("torch", "gnn is left out: it"))
     with Console(stderr=True).status("Loading ..."):
         made = {name: make_policy(name, options.mission) for name in names}
     facts = [facts_of(name, policy, options.mission) for name, policy in made.items()]

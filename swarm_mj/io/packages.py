@@ -3,10 +3,11 @@
 A plain `pip install swarm_mj` brings them all; its core, which flies, does without them.
 """
 
-import re
 from importlib import metadata
 from importlib.util import find_spec
 
+# What flying imports; `pyproject.toml` has their versions under the same name.
+CORE = ("jaxtyping", "msgspec", "mujoco", "numba", "numpy", "packaging", "psutil", "rich")
 # Modules that are named otherwise than the packages that bring them.
 BROUGHT_BY = {"PIL": "pillow", "dm_control": "dm-control", "rerun": "rerun-sdk"}
 
@@ -22,7 +23,7 @@ def need(module: str, what: str, way_out: str = "") -> None:
     Raises:
         ModuleNotFoundError: It is not installed; the message says how to install it.
     """
-    if find_spec(module) is None:
+    if not is_installed(module):
         raise ModuleNotFoundError(missing(module, what, way_out), name=module)
 
 
@@ -35,14 +36,18 @@ def missing(module: str, what: str, way_out: str = "") -> str:
     )
 
 
+def is_installed(module: str) -> bool:
+    """Whether a module, by its name as it is imported, can be."""
+    return find_spec(module) is not None
+
+
 def _wanted(package: str) -> str:
     """A package with the versions that fit, as pip takes it; without, if none are known."""
+    from packaging.requirements import Requirement
+
     try:
-        wanted = metadata.requires("swarm_mj") or []
+        wanted = [Requirement(text) for text in metadata.requires("swarm_mj") or ()]
     except metadata.PackageNotFoundError:  # a checkout that was never installed
         wanted = []
-    for requirement in wanted:
-        name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
-        if name.replace("_", "-").lower() == package:
-            return requirement.partition(";")[0].strip()
-    return package
+    fitting = (each for each in wanted if each.name == package)
+    return next((f"{each.name}{each.specifier}" for each in fitting), package)

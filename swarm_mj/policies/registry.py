@@ -9,6 +9,7 @@ from pathlib import Path
 
 from swarm_mj.fields import check_kind, did_you_mean
 from swarm_mj.io.assets import asset
+from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
 from swarm_mj.policies.aloha import Aloha
 from swarm_mj.policies.gossip import InnovationGossip
@@ -143,6 +144,7 @@ def make_policy(
     check_kind("mission", mission, Mission, 'paper("flocking")')
     if is_learned(name):
         _refuse(probability, name)
+        need("torch", f"policy {name}", "fly another")
         from swarm_mj.policies.stored import load_policy  # torch takes its time to import
 
         folder = asset(f"policies/{SHIPPED}") if name == SHIPPED else Path(name)

@@ -31,6 +31,14 @@ def test_a_team_at_rest_has_no_velocities_and_what_was_not_recorded_no_worst_pai
     assert len(age.lines) == 1
 
 
+def test_a_task_with_a_cost_of_its_own_shows_that():
+    run = swarm_mj.fly("formation", policy="tdma", **SHORT)
+    cost = run.plot().axes[1]
+    assert cost.get_ylabel() == "formation error\n[m]"
+    assert list(cost.lines[0].get_ydata()) == list(run.to_dataframe().task_cost)
+    assert cost.lines[0].get_ydata()[-1] == run.summary.task_cost_last
+
+
 def test_policies_stand_below_each_other_the_lowest_age_first():
     found = swarm_mj.evaluate(["round-robin", "tdma"], "random-walk", num_missions=4, **SHORT)
     (axes,) = found.plot().axes

@@ -7,22 +7,11 @@ from importlib import metadata
 from packaging.requirements import Requirement
 
 from swarm_mj.cli.health.finding import Finding
+from swarm_mj.io.packages import CORE
 from swarm_mj.io.provenance import commit, version
 
 PACKAGE = "swarm_mj"
-# What flying itself imports, and what the others are for.
-NEEDED = (
-    "jaxtyping",
-    "msgspec",
-    "mujoco",
-    "numba",
-    "numpy",
-    "packaging",
-    "psutil",
-    "rich",
-    "scipy",
-)
-PURPOSES = {
+PURPOSES = {  # of what flying itself does without
     "av": "videos of replays",
     "dm-control": "the dm_control environment",
     "dm-env": "the dm_control environment",
@@ -33,6 +22,7 @@ PURPOSES = {
     "pyarrow": "replays",
     "rerun-sdk": "replays and their viewer",
     "safetensors": "learned policies",
+    "scipy": "intervals of evaluations",
     "shtab": "completion in the shell",
     "stable-baselines3": "training",
     "tensorboard": "curves of trainings",
@@ -65,12 +55,12 @@ def packages() -> Iterator[Finding]:
 
 def _package(requirement: Requirement) -> Finding:
     name = requirement.name
-    purpose = "flying" if name in NEEDED else PURPOSES.get(name, "parts of swarm_mj")
+    purpose = "flying" if name in CORE else PURPOSES.get(name, "parts of swarm_mj")
     installed = _installed(name)
     if installed and requirement.specifier.contains(installed, prereleases=True):
         return Finding("packages", name, "ok", installed)
     found = f"{installed}, which is not {requirement.specifier}" if installed else "not installed"
-    state = "broken" if name in NEEDED else "absent"
+    state = "broken" if name in CORE else "absent"
     mend = f"pip install '{name}{requirement.specifier}'"
     return Finding("packages", name, state, f"{found}; for {purpose}", mend)
 

@@ -9,7 +9,8 @@ import pytest
 from packaging.requirements import Requirement
 
 from swarm_mj.cli.health import packages as looked_at
-from swarm_mj.cli.health.packages import EXTRAS, NEEDED, PURPOSES, about, packages
+from swarm_mj.cli.health.packages import EXTRAS, PURPOSES, about, packages
+from swarm_mj.io.packages import CORE
 
 PROJECT = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
 INSTALLED = {"numba": "0.68.1", "mujoco": "3.2", "torch": "2.7", "pettingzoo": "1.27"}
@@ -63,7 +64,7 @@ def test_each_is_as_it_is_installed(found, name, state, words, mend):
 
 def test_every_dependency_is_needed_or_has_a_purpose():
     asked = {Requirement(text).name for text in PROJECT["dependencies"]}
-    assert asked == set(NEEDED) | set(PURPOSES)
+    assert asked == set(CORE) | set(PURPOSES)
     assert set(PROJECT["optional-dependencies"]) == set(EXTRAS)
 
 
