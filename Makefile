@@ -5,7 +5,7 @@ READY := .venv/ready
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: help setup fly bench check test attack lock audit format figures picture docs docs-serve clean
+.PHONY: help setup fly bench check test attack lock audit format figures picture video docs docs-serve clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
@@ -15,6 +15,7 @@ help:
 	@echo "make format  let the formatter and the linter mend what they can"
 	@echo "make bench   time the simulation on this machine"
 	@echo "make figures remake all figures; evaluates what training/results/ lacks of the paper's"
+	@echo "make video   remake the README's moving picture (needs OpenGL, or libosmesa6)"
 	@echo "make picture remake the README's picture (needs a Vulkan driver)"
 	@echo "make docs    build this documentation as a site; make docs-serve shows it while you write"
 	@echo "make setup   create .venv from pinned constraints; PYTHON=python3.12 chooses another"
@@ -101,6 +102,12 @@ docs: setup
 
 docs-serve: setup
 	$(BIN)/mkdocs serve $(ARGS)
+
+video: setup
+	$(BIN)/swarm-mj fly --record replays/planner.rrd --force
+	$(BIN)/swarm-mj fly --policy random-flooding --record replays/random-flooding.rrd --force
+	$(BIN)/swarm-mj replay replays/planner.rrd replays/random-flooding.rrd \
+	  --video assets/pictures/flight.gif --force
 
 clean:
 	rm -rf .venv replays build dist site .pytest_cache .ruff_cache .hypothesis

@@ -11,6 +11,7 @@ from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import plain_console
 from swarm_mj.fields import setting
 from swarm_mj.io.atomic import write_bytes
+from swarm_mj.io.packages import need
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
 
@@ -85,6 +86,8 @@ def _make_video(options: Options, video: Path) -> int:
     needs = video_needs(width, height, (options.seconds or LONGEST_S) * fps, suffix)
     check_fits(needs, video, "choose a smaller --size or fewer --seconds", is_forced=options.yes)
 
+    for module in ("av", "PIL", "rerun"):
+        need(module, "a video")
     from swarm_mj.rendering.movie import MOST_MISSIONS, Style  # rerun and MuJoCo take their time
     from swarm_mj.rendering.video import check_video, make_video
     from swarm_mj.replay.read import read_footage

@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 ELEVATION_DEG = 55.0  # of the camera above the ground: 90 would look straight down
 FOV_Y_DEG = 32.0  # a long lens: what is near is hardly larger than what is far
+SHIFT = 0.15  # of what it looks at, from the square's centre to the south, by half the side
 MARGIN = 0.94  # of the picture, for the square
 
 
@@ -46,7 +47,7 @@ def look_at(centre_m: Float[np.ndarray, "2"], reach_m: float, width: int, height
     """
     corners = reach_m * np.array([[x, y, 0.0] for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
     # The near edge is seen under a wider angle than the far one: the target moves towards it.
-    south_m = 0.1 * reach_m
+    south_m = SHIFT * reach_m
     across, up, ahead = _axes(corners + np.array([0.0, south_m, 0.0]))
     needed = np.maximum(np.abs(across) * height / width, np.abs(up)) / (MARGIN * TAN) - ahead
     return Camera(

@@ -40,8 +40,14 @@ class Footage:
 
     @property
     def frame(self) -> Frame:
-        """The part of the ground that is shown."""
-        return frame(self.position_m, self.facts.mission.half_side_m)
+        """The part of the ground that is shown: of an open area, only where robots ever are."""
+        mission = self.facts.mission
+        whole = frame(self.position_m, mission.half_side_m)
+        if whole.moves or mission.has_walls:
+            return whole
+        low_m, high_m = (end(self.position_m, axis=(0, 1)) for end in (np.min, np.max))
+        centre_m = np.tile((low_m + high_m) / 2.0, (len(self.window), 1))
+        return Frame(centre_m=centre_m, reach_m=max(1.0, float(np.max(high_m - low_m)) / 2.0))
 
     def colours(self, full_scale: float | None = None) -> UInt8[np.ndarray, "T N 3"]:
         """The robots' colours, by the replay's own scale of ages unless one is given [windows]."""

@@ -1,5 +1,6 @@
 """What a video shows is the same from a log and from its replay."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,16 @@ def test_colours_are_by_age_white_for_the_observer_and_dark_for_the_fallen(faili
     is_dark = np.all(footage.colours() == palette.SWITCHED_OFF, axis=2)
     np.testing.assert_array_equal(is_dark, ~log.is_on)
     np.testing.assert_array_equal(footage.colours()[:, log.ego][log.is_on[:, log.ego]], 255)
+
+
+def test_an_open_area_is_shown_where_robots_ever_are(two_way):
+    footage = footage_of(two_way.log, replace(two_way.mission, boundary="none"), "mst", 5)
+    seen, where = footage.frame, two_way.log.position_m
+    assert not np.any(np.diff(seen.centre_m, axis=0))
+    offset = np.abs(where - seen.centre_m[:, None])
+    assert offset.max() == pytest.approx(seen.reach_m)
+    walled = footage_of(two_way.log, two_way.mission, "mst", 5).frame
+    assert walled.reach_m == two_way.mission.half_side_m
 
 
 def test_a_damaged_replay_is_refused(replay, tmp_path):
