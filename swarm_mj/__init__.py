@@ -33,9 +33,9 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     IV-C            minimum spanning tree    policies.minimum_spanning_tree.MinimumSpanningTree
 
 Around the paper: `compiled` and `fields` (how functions are compiled, how options are declared),
-`io` (files that appear whole, processes that end), `swarm` (B missions side by side),
-`rollout` (a policy from the first window to the last), more `policies` than the paper's,
-`evaluation` (V: policies on the same missions, and Figs. 2 to 6), `replay` and
+`io` (files that appear whole, processes that end), `parts` (users' own, by name), `swarm` (B
+missions side by side), `rollout` (a policy from the first window to the last), more `policies` than
+the paper's, `evaluation` (V: policies on the same missions, and Figs. 2 to 6), `replay` and
 `rendering` (what is seen), `envs` (other libraries' faces), `benchmark` (speed), `cli` (the command
 line), `api` (Python in five lines; its names stand here as well).
 """

@@ -215,7 +215,7 @@ class Swarm:
         """Whom each robot addresses, after these phases of the window that began at `start`."""
         if phases:
             self.phases, self.now = phases, start + len(phases) * SLOT_WINDOWS
-        recipient = decide()
+        recipient = np.asarray(decide())
         check_robots("recipient", recipient, self.buffers.shape, may_broadcast=may_broadcast)
         return recipient
 

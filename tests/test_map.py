@@ -101,7 +101,7 @@ def test_the_library_knows_neither_training_nor_tools():
 
 # Each imports those before it only: so no two of them import each other, by whatever way.
 ROOMS = (
-    *("compiled", "fields", "io", "mission", "physics", "radio", "protocol", "control"),
+    *("compiled", "fields", "io", "mission", "parts", "physics", "radio", "protocol", "control"),
     *("gnn", "policies", "swarm", "rollout", "evaluation", "replay", "rendering"),
     *("learning", "envs"),
     *("benchmark", "cli", "api", "__init__", "__main__"),

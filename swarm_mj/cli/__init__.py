@@ -16,6 +16,7 @@ from typing import Any, NoReturn, TypeVar
 
 from swarm_mj.io.interrupt import interruptible
 from swarm_mj.io.streams import lasting_streams
+from swarm_mj.parts import one_line_each
 
 Options = TypeVar("Options")
 
@@ -113,7 +114,8 @@ def _exit_code(name: str, work: Callable[[], int]) -> int:
 def _told(name: str, work: Callable[[], int], was_interrupted: Callable[[], bool]) -> int:
     try:
         try:
-            return work()
+            with one_line_each():
+                return work()
         except (ValueError, OSError) as error:  # perhaps what a library made of a Ctrl-C
             if was_interrupted():
                 raise KeyboardInterrupt from error

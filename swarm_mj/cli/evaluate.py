@@ -15,7 +15,7 @@ from swarm_mj.cli.evaluation_table import print_results
 from swarm_mj.cli.machine import memory_errors
 from swarm_mj.cli.mission_options import several_missions
 from swarm_mj.cli.outputs import Output, check_outputs
-from swarm_mj.cli.policy_options import NAMED, NAMES, PolicyOptions
+from swarm_mj.cli.policy_options import NAMED, NAMES, OTHERS, PolicyOptions
 from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import tell_cores
 from swarm_mj.evaluation import progress
@@ -46,7 +46,7 @@ class Options(PolicyOptions):
     )
     policy: tuple[str, ...] = setting(
         DEFAULT_POLICIES,
-        f"{NAMES}, all of these, or directories of learned policies",
+        f"{NAMES}, all of these, {OTHERS}",
         convert=normalised,
         offers=("all", *NAMED),
     )
@@ -78,6 +78,8 @@ class Options(PolicyOptions):
             seed=self.seed,
             probability=self.probability,
             is_deterministic=self.is_deterministic,
+            features=self.features,
+            parts=self.parts,
             baseline=None if self.baseline is None else flown.get(self.baseline, self.baseline),
         )
 

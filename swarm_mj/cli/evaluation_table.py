@@ -32,11 +32,13 @@ def print_results(results: Sequence[Result]) -> None:
 
 def _regime(result: Result) -> str:
     """A table's title."""
+    parts = {name: getattr(result, name) for name in ("channel", "controller", "scene")}
+    own = "".join(f",\n{kind} {name}" for kind, name in parts.items() if name)
     fate = f", {result.switched_off:.0%} of the robots off half-way" if result.switched_off else ""
     return (
         f"{result.task}, preset {result.preset}: {result.num_robots} robots, range ratio "
         f"{result.range_ratio:g}, velocity ratio {result.velocity_ratio:g},\nboundary "
-        f"{result.boundary}, {result.num_windows} windows of {result.physics} physics{fate}"
+        f"{result.boundary}, {result.num_windows} windows of {result.physics} physics{fate}{own}"
     )
 
 

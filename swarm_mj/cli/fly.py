@@ -26,8 +26,10 @@ from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import (
+    check_used,
     directories,
     is_directory,
+    is_own_policy,
     make_policy,
     normalised,
     with_payload,
@@ -54,7 +56,7 @@ class Options(PolicyOptions):
     )
     policy: str = setting(
         "planner",
-        f"{NAMES}, or a directory with a learned policy",
+        f"{NAMES}, a directory with a learned policy, or module:Name of your own",
         convert=normalised,
         offers=NAMED,
     )
@@ -81,12 +83,13 @@ def run(options: Options) -> int:
     needs = flight_needs(mission, options.policy, is_recorded=path is not None)
     way_out = "choose fewer --robots or --windows" + (", or --no-record" if path else "")
     check_fits(needs, path, way_out, is_forced=options.yes)
-    policy = _make_policy(options, mission)
+    policy, parts = _make_policy(options, mission), options.parts.made(mission)
+    check_used(options.features, [policy])
     console = Console(stderr=True, highlight=False)
     preparing = console.status("Preparing the swarm (compiles once, then it is cached) ...")
     with preparing, heard_interrupt() as was_pressed:
         _compile_ahead(options, mission)
-        swarm = Swarm(mission, [options.seed])
+        swarm = Swarm(mission, [options.seed], **parts)
         recorder = _recorder(options, swarm, policy) if path else None
         if was_pressed():
             raise KeyboardInterrupt
@@ -100,6 +103,7 @@ def run(options: Options) -> int:
         config = flight_config(
             mission, options.policy, policy, seed=options.seed, observer=options.observer
         )
+        config |= options.named
         numbers = flight_numbers(policy, summarise(flown))
         took = {"wall_seconds": wall_s, "interrupted": code != DONE}
         summary = {"config": config} | numbers | took | {"replay": str(path) if path else None}
@@ -107,7 +111,7 @@ def run(options: Options) -> int:
             with console.status("Writing ..."):
                 _write(options, summary, path, recorder)
         finally:
-            out.print(flight_table(title, mission, numbers, wall_s))
+            out.print(flight_table(title + options.parts.title, mission, numbers, wall_s))
     if path:
         out.print(f"Open the replay:  {this_command()} replay {shlex.quote(str(path))}")
     if code != DONE:
@@ -118,7 +122,11 @@ def run(options: Options) -> int:
 
 def _make_policy(options: Options, mission: Mission) -> Policy:
     return make_policy(
-        options.policy, mission, options.probability, is_deterministic=options.is_deterministic
+        options.policy,
+        mission,
+        options.probability,
+        is_deterministic=options.is_deterministic,
+        features=options.features,
     )
 
 
@@ -151,13 +159,16 @@ def _fresh_name(options: Options) -> Path:
 def _short(policy: str) -> str:
     """A policy's name without the path: `x` of runs/x/policy."""
     if not is_directory(policy):
-        return policy.replace(" --", "-").replace(" ", "-")
+        return policy.replace(" --", "-").replace(" ", "-").replace(":", "-")
     path = Path(policy).resolve()
     return path.parent.name if path.name == "policy" else path.name
 
 
 def _compile_ahead(options: Options, mission: Mission) -> None:
-    """Flies a small mission of this kind, beyond half-way, so that compiling is not timed."""
+    """Flies a small mission of this kind, beyond half-way, so that compiling is not timed.
+
+    Parts of users' own are spared: they may be made for this mission only.
+    """
     is_bound = is_directory(options.policy)  # perhaps to teams of one size
     smallest = replace(
         mission,
@@ -165,6 +176,8 @@ def _compile_ahead(options: Options, mission: Mission) -> None:
         range_ratio=10.0,
         num_windows=COMPILING_WINDOWS,
     )
+    if is_own_policy(options.policy):
+        options = replace(options, policy="tdma")
     for _ in rollout(Swarm(smallest, [0]), _make_policy(options, smallest)):
         pass
 

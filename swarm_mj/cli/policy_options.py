@@ -3,16 +3,18 @@
 from dataclasses import dataclass
 
 from swarm_mj.fields import setting
+from swarm_mj.parts import GROUP, SHOWN_AS, OwnParts
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
 
 NAMED = tuple(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes the other
 NAMES = f"who talks to whom: {', '.join(NAMED)}"
+OTHERS = "directories of learned policies, or module:Name of your own"
 HEADING = "policies"
 
 
 @dataclass(frozen=True, kw_only=True)
-class PolicyOptions:
-    """Options that change a policy."""
+class PolicyOptions(OwnParts):
+    """Options that change a policy, or what it flies in."""
 
     probability: float | None = setting(
         None,
@@ -31,3 +33,11 @@ class PolicyOptions:
         choices=PAYLOADS,
         group=HEADING,
     )
+    features: tuple[str, ...] = setting(
+        (), "that a learned policy was trained on; give them again", group=GROUP, metavar=SHOWN_AS
+    )
+
+    @property
+    def parts(self) -> OwnParts:
+        """The parts that are the user's own."""
+        return OwnParts(**self.named)

@@ -7,9 +7,10 @@ from pathlib import Path
 from swarm_mj.cli.mission_options import one_mission
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.terminal import plain_console, this_command
-from swarm_mj.fields import setting
+from swarm_mj.fields import same_as, setting
 from swarm_mj.io.atomic import write_text
 from swarm_mj.mission import Mission
+from swarm_mj.parts import OwnParts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,6 +18,7 @@ class Options:
     """The options of `swarm-mj scene`."""
 
     mission: Mission = one_mission()
+    scene: str | None = same_as(OwnParts, "scene")
     seed: int = setting(1, "of the mission whose start is shown")
     out: Path = setting(Path("scene.xml"), "the file to write")
     force: bool = setting(False, "replace an existing file")
@@ -29,7 +31,8 @@ def run(options: Options) -> int:
 
     mission = options.mission
     check_outputs(Output("scene", options.out, ".xml|.mjcf"), must_be_new=not options.force)
-    spec = compose(mission, start=Swarm(mission, [options.seed]).states)
+    parts = OwnParts(scene=options.scene).made(mission)
+    spec = compose(mission, start=Swarm(mission, [options.seed], **parts).states, **parts)
     spec.compile()
     write_text(options.out, spec.to_xml())
     console = plain_console()

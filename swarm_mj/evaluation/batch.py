@@ -10,6 +10,7 @@ from msgspec import Meta
 from swarm_mj.compiled import compiled
 from swarm_mj.evaluation.lower_bound import ConnectivityFloor
 from swarm_mj.mission import Mission
+from swarm_mj.parts import OwnParts, one_line_each
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.window import SLOT_WINDOWS
@@ -35,6 +36,8 @@ class Batch:
     policy: str  # a name among `POLICIES`, or a directory
     probability: float | None  # of a transmission; None is the policy's own
     is_deterministic: bool = False  # a learned policy takes its most probable recipient
+    features: tuple[str, ...] = ()  # users' own, that a learned policy may see by
+    parts: OwnParts = OwnParts()  # by name, as they are made in other processes
     parameters: Parameters | None = None  # what it must have, where that is known
     mission: Mission
     seeds: tuple[int, ...]  # one per mission
@@ -71,12 +74,21 @@ def fly_batch(batch: Batch) -> BatchCosts:
     A mission's costs depend on its own seed, not on the missions beside it.
 
     Raises:
-        ValueError: Unknown policy, one that has changed, a bad seed, or no connected team could be
-            drawn.
+        ValueError: Unknown policy, one that has changed, a bad seed, no connected team could be
+            drawn, or a part of the user's own raised.
     """
-    swarm = Swarm(batch.mission, batch.seeds)
+    with one_line_each():  # what is raised loses its places on the way between processes
+        return _fly(batch)
+
+
+def _fly(batch: Batch) -> BatchCosts:
+    swarm = Swarm(batch.mission, batch.seeds, **batch.parts.made(batch.mission))
     policy = make_policy(
-        batch.policy, batch.mission, batch.probability, is_deterministic=batch.is_deterministic
+        batch.policy,
+        batch.mission,
+        batch.probability,
+        is_deterministic=batch.is_deterministic,
+        features=batch.features,
     )
     if batch.parameters is not None and policy.parameters != batch.parameters:
         raise ValueError(

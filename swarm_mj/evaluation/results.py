@@ -34,6 +34,9 @@ class Result:
     episodes: int
     seed: int  # of the first mission; the others follow one by one
     probability: float | None  # of a transmission, for the policies that have one
+    channel: str | None = None  # the user's own, as module:Name; None is the mission's
+    controller: str | None = None  # as above
+    scene: str | None = None  # as above
     payload: str | None = None  # what packets carry beyond T, M and P (II-B); "none" or its name
 
     aoi_mean: float

@@ -12,8 +12,15 @@ from swarm_mj.evaluation.batch import Batch
 from swarm_mj.fields import check, setting
 from swarm_mj.io.provenance import code_digest, commit, version
 from swarm_mj.mission import Mission
+from swarm_mj.parts import OwnParts, digest
 from swarm_mj.policies.policy import Parameters, Policy
-from swarm_mj.policies.registry import is_learned, make_policy, normalised
+from swarm_mj.policies.registry import (
+    check_used,
+    is_learned,
+    is_own_policy,
+    make_policy,
+    normalised,
+)
 from swarm_mj.swarm import MAX_SEED
 
 MAX_EPISODES = 100_000
@@ -34,6 +41,8 @@ class Study:
     seed: int = setting(1000, "seed of the first mission; the others follow one by one")
     probability: float | None = setting(None, low=0.0, high=1.0)  # None is each policy's own
     is_deterministic: bool = False  # whether learned policies take the most probable recipient
+    features: tuple[str, ...] = ()  # users' own, that learned policies may see by
+    parts: OwnParts = OwnParts()
     baseline: str | None = setting(
         None,
         "whom the others are compared to, mission by mission",
@@ -57,6 +66,12 @@ class Study:
                 f"{', '.join(self.policies)}; leave it out, or add one"
             )
         _ = self.parameters  # makes every policy, so that a bad one is refused now
+        for regime in self.regimes:
+            self.parts.made(regime)
+        if self.features:
+            check_used(
+                self.features, (self.make_policy(name, self.regimes[0]) for name in self.policies)
+            )
         if len(set(self.pairs)) < len(self.pairs):
             raise ValueError("an evaluation needs each policy and each regime once")
         if self.baseline is not None and self.baseline not in self.policies:
@@ -84,6 +99,8 @@ class Study:
                 policy=policy,
                 probability=self.probability,
                 is_deterministic=self.is_deterministic and is_learned(policy),
+                features=self.features,
+                parts=self.parts,
                 parameters=self.parameters[regime, policy],
                 mission=regime,
                 seeds=tuple(seeds[start : start + BATCH_SIZE]),
@@ -100,18 +117,29 @@ class Study:
     def make_policy(self, policy: str, regime: Mission) -> Policy:
         """A policy as it is evaluated in a regime."""
         is_deterministic = self.is_deterministic and is_learned(policy)
-        return make_policy(policy, regime, self.probability, is_deterministic=is_deterministic)
+        return make_policy(
+            policy,
+            regime,
+            self.probability,
+            is_deterministic=is_deterministic,
+            features=self.features,
+        )
 
     def task_cost(self, regime: Mission) -> tuple[str, str] | None:
         """What a regime's controller calls its task's cost, and the unit; None if it has none."""
-        controller = controller_of(regime)
+        controller = self.parts.made(regime).get("controller") or controller_of(regime)
         if not isinstance(controller, Costed):
             return None
         return controller.cost_name, controller.cost_unit
 
     def config(self, policy: str, regime: Mission) -> dict[str, Any]:
         """All that a policy's missions in a regime depend on, but for their seeds."""
-        return {**asdict(regime), "policy": policy, **self.parameters[regime, policy]}
+        return {
+            **asdict(regime),
+            "policy": policy,
+            **self.parameters[regime, policy],
+            **self.parts.named,
+        }
 
     def header(self) -> dict[str, Any]:
         """All that the batches' costs depend on, as JSON gives it back."""
@@ -122,7 +150,13 @@ class Study:
             "episodes": self.episodes,
             "seed": self.seed,
             "missions side by side": BATCH_SIZE,
+            "own code": {name: digest(name) for name in self._own_names()},
             "baseline": self.compared_to,
             "policies and regimes": [self.config(policy, regime) for regime, policy in self.pairs],
         }
         return json.loads(json.dumps(header))
+
+    def _own_names(self) -> list[str]:
+        """The names of all parts that are the user's own."""
+        own = [name for name in self.policies if is_own_policy(name)]
+        return [*own, *self.features, *self.parts.named.values()]

@@ -62,7 +62,7 @@ def summarise(
                 **_packets(own, regime),
                 **_completeness(own),
                 **_differences(own, merged[regime, study.compared_to]),
-                **_published(policy, regime),
+                **_published(policy, None if study.parts.named else regime),
                 version=made_by["version"],
                 commit=made_by["commit"],
                 baseline=study.compared_to,
@@ -90,13 +90,17 @@ def merge(batches: Sequence[BatchCosts]) -> BatchCosts:
 def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
     """What was flown: the numbers of the mission that a result repeats, and the policy."""
     repeated = {name: value for name, value in asdict(regime).items() if name in COLUMNS}
-    return repeated | {
-        "policy": policy,
-        "episodes": study.episodes,
-        "seed": study.seed,
-        "probability": study.parameters[regime, policy].get("probability"),
-        "payload": study.make_policy(policy, regime).payload,
-    }
+    return (
+        repeated
+        | study.parts.named
+        | {
+            "policy": policy,
+            "episodes": study.episodes,
+            "seed": study.seed,
+            "probability": study.parameters[regime, policy].get("probability"),
+            "payload": study.make_policy(policy, regime).payload,
+        }
+    )
 
 
 def _costs(costs: BatchCosts) -> dict[str, Any]:
@@ -173,8 +177,9 @@ def _differences(costs: BatchCosts, baseline: BatchCosts) -> dict[str, Any]:
     return differences
 
 
-def _published(policy: str, regime: Mission) -> dict[str, Any]:
-    points = published(policy, regime)
+def _published(policy: str, regime: Mission | None) -> dict[str, Any]:
+    """The paper's values; none for missions with parts of the user's own."""
+    points = {} if regime is None else published(policy, regime)
     return {
         f"published_{cost}_{figure}": getattr(points[cost], figure) if cost in points else None
         for cost in COSTS

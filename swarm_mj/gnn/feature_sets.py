@@ -1,10 +1,13 @@
 """The one table of feature sets."""
 
+from collections.abc import Collection
+
 from swarm_mj.fields import did_you_mean
 from swarm_mj.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.gnn.graphs import FeatureExtractor, PaperFeatures, ReferenceFeatures
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.mission import Mission
+from swarm_mj.parts import FORM, load
 
 FEATURE_SETS: dict[str, type[FeatureExtractor]] = {
     "paper": PaperFeatures,
@@ -14,13 +17,16 @@ FEATURE_SETS: dict[str, type[FeatureExtractor]] = {
 }
 
 
+_own: dict[str, type[FeatureExtractor]] = {}  # those that the user of this process named
+
+
 def make_extractor(features: str, mission: Mission) -> FeatureExtractor:
     """An extractor by the name of its feature set; it is to be started.
 
     The mission's area, duration and range normalise the features.
 
     Raises:
-        ValueError: Unknown name.
+        ValueError: Unknown name, or a user's own that was not loaded by `load_features`.
     """
     return _feature_set(features)(mission)
 
@@ -31,21 +37,72 @@ def num_features(features: str) -> int:
 
 
 def _feature_set(features: str) -> type[FeatureExtractor]:
-    if features not in FEATURE_SETS:
-        hint = did_you_mean(features, FEATURE_SETS)
+    check_features(features)
+    if features in FEATURE_SETS:
+        return FEATURE_SETS[features]
+    check_named(features, _own, "this")
+    return _own[features]
+
+
+def load_features(features: str) -> None:
+    """Imports a user's own feature set, `module:Name`, which from then on has that name.
+
+    That runs its code, so the name must be one that the user gave, and none from a file.
+
+    Raises:
+        ValueError: It cannot be loaded, or is no class of a `FeatureExtractor` with names.
+    """
+    own = load("features", features)
+    if not isinstance(own, type) or not issubclass(own, FeatureExtractor):
+        raise ValueError(f"features {features} must be a FeatureExtractor's class, not {own!r:.80}")
+    if not getattr(own, "names", ()):
+        raise ValueError(f"features {features} must have names, one for each number of a node")
+    _own[features] = own
+
+
+def is_own_set(features: str) -> bool:
+    """Whether a feature set is a user's own, named `module:Name`."""
+    return FORM.fullmatch(features) is not None
+
+
+def check_features(features: str) -> None:
+    """Passes if a name is that of a feature set, or could be that of a user's own.
+
+    It imports nothing, so the name may stand in a file.
+
+    Raises:
+        ValueError: It is neither.
+    """
+    if features not in FEATURE_SETS and not is_own_set(features):
         raise ValueError(
-            f"features must be one of {', '.join(FEATURE_SETS)}, not {features!r}{hint}"
+            f"features must be one of {', '.join(FEATURE_SETS)}, or module:Name of your own, not "
+            f"{features!r:.80}{did_you_mean(features, FEATURE_SETS)}"
         )
-    return FEATURE_SETS[features]
+
+
+def check_named(features: str, named: Collection[str], where: str) -> None:
+    """Passes unless a file names a user's own feature set that its user has not named, too.
+
+    Raises:
+        ValueError: It does: to load it would run code that a file chose.
+    """
+    if is_own_set(features) and features not in named:
+        raise ValueError(
+            f"{where} sees by features of someone's own, {features:.200}; if you trust that code, "
+            f"add --features {features:.200}"
+        )
 
 
 def check_fit(network: GnnShape, features: str) -> None:
     """Passes for a network that takes a feature set, and gives what decisions are made of.
 
+    A user's own set is not imported, as the name may stand in a file: it may have any number.
+
     Raises:
         ValueError: It does not, or there is no such feature set.
     """
-    expected = num_features(features)
+    check_features(features)
+    expected = network.num_features if is_own_set(features) else num_features(features)
     if network.num_features != expected:
         raise ValueError(
             f"network.num_features is {network.num_features}, but the {features} features are "

@@ -32,12 +32,14 @@ class LearnedPolicy(DecentralisedPolicy):
         *,
         silence_logit: float = 0.0,
         is_deterministic: bool = False,
+        own_features: str | None = None,
     ) -> None:
         """Takes the network as it is, live, on any device: later changes of its weights count.
 
-        The extractor makes the graphs that it was trained on; the logit is added to silence, but in
-        a robot's own turn.
+        The extractor makes the graphs that it was trained on, and `own_features` is its name if it
+        is a user's own; the logit is added to silence, but in a robot's own turn.
         """
+        self._own_features = own_features
         self._network = network
         self._extractor = extractor
         self._silence_logit = silence_logit
@@ -51,6 +53,7 @@ class LearnedPolicy(DecentralisedPolicy):
             "receptive_field": self._network.shape.receptive_field,
             "is_deterministic": self._is_deterministic,
             "digest": self._digest(),
+            **({"features": self._own_features} if self._own_features else {}),
         }
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:

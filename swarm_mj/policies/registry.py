@@ -11,6 +11,7 @@ from swarm_mj.fields import check_kind, did_you_mean
 from swarm_mj.io.assets import asset
 from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
+from swarm_mj.parts import is_own, make
 from swarm_mj.policies.aloha import Aloha
 from swarm_mj.policies.gossip import InnovationGossip
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle, LookaheadOracle
@@ -18,7 +19,7 @@ from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.without_payload import PlannerWithoutPayload
-from swarm_mj.policies.policy import Policy
+from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.round_robin import RoundRobin
 from swarm_mj.policies.spatial_tdma import SpatialTdma
@@ -119,17 +120,21 @@ def make_policy(
     probability: float | None = None,
     *,
     is_deterministic: bool = False,
+    features: Sequence[str] = (),
 ) -> Policy:
     """A policy by its name on the command line.
 
     Args:
-        name: One of `POLICIES`, or a directory with a learned policy.
+        name: One of `POLICIES`, a directory with a learned policy, or the `module:Name` of one's
+            own.
         mission: Whose preset says how the baseline behaves where paper and code differ, and whose
             numbers normalise what a learned policy sees.
         probability: Of transmission, for the policies that have one; None is the one tuned for
             the regime nearest to the mission's.
         is_deterministic: Whether a learned policy takes the most probable recipient instead of a
             draw.
+        features: Names, as `module:Name`, of own feature sets that may be imported for a learned
+            policy.
 
     Returns:
         The policy.
@@ -142,17 +147,19 @@ def make_policy(
     """
     check_kind("policy", name, str, '"planner"')
     check_kind("mission", mission, Mission, 'paper("flocking")')
+    if is_own_policy(name):
+        return _own_policy(name, mission, probability, is_deterministic)
     if is_learned(name):
         _refuse(probability, name)
         need("torch", f"policy {name}", "fly another")
         from swarm_mj.policies.stored import load_policy  # torch takes its time to import
 
         folder = asset(f"policies/{SHIPPED}") if name == SHIPPED else Path(name)
-        return load_policy(folder, mission, is_deterministic=is_deterministic)
+        return load_policy(folder, mission, is_deterministic=is_deterministic, features=features)
     if name not in RULES:
         raise ValueError(
-            f"policy must be one of {', '.join(POLICIES)}, or a directory with a learned policy, "
-            f"not {name!r}{did_you_mean(name, POLICIES)}"
+            f"policy must be one of {', '.join(POLICIES)}, a directory with a learned policy, or "
+            f"module:Name of your own, not {name!r}{did_you_mean(name, POLICIES)}"
         )
     if is_deterministic:
         raise ValueError(f"{name} draws from no network's distribution; leave --deterministic out")
@@ -161,6 +168,39 @@ def make_policy(
         return RULES[name](mission, tuned)
     _refuse(probability, name)
     return RULES[name](mission)
+
+
+def check_used(features: Sequence[str], policies: Iterable[Policy]) -> None:
+    """Passes if own feature sets that were named are those of some policy.
+
+    Raises:
+        ValueError: Nobody was trained on one.
+    """
+    used = {policy.parameters.get("features") for policy in policies}
+    for name in features:
+        if name not in used:
+            raise ValueError(f"no policy here was trained on the features {name}; leave them out")
+
+
+def is_own_policy(name: str) -> bool:
+    """Whether a policy is a user's own, named `module:Name`."""
+    return is_own(name) and not is_directory(name)
+
+
+def _own_policy(
+    name: str, mission: Mission, probability: float | None, is_deterministic: bool
+) -> Policy:
+    """A user's own; raises ValueError as `make_policy`."""
+    _refuse(probability, name)
+    if is_deterministic:
+        raise ValueError(f"{name} is no learned policy; leave --deterministic out")
+    policy = make("policy", name, mission)
+    if not isinstance(policy, CentralisedPolicy | DecentralisedPolicy):
+        raise ValueError(
+            f"policy {name} must make a DecentralisedPolicy or a CentralisedPolicy, not "
+            f"{policy!r:.80}"
+        )
+    return policy
 
 
 def _is_path(name: str) -> bool:

@@ -1,6 +1,6 @@
 """A policy on disk: a folder of its weights, what they belong to, and a card for its reader."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from safetensors.torch import load, save
 from torch import Tensor
 
 from swarm_mj.gnn.fast import FastAggregationGnn
-from swarm_mj.gnn.feature_sets import make_extractor
+from swarm_mj.gnn.feature_sets import check_named, is_own_set, load_features, make_extractor
 from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.io.reading import format_of
 from swarm_mj.mission import Mission
@@ -55,25 +55,41 @@ def save_policy(
 
 
 def load_policy(
-    folder: Path, mission: Mission, *, is_deterministic: bool = False
+    folder: Path,
+    mission: Mission,
+    *,
+    is_deterministic: bool = False,
+    features: Sequence[str] = (),
 ) -> LearnedPolicy | MlpPolicy:
     """A policy, ready to fly a mission, which may be of another kind than it was trained on.
 
     The mission's area, duration and range normalise what the robots see. A deterministic policy
-    takes the most probable recipient instead of a draw.
+    takes the most probable recipient instead of a draw. Feature sets of one's own are imported only
+    if their names, as `module:Name`, are among `features`: the folder cannot make us run code.
 
     Raises:
-        ValueError: There is none, or it is damaged, foreign, oversized or of a newer version.
+        ValueError: There is none, or it is damaged, foreign, oversized or of a newer version, or
+            its features are not those that may be imported.
         OSError: It cannot be read.
     """
     if _is_mlp(folder):
         return load_mlp(folder, mission, is_deterministic=is_deterministic)
     network, config = read_policy(folder)
+    check_named(config.features, features, f"policy {folder}")
+    if is_own_set(config.features):
+        load_features(config.features)
+    extractor = make_extractor(config.features, mission)
+    if len(extractor.names) != config.network.num_features:
+        raise ValueError(
+            f"policy {folder} was trained on {config.network.num_features} features, and "
+            f"{config.features} now has {len(extractor.names)}"
+        )
     return LearnedPolicy(
         network,
-        make_extractor(config.features, mission),
+        extractor,
         silence_logit=config.silence_logit,
         is_deterministic=is_deterministic,
+        own_features=config.features if is_own_set(config.features) else None,
     )
 
 

@@ -215,7 +215,8 @@ def _send(
 ) -> Phase:
     """Sends everyone's packet through the channel (Eq. 6) and merges what was decoded."""
     sent_to = _of_active(states.is_active, recipient)
-    heard = _of_active(states.is_active, channel(states.position_m, sent_to))
+    decoded = np.asarray(channel(states.position_m, sent_to.copy()))  # which it may write
+    heard = _of_active(states.is_active, decoded)
     merge(buffers, heard)
     return Phase(recipient=sent_to.copy(), heard=heard)
 

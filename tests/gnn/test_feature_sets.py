@@ -46,5 +46,5 @@ def test_the_mission_given_is_the_one_that_normalises():
 @pytest.mark.parametrize("refuse", [lambda name: make_extractor(name, paper()), num_features])
 def test_unknown_features_are_a_clear_error(refuse):
     assert set(FEATURE_SETS) == {"paper", "reference", "local", "extended"}
-    with pytest.raises(ValueError, match="one of paper, reference, local, extended, not 'all'"):
+    with pytest.raises(ValueError, match="extended, or module:Name of your own, not 'all'"):
         refuse("all")

@@ -72,7 +72,7 @@ def test_what_is_no_config(text, complaint):
         ("w" * 1000, 2, "unknown field `www"),
         ("network", [1], r"Expected `object`, got `array` - at `\$\.network`"),
         ("features", "paper", "num_features is 18, but the paper features are 8"),
-        ("features", "all", "features must be one of paper, reference, local, extended, not 'all'"),
+        ("features", "all", "extended, or module:Name of your own, not 'all'"),
         ("features", 7, "Expected `str`, got `int` - at .*features"),
         ("silence_logit", "3", "Expected `float`, got `str` - at .*silence_logit"),
         ("silence_logit", 100.5, "silence_logit must be a number from -100 to 100, not 100.5"),

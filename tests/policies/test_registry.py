@@ -85,7 +85,7 @@ def test_names_are_as_typed_but_for_what_leads_nowhere_else(typed, expected):
 
 @pytest.mark.parametrize("name", ["rumour", ""])
 def test_what_is_neither_a_name_nor_a_directory(name):
-    with pytest.raises(ValueError, match=f"or a directory with a learned policy, not '{name}'"):
+    with pytest.raises(ValueError, match=f"or module:Name of your own, not '{name}'"):
         make_policy(name, MISSION)
 
 

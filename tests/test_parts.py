@@ -1,0 +1,149 @@
+"""Users' own parts, by name: what is loaded, how it is called, and what is said if it cannot be."""
+
+import sys
+import textwrap
+
+import pytest
+
+from swarm_mj.mission import paper
+from swarm_mj.parts import OwnParts, digest, load, make, one_line_each
+
+MISSION = paper(num_robots=3)
+PARTS = '''
+"""Parts."""
+
+class Needs:
+    def __init__(self, mission):
+        self.num_robots = mission.num_robots
+
+class Needless:
+    def __init__(self, probability=0.25):
+        self.probability = probability
+
+class MayTake:
+    def __init__(self, mission=None):
+        self.num_robots = mission.num_robots
+
+def maker(mission):
+    return Needs(mission)
+
+def plain(position_m, recipient):
+    return recipient
+
+class Plain:
+    def __call__(self, spec, mission):
+        """Nothing."""
+
+an_object = Plain()
+number = 7
+
+def breaks(mission):
+    return mission.no_such_field
+
+def breaks_later(position_m, recipient):
+    raise KeyError("lost")
+'''
+
+
+@pytest.fixture
+def parts(here):
+    """A module `own_parts` in the current folder."""
+    path, modules = list(sys.path), set(sys.modules)
+    (here / "own_parts.py").write_text(textwrap.dedent(PARTS))
+    yield here
+    sys.path[:] = path
+    for name in set(sys.modules) - modules:
+        if name.startswith("own_"):
+            del sys.modules[name]
+
+
+@pytest.mark.parametrize("name", ["Needs", "MayTake", "maker"])
+@pytest.mark.usefixtures("parts")
+def test_what_takes_a_mission_is_given_it(name):
+    assert make("controller", f"own_parts:{name}", MISSION).num_robots == 3
+
+
+@pytest.mark.usefixtures("parts")
+def test_what_needs_nothing_is_given_nothing():
+    assert make("policy", "own_parts:Needless", MISSION).probability == 0.25
+
+
+@pytest.mark.parametrize("name", ["plain", "an_object"])
+@pytest.mark.usefixtures("parts")
+def test_what_takes_two_arguments_is_the_part_itself(name):
+    found = make("channel", f"own_parts:{name}", MISSION)
+    assert found is getattr(sys.modules["own_parts"], name)
+
+
+def test_a_part_of_the_package_can_be_named_too():
+    from swarm_mj.policies.tdma import Tdma
+
+    assert isinstance(make("policy", "swarm_mj.policies.tdma:Tdma", MISSION), Tdma)
+
+
+@pytest.mark.parametrize("name", ["foo", "foo:", ":Foo", "a b:C", "a:b:c", "a/b:C", "a:B.c", ""])
+def test_another_form_is_refused(name):
+    with pytest.raises(ValueError, match="must be named module:Name, such as my_parts:Mine"):
+        load("channel", name)
+
+
+@pytest.mark.parametrize(
+    ("name", "complaint"),
+    [
+        (
+            "own_part:Needs",
+            r"no module own_part in .*, nor among those installed; did you mean own_p",
+        ),
+        ("own_parts.deeper:Needs", r"no module own_parts.deeper in"),
+        ("own_parts:Need", r"own_parts.py has no Need; did you mean Needs\?"),
+        ("own_parts:breaks", r"raised AttributeError: .*no_such_field.* \(own_parts.py, line 32\)"),
+        ("own_broken:Any", r"importing it raised SyntaxError: .*own_broken.py, line 2"),
+        (
+            "own_needy:Any",
+            r"raised ModuleNotFoundError: No module named 'nowhere_at_all' \(own_need",
+        ),
+        ("own_quitter:Any", r"importing it raised SystemExit: 3"),
+    ],
+)
+def test_what_cannot_be_made_is_said_in_one_line(parts, name, complaint):
+    (parts / "own_broken.py").write_text("x = 1\ndef (:\n")
+    (parts / "own_needy.py").write_text("import nowhere_at_all\n")
+    (parts / "own_quitter.py").write_text("raise SystemExit(3)\n")
+    with pytest.raises(ValueError, match=complaint) as refused:
+        make("channel", name, MISSION)
+    assert str(refused.value).startswith(f"channel {name}")
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("name", ["number", "Plain", "maker"])
+@pytest.mark.usefixtures("parts")
+def test_parts_must_be_functions_or_like_them(name):
+    channel = OwnParts(channel=f"own_parts:{name}")
+    if name == "Plain":  # its object is called
+        assert callable(channel.made(MISSION)["channel"])
+    else:
+        with pytest.raises(ValueError, match="must make a function, or an object like one"):
+            channel.made(MISSION)
+
+
+@pytest.mark.usefixtures("parts")
+def test_what_a_part_raises_in_flight_names_it():
+    breaks = make("channel", "own_parts:breaks_later", MISSION)
+    with (
+        pytest.raises(ValueError, match=r"^channel own_parts:breaks_later raised KeyError: 'lost'"),
+        one_line_each(),
+    ):
+        breaks(None, None)
+
+
+def test_what_others_raise_is_left_alone():
+    with pytest.raises(KeyError), one_line_each():
+        raise KeyError("ours")
+
+
+def test_a_digest_changes_with_the_file(parts):
+    load("channel", "own_parts:plain")
+    before = digest("own_parts:plain")
+    with (parts / "own_parts.py").open("a") as file:
+        file.write("\n# another line\n")
+    assert digest("own_parts:plain") != before
