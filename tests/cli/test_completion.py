@@ -30,7 +30,7 @@ def script(tmp_path_factory):
         ([""], set(COMMANDS)),
         (["f"], {"fly", "figures"}),
         (["fly", "--rob"], {"--robots"}),
-        (["fly", "--task", ""], {"stationary", "random-walk", "flocking"}),
+        (["fly", "--task", ""], {"stationary", "random-walk", "flocking", "formation", "coverage"}),
         (["fly", "--policy", "g"], {"gossip", "greedy-oracle", "gnn"}),
         (["fly", "--policy", "ru"], {"runs"}),
         (["evaluate", "--policy", "tdma", "al"], {"all", "aloha"}),
@@ -52,7 +52,11 @@ def test_bash_completes(script, tmp_path, typed, offered):
 def test_zsh_is_told_the_same_names():
     said = completion("zsh")
     assert said.startswith("#compdef swarm-mj")
-    for words in ("(stationary random-walk flocking)", "compadd random-flooding", "_files -/"):
+    for words in (
+        "(stationary random-walk flocking formation coverage)",
+        "compadd random-flooding",
+        "_files -/",
+    ):
         assert words in said
 
 

@@ -1,0 +1,145 @@
+"""Parts of one's own on the command line, by module:Name."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+SMALL = ("--task", "random-walk", "--robots", 5, "--windows", 10, "--range-ratio", 0.5)
+PARTS = """
+import numpy as np
+from swarm_mj.mission.batched_rng import Stream, uniform
+from swarm_mj.policies.policy import BroadcastPolicy
+from swarm_mj.radio.mission_radio import radio_of
+
+class Coin(BroadcastPolicy):
+    def start(self, num_robots, rngs):
+        self.stream = Stream(rngs, uniform, (num_robots,))
+    def transmits(self, views):
+        return self.stream.next() < 0.2
+
+class Lossy:
+    def __init__(self, mission):
+        self.radio = radio_of(mission)
+    def start(self, num_robots, rngs):
+        self.stream = Stream(rngs, uniform, (num_robots,))
+    def __call__(self, position_m, recipient):
+        heard = self.radio(position_m, recipient)
+        return np.where(self.stream.next() < 0.5, np.arange(heard.shape[1]), heard)
+
+class Rest:
+    cost_name, cost_unit = "mean speed", "m/s"
+    def __call__(self, buffers, states):
+        return -states.velocity_mps
+    def cost(self, states):
+        return np.linalg.norm(states.velocity_mps, axis=2).mean(axis=1)
+
+def pillar(spec, mission):
+    spec.worldbody.add_geom(name="pillar", size=[9, 9, 9])
+
+def breaks(buffers, states):
+    raise RuntimeError("out of order")
+"""
+ALL = ("--channel", "my_parts:Lossy", "--controller", "my_parts:Rest", "--scene", "my_parts:pillar")
+
+
+@pytest.fixture(autouse=True)
+def _parts(tmp_path):
+    (tmp_path / "my_parts.py").write_text(PARTS)
+
+
+def test_a_flight_with_parts_of_ones_own(swarm_mj, tmp_path):
+    fly = ("fly", *SMALL, "--policy", "my_parts:Coin", *ALL)
+    done = swarm_mj(*fly, "--json", "a.json", "--record", "a.rrd")
+    assert done.returncode == 0, done.stderr
+    assert "channel my_parts:Lossy" in done.stdout
+    assert "mean speed" in done.stdout
+    flown = json.loads((tmp_path / "a.json").read_text())
+    assert flown["config"]["policy"] == "my_parts:Coin"
+    assert flown["config"]["scene"] == "my_parts:pillar"
+    assert flown["task_cost_name"] == "mean speed"
+    assert flown["task_cost_last"] == pytest.approx(0.9**9 * flown["task_cost_first"])
+    again = swarm_mj(*fly, "--json", "b.json", "--no-record")
+    assert again.returncode == 0
+    assert json.loads((tmp_path / "b.json").read_text())["aoi_mean"] == flown["aoi_mean"]
+
+
+def test_an_evaluation_makes_them_in_every_process_and_says_which(swarm_mj, tmp_path):
+    evaluate = ("evaluate", *SMALL, *ALL, "--policy", "my_parts:Coin", "mst", "--episodes", 30)
+    for name, jobs in (("one", 1), ("two", 2)):
+        done = swarm_mj(*evaluate, "--jobs", jobs, "--csv", f"{name}.csv")
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
+    with (tmp_path / "one.csv").open() as file:
+        coin, _ = csv.DictReader(file)
+    assert (coin["policy"], coin["channel"]) == ("my_parts:Coin", "my_parts:Lossy")
+    assert coin["task_cost_name"] == "mean speed"
+    assert coin["published_aoi_mean"] == ""
+    assert json.loads(coin["config"])["controller"] == "my_parts:Rest"
+    assert "channel my_parts:Lossy" in done.stdout
+
+
+@pytest.mark.parametrize("change", ["another part", "another line"])
+def test_an_evaluation_goes_on_with_the_same_parts_only(swarm_mj, tmp_path, change):
+    evaluate = ("evaluate", *SMALL, "--policy", "tdma", "--episodes", 2, "--csv", "r.csv")
+    channel = ("--channel", "my_parts:Lossy")
+    breaking = ("--controller", "my_parts:breaks")
+    done = swarm_mj(*evaluate, *channel, *breaking)
+    assert done.returncode == 2
+    assert "controller my_parts:breaks raised RuntimeError: out of order (my_par" in done.stderr
+    again = channel if change == "another part" else (*channel, *breaking)
+    if change == "another line":
+        with (tmp_path / "my_parts.py").open("a") as file:
+            file.write("# changed\n")
+    done = swarm_mj(*evaluate, *again, "--resume")
+    assert done.returncode == 2
+    assert "is of another evaluation" in done.stderr
+
+
+def test_the_scene_is_in_the_file(swarm_mj, tmp_path):
+    done = swarm_mj("scene", "--robots", 3, "--scene", "my_parts:pillar")
+    assert done.returncode == 0, done.stderr
+    assert 'name="pillar"' in (tmp_path / "scene.xml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        (("--policy", "my_parts:coin"), "policy my_parts:coin: my_parts.py has no coin; did you"),
+        (("--policy", "my_parts:Lossy"), "must make a DecentralisedPolicy or a CentralisedPolicy"),
+        (("--policy", "my_parts:Coin", "--probability", "0.1"), "takes no transmission probab"),
+        (("--policy", "my_parts:Coin", "--deterministic"), "is no learned policy"),
+        (("--channel", "free-space"), "channel must be named module:Name, such as my_parts:Mine"),
+        (("--channel", "your_parts:Lossy"), "there is no module your_parts in"),
+        (
+            ("--controller", "my_parts:breaks"),
+            "controller my_parts:breaks raised RuntimeError: out",
+        ),
+        (("--features", "my_parts:Coin"), "no policy here was trained on the features my_parts:Co"),
+    ],
+)
+def test_what_is_wrong_with_a_part_is_one_line(swarm_mj, options, complaint):
+    done = swarm_mj("fly", "--no-record", *SMALL, *options)
+    assert done.returncode == 2
+    assert complaint in done.stderr
+    assert done.stderr.count("error:") == 1
+    assert "Traceback" not in done.stderr
+
+
+def test_a_channel_of_ones_own_gives_a_mission_the_same_course_beside_any_other(here):
+    from swarm_mj.mission import paper
+    from swarm_mj.parts import OwnParts
+    from swarm_mj.policies.registry import make_policy
+    from swarm_mj.swarm import Swarm
+
+    (here / "my_parts_too.py").write_text(PARTS)
+    mission = paper("random-walk", num_robots=5, range_ratio=0.5)
+    parts = OwnParts(channel="my_parts_too:Lossy")
+    ages = []
+    for seeds in ([3], [8, 3, 1]):
+        swarm = Swarm(mission, seeds, **parts.made(mission))
+        policy = make_policy("my_parts_too:Coin", mission)
+        course = [swarm.step(policy).age_windows[seeds.index(3)] for _ in range(150)]
+        ages.append(course)
+    np.testing.assert_array_equal(*ages)
