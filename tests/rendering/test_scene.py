@@ -21,13 +21,9 @@ def places(num_robots, half_m, rng):
 
 
 def is_of(picture, colour):
-    """Pixels of a colour, their shaded ones too: by the channels' proportions."""
-    pixels, target = picture.astype(float), np.array(colour, dtype=float)
-    brightness = pixels.max(axis=2)
-    hue = pixels / np.maximum(brightness, 1.0)[..., None]
-    return (brightness > 0.4 * target.max()) & (
-        np.abs(hue - target / target.max()).max(axis=2) < 0.15
-    )
+    """Pixels of a vivid colour, in light or shade, or behind glass."""
+    high, low = np.argmax(colour), np.argmin(colour)
+    return picture[..., high].astype(int) - picture[..., low] > 45
 
 
 def num_blobs(is_set):
