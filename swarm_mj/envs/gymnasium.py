@@ -45,7 +45,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, Info]:
-        """Begins a mission; `info` has its seed.
+        """Begins a mission, whose seed is in `info`.
 
         Raises:
             ValueError: No connected team could be drawn.
@@ -53,7 +53,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         super().reset(seed=seed, options=options)
         begun = next_seed(self.np_random) if seed is None else seed
         self.team.restart([begun])
-        return self._observation(), {"seed": begun}
+        return self._observation(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, Info]:
         """One window; `action[i]` is whom robot i addresses, itself for silence.
@@ -66,8 +66,8 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
             ValueError: The action is not one integer from 0 to N - 1 per robot.
         """
         reward = self.team.step(np.asarray(action)[np.newaxis])
-        info = {name: values[0].item() for name, values in self.team.infos().items()}
-        return self._observation(), float(reward[0, 0]), False, self.team.is_over, info
+        is_over = self.team.is_over
+        return self._observation(), float(reward[0, 0]), False, is_over, self._info()
 
     def render(self) -> UInt8[np.ndarray, "H W 3"] | None:
         """The mission as it is now, in the render mode "rgb_array".
@@ -80,6 +80,9 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
     def close(self) -> None:
         """Gives back what pictures took."""
         self._screen.close()
+
+    def _info(self) -> Info:
+        return {name: values[0].item() for name, values in self.team.infos().items()}
 
     def _observation(self) -> Observation:
         return {name: values[0] for name, values in self.team.observation.items()}

@@ -175,7 +175,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         return seed
 
     def _begin(self, envs: Int[np.ndarray, "E"], seeds: Sequence[int | None], infos: Info) -> None:
-        """Begins these environments' missions; writes their seeds into `infos`."""
+        """Begins these environments' missions; writes what they say into `infos`."""
         for env, seed in zip(envs, seeds, strict=True):
             if seed is not None or env not in self._rngs:
                 self._rngs[env], _ = seeding.np_random(seed)
@@ -189,7 +189,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         self._groups = [*self._without(envs), group]
         self._is_over[envs] = False
         self._show(group)
-        self._note(infos, envs, {"seed": np.array(begun)})
+        self._note(infos, envs, team.infos())
 
     def _spare_team(self, envs: Int[np.ndarray, "E"]) -> Team:
         """A team of so many missions that no other environment is part of."""
@@ -219,8 +219,8 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
                 reward[group.envs] = group.team.step(recipient)[group.rows, 0]
                 self._is_over[group.envs] = group.team.is_over
                 self._show(group)
-                costs = group.team.infos().items()
-                self._note(infos, group.envs, {name: each[group.rows] for name, each in costs})
+                said = group.team.infos().items()
+                self._note(infos, group.envs, {name: each[group.rows] for name, each in said})
 
     def _finals(self, is_over: Bool[np.ndarray, "B"], infos: Info) -> Info:
         """What was seen last, and the last window's costs, out of the way of what begins now."""

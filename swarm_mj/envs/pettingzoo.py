@@ -75,7 +75,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         begun = next_seed(self._rng) if seed is None else seed
         self.team.restart([begun])
         self.agents = list(self.possible_agents)
-        return self._observations(), {agent: {"seed": begun} for agent in self.agents}
+        return self._observations(), self._infos()
 
     def step(
         self, actions: dict[str, Action]
@@ -100,13 +100,12 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
             i = self._robot(agent)
             recipient[0, i] = actions.get(agent, i)
         reward = self.team.step(recipient)[0]
-        costs = {name: values[0].item() for name, values in self.team.infos().items()}
         is_active, is_over = self.team.is_active[0], self.team.is_over
         seen = self._observations()
         rewards = {agent: float(reward[self._robot(agent)]) for agent in self.agents}
         ended = {agent: not is_active[self._robot(agent)] for agent in self.agents}
         cut = dict.fromkeys(self.agents, is_over)
-        infos = {agent: dict(costs) for agent in self.agents}
+        infos = self._infos()
         self.agents = [] if is_over else [agent for agent in self.agents if not ended[agent]]
         return seen, rewards, ended, cut, infos
 
@@ -124,6 +123,11 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
 
     def _robot(self, agent: str) -> int:
         return int(agent.removeprefix("robot_"))
+
+    def _infos(self) -> dict[str, Info]:
+        """The same for every agent: the mission's seed, and what the window cost the team."""
+        info = {name: values[0].item() for name, values in self.team.infos().items()}
+        return {agent: dict(info) for agent in self.agents}
 
     def _observations(self) -> dict[str, Observation]:
         """What each agent sees."""

@@ -90,7 +90,7 @@ class SwarmVecEnv(VecEnv):
         ]
         self._given = [None] * len(begun)
         self.team.restart(begun)
-        self.reset_infos = [{"seed": seed} for seed in begun for _ in range(self._per_mission)]
+        self.reset_infos = self._infos()
         return self._observations()
 
     def step_async(self, actions: np.ndarray) -> None:
@@ -106,8 +106,13 @@ class SwarmVecEnv(VecEnv):
         shape = (self.team.num_missions, self.team.mission.num_robots)
         reward = self.team.step(self._actions.reshape(shape))[:, : self._per_mission].ravel()
         is_over = self.team.is_over
-        infos = self._infos(is_over)
-        seen = self.reset() if is_over else self._observations()
+        infos = self._infos()
+        seen = self._observations()
+        if is_over:
+            for env, info in enumerate(infos):
+                info["terminal_observation"] = {name: each[env] for name, each in seen.items()}
+                info["TimeLimit.truncated"] = True
+            seen = self.reset()
         return seen, reward.astype(np.float32), np.full(self.num_envs, is_over), infos
 
     def action_masks(self) -> Bool[np.ndarray, "E A"]:
@@ -142,19 +147,13 @@ class SwarmVecEnv(VecEnv):
     def close(self) -> None:
         """There is nothing to release."""
 
-    def _infos(self, is_over: bool) -> list[dict[str, Any]]:
-        """What the window cost each mission; at its end, also what was seen."""
-        costs = self.team.infos()
-        infos: list[dict[str, Any]] = [
-            {name: values[env // self._per_mission].item() for name, values in costs.items()}
+    def _infos(self) -> list[dict[str, Any]]:
+        """Each environment's mission's seed, and what the window cost it."""
+        infos = self.team.infos().items()
+        return [
+            {name: values[env // self._per_mission].item() for name, values in infos}
             for env in range(self.num_envs)
         ]
-        if is_over:
-            last = self._observations()
-            for env, info in enumerate(infos):
-                info["terminal_observation"] = {name: each[env] for name, each in last.items()}
-                info["TimeLimit.truncated"] = True
-        return infos
 
     def _observations(self) -> Observation:
         """What all environments see."""

@@ -18,7 +18,7 @@ from swarm_mj.learning.credit import credits_of
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.physics.scene import Scene
-from swarm_mj.protocol.costs import WindowCosts
+from swarm_mj.protocol.costs import WindowCosts, age_of_information, velocity_variance
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.swarm import Swarm
 
@@ -96,6 +96,7 @@ class Team:
         self.seeds = list(seeds)
         self._extractor.start(self.num_missions, self.mission.num_robots)
         self._see()
+        self._keep_start()
 
     def step(self, recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B N"]:
         """One window of Alg. 1, in which each robot addresses a recipient; itself is silence.
@@ -108,14 +109,14 @@ class Team:
         """
         swarm = self.flown
         before, start = swarm.buffers.timestamp.copy(), swarm.now
-        self.costs: WindowCosts = swarm.exchange(recipient)
+        costs = swarm.exchange(recipient)
         self._see()
+        self._keep_costs(costs)
         if self.reward == "credit":
             own = credits_of(before, swarm.states.position_m, recipient, swarm.channel, start)
             return own / self.mission.num_robots**2
-        cost = self.costs.age_windows
-        if self.reward == "velocity-variance":
-            cost = self.costs.velocity_variance_m2ps2
+        is_variance = self.reward == "velocity-variance"
+        cost = costs.velocity_variance_m2ps2 if is_variance else costs.age_windows
         return np.broadcast_to(-cost[:, None], recipient.shape)
 
     @property
@@ -138,9 +139,26 @@ class Team:
         return np.ones(shape, dtype=np.bool_) if is_active is None else is_active
 
     def infos(self) -> Info:
-        """What the last window cost, by name, [B] each: the numbers of `swarm-mj fly --json`."""
-        costs = self.costs
-        return {
+        """The missions' seeds, and what the last window cost, by name, [B] each.
+
+        Names and numbers are those of `swarm-mj fly --json`. Before the first window, when nothing
+        is known and nothing was sent, ages and packets are 0.
+        """
+        return {"seed": np.array(self.seeds), **self._costs}
+
+    def _keep_start(self) -> None:
+        """Keeps what a window that has not been flown would cost."""
+        swarm = self.flown
+        age_windows, is_complete = age_of_information(swarm.buffers, swarm.now)
+        self._costs: Info = {
+            "age_windows": age_windows,
+            "velocity_variance_m2ps2": velocity_variance(swarm.states.velocity_mps),
+            "is_complete": is_complete,
+            **{f"packets_{name}": np.zeros(self.num_missions) for name in PACKETS},
+        }
+
+    def _keep_costs(self, costs: WindowCosts) -> None:
+        self._costs = {
             "age_windows": costs.age_windows,
             "velocity_variance_m2ps2": costs.velocity_variance_m2ps2,
             "is_complete": costs.is_complete,

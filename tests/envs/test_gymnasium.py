@@ -42,11 +42,16 @@ def test_an_episode_is_a_mission():
 
 def test_info_is_what_the_window_cost():
     env, swarm = SwarmEnv("random-walk", **SMALL), Swarm(paper("random-walk", **SMALL), [4])
-    assert env.reset(seed=4)[1] == {"seed": 4}
+    start = env.reset(seed=4)[1]
+    assert start.pop("seed") == 4
+    variance = np.var(swarm.states.velocity_mps[0], axis=0).sum()
+    assert start.pop("velocity_variance_m2ps2") == pytest.approx(variance)
+    assert not any(start.values())  # no age, no packets
     for recipient in np.random.default_rng(1).integers(0, 5, (8, 5)):
         *_, info = env.step(recipient)
         costs = swarm.exchange(recipient[None])
         assert info == {
+            "seed": 4,
             "age_windows": costs.age_windows[0],
             "velocity_variance_m2ps2": costs.velocity_variance_m2ps2[0],
             "is_complete": costs.is_complete[0],
@@ -64,6 +69,7 @@ def test_missions_without_a_seed_differ():
 
 
 def test_a_mission_may_be_given_whole_and_changed():
+    register_environments()
     env = gymnasium.make("swarm_mj/Flocking-v0", mission=paper("stationary", **SMALL), num_robots=3)
     assert env.unwrapped.team.mission == paper("stationary", **{**SMALL, "num_robots": 3})
 

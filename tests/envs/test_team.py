@@ -52,7 +52,7 @@ def test_credit_is_the_age_that_a_window_without_the_robot_would_have_left():
     past = []
     for recipient in recipients(6, 1):
         reward = team.step(recipient)
-        ages = team.costs.age_windows[0]
+        ages = team.infos()["age_windows"][0]
         for i in range(5):
             twin = Swarm(team.mission, [3])
             for each in past:
@@ -114,7 +114,7 @@ def test_a_part_of_ones_own_is_used_and_left_alone():
     team = Team(mission, channel=mine)
     team.restart([1])
     team.step(np.array([[1, 2, 3, 4, 0]]))
-    assert team.costs.packets.lost[0] == 5
+    assert team.infos()["packets_lost"] == [5]
     assert (team.swarm.channel.calls, mine.calls) == (2, 0)
 
 
