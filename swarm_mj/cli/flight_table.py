@@ -15,7 +15,7 @@ from swarm_mj.policies.policy import CentralisedPolicy, Policy
 from swarm_mj.rollout import Summary
 
 AGREED = 0.01  # of the first window's velocity variance: a flock with less has agreed
-AGE = "age of information: how old a robot's news of another is, over all pairs"
+AGE = "age of information: how old a robot's news of another is, over all pairs; less is better"
 
 
 def flight_numbers(policy: Policy, summary: Summary) -> dict[str, Any]:
@@ -100,9 +100,9 @@ def _share(count: int, of: int) -> str:
 
 
 def _payload(payload: str) -> str:
-    """What packets carry; T, M and P are the paper's names for what a robot knows (II-B)."""
-    states = "known states (T, M, P)"
-    return states if payload == "none" else f"{states} and {payload}"
+    """What packets carry: the buffer is all that a robot knows, T, M and P (II-B)."""
+    buffer = "the sender's buffer"
+    return buffer if payload == "none" else f"{buffer} and {payload}"
 
 
 def _task_costs(mission: Mission, numbers: Mapping[str, Any]) -> dict[str, str]:

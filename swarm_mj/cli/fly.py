@@ -3,6 +3,7 @@
 import os
 import shlex
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -14,7 +15,7 @@ from swarm_mj.cli import DONE
 from swarm_mj.cli.estimates import YES, check_fits, flight_needs
 from swarm_mj.cli.flight import flight_config, fly_swarm
 from swarm_mj.cli.flight_table import flight_numbers, flight_table, flight_title
-from swarm_mj.cli.mission_options import one_mission
+from swarm_mj.cli.mission_options import mission_flags, one_mission
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.policy_options import NAMED, NAMES, PolicyOptions
 from swarm_mj.cli.progress import WorkBar
@@ -35,8 +36,8 @@ from swarm_mj.policies.registry import (
     with_payload,
 )
 from swarm_mj.replay.recorder import Recorder
+from swarm_mj.replay.view import has_display, view_command
 from swarm_mj.replay.view import run as run_viewer
-from swarm_mj.replay.view import view_command
 from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
@@ -112,12 +113,22 @@ def run(options: Options) -> int:
                 _write(options, summary, path, recorder)
         finally:
             out.print(flight_table(title + options.parts.title, mission, numbers, wall_s))
-    if path:
-        out.print(f"Open the replay:  {this_command()} replay {shlex.quote(str(path))}")
+    for label, line in _next_commands(mission, path):
+        out.print(f"{label:18}{line}")
     if code != DONE:
         console.print(f"{ending} after {len(flown)} of {mission.num_windows} windows.")
         return code
     return run_viewer(view_command(path)) if options.view and path else DONE
+
+
+def _next_commands(mission: Mission, path: Path | None) -> Iterator[tuple[str, str]]:
+    """What to do next, and the commands that do it."""
+    name, way = this_command(), "" if has_display() else "--web "
+    if path:
+        yield "Open the replay:", f"{name} replay {way}{shlex.quote(str(path))}"
+    yield "Other policies:", f"{name} policies"
+    flags = mission_flags(mission)
+    yield "Compare some:", f"{name} evaluate --policy planner gnn tdma --episodes 5 {flags}"
 
 
 def _make_policy(options: Options, mission: Mission) -> Policy:

@@ -29,13 +29,18 @@ def view_command(*paths: Path) -> list[str]:
     Raises:
         ValueError: There is no display to open a window on.
     """
-    has_display = bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-    if sys.platform.startswith("linux") and not has_display:
+    if not has_display():
         raise ValueError(
             "there is no display (DISPLAY and WAYLAND_DISPLAY are unset); use "
             "`swarm-mj replay --web FILE`, or tools/picture.py for a picture"
         )
     return [*VIEWER, *map(str, paths)]
+
+
+def has_display() -> bool:
+    """Whether there is a screen for windows to open on, as far as the environment tells."""
+    is_told = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return not sys.platform.startswith("linux") or bool(is_told)
 
 
 def serve_command(*paths: Path) -> tuple[list[str], str]:

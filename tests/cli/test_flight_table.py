@@ -88,9 +88,9 @@ def test_nothing_sent_has_no_shares():
 @pytest.mark.parametrize(
     ("policy", "carried", "decider"),
     [
-        ("planner", "known states (T, M, P) and snapshots", "each robot by itself"),
-        (WITHOUT_PAYLOAD, "known states (T, M, P)", "each robot by itself"),
-        ("round-robin", "known states (T, M, P)", "a centre that is told where all are"),
+        ("planner", "the sender's buffer and snapshots", "each robot by itself"),
+        (WITHOUT_PAYLOAD, "the sender's buffer", "each robot by itself"),
+        ("round-robin", "the sender's buffer", "a centre that is told where all are"),
     ],
 )
 def test_what_packets_carry_and_who_decides(policy, carried, decider):

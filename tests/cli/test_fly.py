@@ -2,15 +2,18 @@
 
 import json
 import os
+import re
+import shlex
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from swarm_mj.cli import fly, main
+from swarm_mj.cli import fly, main, parse
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tuning import tuned_probability
@@ -30,7 +33,7 @@ def test_the_default_flight_leaves_a_replay_of_the_default_mission(swarm_mj, tmp
     done = swarm_mj("fly")
     assert done.returncode == 0, done.stderr
     (replay,) = (tmp_path / "replays").iterdir()
-    assert f"replay replays/{replay.name}" in done.stdout
+    assert re.search(rf"replay (--web )?replays/{re.escape(replay.name)}\n", done.stdout)
     assert "flocking, planner, 40 robots" in done.stdout
     assert len(windows(replay)) == 500
     assert replay.stat().st_size < 5e6
@@ -195,7 +198,7 @@ def test_replay_and_summary_need_names_of_their_own(swarm_mj, tmp_path):
 def test_odd_names_are_kept_and_quoted(swarm_mj, tmp_path):
     done = swarm_mj("fly", *SHORT, "--record", "a [red] b.rrd")
     assert done.returncode == 0, done.stderr
-    assert "replay 'a [red] b.rrd'" in done.stdout
+    assert "'a [red] b.rrd'\n" in done.stdout
     assert files(tmp_path) == ["a [red] b.rrd"]
 
 
@@ -231,6 +234,21 @@ def test_viewing_needs_a_display_and_says_so_first(tmp_path):
     assert done.returncode == 2
     assert "no display" in done.stderr
     assert files(tmp_path) == []
+
+
+def test_the_next_commands_fit_the_mission_and_the_screen(monkeypatch):
+    mission, path = paper("random-walk", num_robots=9), Path("a b.rrd")
+    monkeypatch.setattr("swarm_mj.replay.view.sys.platform", "linux")
+    for display, way in ((":1", ""), ("", "--web ")):
+        monkeypatch.setenv("DISPLAY", display)
+        monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+        told = dict(fly._next_commands(mission, path))
+        assert told["Open the replay:"].endswith(f"swarm-mj replay {way}'a b.rrd'")
+    assert told["Compare some:"].endswith("--task random-walk --robots 9")
+    assert "Open the replay:" not in dict(fly._next_commands(mission, None))
+    for line in told.values():
+        run, _ = parse(shlex.split(line)[1:])
+        assert callable(run)
 
 
 # Flies as `swarm-mj` does, and tells by a file when the flight is well under way.
