@@ -22,6 +22,7 @@ FENCE = re.compile(
 # Why a block may stand unrun, and what it then has to mention.
 REASONS = {
     "opens a viewer": "replay|view|show|human",
+    "needs OpenGL": "video|render",
     "needs an environment of its own": "benchmarl|torchrl|ray",
 }
 LANGUAGES = {"python", "sh", "", "text", "bibtex", "xml"}
