@@ -24,6 +24,7 @@ REASONS = {
     "opens a viewer": "replay|view|show|human",
     "needs OpenGL": "video|render",
     "needs an environment of its own": "benchmarl|torchrl|ray",
+    "installs packages": "^pip install",
 }
 LANGUAGES = {"python", "sh", "", "text", "bibtex", "xml"}
 # Commands run as they are written, but for less long: what comes last on a line counts.

@@ -7,9 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-
-from swarm_mj.api.fly import BAR_AFTER_S, mission_of
+from swarm_mj.api.bars import AFTER_S, quiet_console
+from swarm_mj.api.fly import mission_of
 from swarm_mj.api.numbers import Numbers
 from swarm_mj.cli.estimates import check_fits, study_needs
 from swarm_mj.cli.evaluate import (
@@ -187,8 +186,7 @@ def evaluate(
     way_out = "choose fewer num_jobs, num_robots, num_windows or num_missions"
     check_fits(study_needs(study, num_jobs), None, way_out, is_forced=False, way_on="")
     costs: dict[int, BatchCosts] = {}
-    console = Console(stderr=True, highlight=False, force_jupyter=False)
-    bar = study_bar(study, costs, console, after_s=BAR_AFTER_S)
+    bar = study_bar(study, costs, quiet_console(), after_s=AFTER_S)
     with memory_errors():
         fly_study(study, costs, num_jobs, None, bar)
     return Evaluation(mission=mission, results=summarise(study, costs, study.header()))

@@ -7,8 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
+from swarm_mj.api.bars import quiet_bar
 from swarm_mj.api.numbers import Numbers
 from swarm_mj.api.run import Run
 from swarm_mj.cli import DONE, INTERRUPTED
@@ -16,7 +15,6 @@ from swarm_mj.cli.estimates import check_fits, flight_needs
 from swarm_mj.cli.flight import flight_config, fly_swarm
 from swarm_mj.cli.flight_table import flight_numbers
 from swarm_mj.cli.mission_options import make_mission
-from swarm_mj.cli.progress import WorkBar
 from swarm_mj.control.controller import Controller
 from swarm_mj.fields import check_kind, check_names
 from swarm_mj.mission import Mission
@@ -28,7 +26,6 @@ from swarm_mj.replay.recorder import Recorder
 from swarm_mj.rollout import summarise
 from swarm_mj.swarm import Swarm
 
-BAR_AFTER_S = 2.0  # shorter work shows no bar
 MISSION_FIELDS = tuple(spec.name for spec in fields(Mission) if spec.name != "task")
 KEYWORDS = ("policy", "seed", "probability", "is_deterministic", "record", "observer")
 PARTS = ("channel", "controller", "scene")
@@ -117,12 +114,6 @@ def mission_of(
             "dataclasses.replace(mission, ...)"
         )
     return task
-
-
-def quiet_bar(what: str, total: int, unit: str) -> WorkBar:
-    """A bar for a terminal, once the work takes its time; notebooks show none."""
-    console = Console(stderr=True, highlight=False, force_jupyter=False)
-    return WorkBar(what, total, unit, console=console, after_s=BAR_AFTER_S)
 
 
 def _policy_of(

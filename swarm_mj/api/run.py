@@ -14,7 +14,7 @@ from swarm_mj.api.numbers import Numbers
 from swarm_mj.cli.flight_table import flight_rows, flight_title
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.fields import as_typed
-from swarm_mj.io.atomic import write_csv, write_json
+from swarm_mj.io.atomic import write_bytes, write_csv, write_json
 from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
 from swarm_mj.replay.recorder import Log
@@ -23,6 +23,8 @@ from swarm_mj.rollout import WindowRecord
 if TYPE_CHECKING:  # each takes its time to import, and flights do without
     from matplotlib.figure import Figure
     from pandas import DataFrame
+
+    from swarm_mj.replay.footage import Footage
 
 PACKETS = ("sent", "attempted", "delivered", "lost", "overheard", "answered", "heard", "receptions")
 
@@ -133,25 +135,56 @@ class Run:
 
         return draw_run(self)
 
+    def show(self) -> None:
+        """Plays the flight as a video, in a notebook; elsewhere, says how to see it.
+
+        Raises:
+            ValueError: Nothing was recorded that a video shows.
+            OSError: No OpenGL works here; it says what to install.
+            ModuleNotFoundError: A package that makes videos is not installed.
+        """
+        from swarm_mj.api import video
+
+        if video.is_notebook():
+            video.play(video.film(self.footage(), ".mp4"))
+        else:
+            video.tell_where()
+
+    def footage(self) -> "Footage":
+        """What a video shows of the flight; `rendering.video.make_video` puts two side by side.
+
+        Raises:
+            ValueError: Nothing was recorded.
+        """
+        from swarm_mj.replay.footage import footage_of
+
+        policy, seed = self.config["policy"], self.config["seed"]
+        return footage_of(self._recorded(), self.mission, policy, seed)
+
     def save(self, path: str | Path) -> Path:
         """Writes the flight, replacing the file if it exists.
 
         Args:
-            path: By its ending, a replay for `swarm-mj replay` (.rrd), the summary as `swarm-mj fly
-                --json` writes it (.json), or one row per window (.csv).
+            path: By its ending, a replay for `swarm-mj replay` (.rrd), a video (.mp4, .gif), the
+                summary as `swarm-mj fly --json` writes it (.json), or one row per window (.csv).
 
         Returns:
             The path.
 
         Raises:
-            ValueError: The name has another ending, or nothing was recorded that a replay shows.
-            OSError: The file cannot be written.
-            ModuleNotFoundError: The package that writes replays is not installed.
+            ValueError: The name has another ending, or nothing was recorded that it would show.
+            OSError: The file cannot be written, or no OpenGL works here.
+            ModuleNotFoundError: A package that writes such files is not installed.
         """
         path = Path(path)
         check_outputs(Output("the file", path, "|".join(WRITERS)))
         WRITERS[path.suffix.lower()](self, path)
         return path
+
+    def _recorded(self) -> Log:
+        if self.log is None:
+            raise ValueError("nothing was recorded that could be shown; fly with record=True")
+        return self.log
 
     def _course(
         self, of: Callable[[WindowRecord], Float[np.ndarray, "B"]]
@@ -166,13 +199,18 @@ def _task_cost(window: WindowRecord) -> Float[np.ndarray, "B"]:
 
 
 def _write_replay(run: Run, path: Path) -> None:
-    if run.log is None:
-        raise ValueError("nothing was recorded that a replay could show; fly with record=True")
+    log = run._recorded()
     need("rerun", "a replay")
     from swarm_mj.replay.write import write_replay  # rerun takes its time to import
 
     config = {name: value for name, value in run.config.items() if value is not None}
-    write_replay(run.log, run.mission, config, path)
+    write_replay(log, run.mission, config, path)
+
+
+def _write_video(run: Run, path: Path) -> None:
+    from swarm_mj.api.video import film
+
+    write_bytes(path, film(run.footage(), path.suffix.lower()))
 
 
 def _write_summary(run: Run, path: Path) -> None:
@@ -186,4 +224,10 @@ def _write_windows(run: Run, path: Path) -> None:
     write_csv(path, list(columns), (dict(zip(columns, row, strict=True)) for row in texts))
 
 
-WRITERS = {".rrd": _write_replay, ".json": _write_summary, ".csv": _write_windows}
+WRITERS = {
+    ".rrd": _write_replay,
+    ".mp4": _write_video,
+    ".gif": _write_video,
+    ".json": _write_summary,
+    ".csv": _write_windows,
+}

@@ -2,8 +2,10 @@
 
 import re
 import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from swarm_mj.cli.estimates import YES, check_fits, video_needs
 from swarm_mj.cli.outputs import Output, check_outputs
@@ -14,6 +16,9 @@ from swarm_mj.io.atomic import write_bytes
 from swarm_mj.io.packages import need
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
+
+if TYPE_CHECKING:
+    from swarm_mj.replay.footage import Footage
 
 VIDEO = "video"  # a heading of the help
 SUFFIXES = ".mp4|.gif"
@@ -95,8 +100,7 @@ def _make_video(options: Options, video: Path) -> int:
     if len(options.file) > MOST_MISSIONS:
         raise ValueError(f"a video shows 1 or {MOST_MISSIONS} replays, not {len(options.file)}")
     footages = [read_footage(file) for file in options.file]
-    flown_s = max(len(each.window) * each.facts.mission.window_s for each in footages)
-    seconds = options.seconds or min(LONGEST_S, max(SHORTEST_S, flown_s))
+    seconds = options.seconds or usual_seconds(footages)
     style = Style(width=width, height=height, seconds=seconds, fps=fps)
     with WorkBar("Rendering", style.num_frames, "pictures") as bar:
         content = make_video(footages, suffix, style, bar.advance)
@@ -105,6 +109,12 @@ def _make_video(options: Options, video: Path) -> int:
     name = shlex.quote(str(video))
     plain_console().print(f"Wrote {name}: {shown}, {len(content) / 1e6:.1f} MB")
     return 0
+
+
+def usual_seconds(footages: "Sequence[Footage]") -> float:
+    """In which a video shows whole missions: their own time, if that is neither short nor long."""
+    flown_s = max(len(each.window) * each.facts.mission.window_s for each in footages)
+    return min(LONGEST_S, max(SHORTEST_S, flown_s))
 
 
 def _size(text: str, suffix: str) -> tuple[int, int]:

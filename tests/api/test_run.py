@@ -70,7 +70,9 @@ def test_a_summary_is_saved_and_replaced(run, tmp_path):
 
 
 def test_other_endings_and_what_was_not_recorded_are_refused(run, unrecorded, tmp_path):
-    with pytest.raises(ValueError, match=r"must be named \*.rrd or \*.json or \*.csv, not"):
+    with pytest.raises(
+        ValueError, match=r"must be named \*.rrd or \*.mp4 or \*.gif or \*.json or \*.csv, not"
+    ):
         run.save(tmp_path / "a.mp3")
     with pytest.raises(ValueError, match="fly with record=True"):
         unrecorded.save(tmp_path / "a.rrd")

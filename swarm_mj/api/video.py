@@ -1,0 +1,59 @@
+"""Videos of what Python flew: as a file's content, and within a notebook."""
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+from swarm_mj.api.bars import quiet_bar
+from swarm_mj.cli.replay import RATES, SIZES, usual_seconds
+from swarm_mj.cli.terminal import plain_console
+from swarm_mj.io.packages import need
+
+if TYPE_CHECKING:  # they load what draws
+    from swarm_mj.replay.footage import Footage
+
+ELSEWHERE = (
+    "run.show() plays a video in a notebook. Here, run.save('flight.mp4') writes the video, and "
+    "run.save('flight.rrd') a replay that `swarm-mj replay flight.rrd` opens."
+)
+
+
+def film(footage: "Footage", suffix: str) -> bytes:
+    """The content of a video file, as `swarm-mj replay --video` makes it.
+
+    Args:
+        footage: What was flown.
+        suffix: `.mp4` or `.gif`.
+
+    Raises:
+        OSError: No OpenGL works here; it says what to install.
+        ModuleNotFoundError: A package that makes videos is not installed.
+    """
+    for module in ("av", "PIL"):
+        need(module, "a video")
+    from swarm_mj.rendering.movie import Style
+    from swarm_mj.rendering.video import make_video
+
+    width, height = map(int, SIZES[suffix].split("x"))
+    seconds = usual_seconds([footage])
+    style = Style(width=width, height=height, seconds=seconds, fps=RATES[suffix])
+    with quiet_bar("Drawing", style.num_frames, "pictures") as bar:
+        return make_video([footage], suffix, style, bar.advance)
+
+
+def is_notebook() -> bool:
+    """Whether this Python is the kernel of a notebook."""
+    ipython = sys.modules.get("IPython")
+    shell: Any = ipython.get_ipython() if ipython else None
+    return hasattr(shell, "kernel")
+
+
+def play(content: bytes) -> None:
+    """Shows a video in the notebook."""
+    from IPython.display import Video, display
+
+    display(Video(data=content, embed=True, mimetype="video/mp4", html_attributes="controls loop"))
+
+
+def tell_where() -> None:
+    """Says what to do where no notebook is."""
+    plain_console().print(ELSEWHERE)
