@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.control.controller import Controller
+from swarm_mj.control.controller import Controller, Costed
+from swarm_mj.control.motion import controller_of
 from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.learning.credit import credits_of
 from swarm_mj.mission import PRESETS, Mission
@@ -22,12 +23,17 @@ from swarm_mj.protocol.costs import WindowCosts, age_of_information, velocity_va
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.swarm import Swarm
 
-REWARDS = ("aoi", "velocity-variance", "credit")
+REWARDS = ("aoi", "velocity-variance", "task-cost", "credit")
 Observation = dict[str, np.ndarray]
 Info = dict[str, Any]
 
 # Missions whose seeds are not given draw theirs from here on, so that none of an evaluation's come.
 FIRST_DRAWN_SEED, LAST_DRAWN_SEED = 2**40, 2**62
+COSTS = {
+    "aoi": "age_windows",
+    "velocity-variance": "velocity_variance_m2ps2",
+    "task-cost": "task_cost",
+}  # what a team's reward is minus of, by its name in infos
 PACKETS = ("sent", "delivered", "lost", "overheard", "answered")
 
 
@@ -59,7 +65,8 @@ class Team:
             preset: Of a task's mission: "paper" or "reference".
             features: What robots see of each teammate: the name of a feature set.
             reward: "aoi", minus the age of information [windows]; "velocity-variance", minus the
-                variance of Eq. 17 [m²/s²]; or "credit", each robot's own: by how much the team's
+                variance of Eq. 17 [m²/s²]; "task-cost", minus what the task costs, by its
+                controller, in its unit; or "credit", each robot's own: by how much the team's
                 age would be higher had it been silent in this window [windows].
             with_parents: Whether robots see the parents P as well, for graph networks.
             channel: As of `Swarm`; a copy of it is used, and so of the next two.
@@ -73,7 +80,7 @@ class Team:
         """
         self.mission = _mission_of(mission, preset, fields)
         self.num_missions = num_missions
-        self.reward = _checked(reward, self.mission, channel)
+        self.reward = _checked(reward, self.mission, channel, controller)
         self.with_parents = with_parents
         self.features = features
         self._extractor = make_extractor(features, self.mission)
@@ -115,8 +122,7 @@ class Team:
         if self.reward == "credit":
             own = credits_of(before, swarm.states.position_m, recipient, swarm.channel, start)
             return own / self.mission.num_robots**2
-        is_variance = self.reward == "velocity-variance"
-        cost = costs.velocity_variance_m2ps2 if is_variance else costs.age_windows
+        cost = self._costs[COSTS[self.reward]]
         return np.broadcast_to(-cost[:, None], recipient.shape)
 
     @property
@@ -149,12 +155,17 @@ class Team:
     def _keep_start(self) -> None:
         """Keeps what a window that has not been flown would cost."""
         swarm = self.flown
+        controller = swarm.controller
+        task = (
+            {"task_cost": controller.cost(swarm.states)} if isinstance(controller, Costed) else {}
+        )
         age_windows, is_complete = age_of_information(swarm.buffers, swarm.now)
         self._costs: Info = {
             "age_windows": age_windows,
             "velocity_variance_m2ps2": velocity_variance(swarm.states.velocity_mps),
             "is_complete": is_complete,
             **{f"packets_{name}": np.zeros(self.num_missions) for name in PACKETS},
+            **task,
         }
 
     def _keep_costs(self, costs: WindowCosts) -> None:
@@ -163,6 +174,7 @@ class Team:
             "velocity_variance_m2ps2": costs.velocity_variance_m2ps2,
             "is_complete": costs.is_complete,
             **{f"packets_{name}": getattr(costs.packets, name) for name in PACKETS},
+            **({"task_cost": costs.task_cost.value} if costs.task_cost else {}),
         }
 
     def _see(self) -> None:
@@ -195,10 +207,17 @@ def _mission_of(mission: Mission | str, preset: str, fields: dict[str, Any]) -> 
     return PRESETS[preset](task, **fields)
 
 
-def _checked(reward: str, mission: Mission, channel: Channel | None) -> str:
+def _checked(
+    reward: str, mission: Mission, channel: Channel | None, controller: Controller | None
+) -> str:
     """The reward, if there is such a one for these missions; raises ValueError otherwise."""
     if reward not in REWARDS:
         raise ValueError(f"reward must be one of {', '.join(REWARDS)}, not {reward!r}")
+    if reward == "task-cost" and not isinstance(controller or controller_of(mission), Costed):
+        raise ValueError(
+            f"reward task-cost needs a task that has a cost, and {mission.task} has none; choose "
+            "another task, or reward aoi"
+        )
     if reward == "credit" and mission.switched_off > 0.0:
         raise ValueError(
             "reward credit needs robots that do not fail, but switched_off is "

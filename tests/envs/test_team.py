@@ -46,6 +46,20 @@ def test_eq17_reward_is_minus_the_variance_of_velocities():
             assert reward[b] == pytest.approx([-variance] * 5, rel=1e-12)
 
 
+@pytest.mark.parametrize("task", ["formation", "coverage", "flocking"])
+def test_task_cost_is_what_the_controller_says(task):
+    team = begun(task, reward="task-cost")
+    swarm = Swarm(team.mission, [1, 2])
+    start = team.infos()["task_cost"]
+    np.testing.assert_array_equal(start, swarm.controller.cost(swarm.states))
+    for recipient in recipients(5):
+        reward, costs = team.step(recipient), swarm.exchange(recipient)
+        np.testing.assert_array_equal(reward, np.tile(-costs.task_cost.value[:, None], 5))
+        np.testing.assert_array_equal(team.infos()["task_cost"], costs.task_cost.value)
+    assert not np.array_equal(team.infos()["task_cost"], start)
+    assert "task_cost" not in begun("stationary").infos()
+
+
 def test_credit_is_the_age_that_a_window_without_the_robot_would_have_left():
     """Every robot's window is flown again by a team in which it alone is silent."""
     team = begun("random-walk", reward="credit", seeds=(3,))
@@ -145,8 +159,12 @@ def test_drawn_seeds_are_none_of_an_evaluations():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"reward": "age"}, "reward must be one of aoi, velocity-variance, credit, not 'age'"),
+        (
+            {"reward": "age"},
+            "reward must be one of aoi, velocity-variance, task-cost, credit, not 'age'",
+        ),
         ({"reward": "credit", "switched_off": 0.2}, "switched_off is 0.2; set it to 0"),
+        ({"mission": "stationary", "reward": "task-cost"}, "stationary has none; choose"),
         ({"features": "mine"}, "features must be one of"),
         ({"preset": "mine"}, "preset must be one of"),
         ({"num_robots": 1}, "number of robots must be"),
