@@ -28,8 +28,9 @@ setup: $(READY)
 # Every wheel must have the hash it was tested with, but torch's, which differ from index to index: a
 # CPU build on one, CUDA's gigabytes on another.
 $(READY): pyproject.toml tools/constraints.txt tools/hashes.txt
-	@$(PYTHON) -c "import sys; sys.exit(0 if sys.version_info >= (3, 11) else \
-	  f'swarm_mj needs Python 3.11 or newer, not {sys.version.split()[0]}; try make PYTHON=python3.11')"
+	@$(PYTHON) -c "import sys; sys.exit(0 if (3, 11) <= sys.version_info < (3, 13) else \
+	  f'the pinned versions are for Python 3.11 and 3.12, not {sys.version.split()[0]}; ' \
+	  'try make PYTHON=python3.11')"
 	@echo "Setting up .venv (a few minutes and 2.7 GB, once) ..."
 	@$(PYTHON) -m venv .venv
 	@$(PIP) --no-deps --require-hashes --requirement tools/hashes.txt
