@@ -36,6 +36,7 @@ CUT_SHORT = {
     "train": "--budget 40 --robots 5 --windows 10 --held-out 1",
     "train --resume": "--budget 80",
 }
+ONLY_PARSED = "--minutes 30"  # the page trains a shorter while before
 PROGRAM = re.compile(r"^# (?P<name>[a-z_]+\.py)\n")  # a block that is a file says so in line 1
 
 
@@ -105,7 +106,7 @@ def test_a_page_runs_from_top_to_bottom(page, page_folder, forks):
 def run_command(line, folder, forks):
     """Runs a line that is a command of this package's, cut short."""
     program, *arguments = shlex.split(line, comments=True)
-    if program != "swarm-mj":
+    if program != "swarm-mj" or ONLY_PARSED in line:
         return
     kind = "train --resume" if "--resume" in arguments else arguments[0]
     found = [sorted(map(str, Path().glob(each))) if "*" in each else [each] for each in arguments]
