@@ -44,6 +44,7 @@ from swarm_mj.swarm import Swarm
 REPLAYS = Path("replays")
 OTHERWISE = "name another place with --record, or leave it out with --no-record"
 OUTPUT = "output"  # a heading of the help
+COMPARED = ("planner", "tdma", "random-flooding")  # with what was flown, for a first comparison
 COMPILING_WINDOWS = 10  # in which three robots do all that a flight does, schedules included
 
 
@@ -113,7 +114,7 @@ def run(options: Options) -> int:
                 _write(options, summary, path, recorder)
         finally:
             out.print(flight_table(title + options.parts.title, mission, numbers, wall_s))
-    for label, line in _next_commands(mission, path):
+    for label, line in _next_commands(options, path):
         out.print(f"{label:18}{line}")
     if code != DONE:
         console.print(f"{ending} after {len(flown)} of {mission.num_windows} windows.")
@@ -121,14 +122,16 @@ def run(options: Options) -> int:
     return run_viewer(view_command(path)) if options.view and path else DONE
 
 
-def _next_commands(mission: Mission, path: Path | None) -> Iterator[tuple[str, str]]:
+def _next_commands(options: Options, path: Path | None) -> Iterator[tuple[str, str]]:
     """What to do next, and the commands that do it."""
     name, way = this_command(), "" if has_display() else "--web "
     if path:
         yield "Open the replay:", f"{name} replay {way}{shlex.quote(str(path))}"
     yield "Other policies:", f"{name} policies"
-    flags = mission_flags(mission)
-    yield "Compare some:", f"{name} evaluate --policy planner gnn tdma --episodes 5 {flags}"
+    policies = " ".join(map(shlex.quote, dict.fromkeys((options.policy, *COMPARED))))
+    parts = [f"--{kind} {shlex.quote(part)}" for kind, part in options.named.items()]
+    flags = " ".join((mission_flags(options.mission), *parts))
+    yield "Compare some:", f"{name} evaluate --policy {policies} --episodes 5 {flags}"
 
 
 def _make_policy(options: Options, mission: Mission) -> Policy:

@@ -43,7 +43,7 @@ class Options:
     EPILOG: ClassVar = "The probabilities p depend on the mission, so the options may name one."
     name: str | None = setting(
         None,
-        "say more of this one; a directory with a learned policy will do",
+        "say more of this one: a policy, a directory of a learned one, or module:Name of your own",
         is_positional=True,
         metavar="NAME",
         convert=normalised,
@@ -118,7 +118,7 @@ def _print_one(each: dict[str, Any], mission: Mission) -> None:
     """All of one policy, and how to fly it."""
     rows = {
         "who decides": "a centre" if each["is_centralised"] else "each robot by itself",
-        "what it uses": each["uses"],
+        "what it uses": each["uses"] or "it does not say: give its class a text `uses`",
         "in a window": WINDOWS[each["window"]],
         "packets carry": ", ".join(_carried(each["payload"])),
         **{name: as_typed(value) for name, value in each["parameters"].items()},
