@@ -32,7 +32,7 @@ def view_command(*paths: Path) -> list[str]:
     if not has_display():
         raise ValueError(
             "there is no display (DISPLAY and WAYLAND_DISPLAY are unset); use "
-            "`swarm-mj replay --web FILE`, or tools/picture.py for a picture"
+            "`swarm-mj replay --web FILE`, or `--video FILE.mp4` for a video"
         )
     return [*VIEWER, *map(str, paths)]
 
