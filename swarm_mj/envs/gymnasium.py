@@ -53,6 +53,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         super().reset(seed=seed, options=options)
         begun = next_seed(self.np_random) if seed is None else seed
         self.team.restart([begun])
+        self._screen.update(self.team)
         return self._observation(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, Info]:
@@ -66,6 +67,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
             ValueError: The action is not one integer from 0 to N - 1 per robot.
         """
         reward = self.team.step(np.asarray(action)[np.newaxis])
+        self._screen.update(self.team)
         is_over = self.team.is_over
         return self._observation(), float(reward[0, 0]), False, is_over, self._info()
 

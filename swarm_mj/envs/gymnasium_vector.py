@@ -39,7 +39,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
     `options={"reset_mask": mask}`, which begins the missions where the mask is True.
     """
 
-    metadata: dict[str, Any] = dict(RENDERING)  # noqa: RUF012 - as in VectorEnv
+    metadata: dict[str, Any] = {**RENDERING, "render_modes": ["rgb_array"]}  # noqa: RUF012 - as in VectorEnv
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         self.num_envs = num_envs
         self._mode = AutoresetMode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self._mode}
-        self._screen = Screen(render_mode)
+        self._screen = Screen(render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
         self._mission: Mission | str = mission
         self._options = options

@@ -74,6 +74,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
             self._rng, _ = seeding.np_random(seed)
         begun = next_seed(self._rng) if seed is None else seed
         self.team.restart([begun])
+        self._screen.update(self.team)
         self.agents = list(self.possible_agents)
         return self._observations(), self._infos()
 
@@ -100,6 +101,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
             i = self._robot(agent)
             recipient[0, i] = actions.get(agent, i)
         reward = self.team.step(recipient)[0]
+        self._screen.update(self.team)
         is_active, is_over = self.team.is_active[0], self.team.is_over
         seen = self._observations()
         rewards = {agent: float(reward[self._robot(agent)]) for agent in self.agents}

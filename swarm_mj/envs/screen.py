@@ -1,5 +1,9 @@
 """Pictures of environments, drawn when one is asked for."""
 
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 from jaxtyping import UInt8
 
@@ -7,27 +11,49 @@ from swarm_mj.envs.team import Team
 from swarm_mj.rendering.contents import contents_of
 from swarm_mj.rendering.scene import SceneRenderer
 
-RENDER_MODES = ("human", "rgb_array")
-RENDERING = {"render_modes": list(RENDER_MODES), "render_fps": 10}  # a window of 100 ms a picture
+if TYPE_CHECKING:
+    from swarm_mj.rendering.viewer import SceneViewer
+
+MODES = ("rgb_array", "human")
+RENDERING = {"render_modes": list(MODES), "render_fps": 10}  # a window of 100 ms a picture
 WIDTH, HEIGHT = 800, 600  # of a picture [pixels]
 
 
 class Screen:
     """Shows missions as MuJoCo draws them: robots coloured by their age, and packets as arcs.
 
-    OpenGL starts with the first picture.
+    In the mode "rgb_array" there are pictures for whoever asks; in "human" a window shows every
+    window of the mission, not faster than it would last. Either starts when it is needed.
     """
 
-    def __init__(self, mode: str | None) -> None:
-        """Takes a render mode, or None, in which there are no pictures.
+    def __init__(self, mode: str | None, modes: Sequence[str] = MODES) -> None:
+        """Takes a render mode, one of these, or None, in which nothing is seen.
 
         Raises:
             ValueError: There is no such mode.
         """
-        if mode not in (None, *RENDER_MODES):
-            raise ValueError(f"render_mode must be one of {', '.join(RENDER_MODES)}, not {mode!r}")
-        self.mode = mode
+        if mode is not None and mode not in modes:
+            raise ValueError(f"render_mode must be one of {', '.join(modes)}, not {mode!r}")
+        self._mode = mode
         self._renderer: SceneRenderer | None = None
+        self._viewer: SceneViewer | None = None
+        self._shown_s = 0.0
+
+    def update(self, team: Team) -> None:
+        """Shows the team's first mission to a human, if one looks on.
+
+        Raises:
+            OSError: There is no display.
+        """
+        if self._mode != "human":
+            return
+        if self._viewer is None:
+            from swarm_mj.rendering.viewer import SceneViewer  # looks for a display when imported
+
+            self._viewer = SceneViewer(team.mission, scene=team.flown.scene)
+        self._viewer.show(contents_of(team.flown))
+        time.sleep(max(0.0, self._shown_s + team.mission.window_s - time.monotonic()))
+        self._shown_s = time.monotonic()
 
     def picture(self, team: Team, index: int = 0) -> UInt8[np.ndarray, "H W 3"]:
         """One of a team's missions as it is now, RGB.
@@ -43,6 +69,7 @@ class Screen:
 
     def close(self) -> None:
         """Gives back what pictures took."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        for shown in (self._renderer, self._viewer):
+            if shown is not None:
+                shown.close()
+        self._renderer = self._viewer = None

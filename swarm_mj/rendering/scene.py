@@ -1,30 +1,25 @@
 """Pictures of a mission's scene: MuJoCo draws floor, walls and robots, and packets between them."""
 
-import itertools
-
 import numpy as np
-from jaxtyping import Float, UInt8
-from mujoco._enums import mjtCamera, mjtCatBit, mjtFontScale, mjtFramebuffer, mjtGeom, mjtObj
+from jaxtyping import UInt8
+from mujoco._enums import mjtCamera, mjtCatBit, mjtFontScale, mjtFramebuffer, mjtObj
 from mujoco._functions import (
     mj_camlight,
     mj_comPos,
     mj_kinematics,
     mj_name2id,
-    mjv_connector,
-    mjv_initGeom,
     mjv_updateScene,
 )
 from mujoco._render import MjrContext, mjr_readPixels, mjr_render, mjr_setBuffer
 from mujoco._specs import MjSpec
-from mujoco._structs import MjData, MjModel, MjrRect, MjvCamera, MjvGeom, MjvOption, MjvScene
+from mujoco._structs import MjData, MjModel, MjrRect, MjvCamera, MjvOption, MjvScene
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.rendering.camera import ELEVATION_DEG, FOV_Y_DEG, Camera, look_at
 from swarm_mj.rendering.contents import Contents
+from swarm_mj.rendering.markers import GEOMS_PER_ROBOT, Markers
 from swarm_mj.rendering.opengl import make_context
-from swarm_mj.replay import palette
-from swarm_mj.replay.arcs import SEGMENTS, arcs
 
 MAX_PIXELS = 4096  # of a picture's side
 BEACONS = 2  # the group of the robots' own markers, assets/robot.xml: too small from afar
@@ -33,12 +28,7 @@ GROUND = 10.0  # an open floor's side, by the area's: a team that flies apart ha
 # What faces up has its own colour exactly, what stands upright half of it.
 AMBIENT, SUN = 0.5, 0.5
 WALL_OPACITY = 0.3  # a wall in front hides no robot
-# Sizes on the picture, of its height, whatever the size of the area.
-ROBOT, OBSERVER, HEADING, LINE = 0.0085, 0.0115, 0.022, 0.0025
-SMALLEST = 520  # [pixels] in height: robots are not drawn smaller than on such a picture
-ROBOT_HEIGHT = 0.6  # of a marker, by its radius
 SLICES, STACKS = 14, 5  # of round things
-NO_TURN = np.eye(3).ravel()
 
 
 class SceneRenderer:
@@ -63,16 +53,16 @@ class SceneRenderer:
             if not 16 <= pixels <= MAX_PIXELS:
                 raise ValueError(f"{what} must be from 16 to {MAX_PIXELS} pixels, not {pixels}")
         self._width, self._height = width, height
-        self._enlarged = max(1.0, SMALLEST / height)
         self._mission = mission
         spec = compose(mission, scene=scene)
-        _prepare(spec, mission)
+        prepare(spec, mission)
         self._model = spec.compile()
         self._data = MjData(self._model)
         self._floor = mj_name2id(self._model, mjtObj.mjOBJ_GEOM.value, "floor")
-        _light(self._model, width, height)
-        num_geoms = self._model.ngeom + mission.num_robots * (2 + 4 * SEGMENTS)
+        light(self._model, width, height)
+        num_geoms = self._model.ngeom + mission.num_robots * GEOMS_PER_ROBOT
         self._scene = MjvScene(self._model, num_geoms)
+        self._markers = Markers(self._scene, height)
         self._options = MjvOption()
         self._options.geomgroup[BEACONS] = 0
         self._opengl = make_context(width, height)
@@ -97,17 +87,18 @@ class SceneRenderer:
             )
         camera = self.camera(contents)
         self._place(contents)
+        free = MjvCamera()
+        aim(free, camera)
         mjv_updateScene(
             self._model,
             self._data,
             self._options,
             None,
-            _free_camera(camera),
+            free,
             mjtCatBit.mjCAT_ALL.value,
             self._scene,
         )
-        self._draw_robots(contents, camera)
-        self._draw_links(contents, camera)
+        self._markers.draw(contents, camera)
         return self._pixels()
 
     def close(self) -> None:
@@ -132,45 +123,6 @@ class SceneRenderer:
             whole_tiles_m = np.round(contents.centre_m / TILE_M) * TILE_M
             self._data.geom_xpos[self._floor, :2] = whole_tiles_m
 
-    def _draw_robots(self, contents: Contents, camera: Camera) -> None:
-        """A disc for each robot, as large on the picture whatever the area; and its heading."""
-        picture_m = self._enlarged * camera.pixel_m * camera.height
-        speed = np.linalg.norm(contents.velocity_mps, axis=1, keepdims=True)
-        way_m = HEADING * picture_m * contents.velocity_mps / np.maximum(speed, 1e-9)
-        for i, (where, way) in enumerate(zip(contents.position_m, way_m, strict=True)):
-            radius_m = (OBSERVER if i == contents.observer else ROBOT) * picture_m
-            height_m = ROBOT_HEIGHT * radius_m
-            self._add_disc(np.append(where, height_m), radius_m, height_m, contents.colour[i])
-            if np.any(way):
-                ends = np.append(where, height_m), np.append(where + way, height_m)
-                self._add_line(*ends, np.array(palette.HEADING))
-
-    def _draw_links(self, contents: Contents, camera: Camera) -> None:
-        """Packets as arcs."""
-        base_m = self._enlarged * ROBOT * camera.pixel_m * camera.height
-        for points, colour in zip(
-            arcs(contents.start_m, contents.end_m, base_m), contents.link_colour, strict=True
-        ):
-            for start, end in itertools.pairwise(points):
-                self._add_line(start, end, colour)
-
-    def _add_disc(
-        self, where: Float[np.ndarray, "3"], radius_m: float, height_m: float, colour: np.ndarray
-    ) -> None:
-        size = np.array([radius_m, radius_m, height_m])
-        kind = mjtGeom.mjGEOM_CYLINDER.value
-        mjv_initGeom(self._next_geom(), kind, size, where, NO_TURN, _rgba(colour))
-
-    def _add_line(self, start: np.ndarray, end: np.ndarray, colour: np.ndarray) -> None:
-        geom, kind = self._next_geom(), mjtGeom.mjGEOM_LINE.value
-        mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), NO_TURN, _rgba(colour))
-        mjv_connector(geom, kind, self._enlarged * LINE * self._height, start, end)
-
-    def _next_geom(self) -> MjvGeom:
-        """A geom more in the scene; there is room for all that a window can have."""
-        self._scene.ngeom += 1
-        return self._scene.geoms[self._scene.ngeom - 1]
-
     def _pixels(self) -> UInt8[np.ndarray, "H W 3"]:
         picture = np.empty((self._height, self._width, 3), dtype=np.uint8)
         whole = MjrRect(0, 0, self._width, self._height)
@@ -180,7 +132,7 @@ class SceneRenderer:
         return picture[::-1].copy()
 
 
-def _light(model: MjModel, width: int, height: int) -> None:
+def light(model: MjModel, width: int, height: int) -> None:
     """Light from above, and the size of the pictures."""
     visual = model.vis
     visual.global_.offwidth, visual.global_.offheight = width, height
@@ -191,7 +143,7 @@ def _light(model: MjModel, width: int, height: int) -> None:
     model.light_dir[:] = (0.0, 0.0, -1.0)
 
 
-def _prepare(spec: MjSpec, mission: Mission) -> None:
+def prepare(spec: MjSpec, mission: Mission) -> None:
     """Makes walls translucent, and an open area's floor as wide as a camera sees.
 
     A scene of one's own may have neither.
@@ -207,13 +159,8 @@ def _prepare(spec: MjSpec, mission: Mission) -> None:
             geom.size = [half_m, half_m, half_m / 10.0]  # drawn in 20 by 20 pieces
 
 
-def _free_camera(camera: Camera) -> MjvCamera:
-    free = MjvCamera()
+def aim(free: MjvCamera, camera: Camera) -> None:
+    """Lets a camera of MuJoCo's see what this one does."""
     free.type = mjtCamera.mjCAMERA_FREE.value
     free.lookat[:] = (*camera.target_m, 0.0)
     free.distance, free.azimuth, free.elevation = camera.distance_m, 90.0, -ELEVATION_DEG
-    return free
-
-
-def _rgba(colour: np.ndarray) -> Float[np.ndarray, "4"]:
-    return np.append(colour / 255.0, 1.0).astype(np.float32)

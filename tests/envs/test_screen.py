@@ -1,5 +1,10 @@
 """Pictures of environments: of the right mission, at the right moment."""
 
+import os
+import shutil
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -75,5 +80,51 @@ def test_without_a_mode_there_is_no_picture():
 
 
 def test_a_mode_that_there_is_not():
-    with pytest.raises(ValueError, match="render_mode must be one of human, rgb_array, not 'ansi'"):
+    with pytest.raises(ValueError, match="render_mode must be one of rgb_array, human, not 'ansi'"):
         Screen("ansi")
+
+
+def test_nobody_looks_at_many_missions_in_a_window():
+    with pytest.raises(ValueError, match="render_mode must be one of rgb_array, not 'human'"):
+        SwarmVectorEnv(2, MISSION, render_mode="human")
+
+
+# In a process of its own: a window belongs to the process, and to its display.
+FLY_BEFORE_A_HUMAN = """
+import time
+import gymnasium, swarm_mj
+import numpy as np
+env = gymnasium.make("swarm_mj/Flocking-v0", num_robots=5, num_windows=9, render_mode="human")
+env.reset(seed=1)
+started = time.monotonic()
+for _ in range(8):
+    env.step(np.arange(5))
+assert time.monotonic() - started > 0.7, "faster than time"
+viewer = env.unwrapped._screen._viewer
+assert viewer._window.is_running()
+assert viewer._markers.ngeom == 10, viewer._markers.ngeom  # five discs with headings
+env.close()
+assert not viewer._window.is_running()
+print("seen")
+"""
+
+
+def fly_before_a_human(*program, **environment):
+    command = [*program, sys.executable, "-W", "ignore", "-c", FLY_BEFORE_A_HUMAN]
+    environ = {k: v for k, v in os.environ.items() if k != "DISPLAY"} | environment
+    return subprocess.run(command, env=environ, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.skipif(shutil.which("xvfb-run") is None, reason="needs Xvfb, a display without one")
+def test_a_human_sees_a_mission_in_a_window():
+    done = fly_before_a_human("xvfb-run", "-a")
+    assert (done.returncode, done.stdout) == (0, "seen\n"), done.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have a display always")
+def test_without_a_display_it_says_so():
+    done = fly_before_a_human()
+    last = done.stderr.strip().splitlines()[-1]
+    assert last == (
+        'OSError: the window needs a display; without one, render_mode="rgb_array" draws pictures'
+    )

@@ -19,7 +19,7 @@ from torchrl.envs import EnvBase, FlattenObservation, PettingZooWrapper, Transfo
 
 from swarm_mj.envs.pettingzoo import parallel_env
 
-NUM_WINDOWS, NUM_ITERATIONS, WINDOWS_PER_BATCH = 100, 40, 500
+NUM_WINDOWS, NUM_ITERATIONS, WINDOWS_PER_BATCH = 100, 11, 500
 SEEN = ("robots", "observation", "observation")
 
 
@@ -82,7 +82,7 @@ class Ages(Callback):
 
 
 def main() -> None:
-    """Trains for a minute or two; `credit` pays every robot for what its own packet changed."""
+    """Trains for a few minutes; `credit` pays every robot for what its own packet changed."""
     config = {
         "mission": "stationary",
         "num_robots": 5,
