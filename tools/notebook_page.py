@@ -9,12 +9,17 @@ from typing import Any
 import nbformat
 from nbclient import NotebookClient
 
+from swarm_mj.rendering.opengl import make_context
+
 TIMEOUT_S = 110  # of a cell
+RENDERS = "renders"  # the tag of cells that need OpenGL
 
 
 @cache
 def page_of(path: Path) -> str:
     """A notebook in Markdown; it is run once a process.
+
+    Where no OpenGL works, cells that render are shown without being run.
 
     Args:
         path: The notebook.
@@ -27,6 +32,10 @@ def page_of(path: Path) -> str:
         CellTimeoutError: A cell takes too long.
     """
     notebook = nbformat.read(path, as_version=4)
+    if not can_render():
+        for cell in notebook.cells:
+            if RENDERS in cell.metadata.get("tags", ()):
+                cell.cell_type, cell.source = "markdown", f"```python\n{cell.source}\n```"
     with tempfile.TemporaryDirectory() as folder:
         client = NotebookClient(
             notebook,
@@ -36,6 +45,15 @@ def page_of(path: Path) -> str:
         )
         client.execute()
     return "\n\n".join(part for cell in notebook.cells for part in _parts(cell))
+
+
+def can_render() -> bool:
+    """Whether OpenGL works here."""
+    try:
+        make_context(8, 8).free()
+    except OSError:
+        return False
+    return True
 
 
 def _parts(cell: Any) -> list[str]:  # noqa: ANN401 - a notebook's node

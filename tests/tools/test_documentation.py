@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from documentation import mission_fields, site_links
+from notebook_page import can_render
 
 ROOT = Path(__file__).parents[2]
 
@@ -72,6 +73,7 @@ def test_the_tour_shows_what_its_cells_show(built):
     page = (built / "tour.html").read_text(encoding="utf-8")
     assert "<td style='text-align:left'>10.54 windows" in page  # of the default flight
     assert page.count("data:image/png;base64,") == 2
+    assert ("data:video/mp4;base64," in page) == can_render()
     notebook = json.loads((ROOT / "docs/tour.ipynb").read_text(encoding="utf-8"))
     assert not any(cell.get("outputs") for cell in notebook["cells"])  # they are made when shown
 

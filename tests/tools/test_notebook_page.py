@@ -33,6 +33,15 @@ def test_a_page_has_text_code_and_outputs_in_order(tmp_path):
     assert places == sorted(places)
 
 
+def test_without_opengl_cells_that_render_are_not_run(tmp_path, monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "off")
+    path = notebook(tmp_path / "a.ipynb", "1 / 0", "1 + 1")
+    written = nbformat.read(path, as_version=4)
+    written.cells[1].metadata["tags"] = ["renders"]
+    nbformat.write(written, path)
+    assert "```python\n1 / 0\n```" in page_of(path)
+
+
 def test_a_cell_that_fails_is_an_error(tmp_path):
     with pytest.raises(CellExecutionError, match="division by zero"):
         page_of(notebook(tmp_path / "a.ipynb", "1 / 0"))
