@@ -116,7 +116,11 @@ def _told(name: str, work: Callable[[], int], was_interrupted: Callable[[], bool
         try:
             with one_line_each():
                 return work()
-        except (ValueError, OSError) as error:  # perhaps what a library made of a Ctrl-C
+        except (
+            ValueError,
+            OSError,
+            ImportError,
+        ) as error:  # perhaps what a library made of a Ctrl-C
             if was_interrupted():
                 raise KeyboardInterrupt from error
             raise

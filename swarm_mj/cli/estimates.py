@@ -20,7 +20,6 @@ if TYPE_CHECKING:  # they load torch, which flights may do without
     from swarm_mj.learning.settings import Training
 
 GB = 1e9
-YES = "start even though memory or disk may not suffice"  # the help of --yes
 LIBRARIES, TORCH = 0.15 * GB, 0.4 * GB  # and compiling; torch with what trains
 ADDRESSES, OF_TORCH, OF_RERUN = 0.5 * GB, 0.7 * GB, 3.0 * GB  # that are asked for, never filled
 
@@ -128,7 +127,7 @@ def video_needs(width: int, height: int, num_pictures: float, suffix: str) -> Ne
     pixels = width * height
     kept = num_pictures if suffix == ".gif" else 0.0
     return Needs(
-        memory=2.0 * LIBRARIES + (100.0 + 2.0 * kept) * pixels,
+        memory=3.0 * LIBRARIES + (130.0 + 1.5 * kept) * pixels,
         addresses=ADDRESSES + OF_RERUN,
         file=0.1e6 + 0.05 * num_pictures * pixels,
     )

@@ -10,9 +10,9 @@ from typing import ClassVar
 from rich.console import Console
 
 from swarm_mj.cli import DONE, FAILED, INTERRUPTED
-from swarm_mj.cli.estimates import YES, check_fits, study_needs
+from swarm_mj.cli.estimates import check_fits, study_needs
 from swarm_mj.cli.evaluation_table import print_results
-from swarm_mj.cli.machine import memory_errors
+from swarm_mj.cli.machine import YES, memory_errors
 from swarm_mj.cli.mission_options import several_missions
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.policy_options import NAMED, NAMES, OTHERS, PolicyOptions

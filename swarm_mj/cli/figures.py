@@ -6,7 +6,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from swarm_mj.cli.estimates import YES, check_fits, figures_needs
+from swarm_mj.cli.estimates import check_fits, figures_needs
+from swarm_mj.cli.machine import YES
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.policy_options import NAMED
 from swarm_mj.cli.terminal import plain_console

@@ -12,9 +12,10 @@ from typing import Any, ClassVar
 from rich.console import Console
 
 from swarm_mj.cli import DONE
-from swarm_mj.cli.estimates import YES, check_fits, flight_needs
+from swarm_mj.cli.estimates import check_fits, flight_needs
 from swarm_mj.cli.flight import flight_config, fly_swarm
 from swarm_mj.cli.flight_table import flight_numbers, flight_table, flight_title
+from swarm_mj.cli.machine import YES
 from swarm_mj.cli.mission_options import mission_flags, one_mission
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.policy_options import NAMED, NAMES, PolicyOptions

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import psutil
 
+YES = "start even though memory or disk may not suffice"  # the help of --yes
 CONTROL_GROUPS = Path("/sys/fs/cgroup")
 # Of both versions: what a group may have, what it has, and what of that is files it can give back.
 GROUP_FILES = {

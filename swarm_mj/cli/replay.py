@@ -7,12 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swarm_mj.cli.estimates import YES, check_fits, video_needs
+from rich.console import Console
+
+from swarm_mj.cli.machine import YES
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.progress import WorkBar
 from swarm_mj.cli.terminal import plain_console
 from swarm_mj.fields import setting
 from swarm_mj.io.atomic import write_bytes
+from swarm_mj.io.interrupt import heard_interrupt
 from swarm_mj.io.packages import need
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
@@ -80,6 +83,8 @@ def run(options: Options) -> int:
 
 
 def _make_video(options: Options, video: Path) -> int:
+    from swarm_mj.cli.estimates import check_fits, video_needs  # with all that flies
+
     if options.web:
         raise ValueError("--web is not allowed with --video; leave one out")
     check_outputs(
@@ -90,25 +95,35 @@ def _make_video(options: Options, video: Path) -> int:
     fps = options.fps or RATES[suffix]
     needs = video_needs(width, height, (options.seconds or LONGEST_S) * fps, suffix)
     check_fits(needs, video, "choose a smaller --size or fewer --seconds", is_forced=options.yes)
-
     for module in ("av", "PIL", "rerun"):
         need(module, "a video")
-    from swarm_mj.rendering.movie import MOST_MISSIONS, Style  # rerun and MuJoCo take their time
+    from swarm_mj.rendering.movie import Style  # rerun and MuJoCo take their time to import
     from swarm_mj.rendering.video import check_video, make_video
-    from swarm_mj.replay.read import read_footage
 
-    if len(options.file) > MOST_MISSIONS:
-        raise ValueError(f"a video shows 1 or {MOST_MISSIONS} replays, not {len(options.file)}")
-    footages = [read_footage(file) for file in options.file]
-    seconds = options.seconds or usual_seconds(footages)
-    style = Style(width=width, height=height, seconds=seconds, fps=fps)
-    with WorkBar("Rendering", style.num_frames, "pictures") as bar:
-        content = make_video(footages, suffix, style, bar.advance)
+    with heard_interrupt() as was_pressed:
+        with Console(stderr=True, highlight=False).status("Reading ..."):
+            footages, seconds = _read(options)
+        style = Style(width=width, height=height, seconds=seconds, fps=fps)
+        with WorkBar("Rendering", style.num_frames, "pictures") as bar:
+            content = make_video(footages, suffix, style, bar.advance)
+        if was_pressed():
+            raise KeyboardInterrupt
     write_bytes(video, content, check=lambda part: check_video(part, suffix, style))
     shown = f"{style.num_frames / fps:.3g} s, {style.num_frames} pictures of {width} by {height}"
     name = shlex.quote(str(video))
     plain_console().print(f"Wrote {name}: {shown}, {len(content) / 1e6:.1f} MB")
     return 0
+
+
+def _read(options: Options) -> tuple[list["Footage"], float]:
+    """What is to be seen, and how long the video is [s]."""
+    from swarm_mj.rendering.movie import MOST_MISSIONS
+    from swarm_mj.replay.read import read_footage
+
+    if len(options.file) > MOST_MISSIONS:
+        raise ValueError(f"a video shows 1 or {MOST_MISSIONS} replays, not {len(options.file)}")
+    footages = [read_footage(file) for file in options.file]
+    return footages, options.seconds or usual_seconds(footages)
 
 
 def usual_seconds(footages: "Sequence[Footage]") -> float:

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 from rich.console import Console
 
 from swarm_mj.cli import DONE, FAILED, INTERRUPTED
-from swarm_mj.cli.estimates import YES, check_fits, training_needs
-from swarm_mj.cli.machine import memory_errors
+from swarm_mj.cli.estimates import check_fits, training_needs
+from swarm_mj.cli.machine import YES, memory_errors
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
 from swarm_mj.cli.outputs import Output, check_outputs

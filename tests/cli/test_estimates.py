@@ -13,6 +13,7 @@ from swarm_mj.cli.estimates import (
     rollout_bytes,
     study_needs,
     training_needs,
+    video_needs,
 )
 from swarm_mj.evaluation.study import Study
 from swarm_mj.gnn.packet_memory import empty_memory
@@ -143,3 +144,10 @@ def test_figures_take_more_for_larger_results(tmp_path):
     assert two.memory - one.memory == 10_000
     assert two.file - one.file == 2e6
     assert figures_needs([tmp_path / "missing.csv", tmp_path], 1).memory < one.memory
+
+
+def test_a_gif_s_pictures_are_kept_and_an_mp4_s_are_not():
+    """500 pictures of 1000 by 1000."""
+    gif, mp4 = (video_needs(1000, 1000, 500.0, suffix) for suffix in (".gif", ".mp4"))
+    assert gif.memory - mp4.memory == pytest.approx(750e6)
+    assert video_needs(1000, 1000, 5000.0, ".mp4").memory == mp4.memory
