@@ -5,10 +5,11 @@ from collections.abc import Iterable, Sequence
 from contextlib import redirect_stdout
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 from swarm_mj.api.bars import AFTER_S, quiet_console
-from swarm_mj.api.fly import mission_of
+from swarm_mj.api.fly import SHARED, mission_of
 from swarm_mj.api.numbers import Numbers
 from swarm_mj.cli.estimates import check_fits, study_needs
 from swarm_mj.cli.evaluate import (
@@ -28,16 +29,14 @@ from swarm_mj.evaluation.summary import Evaluated, summarise
 from swarm_mj.fields import check_kind, check_value
 from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
+from swarm_mj.parts import OwnParts
 from swarm_mj.policies.registry import normalised
 
 if TYPE_CHECKING:  # each takes its time to import
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-KEYWORDS = (
-    *("policies", "num_missions", "seed", "baseline", "probability", "is_deterministic"),
-    "num_jobs",
-)
+KEYWORDS = ("policies", "num_missions", "baseline", "num_jobs", *SHARED)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -141,6 +140,10 @@ def evaluate(
     baseline: str | None = None,
     probability: float | None = None,
     is_deterministic: bool = False,
+    channel: str | None = None,
+    controller: str | None = None,
+    scene: str | None = None,
+    features: Sequence[str] = (),
     num_jobs: int = 1,
     **mission_fields: Any,
 ) -> Evaluation:
@@ -150,7 +153,8 @@ def evaluate(
     how far it is.
 
     Args:
-        policies: Names of `POLICIES`, or folders of learned ones.
+        policies: Names of `POLICIES`, folders of learned ones, or `module:Name` of your own;
+            `__main__:Name` is a class of this script or notebook.
         task: What the robots do, by name; or a mission of one's own.
         num_missions: So many for each policy.
         seed: Of the first mission; the others follow one by one.
@@ -158,6 +162,10 @@ def evaluate(
             given.
         probability: Of a transmission, for the policies that have one; tuned unless given.
         is_deterministic: Whether learned policies take their most probable recipient, not a draw.
+        channel: Who decodes whom, by `module:Name`; the mission's radio unless given.
+        controller: What drives the robots, likewise; that of the task unless given.
+        scene: What changes the arena, likewise; nothing unless given.
+        features: Names of your own feature extractors, that learned policies may see by.
         num_jobs: Processes. With more than one, a script must guard what it runs by
             `if __name__ == "__main__":`, as Python's multiprocessing says.
         **mission_fields: Any field of `Mission`, such as `num_robots=20`.
@@ -173,6 +181,9 @@ def evaluate(
     """
     need("scipy", "an evaluation")
     mission = mission_of(task, mission_fields, known=KEYWORDS)
+    parts = {"channel": channel, "controller": controller, "scene": scene}
+    for kind, name in parts.items():
+        check_kind(kind, name, (str, NoneType), f'"my_module:My{kind.title()}"')
     check_value(Options.__dataclass_fields__["jobs"], num_jobs)
     study = Study(
         policies=_names(policies),
@@ -182,6 +193,8 @@ def evaluate(
         probability=probability,
         is_deterministic=is_deterministic,
         baseline=baseline,
+        features=tuple(features),
+        parts=OwnParts(**parts),
     )
     way_out = "choose fewer num_jobs, num_robots, num_windows or num_missions"
     check_fits(study_needs(study, num_jobs), None, way_out, is_forced=False, way_on="")
@@ -198,5 +211,5 @@ def _names(policies: str | Path | Sequence[str | Path]) -> tuple[str, ...]:
         raise TypeError(f"policies must be a list of names, not {policies!r:.80}")
     named = [policies] if isinstance(policies, str | Path) else list(policies)
     for name in named:
-        check_kind("each of the policies", name, (str, Path), '"planner"')
+        check_kind("each of the policies", name, (str, Path), '"planner" or "my_module:Mine"')
     return tuple(dict.fromkeys(normalised(str(name)) for name in named))

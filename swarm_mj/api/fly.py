@@ -2,14 +2,14 @@
 
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from swarm_mj.api.bars import quiet_bar
 from swarm_mj.api.numbers import Numbers
-from swarm_mj.api.run import Run
+from swarm_mj.api.run import PARTS, Run
 from swarm_mj.cli import DONE, INTERRUPTED
 from swarm_mj.cli.estimates import check_fits, flight_needs
 from swarm_mj.cli.flight import flight_config, fly_swarm
@@ -18,17 +18,17 @@ from swarm_mj.cli.mission_options import make_mission
 from swarm_mj.control.controller import Controller
 from swarm_mj.fields import check_kind, check_names
 from swarm_mj.mission import Mission
+from swarm_mj.parts import OwnParts
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies.policy import Policy
-from swarm_mj.policies.registry import make_policy, normalised
+from swarm_mj.policies.registry import check_used, make_policy, normalised
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.rollout import summarise
 from swarm_mj.swarm import Swarm
 
 MISSION_FIELDS = tuple(spec.name for spec in fields(Mission) if spec.name != "task")
-KEYWORDS = ("policy", "seed", "probability", "is_deterministic", "record", "observer")
-PARTS = ("channel", "controller", "scene")
+SHARED = ("seed", "probability", "is_deterministic", "features", *PARTS)  # with `evaluate`
 
 
 def fly(
@@ -40,9 +40,10 @@ def fly(
     is_deterministic: bool = False,
     record: bool = True,
     observer: int = 0,
-    channel: Channel | None = None,
-    controller: Controller | None = None,
-    scene: Scene | None = None,
+    channel: str | Channel | None = None,
+    controller: str | Controller | None = None,
+    scene: str | Scene | None = None,
+    features: Sequence[str] = (),
     **mission_fields: Any,
 ) -> Run:
     """Flies one mission, from the first window to the last.
@@ -52,15 +53,17 @@ def fly(
 
     Args:
         task: What the robots do, by name; or a mission of one's own.
-        policy: Who transmits when: a name of `POLICIES`, the folder of a learned one, or an object.
+        policy: Who transmits when: a name of `POLICIES`, the folder of a learned one, an object, or
+            `module:Name` of your own.
         seed: The same seed is the same mission.
         probability: Of a transmission, for the named policies that have one; tuned unless given.
         is_deterministic: Whether a learned policy takes its most probable recipient, not a draw.
         record: Whether to keep what a replay and a video show; without it less memory is needed.
         observer: The robot whose knowledge the replay shows.
-        channel: Who decodes whom; the mission's radio unless given.
-        controller: What drives the robots; that of the task unless given.
-        scene: What changes the arena; nothing unless given.
+        channel: Who decodes whom, as an object or `module:Name`; the mission's radio unless given.
+        controller: What drives the robots, likewise; that of the task unless given.
+        scene: What changes the arena, likewise; nothing unless given.
+        features: Names of your own feature extractors, that learned policies may see by.
         **mission_fields: Any field of `Mission`, such as `num_robots=20` or `preset="reference"`.
 
     Returns:
@@ -71,12 +74,16 @@ def fly(
         TypeError: An argument is of the wrong kind, or has a name that is not known.
         KeyboardInterrupt: Ctrl-C was pressed before the first window was flown.
     """
-    mission = mission_of(task, mission_fields, known=(*KEYWORDS, *PARTS))
-    chosen, name = _policy_of(policy, mission, probability, is_deterministic=is_deterministic)
+    mission = mission_of(task, mission_fields, known=("policy", "record", "observer", *SHARED))
+    how = {"is_deterministic": is_deterministic, "features": tuple(features)}
+    chosen, name = _policy_of(policy, mission, probability, **how)
+    check_used(tuple(features), [chosen])
+    parts = {"channel": channel, "controller": controller, "scene": scene}
+    made, named = _parts_of(parts, mission)
     needs, way_out = flight_needs(mission, name, is_recorded=record), "choose fewer num_robots or "
     way_out += "num_windows" + (", or record=False" if record else "")
     check_fits(needs, None, way_out, is_forced=False, way_on="")
-    swarm = Swarm(mission, [seed], channel=channel, controller=controller, scene=scene)
+    swarm = Swarm(mission, [seed], **made)
     is_broadcast = chosen.window(mission).is_broadcast
     recorder = Recorder(swarm, ego=observer, is_broadcast=is_broadcast) if record else None
     start_s = time.perf_counter()
@@ -89,7 +96,7 @@ def fly(
     took = {"wall_seconds": wall_s, "interrupted": code == INTERRUPTED}
     return Run(
         mission=mission,
-        config=flight_config(mission, name, chosen, seed=seed, observer=observer),
+        config=flight_config(mission, name, chosen, seed=seed, observer=observer) | named,
         summary=Numbers(flight_numbers(chosen, summarise(flown)) | took),
         windows=tuple(flown),
         log=recorder.log() if recorder else None,
@@ -120,17 +127,26 @@ def _policy_of(
     policy: str | Path | Policy,
     mission: Mission,
     probability: float | None,
-    *,
-    is_deterministic: bool,
+    **how: Any,
 ) -> tuple[Policy, str]:
     """A policy and its name: what was given, or its class's."""
     if not isinstance(policy, Policy):
         check_kind("policy", policy, (str, Path), '"planner"')
         name = normalised(str(policy))
-        made = make_policy(name, mission, probability, is_deterministic=is_deterministic)
-        return made, name
-    if probability is not None or is_deterministic:
+        return make_policy(name, mission, probability, **how), name
+    if probability is not None or how["is_deterministic"]:
         raise TypeError(
             "probability and is_deterministic change policies by name; make it with them"
         )
     return policy, type(policy).__name__
+
+
+def _parts_of(given: Mapping[str, Any], mission: Mission) -> tuple[dict[str, Any], dict[str, str]]:
+    """Parts of one's own as `Swarm` takes them, and their names: as given, or their own."""
+    own = {kind: part for kind, part in given.items() if part is not None}
+    by_name = OwnParts(**{kind: part for kind, part in own.items() if isinstance(part, str)})
+    made = own | by_name.made(mission)
+    return made, {
+        kind: by_name.named.get(kind) or getattr(part, "__qualname__", type(part).__qualname__)
+        for kind, part in made.items()
+    }

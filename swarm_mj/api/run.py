@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # each takes its time to import, and flights do without
 
     from swarm_mj.replay.footage import Footage
 
+PARTS = ("channel", "controller", "scene")  # of one's own
 PACKETS = ("sent", "attempted", "delivered", "lost", "overheard", "answered", "heard", "receptions")
 
 
@@ -68,7 +69,9 @@ class Run:
     @property
     def title(self) -> str:
         """What was flown, in a line."""
-        return flight_title(self.mission, self.config["policy"], self.config["seed"])
+        parts = (f", {kind} {self.config[kind]}" for kind in PARTS if kind in self.config)
+        title = flight_title(self.mission, self.config["policy"], self.config["seed"])
+        return title + "".join(parts)
 
     @property
     def task_cost(self) -> tuple[str, str] | None:

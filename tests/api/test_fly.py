@@ -66,6 +66,42 @@ def test_parts_of_ones_own_reach_the_swarm():
     assert run.summary.packets_heard == 0
 
 
+OWN = """
+import numpy as np
+from swarm_mj.policies.tdma import Tdma
+class Mine(Tdma):
+    pass
+def deaf(position_m, recipient):
+    return np.broadcast_to(np.arange(recipient.shape[1]), recipient.shape).copy()
+"""
+
+
+def test_parts_by_name_are_those_of_the_command_line(here):
+    (here / "own_fly_parts.py").write_text(OWN)
+    named = {"policy": "own_fly_parts:Mine", "channel": "own_fly_parts:deaf"}
+    run = swarm_mj.fly("stationary", **named, **SHORT)
+    options = [text for kind, name in named.items() for text in (f"--{kind}", name)]
+    line = ["fly", "--task", "stationary", *OPTIONS, *options]
+    assert main([*line, "--no-record", "--json", "told.json"]) == 0
+    told = json.loads((here / "told.json").read_text())
+    assert run.summary.aoi_mean == told["aoi_mean"]
+    assert run.config == told["config"]
+    assert run.title.endswith("own_fly_parts:Mine, 6 robots, seed 1, channel own_fly_parts:deaf")
+
+
+def test_parts_by_name_are_evaluated_too(here):
+    (here / "own_study_parts.py").write_text(OWN)
+    found = swarm_mj.evaluate(
+        ["own_study_parts:Mine", "tdma"], "stationary", num_missions=2, seed=1, **SHORT
+    )
+    mine, tdma = (found.summary[policy].aoi_mean for policy in found.summary)
+    assert mine == tdma
+    deaf = swarm_mj.evaluate(
+        "tdma", "stationary", channel="own_study_parts:deaf", num_missions=2, seed=1, **SHORT
+    )
+    assert deaf.summary.tdma.hearers_per_packet == 0.0
+
+
 def test_ctrl_c_keeps_what_was_flown(monkeypatch):
     windows = flight.rollout
 
