@@ -54,7 +54,7 @@ class Evaluation:
     def __repr__(self) -> str:
         """The table that `swarm-mj evaluate` prints."""
         with redirect_stdout(io.StringIO()) as text:
-            print_results([each.result for each in self.results])
+            print_results([each.result for each in self.results], is_plain=True)
         return text.getvalue().rstrip()
 
     def _repr_html_(self) -> str:

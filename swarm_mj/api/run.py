@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
+from swarm_mj.api.bars import is_notebook
 from swarm_mj.api.numbers import Numbers
 from swarm_mj.cli.flight_table import flight_rows, flight_title
 from swarm_mj.cli.outputs import Output, check_outputs
@@ -148,7 +149,7 @@ class Run:
         """
         from swarm_mj.api import video
 
-        if video.is_notebook():
+        if is_notebook():
             video.play(video.film(self.footage(), ".mp4"))
         else:
             video.tell_where()

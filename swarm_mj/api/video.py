@@ -1,7 +1,6 @@
 """Videos of what Python flew: as a file's content, and within a notebook."""
 
-import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from swarm_mj.api.bars import quiet_bar
 from swarm_mj.cli.replay import RATES, SIZES, usual_seconds
@@ -38,13 +37,6 @@ def film(footage: "Footage", suffix: str) -> bytes:
     style = Style(width=width, height=height, seconds=seconds, fps=RATES[suffix])
     with quiet_bar("Drawing", style.num_frames, "pictures") as bar:
         return make_video([footage], suffix, style, bar.advance)
-
-
-def is_notebook() -> bool:
-    """Whether this Python is the kernel of a notebook."""
-    ipython = sys.modules.get("IPython")
-    shell: Any = ipython.get_ipython() if ipython else None
-    return hasattr(shell, "kernel")
 
 
 def play(content: bytes) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from itertools import groupby
+from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -15,12 +16,19 @@ NAME_WIDTH = 17  # of a policy that fits in there; a longer directory's name wid
 NONE = "-"
 
 
-def print_results(results: Sequence[Result]) -> None:
-    """Prints a table per regime; results of a regime stand together."""
-    console = Console(highlight=False, markup=False, force_jupyter=False)
+def print_results(results: Sequence[Result], *, is_plain: bool = False) -> None:
+    """Prints a table per regime; results of a regime stand together.
+
+    Args:
+        results: One or more.
+        is_plain: Whether no letters are bold, whatever the terminal and its variables say.
+    """
+    how: dict[str, Any] = {"highlight": False, "markup": False, "force_jupyter": False}
+    how |= {"force_terminal": False} if is_plain else {}
+    console = Console(**how)
     longest = max(len(line) for result in results for line in _name(result).splitlines())
     width = max(MIN_WIDTH + max(0, longest - NAME_WIDTH), console.width)
-    wide = Console(highlight=False, markup=False, width=width, force_jupyter=False)
+    wide = Console(**how, width=width)
     for regime, group in groupby(results, _regime):
         of_regime = sorted(group, key=lambda result: result.aoi_mean)
         console.print(regime)

@@ -47,7 +47,9 @@ def test_it_agrees_with_flights_one_by_one(found):
     assert found.summary.tdma.aoi_mean == pytest.approx(mean)
 
 
-def test_it_shows_itself_as_the_table(found):
+def test_it_shows_itself_as_the_table(found, monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")  # as a notebook's server does
+    assert "\x1b" not in repr(found)
     assert repr(found).startswith("random-walk, preset paper: 6 robots")
     assert "round-robin" in repr(found)
     assert "round-robin" in found._repr_html_()

@@ -53,7 +53,7 @@ def test_elsewhere_nothing_opens(monkeypatch, capsys):
 
 
 def test_what_was_not_recorded_cannot_be_shown(monkeypatch):
-    monkeypatch.setattr(video, "is_notebook", lambda: True)
+    monkeypatch.setattr("swarm_mj.api.run.is_notebook", lambda: True)
     run = swarm_mj.fly("stationary", policy="tdma", record=False, **TINY)
     with pytest.raises(ValueError, match="fly with record=True"):
         run.show()
