@@ -7,6 +7,7 @@ from gymnasium import spaces
 from gymnasium.vector.utils import batch_space
 
 from swarm_mj.envs.team import Team
+from swarm_mj.gnn.feature_sets import is_own_set
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 from swarm_mj.protocol.buffers import NO_PARENT
 
@@ -20,7 +21,7 @@ def robot_spaces(team: Team) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
     teammate's news came over first, or -1.
     """
     num_robots = team.mission.num_robots
-    most = _largest_feature(team.mission)
+    most = np.inf if is_own_set(team.features) else _largest_feature(team.mission)
     seen: dict[str, spaces.Space] = {
         "action_mask": spaces.Box(0, 1, (num_robots,), np.int8),
         "observation": spaces.Box(-most, most, (num_robots, team.num_features), np.float32),

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.control.controller import Controller, Costed
 from swarm_mj.control.motion import controller_of
-from swarm_mj.gnn.feature_sets import make_extractor
+from swarm_mj.gnn.feature_sets import is_own_set, load_features, make_extractor
 from swarm_mj.learning.credit import credits_of
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.mission.batched_rng import Started
@@ -63,7 +63,8 @@ class Team:
             mission: The mission, or its task.
             num_missions: B.
             preset: Of a task's mission: "paper" or "reference".
-            features: What robots see of each teammate: the name of a feature set.
+            features: What robots see of each teammate: the name of a feature set, or
+                `module:Name` of your own.
             reward: "aoi", minus the age of information [windows]; "velocity-variance", minus the
                 variance of Eq. 17 [m²/s²]; "task-cost", minus what the task costs, by its
                 controller, in its unit; or "credit", each robot's own: by how much the team's
@@ -82,6 +83,8 @@ class Team:
         self.num_missions = num_missions
         self.reward = _checked(reward, self.mission, channel, controller)
         self.with_parents = with_parents
+        if is_own_set(features):
+            load_features(features)
         self.features = features
         self._extractor = make_extractor(features, self.mission)
         self.num_features = len(self._extractor.names)  # F

@@ -29,3 +29,27 @@ def test_a_robot_sees_a_row_of_what_the_team_sees():
 
 def test_parents_are_seen_on_request_only():
     assert set(robot_spaces(Team("stationary"))[0]) == {"action_mask", "observation"}
+
+
+OWN = """
+import numpy as np
+from swarm_mj.gnn.graphs import PaperFeatures
+
+class Mine(PaperFeatures):
+    names = ("T", "huge")
+
+    def graphs(self, views):
+        from dataclasses import replace
+        seen = super().graphs(views)
+        return replace(seen, node=np.full((*seen.parent.shape, 2), 1e9, dtype=np.float32))
+"""
+
+
+def test_features_of_ones_own_have_no_bounds(here, monkeypatch):
+    monkeypatch.syspath_prepend(here)
+    (here / "mine_features.py").write_text(OWN)
+    team = Team("stationary", num_robots=3, features="mine_features:Mine")
+    seen, _ = robot_spaces(team)
+    team.restart([1])
+    assert team.observation["observation"].shape == (1, 3, 3, 2)
+    assert {name: each[0, 0] for name, each in team.observation.items()} in seen
