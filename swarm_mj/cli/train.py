@@ -19,6 +19,8 @@ from swarm_mj.cli.train_settings import (
     add_setting_options,
     asked_settings,
     given_settings,
+    load_own,
+    own_names,
     refuse_others,
 )
 from swarm_mj.fields import same_as, setting
@@ -74,7 +76,10 @@ def run(options: Options) -> int:
             is_over = not watch.has_stopped
             _print(options.out, asked, progress, is_over=is_over)
     except (KeyboardInterrupt, MemoryError) as error:
-        is_memory, go_on = isinstance(error, MemoryError), _resume_command(options.out)
+        is_memory, go_on = (
+            isinstance(error, MemoryError),
+            _resume_command(options.out, asked.training),
+        )
         ending = "Out of memory" if is_memory else "Broken off"
         console.print(f"{ending}; the last checkpoint is kept.\nGo on:    {go_on}", markup=False)
         return FAILED if is_memory else INTERRUPTED
@@ -97,10 +102,12 @@ def _asked_run(options: Options) -> Run:
 
 
 def _begun_run(options: Options) -> Run:
-    run = read_run(options.out)
+    named = own_names(options.settings)
+    run = read_run(options.out, named)
     if options.init is not None:
         raise ValueError(f"{options.out} has begun, so --init {options.init} is too late")
     refuse_others(options.settings, run.training, f"the run in {options.out}")
+    load_own(run.training)
     return run
 
 
@@ -166,9 +173,10 @@ def _next_commands(
     name, policy = this_command(), shlex.quote(str(out / "policy"))
     training = asked.training
     mission = mission_flags(replace(training.mission, num_robots=training.robots[0]))
+    mission += f" {training.own_options}" if training.own else ""
     lines = [
         ("Watch:", f"{this_command('tensorboard')} --logdir {shlex.quote(str(out))}"),
-        ("Go on:", _resume_command(out, 2 * progress.decisions if is_over else None)),
+        ("Go on:", _resume_command(out, training, 2 * progress.decisions if is_over else None)),
     ]
     if progress.best is None:
         return lines
@@ -179,6 +187,7 @@ def _next_commands(
     ]
 
 
-def _resume_command(out: Path, budget: int | None = None) -> str:
+def _resume_command(out: Path, training: Training, budget: int | None = None) -> str:
     more = "" if budget is None else f" --budget {budget}"
+    more += f" {training.own_options}" if training.own else ""
     return f"{this_command()} train --out {shlex.quote(str(out))} --resume{more}"

@@ -13,14 +13,27 @@ from typing import Any
 from swarm_mj.cli.mission_options import make_mission
 from swarm_mj.cli.options import add_option, flag_of
 from swarm_mj.fields import as_typed
-from swarm_mj.gnn.feature_sets import num_features
+from swarm_mj.gnn.feature_sets import check_named, is_own_set, load_features, num_features
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission
+from swarm_mj.parts import GROUP, OwnParts, is_own
 from swarm_mj.policies.policy_config import PolicyConfig
 
-PARTS = {"": Training, "network.": GnnShape, "ppo.": PpoSettings, "mission.": Mission}
-HEADINGS = {"": "run", "network.": "network", "ppo.": "PPO", "mission.": "missions"}
+PARTS = {
+    "": Training,
+    "network.": GnnShape,
+    "ppo.": PpoSettings,
+    "parts.": OwnParts,
+    "mission.": Mission,
+}
+HEADINGS = {
+    "": "run",
+    "network.": "network",
+    "ppo.": "PPO",
+    "parts.": GROUP,
+    "mission.": "missions",
+}
 NOT_TRAINED = ("num_robots", "physics", "switched_off")  # team sizes are the run's own
 SPECS: dict[str, Field[Any]] = {
     f"{part}{spec.name}": spec
@@ -73,8 +86,11 @@ def asked_settings(
             place: given[place] for place in given if place.startswith(("features", "network"))
         }
         refuse_others(shape, training, f"the policy {init_path}")
+        check_named(init.features, own_names(given), f"policy {init_path}")
     missions = _missions(own.get("missions"), training.missions, len(sizes))
     training = replace(training, missions=missions)  # first, for its errors
+    training = replace(training, parts=OwnParts(**_part("parts.", given)))
+    load_own(replace(training, features=own.get("features", training.features)))
     if "features" in own:
         network["num_features"] = num_features(own["features"])
     training = replace(
@@ -86,6 +102,23 @@ def asked_settings(
     )
     _check(training)
     return training
+
+
+def own_names(given: dict[str, Any]) -> list[str]:
+    """Names of parts of the user's own among settings that were given."""
+    places = ("features", *(place for place in SPECS if place.startswith("parts.")))
+    return [given[place] for place in places if place in given and is_own(given[place])]
+
+
+def load_own(training: Training) -> None:
+    """Loads the parts of a run that are the user's own, who has named them all here.
+
+    Raises:
+        ValueError: One cannot be made.
+    """
+    if is_own_set(training.features):
+        load_features(training.features)
+    training.parts.made(training.mission)
 
 
 def refuse_others(given: dict[str, Any], training: Training, whose: str) -> None:
@@ -147,6 +180,8 @@ def _check(training: Training) -> None:
 
 def _usual(place: str) -> str:
     """The default as text: per robot and, where it differs, per team."""
+    if "shown" in SPECS[place].metadata:
+        return SPECS[place].metadata["shown"]
     robot, team = (_usual_of(arm, place) for arm in ("robot", "team"))
     if robot == "False":
         return ""

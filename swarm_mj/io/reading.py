@@ -167,12 +167,20 @@ def _made(kind: type[Any], value: object) -> object:
 
 @cache
 def _strict(kind: Any, bases: tuple[type, ...] = ()) -> Any:  # noqa: ANN401 - any type
-    """Like a dataclass, but all keys are needed and no others known; other types are themselves."""
+    """Like a dataclass, but all keys are needed and no others known; other types are themselves.
+
+    Fields that say `may_lack` are newer than some files: there they have their default.
+    """
     if not (isinstance(kind, type) and is_dataclass(kind)):
         return kind
-    keys = [(spec.name, _strict(spec.type)) for spec in fields(kind)]
+    keys = [
+        (spec.name, _strict(spec.type), spec.default)
+        if spec.metadata.get("may_lack")
+        else (spec.name, _strict(spec.type))
+        for spec in fields(kind)
+    ]
     return msgspec.defstruct(
-        f"_{kind.__name__}", keys, bases=bases or None, forbid_unknown_fields=True
+        f"_{kind.__name__}", keys, bases=bases or None, forbid_unknown_fields=True, kw_only=True
     )
 
 

@@ -5,13 +5,16 @@ the same channel and by the same protocol. Its sum has the gradient of the team'
 robot's credit is 0.
 """
 
+import copy
+
 import numpy as np
 from jaxtyping import Float, Int
 
 from swarm_mj.compiled import compiled
+from swarm_mj.mission.batched_rng import Started
 from swarm_mj.protocol.timestamps import merge_timestamps, observe_own
 from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, respondents
-from swarm_mj.radio.free_space import Channel
+from swarm_mj.radio.free_space import Channel, FreeSpaceRadio
 
 
 def credits_of(
@@ -23,11 +26,14 @@ def credits_of(
 ) -> Float[np.ndarray, "B N"]:
     """The age that the team would not have lost in a window without each robot.
 
+    A channel that is not the package's meets B missions at a time, as it does in flight.
+
     Args:
         timestamp: T at the end of the window before [windows].
         position_m: Where the robots are in this window [m].
         recipient: Whom each robot addresses; itself is silence.
-        channel: Who decodes whom.
+        channel: Who decodes whom; of one that draws or remembers, what `as_it_is` gave before the
+            window.
         now: t at the start of the window [windows].
 
     Returns:
@@ -37,12 +43,46 @@ def credits_of(
     alone = recipient[mission]  # one row per sender: everyone's recipients without it
     alone[np.arange(sender.size), sender] = sender
     rows = np.concatenate([np.arange(len(now)), mission])
+    if not isinstance(channel, FreeSpaceRadio):
+        channel = _Rows(channel, rows)
     gained = gain(
         timestamp, position_m[rows], np.concatenate([recipient, alone]), channel, now[rows], rows
     )
     credit = np.zeros(recipient.shape)
     credit[mission, sender] = gained[mission] - gained[len(now) :]
     return credit
+
+
+def as_it_is(channel: Channel) -> Channel:
+    """A channel that later draws of this one do not change, to replay a window with."""
+    return copy.deepcopy(channel) if isinstance(channel, Started) else channel
+
+
+class _Rows:
+    """A channel of B missions for rows of windows, each as if it alone were that mission's.
+
+    A channel that draws gives every row the numbers that the mission's own window had.
+    """
+
+    def __init__(self, channel: Channel, mission: Int[np.ndarray, "W"]) -> None:
+        """Takes the channel as it was before the window, and each row's mission."""
+        self._mission = mission
+        self._turn = np.array([np.sum(mission[:w] == b) for w, b in enumerate(mission)])
+        self._channels = [as_it_is(channel) for _ in range(int(np.max(self._turn)) + 1)]
+
+    def __call__(
+        self, position_m: Float[np.ndarray, "W N 2"], recipient: Int[np.ndarray, "W N"]
+    ) -> Int[np.ndarray, "W N"]:
+        """As `Channel`; the first rows are all missions in their order."""
+        heard = np.empty_like(recipient)
+        num_missions = int(np.max(self._mission)) + 1
+        for turn, channel in enumerate(self._channels):
+            rows = np.flatnonzero(self._turn == turn)
+            sent_to = np.tile(np.arange(recipient.shape[1]), (num_missions, 1))
+            sent_to[self._mission[rows]] = recipient[rows]
+            decoded = np.asarray(channel(position_m[:num_missions], sent_to))
+            heard[rows] = decoded[self._mission[rows]]
+        return heard
 
 
 def gain(

@@ -79,7 +79,7 @@ def record_replay(
     from swarm_mj.replay.write import write_replay  # rerun takes its time to import
 
     mission = held_out_missions(training)[0]
-    swarm = Swarm(mission, [HELD_OUT_SEED])
+    swarm = Swarm(mission, [HELD_OUT_SEED], **training.parts.made(mission))
     recorder = Recorder(swarm)
     for window in rollout(swarm, held_out_policy(training, network, mission)):
         recorder.add(window)
@@ -99,7 +99,7 @@ def _fly(
     seeds = range(HELD_OUT_SEED, HELD_OUT_SEED + training.held_out)
     sizes = []
     for mission in missions:
-        swarm = Swarm(mission, seeds)
+        swarm = Swarm(mission, seeds, **training.parts.made(mission))
         policy = held_out_policy(training, network, mission)
         sizes.append([])
         for window in range(1, mission.num_windows + 1):

@@ -13,8 +13,9 @@ from jaxtyping import Float, Int
 
 from swarm_mj.gnn.feature_sets import make_extractor
 from swarm_mj.gnn.graphs import Graphs
-from swarm_mj.learning.credit import credits_of
+from swarm_mj.learning.credit import as_it_is, credits_of
 from swarm_mj.mission import Mission
+from swarm_mj.parts import OwnParts
 from swarm_mj.protocol.costs import WindowCosts
 from swarm_mj.swarm import Swarm
 
@@ -53,6 +54,7 @@ class MissionBatch:
         rng: np.random.Generator,
         *,
         first_windows: int,
+        parts: OwnParts = OwnParts(),
     ) -> None:
         """Starts the first missions, of so many windows; `rng` draws the missions' seeds."""
         self.mission = mission
@@ -61,17 +63,18 @@ class MissionBatch:
         self._extractor = make_extractor(features, mission)
         self.num_features = len(self._extractor.names)  # F
         seeds = self._draw_seeds()
-        self._swarm = Swarm(mission, seeds)
+        self._swarm = Swarm(mission, seeds, **parts.made(mission))
         self._begin(ActionHistory(seeds=seeds, last_window=first_windows))
 
     def step(self, recipient: Int[np.ndarray, "B N"], *, with_credit: bool) -> Transition:
         """One window; missions that end start anew."""
         swarm, mission = self._swarm, self.mission
         before, now = swarm.buffers.timestamp.copy(), swarm.now
+        channel = as_it_is(swarm.channel) if with_credit else swarm.channel
         costs = swarm.exchange(recipient)
         credit = np.zeros(recipient.shape)
         if with_credit:
-            credit = credits_of(before, swarm.states.position_m, recipient, swarm.channel, now)
+            credit = credits_of(before, swarm.states.position_m, recipient, channel, now)
         self.history.recipients.append(recipient.astype(np.int16))
         graphs = self._extractor.graphs(swarm.views)
         last_graphs = None
@@ -117,6 +120,7 @@ def make_batches(
     num_missions: int,
     num_batches: int,
     rng: np.random.Generator,
+    parts: OwnParts = OwnParts(),
 ) -> list[MissionBatch]:
     """Batches whose first missions are cut at different windows; team sizes take turns.
 
@@ -137,6 +141,7 @@ def make_batches(
             num_missions // num_batches,
             rng,
             first_windows=max(1, mission.num_windows * (place + 1) // num_batches),
+            parts=parts,
         )
         for place in range(num_batches)
     ]

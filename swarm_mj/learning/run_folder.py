@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -136,11 +136,17 @@ def write_run(folder: Path, run: Run) -> None:
     write_json(folder / SETTINGS, document)
 
 
-def read_run(folder: Path) -> Run:
+def read_run(folder: Path, named: Collection[str] = ()) -> Run:
     """What a run was asked for when it began, or last went on.
 
+    Args:
+        folder: The run's.
+        named: The parts of users' own that it may have, as `module:Name`: to go on runs their
+            code, and a folder may come from anyone.
+
     Raises:
-        ValueError: There is no run, or its settings are damaged, foreign or of a newer version.
+        ValueError: There is no run, its settings are damaged, foreign or of a newer version, or it
+            has parts that were not named.
         OSError: The settings cannot be read.
     """
     path = folder / SETTINGS
@@ -148,9 +154,16 @@ def read_run(folder: Path) -> Run:
         raise ValueError(f"{folder} holds no run to go on with; to begin one, leave out --resume")
     text = read_file(path, "settings", MOST_BYTES, folder=folder)
     try:
-        return read_document(text, FORMAT, FORMAT_VERSION, Run)
+        run = read_document(text, FORMAT, FORMAT_VERSION, Run)
     except ValueError as error:
         raise ValueError(f"settings {path} are damaged, or no run's: {error}") from error
+    for name in run.training.own.values():
+        if name not in named:
+            raise ValueError(
+                f"{folder} goes on with someone's own {name:.200}; if you trust that code, give "
+                f"the run's {run.training.own_options} again"
+            )
+    return run
 
 
 def check_new(folder: Path) -> None:

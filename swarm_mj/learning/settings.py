@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 from swarm_mj.fields import FieldOf, check, check_value, setting
-from swarm_mj.gnn.feature_sets import FEATURE_SETS, check_fit, num_features
+from swarm_mj.gnn.feature_sets import FEATURE_SETS, check_fit, is_own_set, num_features
 from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.mission import Mission
+from swarm_mj.parts import OwnParts
 
 CreditAssignment = Literal["robot", "team"]  # per robot, per team
 Reward = Literal["aoi", "velocity-variance"]
@@ -102,7 +103,10 @@ class Training:
         help="size of the team; several are trained on together", low=2, high=MOST_ROBOTS
     )
     features: str = setting(
-        "extended", "what the network sees of each teammate", choices=tuple(FEATURE_SETS)
+        "extended",
+        f"what the network sees of each teammate: {', '.join(FEATURE_SETS)}, or module:Name of "
+        "your own",
+        offers=tuple(FEATURE_SETS),
     )
     network: GnnShape = ROBOTS_NETWORK  # that acts
     shares_trunk: bool = True  # whether values come from its last stage but one number
@@ -130,6 +134,7 @@ class Training:
         low=1,
         high=10_000,
     )
+    parts: OwnParts = setting(OwnParts(), may_lack=True)
     threads: int = setting(1, "torch's threads", low=1, high=256)
 
     def __post_init__(self) -> None:
@@ -139,6 +144,17 @@ class Training:
             raise ValueError("robots must have at least 1 size")
         if self.arm == "robot" and self.reward != "aoi":
             raise ValueError(f"reward {self.reward} is a team's; choose arm team, or reward aoi")
+
+    @property
+    def own(self) -> dict[str, str]:
+        """The names of parts that are a user's own: to go on with them is to run their code."""
+        features = {"features": self.features} if is_own_set(self.features) else {}
+        return features | self.parts.named
+
+    @property
+    def own_options(self) -> str:
+        """The options that name them."""
+        return " ".join(f"--{kind} {name:.200}" for kind, name in self.own.items())
 
     @property
     def sums_nodes(self) -> bool:

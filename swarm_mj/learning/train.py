@@ -62,6 +62,7 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
         training.missions,
         training.groups,
         rng,
+        training.parts,
     )
     ppo = training.ppo
     is_robot = training.arm == "robot"
