@@ -107,7 +107,7 @@ def _begun_run(options: Options) -> Run:
     if options.init is not None:
         raise ValueError(f"{options.out} has begun, so --init {options.init} is too late")
     refuse_others(options.settings, run.training, f"the run in {options.out}")
-    load_own(run.training)
+    load_own(run.training.features, run.training)
     return run
 
 

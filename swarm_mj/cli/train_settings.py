@@ -90,7 +90,7 @@ def asked_settings(
     missions = _missions(own.get("missions"), training.missions, len(sizes))
     training = replace(training, missions=missions)  # first, for its errors
     training = replace(training, parts=OwnParts(**_part("parts.", given)))
-    load_own(replace(training, features=own.get("features", training.features)))
+    load_own(own.get("features", training.features), training)
     if "features" in own:
         network["num_features"] = num_features(own["features"])
     training = replace(
@@ -110,14 +110,14 @@ def own_names(given: dict[str, Any]) -> list[str]:
     return [given[place] for place in places if place in given and is_own(given[place])]
 
 
-def load_own(training: Training) -> None:
-    """Loads the parts of a run that are the user's own, who has named them all here.
+def load_own(features: str, training: Training) -> None:
+    """Loads features, and the parts of a run, that are the user's own and were all named here.
 
     Raises:
         ValueError: One cannot be made.
     """
-    if is_own_set(training.features):
-        load_features(training.features)
+    if is_own_set(features):
+        load_features(features)
     training.parts.made(training.mission)
 
 

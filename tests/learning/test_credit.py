@@ -1,6 +1,7 @@
 """A robot's credit is what its team would not have gained in a window without it."""
 
 import copy
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,10 +9,11 @@ from channels import to_the_addressee
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_mj.learning.credit import credits_of, gain
+from swarm_mj.learning.credit import as_it_is, credits_of, gain
 from swarm_mj.mission import paper, reference
 from swarm_mj.protocol.window import window
 from swarm_mj.radio.free_space import FreeSpaceRadio
+from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.swarm import Swarm
 
 
@@ -118,3 +120,43 @@ def test_nothing_given_is_changed():
     credits_of(*given_, swarm.channel, swarm.now)
     for after, as_it_was in zip(given_, before, strict=True):
         np.testing.assert_array_equal(after, as_it_was)
+
+
+class Lossy:
+    """A radio that loses three packets of ten; every mission draws for itself."""
+
+    def __init__(self, mission):
+        self.radio = radio_of(mission)
+
+    def start(self, num_robots, rngs):
+        self.num_robots, self.rngs = num_robots, rngs
+
+    def __call__(self, position_m, recipient):
+        draws = np.stack([rng.random(self.num_robots) for rng in self.rngs])
+        heard = self.radio(position_m, recipient)
+        return np.where(draws < 0.3, np.arange(self.num_robots), heard)
+
+
+def test_a_channel_that_draws_replays_a_window_with_its_own_numbers():
+    rng = np.random.default_rng(4)
+    mission = paper("random-walk", num_robots=6, range_ratio=0.6)
+    swarm = Swarm(mission, [5, 6, 7], channel=Lossy(mission))
+    num_lost = 0
+    for _ in range(15):
+        buffers, now, before = copy.deepcopy(swarm.buffers), swarm.now, as_it_is(swarm.channel)
+        recipient = random_recipients(rng, (3, 6), 0.4)
+        swarm.exchange(recipient)
+        found = credits_of(buffers.timestamp, swarm.states.position_m, recipient, before, now)
+        replays = SimpleNamespace(states=swarm.states, channel=None)
+        total = {}
+        for silent in (None, *range(6)):
+            replays.channel = copy.deepcopy(before)
+            without = recipient.copy()
+            if silent is not None:
+                without[:, silent] = silent
+            total[silent] = total_after(replays, buffers, without, now)
+        np.testing.assert_array_equal(total[None], swarm.buffers.timestamp.sum(axis=(1, 2)))
+        expected = np.stack([total[None] - total[i] for i in range(6)], axis=1)
+        np.testing.assert_allclose(found, expected, atol=1e-9)
+        num_lost += np.count_nonzero(found < 0.0)
+    assert num_lost > 0  # some packet destroyed another

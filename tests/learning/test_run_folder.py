@@ -27,6 +27,7 @@ from swarm_mj.learning.run_folder import (
 )
 from swarm_mj.learning.vec_env import TeamEnv
 from swarm_mj.mission import paper
+from swarm_mj.parts import OwnParts
 
 LIMITS = Limits(decisions=5, minutes=0.5, replay_every=3)
 ROW = {"decisions": 10.0, "aoi": 1 / 3, "objective": 0.2}
@@ -172,3 +173,16 @@ def test_a_curve_is_a_table_even_if_later_rows_have_more_columns(tmp_path):
         first, second = csv.DictReader(file)
     assert {name: float(x) for name, x in first.items() if x} == ROW
     assert float(second["train/entropy"]) == 0.5
+
+
+def test_a_run_from_before_there_were_parts_of_ones_own_is_read(tmp_path):
+    assert read_run(changed(tmp_path, lambda document: document["training"].pop("parts"))) == RUN
+
+
+def test_a_runs_own_parts_must_be_named(tmp_path):
+    parts = OwnParts(channel="my_parts:Lossy", scene="my_parts:walls")
+    run = replace(RUN, training=replace(RUN.training, parts=parts))
+    write_run(tmp_path, run)
+    with pytest.raises(ValueError, match="--channel my_parts:Lossy --scene my_parts:walls again"):
+        read_run(tmp_path, ["my_parts:Lossy"])
+    assert read_run(tmp_path, ["my_parts:Lossy", "my_parts:walls"]) == run
