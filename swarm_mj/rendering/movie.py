@@ -78,7 +78,9 @@ class Movie:
         self._plot.draw_axes(draw)
         with ExitStack() as stack:
             self._renderers = [
-                stack.enter_context(SceneRenderer(each.facts.mission, box.width, box.height))
+                stack.enter_context(
+                    SceneRenderer(each.facts.mission, box.width, box.height, scene=each.scene)
+                )
                 for each, box in zip(footages, self._boxes, strict=True)
             ]
             self._open = stack.pop_all()

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from swarm_mj.mission import Mission
+from swarm_mj.physics.scene import Scene
 from swarm_mj.replay import palette
 from swarm_mj.replay.frame import Frame, frame
 from swarm_mj.replay.links import fates
@@ -37,6 +38,7 @@ class Footage:
     is_on: Bool[np.ndarray, "T N"]  # whether a robot was switched on
     shots: Shots
     age_mean: Float[np.ndarray, "T"]  # Eq. 10 [windows]
+    scene: Scene | None = None  # what changed the arena; files do not hold it
 
     @property
     def frame(self) -> Frame:
@@ -86,4 +88,5 @@ def footage_of(log: Log, mission: Mission, policy: str, seed: int) -> Footage:
         is_on=log.is_on,
         shots=shots(fates(log), log.position_m),
         age_mean=log.age_mean,
+        scene=log.scene,
     )

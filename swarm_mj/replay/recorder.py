@@ -6,6 +6,7 @@ from numbers import Integral
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from swarm_mj.physics.scene import Scene
 from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.rollout import WindowRecord
 from swarm_mj.swarm import Swarm
@@ -41,6 +42,7 @@ class Log:
     age_std: Float[np.ndarray, "T"]  # over all pairs of different robots that are on [windows]
     age_max: Float[np.ndarray, "T"]  # the worst pair's [windows]
     velocity_variance_m2ps2: Float[np.ndarray, "T"]  # Eq. 17
+    scene: Scene | None = None  # what changed the arena, if anything did
     task_cost: TaskCost | None = None  # one value a window; None if the controller has none
 
     @property
@@ -132,6 +134,7 @@ class Recorder:
             ego=self._ego,
             window=window,
             is_broadcast=self._is_broadcast,
+            scene=self._swarm.scene,
             age_window=age_window,
             # An interrupt between the two appends of `add` leaves one matrix too many.
             age=np.stack(self._age[: len(age_window)]),

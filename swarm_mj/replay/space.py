@@ -5,7 +5,7 @@ import rerun as rr
 from jaxtyping import UInt8
 
 from swarm_mj.mission import Mission
-from swarm_mj.physics.scene import Scene, compose
+from swarm_mj.physics.scene import compose
 from swarm_mj.replay import palette
 from swarm_mj.replay.arcs import arcs
 from swarm_mj.replay.arena import HEADING_SHARE, RING_SHARE, grid
@@ -26,7 +26,6 @@ def draw_space(
     mission: Mission,
     packets: dict[str, Links],
     colours: UInt8[np.ndarray, "T N 3"],
-    scene: Scene | None,
 ) -> None:
     """Draws it: what stands still once, the rest window by window.
 
@@ -35,12 +34,11 @@ def draw_space(
         mission: Its numbers.
         packets: By their fate.
         colours: The robots'.
-        scene: What changes the arena, if anything does.
     """
     if sheet.frame.moves:
         away = np.pad(-sheet.frame.centre_m, ((0, 0), (0, 1)))
         sheet.timed("scene", rr.Transform3D.columns(translation=away))
-    spec = compose(mission, scene=scene)
+    spec = compose(mission, scene=sheet.log.scene)
     if not mission.has_walls:
         # An open area's floor is as large as what is ever seen.
         low, high = (end(sheet.frame.centre_m, axis=0) for end in (np.min, np.max))

@@ -9,7 +9,6 @@ import rerun_bindings as bindings
 
 from swarm_mj.io.atomic import write_bytes
 from swarm_mj.mission import Mission
-from swarm_mj.physics.scene import Scene
 from swarm_mj.replay import arena, charts, palette
 from swarm_mj.replay.digest import with_digest
 from swarm_mj.replay.footage import facts_of
@@ -25,14 +24,7 @@ from swarm_mj.replay.space import draw_space
 APPLICATION = "swarm_mj"
 
 
-def write_replay(
-    log: Log,
-    mission: Mission,
-    config: dict[str, object],
-    path: Path,
-    *,
-    scene: Scene | None = None,
-) -> None:
+def write_replay(log: Log, mission: Mission, config: dict[str, object], path: Path) -> None:
     """Writes a replay; the file appears under its name only when it is whole.
 
     Args:
@@ -40,20 +32,17 @@ def write_replay(
         mission: Its numbers.
         config: Kept in the file as recording properties; values are numbers, texts or booleans.
         path: The file, replaced if it exists; missing folders are made.
-        scene: What changes the arena, if anything does.
 
     Raises:
         OSError: The file cannot be written.
     """
     # Rerun's own writer of files hides a full disk, or waits for space for good.
-    recorded = with_digest(_recorded(log, mission, config, path.stem, scene))
+    recorded = with_digest(_recorded(log, mission, config, path.stem))
     bindings.flush_and_cleanup_orphaned_recordings()  # its threads, which would stay
     write_bytes(path, recorded, check=check_replay)
 
 
-def _recorded(
-    log: Log, mission: Mission, config: dict[str, object], name: str, scene: Scene | None
-) -> bytes:
+def _recorded(log: Log, mission: Mission, config: dict[str, object], name: str) -> bytes:
     """The bytes of a replay."""
     rr.set_strict_mode(True)  # bad data raises; otherwise a column is silently missing
     packets = fates(log)
@@ -69,7 +58,7 @@ def _recorded(
         recording.send_property("mission", rr.AnyValues(drop_untyped_nones=True, **config))
         facts = facts_of(log, mission, str(config.get("policy", "")), _seed(config))
         recording.send_property(FACTS, rr.AnyValues(json=json.dumps(asdict(facts))))
-        draw(Sheet(recording, log, shown, mission.window_s), mission, packets, scene)
+        draw(Sheet(recording, log, shown, mission.window_s), mission, packets)
         lines = [f"- **{key}**: {value}" for key, value in config.items()]
         about = "\n".join([f"# {name}", *lines])
         recording.log("about", rr.TextDocument(about, media_type="text/markdown"), static=True)
@@ -81,9 +70,7 @@ def _seed(config: dict[str, object]) -> int:
     return seed if isinstance(seed, int) else 0
 
 
-def draw(
-    sheet: Sheet, mission: Mission, packets: dict[str, Links], scene: Scene | None = None
-) -> None:
+def draw(sheet: Sheet, mission: Mission, packets: dict[str, Links]) -> None:
     """Draws every layer of a replay; `packets` by their fate."""
     log = sheet.log
     full_scale = palette.nice_scale(log.age)
@@ -95,7 +82,7 @@ def draw(
         arena.draw_beliefs(sheet)
     arena.draw_tree_on_map(sheet)
     arena.draw_radio(sheet, packets, mission.range_m)
-    draw_space(sheet, mission, packets, colours, scene)
+    draw_space(sheet, mission, packets, colours)
     draw_legend(sheet, full_scale)
     charts.draw_tree(sheet, colours)
     charts.draw_age_matrix(sheet, full_scale)

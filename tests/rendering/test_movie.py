@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mujoco import mjtGeom
 from scipy import ndimage
 
 from swarm_mj.mission import paper
@@ -97,3 +98,16 @@ def test_a_mission_s_video_is_whole(tdma, suffix, tmp_path):
     (tmp_path / f"a{suffix}").write_bytes(content)
     check_video(tmp_path / f"a{suffix}", suffix, STYLE)
     assert len(seen) == 6
+
+
+def test_a_scene_of_one_s_own_is_seen(tdma):
+    def with_tower(spec, _mission):
+        kind = mjtGeom.mjGEOM_BOX
+        spec.worldbody.add_geom(type=kind, size=[40, 40, 20], rgba=[1, 0, 0, 1])
+
+    is_red = []
+    for scene in (None, with_tower):
+        with Movie([replace(tdma, scene=scene)], STYLE) as movie:
+            picture = movie.picture([5]).astype(int)
+        is_red.append(np.any(picture[..., 0] - picture[..., 1:].max(axis=2) > 80))
+    assert is_red == [False, True]

@@ -1,5 +1,7 @@
 """The scene in three dimensions, read back from the file, against the flight and MuJoCo's model."""
 
+from dataclasses import replace
+
 import numpy as np
 from mujoco import mjtGeom
 from reading import column, counts, rows, static
@@ -57,7 +59,7 @@ def test_a_scene_of_one_s_own_is_drawn_whatever_its_geoms(two_way, tmp_path):
         add(name="camp", type=mjtGeom.mjGEOM_MESH, meshname="tent", pos=[-40, -40, 0])
 
     path = tmp_path / "town.rrd"
-    write_replay(two_way.log, two_way.mission, {"seed": 5}, path, scene=town)
+    write_replay(replace(two_way.log, scene=town), two_way.mission, {"seed": 5}, path)
     kinds = {
         chunk.entity_path.removeprefix("/scene/area/"): name.split(":")[0]
         for chunk in RrdReader(path).stream()
