@@ -65,13 +65,15 @@ def test_rewards_are_each_robots_own():
 
 @pytest.mark.parametrize(("agent", "size"), [("robot", 4), ("team", 16)])
 def test_sb3_contrib_gets_the_masks(agent, size):
-    env = make_vec_env("stationary", 2, agent=agent, seed=1, **{**SMALL, "range_ratio": 0.15})
+    far_apart = {**SMALL, "range_ratio": 0.15, "num_windows": 100}
+    env = make_vec_env("stationary", 2, agent=agent, seed=1, **far_apart)
     seen = env.reset()
     assert is_masking_supported(env)
-    for action in actions(env, 5):
+    for action in actions(env, 80):
         masks = get_action_masks(env)
         np.testing.assert_array_equal(masks, seen["action_mask"].reshape(env.num_envs, size) == 1)
         seen = env.step(action)[0]
+    assert not np.array_equal(env.action_masks(), env.action_masks()[::-1])
     assert np.array_equal(env.env_method("action_masks", indices=[1])[0], env.action_masks()[1])
 
 
