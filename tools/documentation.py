@@ -6,7 +6,6 @@ a page links to another file of the repository, the site gets that file, too.
 
 import os
 import posixpath
-import pydoc
 import re
 from dataclasses import fields
 from pathlib import Path
@@ -148,10 +147,9 @@ def names_of(page: str) -> list[str]:
 
 
 def home_of(name: str) -> str:
-    """A name by the module in which it is defined: it may be imported from elsewhere, too."""
-    found = pydoc.locate(name)
-    defined = getattr(found, "__qualname__", None)
-    return f"{found.__module__}.{defined}" if defined else name
+    """A name by the module in which it is defined, where `swarm_mj` itself has it, too."""
+    found = getattr(swarm_mj, name.removeprefix("swarm_mj."), None)
+    return f"{found.__module__}.{found.__qualname__}" if found is not None else name
 
 
 MAP_INTRODUCTION = """# From the paper to the code
