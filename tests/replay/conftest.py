@@ -41,6 +41,12 @@ def record(policy_name, probability, *, task="flocking", **overrides):
 
 
 @pytest.fixture(scope="session")
+def long():
+    """A busy flight of the default size."""
+    return record("mst", 0.3, num_robots=40, num_windows=500, boundary="none")
+
+
+@pytest.fixture(scope="session")
 def two_way():
     """Windows of Alg. 1, busy enough that packets of all fates occur."""
     return record("mst", 0.3)

@@ -101,3 +101,8 @@ def test_a_team_at_rest_has_no_velocities(still_replay):
     assert not found & {"/arena/heading", "/arena/trail", "/arena/belief/ring"}
     assert not any(path.startswith("/plots/task") for path in found)
     assert {"/plots/age/mean", "/arena/tree", "/arena/radio/delivered"} <= found
+
+
+def test_a_replay_of_500_windows_of_40_robots_stays_below_5_mb(long, tmp_path):
+    write_replay(long.log, long.mission, {"seed": 5}, tmp_path / "a.rrd")
+    assert 1e6 < (tmp_path / "a.rrd").stat().st_size < 5e6
