@@ -118,10 +118,12 @@ def core(installed, tmp_path_factory):
         shutil.copy(compiled, place)
 
     def run(folder, *arguments):
+        environment = os.environ | {"PYTHONPATH": f"{wheel}{os.pathsep}{packages}"}
+        environment.pop("MUJOCO_GL", None)  # tests that render leave it; MuJoCo then loads OpenGL
         return subprocess.run(
             [sys.executable, "-S", *arguments],  # without this Python's own site-packages
             cwd=folder,
-            env=os.environ | {"PYTHONPATH": f"{wheel}{os.pathsep}{packages}"},
+            env=environment,
             capture_output=True,
             text=True,
             check=False,
