@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Float32, Int
 
 from swarm_mj.fields import check, setting
 from swarm_mj.gnn.action_distribution import IMPOSSIBLE, sample
-from swarm_mj.gnn.feature_sets import num_features
+from swarm_mj.gnn.feature_sets import check_features, num_features
 from swarm_mj.gnn.graphs import FeatureExtractor
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.policy import DecentralisedPolicy, Parameters
@@ -41,7 +41,7 @@ class MlpShape:
 
     def __post_init__(self) -> None:
         check(self)
-        num_features(self.features)
+        check_features(self.features)
 
     def tensors(self) -> dict[str, tuple[int, ...]]:
         """The weights' names and shapes."""
