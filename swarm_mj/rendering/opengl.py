@@ -46,7 +46,12 @@ def make_context(width: int, height: int) -> Context:
     try:
         return importlib.import_module(f"mujoco.{name}").GLContext(width, height)
     except Exception as error:  # each back end has its own
-        raise OSError(f"{name} does not work here ({type(error).__name__}); {WAY_OUT}") from error
+        raise unusable(error) from error
+
+
+def unusable(error: Exception) -> OSError:
+    """What to raise when the back end in use turns out not to work."""
+    return OSError(f"{backend()} does not work here ({type(error).__name__}); {WAY_OUT}")
 
 
 def backend() -> str:

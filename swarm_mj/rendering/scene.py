@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import UInt8
 from mujoco._enums import mjtCamera, mjtCatBit, mjtFontScale, mjtFramebuffer, mjtObj
+from mujoco._errors import FatalError
 from mujoco._functions import (
     mj_camlight,
     mj_comPos,
@@ -19,7 +20,7 @@ from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.rendering.camera import ELEVATION_DEG, FOV_Y_DEG, Camera, look_at
 from swarm_mj.rendering.contents import Contents
 from swarm_mj.rendering.markers import GEOMS_PER_ROBOT, Markers
-from swarm_mj.rendering.opengl import make_context
+from swarm_mj.rendering.opengl import make_context, unusable
 
 MAX_PIXELS = 4096  # of a picture's side
 BEACONS = 2  # the group of the robots' own markers, assets/robot.xml: too small from afar
@@ -67,7 +68,10 @@ class SceneRenderer:
         self._options.geomgroup[BEACONS] = 0
         self._opengl = make_context(width, height)
         self._opengl.make_current()
-        self._context = MjrContext(self._model, mjtFontScale.mjFONTSCALE_100.value)
+        try:
+            self._context = MjrContext(self._model, mjtFontScale.mjFONTSCALE_100.value)
+        except FatalError as error:  # GLFW without a screen says nothing before
+            raise unusable(error) from error
         mjr_setBuffer(mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
 
     def camera(self, contents: Contents) -> Camera:

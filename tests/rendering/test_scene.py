@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from moments import GREEN, moment
+from mujoco import FatalError
 from mujoco import mjtGeom as MjtGeom
 from scipy import ndimage
 
@@ -140,3 +141,12 @@ def test_wrong_sizes_and_teams_are_named():
         pytest.raises(ValueError, match="contents must have 3 robots, not 2"),
     ):
         renderer.frame(moment([(0.0, 0.0), (1.0, 1.0)]))
+
+
+def test_a_back_end_that_turns_out_not_to_work_is_one_line(monkeypatch):
+    def refuse(*_):
+        raise FatalError("no context")
+
+    monkeypatch.setattr("swarm_mj.rendering.scene.MjrContext", refuse)
+    with pytest.raises(OSError, match=r"does not work here \(FatalError\); rendering needs OpenGL"):
+        SceneRenderer(paper(num_robots=3), 64, 64)
