@@ -40,7 +40,7 @@ def _feature_set(features: str) -> type[FeatureExtractor]:
     check_features(features)
     if features in FEATURE_SETS:
         return FEATURE_SETS[features]
-    check_named(features, _own, "this")
+    check_named(features, _own, "it")
     return _own[features]
 
 
