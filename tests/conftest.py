@@ -1,5 +1,7 @@
 """What every test runs under."""
 
+import os
+from ctypes.util import find_library
 from pathlib import Path
 
 import pytest
@@ -10,6 +12,11 @@ from sampled_types import check_again
 # Compiling takes its time on an example's first run; no law here is about time.
 settings.register_profile("swarm_mj", deadline=None, max_examples=50)
 settings.load_profile("swarm_mj")
+
+# dm_control settles on an OpenGL for the whole process when its tests are collected. Left to itself
+# without a display, it takes EGL at its word, and where that has no driver nothing draws any more.
+if find_library("OSMesa") and not os.environ.get("DISPLAY"):
+    os.environ.setdefault("MUJOCO_GL", "osmesa")
 
 TRAINING = Path(__file__).parent.parent / "training"
 
