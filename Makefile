@@ -31,7 +31,7 @@ $(READY): pyproject.toml tools/constraints.txt tools/hashes.txt
 	@$(PYTHON) -c "import sys; sys.exit(0 if (3, 11) <= sys.version_info < (3, 13) else \
 	  f'the pinned versions are for Python 3.11 and 3.12, not {sys.version.split()[0]}; ' \
 	  'try make PYTHON=python3.11')"
-	@echo "Setting up .venv (a few minutes and 2.7 GB, once) ..."
+	@echo "Setting up .venv (a few minutes, once; 3.3 GB, or 6.9 GB with CUDA) ..."
 	@$(PYTHON) -m venv .venv
 	@$(PIP) --no-deps --require-hashes --requirement tools/hashes.txt
 	@$(PIP) --constraint tools/constraints.txt --no-build-isolation --editable '.[dev]'
