@@ -48,7 +48,9 @@ def parse(arguments: Sequence[str]) -> tuple[Any, Any]:
         from rich.console import Console
 
         from swarm_mj.cli import options
+        from swarm_mj.rendering.opengl import check_choice
 
+        check_choice()  # before something imports MuJoCo
         with Console(stderr=True).status("Loading ..."):
             command = importlib.import_module(f"swarm_mj.cli.{arguments[0]}")
         prog, summary = f"swarm-mj {arguments[0]}", COMMANDS[arguments[0]]

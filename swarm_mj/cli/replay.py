@@ -3,7 +3,7 @@
 import re
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ from swarm_mj.fields import setting
 from swarm_mj.io.atomic import write_bytes
 from swarm_mj.io.interrupt import heard_interrupt
 from swarm_mj.io.packages import need
+from swarm_mj.parts import SHOWN_AS, OwnParts
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
 
@@ -61,6 +62,13 @@ class Options:
     fps: int | None = setting(
         None, "pictures per second", group=VIDEO, low=1, high=60, shown="25; GIF: 15"
     )
+    scene: str | None = setting(
+        None,
+        "the scene of your own that the mission was flown in",
+        group=VIDEO,
+        metavar=SHOWN_AS,
+        shown="the bare arena",
+    )
     force: bool = setting(False, "replace an existing video", group=VIDEO)
     yes: bool = setting(False, YES, group=VIDEO)
 
@@ -69,8 +77,10 @@ def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
     if options.video is not None:
         return _make_video(options, options.video)
-    if options.size or options.seconds or options.fps or options.force:
-        raise ValueError("--size, --seconds, --fps and --force are of videos; name one by --video")
+    if options.size or options.seconds or options.fps or options.force or options.scene:
+        raise ValueError(
+            "--size, --seconds, --fps, --scene and --force are of videos; name one by --video"
+        )
     from swarm_mj.replay.read import check_replay  # rerun takes its time to import
 
     for file in options.file:
@@ -122,8 +132,21 @@ def _read(options: Options) -> tuple[list["Footage"], float]:
 
     if len(options.file) > MOST_MISSIONS:
         raise ValueError(f"a video shows 1 or {MOST_MISSIONS} replays, not {len(options.file)}")
-    footages = [read_footage(file) for file in options.file]
+    footages = [_in_scene(read_footage(file), options.scene) for file in options.file]
     return footages, options.seconds or usual_seconds(footages)
+
+
+def _in_scene(footage: "Footage", scene: str | None) -> "Footage":
+    """With the scene named here: the name in a file is somebody else's, and is never loaded."""
+    flown_in = footage.facts.scene
+    if scene is not None:
+        return replace(footage, **OwnParts(scene=scene).made(footage.facts.mission))
+    if flown_in is not None:
+        Console(stderr=True, highlight=False).print(
+            f"The video shows the bare arena. The mission was flown in the scene {flown_in}; "
+            "--scene shows it, too."
+        )
+    return footage
 
 
 def usual_seconds(footages: "Sequence[Footage]") -> float:

@@ -14,6 +14,8 @@ from typing import Protocol, runtime_checkable
 from swarm_mj.io.processes import running
 
 CHOICE = "MUJOCO_GL"  # the variable by which people choose, and MuJoCo's renderer is told
+OFF, ON = ("disable", "disabled", "off", "false", "0"), ("enable", "enabled", "on", "true", "1")
+NAMES = ("egl", "osmesa", "glfw", "glx", "cgl", "wgl")  # each works on some systems
 WITHOUT_SCREEN = ("egl", "osmesa")  # on Linux; EGL may have a graphics card, OSMesa never
 TRIAL = "from mujoco.egl import GLContext; GLContext(8, 8).make_current()"
 WAY_OUT = (
@@ -54,16 +56,31 @@ def unusable(error: Exception) -> OSError:
     return OSError(f"{backend()} does not work here ({type(error).__name__}); {WAY_OUT}")
 
 
+def check_choice() -> str:
+    """What MUJOCO_GL says, in lower case; MuJoCo cannot even be imported with a name it lacks.
+
+    Raises:
+        ValueError: It has no such back end.
+    """
+    chosen = os.environ.get(CHOICE, "").lower().strip()
+    if chosen and chosen not in (*NAMES, *ON, *OFF):
+        raise ValueError(
+            f"the environment variable {CHOICE} must be one of {', '.join(NAMES)} or off, not "
+            f"{chosen!r}; unset it"
+        )
+    return chosen
+
+
 def backend() -> str:
     """The back end in use: the one that MUJOCO_GL names, or else the first that works here.
 
     Raises:
         OSError: MUJOCO_GL says that there is to be none.
     """
-    chosen = os.environ.get(CHOICE, "").lower().strip()
-    if chosen in ("disable", "disabled", "off", "false", "0"):
+    chosen = check_choice()
+    if chosen in OFF:
         raise OSError(f"{CHOICE}={chosen} switches rendering off; unset it")
-    if chosen in ("", "enable", "enabled", "on", "true", "1"):
+    if chosen in ("", *ON):
         return _default()
     return "glfw" if chosen == "glx" else chosen
 

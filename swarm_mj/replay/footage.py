@@ -24,6 +24,7 @@ class Facts:
     observer: int
     is_broadcast: bool
     full_scale: float  # the age from which robots are darkest [windows]
+    scene: str | None = None  # the name of what changed the arena
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +39,7 @@ class Footage:
     is_on: Bool[np.ndarray, "T N"]  # whether a robot was switched on
     shots: Shots
     age_mean: Float[np.ndarray, "T"]  # Eq. 10 [windows]
-    scene: Scene | None = None  # what changed the arena; files do not hold it
+    scene: Scene | None = None  # what changed the arena; files have its name only
 
     @property
     def frame(self) -> Frame:
@@ -58,7 +59,7 @@ class Footage:
         return palette.robot_colours(age, scale, is_known, self.is_on, self.facts.observer)
 
 
-def facts_of(log: Log, mission: Mission, policy: str, seed: int) -> Facts:
+def facts_of(log: Log, mission: Mission, policy: str, seed: int, scene: str | None = None) -> Facts:
     """What does not change in a mission that was recorded."""
     return Facts(
         mission=mission,
@@ -67,6 +68,7 @@ def facts_of(log: Log, mission: Mission, policy: str, seed: int) -> Facts:
         observer=log.ego,
         is_broadcast=log.is_broadcast,
         full_scale=palette.nice_scale(log.age),
+        scene=scene,
     )
 
 

@@ -56,7 +56,10 @@ def _recorded(log: Log, mission: Mission, config: dict[str, object], name: str) 
         recording.set_log_time_enabled(False)
         recording.send_recording_name(name)
         recording.send_property("mission", rr.AnyValues(drop_untyped_nones=True, **config))
-        facts = facts_of(log, mission, str(config.get("policy", "")), _seed(config))
+        policy, scene = (config.get(name) for name in ("policy", "scene"))
+        facts = facts_of(
+            log, mission, str(policy or ""), _seed(config), None if scene is None else str(scene)
+        )
         recording.send_property(FACTS, rr.AnyValues(json=json.dumps(asdict(facts))))
         draw(Sheet(recording, log, shown, mission.window_s), mission, packets)
         lines = [f"- **{key}**: {value}" for key, value in config.items()]

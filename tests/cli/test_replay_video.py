@@ -142,3 +142,40 @@ def test_the_first_picture_of_a_process_needs_no_variables(flown, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert shape(tmp_path / "a.mp4")[0] == 6
+
+
+PILLAR = """
+import mujoco
+
+
+def pillar(spec, mission):
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX, size=[60, 60, 20], rgba=[1, 0, 0, 1], pos=[0, 0, 20]
+    )
+"""
+
+
+def num_red(path):
+    """Pixels of the pillar in the first picture."""
+    with av.open(str(path)) as container:
+        picture = next(container.decode(video=0)).to_ndarray(format="rgb24").astype(int)
+    return int(((picture[..., 0] > 90) & (picture[..., 1:].max(axis=-1) < 60)).sum())
+
+
+def test_a_scene_of_ones_own_is_shown_when_it_is_named_again(here, capsys):
+    """The name in a replay's file may be anybody's: it is told, and not loaded."""
+    Path("my_scene.py").write_text(PILLAR)
+    flight = ["fly", "--task", "stationary", "--robots", "5", "--windows", "6", "--range-ratio"]
+    scene = ["--scene", "my_scene:pillar"]
+    assert main([*flight, "0.5", "--policy", "tdma", "--record", "a.rrd", *scene]) == 0
+    video = ["replay", "a.rrd", "--video"]
+    capsys.readouterr()
+    assert main([*video, "bare.mp4", *SMALL]) == 0
+    said = " ".join(capsys.readouterr().err.split())
+    assert "shows the bare arena. The mission was flown in the scene my_scene:pillar;" in said
+    assert main([*video, "whole.mp4", *SMALL, *scene]) == 0
+    assert "bare arena" not in capsys.readouterr().err
+    assert num_red(here / "bare.mp4") == 0
+    assert num_red(here / "whole.mp4") > 20
+    assert main([*video, "none.mp4", *SMALL, "--scene", "my_scene:pilar"]) == 2
+    assert "pillar" in capsys.readouterr().err

@@ -4,6 +4,7 @@ import sys
 
 import pytest
 
+from swarm_mj.cli import main
 from swarm_mj.rendering import opengl
 
 
@@ -46,8 +47,8 @@ def test_a_trial_that_fails_is_quiet(capfd):
 
 
 def test_no_opengl_is_one_line_with_the_way_out(monkeypatch):
-    monkeypatch.setenv(opengl.CHOICE, "nothing")
-    with pytest.raises(OSError, match=r"nothing does not work here .*apt-get install") as refused:
+    monkeypatch.setenv(opengl.CHOICE, "wgl")
+    with pytest.raises(OSError, match=r"wgl does not work here .*apt-get install") as refused:
         opengl.make_context(8, 8)
     assert "\n" not in str(refused.value)
 
@@ -56,3 +57,12 @@ def test_rendering_that_is_switched_off_says_so(monkeypatch):
     monkeypatch.setenv(opengl.CHOICE, "off")
     with pytest.raises(OSError, match="MUJOCO_GL=off switches rendering off"):
         opengl.backend()
+
+
+def test_a_back_end_that_does_not_exist_is_told_before_mujoco_is_loaded(monkeypatch, capsys):
+    monkeypatch.setenv(opengl.CHOICE, "bogus")
+    assert main(["fly", "--no-record"]) == 2
+    said = capsys.readouterr().err
+    assert "MUJOCO_GL must be one of egl, osmesa" in said
+    assert "not 'bogus'; unset it" in said
+    assert said.count("\n") == 1
