@@ -44,7 +44,7 @@ def made(committed, forks, tmp_path_factory):
 @pytest.mark.parametrize("policy", CHEAP)
 def test_a_committed_row_is_what_its_command_makes(committed, made, policy):
     row, again = committed[policy], made[policy]
-    assert row.keys() == again.keys()
+    assert row.keys() <= again.keys()  # columns may have been added since
     for column in row.keys() - {"version", "commit", "config"}:
         try:
             expected = pytest.approx(float(again[column]), rel=1e-9)
