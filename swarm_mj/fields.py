@@ -7,6 +7,7 @@ line at once.
 from collections.abc import Iterable
 from dataclasses import MISSING, Field, field, fields
 from difflib import get_close_matches
+from functools import partial
 from numbers import Integral, Real
 from types import NoneType
 from typing import Any, Literal, get_args, get_origin
@@ -101,6 +102,13 @@ def check_kind(
         raise TypeError(
             f"{what} must be of the type {names}, such as {such_as}, not {_shown(value)}"
         )
+
+
+def name_of(part: Any) -> str:  # noqa: ANN401 - any function or object
+    """What a function, a class or an object is called: an object by its class, for messages."""
+    while isinstance(part, partial):
+        part = part.func
+    return getattr(part, "__name__", type(part).__name__)
 
 
 def check_callable(what: str, value: object) -> None:

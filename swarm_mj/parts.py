@@ -32,6 +32,12 @@ def is_own(name: str) -> bool:
     return ":" in name
 
 
+def is_ours(part: object) -> bool:
+    """Whether a part is this package's: what it does is known, so it may be handed live arrays."""
+    home = getattr(part, "__module__", None) or type(part).__module__
+    return home.partition(".")[0] == __package__
+
+
 def load(kind: str, name: str) -> Any:  # noqa: ANN401 - whatever has that name
     """What a user's `module:Name` names; the module is looked for in the current folder first.
 

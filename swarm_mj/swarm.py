@@ -14,6 +14,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.mission.placement import connected_positions
 from swarm_mj.mission.robot_failures import draw_survivors, failure_window
+from swarm_mj.parts import is_ours
 from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import Physics
@@ -139,15 +140,16 @@ class Swarm:
         """
         if policy is not self._started:
             self.start(policy)
+        views = self.views if is_ours(policy) else self.views.copy()
         if isinstance(policy, CentralisedPolicy):
-            return policy.recipients(self.views, self.states)
+            return policy.recipients(views, self._states_for(policy))
         if isinstance(policy, DecentralisedPolicy):
-            return policy.recipients(self.views)
+            return policy.recipients(views)
         raise TypeError("a policy must be a DecentralisedPolicy or a CentralisedPolicy")
 
     def move(self) -> RobotStates:
         """Moves the robots through one window, by their controller and the physics."""
-        wanted_mps2 = self.controller(self._read_only, self.states)
+        wanted_mps2 = self.controller(self._read_only, self._states_for(self.controller))
         return self._physics.step(np.asarray(wanted_mps2, dtype=np.float64))
 
     def step(self, policy: Policy) -> WindowCosts:
@@ -174,6 +176,10 @@ class Swarm:
         request_response = RequestResponse(silence_is_attempt=self.mission.silence_is_attempt)
         return self._play(request_response, lambda: recipient)
 
+    def _states_for(self, part: object) -> RobotStates:
+        """Where the robots truly are; a user's own part gets copies, so it can move nothing."""
+        return self.states if is_ours(part) else self.states.copy()
+
     def _play(
         self, window: WindowProtocol, decide: Callable[[], Int[np.ndarray, "B N"]]
     ) -> WindowCosts:
@@ -197,7 +203,7 @@ class Swarm:
         controller = self._costed
         if controller is None:
             return None
-        value = np.asarray(controller.cost(self.states), dtype=np.float64)
+        value = np.asarray(controller.cost(self._states_for(controller)), dtype=np.float64)
         if value.shape != self.now.shape or not np.all(value >= 0.0):
             raise ValueError(
                 f"a controller's cost must be {len(self.now)} numbers of 0 or more, one a mission, "

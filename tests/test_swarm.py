@@ -311,15 +311,15 @@ def test_eq7_silence_is_an_attempt_in_the_reference_preset_only(preset, own_atte
 
 
 def test_eq6_channel_is_exchangeable():
-    """Everyone decodes robot 5, whatever was sent: the swarm believes its channel."""
+    """Everyone decodes robot 5 and nobody else, wherever they are: the swarm believes it."""
 
     def only_robot_5(position_m, recipient):
         assert position_m.shape == (*recipient.shape, 2)
-        return np.full_like(recipient, 5)
+        return np.where(recipient[:, 5:6] != 5, 5, np.arange(8))
 
     swarm = Swarm(small(), [1, 2], channel=only_robot_5)
-    swarm.exchange(silence_of(2, 8))
-    assert np.all(swarm.buffers.timestamp[..., 5] == 1.0)
+    swarm.exchange(np.roll(silence_of(2, 8), 1, axis=1))
+    assert np.all(swarm.buffers.timestamp[:, np.arange(8) != 5, 5] == 0.5)
     is_own_or_5 = np.eye(8, dtype=bool) | (np.arange(8) == 5)
     np.testing.assert_array_equal(swarm.buffers.is_known, np.stack([is_own_or_5] * 2))
 
@@ -342,7 +342,7 @@ def test_eq16_a_robot_does_not_react_to_one_it_has_not_heard(preset, monkeypatch
 
     def all_but_7_hear_0(position_m, recipient):
         heard = to_nobody(position_m, recipient)
-        heard[:, 1:7] = 0
+        heard[:, 1:7] = np.where(recipient[:, :1] != 0, 0, heard[:, 1:7])
         return heard
 
     def with_a_slower_robot_7(mission, rng):
@@ -356,7 +356,9 @@ def test_eq16_a_robot_does_not_react_to_one_it_has_not_heard(preset, monkeypatch
         swarm = Swarm(small(preset=preset), [1, 2], channel=all_but_7_hear_0)
         start_mps = swarm.states.velocity_mps
         for _ in range(NUM_WINDOWS):
-            swarm.exchange(silence_of(2, 8))
+            recipient = silence_of(2, 8).copy()
+            recipient[:, 0] = 1
+            swarm.exchange(recipient)
         ends.append(swarm.states.velocity_mps)
     assert np.all(start_mps[:, 1:7] != ends[0][:, 1:7])  # they did react to robot 0
     np.testing.assert_array_equal(ends[0][:, :7], ends[1][:, :7])
@@ -446,3 +448,77 @@ def test_the_clock_and_the_last_phase_are_current_at_each_half_of_flooding():
         swarm.step(policy)
     np.testing.assert_array_equal(policy.own_age, 0.0)
     assert policy.num_phases == [0, 1, 2, 1, 2, 1]
+
+
+class Meddles(CentralisedPolicy):
+    """Writes into everything that it gets; so do the two below."""
+
+    def recipients(self, views, states):
+        views.now[:] = 1000.0
+        for phase in views.phases:
+            phase.heard[:] = 0
+        spoil(states)
+        return np.roll(views.silence, 1, axis=1)
+
+
+def spoil(states):
+    states.position_m[:] = states.velocity_mps[:] = 7.0
+    if states.is_active is not None:
+        states.is_active[:] = True
+
+
+class Pulls:
+    cost_name, cost_unit = "nothing", "m"
+
+    def __init__(self, *, meddles):
+        self.meddles = meddles
+
+    def __call__(self, _buffers, states):
+        wanted = -states.position_m
+        self.spoil(states)
+        return wanted
+
+    def cost(self, states):
+        self.spoil(states)
+        return np.zeros(len(states.position_m))
+
+    def spoil(self, states):
+        if self.meddles:
+            spoil(states)
+
+
+class Asks(CentralisedPolicy):
+    """Chooses as `Meddles` does."""
+
+    def recipients(self, views, _states):
+        return np.roll(views.silence, 1, axis=1)
+
+
+def hears_nothing_and_writes(position_m, recipient):
+    position_m[:] = 0.0
+    return to_nobody(position_m, recipient)
+
+
+def test_parts_of_ones_own_cannot_move_what_they_are_shown():
+    mission = small(switched_off=0.3, num_windows=NUM_WINDOWS)
+    honest = Swarm(mission, [1, 2], channel=to_nobody, controller=Pulls(meddles=False))
+    channel, controller = hears_nothing_and_writes, Pulls(meddles=True)
+    meddled = Swarm(mission, [1, 2], channel=channel, controller=controller)
+    assert_same(course(honest, Asks()), course(meddled, Meddles()))
+
+
+@pytest.mark.parametrize(
+    ("answer", "complaint"),
+    [
+        (np.ones((1, 8)), r"transmits of Says must be True or False .* \(1, 8\), .* not float64"),
+        (np.ones(8, dtype=bool), r"transmits of Says must .* not bool of shape \(8,\)"),
+        (-1, r"transmits of Says must .* not int64 of shape \(\)"),
+    ],
+)
+def test_who_transmits_is_told_by_one_truth_value_a_robot(answer, complaint):
+    class Says(BroadcastPolicy):
+        def transmits(self, _views):
+            return answer
+
+    with pytest.raises(ValueError, match=complaint):
+        Swarm(small(), [1]).step(Says())

@@ -33,7 +33,8 @@ def print_results(results: Sequence[Result], *, is_plain: bool = False) -> None:
         of_regime = sorted(group, key=lambda result: result.aoi_mean)
         console.print(regime)
         wide.print(_table(of_regime))
-        console.print(_bound(of_regime))
+        for line in _bound(of_regime):
+            console.print(line)
         console.print()
     console.print(_legend(results))
 
@@ -116,11 +117,15 @@ def _published(result: Result) -> str:
     return f"{age}\n{_number(result.published_velocity_variance_mean, '.4f')}"
 
 
-def _bound(results: Sequence[Result]) -> str:
-    """The lower bound; flocks fly as they are told, so each policy may have its own."""
-    bounds = [result.aoi_floor_mean for result in results]
+def _bound(results: Sequence[Result]) -> list[str]:
+    """The lower bound, if known; flocks fly as they are told, so each policy may have its own."""
+    bounds = [result.aoi_floor_mean for result in results if result.aoi_floor_mean is not None]
+    if not bounds:
+        return []
     low, high = f"{min(bounds):.2f}", f"{max(bounds):.2f}"
-    return f"lower bound (connectivity): {low}" + (f" to {high}, by policy" if low != high else "")
+    return [
+        f"lower bound (connectivity): {low}" + (f" to {high}, by policy" if low != high else "")
+    ]
 
 
 def _legend(results: Sequence[Result]) -> str:
@@ -141,9 +146,10 @@ def _legend(results: Sequence[Result]) -> str:
         sentences.append("Velocity variance (var.): of the robots' velocities [m²/s²].")
     if any(result.published_aoi_mean is not None for result in results):
         sentences.append("Published: by the paper.")
-    sentences.append(
-        "Lower bound: the AoI if all robots with a path between them shared everything at once."
-    )
+    if any(result.aoi_floor_mean is not None for result in results):
+        sentences.append(
+            "Lower bound: the AoI if all robots with a path between them shared everything at once."
+        )
     if any(carries_more(result) for result in results):
         sentences.append(f"+: packets {CARRIES_MORE}, which the paper's carry.")
     return " ".join(sentences)

@@ -12,8 +12,9 @@ from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.policy_options import NAMED
 from swarm_mj.cli.terminal import plain_console
 from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS
-from swarm_mj.evaluation.results import read_results
+from swarm_mj.evaluation.results import Result, read_results
 from swarm_mj.fields import setting
+from swarm_mj.parts import OwnParts
 from swarm_mj.policies.registry import directories
 
 
@@ -48,7 +49,7 @@ def run(options: Options) -> int:
     paths = _paths(options)
     needs = figures_needs(options.results, sum(map(len, paths.values())))
     check_fits(needs, options.out, "draw fewer results at once", is_forced=options.yes)
-    results = [result for path in options.results for result in read_results(path)]
+    results = [result for path in options.results for result in _papers(path)]
     with Console(stderr=True).status("Drawing ...") as status:
         # matplotlib takes its time to import; a cache that it cannot keep is no news
         logging.getLogger("matplotlib").setLevel(logging.ERROR)
@@ -75,6 +76,20 @@ def run(options: Options) -> int:
     if left_out := ", ".join(name for name in paths if name not in drawn):
         plain_console().print(f"Left out {left_out}: the results hold no point of them")
     return 0
+
+
+def _papers(path: Path) -> list[Result]:
+    """A file's results; raises ValueError for those that the paper's values cannot stand beside."""
+    results = read_results(path)
+    for row, result in enumerate(results, start=1):
+        parts = OwnParts(channel=result.channel, controller=result.controller, scene=result.scene)
+        for kind, name in parts.named.items():
+            raise ValueError(
+                f"figures compare with the paper's values, but row {row} of {path} was flown with "
+                f"the {kind} {name}; leave such rows out, or chart them with "
+                f"`swarm_mj.evaluate(...).plot()` in Python"
+            )
+    return results
 
 
 def _paths(options: Options) -> dict[str, list[Path]]:

@@ -14,10 +14,12 @@ from swarm_mj.parts import OwnParts, one_line_each
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.window import SLOT_WINDOWS
+from swarm_mj.radio.free_space import FreeSpaceRadio
+from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.rollout import WindowRecord, rollout
 from swarm_mj.swarm import Swarm
 
-MEANS = ("aoi", "aoi_floor", "velocity_variance", "hops")  # over windows
+MEANS = ("aoi", "velocity_variance", "hops")  # over windows
 PACKETS = {  # totals, and what `protocol.costs.Packets` calls them
     "packets_sent": "sent",
     "packets_delivered": "delivered",
@@ -49,7 +51,7 @@ class BatchCosts:
 
     aoi: list[Cost]  # Eq. 10, mean over windows [windows]
     aoi_steady: list[Cost]  # as above, over the second half of the mission
-    aoi_floor: list[Cost]  # the connectivity floor, mean over windows [windows]
+    aoi_floor: list[Cost | None]  # the connectivity floor, as above; None: own channel
     velocity_variance: list[Cost]  # Eq. 17, mean over windows [m²/s²]
     hops: list[Cost]  # depth of the parent trees, mean over windows
     task_cost: list[Cost | None]  # mean over windows; None if the controller has none
@@ -110,9 +112,12 @@ class Tally:
         """Starts at nothing; the swarm is at the start of its missions."""
         mission, num_missions = swarm.mission, len(swarm.now)
         self._swarm = swarm
-        self._floor = ConnectivityFloor(num_missions, mission.num_robots, mission.range_m)
+        self._floor: ConnectivityFloor | None = None  # it reckons with the mission's own range
+        if isinstance(swarm.channel, FreeSpaceRadio) and swarm.channel == radio_of(mission):
+            self._floor = ConnectivityFloor(num_missions, mission.num_robots, mission.range_m)
         self._num_steady = mission.num_windows - mission.num_windows // 2
-        self._sums = {name: np.zeros(num_missions) for name in (*MEANS, "aoi_steady", *PACKETS)}
+        names = (*MEANS, "aoi_steady", "aoi_floor", *PACKETS)
+        self._sums = {name: np.zeros(num_missions) for name in names}
         self._task_cost, self._last_task_cost = np.full((2, num_missions), np.nan)
         self._complete = np.full(num_missions, np.inf)
         self._ages = np.zeros(num_ages(mission), dtype=np.int64)
@@ -125,7 +130,9 @@ class Tally:
         added = packets | {
             "aoi": costs.age_windows,
             "aoi_steady": costs.age_windows * is_steady,
-            "aoi_floor": self._floor.next(swarm.states.position_m, swarm.now, is_active),
+            "aoi_floor": self._floor.next(swarm.states.position_m, swarm.now, is_active)
+            if self._floor
+            else np.nan,
             "velocity_variance": costs.velocity_variance_m2ps2,
             "hops": flown.hops,
         }
@@ -146,6 +153,7 @@ class Tally:
             **{name: (sums[name] / num_windows).tolist() for name in MEANS},
             **packets,
             aoi_steady=(sums["aoi_steady"] / self._num_steady).tolist(),
+            aoi_floor=_finite(sums["aoi_floor"] / num_windows),
             task_cost=_finite(self._task_cost / num_windows),
             task_cost_last=_finite(self._last_task_cost),
             complete_window=_whole(self._complete),

@@ -51,7 +51,8 @@ class Result:
     aoi_steady_sem: float | None
     age_p95: float  # over all ordered pairs of two robots and all windows of all missions
     age_worst: float  # as above
-    aoi_floor_mean: float  # what instant sharing within connected parts would leave
+    # What instant sharing within connected parts would leave; None over a channel of one's own.
+    aoi_floor_mean: float | None
     aoi_floor_sem: float | None
 
     velocity_variance_mean: float

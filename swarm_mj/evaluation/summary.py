@@ -109,9 +109,8 @@ def _costs(costs: BatchCosts) -> dict[str, Any]:
     for cost in COSTS:
         found = asdict(spread(np.array(getattr(costs, cost))))
         columns |= {f"{cost}_{name}": value for name, value in found.items()}
-    for cost in ("aoi_steady", "aoi_floor"):
-        samples = np.array(getattr(costs, cost))
-        columns |= {f"{cost}_mean": float(np.mean(samples)), f"{cost}_sem": standard_error(samples)}
+    columns |= _mean_and_sem("aoi_steady", costs.aoi_steady)
+    columns |= _mean_and_sem("aoi_floor", costs.aoi_floor)
     for name, share in (("age_p95", 0.95), ("age_worst", 1.0)):
         columns[name] = SLOT_WINDOWS * quantile_of_counts(np.array(costs.ages), share)
     return {name: value for name, value in columns.items() if name in COLUMNS}
@@ -123,9 +122,17 @@ def _task_costs(costs: BatchCosts, label: tuple[str, str] | None) -> dict[str, A
         return {}
     columns: dict[str, Any] = {"task_cost_name": label[0], "task_cost_unit": label[1]}
     for name in ("task_cost", "task_cost_last"):
-        samples = np.array(_known(getattr(costs, name)))
-        columns |= {f"{name}_mean": float(np.mean(samples)), f"{name}_sem": standard_error(samples)}
+        columns |= _mean_and_sem(name, getattr(costs, name))
     return columns
+
+
+def _mean_and_sem(name: str, costs: Sequence[float | None]) -> dict[str, float | None]:
+    """The mean over missions and its standard error; None unless all missions have the cost."""
+    samples = _known(costs)
+    if samples is None:
+        return {f"{name}_mean": None, f"{name}_sem": None}
+    mean, sem = float(np.mean(samples)), standard_error(np.array(samples))
+    return {f"{name}_mean": mean, f"{name}_sem": sem}
 
 
 def _known(costs: Sequence[float | None]) -> list[float] | None:

@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 
 from swarm_mj.compiled import compiled
 from swarm_mj.mission.batched_rng import Started
+from swarm_mj.protocol.own_channel import decoded
 from swarm_mj.protocol.timestamps import merge_timestamps, observe_own
 from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, respondents
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio
@@ -80,8 +81,8 @@ class _Rows:
             rows = np.flatnonzero(self._turn == turn)
             sent_to = np.tile(np.arange(recipient.shape[1]), (num_missions, 1))
             sent_to[self._mission[rows]] = recipient[rows]
-            decoded = np.asarray(channel(position_m[:num_missions], sent_to))
-            heard[rows] = decoded[self._mission[rows]]
+            answered = decoded(channel, position_m[:num_missions], sent_to)
+            heard[rows] = answered[self._mission[rows]]
         return heard
 
 

@@ -13,3 +13,11 @@ class RobotStates:
     position_m: Float[np.ndarray, "B N 2"]  # p [m]
     velocity_mps: Float[np.ndarray, "B N 2"]  # v [m/s]
     is_active: Bool[np.ndarray, "B N"] | None = None  # who observes and talks; None: everyone
+
+    def copy(self) -> "RobotStates":
+        """The same in arrays of its own."""
+        return RobotStates(
+            position_m=self.position_m.copy(),
+            velocity_mps=self.velocity_mps.copy(),
+            is_active=None if self.is_active is None else self.is_active.copy(),
+        )

@@ -7,6 +7,7 @@ from numbers import Real
 import numpy as np
 from jaxtyping import Bool, Int
 
+from swarm_mj.fields import name_of
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.physics.state import RobotStates
@@ -86,8 +87,20 @@ class BroadcastPolicy(DecentralisedPolicy):
         """
 
     def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """`BROADCAST` for whoever transmits; the others address themselves, which is silence."""
-        return np.where(self.transmits(views), BROADCAST, views.silence)
+        """`BROADCAST` for whoever transmits; the others address themselves, which is silence.
+
+        Raises:
+            ValueError: `transmits` did not say True or False for each robot.
+        """
+        transmits = np.asarray(self.transmits(views))
+        shape = views.silence.shape
+        if transmits.shape != shape or transmits.dtype != np.bool_:
+            raise ValueError(
+                f"transmits of {name_of(self)} must be True or False for each robot, an array of "
+                f"bool of shape {shape}, missions by robots, not {transmits.dtype} of shape "
+                f"{transmits.shape}"
+            )
+        return np.where(transmits, BROADCAST, views.silence)
 
 
 class CentralisedPolicy(Policy, ABC):

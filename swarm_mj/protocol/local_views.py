@@ -22,6 +22,11 @@ class LocalViews:
     now: Float[np.ndarray, "B"]  # t on the synchronised clock [windows]
     phases: tuple[Phase, ...]  # of this window, or else the last: whom robot i addressed and heard
 
+    def copy(self) -> "LocalViews":
+        """The same for whoever may write: arrays of its own, and the buffers, which none can."""
+        phases = tuple(phase.copy() for phase in self.phases)
+        return LocalViews(buffers=self.buffers, now=self.now.copy(), phases=phases)
+
     @property
     def num_robots(self) -> int:
         """N, known to everyone before the mission (II-C)."""

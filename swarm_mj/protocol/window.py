@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.compiled import compiled
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST, Buffers, merge, observe_self, record_attempt
+from swarm_mj.protocol.own_channel import decoded
 from swarm_mj.radio.free_space import Channel
 
 SLOTS_PER_WINDOW = 2  # a transmission takes one, and so do its responses
@@ -26,6 +27,10 @@ class Phase:
 
     recipient: Int[np.ndarray, "B N"]  # S^i: whom i addressed, or BROADCAST; itself: it was silent
     heard: Int[np.ndarray, "B N"]  # i with j in R^i: whom robot j decoded; itself: nobody
+
+    def copy(self) -> "Phase":
+        """The same in arrays of its own."""
+        return Phase(recipient=self.recipient.copy(), heard=self.heard.copy())
 
 
 # Whom each robot addresses next, given the phases of this window so far.
@@ -215,8 +220,7 @@ def _send(
 ) -> Phase:
     """Sends everyone's packet through the channel (Eq. 6) and merges what was decoded."""
     sent_to = _of_active(states.is_active, recipient)
-    decoded = np.asarray(channel(states.position_m, sent_to.copy()))  # which it may write
-    heard = _of_active(states.is_active, decoded)
+    heard = _of_active(states.is_active, decoded(channel, states.position_m, sent_to))
     merge(buffers, heard)
     return Phase(recipient=sent_to.copy(), heard=heard)
 

@@ -31,7 +31,8 @@ class Channel(Protocol):
             recipient: Whom each robot addresses, or -1 for everyone; itself is silence.
 
         Returns:
-            The sender that each robot decodes; itself is nobody.
+            The sender that each robot decodes; itself is nobody. A robot that transmits may decode
+            another's packet; nobody decodes a robot that is silent.
         """
         ...
 

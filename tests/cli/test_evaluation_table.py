@@ -139,6 +139,8 @@ def test_the_lower_bound_stands_below(printed):
     lines = printed([some_result("a", 1.0), some_result("b", 2.0, aoi_floor_mean=1.75)], 100)
     assert "lower bound (connectivity): 1.00 to 1.75, by policy" in lines
     assert "lower bound (connectivity): 1.00" in printed([some_result("a", 1.0)], 100)
+    unknown = "\n".join(printed([some_result("a", 1.0, aoi_floor_mean=None)], 100))
+    assert "ower bound" not in unknown
 
 
 def test_a_tasks_own_cost_has_a_column_and_a_sentence(printed):

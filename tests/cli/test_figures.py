@@ -144,3 +144,13 @@ def test_help_names_the_figures_and_formats(swarm_mj):
     for word in ("fig2, fig3, fig4, fig5, fig6", "svg, png, pdf", "RESULTS.csv", "--force"):
         assert word in text
     assert "None" not in text
+
+
+@pytest.mark.parametrize("kind", ["channel", "controller", "scene"])
+def test_results_of_ones_own_parts_are_not_drawn_beside_the_papers(swarm_mj, tmp_path, kind):
+    everything = SYNTHETIC["everything"]()
+    everything[2] = replace(everything[2], **{kind: "mine:Part"})
+    write_csv(tmp_path / "all.csv", everything)
+    line = refusal(swarm_mj("figures", "all.csv", "--out", "."))
+    assert f"row 3 of all.csv was flown with the {kind} mine:Part" in line
+    assert [path.name for path in tmp_path.iterdir()] == ["all.csv"]

@@ -1,14 +1,17 @@
 """A batch's costs against flights summed up apart, and missions that do not depend on company."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from swarm_mj.evaluation.batch import Batch, count_ages, fly_batch
+from swarm_mj.evaluation.batch import Batch, Tally, count_ages, fly_batch
 from swarm_mj.evaluation.lower_bound import ConnectivityFloor
 from swarm_mj.evaluation.summary import merge
 from swarm_mj.mission import paper
 from swarm_mj.mission.placement import is_connected
 from swarm_mj.policies.registry import make_policy
+from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
@@ -105,3 +108,19 @@ def test_ages_by_hand():
     counts[:] = 0
     count_ages(timestamp, np.array([2.0]), counts, np.array([[True, True, False]]))
     assert counts.tolist() == [0, 1, 1, 0, 0]  # the third robot is off: 0.5 and 1 are left
+
+
+def test_over_a_channel_of_ones_own_there_is_no_floor():
+    """It reckons with the paper's range, which another radio need not have."""
+    mission = small("stationary")
+    radio = radio_of(mission)
+    for channel, expected in (
+        (radio, [0.0]),
+        (replace(radio, power_mw=2.0 * radio.power_mw), [None]),
+        (lambda *given: radio(*given), [None]),
+    ):
+        swarm = Swarm(mission, [1], channel=channel)
+        tally = Tally(swarm)
+        for flown in rollout(swarm, make_policy("mst", mission)):
+            tally.add(flown)
+        assert tally.costs().aoi_floor == expected

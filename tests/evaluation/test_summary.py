@@ -224,3 +224,9 @@ def test_a_task_without_a_cost_has_none():
     mst, _ = results()
     assert mst.task_cost_name is None
     assert mst.task_cost_mean is None
+
+
+def test_a_floor_that_no_mission_has_is_left_out():
+    unknown = [costs([1.0, 2.0], aoi_floor=[None, None]), costs([3.0], aoi_floor=[None])]
+    found, _ = summarise(two_policies(), dict(enumerate(unknown + ROUND_ROBIN)), MADE_BY)
+    assert (found.result.aoi_floor_mean, found.result.aoi_floor_sem) == (None, None)

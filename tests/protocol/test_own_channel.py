@@ -1,0 +1,65 @@
+"""What a user's own channel may answer, and that it cannot move what it is shown."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from swarm_mj.mission import paper
+from swarm_mj.protocol.own_channel import decoded
+from swarm_mj.radio.mission_radio import radio_of
+
+POSITION_M = np.zeros((1, 4, 2))
+RECIPIENT = np.array([[1, 1, -1, 3]])  # 0 addresses 1, 2 broadcasts; 1 and 3 are silent
+
+
+def answering(*heard):
+    def answer(_position_m, _recipient, wanted):
+        return wanted
+
+    return partial(answer, wanted=np.array([heard]))
+
+
+def test_a_robot_that_transmits_may_be_decoded_by_one_that_does_too():
+    heard = decoded(answering(2, 0, 0, 2), POSITION_M, RECIPIENT)
+    assert heard.tolist() == [[2, 0, 0, 2]]
+
+
+@pytest.mark.parametrize(
+    ("heard", "complaint"),
+    [
+        ((0, 3, 2, 3), "channel answer let robot 1 in mission 0 decode robot 3, which is silent;"),
+        ((0, 1, 2, 1), "channel answer let robot 3 in mission 0 decode robot 1, which is silent;"),
+        ((0, 1, 2, 4), "channel answer: sender heard of robot 3 in mission 0 must be from 0 to 3"),
+        ((0.0, 1.0, 2.0, 3.0), "channel answer: sender heard must be integers from 0 to 3, not fl"),
+        ((0, 1), r"channel answer: sender heard must have shape \(1, 4\), missions by robots"),
+    ],
+)
+def test_what_no_radio_does_is_refused(heard, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        decoded(answering(*heard), POSITION_M, RECIPIENT)
+
+
+def test_it_may_write_what_it_gets():
+    def writes(position_m, recipient):
+        heard = recipient.copy()
+        position_m += 7.0
+        recipient[:] = 2
+        return np.where(heard == -1, 2, np.arange(4))
+
+    assert decoded(writes, POSITION_M, RECIPIENT).tolist() == [[0, 1, 2, 3]]
+    assert np.all(POSITION_M == 0.0)
+    assert RECIPIENT.tolist() == [[1, 1, -1, 3]]
+
+
+def test_the_papers_channel_gets_the_arrays_themselves(monkeypatch):
+    """Its loops only read them, and copies would take time."""
+    radio, seen = radio_of(paper()), []
+
+    def looks(_radio, position_m, recipient):
+        seen.append(position_m)
+        return recipient
+
+    monkeypatch.setattr(type(radio), "__call__", looks)
+    decoded(radio, POSITION_M, RECIPIENT)
+    assert seen[0] is POSITION_M
