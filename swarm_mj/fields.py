@@ -4,6 +4,7 @@ A dataclass of such fields is the settings, their documentation and, in `cli.opt
 line at once.
 """
 
+import inspect
 from collections.abc import Iterable
 from dataclasses import MISSING, Field, field, fields
 from difflib import get_close_matches
@@ -79,7 +80,9 @@ def as_typed(value: object) -> str:
 def did_you_mean(typed: object, known: Iterable[str]) -> str:
     """The end of a complaint about an unknown name: the known one most like it, or nothing."""
     names = {name.lstrip("-"): name for name in known}  # flags are not alike for their dashes
-    likely = get_close_matches(str(typed).lstrip("-"), names, n=1)
+    bare = str(typed).lstrip("-")
+    likely = [name for name in names if bare in name.split("_")[1:]]  # windows of num_windows
+    likely += get_close_matches(bare, names, n=1)
     return f"; did you mean {names[likely[0]]}?" if likely else ""
 
 
@@ -111,10 +114,26 @@ def name_of(part: Any) -> str:  # noqa: ANN401 - any function or object
     return getattr(part, "__name__", type(part).__name__)
 
 
-def check_callable(what: str, value: object) -> None:
-    """Passes if an argument is None or can be called; raises TypeError if not, or for a class."""
-    if value is not None and (isinstance(value, type) or not callable(value)):
+def check_callable(what: str, value: object, takes: tuple[str, ...]) -> None:
+    """Passes if an argument is None, or can be called with so many others.
+
+    Raises:
+        TypeError: It cannot, or it is a class.
+    """
+    if value is None:
+        return
+    if isinstance(value, type) or not callable(value):
         raise TypeError(f"{what} must be a function, or an object like one, not {_shown(value)}")
+    try:
+        signature = inspect.signature(value)
+    except (TypeError, ValueError):  # of what is not Python's own
+        return
+    try:
+        signature.bind(*takes)
+    except TypeError as error:
+        raise TypeError(
+            f"a {what} is called with ({', '.join(takes)}), but this one takes {signature}"
+        ) from error
 
 
 def _shown(value: object) -> str:

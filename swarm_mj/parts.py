@@ -119,8 +119,8 @@ class OwnParts:
         for kind, part in made.items():
             if isinstance(part, type) or not callable(part):
                 raise ValueError(
-                    f"{kind} {self.named[kind]} must make a function, or an object like one, not "
-                    f"{_shown(part)}"
+                    f"{kind} {self.named[kind]} must be a function of two arguments, or make an "
+                    f"object like one, not {_shown(part)}"
                 )
         return made
 

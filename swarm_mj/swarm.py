@@ -7,7 +7,7 @@ from numbers import Integral
 import numpy as np
 from jaxtyping import Float, Int
 
-from swarm_mj.control.controller import Controller, Costed
+from swarm_mj.control.controller import Controller, costed
 from swarm_mj.control.motion import controller_of, initial_velocity
 from swarm_mj.fields import check_callable, check_kind
 from swarm_mj.mission import Mission
@@ -26,6 +26,11 @@ from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, RequestResponse, Windo
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.radio.mission_radio import radio_of
 
+CALLED_WITH = {  # what own parts are given
+    "channel": ("position_m", "recipient"),
+    "controller": ("buffers", "states"),
+    "scene": ("spec", "mission"),
+}
 MAX_THREADS = 1024
 MAX_SEED = 2**63 - 1  # the largest that a replay's properties keep
 
@@ -65,7 +70,7 @@ class Swarm:
         check_kind("mission", mission, Mission, 'paper("flocking")')
         parts = {"channel": channel, "controller": controller, "scene": scene}
         for what, part in parts.items():
-            check_callable(what, part)
+            check_callable(what, part, CALLED_WITH[what])
         _check_seeds(seeds)
         if not isinstance(num_threads, Integral) or not 1 <= num_threads <= MAX_THREADS:
             limits = f"from 1 to {MAX_THREADS}"
@@ -73,7 +78,7 @@ class Swarm:
         self.mission = mission
         self.channel = radio_of(mission) if channel is None else channel
         self.controller = controller_of(mission) if controller is None else controller
-        self._costed = self.controller if isinstance(self.controller, Costed) else None
+        self._costed = costed(self.controller)
         self.scene = scene
         self._physics = Physics(mission, len(seeds), scene=scene, num_threads=num_threads)
         self._num_missions = len(seeds)
@@ -206,8 +211,8 @@ class Swarm:
         value = np.asarray(controller.cost(self._states_for(controller)), dtype=np.float64)
         if value.shape != self.now.shape or not np.all(value >= 0.0):
             raise ValueError(
-                f"a controller's cost must be {len(self.now)} numbers of 0 or more, one a mission, "
-                f"not {np.array2string(value, threshold=8)}"
+                f"a controller's cost must have shape {self.now.shape}, one number of 0 or more "
+                f"for each mission, not {np.array2string(value, threshold=8)}"
             )
         return TaskCost(name=controller.cost_name, unit=controller.cost_unit, value=value)
 

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from swarm_mj.fields import check, kind_of, same_as, setting
+from swarm_mj.fields import check, did_you_mean, kind_of, same_as, setting
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,3 +62,12 @@ def test_a_field_like_another_has_its_default_and_range():
     assert Pot().litres == 1.5
     with pytest.raises(ValueError, match="volume must be a number"):
         check(Pot(litres=9.0))
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"),
+    [("windows", "num_windows"), ("robots", "num_robots"), ("num_robot", "num_robots")],
+)
+def test_the_name_that_was_meant_holds_the_word_or_is_like_it(typed, meant):
+    known = ["window_s", "num_windows", "num_robots", "noise_dbm"]
+    assert did_you_mean(typed, known) == f"; did you mean {meant}?"

@@ -122,7 +122,7 @@ def test_parts_must_be_functions_or_like_them(name):
     if name == "Plain":  # its object is called
         assert callable(channel.made(MISSION)["channel"])
     else:
-        with pytest.raises(ValueError, match="must make a function, or an object like one"):
+        with pytest.raises(ValueError, match="must be a function of two arguments, or make an"):
             channel.made(MISSION)
 
 

@@ -1,6 +1,7 @@
 import itertools
 from functools import partial
 
+import mujoco
 import numpy as np
 import pytest
 from channels import to_nobody
@@ -522,3 +523,40 @@ def test_who_transmits_is_told_by_one_truth_value_a_robot(answer, complaint):
 
     with pytest.raises(ValueError, match=complaint):
         Swarm(small(), [1]).step(Says())
+
+
+def test_a_cost_needs_a_name_and_a_unit():
+    class Nameless:
+        def __call__(self, _buffers, states):
+            return np.zeros_like(states.velocity_mps)
+
+        def cost(self, states):
+            return np.zeros(len(states.position_m))
+
+    with pytest.raises(TypeError, match="set its cost_name and cost_unit"):
+        Swarm(paper(num_robots=3), [1], controller=Nameless())
+
+
+@pytest.mark.parametrize(
+    ("part", "said"),
+    [
+        ({"controller": lambda states: states}, r"a controller is called with \(buffers, states\)"),
+        (
+            {"channel": lambda: 0},
+            r"a channel is called with \(position_m, recipient\), but .* \(\)",
+        ),
+        ({"scene": lambda _spec: None}, r"a scene is called with \(spec, mission\)"),
+    ],
+)
+def test_parts_that_take_other_arguments_are_refused_before_the_flight(part, said):
+    with pytest.raises(TypeError, match=said):
+        Swarm(paper(num_robots=3), [1], **part)
+
+
+def test_a_scene_that_mujoco_does_not_take_is_told_in_one_line():
+    def flat(spec, _mission):
+        spec.worldbody.add_geom(name="wall", type=mujoco.mjtGeom.mjGEOM_BOX, size=[1, 1, 0])
+
+    with pytest.raises(ValueError, match=r"the scene does not compile: .*size 2 .*wall") as told:
+        Swarm(paper(num_robots=3), [1], scene=flat)
+    assert "\n" not in str(told.value)

@@ -82,8 +82,13 @@ def _columns_of(result: Result) -> dict[str, Callable[[Result], str]]:
     if _has_own_cost(result):
         return {
             "task cost\nat the end": lambda r: (
-                f"{_number(r.task_cost_mean)}\n{_number(r.task_cost_last_mean)}"
-            )
+                f"{_with_error(r.task_cost_mean, r.task_cost_sem)}\n"
+                f"{_with_error(r.task_cost_last_mean, r.task_cost_last_sem)}"
+            ),
+            "difference\nof task cost": lambda r: (
+                f"{_number(r.task_cost_difference_mean)}\n"
+                f"{_interval(r.task_cost_difference_ci_low, r.task_cost_difference_ci_high)}"
+            ),
         }
     if result.task == "flocking":
         return {
@@ -140,7 +145,8 @@ def _legend(results: Sequence[Result]) -> str:
         "at least one robot; hearers: robots that decoded a broadcast, on average.",
     ]
     for result in filter(_has_own_cost, results):
-        cost = f"Task cost: {result.task_cost_name} [{result.task_cost_unit}], mean over windows."
+        named = f"{result.task_cost_name} [{result.task_cost_unit}]"
+        cost = f"Task cost: {named}, mean over windows ± standard error over missions."
         sentences += [] if cost in sentences else [cost]
     if any(result.task == "flocking" for result in results):
         sentences.append("Velocity variance (var.): of the robots' velocities [m²/s²].")

@@ -44,6 +44,22 @@ class Costed(Protocol):
         ...
 
 
+def costed(controller: Controller) -> Costed | None:
+    """A controller that says what its task costs, or None.
+
+    Raises:
+        TypeError: It has a cost without a name or a unit.
+    """
+    if isinstance(controller, Costed):
+        return controller
+    if hasattr(controller, "cost"):
+        raise TypeError(
+            "the controller has a cost, which needs a name and a unit; set its cost_name and "
+            'cost_unit, such as "spread of the team" and "m"'
+        )
+    return None
+
+
 STIFFNESS_PER_S2 = 0.25  # k: a robot begins to brake V_max c / k before its target, 12 m by default
 DAMPING_PER_S = 1.0  # c: critical, 2 sqrt(k)
 

@@ -40,9 +40,19 @@ class Physics:
             num_missions: B.
             scene: What changes the arena, as in `compose`.
             num_threads: MuJoCo's own; 1 is fastest when the other cores are busy.
+
+        Raises:
+            ValueError: The scene changed the robots, or MuJoCo does not take it.
         """
         self._mission = mission
-        self._model = compose(mission, scene=scene).compile()
+        try:
+            self._model = compose(mission, scene=scene).compile()
+        except ValueError as error:  # MuJoCo's, in several lines
+            if scene is None:
+                raise
+            raise ValueError(
+                f"the scene does not compile: {' '.join(str(error).split())}"
+            ) from error
         self._batch = batch.Batch(self._model, num_missions, num_threads)
         shape = (num_missions, mission.num_robots, 2)
         self._qpos = self._batch.bind("qpos").reshape(shape)

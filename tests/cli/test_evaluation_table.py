@@ -145,8 +145,12 @@ def test_the_lower_bound_stands_below(printed):
 
 def test_a_tasks_own_cost_has_a_column_and_a_sentence(printed):
     cost = {"task_cost_name": "formation error", "task_cost_unit": "m", "task_cost_mean": 321.5}
-    found = some_result("mst", 1.0, task="formation", task_cost_last_mean=12.25, **cost)
+    cost |= {"task_cost_sem": 1.25, "task_cost_difference_mean": -4.5}
+    interval = {"task_cost_difference_ci_low": -7.0, "task_cost_difference_ci_high": -2.0}
+    found = some_result("mst", 1.0, task="formation", task_cost_last_mean=12.25, **cost, **interval)
     text = "\n".join(printed([found], 100))
+    assert "± 1.25" in text
+    assert "-7.00, -2.00" in text
     assert "321.50" in text
     assert "12.25" in text
-    assert "Task cost: formation error [m], mean over windows." in text
+    assert "Task cost: formation error [m], mean over windows ± standard error" in text
