@@ -7,6 +7,7 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from jaxtyping import UInt8
 
+from swarm_mj.envs.options import check_reset
 from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.envs.spaces import team_spaces
 from swarm_mj.envs.team import Info, Observation, Team, next_seed
@@ -45,11 +46,12 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, Info]:
-        """Begins a mission, whose seed is in `info`.
+        """Begins a mission, whose seed is in `info`. There are no options.
 
         Raises:
-            ValueError: No connected team could be drawn.
+            ValueError: There is such an option, or no connected team could be drawn.
         """
+        check_reset(options or {})
         super().reset(seed=seed, options=options)
         begun = next_seed(self.np_random) if seed is None else seed
         self.team.restart([begun])

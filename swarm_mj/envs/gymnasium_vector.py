@@ -15,9 +15,11 @@ from gymnasium.vector.utils import batch_space, create_empty_array
 from jaxtyping import Bool, Float, Int, UInt8
 
 from swarm_mj.envs.gymnasium import check_paid_together
+from swarm_mj.envs.options import check_reset
 from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.envs.spaces import team_spaces
 from swarm_mj.envs.team import Info, Observation, Team, next_seed
+from swarm_mj.fields import did_you_mean
 from swarm_mj.mission import Mission
 
 Step = tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Info]
@@ -64,8 +66,10 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
             render_mode=render_mode,
             **options,
         )
+        if num_envs < 1:
+            raise ValueError(f"num_envs must be 1 or more, not {num_envs}")
         self.num_envs = num_envs
-        self._mode = AutoresetMode(autoreset_mode)
+        self._mode = _mode_of(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self._mode}
         self._screen = Screen(render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
@@ -97,9 +101,10 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
             options: `reset_mask`, or nothing.
 
         Raises:
-            ValueError: Not one seed or one bool per environment, or no connected team could be
-                drawn.
+            ValueError: Not one seed or one bool per environment, another option, or no connected
+                team could be drawn.
         """
+        check_reset(options or {}, ("reset_mask",))
         super().reset(seed=seed if isinstance(seed, int) else None)
         envs = np.flatnonzero(self._mask_of(options or {}))
         seeds = self._seeds_of(seed)
@@ -251,3 +256,14 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
 
     def _copied(self) -> Observation:
         return {name: each.copy() for name, each in self._seen.items()}
+
+
+def _mode_of(mode: str | AutoresetMode) -> AutoresetMode:
+    """What happens after a mission's last window; raises ValueError if it is no such thing."""
+    modes = [each.value for each in AutoresetMode]
+    if mode not in (*modes, *AutoresetMode):
+        raise ValueError(
+            f"autoreset_mode must be one of {', '.join(modes)}, not {mode!r:.80}"
+            f"{did_you_mean(mode, modes)}"
+        )
+    return AutoresetMode(mode)

@@ -64,7 +64,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, Info]]:
-        """Begins a mission; every agent's info has its seed. There are no options.
+        """Begins a mission; every agent's info has its seed. Options are ignored.
 
         Raises:
             ValueError: No connected team could be drawn.
@@ -87,19 +87,22 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         dict[str, bool],
         dict[str, Info],
     ]:
-        """One window, in which each agent addresses a robot; agents that say nothing are silent.
+        """One window, in which each agent addresses a robot.
+
+        An agent without an action is silent, and so is one that has dropped out whatever it does.
 
         Returns:
             By agent: what it sees, its reward, whether it was switched off, whether the mission was
             cut off, and what the window cost the team.
 
         Raises:
-            ValueError: An action is no robot; nothing has moved.
+            ValueError: There is no such agent, or an action is no robot; nothing has moved.
         """
         recipient = self.team.flown.views.silence.copy()
-        for agent in self.agents:
-            i = self._robot(agent)
-            recipient[0, i] = actions.get(agent, i)
+        for agent, action in actions.items():
+            self._check_action(agent, action)
+            if agent in self.agents:
+                recipient[0, self._robot(agent)] = action
         reward = self.team.step(recipient)[0]
         self._screen.update(self.team)
         is_active, is_over = self.team.is_active[0], self.team.is_over
@@ -122,6 +125,19 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
     def close(self) -> None:
         """Gives back what pictures took."""
         self._screen.close()
+
+    def _check_action(self, agent: str, action: Action | None) -> None:
+        """Raises ValueError for who is no agent, and for what is no action."""
+        names = self.possible_agents
+        if agent not in names:
+            raise ValueError(
+                f"agents are {names[0]} to {names[-1]}, not {agent!r:.80}; leave it out"
+            )
+        if action is None:
+            raise ValueError(
+                f"the action of {agent} must be a robot's number from 0 to {len(names) - 1}, its "
+                "own for silence, not None"
+            )
 
     def _robot(self, agent: str) -> int:
         return int(agent.removeprefix("robot_"))

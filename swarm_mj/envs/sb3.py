@@ -14,7 +14,7 @@ from gymnasium.utils import seeding
 from jaxtyping import Bool
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.torch_layers import CombinedExtractor
-from stable_baselines3.common.vec_env import VecEnv, VecNormalize, is_vecenv_wrapped
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize, unwrap_vec_wrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 from torch import nn
 
@@ -55,6 +55,8 @@ def make_vec_env(
     """
     if agent not in AGENTS:
         raise ValueError(f"agent must be one of {', '.join(AGENTS)}, not {agent!r}")
+    for name in {"n_envs", "num_envs"} & options.keys():
+        raise TypeError(f"make_vec_env has no {name!r}; did you mean num_missions?")
     env = SwarmVecEnv(Team(mission, num_missions, **options), agent)
     env.seed(seed)
     return env
@@ -170,8 +172,8 @@ def save_policy(model: BaseAlgorithm, folder: Path | str) -> None:
 
     Args:
         model: PPO, A2C or MaskablePPO with its own "MultiInputPolicy", trained on an environment
-            of `make_vec_env` whose agents are robots. A model that was loaded needs it again:
-            `PPO.load(path, env=env)`.
+            of `make_vec_env` whose agents are robots; `VecNormalize` may have normalised its
+            rewards. A model that was loaded needs it again: `PPO.load(path, env=env)`.
         folder: What is there is replaced if it is a policy.
 
     Raises:
@@ -206,22 +208,35 @@ def save_policy(model: BaseAlgorithm, folder: Path | str) -> None:
 
 def _trained_on(model: BaseAlgorithm) -> Team:
     """The missions that a model was trained on; raises ValueError if a policy cannot be made."""
-    env = model.get_env()
-    inner = env.unwrapped if env is not None else None
-    if (
-        env is None
-        or not isinstance(inner, SwarmVecEnv)
-        or inner.agent != "robot"
-        or inner.team.with_parents
-    ):
+    env, kind = model.get_env(), type(model).__name__
+    if not hasattr(model.policy, "action_dist"):
         raise ValueError(
-            "a policy is made of a model on make_vec_env's robots, without parents; train on that, "
-            "or load the model with it: PPO.load(path, env=env)"
+            f"a policy is made of an actor that draws recipients, and {kind} has none; train PPO, "
+            "A2C or MaskablePPO"
         )
-    if is_vecenv_wrapped(env, VecNormalize):
+    if env is None:
         raise ValueError(
-            "a policy cannot be made of a model behind VecNormalize, whose averages it would need; "
-            "train without it: observations are normalised already"
+            f"the model has no environment; load the model with it: {kind}.load(path, env=env)"
+        )
+    inner = env.unwrapped
+    if not isinstance(inner, SwarmVecEnv):
+        raise ValueError(
+            "a policy is made of a model that decides for one robot, and this one was trained on "
+            "another environment; train on swarm_mj.envs.sb3.make_vec_env"
+        )
+    if inner.agent != "robot":
+        raise ValueError(
+            'a policy decides for one robot, and agent="team" for all at once; train on '
+            'make_vec_env(..., agent="robot")'
+        )
+    if inner.team.with_parents:
+        raise ValueError("a policy of this kind sees no parents; train without with_parents=True")
+    normalised = unwrap_vec_wrapper(env, VecNormalize)
+    if normalised is not None and normalised.norm_obs:
+        raise ValueError(
+            "a policy cannot be made of a model whose observations VecNormalize normalises, as it "
+            "would need their averages; they are normalised already, so train with "
+            "VecNormalize(env, norm_obs=False)"
         )
     return inner.team
 

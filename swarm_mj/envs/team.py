@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.control.controller import Controller, Costed
 from swarm_mj.control.motion import controller_of
+from swarm_mj.envs.options import check_fields, check_task
 from swarm_mj.gnn.feature_sets import is_own_set, load_features, make_extractor
 from swarm_mj.learning.credit import credits_of
 from swarm_mj.mission import PRESETS, Mission
@@ -204,6 +205,8 @@ def next_seed(rng: np.random.Generator) -> int:
 
 def _mission_of(mission: Mission | str, preset: str, fields: dict[str, Any]) -> Mission:
     """A mission as it is, or a task's, with other values of some fields."""
+    check_task(mission)
+    check_fields(mission, fields)
     if isinstance(mission, Mission):
         return replace(mission, **fields)
     task = replace(Mission(), preset=preset, task=mission).task  # refuses what is unknown

@@ -1,5 +1,8 @@
 """Pictures of a mission's scene: MuJoCo draws floor, walls and robots, and packets between them."""
 
+import atexit
+from weakref import ref
+
 import numpy as np
 from jaxtyping import UInt8
 from mujoco._enums import mjtCamera, mjtCatBit, mjtFontScale, mjtFramebuffer, mjtObj
@@ -73,6 +76,8 @@ class SceneRenderer:
         except FatalError as error:  # GLFW without a screen says nothing before
             raise unusable(error) from error
         mjr_setBuffer(mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+        self._is_open = True
+        atexit.register(_close, ref(self))  # before the back end ends, which registered earlier
 
     def camera(self, contents: Contents) -> Camera:
         """The camera by which a picture of these contents is seen."""
@@ -107,6 +112,9 @@ class SceneRenderer:
 
     def close(self) -> None:
         """Gives OpenGL's memory back; nothing can be drawn any more."""
+        if not self._is_open:
+            return
+        self._is_open = False
         self._opengl.make_current()
         self._context.free()
         self._opengl.free()
@@ -134,6 +142,12 @@ class SceneRenderer:
         mjr_render(whole, self._scene, self._context)
         mjr_readPixels(picture, None, whole, self._context)
         return picture[::-1].copy()
+
+
+def _close(renderer: "ref[SceneRenderer]") -> None:
+    """Closes a renderer that is still there when Python ends: by then, OpenGL would fail."""
+    if (left := renderer()) is not None:
+        left.close()
 
 
 def light(model: MjModel, width: int, height: int) -> None:

@@ -75,6 +75,21 @@ def test_agents_that_say_nothing_are_silent():
     assert env.step({"robot_2": 3})[4]["robot_0"]["packets_sent"] == 1.0
 
 
+@pytest.mark.parametrize(
+    ("actions", "message"),
+    [
+        ({"robot_6": 1}, "agents are robot_0 to robot_5, not 'robot_6'"),
+        ({"robot_0": 1, "robot_3": None}, "robot_3 must be a robot's number from 0 to 5"),
+    ],
+)
+def test_refused_actions_move_nothing(actions, message):
+    env = parallel_env(**SMALL)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=message):
+        env.step(actions)
+    assert env.team.flown.now[0] == 0
+
+
 def test_a_copy_by_pickle_flies_the_same():
     env = parallel_env(**FAILING)
     copy = pickle.loads(pickle.dumps(env))

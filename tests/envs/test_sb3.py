@@ -5,11 +5,12 @@ import pytest
 import torch
 from sb3_contrib import MaskablePPO, RecurrentPPO
 from sb3_contrib.common.maskable.utils import get_action_masks, is_masking_supported
-from stable_baselines3 import A2C, PPO
+from stable_baselines3 import A2C, DQN, PPO
 from stable_baselines3.common.torch_layers import CombinedExtractor
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 from torch import nn
 
+from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.sb3 import make_vec_env, save_policy
 from swarm_mj.policies.registry import make_policy
 
@@ -127,6 +128,12 @@ def test_refusals(options, message):
         make_vec_env(**options)
 
 
+@pytest.mark.parametrize("name", ["n_envs", "num_envs"])
+def test_what_others_call_missions(name):
+    with pytest.raises(TypeError, match=f"has no '{name}'; did you mean num_missions"):
+        make_vec_env(**{name: 3})
+
+
 def test_what_environments_do_not_have():
     env = make_vec_env(**SMALL)
     with pytest.raises(AttributeError, match="no environment has its own fly"):
@@ -194,6 +201,12 @@ def test_a_model_read_back_is_stored_with_its_environment(tmp_path):
     assert (tmp_path / "policy" / "config.json").exists()
 
 
+def test_normalised_rewards_are_no_part_of_a_policy(tmp_path):
+    env = VecMonitor(VecNormalize(make_vec_env("stationary", 2, **SMALL), norm_obs=False))
+    save_policy(trained(PPO, env), tmp_path / "policy")
+    assert (tmp_path / "policy" / "config.json").exists()
+
+
 class Halved(CombinedExtractor):
     def forward(self, observations):
         return 0.5 * super().forward(observations)
@@ -202,9 +215,11 @@ class Halved(CombinedExtractor):
 @pytest.mark.parametrize(
     ("model", "message"),
     [
-        (lambda: trained(PPO, make_vec_env(agent="team", **SMALL)), "make_vec_env's robots"),
-        (lambda: trained(PPO, make_vec_env(with_parents=True, **SMALL)), "without parents"),
-        (lambda: trained(PPO, VecNormalize(make_vec_env(**SMALL))), "behind VecNormalize"),
+        (lambda: DQN("MultiInputPolicy", make_vec_env(**SMALL), buffer_size=9), "DQN has none"),
+        (lambda: PPO("MultiInputPolicy", SwarmEnv(**SMALL)), "trained on another environment"),
+        (lambda: trained(PPO, make_vec_env(agent="team", **SMALL)), 'agent="team" for all at once'),
+        (lambda: trained(PPO, make_vec_env(with_parents=True, **SMALL)), "sees no parents"),
+        (lambda: trained(PPO, VecNormalize(make_vec_env(**SMALL))), "norm_obs=False"),
         (
             lambda: trained(PPO, policy_kwargs={"features_extractor_class": Halved}),
             "own features extractor",

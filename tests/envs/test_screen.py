@@ -89,6 +89,20 @@ def test_nobody_looks_at_many_missions_in_a_window():
         SwarmVectorEnv(2, MISSION, render_mode="human")
 
 
+DRAW_AND_END = """
+import gymnasium, swarm_mj
+env = gymnasium.make("swarm_mj/Flocking-v0", num_robots=3, render_mode="rgb_array")
+env.reset(seed=1)
+print(env.render().shape)
+"""
+
+
+def test_a_script_that_closes_nothing_ends_quietly():
+    command = [sys.executable, "-W", "ignore", "-c", DRAW_AND_END]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "(600, 800, 3)\n", "")
+
+
 # In a process of its own: a window belongs to the process, and to its display.
 FLY_BEFORE_A_HUMAN = """
 import time
