@@ -61,6 +61,18 @@ def opengl():
         pytest.skip(str(error))
 
 
+TRAPPED = ("mujoco", "multiprocessing", "numpy", "pickle", "rerun_cli", "swarm_mj")
+
+
+@pytest.fixture
+def trapped(here):
+    """A folder one stands in, whose modules nobody asked for; what they leave if they are run."""
+    sprung = here / "sprung"
+    for name in TRAPPED:
+        (here / f"{name}.py").write_text(f"open({str(sprung)!r}, 'a').write('{name} ')\n")
+    return sprung
+
+
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     """An empty folder, and this process in it."""

@@ -119,7 +119,7 @@ def core(installed, tmp_path_factory):
 
     def run(folder, *arguments):
         environment = os.environ | {"PYTHONPATH": f"{wheel}{os.pathsep}{packages}"}
-        environment.pop("MUJOCO_GL", None)  # tests that render leave it; MuJoCo then loads OpenGL
+        environment.pop("MUJOCO_GL", None)  # MuJoCo then loads OpenGL
         return subprocess.run(
             [sys.executable, "-S", *arguments],  # without this Python's own site-packages
             cwd=folder,

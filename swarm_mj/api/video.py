@@ -1,11 +1,12 @@
 """Videos of what Python flew: as a file's content, and within a notebook."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from swarm_mj.api.bars import quiet_bar
-from swarm_mj.cli.replay import RATES, SIZES, usual_seconds
 from swarm_mj.cli.terminal import plain_console
 from swarm_mj.io.packages import need
+from swarm_mj.rendering.style import USUAL, fitted, usual_seconds
 
 if TYPE_CHECKING:  # they load what draws
     from swarm_mj.replay.footage import Footage
@@ -29,12 +30,9 @@ def film(footage: "Footage", suffix: str) -> bytes:
     """
     for module in ("av", "PIL"):
         need(module, "a video")
-    from swarm_mj.rendering.movie import Style
     from swarm_mj.rendering.video import make_video
 
-    width, height = map(int, SIZES[suffix].split("x"))
-    seconds = usual_seconds([footage])
-    style = Style(width=width, height=height, seconds=seconds, fps=RATES[suffix])
+    style = fitted(replace(USUAL[suffix], seconds=usual_seconds([footage])), suffix)
     with quiet_bar("Drawing", style.num_frames, "pictures") as bar:
         return make_video([footage], suffix, style, bar.advance)
 

@@ -122,7 +122,7 @@ def training_needs(training: "Training", limits: "Limits") -> Needs:
     )
 
 
-def video_needs(width: int, height: int, num_pictures: float, suffix: str) -> Needs:
+def video_needs(width: int, height: int, num_pictures: int | float, suffix: str) -> Needs:
     """Of `replay --video`: a GIF's pictures are kept until the last one is drawn."""
     pixels = width * height
     kept = num_pictures if suffix == ".gif" else 0.0

@@ -2,7 +2,6 @@
 
 import re
 import shlex
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +16,8 @@ from swarm_mj.fields import setting
 from swarm_mj.io.atomic import write_bytes
 from swarm_mj.io.interrupt import heard_interrupt
 from swarm_mj.io.packages import need
-from swarm_mj.parts import SHOWN_AS, OwnParts
+from swarm_mj.parts import SHOWN_AS, OwnParts, is_own
+from swarm_mj.rendering.style import LONGEST_S, USUAL, Style, fitted, usual_seconds
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
 
@@ -26,9 +26,6 @@ if TYPE_CHECKING:
 
 VIDEO = "video"  # a heading of the help
 SUFFIXES = ".mp4|.gif"
-SIZES = {".mp4": "1280x720", ".gif": "830x520"}
-RATES = {".mp4": 25, ".gif": 15}  # pictures per second
-LONGEST_S, SHORTEST_S = 10.0, 1.0  # of a video, unless told otherwise
 PIXELS = (160, 3840)  # of a side
 
 
@@ -60,7 +57,12 @@ class Options:
         shown=f"the mission's own time, {LONGEST_S:g} at most",
     )
     fps: int | None = setting(
-        None, "pictures per second", group=VIDEO, low=1, high=60, shown="25; GIF: 15"
+        None,
+        "pictures per second, of a GIF 50 at most",
+        group=VIDEO,
+        low=1,
+        high=60,
+        shown="25; GIF: 15",
     )
     scene: str | None = setting(
         None,
@@ -101,39 +103,46 @@ def _make_video(options: Options, video: Path) -> int:
         Output("video", video, SUFFIXES), inputs=options.file, must_be_new=not options.force
     )
     suffix = video.suffix.lower()
-    width, height = _size(options.size or SIZES[suffix], suffix)
-    fps = options.fps or RATES[suffix]
-    needs = video_needs(width, height, (options.seconds or LONGEST_S) * fps, suffix)
+    style = _style(options, suffix)
+    needs = video_needs(style.width, style.height, style.num_frames, suffix)
     check_fits(needs, video, "choose a smaller --size or fewer --seconds", is_forced=options.yes)
     for module in ("av", "PIL", "rerun"):
         need(module, "a video")
-    from swarm_mj.rendering.movie import Style  # rerun and MuJoCo take their time to import
-    from swarm_mj.rendering.video import check_video, make_video
+    from swarm_mj.rendering.video import check_video, make_video  # MuJoCo takes its time to import
 
     with heard_interrupt() as was_pressed:
         with Console(stderr=True, highlight=False).status("Reading ..."):
-            footages, seconds = _read(options)
-        style = Style(width=width, height=height, seconds=seconds, fps=fps)
+            footages = _read(options)
+        style = replace(style, seconds=options.seconds or usual_seconds(footages))
         with WorkBar("Rendering", style.num_frames, "pictures") as bar:
             content = make_video(footages, suffix, style, bar.advance)
         if was_pressed():
             raise KeyboardInterrupt
     write_bytes(video, content, check=lambda part: check_video(part, suffix, style))
-    shown = f"{style.num_frames / fps:.3g} s, {style.num_frames} pictures of {width} by {height}"
-    name = shlex.quote(str(video))
-    plain_console().print(f"Wrote {name}: {shown}, {len(content) / 1e6:.1f} MB")
+    number, name = style.num_frames, shlex.quote(str(video))
+    plain_console().print(
+        f"Wrote {name}: {number / style.fps:.3g} s, {number} pictures of {style.width} by "
+        f"{style.height}, {len(content) / 1e6:.1f} MB"
+    )
     return 0
 
 
-def _read(options: Options) -> tuple[list["Footage"], float]:
-    """What is to be seen, and how long the video is [s]."""
+def _style(options: Options, suffix: str) -> Style:
+    """What is asked for, or usual; raises ValueError for what the kind of file cannot have."""
+    usual = USUAL[suffix]
+    width, height = _size(options.size, suffix) if options.size else (usual.width, usual.height)
+    seconds, fps = options.seconds or usual.seconds, options.fps or usual.fps
+    return fitted(Style(width=width, height=height, seconds=seconds, fps=fps), suffix)
+
+
+def _read(options: Options) -> list["Footage"]:
+    """What is to be seen."""
     from swarm_mj.rendering.movie import MOST_MISSIONS
     from swarm_mj.replay.read import read_footage
 
     if len(options.file) > MOST_MISSIONS:
         raise ValueError(f"a video shows 1 or {MOST_MISSIONS} replays, not {len(options.file)}")
-    footages = [_in_scene(read_footage(file), options.scene) for file in options.file]
-    return footages, options.seconds or usual_seconds(footages)
+    return [_in_scene(read_footage(file), options.scene) for file in options.file]
 
 
 def _in_scene(footage: "Footage", scene: str | None) -> "Footage":
@@ -142,17 +151,10 @@ def _in_scene(footage: "Footage", scene: str | None) -> "Footage":
     if scene is not None:
         return replace(footage, **OwnParts(scene=scene).made(footage.facts.mission))
     if flown_in is not None:
-        Console(stderr=True, highlight=False).print(
-            f"The video shows the bare arena. The mission was flown in the scene {flown_in}; "
-            "--scene shows it, too."
-        )
+        hint = "; --scene shows it, too." if is_own(flown_in) else "."
+        told = f"The video shows the bare arena. The mission was flown in the scene {flown_in!r}"
+        plain_console(is_error=True).print(told + hint)
     return footage
-
-
-def usual_seconds(footages: "Sequence[Footage]") -> float:
-    """In which a video shows whole missions: their own time, if that is neither short nor long."""
-    flown_s = max(len(each.window) * each.facts.mission.window_s for each in footages)
-    return min(LONGEST_S, max(SHORTEST_S, flown_s))
 
 
 def _size(text: str, suffix: str) -> tuple[int, int]:

@@ -19,7 +19,8 @@ Product = TypeVar("Product")
 # Jobs share the machine's cores, so none starts threads of its own. And none draws: MuJoCo need not
 # look for a window system, which it does by a program that complains if it is left.
 SURROUNDINGS = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
-SURROUNDINGS |= {"MUJOCO_GL": "disable"}
+# Nor does any run what lies in the folder one stands in, as `python -c` would.
+SURROUNDINGS |= {"MUJOCO_GL": "disable", "PYTHONSAFEPATH": "1"}
 
 
 def run_jobs(
@@ -52,8 +53,9 @@ def run_jobs(
     context = get_context("spawn")
     with ExitStack() as stack:
         watch = stack.enter_context(guard())
-        resource_tracker.ensure_running()  # multiprocessing's own; to start it lifts all shields
-        with deferred_interrupt() as is_interrupted, _shielded():
+        with _surrounded():
+            resource_tracker.ensure_running()  # multiprocessing's; to start it lifts all shields
+        with deferred_interrupt() as is_interrupted, _shielded(), _surrounded():
             each = (_worker(work, context, watch) for _ in range(min(num_jobs, len(pieces))))
             workers = [stack.enter_context(worker) for worker in each]
         if is_interrupted():
@@ -123,8 +125,18 @@ def _serve(work: Callable[[Any], Any], connection: Connection) -> None:
 
 @contextmanager
 def _shielded() -> Iterator[None]:
-    """Processes started within it hear no Ctrl-C, even as they load, and start no more threads."""
-    mask, before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS), dict(os.environ)
+    """Processes started within it hear no Ctrl-C, even as they load."""
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+@contextmanager
+def _surrounded() -> Iterator[None]:
+    """Processes started within it start no more threads, draw nothing, load nothing from here."""
+    before = dict(os.environ)
     os.environ.update(SURROUNDINGS)
     try:
         yield
@@ -132,4 +144,3 @@ def _shielded() -> Iterator[None]:
         for name in SURROUNDINGS.keys() - before.keys():
             del os.environ[name]
         os.environ.update(before)
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)

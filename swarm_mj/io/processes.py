@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import IO
 
+# A Python that runs nothing out of the folder one stands in, where a numpy.py may lie.
+PYTHON = (sys.executable, "-P")
 # Reads until its pipe is closed: the kernel does so when the one who writes has ended.
 GUARD = """
 import os, signal, sys

@@ -3,7 +3,6 @@
 import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Int, UInt8
@@ -12,6 +11,7 @@ from PIL import Image, ImageDraw
 from swarm_mj.rendering.contents import Contents
 from swarm_mj.rendering.drawing import CURVES, AgePlot, Box, blank, draw_legend, draw_title
 from swarm_mj.rendering.scene import SceneRenderer
+from swarm_mj.rendering.style import Style
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
 
@@ -20,21 +20,6 @@ STRIP = 0.22  # of the height, below the scenes
 TEXT = 0.028  # of the height, or of the width of a narrow scene
 SEAM = 4  # between scenes [pixels]
 LEGEND = 0.32  # of the width; the plot has the rest
-
-
-@dataclass(frozen=True, kw_only=True)
-class Style:
-    """How a video is made."""
-
-    width: int = 1280  # [pixels]
-    height: int = 720
-    seconds: float = 10.0  # in which the whole mission is shown
-    fps: int = 25
-
-    @property
-    def num_frames(self) -> int:
-        """How many pictures there are."""
-        return max(1, round(self.seconds * self.fps))
 
 
 class Movie:

@@ -8,16 +8,19 @@ import importlib
 import os
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from typing import Protocol, runtime_checkable
 
-from swarm_mj.io.processes import running
+from swarm_mj.io.processes import PYTHON, running
 
 CHOICE = "MUJOCO_GL"  # the variable by which people choose, and MuJoCo's renderer is told
+PYOPENGL = "PYOPENGL_PLATFORM"  # PyOpenGL's own, which MuJoCo and dm_control set
 OFF, ON = ("disable", "disabled", "off", "false", "0"), ("enable", "enabled", "on", "true", "1")
 NAMES = ("egl", "osmesa", "glfw", "glx", "cgl", "wgl")  # each works on some systems
 WITHOUT_SCREEN = ("egl", "osmesa")  # on Linux; EGL may have a graphics card, OSMesa never
-TRIAL = "from mujoco.egl import GLContext; GLContext(8, 8).make_current()"
+TRIAL = "from mujoco.{} import GLContext; GLContext(8, 8).make_current()"
 WAY_OUT = (
     "rendering needs OpenGL; on Debian and Ubuntu, `apt-get install libosmesa6` draws without a "
     "graphics card and a screen (`libegl1` with one)"
@@ -44,11 +47,24 @@ def make_context(width: int, height: int) -> Context:
         OSError: No OpenGL works here, or not the one that MUJOCO_GL names.
     """
     name = backend()
-    os.environ[CHOICE] = name  # MuJoCo's renderer reads it when it makes its first context
     try:
         return importlib.import_module(f"mujoco.{name}").GLContext(width, height)
     except Exception as error:  # each back end has its own
         raise unusable(error) from error
+
+
+@contextmanager
+def chosen() -> Iterator[None]:
+    """Within it MuJoCo's renderer may start: it asks for the back end once, by the variable."""
+    before = os.environ.get(CHOICE)
+    os.environ[CHOICE] = backend()
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[CHOICE]
+        else:
+            os.environ[CHOICE] = before
 
 
 def unusable(error: Exception) -> OSError:
@@ -75,30 +91,41 @@ def backend() -> str:
     """The back end in use: the one that MUJOCO_GL names, or else the first that works here.
 
     Raises:
-        OSError: MUJOCO_GL says that there is to be none.
+        OSError: MUJOCO_GL says that there is to be none, or somebody else has settled on one that
+            does not work.
     """
-    chosen = check_choice()
-    if chosen in OFF:
-        raise OSError(f"{CHOICE}={chosen} switches rendering off; unset it")
-    if chosen in ("", *ON):
+    named = check_choice()
+    if named in OFF:
+        raise OSError(f"{CHOICE}={named} switches rendering off; unset it")
+    if named in ("", *ON):
         return _default()
-    return "glfw" if chosen == "glx" else chosen
+    return "glfw" if named == "glx" else named
 
 
 @cache
 def _default() -> str:
     if sys.platform == "darwin":
         return "cgl"
-    preset = os.environ.get("PYOPENGL_PLATFORM", "").lower()  # of whoever has drawn already
-    if preset in WITHOUT_SCREEN:
+    preset = os.environ.get(PYOPENGL, "").lower()  # of whoever has drawn already, or means to
+    if preset in WITHOUT_SCREEN and _works(preset):
         return preset
-    return "egl" if _works(TRIAL) else "osmesa"
+    found = "egl" if preset != "egl" and _works("egl") else "osmesa"
+    if preset in WITHOUT_SCREEN:
+        if "OpenGL.platform" in sys.modules:  # which settles for good
+            raise OSError(
+                f"another library has chosen {preset}, which does not work here; "
+                f"set {CHOICE}={found} before Python starts"
+            )
+        del os.environ[PYOPENGL]
+    return found
 
 
-def _works(trial: str) -> bool:
-    environment = {**os.environ, CHOICE: "egl"}
+def _works(name: str) -> bool:
+    """Whether a back end makes a context, in a process of its own."""
+    command = [*PYTHON, "-c", TRIAL.format(name)]
+    environment = {**os.environ, CHOICE: name, PYOPENGL: name}
     with (
         tempfile.TemporaryFile("w+") as said,
-        running([sys.executable, "-c", trial], environment=environment, output=said) as child,
+        running(command, environment=environment, output=said) as child,
     ):
         return child.wait() == 0

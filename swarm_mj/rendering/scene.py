@@ -1,6 +1,7 @@
 """Pictures of a mission's scene: MuJoCo draws floor, walls and robots, and packets between them."""
 
 import atexit
+from contextlib import ExitStack
 from weakref import ref
 
 import numpy as np
@@ -23,7 +24,7 @@ from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.rendering.camera import ELEVATION_DEG, FOV_Y_DEG, Camera, look_at
 from swarm_mj.rendering.contents import Contents
 from swarm_mj.rendering.markers import GEOMS_PER_ROBOT, Markers
-from swarm_mj.rendering.opengl import make_context, unusable
+from swarm_mj.rendering.opengl import chosen, make_context, unusable
 
 MAX_PIXELS = 4096  # of a picture's side
 BEACONS = 2  # the group of the robots' own markers, assets/robot.xml: too small from afar
@@ -69,15 +70,24 @@ class SceneRenderer:
         self._markers = Markers(self._scene, height)
         self._options = MjvOption()
         self._options.geomgroup[BEACONS] = 0
-        self._opengl = make_context(width, height)
-        self._opengl.make_current()
-        try:
-            self._context = MjrContext(self._model, mjtFontScale.mjFONTSCALE_100.value)
-        except FatalError as error:  # GLFW without a screen says nothing before
-            raise unusable(error) from error
-        mjr_setBuffer(mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+        with ExitStack() as stack:
+            self._opengl = make_context(width, height)
+            stack.callback(self._opengl.free)
+            self._context = self._start()
+            stack.pop_all()
         self._is_open = True
         atexit.register(_close, ref(self))  # before the back end ends, which registered earlier
+
+    def _start(self) -> MjrContext:
+        """MuJoCo's own part of OpenGL."""
+        self._opengl.make_current()
+        try:
+            with chosen():
+                context = MjrContext(self._model, mjtFontScale.mjFONTSCALE_100.value)
+        except FatalError as error:  # GLFW without a screen says nothing before
+            raise unusable(error) from error
+        mjr_setBuffer(mjtFramebuffer.mjFB_OFFSCREEN.value, context)
+        return context
 
     def camera(self, contents: Contents) -> Camera:
         """The camera by which a picture of these contents is seen."""

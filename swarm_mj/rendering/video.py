@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from fractions import Fraction
 from pathlib import Path
 
 import av
@@ -9,7 +10,8 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, ImageSequence
 
-from swarm_mj.rendering.movie import Movie, Style
+from swarm_mj.rendering.movie import Movie
+from swarm_mj.rendering.style import GIF, Style, fitted
 from swarm_mj.replay.footage import Footage
 
 Picture = UInt8[np.ndarray, "H W 3"]
@@ -30,21 +32,22 @@ def make_video(
     Args:
         footages: What is shown, from `footage_of` or `read_footage`.
         suffix: `.mp4` or `.gif`.
-        style: Size and length.
+        style: Size and length; a GIF's is `fitted`.
         on_picture: Called after each picture.
 
     Returns:
         The file's content.
 
     Raises:
-        ValueError: There are not one or two missions, or the suffix is another.
+        ValueError: There are not one or two missions, the suffix is another, or a GIF cannot show
+            so many pictures per second.
         OSError: No OpenGL works here; it says what to install.
     """
     if suffix not in ENCODERS:
         raise ValueError(f"a video is {' or '.join(ENCODERS)}, not {suffix}")
-    style = style or Style()
+    style = fitted(style or Style(), suffix)
     with Movie(footages, style) as movie:
-        samples = [movie.picture(rows) for rows in _samples(footages)] if suffix == ".gif" else []
+        samples = [movie.picture(rows) for rows in _samples(footages)] if suffix == GIF else []
 
         def pictures() -> Iterator[Picture]:
             for picture in movie:
@@ -58,30 +61,33 @@ def check_video(path: Path, suffix: str, style: Style) -> None:
     """Passes for a video that is whole.
 
     Raises:
-        ValueError: It does not have the pictures that it should, or not in this size.
+        ValueError: It does not have the pictures that it should, not in this size, or does not
+            last as long.
     """
-    if suffix == ".gif":
-        found, size = _pictures_of_gif(path, style)
-    else:
-        with av.open(str(path)) as container:
-            found = sum(1 for _ in container.decode(video=0))
-            size = container.streams.video[0].width, container.streams.video[0].height
+    style = fitted(style, suffix)
+    found, size, seconds = _look_at_gif(path, style) if suffix == GIF else _look_at_mp4(path)
     if found != style.num_frames or size != (style.width, style.height):
         raise ValueError(f"{found} pictures of {size} were found, not {style.num_frames}")
+    if abs(seconds - style.seconds) > 1.0 / style.fps:
+        raise ValueError(f"{seconds:g} s were found, not {style.seconds:g} s")
 
 
-def _pictures_of_gif(path: Path, style: Style) -> tuple[int, tuple[int, int]]:
-    """How many there are, and their size; equal ones that follow each other are kept as one."""
+def _look_at_mp4(path: Path) -> tuple[int, tuple[int, int], float]:
+    """How many pictures there are, their size, and how long they last [s]."""
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        size, rate = (stream.width, stream.height), float(stream.average_rate or 1)
+        found = sum(1 for _ in container.decode(video=0))
+        return found, size, found / rate
+
+
+def _look_at_gif(path: Path, style: Style) -> tuple[int, tuple[int, int], float]:
+    """As for an MP4; equal pictures that follow each other are kept as one that lasts longer."""
     with Image.open(path) as image:
-        lasts_ms = [
-            frame.info.get("duration", _lasts_ms(style)) for frame in ImageSequence.Iterator(image)
-        ]
-        return sum(lasts_ms) // _lasts_ms(style), image.size
-
-
-def _lasts_ms(style: Style) -> int:
-    """How long a GIF shows a picture; it counts in hundredths of a second."""
-    return 10 * max(2, round(100 / style.fps))
+        seconds = (
+            sum(frame.info.get("duration", 0.0) for frame in ImageSequence.Iterator(image)) / 1000.0
+        )
+        return round(seconds * style.fps), image.size, seconds
 
 
 def _samples(footages: Sequence[Footage]) -> Iterator[list[int]]:
@@ -93,7 +99,7 @@ def encode_mp4(pictures: Iterable[Picture], style: Style, _: Sequence[Picture] =
     """An H.264 video in the pixel format that every browser plays."""
     content = io.BytesIO()
     with av.open(content, "w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=style.fps)
+        stream = container.add_stream("libx264", rate=Fraction(style.fps).limit_denominator())
         stream.width, stream.height = style.width, style.height
         stream.pix_fmt = "yuv420p"
         stream.options = {"crf": QUALITY, "preset": "fast"}
@@ -111,10 +117,8 @@ def encode_gif(pictures: Iterable[Picture], style: Style, samples: Sequence[Pict
         for picture in pictures
     )
     content = io.BytesIO()
-    first = next(images)
-    first.save(
-        content, "gif", save_all=True, append_images=images, duration=_lasts_ms(style), loop=0
-    )
+    first, lasts_ms = next(images), round(1000.0 / style.fps)
+    first.save(content, "gif", save_all=True, append_images=images, duration=lasts_ms, loop=0)
     return content.getvalue()
 
 
@@ -131,5 +135,5 @@ def _colours(samples: Sequence[Picture]) -> Image.Image:
 
 ENCODERS: dict[str, Callable[[Iterable[Picture], Style, Sequence[Picture]], bytes]] = {
     ".mp4": encode_mp4,
-    ".gif": encode_gif,
+    GIF: encode_gif,
 }

@@ -6,12 +6,12 @@ import sys
 from contextlib import ExitStack
 from pathlib import Path
 
-from swarm_mj.io.processes import running
+from swarm_mj.io.processes import PYTHON, running
 
 LOOPBACK = "127.0.0.1"
 # Light, unlike `python -m rerun`; and unlike `python -m rerun_cli` it tells the exit code.
 START = "import sys; from rerun_cli.__main__ import main; sys.exit(main())"
-VIEWER = (sys.executable, "-c", START)
+VIEWER = (*PYTHON, "-c", START)
 NOWHERE = f"http://{LOOPBACK}:9"  # a proxy that is not there
 # With CI set rerun does not count its users; its search for newer versions has no switch.
 REPLACED = ("CI", "FORCE_RERUN_ANALYTICS", "ALL_PROXY", "HTTPS_PROXY", "HTTP_PROXY", "NO_PROXY")

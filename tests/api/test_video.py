@@ -7,7 +7,7 @@ import pytest
 
 import swarm_mj
 from swarm_mj.api import video
-from swarm_mj.rendering.movie import Style
+from swarm_mj.rendering.style import Style
 from swarm_mj.rendering.video import check_video
 
 TINY = {"num_robots": 4, "num_windows": 3, "range_ratio": 2.0}
@@ -17,8 +17,7 @@ TINY = {"num_robots": 4, "num_windows": 3, "range_ratio": 2.0}
 def small(monkeypatch):
     """Small pictures, of which there are few."""
     for suffix in (".mp4", ".gif"):
-        monkeypatch.setitem(video.SIZES, suffix, "320x200")
-        monkeypatch.setitem(video.RATES, suffix, 4)
+        monkeypatch.setitem(video.USUAL, suffix, Style(width=320, height=200, fps=4))
 
 
 @pytest.mark.usefixtures("opengl", "small")

@@ -3,24 +3,20 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import av
 import pytest
 from PIL import Image
 
-from swarm_mj.cli import main
-from swarm_mj.rendering.opengl import make_context
+from swarm_mj.cli import main, replay
+from swarm_mj.replay.read import read_footage
 
 SMALL = ("--size", "160x160", "--fps", "5")
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _opengl():
-    try:
-        make_context(8, 8).free()
-    except OSError as error:
-        pytest.skip(str(error))
+pytestmark = pytest.mark.usefixtures("opengl")
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +77,7 @@ def test_an_existing_video_is_kept_without_force(flown, here, capsys):
         (["--video", "a.mp4", "--web"], "--web is not allowed with --video"),
         (["--seconds", "5"], "are of videos; name one by --video"),
         (["--video", "a.mp4", "--fps", "0"], "fps"),
+        (["--video", "a.gif", "--fps", "51"], "fps of a GIF must be at most 50, not 51"),
     ],
 )
 def test_bad_input_is_one_clear_line(flown, here, capsys, arguments, complaint):
@@ -110,7 +107,7 @@ def test_an_interrupt_leaves_nothing(flown, here, monkeypatch):
 
 
 def test_a_video_that_does_not_fit_is_refused_before_the_work(flown, here, capsys):
-    arguments = ["--video", "a.gif", "--size", "3840x3840", "--seconds", "600", "--fps", "60"]
+    arguments = ["--video", "a.gif", "--size", "3840x3840", "--seconds", "600", "--fps", "50"]
     assert main(["replay", str(flown / "tdma.rrd"), *arguments]) == 2
     assert "choose a smaller --size or fewer --seconds" in capsys.readouterr().err
     assert list(here.iterdir()) == []
@@ -155,6 +152,16 @@ def pillar(spec, mission):
 """
 
 
+@pytest.mark.parametrize("name", ["x[/b]", "line\nbreak", "\x1b[31mred", "long " * 40])
+def test_a_scene_s_name_in_a_file_is_text_and_no_more(flown, capsys, name):
+    footage = read_footage(flown / "tdma.rrd")
+    elsewhere = replace(footage, facts=replace(footage.facts, scene=name))
+    assert replay._in_scene(elsewhere, None) is elsewhere
+    said = capsys.readouterr().err
+    assert said.endswith(f"The mission was flown in the scene {name!r}.\n")
+    assert said.count("\n") == 1
+
+
 def num_red(path):
     """Pixels of the pillar in the first picture."""
     with av.open(str(path)) as container:
@@ -171,8 +178,8 @@ def test_a_scene_of_ones_own_is_shown_when_it_is_named_again(here, capsys):
     video = ["replay", "a.rrd", "--video"]
     capsys.readouterr()
     assert main([*video, "bare.mp4", *SMALL]) == 0
-    said = " ".join(capsys.readouterr().err.split())
-    assert "shows the bare arena. The mission was flown in the scene my_scene:pillar;" in said
+    said = capsys.readouterr().err
+    assert said.endswith("flown in the scene 'my_scene:pillar'; --scene shows it, too.\n")
     assert main([*video, "whole.mp4", *SMALL, *scene]) == 0
     assert "bare arena" not in capsys.readouterr().err
     assert num_red(here / "bare.mp4") == 0

@@ -107,3 +107,8 @@ def test_breaking_off_ends_the_jobs_at_once():
     assert len(multiprocessing.active_children()) == 2
     work.close()
     assert multiprocessing.active_children() == []
+
+
+def test_jobs_run_nothing_of_the_folder_here(trapped):
+    assert sorted(product for _, (product, _) in run_jobs(square, [2, 3], 2)) == [4, 9]
+    assert not trapped.exists()

@@ -10,7 +10,8 @@ from scipy import ndimage
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.rendering.movie import Movie, Style
+from swarm_mj.rendering.movie import Movie
+from swarm_mj.rendering.style import Style
 from swarm_mj.rendering.video import check_video, make_video
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import footage_of

@@ -8,6 +8,7 @@ from mujoco import mjtGeom as MjtGeom
 from scipy import ndimage
 
 from swarm_mj.mission import paper
+from swarm_mj.rendering.opengl import make_context
 from swarm_mj.rendering.scene import SceneRenderer
 
 SIZE = 640, 480
@@ -147,6 +148,16 @@ def test_a_back_end_that_turns_out_not_to_work_is_one_line(monkeypatch):
     def refuse(*_):
         raise FatalError("no context")
 
+    made = []
+
+    def noted(width, height):
+        made.append(make_context(width, height))
+        freed = made[-1].free
+        monkeypatch.setattr(made[-1], "free", lambda: (freed(), made.clear()))
+        return made[-1]
+
     monkeypatch.setattr("swarm_mj.rendering.scene.MjrContext", refuse)
+    monkeypatch.setattr("swarm_mj.rendering.scene.make_context", noted)
     with pytest.raises(OSError, match=r"does not work here \(FatalError\); rendering needs OpenGL"):
         SceneRenderer(paper(num_robots=3), 64, 64)
+    assert made == []

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from swarm_mj.rendering.movie import Style
+from swarm_mj.rendering.style import Style
 from swarm_mj.rendering.video import check_video, encode_gif, encode_mp4, make_video
 from swarm_mj.replay import palette
 
@@ -85,3 +85,20 @@ def test_a_gif_s_equal_pictures_count(tmp_path):
 def test_other_kinds_of_files_are_refused():
     with pytest.raises(ValueError, match=r"a video is \.mp4 or \.gif, not \.avi"):
         make_video([], ".avi")
+
+
+def test_a_gif_that_lasts_longer_than_asked_is_found_out(tmp_path):
+    """As many pictures as 15 in a second, each shown for 70 ms, which is what GIFs can do."""
+    pictures = [np.full((24, 32, 3), k, dtype=np.uint8) for k in range(0, 150, 5)]
+    (tmp_path / "a.gif").write_bytes(
+        encode_gif(pictures, Style(width=32, height=24, fps=100 / 7), pictures[:2])
+    )
+    with pytest.raises(ValueError, match=r"30 pictures of \(32, 24\) were found, not 29"):
+        check_video(tmp_path / "a.gif", ".gif", Style(width=32, height=24, seconds=2.0, fps=15))
+
+
+def test_an_mp4_of_another_rate_is_found_out(tmp_path):
+    (tmp_path / "a.mp4").write_bytes(made(".mp4"))
+    slower = Style(width=320, height=240, seconds=2.0, fps=5)
+    with pytest.raises(ValueError, match="1 s were found, not 2 s"):
+        check_video(tmp_path / "a.mp4", ".mp4", slower)

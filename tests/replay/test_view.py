@@ -8,7 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from swarm_mj.replay.view import LOOPBACK, quiet_environment, run, serve_command, view_command
+from swarm_mj.replay.view import (
+    LOOPBACK,
+    VIEWER,
+    quiet_environment,
+    run,
+    serve_command,
+    view_command,
+)
 
 FILE = Path("some where") / "mission.rrd"
 
@@ -47,6 +54,11 @@ def test_a_viewer_s_way_out_of_this_machine_is_closed(monkeypatch):
 )
 def test_a_viewer_that_fails_is_a_machine_that_fails(end, code):
     assert run([sys.executable, "-c", f"import os, sys; {end}"]) == code
+
+
+def test_a_viewer_runs_nothing_of_the_folder_here(trapped):
+    assert run([*VIEWER, "--version"]) == 0
+    assert not trapped.exists()
 
 
 def test_the_page_is_served(replay):

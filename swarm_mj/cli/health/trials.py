@@ -4,7 +4,6 @@ MuJoCo chooses how to render once in a process, so each way needs one of its own
 """
 
 import os
-import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
@@ -12,7 +11,7 @@ from subprocess import Popen, TimeoutExpired
 from typing import IO, NamedTuple
 
 from swarm_mj.cli.health.finding import Finding
-from swarm_mj.io.processes import running
+from swarm_mj.io.processes import PYTHON, running
 
 LONGEST_S = 120.0  # of a trial; the first flight of an installation compiles for half a minute
 MOST_LETTERS = 100  # of what a trial complains
@@ -100,7 +99,7 @@ def tried() -> Iterator[Finding]:
         under_way = []
         for trial in TRIALS:
             said = stack.enter_context(tempfile.TemporaryFile("w+"))
-            command = [sys.executable, *trial.arguments]
+            command = [*PYTHON, *trial.arguments]
             environment = os.environ | trial.variables
             process = running(command, environment=environment, output=said)
             under_way.append((trial, stack.enter_context(process), said))

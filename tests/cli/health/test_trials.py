@@ -32,3 +32,11 @@ def test_each_way_to_render_is_tried_by_its_own_name():
     ways = {each.name: each.variables for each in TRIALS if each.group == RENDERING}
     assert ways == {f"MUJOCO_GL={way}": {"MUJOCO_GL": way} for way in ("egl", "osmesa", "glfw")}
     assert [each.name for each in TRIALS if each.is_needed] == ["three robots fly"]
+
+
+def test_trials_run_nothing_of_the_folder_here(monkeypatch, trapped):
+    trial = Trial("group", "name", ("-c", "import numpy; print(numpy.pi)"), "mend it")
+    monkeypatch.setattr(trials, "TRIALS", (trial,))
+    (outcome,) = tried()
+    assert outcome.found.startswith("3.14")
+    assert not trapped.exists()
