@@ -191,6 +191,7 @@ def save_policy(model: BaseAlgorithm, folder: Path | str) -> None:
     network = MlpShape(
         num_robots=team.mission.num_robots,
         features=team.features,
+        num_features=team.num_features,
         hidden=hidden,
         activation=activation,
         obeys_mask=hasattr(model.policy.action_dist, "apply_masking"),

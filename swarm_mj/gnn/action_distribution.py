@@ -1,13 +1,10 @@
-"""From a network's numbers to a decision (III-C): logits over recipients, silence among them."""
+"""From a network's numbers to logits over recipients, silence among them (III-C)."""
 
-import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from swarm_mj.compiled import compiled
-
-IMPOSSIBLE = -1e9  # the logit of a recipient that may not be addressed; finite, so that 0 p stays 0
+from swarm_mj.gnn.sampling import IMPOSSIBLE
 
 
 def recipient_logits(
@@ -44,29 +41,3 @@ def recipient_logits(
             bias = bias.masked_fill(has_turn[:, None], 0.0)
         logits = logits.scatter_add(1, own, bias)
     return logits.masked_fill(~may_address, IMPOSSIBLE)
-
-
-@compiled()
-def sample(
-    logits: Float[np.ndarray, "R N"], uniform: Float[np.ndarray, "R"]
-) -> Int[np.ndarray, "R"]:
-    """A recipient from each row's Boltzmann distribution, by its cumulated probabilities.
-
-    `uniform` is one number in [0, 1) a row; the same number is the same decision.
-    """
-    num_rows, num_nodes = logits.shape
-    chosen, weight = np.zeros(num_rows, dtype=np.int64), np.empty(num_nodes)
-    for r in range(num_rows):
-        highest = logits[r].max()
-        total = 0.0
-        for k in range(num_nodes):
-            weight[k] = np.exp(logits[r, k] - highest)
-            total += weight[k]
-        left = uniform[r] * total
-        for k in range(num_nodes):
-            if weight[k] > 0.0:
-                chosen[r] = k  # the last possible one, should rounding leave a rest
-                left -= weight[k]
-                if left < 0.0:
-                    break
-    return chosen

@@ -93,20 +93,50 @@ def check_named(features: str, named: Collection[str], where: str) -> None:
         )
 
 
+def trained_extractor(
+    features: str, num_features: int, mission: Mission, *, named: Collection[str], where: str
+) -> FeatureExtractor:
+    """An extractor of what a stored network, which `where` calls, was trained on.
+
+    A user's own set is imported, but only if it is among those that the user named.
+
+    Raises:
+        ValueError: It is not, it cannot be loaded, or it now has another number of features.
+    """
+    check_named(features, named, where)
+    if is_own_set(features):
+        load_features(features)
+    extractor = make_extractor(features, mission)
+    if len(extractor.names) != num_features:
+        raise ValueError(
+            f"{where} was trained on {num_features} features, and {features} now has "
+            f"{len(extractor.names)}"
+        )
+    return extractor
+
+
+def check_num_features(given: int, features: str) -> None:
+    """Passes if a feature set has so many numbers for each node, or is a user's own.
+
+    That is not imported, as the name may stand in a file: it may have any number.
+
+    Raises:
+        ValueError: It has not, or there is no such feature set.
+    """
+    check_features(features)
+    expected = given if is_own_set(features) else num_features(features)
+    if given != expected:
+        raise ValueError(
+            f"network.num_features is {given}, but the {features} features are {expected}"
+        )
+
+
 def check_fit(network: GnnShape, features: str) -> None:
     """Passes for a network that takes a feature set, and gives what decisions are made of.
 
-    A user's own set is not imported, as the name may stand in a file: it may have any number.
-
     Raises:
-        ValueError: It does not, or there is no such feature set.
+        ValueError: It does not; as `check_num_features`.
     """
-    check_features(features)
-    expected = network.num_features if is_own_set(features) else num_features(features)
-    if network.num_features != expected:
-        raise ValueError(
-            f"network.num_features is {network.num_features}, but the {features} features are "
-            f"{expected}"
-        )
+    check_num_features(network.num_features, features)
     if network.num_outputs not in (1, 2):
         raise ValueError(f"network.num_outputs must be 1 or 2, not {network.num_outputs}")

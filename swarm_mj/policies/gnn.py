@@ -8,9 +8,10 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int
 
-from swarm_mj.gnn.action_distribution import recipient_logits, sample
+from swarm_mj.gnn.action_distribution import recipient_logits
 from swarm_mj.gnn.graphs import FeatureExtractor
 from swarm_mj.gnn.network import AggregationGnn
+from swarm_mj.gnn.sampling import sample
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.policy import DecentralisedPolicy, Parameters
 from swarm_mj.protocol.local_views import LocalViews

@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from swarm_mj.fields import check, setting
-from swarm_mj.gnn.action_distribution import IMPOSSIBLE, sample
-from swarm_mj.gnn.feature_sets import check_features, num_features
+from swarm_mj.gnn.feature_sets import check_num_features, is_own_set
 from swarm_mj.gnn.graphs import FeatureExtractor
+from swarm_mj.gnn.sampling import IMPOSSIBLE, sample
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.policy import DecentralisedPolicy, Parameters
 from swarm_mj.protocol.local_views import LocalViews
@@ -35,17 +35,18 @@ class MlpShape:
 
     num_robots: int = setting(low=2, high=1000)  # N: of the one team size that it flies
     features: str  # the name of a feature set, see `FEATURE_SETS`
+    num_features: int = setting(low=1, high=1024)  # F: numbers per teammate
     hidden: tuple[int, ...] = setting(low=1, high=4096)  # widths of the layers but the last
     activation: Activation = setting(choices=get_args(Activation))  # after all layers but the last
     obeys_mask: bool  # whether it addresses only those whom the features call worth a thought
 
     def __post_init__(self) -> None:
         check(self)
-        check_features(self.features)
+        check_num_features(self.num_features, self.features)
 
     def tensors(self) -> dict[str, tuple[int, ...]]:
         """The weights' names and shapes."""
-        inputs = self.num_robots * (1 + num_features(self.features))
+        inputs = self.num_robots * (1 + self.num_features)
         widths = [inputs, *self.hidden, self.num_robots]
         shapes: dict[str, tuple[int, ...]] = {}
         for n, (before, after) in enumerate(itertools.pairwise(widths)):
@@ -80,6 +81,7 @@ class MlpPolicy(DecentralisedPolicy):
         return {
             "is_deterministic": self._is_deterministic,
             "digest": digest.hexdigest()[:DIGITS],
+            **({"features": self._shape.features} if is_own_set(self._shape.features) else {}),
         }
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:

@@ -1,9 +1,11 @@
 """The card of a stored policy, for whoever finds it: what it is, where it comes from, its costs."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from swarm_mj.gnn.feature_sets import is_own_set
+from swarm_mj.policies.mlp import MlpShape
 from swarm_mj.policies.policy_config import PolicyConfig
 
 EDGES = {
@@ -22,30 +24,74 @@ def model_card(config: PolicyConfig) -> str:
     training = dict(_flat(config.training))
     task = next((v for k, v in training.items() if v and _is_text(k, v, "task")), "TASK")
     commit = f", commit {config.commit}" if config.commit else ""
+    return _card(
+        _network(config),
+        sees="its own buffer, seen as a graph",
+        flags=f"--task {task}{_own_features(config.features)}",
+        teams="Teams of any size fly with it; those much larger than the ones it was trained on "
+        "may fare badly.",
+        training=training,
+        origin=f"By swarm_mj {config.version}{commit}.",
+        rest=[
+            "## Evaluation",
+            *_described(dict(_flat(config.evaluation))),
+            "## Licence",
+            "Apache-2.0, as swarm_mj.",
+        ],
+    )
+
+
+def mlp_card(shape: MlpShape, training: Mapping[str, Any], version: str) -> str:
+    """As `model_card`, for a plain network; the version is that of swarm_mj that stored it."""
+    widths = " and ".join(map(str, shape.hidden)) or "no"
+    return _card(
+        f"- network: perceptrons, {widths} hidden units, {shape.activation}\n"
+        "- packets: T, M and P, as the paper's, and nothing more\n"
+        f"- features: `{shape.features}`, {shape.num_features} for each robot",
+        sees="what it knows of its teammates",
+        flags=f"--robots {shape.num_robots}{_own_features(shape.features)}",
+        teams=f"It flies teams of {shape.num_robots} robots only.",
+        training=dict(_flat(training)),
+        origin=f"Stored by swarm_mj {version}.",
+    )
+
+
+def _card(
+    network: str,
+    *,
+    sees: str,
+    flags: str,
+    teams: str,
+    training: Mapping[str, Any],
+    origin: str,
+    rest: Iterable[str] = (),
+) -> str:
+    """What every card says, about a network that is listed so."""
     parts = [
         "# A learned communication policy of swarm_mj",
-        _network(config),
+        f"Every robot evaluates this network on {sees}, and draws from the result whom it "
+        "addresses in the next window, or that it stays silent.",
+        network,
         "## Fly it",
-        f"    swarm-mj fly --policy DIR --task {task}",
-        "`DIR` is this folder; `swarm-mj evaluate` takes it too. Teams of any size fly with it; "
-        "those much larger than the ones it was trained on may fare badly.",
+        f"    swarm-mj fly --policy DIR {flags}",
+        f"`DIR` is this folder; `swarm-mj evaluate` takes it too. {teams}",
         "## Training",
         *_described(training),
-        f"By swarm_mj {config.version}{commit}.",
-        "## Evaluation",
-        *_described(dict(_flat(config.evaluation))),
-        "## Licence",
-        "Apache-2.0, as swarm_mj.",
+        origin,
+        *rest,
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _own_features(features: str) -> str:
+    """What the command needs as well if the features are somebody's own."""
+    return f" --features {features}" if is_own_set(features) else ""
 
 
 def _network(config: PolicyConfig) -> str:
     shape = config.network
     kind = "linear Aggregation GNN" if shape.is_linear else "Aggregation GNN"
     return (
-        "Every robot evaluates this network on its own buffer, seen as a graph, and draws from the "
-        "result whom it addresses in the next window, or that it stays silent.\n\n"
         f"- network: {kind}, receptive field {shape.receptive_field}, width {shape.latent}, "
         f"{shape.depth} layers in each MLP; {EDGES[shape.edges]}\n"
         "- packets: T, M and P, as the paper's, and nothing more\n"

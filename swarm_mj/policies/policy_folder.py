@@ -1,13 +1,16 @@
 """The folder of a stored policy: its weights, what they belong to, and a card for its reader."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from swarm_mj.io.atomic import present_folder, write_folder
-from swarm_mj.io.reading import check_size, read_file
+from swarm_mj.io.reading import check_size, format_of, read_file
 
 WEIGHTS, CONFIG, CARD = "model.safetensors", "config.json", "README.md"
 MAX_BYTES = {WEIGHTS: 64_000_000, CONFIG: 1_000_000}
+MLP_FORMAT = "swarm_mj mlp policy"  # of a plain network's config; a GNN's is another
 WAY_OUT = "copy it again, or make one with `swarm-mj train`"
 
 
@@ -48,6 +51,48 @@ def present_policy(folder: Path) -> Path:
 def read_part(folder: Path, name: str) -> bytes:
     """One of a policy's files; raises ValueError or OSError as `read_file`."""
     return read_file(folder / name, "file", MAX_BYTES[name])
+
+
+def is_mlp(folder: Path) -> bool:
+    """Whether a folder says that its network is no GNN, but a plain one.
+
+    Raises:
+        ValueError: It is no policy's folder.
+        OSError: It cannot be read.
+    """
+    present = present_policy(folder)
+    with suppress(ValueError):  # what is wrong is said when all of it is read
+        return format_of(read_part(present, CONFIG)) == MLP_FORMAT
+    return False
+
+
+def check_tensors(
+    expected: Mapping[str, str], tensors: Mapping[str, Any], is_finite: Callable[[Any], object]
+) -> None:
+    """Passes if these are a network's tensors, all of them finite.
+
+    Args:
+        expected: Each one's shape and type as `kind_of_tensor` says them, by name.
+        tensors: NumPy's or torch's.
+        is_finite: Whether all numbers of one are.
+
+    Raises:
+        ValueError: One is missing, unknown, of another shape or type, or not finite.
+    """
+    for name in sorted(expected.keys() ^ tensors.keys()):
+        known = "lacks the" if name in expected else "has an unknown"
+        raise ValueError(f"it {known} tensor {name:.80}")
+    for name, tensor in tensors.items():
+        given = kind_of_tensor(tensor.shape, tensor.dtype)
+        if given != expected[name]:
+            raise ValueError(f"tensor {name} must be {expected[name]}, not {given}")
+        if not is_finite(tensor):
+            raise ValueError(f"tensor {name} has numbers that are not finite")
+
+
+def kind_of_tensor(shape: Iterable[int], dtype: object) -> str:
+    """A tensor's shape and type, in words."""
+    return f"{list(shape)} of {dtype}"
 
 
 def check_replaceable(folder: Path) -> None:

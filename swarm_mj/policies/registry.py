@@ -6,6 +6,7 @@ A learned policy has no name but that of the directory that holds it, except the
 import os
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 from swarm_mj.fields import check_kind, did_you_mean
 from swarm_mj.io.assets import asset
@@ -20,6 +21,7 @@ from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.without_payload import PlannerWithoutPayload
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
+from swarm_mj.policies.policy_folder import is_mlp
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.round_robin import RoundRobin
 from swarm_mj.policies.spatial_tdma import SpatialTdma
@@ -151,11 +153,7 @@ def make_policy(
         return _own_policy(name, mission, probability, is_deterministic)
     if is_learned(name):
         _refuse(probability, name)
-        need("torch", f"policy {name}", "fly another")
-        from swarm_mj.policies.stored import load_policy  # torch takes its time to import
-
-        folder = asset(f"policies/{SHIPPED}") if name == SHIPPED else Path(name)
-        return load_policy(folder, mission, is_deterministic=is_deterministic, features=features)
+        return _learned(name, mission, is_deterministic=is_deterministic, features=features)
     if name not in RULES:
         raise ValueError(
             f"policy must be one of {', '.join(POLICIES)}, a directory with a learned policy, or "
@@ -185,6 +183,20 @@ def check_used(features: Sequence[str], policies: Iterable[Policy]) -> None:
 def is_own_policy(name: str) -> bool:
     """Whether a policy is a user's own, named `module:Name`."""
     return is_own(name) and not is_directory(name)
+
+
+def _learned(name: str, mission: Mission, **options: Any) -> Policy:
+    """A trained network, which takes its libraries' time to import."""
+    if name != SHIPPED and is_mlp(Path(name)):
+        need("safetensors", f"policy {name}", "fly another")
+        from swarm_mj.policies.mlp_folder import load_mlp
+
+        return load_mlp(Path(name), mission, **options)
+    need("torch", f"policy {name}", "fly another")
+    from swarm_mj.policies.stored import load_policy
+
+    folder = asset(f"policies/{SHIPPED}") if name == SHIPPED else Path(name)
+    return load_policy(folder, mission, **options)
 
 
 def _own_policy(

@@ -1,22 +1,17 @@
 """A policy on disk: a folder of its weights, what they belong to, and a card for its reader."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 
 import torch
 from safetensors import SafetensorError
 from safetensors.torch import load, save
-from torch import Tensor
 
 from swarm_mj.gnn.fast import FastAggregationGnn
-from swarm_mj.gnn.feature_sets import check_named, is_own_set, load_features, make_extractor
+from swarm_mj.gnn.feature_sets import is_own_set, trained_extractor
 from swarm_mj.gnn.network import AggregationGnn
-from swarm_mj.io.reading import format_of
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn import LearnedPolicy
-from swarm_mj.policies.mlp import MlpPolicy
-from swarm_mj.policies.mlp_folder import MLP_FORMAT, load_mlp
 from swarm_mj.policies.model_card import model_card
 from swarm_mj.policies.policy_config import PolicyConfig, from_json, to_json
 from swarm_mj.policies.policy_folder import (
@@ -24,6 +19,8 @@ from swarm_mj.policies.policy_folder import (
     CONFIG,
     WAY_OUT,
     WEIGHTS,
+    check_tensors,
+    kind_of_tensor,
     present_policy,
     read_part,
     write_policy,
@@ -45,7 +42,7 @@ def save_policy(
     if config.network != network.shape:
         raise ValueError(f"config describes {config.network}, but the network is {network.shape}")
     tensors = {name: t.detach().cpu().contiguous() for name, t in network.state_dict().items()}
-    _check_tensors(tensors, _empty(config))
+    _check(tensors, _empty(config))
     contents = {
         WEIGHTS: save(tensors),
         CONFIG: to_json(config).encode(),
@@ -60,7 +57,7 @@ def load_policy(
     *,
     is_deterministic: bool = False,
     features: Sequence[str] = (),
-) -> LearnedPolicy | MlpPolicy:
+) -> LearnedPolicy:
     """A policy, ready to fly a mission, which may be of another kind than it was trained on.
 
     The mission's area, duration and range normalise what the robots see. A deterministic policy
@@ -72,18 +69,14 @@ def load_policy(
             its features are not those that may be imported.
         OSError: It cannot be read.
     """
-    if _is_mlp(folder):
-        return load_mlp(folder, mission, is_deterministic=is_deterministic)
     network, config = read_policy(folder)
-    check_named(config.features, features, f"policy {folder}")
-    if is_own_set(config.features):
-        load_features(config.features)
-    extractor = make_extractor(config.features, mission)
-    if len(extractor.names) != config.network.num_features:
-        raise ValueError(
-            f"policy {folder} was trained on {config.network.num_features} features, and "
-            f"{config.features} now has {len(extractor.names)}"
-        )
+    extractor = trained_extractor(
+        config.features,
+        config.network.num_features,
+        mission,
+        named=features,
+        where=f"policy {folder}",
+    )
     return LearnedPolicy(
         network,
         extractor,
@@ -91,13 +84,6 @@ def load_policy(
         is_deterministic=is_deterministic,
         own_features=config.features if is_own_set(config.features) else None,
     )
-
-
-def _is_mlp(folder: Path) -> bool:
-    """Whether a folder says that its network is no GNN, but a plain one."""
-    with suppress(ValueError):  # what is wrong is said when it is read
-        return format_of(read_part(present_policy(folder), CONFIG)) == MLP_FORMAT
-    return False
 
 
 def read_policy(folder: Path) -> tuple[AggregationGnn, PolicyConfig]:
@@ -119,7 +105,7 @@ def _network(config: PolicyConfig, data: bytes) -> AggregationGnn:
     except (SafetensorError, AssertionError, KeyError, RuntimeError, ValueError) as error:
         raise ValueError(f"it is damaged, or no safetensors file ({error})") from error
     network = _empty(config)
-    _check_tensors(tensors, network)
+    _check(tensors, network)
     network.load_state_dict(tensors, assign=True)
     return network
 
@@ -130,15 +116,7 @@ def _empty(config: PolicyConfig) -> AggregationGnn:
         return FastAggregationGnn(config.network)
 
 
-def _check_tensors(tensors: Mapping[str, Tensor], network: AggregationGnn) -> None:
+def _check(tensors: Mapping[str, torch.Tensor], network: AggregationGnn) -> None:
     """Raises ValueError unless these are a network's tensors, all of them finite."""
-    expected = network.state_dict()
-    for name in sorted(expected.keys() ^ tensors.keys()):
-        known = "lacks the" if name in expected else "has an unknown"
-        raise ValueError(f"it {known} tensor {name:.80}")
-    for name, tensor in tensors.items():
-        wanted, given = (f"{list(t.shape)} of {t.dtype}" for t in (expected[name], tensor))
-        if given != wanted:
-            raise ValueError(f"tensor {name} must be {wanted}, not {given}")
-        if not torch.isfinite(tensor).all():
-            raise ValueError(f"tensor {name} has numbers that are not finite")
+    expected = {n: kind_of_tensor(t.shape, t.dtype) for n, t in network.state_dict().items()}
+    check_tensors(expected, tensors, lambda tensor: torch.isfinite(tensor).all())

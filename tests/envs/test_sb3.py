@@ -191,6 +191,18 @@ def test_a_stored_actor_flies_from_the_command_line(here, forks):
     assert "flies teams of 4 robots" in done.stderr
 
 
+def test_an_actor_that_sees_by_ones_own_features_flies_if_they_are_named(here, forks):
+    own = "swarm_mj.gnn.graphs:PaperFeatures"
+    save_policy(trained(env=make_vec_env("stationary", 2, seed=1, features=own, **SMALL)), "own")
+    fly = ("fly", "--policy", "own/", "--task", "stationary", "--robots", 4, "--windows", 5)
+    done = forks.run(here, "swarm_mj", *fly, "--no-record")
+    assert done.returncode == 2
+    assert done.stderr.rstrip().endswith(f"if you trust that code, add --features {own}")
+    done = forks.run(here, "swarm_mj", *fly, "--no-record", "--features", own)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"--robots 4 --features {own}" in (here / "own" / "README.md").read_text()
+
+
 def test_a_model_read_back_is_stored_with_its_environment(tmp_path):
     model = trained(PPO)
     model.save(tmp_path / "model.zip")

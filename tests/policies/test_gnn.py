@@ -7,8 +7,9 @@ from mixed_missions import MISSION as WALK
 from mixed_missions import NUM_ROBOTS, SEEDS, mixed_views
 from tiny_policies import FEATURES, save_tiny, tiny_network
 
-from swarm_mj.gnn.action_distribution import recipient_logits, sample
+from swarm_mj.gnn.action_distribution import recipient_logits
 from swarm_mj.gnn.feature_sets import make_extractor
+from swarm_mj.gnn.sampling import sample
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.gnn import LearnedPolicy
 from swarm_mj.policies.policy import DecentralisedPolicy

@@ -13,7 +13,12 @@ MISSION = paper("random-walk", num_robots=4, range_ratio=0.2, num_windows=30)
 
 def shape_of(hidden=(5,), activation="tanh", obeys_mask=True, features="extended"):
     return MlpShape(
-        num_robots=4, features=features, hidden=hidden, activation=activation, obeys_mask=obeys_mask
+        num_robots=4,
+        features=features,
+        num_features=18,
+        hidden=hidden,
+        activation=activation,
+        obeys_mask=obeys_mask,
     )
 
 
@@ -95,9 +100,11 @@ def test_a_digest_tells_networks_apart():
         ({"num_robots": 1}, "num_robots must be a whole number from 2 to 1000, not 1"),
         ({"hidden": (0,)}, "hidden must be a whole number from 1 to 4096, not 0"),
         ({"features": "mine"}, "features must be one of"),
+        ({"num_features": 18}, "num_features is 18, but the paper features are 8"),
     ],
 )
 def test_a_shape_refuses_what_is_out_of_range(its, complaint):
-    usual = {"num_robots": 4, "features": "paper", "hidden": (3,), "activation": "tanh"}
+    usual = {"num_robots": 4, "features": "paper", "num_features": 8}
+    usual |= {"hidden": (3,), "activation": "tanh"}
     with pytest.raises(ValueError, match=complaint):
         MlpShape(obeys_mask=True, **(usual | its))

@@ -1,6 +1,8 @@
 """Plain networks on disk: as they were stored, and refused where they are not."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -8,12 +10,19 @@ from safetensors.numpy import load_file, save_file
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.mlp import MlpPolicy, MlpShape
-from swarm_mj.policies.mlp_folder import MlpConfig, read_mlp, save_mlp
+from swarm_mj.policies.mlp_folder import MlpConfig, load_mlp, read_mlp, save_mlp
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.policies.stored import load_policy, read_policy
+from swarm_mj.policies.stored import read_policy
 
 MISSION = paper("stationary", num_robots=3)
-SHAPE = MlpShape(num_robots=3, features="paper", hidden=(4, 2), activation="relu", obeys_mask=False)
+SHAPE = MlpShape(
+    num_robots=3,
+    features="paper",
+    num_features=8,
+    hidden=(4, 2),
+    activation="relu",
+    obeys_mask=False,
+)
 CONFIG = MlpConfig(network=SHAPE, training={"timesteps": 7}, version="1.2.3")
 
 
@@ -31,7 +40,7 @@ def policy(tmp_path):
 
 def refused(folder, complaint):
     with pytest.raises(ValueError, match=complaint) as error:
-        load_policy(folder, MISSION)
+        make_policy(str(folder), MISSION)
     assert str(folder) in str(error.value)
     assert "\n" not in str(error.value)
 
@@ -65,7 +74,7 @@ def test_a_policy_there_is_replaced_and_nothing_else(policy):
 
 def test_other_teams_are_refused(policy):
     with pytest.raises(ValueError, match=r"flies teams of 3 robots.* not 5; choose --robots 3"):
-        load_policy(policy, paper("stationary", num_robots=5))
+        load_mlp(policy, paper("stationary", num_robots=5))
 
 
 def test_it_is_no_gnn_to_train_on(policy):
@@ -88,7 +97,8 @@ def changed(policy, change):
         (lambda d: d["network"].update(hidden=[4, 10**9]), "hidden must be a whole number"),
         (lambda d: d["network"].update(activation="os.system"), "os.system"),
         (lambda d: d["network"].update(features="mine"), "features must be one of"),
-        (lambda d: d["network"].update(features="os:system"), "if you trust that code"),
+        (lambda d: d["network"].update(features="os:system"), "add --features os:system$"),
+        (lambda d: d["network"].update(num_features=7), "is 7, but the paper features are 8"),
         (lambda d: d["network"].update(hidden=[4, 3]), r"tensor [12]\.\w+ must be"),
         (lambda d: d["network"].update(hidden=[4]), "it has an unknown tensor 2"),
         (lambda d: d["network"].update(hidden=[4, 2, 2]), "it lacks the tensor 3"),
@@ -134,3 +144,13 @@ def test_weights_of_another_shape_are_not_stored(tmp_path):
     with pytest.raises(ValueError, match=r"it lacks the tensor 0\.bias"):
         save_mlp(tmp_path / "x", {k: v for k, v in some_weights().items() if k != "0.bias"}, CONFIG)
     assert not (tmp_path / "x").exists()
+
+
+def test_it_flies_without_torch(policy):
+    code = (
+        "import sys; sys.modules['torch'] = None; import swarm_mj; "
+        f"swarm_mj.fly('stationary', policy={str(policy)!r}, num_robots=3, num_windows=5, "
+        "record=False)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
