@@ -41,6 +41,20 @@ def check_fields(mission: Mission | str, fields: Mapping[str, Any]) -> None:
         )
 
 
+def check_features_named(features: object) -> None:
+    """Passes for a name, which stored policies keep.
+
+    Raises:
+        TypeError: The features are a class, or something else.
+    """
+    if not isinstance(features, str):
+        is_class = isinstance(features, type)
+        name = f"{features.__module__}:{features.__qualname__}" if is_class else "module:Name"
+        raise TypeError(
+            f'features must be named, as stored policies keep the name; write features="{name}"'
+        )
+
+
 def check_reset(options: Collection[str], known: Collection[str] = ()) -> None:
     """Passes if these are options of `reset`.
 

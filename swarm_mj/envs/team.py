@@ -14,8 +14,9 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.control.controller import Controller, Costed
 from swarm_mj.control.motion import controller_of
-from swarm_mj.envs.options import check_fields, check_task
+from swarm_mj.envs.options import check_features_named, check_fields, check_task
 from swarm_mj.gnn.feature_sets import is_own_set, load_features, make_extractor
+from swarm_mj.gnn.graphs import check_width
 from swarm_mj.learning.credit import credits_of
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.mission.batched_rng import Started
@@ -78,12 +79,13 @@ class Team:
 
         Raises:
             ValueError: A value is unknown or out of range, or does not go with another.
-            TypeError: A field is not one of `Mission`'s.
+            TypeError: A field is not one of `Mission`'s, or the features are no name.
         """
         self.mission = _mission_of(mission, preset, fields)
         self.num_missions = num_missions
         self.reward = _checked(reward, self.mission, channel, controller)
         self.with_parents = with_parents
+        check_features_named(features)
         if is_own_set(features):
             load_features(features)
         self.features = features
@@ -187,6 +189,7 @@ class Team:
         A robot that was switched off may only be silent.
         """
         graphs = self._extractor.graphs(self.flown.views)
+        check_width(self.features, self._extractor, graphs)
         shape = (self.num_missions, self.mission.num_robots, self.mission.num_robots)
         may_address = graphs.may_address.reshape(shape) & self.is_active[:, :, None]
         may_address |= np.eye(self.mission.num_robots, dtype=np.bool_)

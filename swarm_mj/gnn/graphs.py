@@ -46,6 +46,17 @@ class FeatureExtractor(ABC):
         """What every robot's network sees now, row [b N + i] from view [b, i] only."""
 
 
+def check_width(features: str, extractor: FeatureExtractor, graphs: Graphs) -> None:
+    """Passes if an extractor, of the feature set of this name, names all numbers of its nodes.
+
+    Raises:
+        ValueError: It does not, as a user's own may.
+    """
+    named, found = len(extractor.names), graphs.node.shape[-1]
+    if named != found:
+        raise ValueError(f"{features} names {named} features, but its node has {found}")
+
+
 class PaperFeatures(FeatureExtractor):
     """The paper's features: T, M and L, by the mission's area and duration.
 

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from swarm_mj.gnn.feature_sets import make_extractor
-from swarm_mj.gnn.graphs import Graphs
+from swarm_mj.gnn.graphs import Graphs, check_width
 from swarm_mj.learning.credit import as_it_is, credits_of
 from swarm_mj.mission import Mission
 from swarm_mj.parts import OwnParts
@@ -60,6 +60,7 @@ class MissionBatch:
         self.mission = mission
         self.num_missions = num_missions
         self._rng = rng
+        self._features = features
         self._extractor = make_extractor(features, mission)
         self.num_features = len(self._extractor.names)  # F
         seeds = self._draw_seeds()
@@ -106,7 +107,9 @@ class MissionBatch:
         self.history = history
         self._swarm.restart(history.seeds)
         self._extractor.start(self.num_missions, self.mission.num_robots)
-        return self._extractor.graphs(self._swarm.views)
+        graphs = self._extractor.graphs(self._swarm.views)
+        check_width(self._features, self._extractor, graphs)
+        return graphs
 
     def _draw_seeds(self) -> list[int]:
         size = self.num_missions

@@ -22,12 +22,11 @@ def model_card(config: PolicyConfig) -> str:
     becomes a block.
     """
     training = dict(_flat(config.training))
-    task = next((v for k, v in training.items() if v and _is_text(k, v, "task")), "TASK")
     commit = f", commit {config.commit}" if config.commit else ""
     return _card(
         _network(config),
         sees="its own buffer, seen as a graph",
-        flags=f"--task {task}{_own_features(config.features)}",
+        flags=f"--task {_task(training)}{_own_features(config.features)}",
         teams="Teams of any size fly with it; those much larger than the ones it was trained on "
         "may fare badly.",
         training=training,
@@ -44,14 +43,15 @@ def model_card(config: PolicyConfig) -> str:
 def mlp_card(shape: MlpShape, training: Mapping[str, Any], version: str) -> str:
     """As `model_card`, for a plain network; the version is that of swarm_mj that stored it."""
     widths = " and ".join(map(str, shape.hidden)) or "no"
+    noted = dict(_flat(training))
     return _card(
         f"- network: perceptrons, {widths} hidden units, {shape.activation}\n"
         "- packets: T, M and P, as the paper's, and nothing more\n"
         f"- features: `{shape.features}`, {shape.num_features} for each robot",
         sees="what it knows of its teammates",
-        flags=f"--robots {shape.num_robots}{_own_features(shape.features)}",
+        flags=f"--task {_task(noted)} --robots {shape.num_robots}{_own_features(shape.features)}",
         teams=f"It flies teams of {shape.num_robots} robots only.",
-        training=dict(_flat(training)),
+        training=noted,
         origin=f"Stored by swarm_mj {version}.",
     )
 
@@ -81,6 +81,11 @@ def _card(
         *rest,
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _task(training: Mapping[str, Any]) -> str:
+    """The task that a network was trained on, if that is known."""
+    return next((v for k, v in training.items() if v and _is_text(k, v, "task")), "TASK")
 
 
 def _own_features(features: str) -> str:

@@ -11,6 +11,7 @@ from swarm_mj.io.reading import check_size, format_of, read_file
 WEIGHTS, CONFIG, CARD = "model.safetensors", "config.json", "README.md"
 MAX_BYTES = {WEIGHTS: 64_000_000, CONFIG: 1_000_000}
 MLP_FORMAT = "swarm_mj mlp policy"  # of a plain network's config; a GNN's is another
+MOST_SHOWN = 8  # policies in a message
 WAY_OUT = "copy it again, or make one with `swarm-mj train`"
 
 
@@ -43,9 +44,25 @@ def present_policy(folder: Path) -> Path:
         )
     if not present.is_dir():
         raise ValueError(f"policy {folder} is a file; name the directory that holds the policy")
-    if not (present / CONFIG).exists() and (present / "policy" / CONFIG).exists():
-        raise ValueError(f"{folder} is a run; name the policy in it, {folder / 'policy'}")
+    if not (present / CONFIG).exists():
+        _check_none_below(folder)
     return present
+
+
+def _check_none_below(folder: Path) -> None:
+    """Raises ValueError if a folder that is no policy holds some, by themselves or in runs."""
+    found = sorted(
+        path.parent
+        for pattern in (f"*/{CONFIG}", f"*/policy/{CONFIG}")
+        for path in folder.glob(pattern)
+        if (path.parent / WEIGHTS).exists()
+    )
+    if found == [folder / "policy"]:
+        raise ValueError(f"{folder} is a run; name the policy in it, {found[0]}")
+    if found:
+        shown = ", ".join(map(str, found[:MOST_SHOWN]))
+        more = f" and {len(found) - MOST_SHOWN} more" if len(found) > MOST_SHOWN else ""
+        raise ValueError(f"{folder} holds policies; name one of them: {shown}{more}")
 
 
 def read_part(folder: Path, name: str) -> bytes:

@@ -8,7 +8,9 @@ from gymnasium.vector import AutoresetMode
 import swarm_mj  # noqa: F401 - which registers environments
 from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
+from swarm_mj.envs.options import check_features_named
 from swarm_mj.envs.team import Team
+from swarm_mj.gnn.graphs import PaperFeatures
 from swarm_mj.mission import paper
 
 SMALL = {"num_robots": 3, "num_windows": 5}
@@ -29,6 +31,33 @@ def test_an_environments_name_settles_its_task():
 def test_seeds_are_given_to_reset():
     with pytest.raises(TypeError, match=r"give it to reset\(seed=...\)"):
         gymnasium.make("swarm_mj/Flocking-v0", seed=1)
+
+
+OWN = """
+from dataclasses import replace
+from swarm_mj.gnn.graphs import PaperFeatures
+
+class Three(PaperFeatures):
+    names = ("one", "two", "three")
+
+    def graphs(self, views):
+        seen = super().graphs(views)
+        return replace(seen, node=seen.node[:, :, :2])
+"""
+
+
+def test_own_features_name_all_their_numbers(here, monkeypatch):
+    monkeypatch.syspath_prepend(here)
+    (here / "two_of_three.py").write_text(OWN)
+    team = Team(features="two_of_three:Three", **SMALL)
+    with pytest.raises(ValueError, match="two_of_three:Three names 3 features, but its node has 2"):
+        team.restart([1])
+
+
+def test_features_are_no_class():
+    with pytest.raises(TypeError, match=r'features="swarm_mj\.gnn\.graphs:PaperFeatures"'):
+        check_features_named(PaperFeatures)
+    check_features_named("swarm_mj.gnn.graphs:PaperFeatures")
 
 
 def test_options_of_reset():

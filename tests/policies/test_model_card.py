@@ -2,7 +2,8 @@
 
 from tiny_policies import tiny_config, tiny_network
 
-from swarm_mj.policies.model_card import model_card
+from swarm_mj.policies.mlp import MlpShape
+from swarm_mj.policies.model_card import mlp_card, model_card
 
 
 def card(**overrides):
@@ -49,6 +50,14 @@ def test_what_is_not_known_is_not_said():
     assert "--task TASK" in written
     assert "commit" not in written
     assert "By swarm_mj 1.2.3." in written
+
+
+def test_the_card_of_a_plain_network_says_how_to_fly_it_as_it_was_trained():
+    shape = {"num_robots": 3, "num_features": 2, "hidden": (4,), "activation": "relu"}
+    network = MlpShape(features="my_features:Ages", obeys_mask=True, **shape)
+    written = mlp_card(network, {"mission.task": "random-walk"}, "1.2.3").splitlines()
+    flags = "--task random-walk --robots 3 --features my_features:Ages"
+    assert f"    swarm-mj fly --policy DIR {flags}" in written
 
 
 def test_odd_values_stay_on_their_lines():

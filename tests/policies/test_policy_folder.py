@@ -76,6 +76,21 @@ def test_a_config_says_whether_the_network_is_a_plain_one(policy, config, expect
     assert is_mlp(policy) == expected
 
 
+def test_a_folder_of_policies_lists_them(tmp_path):
+    for name in ("a/policy", "b/policy", "sb3"):
+        write_policy(tmp_path / name, CONTENTS, check=lambda _: None)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(ValueError, match="holds policies; name one of them") as refused:
+        present_policy(tmp_path)
+    shown = str(refused.value).partition("them: ")[2]
+    assert shown == ", ".join(str(tmp_path / name) for name in ("a/policy", "b/policy", "sb3"))
+    for n in range(7):
+        write_policy(tmp_path / f"c{n}", CONTENTS, check=lambda _: None)
+    with pytest.raises(ValueError, match=r"c4, .*c5 and 2 more$"):
+        present_policy(tmp_path)
+    assert present_policy(tmp_path / "empty") == tmp_path / "empty"
+
+
 def test_files_that_are_no_policys_are_never_replaced(policy):
     check_replaceable(policy)
     (policy / ".DS_Store").write_text("")
