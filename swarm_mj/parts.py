@@ -14,6 +14,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -48,15 +49,14 @@ def load(kind: str, name: str) -> Any:  # noqa: ANN401 - whatever has that name
     Raises:
         ValueError: The name has another form, leads nowhere, or the module cannot be imported.
     """
-    if not FORM.fullmatch(name):
-        raise ValueError(f"{kind} must be named module:Name, such as my_parts:Mine, not {name!r}")
+    _check_form(kind, name)
     module_name, _, attribute = name.partition(":")
     module = _import(kind, name, module_name)
     if not hasattr(module, attribute):
         hint = did_you_mean(attribute, vars(module))
         raise ValueError(f"{kind} {name}: {_place(module)} has no {attribute}{hint}")
     found = getattr(module, attribute)
-    for home in (module_name, getattr(found, "__module__", None) or module_name):
+    for home in (module_name, getattr(_whole(found), "__module__", None) or module_name):
         if home.partition(".")[0] != __package__:
             _loaded[home] = f"{kind} {name}"
     return found
@@ -66,16 +66,18 @@ def make(kind: str, name: str, mission: Mission) -> Any:  # noqa: ANN401 - any k
     """A user's own part for a mission.
 
     What `name` names is called with the mission, or with nothing if it needs no argument. A
-    function of two arguments, or an object like one, is the part itself.
+    function of two arguments, or an object like one, is the part itself. Either may be a
+    `functools.partial`, which is how one file holds a part with several values of its numbers.
 
     Raises:
         ValueError: As for `load`, or what it names cannot be called so, or raises.
     """
     found = load(kind, name)
-    if not callable(found) or (not isinstance(found, type) and _num_needed(found) >= OF_FUNCTIONS):
+    is_class = isinstance(_whole(found), type)
+    if not callable(found) or (not is_class and _num_needed(found) >= OF_FUNCTIONS):
         return found
     try:
-        return found(mission) if _takes_mission(found) else found()
+        return _called(found, mission)
     except Exception as error:
         raise ValueError(
             f"{kind} {name} raised {_said(error, [name.partition(':')[0]])}"
@@ -139,6 +141,23 @@ def one_line_each() -> Iterator[None]:
         raise
 
 
+def _check_form(kind: str, name: str) -> None:
+    """Raises ValueError, with what it should be, unless a name has the form of one."""
+    module, _, attribute = name.partition(":")
+    if module.endswith(".py"):
+        dotted = module.removesuffix(".py").removeprefix("./").replace("/", ".")
+        raise ValueError(f"{kind} {name}: leave out .py: {dotted}:{attribute}")
+    called = FORM.match(name)
+    if called and name[called.end() :].startswith("("):
+        made = f"{attribute.partition('(')[0]}, {attribute.partition('(')[2]}".replace(", )", ")")
+        raise ValueError(
+            f"{kind} {name}: a name cannot hold numbers; write `mine = functools.partial({made}` "
+            f"into {module}.py and name {module}:mine"
+        )
+    if not FORM.fullmatch(name):
+        raise ValueError(f"{kind} must be named module:Name, such as my_parts:Mine, not {name!r}")
+
+
 def _import(kind: str, name: str, module_name: str) -> ModuleType:
     """Imports a part's module; the current folder comes first from now on, as for `python -m`."""
     here = os.getcwd()
@@ -193,20 +212,35 @@ def _shown(part: object) -> str:
     return f"the class {part.__name__}" if isinstance(part, type) else f"{part!r:.80}"
 
 
-def _positional(found: Callable[..., Any]) -> list[inspect.Parameter]:
-    """What can be given by place; nothing if Python cannot tell."""
+def _parameters(found: Callable[..., Any]) -> list[inspect.Parameter]:
+    """What can be given; nothing if Python cannot tell."""
     try:
-        parameters = inspect.signature(found).parameters.values()
+        return list(inspect.signature(found).parameters.values())
     except (TypeError, ValueError):
         return []
+
+
+def _positional(found: Callable[..., Any]) -> list[inspect.Parameter]:
+    """What can be given by place."""
     kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    return [each for each in parameters if each.kind in kinds]
+    return [each for each in _parameters(found) if each.kind in kinds]
 
 
 def _num_needed(found: Callable[..., Any]) -> int:
     return sum(each.default is inspect.Parameter.empty for each in _positional(found))
 
 
-def _takes_mission(found: Callable[..., Any]) -> bool:
-    """Whether an argument is needed, or may be the mission."""
-    return _num_needed(found) > 0 or any(each.name == "mission" for each in _positional(found))
+def _whole(found: object) -> object:
+    """The function or class that a partial one is made of."""
+    while isinstance(found, partial):
+        found = found.func
+    return found
+
+
+def _called(found: Callable[..., Any], mission: Mission) -> object:
+    """What it makes, given the mission if an argument is needed, or may be the mission."""
+    by_place = _positional(found)
+    if any(each.default is inspect.Parameter.empty for each in by_place):
+        return found(mission)
+    takes_mission = any(each.name == "mission" for each in _parameters(found))
+    return found(mission=mission) if takes_mission else found()

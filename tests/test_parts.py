@@ -42,6 +42,20 @@ def breaks(mission):
 
 def breaks_later(position_m, recipient):
     raise KeyError("lost")
+
+from functools import partial
+
+def given_mission_last(probability, mission):
+    made = Needs(mission)
+    made.probability = probability
+    return made
+
+def within(position_m, recipient, range_m):
+    return recipient
+
+by_place, by_name = partial(given_mission_last, 0.1), partial(given_mission_last, probability=0.1)
+of_a_class = partial(Needless, 0.5)
+near = partial(within, range_m=9.0)
 '''
 
 
@@ -147,3 +161,34 @@ def test_a_digest_changes_with_the_file(parts):
     with (parts / "own_parts.py").open("a") as file:
         file.write("\n# another line\n")
     assert digest("own_parts:plain") != before
+
+
+@pytest.mark.parametrize("name", ["by_place", "by_name"])
+@pytest.mark.usefixtures("parts")
+def test_a_partial_function_is_given_the_mission_that_it_still_needs(name):
+    made = make("policy", f"own_parts:{name}", MISSION)
+    assert (made.num_robots, made.probability) == (3, 0.1)
+
+
+@pytest.mark.usefixtures("parts")
+def test_a_partial_class_is_made_and_a_partial_function_of_two_arguments_is_the_part():
+    assert make("policy", "own_parts:of_a_class", MISSION).probability == 0.5
+    near = make("channel", "own_parts:near", MISSION)
+    assert near is sys.modules["own_parts"].near
+
+
+@pytest.mark.parametrize(
+    ("name", "way_out"),
+    [
+        (
+            "csma:Csma(0.3)",
+            r"`mine = functools.partial\(Csma, 0.3\)` into csma.py and name csma:mine",
+        ),
+        ("csma:Csma()", r"`mine = functools.partial\(Csma\)` into csma.py"),
+        ("fading.py:Rayleigh", "channel fading.py:Rayleigh: leave out .py: fading:Rayleigh$"),
+        ("./sub/fading.py:Rayleigh", "leave out .py: sub.fading:Rayleigh$"),
+    ],
+)
+def test_other_forms_that_one_would_try_are_told_the_right_one(name, way_out):
+    with pytest.raises(ValueError, match=way_out):
+        load("channel", name)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.figures.style import FAINT, as_it_is, look_of, styled
 from swarm_mj.evaluation.results import Result
+from swarm_mj.parts import OwnParts
 
 if TYPE_CHECKING:
     from swarm_mj.api.run import Run
@@ -58,7 +59,9 @@ def draw_evaluation(results: Sequence[Result]) -> Figure:
             figsize=(WIDTH_IN, HEAD_IN + ROW_IN * len(shown)),
         )
         about = f"{first.task}, {first.num_robots} robots, {first.episodes} missions from seed "
-        figure.suptitle(f"{about}{first.seed}", x=0.01, ha="left", fontsize=TITLE_PT)
+        own = OwnParts(channel=first.channel, controller=first.controller, scene=first.scene)
+        title = as_it_is(f"{about}{first.seed}{own.title}")
+        figure.suptitle(title, x=0.01, ha="left", fontsize=TITLE_PT)
         for each, cost in zip(axes[0], costs, strict=True):
             for place, result in enumerate(shown):
                 _draw_mean(each, place, result, cost)

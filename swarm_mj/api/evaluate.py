@@ -5,7 +5,6 @@ from collections.abc import Iterable, Sequence
 from contextlib import redirect_stdout
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 from swarm_mj.api.bars import AFTER_S, quiet_console
@@ -23,10 +22,10 @@ from swarm_mj.cli.evaluation_table import print_results
 from swarm_mj.cli.machine import memory_errors
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.evaluation.batch import BatchCosts
-from swarm_mj.evaluation.results import write_csv
+from swarm_mj.evaluation.results import COLUMNS, write_csv
 from swarm_mj.evaluation.study import Study
 from swarm_mj.evaluation.summary import Evaluated, summarise
-from swarm_mj.fields import check_kind, check_value
+from swarm_mj.fields import check_value, name_of
 from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
 from swarm_mj.parts import OwnParts
@@ -36,6 +35,7 @@ if TYPE_CHECKING:  # each takes its time to import
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
+FIRST = ("policy", "num_robots", "aoi_mean", "aoi_sem", "aoi_ci_low", "aoi_ci_high")  # in tables
 KEYWORDS = ("policies", "num_missions", "baseline", "num_jobs", *SHARED)
 
 
@@ -85,7 +85,8 @@ class Evaluation:
         from pandas import DataFrame
 
         if not by_mission:
-            return DataFrame([asdict(each.result) for each in self.results])
+            columns = [*FIRST, *(name for name in COLUMNS if name not in FIRST)]
+            return DataFrame([asdict(each.result) for each in self.results], columns=columns)
         return DataFrame(
             [
                 {"policy": each.result.policy, "seed": each.result.seed + index, "aoi": aoi}
@@ -183,7 +184,8 @@ def evaluate(
     mission = mission_of(task, mission_fields, known=KEYWORDS)
     parts = {"channel": channel, "controller": controller, "scene": scene}
     for kind, name in parts.items():
-        check_kind(kind, name, (str, NoneType), f'"my_module:My{kind.title()}"')
+        if name is not None:
+            _check_named(kind, name)
     check_value(Options.__dataclass_fields__["jobs"], num_jobs)
     study = Study(
         policies=_names(policies),
@@ -205,11 +207,23 @@ def evaluate(
     return Evaluation(mission=mission, results=summarise(study, costs, study.header()))
 
 
+def _check_named(kind: str, part: object) -> None:
+    """Passes for a name; raises TypeError for anything else, with a name that leads to it."""
+    if isinstance(part, str) or (kind == "policy" and isinstance(part, Path)):
+        return
+    home = getattr(part, "__module__", "builtins")
+    name = f"{home}:{name_of(part)}" if home not in ("builtins", "functools") else "my_file:Name"
+    raise TypeError(
+        f'evaluate takes the {kind} by name, such as "{name}", not {part!r:.80}: it flies missions '
+        "in several processes, which each make their own"
+    )
+
+
 def _names(policies: str | Path | Sequence[str | Path]) -> tuple[str, ...]:
     """Policies' names, one or several."""
     if not isinstance(policies, str | Path | Iterable):
         raise TypeError(f"policies must be a list of names, not {policies!r:.80}")
     named = [policies] if isinstance(policies, str | Path) else list(policies)
     for name in named:
-        check_kind("each of the policies", name, (str, Path), '"planner" or "my_module:Mine"')
+        _check_named("policy", name)
     return tuple(dict.fromkeys(normalised(str(name)) for name in named))

@@ -116,9 +116,10 @@ def mission_of(
     if not isinstance(task, Mission):
         return make_mission(task=task, **mission_fields)
     if mission_fields:
+        fields_given = ", ".join(f"{name}={value!r}" for name, value in mission_fields.items())
         raise TypeError(
-            f"{', '.join(mission_fields)} change the mission of a task, not one that is given; use "
-            "dataclasses.replace(mission, ...)"
+            f"you gave a finished mission, so {', '.join(mission_fields)} must be part of it: "
+            f"dataclasses.replace(mission, {fields_given})"
         )
     return task
 

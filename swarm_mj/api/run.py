@@ -18,6 +18,7 @@ from swarm_mj.fields import as_typed
 from swarm_mj.io.atomic import write_bytes, write_csv, write_json
 from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
+from swarm_mj.parts import OwnParts
 from swarm_mj.replay.recorder import Log
 from swarm_mj.rollout import WindowRecord
 
@@ -163,7 +164,8 @@ class Run:
         from swarm_mj.replay.footage import footage_of
 
         policy, seed = self.config["policy"], self.config["seed"]
-        return footage_of(self._recorded(), self.mission, policy, seed)
+        own = OwnParts(**{kind: self.config[kind] for kind in PARTS if kind in self.config})
+        return footage_of(self._recorded(), self.mission, policy, seed, own)
 
     def save(self, path: str | Path) -> Path:
         """Writes the flight, replacing the file if it exists.

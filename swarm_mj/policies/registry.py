@@ -203,7 +203,11 @@ def _own_policy(
     name: str, mission: Mission, probability: float | None, is_deterministic: bool
 ) -> Policy:
     """A user's own; raises ValueError as `make_policy`."""
-    _refuse(probability, name)
+    if probability is not None:
+        raise ValueError(
+            f"{name} takes no transmission probability; leave out {probability}, and name one "
+            "policy per value in its file, as `p01 = functools.partial(Mine, 0.1)`"
+        )
     if is_deterministic:
         raise ValueError(f"{name} is no learned policy; leave --deterministic out")
     policy = make("policy", name, mission)

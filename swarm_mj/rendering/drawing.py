@@ -46,12 +46,13 @@ def font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 def draw_title(
     draw: ImageDraw.ImageDraw, footage: Footage, row: int, box: Box, size: int, curve: Colour
 ) -> None:
-    """Policy, mission and time above a scene, and its mean age in the colour of its curve."""
+    """Policy, mission, own parts, time above a scene, and its mean age in its curve's colour."""
     facts = footage.facts
     mission = facts.mission
     left, top, pad = box.left, box.top, size // 2
     draw.text((left + pad, top + pad), facts.policy, palette.TEXT, font(round(1.3 * size)))
     about = f"{mission.task}, {mission.num_robots} robots, seed {facts.seed}"
+    about = "\n".join([about, *facts.own_parts])
     draw.text((left + pad, top + pad + 1.7 * size), about, palette.SENT, font(round(0.8 * size)))
     now = footage.window[row]
     time = f"{now * mission.window_s:.1f} s, window {now}"

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from swarm_mj.mission import Mission
+from swarm_mj.parts import OwnParts
 from swarm_mj.physics.scene import Scene
 from swarm_mj.replay import palette
 from swarm_mj.replay.frame import Frame, frame
@@ -24,7 +25,15 @@ class Facts:
     observer: int
     is_broadcast: bool
     full_scale: float  # the age from which robots are darkest [windows]
-    scene: str | None = None  # the name of what changed the arena
+    channel: str | None = None  # the names of the user's own parts
+    controller: str | None = None
+    scene: str | None = None
+
+    @property
+    def own_parts(self) -> list[str]:
+        """Which are the user's own, in words."""
+        own = OwnParts(channel=self.channel, controller=self.controller, scene=self.scene)
+        return [f"{kind} {name}" for kind, name in own.named.items()]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +68,7 @@ class Footage:
         return palette.robot_colours(age, scale, is_known, self.is_on, self.facts.observer)
 
 
-def facts_of(log: Log, mission: Mission, policy: str, seed: int, scene: str | None = None) -> Facts:
+def facts_of(log: Log, mission: Mission, policy: str, seed: int, parts: OwnParts) -> Facts:
     """What does not change in a mission that was recorded."""
     return Facts(
         mission=mission,
@@ -68,11 +77,13 @@ def facts_of(log: Log, mission: Mission, policy: str, seed: int, scene: str | No
         observer=log.ego,
         is_broadcast=log.is_broadcast,
         full_scale=palette.nice_scale(log.age),
-        scene=scene,
+        **parts.named,
     )
 
 
-def footage_of(log: Log, mission: Mission, policy: str, seed: int) -> Footage:
+def footage_of(
+    log: Log, mission: Mission, policy: str, seed: int, parts: OwnParts = OwnParts()
+) -> Footage:
     """What a video shows of a mission that was recorded.
 
     Args:
@@ -80,9 +91,10 @@ def footage_of(log: Log, mission: Mission, policy: str, seed: int) -> Footage:
         mission: Its numbers.
         policy: Its name, for the title.
         seed: The mission's.
+        parts: Names of the user's own.
     """
     return Footage(
-        facts=facts_of(log, mission, policy, seed),
+        facts=facts_of(log, mission, policy, seed, parts),
         window=log.window,
         position_m=log.position_m,
         velocity_mps=log.velocity_mps,

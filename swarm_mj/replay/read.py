@@ -26,6 +26,8 @@ def check_replay(path: Path) -> None:
         OSError: The disk fails.
     """
     if not has_digest(path):
+        if path.suffix.lower() != ".rrd":
+            raise ValueError(f"{path} is no .rrd file; `swarm-mj fly` records them")
         raise ValueError(
             f"{path} is no whole replay: damaged, truncated, or not recorded by this version of "
             f"swarm-mj; record it again, or see what `rerun {shlex.quote(str(path))}` makes of it"

@@ -1,7 +1,7 @@
 """Writes a log as a rerun recording, its layout inside."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 
 import rerun as rr
@@ -9,6 +9,7 @@ import rerun_bindings as bindings
 
 from swarm_mj.io.atomic import write_bytes
 from swarm_mj.mission import Mission
+from swarm_mj.parts import OwnParts
 from swarm_mj.replay import arena, charts, palette
 from swarm_mj.replay.digest import with_digest
 from swarm_mj.replay.footage import facts_of
@@ -56,16 +57,18 @@ def _recorded(log: Log, mission: Mission, config: dict[str, object], name: str) 
         recording.set_log_time_enabled(False)
         recording.send_recording_name(name)
         recording.send_property("mission", rr.AnyValues(drop_untyped_nones=True, **config))
-        policy, scene = (config.get(name) for name in ("policy", "scene"))
-        facts = facts_of(
-            log, mission, str(policy or ""), _seed(config), None if scene is None else str(scene)
-        )
+        facts = facts_of(log, mission, str(config.get("policy") or ""), _seed(config), _own(config))
         recording.send_property(FACTS, rr.AnyValues(json=json.dumps(asdict(facts))))
         draw(Sheet(recording, log, shown, mission.window_s), mission, packets)
         lines = [f"- **{key}**: {value}" for key, value in config.items()]
         about = "\n".join([f"# {name}", *lines])
         recording.log("about", rr.TextDocument(about, media_type="text/markdown"), static=True)
     return stream.read() or b""
+
+
+def _own(config: dict[str, object]) -> OwnParts:
+    kinds = (spec.name for spec in fields(OwnParts))
+    return OwnParts(**{kind: str(config[kind]) for kind in kinds if config.get(kind) is not None})
 
 
 def _seed(config: dict[str, object]) -> int:

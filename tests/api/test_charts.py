@@ -1,5 +1,7 @@
 """Charts show the numbers that they are drawn from."""
 
+from dataclasses import replace
+
 import matplotlib.pyplot as plt
 import pytest
 
@@ -62,3 +64,10 @@ def test_a_notebook_shows_a_chart_once(monkeypatch):
     monkeypatch.setattr(plt, "get_backend", lambda: "module://matplotlib_inline.backend_inline")
     run.plot()
     assert len(plt.get_fignums()) == 1
+
+
+def test_parts_of_ones_own_stand_in_the_title():
+    found = swarm_mj.evaluate("tdma", "stationary", num_missions=1, **SHORT).results[0].result
+    flown = replace(found, channel="my$:Radio", scene="my:walls")
+    title = charts.draw_evaluation([flown]).get_suptitle()
+    assert title.endswith(r"from seed 1000, channel my\$:Radio, scene my:walls")

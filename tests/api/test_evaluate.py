@@ -6,6 +6,7 @@ import pytest
 import swarm_mj
 from swarm_mj.api import evaluate as module
 from swarm_mj.cli import main
+from swarm_mj.evaluation.results import COLUMNS
 
 SHORT = {"num_robots": 6, "num_windows": 20, "range_ratio": 0.5}
 OPTIONS = ("--robots", "6", "--windows", "20", "--range-ratio", "0.5")
@@ -83,3 +84,9 @@ def test_what_is_not_installed_is_told_before_the_work(monkeypatch):
         ModuleNotFoundError, match=r"an evaluation needs scipy, .* pip install 'scipy"
     ):
         module.evaluate("tdma", num_missions=1, **SHORT)
+
+
+def test_a_table_begins_with_what_one_looks_for(found):
+    columns = list(found.to_dataframe().columns)
+    assert columns[:4] == ["policy", "num_robots", "aoi_mean", "aoi_sem"]
+    assert sorted(columns) == sorted(COLUMNS)

@@ -129,7 +129,10 @@ def test_ctrl_c_keeps_what_was_flown(monkeypatch):
         ({"observer": 6}, "observer must be from 0 to 5, not 6"),
         ({"policy": "tdma", "probability": 0.5}, "tdma takes no transmission probability"),
         ({"policy": Silent(), "probability": 0.5}, "change policies by name"),
-        ({"task": paper(), "num_robots": 6}, "use dataclasses.replace"),
+        (
+            {"task": paper(), "num_robots": 6},
+            "part of it: dataclasses.replace(mission, num_robots=6)",
+        ),
         ({"num_windows": 10**9}, "number of windows must be a whole number from 1 to 100000"),
     ],
 )

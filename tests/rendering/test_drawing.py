@@ -1,5 +1,7 @@
 """What stands around the scene, found again in the picture."""
 
+from dataclasses import replace
+
 import numpy as np
 from PIL import ImageDraw
 
@@ -82,3 +84,14 @@ def test_the_title_stays_in_its_part_of_the_picture():
     assert np.all(pixels[:, :100] == palette.BACKGROUND)
     assert np.any(has(picture, palette.TEXT))
     assert np.any(has(picture, (255, 0, 0)))
+
+
+def test_a_title_has_a_line_for_each_part_of_ones_own():
+    lowest = []
+    for parts in ({}, {"channel": "my:Radio"}, {"channel": "my:Radio", "scene": "my:walls"}):
+        picture, seen = blank(400, 160), footage([1.0])
+        seen = replace(seen, facts=replace(seen.facts, **parts))
+        draw_title(ImageDraw.Draw(picture), seen, 0, Box(0, 0, 400, 160), 12, (255, 0, 0))
+        rows, _ = np.nonzero(~has(picture, palette.BACKGROUND))
+        lowest.append(rows.max())
+    assert np.all(np.diff(lowest) >= 8)

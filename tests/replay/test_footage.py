@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from swarm_mj.parts import OwnParts
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import footage_of
 from swarm_mj.replay.read import read_footage
@@ -67,3 +68,21 @@ def test_a_replay_without_facts_is_refused_in_one_line(two_way, tmp_path, monkey
     write_replay(two_way.log, two_way.mission, {"seed": 5}, tmp_path / "old.rrd")
     with pytest.raises(ValueError, match=r"old\.rrd does not hold .*; record it again"):
         read_footage(Path(tmp_path / "old.rrd"))
+
+
+def test_a_replay_keeps_the_names_of_ones_own_parts(two_way, tmp_path):
+    config = {"seed": 5, "policy": "mst", "channel": "my:Radio", "scene": None}
+    write_replay(two_way.log, two_way.mission, config, tmp_path / "a.rrd")
+    parts = OwnParts(channel="my:Radio")
+    read, made = (
+        read_footage(tmp_path / "a.rrd"),
+        footage_of(two_way.log, two_way.mission, "mst", 5, parts),
+    )
+    assert read.facts == made.facts
+    assert read.facts.own_parts == ["channel my:Radio"]
+
+
+def test_a_file_of_another_kind_is_called_so(tmp_path):
+    (tmp_path / "fading.py").write_text("text")
+    with pytest.raises(ValueError, match=r"fading.py is no .rrd file; `swarm-mj fly` records them"):
+        read_footage(tmp_path / "fading.py")

@@ -8,13 +8,14 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from subprocess import Popen, TimeoutExpired
+from textwrap import shorten
 from typing import IO, NamedTuple
 
 from swarm_mj.cli.health.finding import Finding
 from swarm_mj.io.processes import PYTHON, running
 
 LONGEST_S = 120.0  # of a trial; the first flight of an installation compiles for half a minute
-MOST_LETTERS = 100  # of what a trial complains
+MOST_LETTERS = 400  # of what a trial complains, cut between words
 
 RENDER = """
 import mujoco
@@ -113,7 +114,8 @@ def _outcome(trial: Trial, process: "Popen[bytes]", said: IO[str]) -> Finding:
     except TimeoutExpired:
         code = None
     said.seek(0)
-    last = (said.read().strip().splitlines() or ["it said nothing"])[-1][:MOST_LETTERS]
+    last = (said.read().strip().splitlines() or ["it said nothing"])[-1]
+    last = shorten(last, MOST_LETTERS, placeholder=" ...")
     if code == 0:
         return Finding(trial.group, trial.name, "ok", trial.works or last)
     found = f"not within {LONGEST_S:g} s" if code is None else last

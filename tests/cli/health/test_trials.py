@@ -12,6 +12,7 @@ from swarm_mj.cli.health.trials import RENDERING, TRIALS, Trial, tried
         ("print('hello'); print('fine')", False, "ok", "fine"),
         ("raise SystemExit('no driver')", False, "absent", "no driver"),
         ("raise SystemExit('no driver')", True, "broken", "no driver"),
+        ("raise SystemExit('a word ' * 99)", False, "absent", "a word " * 56 + "a ..."),
         ("import os; os.abort()", True, "broken", "it said nothing"),
         ("import time; time.sleep(60)", False, "absent", "not within 0.3 s"),
         ("import os; print(os.environ['SAID'])", False, "ok", "by its variables"),
