@@ -10,6 +10,7 @@ import inspect
 import os
 import re
 import sys
+import sysconfig
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -57,7 +58,7 @@ def load(kind: str, name: str) -> Any:  # noqa: ANN401 - whatever has that name
         raise ValueError(f"{kind} {name}: {_place(module)} has no {attribute}{hint}")
     found = getattr(module, attribute)
     for home in (module_name, getattr(_whole(found), "__module__", None) or module_name):
-        if home.partition(".")[0] != __package__:
+        if home.partition(".")[0] != __package__ and (home == module_name or _is_users(home)):
             _loaded[home] = f"{kind} {name}"
     return found
 
@@ -201,6 +202,13 @@ def _modules_within(error: BaseException) -> list[str]:
     """The modules of parts that an exception came through, the innermost first."""
     names = [f.f_globals.get("__name__") for f, _ in traceback.walk_tb(error.__traceback__)]
     return [name for name in reversed(names) if name in _loaded]
+
+
+def _is_users(home: str) -> bool:
+    """Whether a module is a file that neither Python nor an installed package brought."""
+    file = getattr(sys.modules.get(home), "__file__", None)
+    places = [sysconfig.get_path(kind) for kind in ("stdlib", "platstdlib", "purelib", "platlib")]
+    return file is not None and not any(Path(file).is_relative_to(place) for place in places)
 
 
 def _place(module: ModuleType) -> str:

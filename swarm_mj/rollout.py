@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from swarm_mj.fields import check_kind
 from swarm_mj.policies.policy import Policy
-from swarm_mj.protocol.costs import TaskCost, WindowCosts, mean_hops
+from swarm_mj.protocol.costs import PACKETS, TaskCost, WindowCosts, mean_hops
 from swarm_mj.swarm import Swarm
 
 
@@ -96,9 +96,9 @@ def summarise(flown: Iterable[WindowRecord]) -> Summary:
     first_complete = np.argmax(is_complete, axis=0) + 1.0
     packets = {
         name: np.sum([getattr(window.costs.packets, name) for window in flown], axis=0)
-        for name in ("sent", "attempted", "delivered", "lost", "overheard", "answered", "heard")
+        for name in PACKETS
     }
-    receptions = np.sum([window.costs.packets.receptions for window in flown], axis=0)
+    receptions = packets.pop("receptions")
     num_sent = np.where(packets["sent"] > 0, packets["sent"], np.nan)
     return Summary(
         num_windows=len(flown),

@@ -18,6 +18,18 @@ def to_the_addressee(position_m, recipient):
     return heard
 
 
+class Lossy:
+    """Half of the packets reach their recipient; every mission draws for itself."""
+
+    def start(self, _num_robots, rngs):
+        self.rngs = rngs
+
+    def __call__(self, position_m, recipient):
+        heard = to_the_addressee(position_m, recipient)
+        draws = np.stack([rng.random(recipient.shape[1]) for rng in self.rngs])
+        return np.where(draws < 0.5, to_nobody(position_m, recipient), heard)
+
+
 def to_everyone(_position_m, recipient):
     """All others decode the one sender, and nobody if there are several or none."""
     heard = to_nobody(_position_m, recipient)

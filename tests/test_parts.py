@@ -1,5 +1,6 @@
 """Users' own parts, by name: what is loaded, how it is called, and what is said if it cannot be."""
 
+import json
 import sys
 import textwrap
 
@@ -11,6 +12,8 @@ from swarm_mj.parts import OwnParts, digest, load, make, one_line_each
 MISSION = paper(num_robots=3)
 PARTS = '''
 """Parts."""
+
+import json
 
 class Needs:
     def __init__(self, mission):
@@ -35,6 +38,7 @@ class Plain:
         """Nothing."""
 
 an_object = Plain()
+decoder = json.JSONDecoder()
 number = 7
 
 def breaks(mission):
@@ -110,7 +114,7 @@ def test_another_form_is_refused(name):
         ),
         ("own_parts.deeper:Needs", r"no module own_parts.deeper in"),
         ("own_parts:Need", r"own_parts.py has no Need; did you mean Needs\?"),
-        ("own_parts:breaks", r"raised AttributeError: .*no_such_field.* \(own_parts.py, line 30\)"),
+        ("own_parts:breaks", r"raised AttributeError: .*no_such_field.* \(own_parts.py, line 33\)"),
         ("own_broken:Any", r"importing it raised SyntaxError: .*own_broken.py, line 2"),
         (
             "own_needy:Any",
@@ -153,6 +157,22 @@ def test_what_a_part_raises_in_flight_names_it():
 def test_what_others_raise_is_left_alone():
     with pytest.raises(KeyError), one_line_each():
         raise KeyError("ours")
+
+
+@pytest.mark.usefixtures("parts")
+def test_what_a_part_was_made_with_is_no_part():
+    """An object of json's is named; what json raises elsewhere is left alone."""
+    load("channel", "own_parts:decoder")
+    with pytest.raises(json.JSONDecodeError), one_line_each():
+        json.loads("x")
+
+
+def test_a_part_that_the_module_took_from_another_of_ones_own(parts):
+    (parts / "own_inner.py").write_text("def late(position_m, recipient):\n    raise KeyError(1)\n")
+    (parts / "own_outer.py").write_text("from own_inner import late\n")
+    late = make("channel", "own_outer:late", MISSION)
+    with pytest.raises(ValueError, match="channel own_outer:late raised"), one_line_each():
+        late(None, None)
 
 
 def test_a_digest_changes_with_the_file(parts):

@@ -19,6 +19,7 @@ from swarm_mj.io.atomic import write_bytes, write_csv, write_json
 from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
 from swarm_mj.parts import OwnParts
+from swarm_mj.protocol.costs import PACKETS
 from swarm_mj.replay.recorder import Log
 from swarm_mj.rollout import WindowRecord
 
@@ -29,7 +30,6 @@ if TYPE_CHECKING:  # each takes its time to import, and flights do without
     from swarm_mj.replay.footage import Footage
 
 PARTS = ("channel", "controller", "scene")  # of one's own
-PACKETS = ("sent", "attempted", "delivered", "lost", "overheard", "answered", "heard", "receptions")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -21,7 +21,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
     without a seed it begins another one, drawn from the last seed given.
     """
 
-    metadata: dict[str, Any] = dict(RENDERING)  # noqa: RUF012 - as in Env
+    metadata = RENDERING
 
     def __init__(
         self,
@@ -66,7 +66,8 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
             the window cost.
 
         Raises:
-            ValueError: The action is not one integer from 0 to N - 1 per robot.
+            ValueError: The action is not one integer from 0 to N - 1 per robot, or the mission is
+                over.
         """
         reward = self.team.step(np.asarray(action)[np.newaxis])
         self._screen.update(self.team)

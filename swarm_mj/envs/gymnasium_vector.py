@@ -18,10 +18,11 @@ from swarm_mj.envs.gymnasium import check_paid_together
 from swarm_mj.envs.options import check_reset
 from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.envs.spaces import team_spaces
-from swarm_mj.envs.team import Info, Observation, Team, next_seed
+from swarm_mj.envs.team import Info, Observation, Team, check_count, next_seed
 from swarm_mj.fields import did_you_mean
 from swarm_mj.mission import Mission
 
+METADATA: dict[str, Any] = {**RENDERING, "render_modes": ["rgb_array"]}
 Step = tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Info]
 
 
@@ -41,7 +42,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
     `options={"reset_mask": mask}`, which begins the missions where the mask is True.
     """
 
-    metadata: dict[str, Any] = {**RENDERING, "render_modes": ["rgb_array"]}  # noqa: RUF012 - as in VectorEnv
+    metadata = METADATA
 
     def __init__(
         self,
@@ -66,8 +67,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
             render_mode=render_mode,
             **options,
         )
-        if num_envs < 1:
-            raise ValueError(f"num_envs must be 1 or more, not {num_envs}")
+        check_count("num_envs", num_envs)
         self.num_envs = num_envs
         self._mode = _mode_of(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self._mode}

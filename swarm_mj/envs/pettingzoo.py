@@ -11,6 +11,7 @@ from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.envs.spaces import robot_spaces
 from swarm_mj.envs.team import Info, Observation, Team, next_seed
 from swarm_mj.mission import Mission
+from swarm_mj.protocol.buffers import check_robots
 
 try:
     from pettingzoo import ParallelEnv
@@ -20,6 +21,7 @@ except ModuleNotFoundError as error:
     ) from error
 
 Action = int | np.integer[Any]
+METADATA: dict[str, Any] = {"name": "swarm_mj_v0", **RENDERING}
 
 
 class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
@@ -29,7 +31,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
     seed s; without a seed it begins another one, drawn from the last seed given.
     """
 
-    metadata: dict[str, Any] = {"name": "swarm_mj_v0", **RENDERING}  # noqa: RUF012 - as there
+    metadata = METADATA
 
     def __init__(
         self,
@@ -93,16 +95,20 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
 
         Returns:
             By agent: what it sees, its reward, whether it was switched off, whether the mission was
-            cut off, and what the window cost the team.
+            cut off, and what the window cost the team. Nothing if nobody is left.
 
         Raises:
             ValueError: There is no such agent, or an action is no robot; nothing has moved.
         """
-        recipient = self.team.flown.views.silence.copy()
+        [chosen] = self.team.flown.views.silence.tolist()
         for agent, action in actions.items():
             self._check_action(agent, action)
             if agent in self.agents:
-                recipient[0, self._robot(agent)] = action
+                chosen[self._robot(agent)] = np.squeeze(action)  # some wrap it
+        if not self.agents:
+            return {}, {}, {}, {}, {}
+        recipient = np.array([chosen])
+        check_robots("action", recipient, self.team.flown.buffers.shape)
         reward = self.team.step(recipient)[0]
         self._screen.update(self.team)
         is_active, is_over = self.team.is_active[0], self.team.is_over
@@ -126,7 +132,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         """Gives back what pictures took."""
         self._screen.close()
 
-    def _check_action(self, agent: str, action: Action | None) -> None:
+    def _check_action(self, agent: str, action: object) -> None:
         """Raises ValueError for who is no agent, and for what is no action."""
         names = self.possible_agents
         if agent not in names:

@@ -46,7 +46,8 @@ def make_vec_env(
         agent: What an environment is: a "robot", so that B N environments share one network that
             sees what one robot knows; or a "team", which decides for all at once.
         seed: Of the first mission; the others count on from it. Later missions are drawn from
-            these; None draws the first ones, too.
+            these; None draws the first ones, too. A model with a `seed` of its own begins with
+            that mission instead: stable-baselines3 seeds its environment with it.
         **options: As of `Team`: the reward, the features, and any field of `Mission`.
 
     Raises:
@@ -142,8 +143,9 @@ class SwarmVecEnv(VecEnv):
         """Environments have no attributes of their own; raises AttributeError."""
         raise AttributeError(f"no environment has its own {attr_name}")
 
-    def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:  # noqa: ARG002 - VecEnv's
+    def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
         """No environment is wrapped."""
+        del wrapper_class
         return [False for _ in self._get_indices(indices)]
 
     def close(self) -> None:

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import UInt8
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from swarm_mj.rendering.viewer import SceneViewer
 
 MODES = ("rgb_array", "human")
-RENDERING = {"render_modes": list(MODES), "render_fps": 10}  # a window of 100 ms a picture
+RENDERING: dict[str, Any] = {"render_modes": list(MODES), "render_fps": 10}  # 100 ms a window
 WIDTH, HEIGHT = 800, 600  # of a picture [pixels]
 
 

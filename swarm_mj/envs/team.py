@@ -7,6 +7,7 @@ through each of them.
 import copy
 from collections.abc import Sequence
 from dataclasses import replace
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -15,28 +16,28 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.control.controller import Controller, Costed
 from swarm_mj.control.motion import controller_of
 from swarm_mj.envs.options import check_features_named, check_fields, check_task
+from swarm_mj.fields import check_callable
 from swarm_mj.gnn.feature_sets import is_own_set, load_features, make_extractor
 from swarm_mj.gnn.graphs import check_width
-from swarm_mj.learning.credit import credits_of
+from swarm_mj.learning.credit import as_it_is, credits_of
+from swarm_mj.learning.mission_batch import FIRST_TRAINING_SEED, LAST_TRAINING_SEED
 from swarm_mj.mission import PRESETS, Mission
-from swarm_mj.mission.batched_rng import Started
+from swarm_mj.parts import OwnParts
 from swarm_mj.physics.scene import Scene
 from swarm_mj.protocol.costs import WindowCosts, age_of_information, velocity_variance
 from swarm_mj.radio.free_space import Channel
-from swarm_mj.swarm import Swarm
+from swarm_mj.swarm import CALLED_WITH, Swarm
 
 REWARDS = ("aoi", "velocity-variance", "task-cost", "credit")
 Observation = dict[str, np.ndarray]
 Info = dict[str, Any]
 
-# Missions whose seeds are not given draw theirs from here on, so that none of an evaluation's come.
-FIRST_DRAWN_SEED, LAST_DRAWN_SEED = 2**40, 2**62
 COSTS = {
     "aoi": "age_windows",
     "velocity-variance": "velocity_variance_m2ps2",
     "task-cost": "task_cost",
 }  # what a team's reward is minus of, by its name in infos
-PACKETS = ("sent", "delivered", "lost", "overheard", "answered")
+TOLD = ("sent", "delivered", "lost", "overheard", "answered")  # counts of packets, in infos
 
 
 class Team:
@@ -50,13 +51,13 @@ class Team:
         mission: Mission | str = "flocking",
         num_missions: int = 1,
         *,
-        preset: str = "paper",
+        preset: str | None = None,
         features: str = "extended",
         reward: str = "aoi",
         with_parents: bool = False,
-        channel: Channel | None = None,
-        controller: Controller | None = None,
-        scene: Scene | None = None,
+        channel: Channel | str | None = None,
+        controller: Controller | str | None = None,
+        scene: Scene | str | None = None,
         **fields: Any,
     ) -> None:
         """Takes what to play; `restart` begins.
@@ -64,7 +65,7 @@ class Team:
         Args:
             mission: The mission, or its task.
             num_missions: B.
-            preset: Of a task's mission: "paper" or "reference".
+            preset: Of a task's mission: "paper", which None is, or "reference".
             features: What robots see of each teammate: the name of a feature set, or
                 `module:Name` of your own.
             reward: "aoi", minus the age of information [windows]; "velocity-variance", minus the
@@ -72,18 +73,23 @@ class Team:
                 controller, in its unit; or "credit", each robot's own: by how much the team's
                 age would be higher had it been silent in this window [windows].
             with_parents: Whether robots see the parents P as well, for graph networks.
-            channel: As of `Swarm`; a copy of it is used, and so of the next two.
+            channel: As of `Swarm`, or its name, `module:Name`. A copy of it is used, and so of the
+                next two.
             controller: As of `Swarm`.
             scene: As of `Swarm`.
             **fields: Any other field of `Mission`.
 
         Raises:
             ValueError: A value is unknown or out of range, or does not go with another.
-            TypeError: A field is not one of `Mission`'s, or the features are no name.
+            TypeError: A field is not one of `Mission`'s, the features are no name, or a part cannot
+                be called.
         """
+        check_count("num_missions", num_missions)
         self.mission = _mission_of(mission, preset, fields)
         self.num_missions = num_missions
-        self.reward = _checked(reward, self.mission, channel, controller)
+        parts = _made({"channel": channel, "controller": controller, "scene": scene}, self.mission)
+        self._parts = copy.deepcopy(parts)  # those that draw or remember do so for us only
+        self.reward = _checked(reward, self.mission, self._parts["controller"])
         self.with_parents = with_parents
         check_features_named(features)
         if is_own_set(features):
@@ -91,9 +97,6 @@ class Team:
         self.features = features
         self._extractor = make_extractor(features, self.mission)
         self.num_features = len(self._extractor.names)  # F
-        self._parts = copy.deepcopy(
-            {"channel": channel, "controller": controller, "scene": scene}
-        )  # those that draw or remember do so for these missions only
         self.swarm: Swarm | None = None  # made when it begins
 
     def restart(self, seeds: Sequence[int]) -> None:
@@ -118,15 +121,21 @@ class Team:
             What each robot is paid; all of a team alike, unless the reward is credit.
 
         Raises:
-            ValueError: No mission has begun, or a recipient is no robot; nothing has moved.
+            ValueError: No mission has begun, they are over, or a recipient is no robot; nothing has
+                moved.
         """
         swarm = self.flown
+        if self.is_over:
+            raise ValueError(
+                f"the mission is over after its {self.mission.num_windows} windows; call reset()"
+            )
         before, start = swarm.buffers.timestamp.copy(), swarm.now
+        channel = as_it_is(swarm.channel) if self.reward == "credit" else swarm.channel
         costs = swarm.exchange(recipient)
         self._see()
         self._keep_costs(costs)
         if self.reward == "credit":
-            own = credits_of(before, swarm.states.position_m, recipient, swarm.channel, start)
+            own = credits_of(before, swarm.states.position_m, recipient, channel, start)
             return own / self.mission.num_robots**2
         cost = self._costs[COSTS[self.reward]]
         return np.broadcast_to(-cost[:, None], recipient.shape)
@@ -170,7 +179,7 @@ class Team:
             "age_windows": age_windows,
             "velocity_variance_m2ps2": velocity_variance(swarm.states.velocity_mps),
             "is_complete": is_complete,
-            **{f"packets_{name}": np.zeros(self.num_missions) for name in PACKETS},
+            **{f"packets_{name}": np.zeros(self.num_missions) for name in TOLD},
             **task,
         }
 
@@ -179,7 +188,7 @@ class Team:
             "age_windows": costs.age_windows,
             "velocity_variance_m2ps2": costs.velocity_variance_m2ps2,
             "is_complete": costs.is_complete,
-            **{f"packets_{name}": getattr(costs.packets, name) for name in PACKETS},
+            **{f"packets_{name}": getattr(costs.packets, name) for name in TOLD},
             **({"task_cost": costs.task_cost.value} if costs.task_cost else {}),
         }
 
@@ -202,23 +211,42 @@ class Team:
 
 
 def next_seed(rng: np.random.Generator) -> int:
-    """The seed of a mission for which none was given."""
-    return int(rng.integers(FIRST_DRAWN_SEED, LAST_DRAWN_SEED))
+    """The seed of a mission for which none was given; like training's, none of an evaluation's."""
+    return int(rng.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED))
 
 
-def _mission_of(mission: Mission | str, preset: str, fields: dict[str, Any]) -> Mission:
+def check_count(what: str, number: object) -> None:
+    """Raises ValueError unless a number of missions, or of environments, is one."""
+    if not isinstance(number, Integral) or number < 1:
+        raise ValueError(f"{what} must be 1 or more, not {number!r}")
+
+
+def _mission_of(mission: Mission | str, preset: str | None, fields: dict[str, Any]) -> Mission:
     """A mission as it is, or a task's, with other values of some fields."""
     check_task(mission)
     check_fields(mission, fields)
     if isinstance(mission, Mission):
+        if preset not in (None, mission.preset):
+            raise ValueError(
+                f"preset {preset} goes with a task's name, and this mission is given whole, from "
+                f"the preset {mission.preset}; leave it out"
+            )
         return replace(mission, **fields)
+    preset = "paper" if preset is None else preset
     task = replace(Mission(), preset=preset, task=mission).task  # refuses what is unknown
     return PRESETS[preset](task, **fields)
 
 
-def _checked(
-    reward: str, mission: Mission, channel: Channel | None, controller: Controller | None
-) -> str:
+def _made(parts: dict[str, Any], mission: Mission) -> dict[str, Any]:
+    """The parts themselves, where some may be names; raises ValueError or TypeError as `Team`."""
+    named = {kind: part for kind, part in parts.items() if isinstance(part, str)}
+    made = parts | OwnParts(**named).made(mission)
+    for kind, part in made.items():
+        check_callable(kind, part, CALLED_WITH[kind])
+    return made
+
+
+def _checked(reward: str, mission: Mission, controller: Controller | None) -> str:
     """The reward, if there is such a one for these missions; raises ValueError otherwise."""
     if reward not in REWARDS:
         raise ValueError(f"reward must be one of {', '.join(REWARDS)}, not {reward!r}")
@@ -231,10 +259,5 @@ def _checked(
         raise ValueError(
             "reward credit needs robots that do not fail, but switched_off is "
             f"{mission.switched_off:g}; set it to 0, or choose reward aoi"
-        )
-    if reward == "credit" and isinstance(channel, Started):
-        raise ValueError(
-            "reward credit replays each window, and this channel would draw other numbers; choose "
-            "reward aoi"
         )
     return reward

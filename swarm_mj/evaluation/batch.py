@@ -20,7 +20,7 @@ from swarm_mj.rollout import WindowRecord, rollout
 from swarm_mj.swarm import Swarm
 
 MEANS = ("aoi", "velocity_variance", "hops")  # over windows
-PACKETS = {  # totals, and what `protocol.costs.Packets` calls them
+TOTALS = {  # totals, and what `protocol.costs.Packets` calls them
     "packets_sent": "sent",
     "packets_delivered": "delivered",
     "packets_heard": "heard",
@@ -116,7 +116,7 @@ class Tally:
         if isinstance(swarm.channel, FreeSpaceRadio) and swarm.channel == radio_of(mission):
             self._floor = ConnectivityFloor(num_missions, mission.num_robots, mission.range_m)
         self._num_steady = mission.num_windows - mission.num_windows // 2
-        names = (*MEANS, "aoi_steady", "aoi_floor", *PACKETS)
+        names = (*MEANS, "aoi_steady", "aoi_floor", *TOTALS)
         self._sums = {name: np.zeros(num_missions) for name in names}
         self._task_cost, self._last_task_cost = np.full((2, num_missions), np.nan)
         self._complete = np.full(num_missions, np.inf)
@@ -126,7 +126,7 @@ class Tally:
         """Adds a window; the swarm stands at its end."""
         swarm, costs, is_active = self._swarm, flown.costs, self._swarm.states.is_active
         is_steady = swarm.now[0] > swarm.mission.num_windows - self._num_steady
-        packets = {name: getattr(costs.packets, count) for name, count in PACKETS.items()}
+        packets = {name: getattr(costs.packets, count) for name, count in TOTALS.items()}
         added = packets | {
             "aoi": costs.age_windows,
             "aoi_steady": costs.age_windows * is_steady,
@@ -148,7 +148,7 @@ class Tally:
     def costs(self) -> BatchCosts:
         """What the missions cost, all windows of them flown."""
         sums, num_windows = self._sums, self._swarm.mission.num_windows
-        packets: dict[str, Any] = {name: _whole(sums[name]) for name in PACKETS}
+        packets: dict[str, Any] = {name: _whole(sums[name]) for name in TOTALS}
         return BatchCosts(
             **{name: (sums[name] / num_windows).tolist() for name in MEANS},
             **packets,

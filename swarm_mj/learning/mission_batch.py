@@ -19,8 +19,8 @@ from swarm_mj.parts import OwnParts
 from swarm_mj.protocol.costs import WindowCosts
 from swarm_mj.swarm import Swarm
 
-FIRST_TRAINING_SEED = 2**40  # training draws seeds from here on, so that small ones are never seen
-LAST_TRAINING_SEED = 2**62
+# Training and environments draw seeds from here on, so that small ones are never seen.
+FIRST_TRAINING_SEED, LAST_TRAINING_SEED = 2**40, 2**62
 
 
 @dataclass(kw_only=True)

@@ -105,8 +105,9 @@ class MissionsEnv(VecEnv):
         """Environments have no methods of their own; raises AttributeError."""
         raise AttributeError(f"no environment has its own {method_name}")
 
-    def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:  # noqa: ARG002 - VecEnv's
+    def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
         """No environment is wrapped."""
+        del wrapper_class
         return [False for _ in self._get_indices(indices)]
 
 
@@ -145,8 +146,9 @@ class TeamEnv(MissionsEnv):
     """B environments; the joint action is everyone's recipient, the reward the negative cost.
 
     With `aoi` the reward is the mean age of information (Eq. 10) over the mission's duration,
-    negative; with `velocity-variance` it is the negative variance (Eq. 17), as in Fig. 6. Smaller
-    teams are padded with robots that do not exist: they are silent and see nothing.
+    negative: that of `envs.team.Team` over the number of windows. With `velocity-variance` it is
+    the negative variance (Eq. 17), as in Fig. 6. Smaller teams are padded with robots that do not
+    exist: they are silent and see nothing.
     """
 
     def __init__(self, batches: Sequence[MissionBatch], reward: Reward = "aoi") -> None:

@@ -36,6 +36,9 @@ class Packets:
         return self.attempted - self.delivered
 
 
+PACKETS = ("sent", "attempted", "delivered", "lost", "overheard", "answered", "heard", "receptions")
+
+
 def age_of_information(
     buffers: Buffers,
     now: Float[np.ndarray, "B"],

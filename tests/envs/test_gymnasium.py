@@ -63,6 +63,24 @@ def test_info_is_what_the_window_cost():
         }
 
 
+def test_a_mission_that_is_over_asks_for_reset():
+    env = SwarmEnv("stationary", **SMALL)
+    env.reset(seed=1)
+    for _ in range(8):
+        env.step(np.arange(5))
+    with pytest.raises(ValueError, match=r"over after its 8 windows; call reset\(\)"):
+        env.step(np.arange(5))
+
+
+def test_parts_by_name_are_made_when_the_environment_is():
+    register_environments()
+    env = gymnasium.make("swarm_mj/Flocking-v0", channel="channels:to_nobody", **SMALL)
+    env.reset(seed=1)
+    assert env.step(np.array([1, 1, 2, 3, 4]))[4]["packets_lost"] == 1.0
+    with pytest.raises(ValueError, match="there is no module nowhere"):
+        gymnasium.make("swarm_mj/Flocking-v0", channel="nowhere:to_nobody")
+
+
 def test_missions_without_a_seed_differ():
     env = SwarmEnv(**SMALL)
     assert len({env.reset()[1]["seed"] for _ in range(4)}) == 4

@@ -90,6 +90,26 @@ def test_refused_actions_move_nothing(actions, message):
     assert env.team.flown.now[0] == 0
 
 
+@pytest.mark.parametrize("action", [1.0, 1.7, np.float32(1.0)])
+def test_actions_that_are_no_integers_are_refused(action):
+    env = parallel_env(**SMALL)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="must be integers from 0 to 5, not float"):
+        env.step({"robot_0": 0, "robot_2": action})
+    assert env.team.flown.now[0] == 0.0
+
+
+def test_nothing_flies_on_when_nobody_is_left():
+    env = parallel_env(**SMALL)
+    with pytest.raises(ValueError, match="call reset"):
+        env.step({})
+    env.reset(seed=0)
+    while env.agents:
+        env.step({})
+    assert env.step({"robot_0": 1}) == ({}, {}, {}, {}, {})
+    assert env.team.flown.now[0] == 12.0
+
+
 def test_a_copy_by_pickle_flies_the_same():
     env = parallel_env(**FAILING)
     copy = pickle.loads(pickle.dumps(env))

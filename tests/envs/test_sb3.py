@@ -36,6 +36,13 @@ def test_environments_are_robots_or_teams(agent, num_envs, seen):
     ]
 
 
+def test_a_models_own_seed_wins():
+    env = make_vec_env("stationary", 3, agent="team", seed=1000, **SMALL)
+    PPO("MultiInputPolicy", env, seed=7, n_steps=2, batch_size=6)
+    env.reset()
+    assert [info["seed"] for info in env.reset_infos] == [7, 8, 9]
+
+
 def test_after_the_last_window_another_mission_begins():
     env = make_vec_env("random-walk", 2, seed=1, **SMALL)
     first = env.reset()
@@ -121,6 +128,7 @@ def test_maskable_ppo_learns():
         ({"agent": "mission"}, "agent must be one of robot, team, not 'mission'"),
         ({"agent": "team", "reward": "credit"}, "choose reward aoi"),
         ({"reward": "age"}, "reward must be one of"),
+        ({"num_missions": 0}, "num_missions must be 1 or more, not 0"),
     ],
 )
 def test_refusals(options, message):

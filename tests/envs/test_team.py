@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from channels import to_nobody
+from channels import Lossy, to_nobody, to_the_addressee
 
 from swarm_mj.envs.spaces import robot_spaces
-from swarm_mj.envs.team import FIRST_DRAWN_SEED, Team, next_seed
+from swarm_mj.envs.team import Team, next_seed
 from swarm_mj.gnn.feature_sets import FEATURE_SETS, make_extractor
+from swarm_mj.learning.mission_batch import MissionBatch
 from swarm_mj.mission import paper, reference
+from swarm_mj.parts import OwnParts
 from swarm_mj.swarm import Swarm
 
 SMALL = {"num_robots": 5, "num_windows": 10, "range_ratio": 0.4}
@@ -92,7 +94,7 @@ def test_what_is_seen_is_what_the_networks_see():
 
 def test_masks_leave_out_teammates_believed_out_of_range():
     """Beyond 1.2 ranges; whoever is unknown, and silence, may always be chosen."""
-    team = begun("stationary", num_robots=8, range_ratio=0.15, seeds=(1, 2, 3))
+    team = begun("stationary", num_robots=8, num_windows=60, range_ratio=0.15, seeds=(1, 2, 3))
     for recipient in recipients(60, 3, 8):
         team.step(recipient)
     buffers, num_masked = team.swarm.buffers, 0
@@ -153,7 +155,7 @@ def test_no_feature_leaves_its_bounds(mission, features):
 
 def test_drawn_seeds_are_none_of_an_evaluations():
     rng = np.random.default_rng(0)
-    assert min(next_seed(rng) for _ in range(1000)) >= FIRST_DRAWN_SEED == 2**40
+    assert min(next_seed(rng) for _ in range(1000)) >= 2**40
 
 
 @pytest.mark.parametrize(
@@ -168,6 +170,10 @@ def test_drawn_seeds_are_none_of_an_evaluations():
         ({"features": "mine"}, "features must be one of"),
         ({"preset": "mine"}, "preset must be one of"),
         ({"num_robots": 1}, "number of robots must be"),
+        ({"num_missions": 0}, "num_missions must be 1 or more, not 0"),
+        ({"mission": paper(), "preset": "reference"}, "preset reference goes with a task's name"),
+        ({"channel": "channels:lost"}, r"channels.py has no lost"),
+        ({"scene": "wall"}, "must be named module:Name"),
     ],
 )
 def test_refusals(options, message):
@@ -175,16 +181,37 @@ def test_refusals(options, message):
         Team(**options)
 
 
-def test_credit_refuses_a_channel_that_draws():
-    class Noisy:
-        def start(self, num_robots, rngs):
-            pass
+def test_credit_is_that_of_training_though_the_channel_draws():
+    rng, own = np.random.default_rng(1), OwnParts(channel="channels:Lossy")
+    mission = paper("random-walk", **SMALL)
+    batch = MissionBatch(mission, "extended", 2, rng, first_windows=10, parts=own)
+    team = begun(mission, reward="credit", channel=Lossy(), seeds=batch.history.seeds)
+    for recipient in recipients(9):
+        transition = batch.step(recipient, with_credit=True)
+        np.testing.assert_array_equal(25.0 * team.step(recipient), transition.credit)
 
-        def __call__(self, position_m, recipient):
-            return to_nobody(position_m, recipient)
 
-    with pytest.raises(ValueError, match="would draw other numbers; choose reward aoi"):
-        Team(reward="credit", channel=Noisy())
+def test_parts_may_be_named():
+    by_name = begun("stationary", channel="channels:to_the_addressee")
+    itself = begun("stationary", channel=to_the_addressee)
+    for recipient in recipients(10):
+        np.testing.assert_array_equal(by_name.step(recipient), itself.step(recipient))
+
+
+def test_a_part_that_cannot_be_called_is_refused_at_once():
+    with pytest.raises(TypeError, match="channel must be a function"):
+        Team(channel=Lossy)
+
+
+def test_nothing_flies_on_after_the_last_window():
+    team = begun("stationary")
+    for recipient in recipients(10):
+        team.step(recipient)
+    with pytest.raises(ValueError, match=r"over after its 10 windows; call reset\(\)"):
+        team.step(recipient)
+    assert team.flown.now[0] == 10.0
+    team.restart([1, 2])
+    team.step(recipient)
 
 
 def test_before_it_has_begun():
