@@ -35,7 +35,9 @@ if TYPE_CHECKING:  # each takes its time to import
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-FIRST = ("policy", "num_robots", "aoi_mean", "aoi_sem", "aoi_ci_low", "aoi_ci_high")  # in tables
+# pandas prints the ends of a wide table, so there stands what one looks for.
+FIRST = ("policy", "num_robots", "aoi_mean", "aoi_sem")
+LAST = ("aoi_ci_low", "aoi_ci_high", "packets_per_window")
 KEYWORDS = ("policies", "num_missions", "baseline", "num_jobs", *SHARED)
 
 
@@ -85,7 +87,8 @@ class Evaluation:
         from pandas import DataFrame
 
         if not by_mission:
-            columns = [*FIRST, *(name for name in COLUMNS if name not in FIRST)]
+            others = [name for name in COLUMNS if name not in (*FIRST, *LAST)]
+            columns = [*FIRST, *others, *LAST]
             return DataFrame([asdict(each.result) for each in self.results], columns=columns)
         return DataFrame(
             [

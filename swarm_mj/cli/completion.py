@@ -2,6 +2,7 @@
 
 import argparse
 import importlib
+from collections.abc import Mapping
 from dataclasses import Field
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,13 @@ from swarm_mj.fields import kind_of
 OR_FOLDER = {
     "bash": '{function}() {{ compgen -W \'{names}\' -- "$1"; compgen -d -- "$1"; }}',
     "zsh": "{function}() {{ compadd {names}; _files -/ }}",
+}
+
+
+# Files of one kind, and folders on the way to them.
+OF_KIND = {
+    "bash": '{function}() {{ compgen -f -X \'!*{names}\' -- "$1"; compgen -d -- "$1"; }}',
+    "zsh": "{function}() {{ _files -g '*{names}' }}",
 }
 
 
@@ -43,14 +51,19 @@ def _complete(action: argparse.Action, function: str) -> None:
     if "choices" in spec.metadata:
         action.choices = spec.metadata["choices"]
     elif "offers" in spec.metadata:
-        names = " ".join(spec.metadata["offers"])
-        _mark(action, {**dict.fromkeys(OR_FOLDER, function), "preamble": _filled(function, names)})
+        _mark_function(action, function, OR_FOLDER, " ".join(spec.metadata["offers"]))
+    elif "ending" in spec.metadata:
+        _mark_function(action, function, OF_KIND, spec.metadata["ending"])
     elif kind_of(spec) is Path:
         _mark(action, shtab.FILE)
 
 
-def _filled(function: str, names: str) -> dict[str, str]:
-    return {shell: text.format(function=function, names=names) for shell, text in OR_FOLDER.items()}
+def _mark_function(
+    action: argparse.Action, function: str, texts: Mapping[str, str], names: str
+) -> None:
+    """Has a shell function of this name and text offer these."""
+    filled = {shell: text.format(function=function, names=names) for shell, text in texts.items()}
+    _mark(action, {**dict.fromkeys(texts, function), "preamble": filled})
 
 
 def _mark(action: Any, how: Any) -> None:  # noqa: ANN401 - shtab reads an attribute that it adds

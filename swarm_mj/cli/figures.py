@@ -26,6 +26,7 @@ class Options:
         help="files of one preset that `swarm-mj evaluate --csv` wrote",
         metavar="RESULTS.csv",
         is_positional=True,
+        ending=".csv",
     )
     out: Path = setting(help="where to write", metavar="DIR")
     figure: tuple[str, ...] = setting(

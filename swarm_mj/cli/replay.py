@@ -34,7 +34,7 @@ class Options:
     """The options of `swarm-mj replay`."""
 
     file: tuple[Path, ...] = setting(
-        help=".rrd files that `swarm-mj fly` recorded", is_positional=True
+        help=".rrd files that `swarm-mj fly` recorded", is_positional=True, ending=".rrd"
     )
     web: bool = setting(
         False, "serve it to a browser, on this machine's loopback address only, until Ctrl-C"

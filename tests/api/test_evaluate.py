@@ -89,4 +89,5 @@ def test_what_is_not_installed_is_told_before_the_work(monkeypatch):
 def test_a_table_begins_with_what_one_looks_for(found):
     columns = list(found.to_dataframe().columns)
     assert columns[:4] == ["policy", "num_robots", "aoi_mean", "aoi_sem"]
+    assert columns[-3:] == ["aoi_ci_low", "aoi_ci_high", "packets_per_window"]
     assert sorted(columns) == sorted(COLUMNS)

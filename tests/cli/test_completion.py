@@ -37,12 +37,16 @@ def script(tmp_path_factory):
         (["evaluate", "--task", "flocking", "st"], {"stationary"}),
         (["train", "--arm", ""], {"robot", "team"}),
         (["replay", "so"], {"some.rrd"}),
-        (["fly", "--json", "so"], {"some.rrd"}),
+        (["replay", "some.rrd", "s"], {"some.rrd", "studies"}),
+        (["figures", "s"], {"some.csv", "studies"}),
+        (["fly", "--json", "so"], {"some.rrd", "some.csv"}),
         (["policies", "spa"], {"spatial-tdma"}),
     ],
 )
 def test_bash_completes(script, tmp_path, typed, offered):
     (tmp_path / "some.rrd").touch()
+    (tmp_path / "some.csv").touch()
+    (tmp_path / "studies").mkdir()
     (tmp_path / "runs").mkdir()
     asked = ["bash", "-c", ASK, "bash", str(script), *typed]
     done = subprocess.run(asked, cwd=tmp_path, capture_output=True, text=True, check=True)
@@ -56,6 +60,7 @@ def test_zsh_is_told_the_same_names():
         "(stationary random-walk flocking formation coverage)",
         "compadd random-flooding",
         "_files -/",
+        "_files -g '*.rrd'",
     ):
         assert words in said
 
