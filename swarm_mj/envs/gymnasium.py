@@ -5,7 +5,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.utils import EzPickle
-from jaxtyping import UInt8
+from jaxtyping import Bool, UInt8
 
 from swarm_mj.envs.options import check_reset
 from swarm_mj.envs.screen import RENDERING, Screen
@@ -73,6 +73,10 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         self._screen.update(self.team)
         is_over = self.team.is_over
         return self._observation(), float(reward[0, 0]), False, is_over, self._info()
+
+    def action_masks(self) -> Bool[np.ndarray, "A"]:
+        """Which recipients are worth a thought, robot by robot, as `MaskablePPO` asks for it."""
+        return self.team.observation["action_mask"].ravel().astype(np.bool_)
 
     def render(self) -> UInt8[np.ndarray, "H W 3"] | None:
         """The mission as it is now, in the render mode "rgb_array".

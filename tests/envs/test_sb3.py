@@ -85,6 +85,15 @@ def test_sb3_contrib_gets_the_masks(agent, size):
     assert np.array_equal(env.env_method("action_masks", indices=[1])[0], env.action_masks()[1])
 
 
+def test_sb3_contrib_gets_the_masks_of_a_single_environment():
+    model = MaskablePPO("MultiInputPolicy", SwarmEnv("stationary", **SMALL), n_steps=8)
+    env = model.get_env()
+    assert is_masking_supported(env)
+    seen = env.reset()
+    np.testing.assert_array_equal(get_action_masks(env)[0], seen["action_mask"].ravel() == 1)
+    assert model.learn(16).num_timesteps == 16
+
+
 @pytest.mark.parametrize("agent", ["robot", "team"])
 def test_plain_algorithms_train(agent):
     env = VecMonitor(make_vec_env("flocking", 2, agent=agent, **SMALL))

@@ -1,8 +1,12 @@
+import re
+from pathlib import Path
+
 import numpy as np
 from gymnasium import spaces
 
 from swarm_mj.envs.spaces import robot_spaces, team_spaces
 from swarm_mj.envs.team import Team
+from swarm_mj.gnn.extended_features import ExtendedFeatures, LocalFeatures
 
 
 def test_a_robot_sees_a_row_of_what_the_team_sees():
@@ -53,3 +57,14 @@ def test_features_of_ones_own_have_no_bounds(here, monkeypatch):
     team.restart([1])
     assert team.observation["observation"].shape == (1, 3, 3, 2)
     assert {name: each[0, 0] for name, each in team.observation.items()} in seen
+
+
+def test_the_documentation_names_the_columns_in_order():
+    page = (Path(__file__).parents[2] / "docs" / "environments.md").read_text()
+    rows = re.findall(r"^\| (\d+) \| ([^|]+) \|", page, re.MULTILINE)
+    assert rows == [(str(n), name) for n, name in enumerate(ExtendedFeatures.names)]
+    without = [
+        n for n, name in enumerate(ExtendedFeatures.names) if name not in LocalFeatures.names
+    ]
+    assert f"`local` leaves out columns {without[0]} to {without[-1]}" in page
+    assert without == list(range(without[0], without[-1] + 1))
