@@ -58,7 +58,7 @@ if TYPE_CHECKING:
         Policy,
         make_policy,
     )
-    from swarm_mj.rollout import rollout, summarise
+    from swarm_mj.rollout import summarise
     from swarm_mj.swarm import Swarm
 
     __version__: str
@@ -79,7 +79,6 @@ __all__ = [
     "make_policy",
     "paper",
     "reference",
-    "rollout",
     "summarise",
 ]
 
@@ -93,7 +92,7 @@ _HOMES = {
         *("POLICIES", "BroadcastPolicy", "CentralisedPolicy", "DecentralisedPolicy"),
         *("LocalViews", "Policy", "make_policy"),
     ),
-    "rollout": ("rollout", "summarise"),
+    "rollout": ("summarise",),
     "swarm": ("Swarm",),
 }
 

@@ -144,10 +144,10 @@ def _shown(value: object) -> str:
     return f"{value!r:.80}"
 
 
-def check_value(spec: Field[Any], value: Any) -> None:  # noqa: ANN401 - any field's value
-    """As `check`, for one value of a field."""
+def check_value(spec: Field[Any], value: Any, called: str = "") -> None:  # noqa: ANN401 - any field's value
+    """As `check`, for one value of a field, which may be `called` otherwise where it was given."""
     allowed = spec.metadata
-    label = allowed.get("label", spec.name)
+    label = called or allowed.get("label", spec.name)
     kind, described = KINDS.get(kind_of(spec), (object, ""))
     if "choices" in allowed and value not in allowed["choices"]:
         known = allowed["choices"]

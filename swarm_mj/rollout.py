@@ -1,9 +1,7 @@
 """A flight: a policy on a swarm from the first window to the last, and what it cost."""
 
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -131,16 +129,3 @@ def _task_costs(windows: Sequence[TaskCost | None]) -> dict[str, Any]:
 def _mean(windows: Sequence[Float[np.ndarray, "B"]]) -> Float[np.ndarray, "B"]:
     """Over windows, each mission's in one row: NumPy adds rows alike, however many there are."""
     return np.mean(np.ascontiguousarray(np.stack(windows, axis=1)), axis=1)
-
-
-class _Rollout(ModuleType):
-    """This module, which can be called as well: `swarm_mj.rollout` is its name and the function's.
-
-    Whichever of the two Python was asked for first, both ways of writing it work.
-    """
-
-    def __call__(self, swarm: Swarm, policy: Policy) -> Iterator[WindowRecord]:
-        return rollout(swarm, policy)
-
-
-sys.modules[__name__].__class__ = _Rollout

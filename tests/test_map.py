@@ -121,6 +121,12 @@ def test_imports_go_forward_only(room):
             assert {name.split(".")[0] for name in imports(path)} <= set(earlier), path
 
 
+NOT_TO_FLY = {
+    *("torch", "stable_baselines3", "rerun", "dm_control", "matplotlib", "pandas", "pyarrow"),
+    *("av", "PIL", "safetensors", "tensorboard", "pettingzoo", "IPython"),
+}
+
+
 @pytest.mark.parametrize(
     ("core", "heavy"),
     [
@@ -129,18 +135,8 @@ def test_imports_go_forward_only(room):
             "swarm_mj.envs.gymnasium_vector, swarm_mj.envs.pettingzoo",
             {"torch", "stable_baselines3", "rerun", "dm_control", "matplotlib"},
         ),
-        (
-            "swarm_mj.api.fly, swarm_mj.cli.fly",
-            {
-                "torch",
-                "stable_baselines3",
-                "rerun",
-                "dm_control",
-                "matplotlib",
-                "pandas",
-                "pyarrow",
-            },
-        ),
+        ("swarm_mj.api.fly, swarm_mj.cli.fly, swarm_mj.cli.replay", NOT_TO_FLY),
+        ("swarm_mj; swarm_mj.fly", NOT_TO_FLY),
     ],
 )
 def test_the_core_does_not_load_heavy_libraries(core, heavy):

@@ -1,14 +1,12 @@
 """`swarm_mj.evaluate`: policies on the same missions, as `swarm-mj evaluate` compares them."""
 
-import io
 from collections.abc import Iterable, Sequence
-from contextlib import redirect_stdout
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarm_mj.api.bars import AFTER_S, quiet_console
-from swarm_mj.api.fly import SHARED, mission_of
+from swarm_mj.api.fly import SHARED, mission_of, names_of
 from swarm_mj.api.numbers import Numbers
 from swarm_mj.cli.estimates import check_fits, study_needs
 from swarm_mj.cli.evaluate import (
@@ -18,7 +16,7 @@ from swarm_mj.cli.evaluate import (
     study_bar,
     write_evaluated,
 )
-from swarm_mj.cli.evaluation_table import print_results
+from swarm_mj.cli.evaluation_table import results_text
 from swarm_mj.cli.machine import memory_errors
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.evaluation.batch import BatchCosts
@@ -29,7 +27,7 @@ from swarm_mj.fields import check_value, name_of
 from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
 from swarm_mj.parts import OwnParts
-from swarm_mj.policies.registry import normalised
+from swarm_mj.policies.registry import listed, normalised
 
 if TYPE_CHECKING:  # each takes its time to import
     from matplotlib.figure import Figure
@@ -55,9 +53,7 @@ class Evaluation:
 
     def __repr__(self) -> str:
         """The table that `swarm-mj evaluate` prints."""
-        with redirect_stdout(io.StringIO()) as text:
-            print_results([each.result for each in self.results], is_plain=True)
-        return text.getvalue().rstrip()
+        return results_text([each.result for each in self.results])
 
     def _repr_html_(self) -> str:
         """The main columns of `to_dataframe`, for notebooks."""
@@ -78,7 +74,8 @@ class Evaluation:
 
         Args:
             by_mission: Whether to have one row per policy and mission instead: `policy`, `seed`,
-                `aoi` [windows], `velocity_variance` [m²/s²].
+                `aoi` [windows], `velocity_variance` [m²/s²], and `task_cost` where the task has one
+                (`summary[policy].task_cost_name` says which).
 
         Raises:
             ModuleNotFoundError: pandas is not installed.
@@ -94,6 +91,7 @@ class Evaluation:
             [
                 {"policy": each.result.policy, "seed": each.result.seed + index, "aoi": aoi}
                 | {"velocity_variance": each.velocity_variance[index]}
+                | ({} if each.task_cost is None else {"task_cost": each.task_cost[index]})
                 for each in self.results
                 for index, aoi in enumerate(each.aoi)
             ]
@@ -147,7 +145,7 @@ def evaluate(
     channel: str | None = None,
     controller: str | None = None,
     scene: str | None = None,
-    features: Sequence[str] = (),
+    features: str | Sequence[str] = (),
     num_jobs: int = 1,
     **mission_fields: Any,
 ) -> Evaluation:
@@ -158,7 +156,7 @@ def evaluate(
 
     Args:
         policies: Names of `POLICIES`, folders of learned ones, or `module:Name` of your own;
-            `__main__:Name` is a class of this script or notebook.
+            `__main__:Name` is a class of this script or notebook. "all" is all of `POLICIES`.
         task: What the robots do, by name; or a mission of one's own.
         num_missions: So many for each policy.
         seed: Of the first mission; the others follow one by one.
@@ -184,12 +182,13 @@ def evaluate(
         KeyboardInterrupt: Ctrl-C was pressed; nothing is kept.
     """
     need("scipy", "an evaluation")
-    mission = mission_of(task, mission_fields, known=KEYWORDS)
+    mission = mission_of("swarm_mj.evaluate", task, mission_fields, KEYWORDS)
     parts = {"channel": channel, "controller": controller, "scene": scene}
     for kind, name in parts.items():
         if name is not None:
             _check_named(kind, name)
-    check_value(Options.__dataclass_fields__["jobs"], num_jobs)
+    check_value(Options.__dataclass_fields__["jobs"], num_jobs, "num_jobs")
+    check_value(Study.__dataclass_fields__["episodes"], num_missions, "num_missions")
     study = Study(
         policies=_names(policies),
         regimes=(mission,),
@@ -198,7 +197,7 @@ def evaluate(
         probability=probability,
         is_deterministic=is_deterministic,
         baseline=baseline,
-        features=tuple(features),
+        features=names_of(features),
         parts=OwnParts(**parts),
     )
     way_out = "choose fewer num_jobs, num_robots, num_windows or num_missions"
@@ -229,4 +228,4 @@ def _names(policies: str | Path | Sequence[str | Path]) -> tuple[str, ...]:
     named = [policies] if isinstance(policies, str | Path) else list(policies)
     for name in named:
         _check_named("policy", name)
-    return tuple(dict.fromkeys(normalised(str(name)) for name in named))
+    return tuple(listed(normalised(str(name)) for name in named))

@@ -1,6 +1,5 @@
 """`swarm_mj.fly`: one mission from Python, flown as `swarm-mj fly` flies it."""
 
-import time
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
@@ -10,10 +9,15 @@ from typing import Any
 from swarm_mj.api.bars import quiet_bar
 from swarm_mj.api.numbers import Numbers
 from swarm_mj.api.run import PARTS, Run
-from swarm_mj.cli import DONE, INTERRUPTED
+from swarm_mj.cli import DONE
 from swarm_mj.cli.estimates import check_fits, flight_needs
-from swarm_mj.cli.flight import flight_config, fly_swarm
-from swarm_mj.cli.flight_table import flight_numbers
+from swarm_mj.cli.flight import (
+    COMPILING_WINDOWS,
+    compile_ahead,
+    flight_config,
+    flight_summary,
+    fly_swarm,
+)
 from swarm_mj.cli.mission_options import make_mission
 from swarm_mj.control.controller import Controller
 from swarm_mj.fields import check_kind, check_names
@@ -24,11 +28,11 @@ from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import check_used, make_policy, normalised
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.replay.recorder import Recorder
-from swarm_mj.rollout import summarise
 from swarm_mj.swarm import Swarm
 
 MISSION_FIELDS = tuple(spec.name for spec in fields(Mission) if spec.name != "task")
 SHARED = ("seed", "probability", "is_deterministic", "features", *PARTS)  # with `evaluate`
+KEYWORDS = ("policy", "record", "observer", *SHARED)
 
 
 def fly(
@@ -43,7 +47,7 @@ def fly(
     channel: str | Channel | None = None,
     controller: str | Controller | None = None,
     scene: str | Scene | None = None,
-    features: Sequence[str] = (),
+    features: str | Sequence[str] = (),
     **mission_fields: Any,
 ) -> Run:
     """Flies one mission, from the first window to the last.
@@ -74,10 +78,11 @@ def fly(
         TypeError: An argument is of the wrong kind, or has a name that is not known.
         KeyboardInterrupt: Ctrl-C was pressed before the first window was flown.
     """
-    mission = mission_of(task, mission_fields, known=("policy", "record", "observer", *SHARED))
-    how = {"is_deterministic": is_deterministic, "features": tuple(features)}
-    chosen, name = _policy_of(policy, mission, probability, **how)
-    check_used(tuple(features), [chosen])
+    mission = mission_of("swarm_mj.fly", task, mission_fields, KEYWORDS)
+    how: dict[str, Any] = {"probability": probability, "is_deterministic": is_deterministic}
+    how["features"] = names_of(features)
+    chosen, name = _policy_of(policy, mission, how)
+    check_used(how["features"], [chosen])
     parts = {"channel": channel, "controller": controller, "scene": scene}
     made, named = _parts_of(parts, mission)
     needs, way_out = flight_needs(mission, name, is_recorded=record), "choose fewer num_robots or "
@@ -86,33 +91,44 @@ def fly(
     swarm = Swarm(mission, [seed], **made)
     is_broadcast = chosen.window(mission).is_broadcast
     recorder = Recorder(swarm, ego=observer, is_broadcast=is_broadcast) if record else None
-    start_s = time.perf_counter()
+    with quiet_bar("Compiling", COMPILING_WINDOWS, "windows") as compiling:
+        like = "tdma" if isinstance(policy, Policy) else name  # objects are flown but once
+        compile_ahead(mission, like, compiling.advance, **how)
     bar = quiet_bar("Flying", mission.num_windows, "windows")
-    flown, code, ending = fly_swarm(swarm, chosen, recorder, bar, way_on="")
-    wall_s = time.perf_counter() - start_s
-    if code != DONE:
-        said = f"{ending} after {len(flown)} of {mission.num_windows} windows; these are kept"
-        warnings.warn(said, stacklevel=2)
-    took = {"wall_seconds": wall_s, "interrupted": code == INTERRUPTED}
+    flown = fly_swarm(swarm, chosen, recorder, bar, way_on="")
+    if flown.code != DONE:
+        kept = f"{len(flown.windows)} of {mission.num_windows} windows; these are kept"
+        warnings.warn(f"{flown.ending} after {kept}", stacklevel=2)
     return Run(
         mission=mission,
         config=flight_config(mission, name, chosen, seed=seed, observer=observer) | named,
-        summary=Numbers(flight_numbers(chosen, summarise(flown)) | took),
-        windows=tuple(flown),
+        summary=Numbers(flight_summary(chosen, flown)),
+        windows=tuple(flown.windows),
         log=recorder.log() if recorder else None,
     )
 
 
+def names_of(features: str | Sequence[str]) -> tuple[str, ...]:
+    """Names of feature extractors, one or several."""
+    return (features,) if isinstance(features, str) else tuple(features)
+
+
 def mission_of(
-    task: str | Mission, mission_fields: Mapping[str, Any], known: tuple[str, ...]
+    function: str, task: str | Mission, mission_fields: Mapping[str, Any], known: tuple[str, ...]
 ) -> Mission:
-    """The mission that arguments name.
+    """The mission that a function's arguments name.
+
+    Args:
+        function: Its name, for messages.
+        task: What the robots do, by name; or the mission itself.
+        mission_fields: Other fields of the mission.
+        known: The function's other arguments, any of which may have been meant.
 
     Raises:
         ValueError: A value is unknown or out of range.
         TypeError: A field is none, nor among the other names that are `known`.
     """
-    check_names("it", mission_fields, (*MISSION_FIELDS, *known))
+    check_names(function, mission_fields, (*MISSION_FIELDS, *known))
     if not isinstance(task, Mission):
         return make_mission(task=task, **mission_fields)
     if mission_fields:
@@ -125,17 +141,14 @@ def mission_of(
 
 
 def _policy_of(
-    policy: str | Path | Policy,
-    mission: Mission,
-    probability: float | None,
-    **how: Any,
+    policy: str | Path | Policy, mission: Mission, how: Mapping[str, Any]
 ) -> tuple[Policy, str]:
     """A policy and its name: what was given, or its class's."""
     if not isinstance(policy, Policy):
         check_kind("policy", policy, (str, Path), '"planner"')
         name = normalised(str(policy))
-        return make_policy(name, mission, probability, **how), name
-    if probability is not None or how["is_deterministic"]:
+        return make_policy(name, mission, **how), name
+    if how["probability"] is not None or how["is_deterministic"]:
         raise TypeError(
             "probability and is_deterministic change policies by name; make it with them"
         )

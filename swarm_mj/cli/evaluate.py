@@ -30,7 +30,7 @@ from swarm_mj.io.interrupt import deferred_interrupt, heard_interrupt
 from swarm_mj.io.owned import owned
 from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
-from swarm_mj.policies.registry import POLICIES, directories, normalised, with_payload
+from swarm_mj.policies.registry import directories, listed, normalised, with_payload
 
 OUTPUT = "output"  # a heading of the help
 DEFAULT_POLICIES = ("planner", *BASELINES)
@@ -68,8 +68,7 @@ class Options(PolicyOptions):
     @property
     def study(self) -> Study:
         """The study that the options name; raises ValueError as it does."""
-        named = [name for name in self.policy if name != "all"]
-        named = list(dict.fromkeys(named + list(POLICIES if "all" in self.policy else ())))
+        named = listed(self.policy)
         flown = dict(zip(named, with_payload(named, self.payload), strict=True))
         return Study(
             policies=tuple(dict.fromkeys(flown.values())),

@@ -1,5 +1,6 @@
 """Results on the terminal: one table per regime, the freshest knowledge first."""
 
+import io
 from collections.abc import Callable, Sequence
 from itertools import groupby
 from typing import Any
@@ -16,15 +17,21 @@ NAME_WIDTH = 17  # of a policy that fits in there; a longer directory's name wid
 NONE = "-"
 
 
-def print_results(results: Sequence[Result], *, is_plain: bool = False) -> None:
+def results_text(results: Sequence[Result]) -> str:
+    """What `print_results` prints, as plain text, whatever the terminal and its variables say."""
+    file = io.StringIO()
+    print_results(results, file=file, force_terminal=False)
+    return file.getvalue().rstrip()
+
+
+def print_results(results: Sequence[Result], **where: Any) -> None:
     """Prints a table per regime; results of a regime stand together.
 
     Args:
         results: One or more.
-        is_plain: Whether no letters are bold, whatever the terminal and its variables say.
+        **where: Arguments of the console that prints; usually none.
     """
-    how: dict[str, Any] = {"highlight": False, "markup": False, "force_jupyter": False}
-    how |= {"force_terminal": False} if is_plain else {}
+    how: dict[str, Any] = {"highlight": False, "markup": False, "force_jupyter": False, **where}
     console = Console(**how)
     longest = max(len(line) for result in results for line in _name(result).splitlines())
     width = max(MIN_WIDTH + max(0, longest - NAME_WIDTH), console.width)

@@ -6,23 +6,27 @@ what was flown.
 
 import gc
 import time
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, NamedTuple
 
 from swarm_mj.cli import DONE, FAILED, INTERRUPTED
 from swarm_mj.cli.estimates import in_gb, replay_memory
+from swarm_mj.cli.flight_table import flight_numbers
 from swarm_mj.cli.machine import free_memory, memory_errors
 from swarm_mj.cli.progress import WorkBar
 from swarm_mj.io.interrupt import deferred_interrupt
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
+from swarm_mj.policies.registry import is_directory, is_own_policy, make_policy
 from swarm_mj.replay.recorder import Recorder
-from swarm_mj.rollout import WindowRecord, rollout
+from swarm_mj.rollout import WindowRecord, rollout, summarise
 from swarm_mj.swarm import Swarm
 
 WINDOWS_BETWEEN_LOOKS = 50  # at the memory that is left
+COMPILING_WINDOWS = 10  # in which three robots do all that a flight does, schedules included
 SECOND_LOOK_S = 0.5  # later, as what others have just freed may still be counted
 
 
@@ -32,6 +36,7 @@ class Flown(NamedTuple):
     windows: list[WindowRecord]
     code: int  # an exit code
     ending: str  # why it ended early; empty if it did not
+    wall_s: float  # that it took
 
 
 def fly_swarm(
@@ -51,6 +56,11 @@ def fly_swarm(
         MemoryError: Memory did not suffice for one window.
     """
     flown: list[WindowRecord] = []
+    start_s = time.perf_counter()
+
+    def ended(code: int, ending: str = "") -> Flown:
+        return Flown(flown, code, ending, time.perf_counter() - start_s)
+
     with suppress(MemoryError), memory_errors(), deferred_interrupt() as is_interrupted, bar:
         for window in rollout(swarm, policy):
             if recorder:
@@ -59,14 +69,49 @@ def fly_swarm(
             bar.text = f"age {float(window.costs.age_windows[0]):.1f}"
             bar.advance()
             if is_interrupted():
-                return Flown(flown, INTERRUPTED, "Interrupted")
+                return ended(INTERRUPTED, "Interrupted")
             is_time = way_on is not None and len(flown) % WINDOWS_BETWEEN_LOOKS == 0
             if recorder and is_time and (short := _shortage(swarm.mission, len(flown), recorder)):
-                return Flown(flown, FAILED, f"Memory ran short ({short}{way_on})")
-        return Flown(flown, DONE, "")
+                return ended(FAILED, f"Memory ran short ({short}{way_on})")
+        return ended(DONE)
     if not flown:
         raise MemoryError
-    return Flown(flown, FAILED, "Out of memory")
+    return ended(FAILED, "Out of memory")
+
+
+def compile_ahead(
+    mission: Mission,
+    policy_name: str,
+    on_window: Callable[[], object] = lambda: None,
+    **how: Any,
+) -> None:
+    """Flies a small mission of this kind, beyond half-way, so that compiling is not timed.
+
+    Parts of users' own are spared: they may be made for this mission only.
+
+    Args:
+        mission: The one that is to be flown.
+        policy_name: As it is given to `make_policy`.
+        on_window: Called after each window.
+        **how: The other arguments of `make_policy`.
+    """
+    is_bound = is_directory(policy_name)  # perhaps to teams of one size
+    smallest = replace(
+        mission,
+        num_robots=mission.num_robots if is_bound else 3,
+        range_ratio=10.0,
+        num_windows=COMPILING_WINDOWS,
+    )
+    if is_own_policy(policy_name):
+        policy_name, how = "tdma", {}
+    for _ in rollout(Swarm(smallest, [0]), make_policy(policy_name, smallest, **how)):
+        on_window()
+
+
+def flight_summary(policy: Policy, flown: Flown) -> dict[str, Any]:
+    """What a flight cost, how long it took, and whether it ended early for whatever reason."""
+    took = {"wall_seconds": flown.wall_s, "interrupted": flown.code != DONE}
+    return flight_numbers(policy, summarise(flown.windows)) | took
 
 
 def flight_config(

@@ -2,7 +2,6 @@
 
 import os
 import shlex
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -13,8 +12,8 @@ from rich.console import Console
 
 from swarm_mj.cli import DONE
 from swarm_mj.cli.estimates import check_fits, flight_needs
-from swarm_mj.cli.flight import flight_config, fly_swarm
-from swarm_mj.cli.flight_table import flight_numbers, flight_table, flight_title
+from swarm_mj.cli.flight import compile_ahead, flight_config, flight_summary, fly_swarm
+from swarm_mj.cli.flight_table import flight_table, flight_title
 from swarm_mj.cli.machine import YES
 from swarm_mj.cli.mission_options import mission_flags, one_mission
 from swarm_mj.cli.outputs import Output, check_outputs
@@ -31,7 +30,6 @@ from swarm_mj.policies.registry import (
     check_used,
     directories,
     is_directory,
-    is_own_policy,
     make_policy,
     normalised,
     with_payload,
@@ -39,14 +37,12 @@ from swarm_mj.policies.registry import (
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.view import has_display, view_command
 from swarm_mj.replay.view import run as run_viewer
-from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
 REPLAYS = Path("replays")
 OTHERWISE = "name another place with --record, or leave it out with --no-record"
 OUTPUT = "output"  # a heading of the help
 COMPARED = ("planner", "tdma", "random-flooding")  # with what was flown, for a first comparison
-COMPILING_WINDOWS = 10  # in which three robots do all that a flight does, schedules included
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,40 +82,39 @@ def run(options: Options) -> int:
     needs = flight_needs(mission, options.policy, is_recorded=path is not None)
     way_out = "choose fewer --robots or --windows" + (", or --no-record" if path else "")
     check_fits(needs, path, way_out, is_forced=options.yes)
-    policy, parts = _make_policy(options, mission), options.parts.made(mission)
+    policy = make_policy(options.policy, mission, **options.how)
+    parts = options.parts.made(mission)
     check_used(options.features, [policy])
     console = Console(stderr=True, highlight=False)
     preparing = console.status("Preparing the swarm (compiles once, then it is cached) ...")
     with preparing, heard_interrupt() as was_pressed:
-        _compile_ahead(options, mission)
+        compile_ahead(mission, options.policy, **options.how)
         swarm = Swarm(mission, [options.seed], **parts)
         recorder = _recorder(options, swarm, policy) if path else None
         if was_pressed():
             raise KeyboardInterrupt
-    start_s = time.perf_counter()
     bar = WorkBar("Flying", mission.num_windows, "windows", console=console)
     way_on = None if options.yes else "; --yes flies on all the same"
-    flown, code, ending = fly_swarm(swarm, policy, recorder, bar, way_on=way_on)
-    wall_s = time.perf_counter() - start_s
+    flown = fly_swarm(swarm, policy, recorder, bar, way_on=way_on)
     out, title = plain_console(), flight_title(mission, options.policy, options.seed)
     with deferred_interrupt():
         config = flight_config(
             mission, options.policy, policy, seed=options.seed, observer=options.observer
         )
         config |= options.named
-        numbers = flight_numbers(policy, summarise(flown))
-        took = {"wall_seconds": wall_s, "interrupted": code != DONE}
-        summary = {"config": config} | numbers | took | {"replay": str(path) if path else None}
+        numbers = flight_summary(policy, flown)
+        summary = {"config": config} | numbers | {"replay": str(path) if path else None}
         try:  # either may fail
             with console.status("Writing ..."):
                 _write(options, summary, path, recorder)
         finally:
-            out.print(flight_table(title + options.parts.title, mission, numbers, wall_s))
+            out.print(flight_table(title + options.parts.title, mission, numbers, flown.wall_s))
     for label, line in _next_commands(options, path):
         out.print(f"{label:18}{line}")
-    if code != DONE:
-        console.print(f"{ending} after {len(flown)} of {mission.num_windows} windows.")
-        return code
+    if flown.code != DONE:
+        told = f"{flown.ending} after {len(flown.windows)} of {mission.num_windows} windows."
+        console.print(told)
+        return flown.code
     return run_viewer(view_command(path)) if options.view and path else DONE
 
 
@@ -133,16 +128,6 @@ def _next_commands(options: Options, path: Path | None) -> Iterator[tuple[str, s
     parts = [f"--{kind} {shlex.quote(part)}" for kind, part in options.named.items()]
     flags = " ".join((mission_flags(options.mission), *parts))
     yield "Compare some:", f"{name} evaluate --policy {policies} --episodes 5 {flags}"
-
-
-def _make_policy(options: Options, mission: Mission) -> Policy:
-    return make_policy(
-        options.policy,
-        mission,
-        options.probability,
-        is_deterministic=options.is_deterministic,
-        features=options.features,
-    )
 
 
 def _replay_path(options: Options) -> Path | None:
@@ -177,24 +162,6 @@ def _short(policy: str) -> str:
         return policy.replace(" --", "-").replace(" ", "-").replace(":", "-")
     path = Path(policy).resolve()
     return path.parent.name if path.name == "policy" else path.name
-
-
-def _compile_ahead(options: Options, mission: Mission) -> None:
-    """Flies a small mission of this kind, beyond half-way, so that compiling is not timed.
-
-    Parts of users' own are spared: they may be made for this mission only.
-    """
-    is_bound = is_directory(options.policy)  # perhaps to teams of one size
-    smallest = replace(
-        mission,
-        num_robots=mission.num_robots if is_bound else 3,
-        range_ratio=10.0,
-        num_windows=COMPILING_WINDOWS,
-    )
-    if is_own_policy(options.policy):
-        options = replace(options, policy="tdma")
-    for _ in rollout(Swarm(smallest, [0]), _make_policy(options, smallest)):
-        pass
 
 
 def _recorder(options: Options, swarm: Swarm, policy: Policy) -> Recorder:

@@ -1,6 +1,7 @@
 """How policies fly: options of `fly` and `evaluate` alike."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from swarm_mj.fields import setting
 from swarm_mj.parts import GROUP, SHOWN_AS, OwnParts
@@ -41,3 +42,12 @@ class PolicyOptions(OwnParts):
     def parts(self) -> OwnParts:
         """The parts that are the user's own."""
         return OwnParts(**self.named)
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """What `make_policy` takes beside a policy's name and a mission."""
+        return {
+            "probability": self.probability,
+            "is_deterministic": self.is_deterministic,
+            "features": self.features,
+        }

@@ -76,10 +76,8 @@ def run(options: Options) -> int:
             is_over = not watch.has_stopped
             _print(options.out, asked, progress, is_over=is_over)
     except (KeyboardInterrupt, MemoryError) as error:
-        is_memory, go_on = (
-            isinstance(error, MemoryError),
-            _resume_command(options.out, asked.training),
-        )
+        is_memory = isinstance(error, MemoryError)
+        go_on = _resume_command(options.out, asked.training)
         ending = "Out of memory" if is_memory else "Broken off"
         console.print(f"{ending}; the last checkpoint is kept.\nGo on:    {go_on}", markup=False)
         return FAILED if is_memory else INTERRUPTED

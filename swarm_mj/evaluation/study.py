@@ -58,7 +58,7 @@ class Study:
         if not 0 <= self.seed <= MAX_SEED - self.episodes + 1:
             raise ValueError(
                 f"seed must be from 0 to {MAX_SEED - self.episodes + 1}, the last of "
-                f"{self.episodes} episodes included, not {self.seed}"
+                f"{self.episodes} missions included, not {self.seed}"
             )
         if self.is_deterministic and not any(map(is_learned, self.policies)):
             raise ValueError(
@@ -77,7 +77,7 @@ class Study:
         if self.baseline is not None and self.baseline not in self.policies:
             raise ValueError(
                 f"baseline must be one of the policies evaluated, {', '.join(self.policies)}, not "
-                f"{self.baseline!r}; add it with --policy {self.baseline}"
+                f"{self.baseline!r}; add it to them"
             )
 
     @property

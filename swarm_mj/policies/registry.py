@@ -98,6 +98,13 @@ def normalised(name: str) -> str:
     return plain if is_directory(plain) else os.path.join(os.curdir, plain)
 
 
+def listed(names: Iterable[str]) -> list[str]:
+    """Policies' names, each once; `all` stands for `POLICIES`, after the others."""
+    names = list(names)
+    named = [name for name in names if name != "all"]
+    return list(dict.fromkeys([*named, *(POLICIES if "all" in names else ())]))
+
+
 def with_payload(names: Sequence[str], payload: str) -> list[str]:
     """Names of policies whose packets carry this beyond T, M and P, where they can carry anything.
 

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.frame import NEAR
+from swarm_mj.replay.frame import frame
 from swarm_mj.replay.links import fates
 from swarm_mj.replay.shots import shots
 from swarm_mj.swarm import Swarm
@@ -67,7 +67,8 @@ def contents_of(
     states = swarm.states
     position_m = states.position_m[index].copy()
     seen = shots(fates(_flown(swarm, index, is_broadcast)), position_m[None])
-    centre_m, reach_m = _square(position_m, swarm.mission.half_side_m)
+    half_side_m = swarm.mission.half_side_m
+    square = frame(position_m[None], half_side_m)
     return Contents(
         position_m=position_m,
         velocity_mps=states.velocity_mps[index].copy(),
@@ -76,8 +77,8 @@ def contents_of(
         start_m=seen.start_m,
         end_m=seen.end_m,
         link_colour=seen.colour,
-        centre_m=centre_m,
-        reach_m=reach_m,
+        centre_m=square.centre_m[0],
+        reach_m=max(half_side_m, square.reach_m),  # as wide wherever the team is
     )
 
 
@@ -99,13 +100,3 @@ def _colours(
     is_active = swarm.states.is_active
     is_on = np.ones(len(age), dtype=bool) if is_active is None else is_active[index]
     return palette.robot_colours(age, full_scale, is_known, is_on, observer)
-
-
-def _square(
-    position_m: Float[np.ndarray, "N 2"], half_side_m: float
-) -> tuple[Float[np.ndarray, "2"], float]:
-    """The area, or around the team if it has left it."""
-    if np.max(np.abs(position_m)) <= NEAR * half_side_m:
-        return np.zeros(2), max(half_side_m, float(np.max(np.abs(position_m))))
-    low_m, high_m = np.min(position_m, axis=0), np.max(position_m, axis=0)
-    return (low_m + high_m) / 2.0, max(half_side_m, float(np.max(high_m - low_m)) / 2.0)

@@ -31,7 +31,7 @@ class SceneViewer:
             scene: What changes the arena, if anything does: `swarm.scene`.
 
         Raises:
-            OSError: There is no display.
+            OSError: There is no display, or the window is closed already.
         """
         _check_display()
         spec = compose(mission, scene=scene)
@@ -47,8 +47,10 @@ class SceneViewer:
         except RuntimeError as error:  # macOS opens windows for `mjpython` only
             raise OSError(f"{error}; {WAY_OUT}") from error
         self._threads = set(threading.enumerate()) - others
-        assert self._window.user_scn is not None  # passive viewers have one
-        self._markers = self._window.user_scn
+        markers = self._window.user_scn
+        if markers is None:
+            raise OSError("the window was closed before the mission began; open it again")
+        self._markers = markers
         self._is_aimed = False
 
     def show(self, contents: Contents) -> None:

@@ -1,5 +1,7 @@
 """Python finds what `swarm-mj evaluate` finds, to the last digit."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import swarm_mj
 from swarm_mj.api import evaluate as module
 from swarm_mj.cli import main
 from swarm_mj.evaluation.results import COLUMNS
+from swarm_mj.policies.registry import POLICIES
 
 SHORT = {"num_robots": 6, "num_windows": 20, "range_ratio": 0.5}
 OPTIONS = ("--robots", "6", "--windows", "20", "--range-ratio", "0.5")
@@ -39,6 +42,20 @@ def test_each_policy_has_its_numbers(found):
     ]
 
 
+def test_all_are_the_policies_that_have_names():
+    assert module._names("all") == POLICIES
+    assert module._names(["mst", "all"]) == ("mst", *(name for name in POLICIES if name != "mst"))
+
+
+def test_what_each_mission_s_task_cost_is_in_the_table_too(here):
+    found = swarm_mj.evaluate("tdma", task="formation", num_missions=2, **SHORT)
+    found.save("found.json")
+    (told,) = json.loads((here / "found.json").read_text())["results"]
+    table = found.to_dataframe(by_mission=True)
+    assert table.task_cost.tolist() == told["episode_task_cost"]
+    assert table.task_cost.mean() == pytest.approx(found.summary.tdma.task_cost_mean)
+
+
 def test_it_agrees_with_flights_one_by_one(found):
     ages = [
         swarm_mj.fly("random-walk", policy="tdma", seed=seed, record=False, **SHORT)
@@ -61,9 +78,19 @@ def test_it_shows_itself_as_the_table(found, monkeypatch):
     [
         (["tdmaa"], {}, "did you mean tdma?"),
         ([], {}, "an evaluation needs at least 1 policy"),
-        (["tdma"], {"num_mission": 3}, "it has no 'num_mission'; did you mean num_missions?"),
-        (["tdma"], {"num_missions": 0}, "must be a whole number from 1 to 100000, not 0"),
-        (["tdma"], {"num_jobs": 0}, "jobs must be a whole number from 1 to 256, not 0"),
+        (
+            ["tdma"],
+            {"num_mission": 3},
+            "swarm_mj.evaluate has no 'num_mission'; did you mean num_missions?",
+        ),
+        (
+            ["tdma"],
+            {"num_missions": 0},
+            "num_missions must be a whole number from 1 to 100000, not 0",
+        ),
+        (["tdma"], {"seed": 2**64}, "the last of 100 missions included"),
+        (["gnn"], {"features": "mine:Feat"}, "on the features mine:Feat; leave them out"),
+        (["tdma"], {"num_jobs": 0}, "num_jobs must be a whole number from 1 to 256, not 0"),
         (["tdma"], {"baseline": "mst"}, "baseline must be one of the policies evaluated"),
     ],
 )

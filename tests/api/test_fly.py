@@ -3,6 +3,7 @@
 import json
 import math
 import signal
+from types import SimpleNamespace
 
 import pytest
 
@@ -111,6 +112,7 @@ def test_ctrl_c_keeps_what_was_flown(monkeypatch):
                 signal.raise_signal(signal.SIGINT)
             yield window
 
+    monkeypatch.setattr(module, "compile_ahead", lambda *_, **__: None)
     monkeypatch.setattr(flight, "rollout", pressed)
     with pytest.warns(UserWarning, match="Interrupted after 5 of 20 windows; these are kept"):
         run = swarm_mj.fly(**SHORT)
@@ -119,12 +121,28 @@ def test_ctrl_c_keeps_what_was_flown(monkeypatch):
     assert math.isfinite(run.summary.aoi_mean)
 
 
+def test_compiling_is_not_timed(monkeypatch):
+    """By a clock that moves when the small mission is flown ahead, and at no other time."""
+    now_s, flown = [0.0], []
+
+    def compile_slowly(mission, name, *_, **how):
+        flown.append((mission.task, name, how["probability"]))
+        now_s[0] += 20.0
+
+    monkeypatch.setattr(flight, "time", SimpleNamespace(perf_counter=lambda: now_s[0]))
+    monkeypatch.setattr(module, "compile_ahead", compile_slowly)
+    for policy in ("mst", Silent()):
+        assert swarm_mj.fly(policy=policy, record=False, **SHORT).summary.wall_seconds == 0.0
+    assert flown == [("flocking", "mst", None), ("flocking", "tdma", None)]
+
+
 @pytest.mark.parametrize(
     ("keywords", "complaint"),
     [
-        ({"num_robot": 20}, "it has no 'num_robot'; did you mean num_robots?"),
-        ({"polcy": "tdma"}, "it has no 'polcy'; did you mean policy?"),
+        ({"num_robot": 20}, "swarm_mj.fly has no 'num_robot'; did you mean num_robots?"),
+        ({"polcy": "tdma"}, "swarm_mj.fly has no 'polcy'; did you mean policy?"),
         ({"policy": "tdmaa"}, "not 'tdmaa'; did you mean tdma?"),
+        ({"features": "mine:Feat"}, "was trained on the features mine:Feat; leave them out"),
         ({"seed": -1}, "seeds must be one or more integers from 0"),
         ({"observer": 6}, "observer must be from 0 to 5, not 6"),
         ({"policy": "tdma", "probability": 0.5}, "tdma takes no transmission probability"),

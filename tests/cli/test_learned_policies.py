@@ -74,7 +74,10 @@ def test_the_mode_is_flown_on_request(runs):
         (["evaluate", "--policy", "mst", "--deterministic"], "none is among mst; leave it out"),
         (["evaluate", "--policy", "mst", "runs/z"], "policy runs/z does not exist"),
         (["evaluate", "--policy", "runs/y", "--probability", "0.1"], "takes no transmission prob"),
-        (["evaluate", "--policy", "runs/y", "--baseline", "runs/x"], "not 'runs/x'; add it with"),
+        (
+            ["evaluate", "--policy", "runs/y", "--baseline", "runs/x"],
+            "not 'runs/x'; add it to them",
+        ),
     ],
 )
 def test_bad_input_is_one_clear_line(capsys, options, complaint):

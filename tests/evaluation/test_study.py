@@ -53,9 +53,9 @@ def test_the_header_tells_what_costs_depend_on():
         ({"episodes": 0}, "episodes must be a whole number from 1 to 100000, not 0"),
         ({"episodes": -3}, "episodes must be a whole number from 1 to 100000, not -3"),
         ({"seed": -1}, "seed must be from 0 to .*, not -1"),
-        ({"seed": 2**63 - 1}, "seed must be from 0 to 9223372036854775708, .* 100 episodes"),
+        ({"seed": 2**63 - 1}, "seed must be from 0 to 9223372036854775708, .* 100 missions"),
         ({"probability": 1.5}, "probability must be a number from 0 to 1, not 1.5"),
-        ({"baseline": "random-flooding"}, "add it with --policy random-flooding"),
+        ({"baseline": "random-flooding"}, "not .random-flooding.; add it to them"),
     ],
 )
 def test_what_a_study_refuses(overrides, complaint):

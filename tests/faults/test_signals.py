@@ -63,12 +63,12 @@ def test_a_flight_leaves_a_whole_replay(forks, tmp_path, record_property, wishes
 def test_a_signal_that_a_library_swallows_while_it_loads_is_not_lost(tmp_path, monkeypatch):
     """As numba may, when it loads a kernel."""
 
-    def swallow(*_arguments):
+    def swallow(*_arguments, **_how):
         with suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGTERM)
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("swarm_mj.cli.fly._compile_ahead", swallow)
+    monkeypatch.setattr("swarm_mj.cli.fly.compile_ahead", swallow)
     assert main(["fly", "--robots", "3", "--windows", "3"]) == 130
     assert files(tmp_path) == []
 

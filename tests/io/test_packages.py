@@ -1,12 +1,15 @@
 """What is missing is named as pip knows it, with the versions that fit."""
 
+import re
+import shlex
 import tomllib
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 from swarm_mj.io import packages
-from swarm_mj.io.packages import BROUGHT_BY, missing, need
+from swarm_mj.io.packages import BROUGHT_BY, CORE, missing, need
 
 ROOT = Path(__file__).parent.parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -46,3 +49,10 @@ def test_without_metadata_the_name_alone_is_told(monkeypatch):
 
     monkeypatch.setattr(packages.metadata, "requires", unknown)
     assert "pip install 'torch'" in missing("torch", "it")
+
+
+def test_the_guide_names_the_core_for_those_who_have_a_wheel_only():
+    guide = (ROOT / "docs" / "python.md").read_text()
+    (line,) = re.findall(r"^pip install (jaxtyping .*)$", guide, re.MULTILINE)
+    named = [Requirement(text) for text in shlex.split(line)]
+    assert tuple(each.name for each in named) == CORE
