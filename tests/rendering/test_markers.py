@@ -1,0 +1,32 @@
+"""What is added to a scene for robots and packets."""
+
+import mujoco
+import numpy as np
+from moments import moment
+
+from swarm_mj.rendering.camera import look_at
+from swarm_mj.rendering.markers import Markers
+from swarm_mj.replay.arcs import SEGMENTS
+
+
+def drawn(contents):
+    scene = mujoco.MjvScene(mujoco.MjModel.from_xml_string("<mujoco/>"), 100)
+    scene.ngeom = 0
+    camera = look_at(contents.centre_m, contents.reach_m, 640, 480)
+    Markers(scene, 480).draw(contents, camera)
+    return [scene.geoms[k] for k in range(scene.ngeom)]
+
+
+def test_the_observer_is_the_largest_and_white():
+    discs = drawn(moment([(0.0, 0.0), (100.0, 0.0), (0.0, 100.0)], observer=1))
+    assert np.argmax([disc.size[0] for disc in discs]) == 1
+    assert discs[0].size[0] == discs[2].size[0]
+    np.testing.assert_array_equal(discs[1].rgba, 1.0)
+    np.testing.assert_allclose([disc.pos[:2] for disc in discs], [(0, 0), (100, 0), (0, 100)])
+
+
+def test_a_packet_is_an_arc_of_lines_and_a_heading_one_more():
+    contents = moment([(0.0, 0.0), (100.0, 0.0)], [(0, 1)])
+    assert len(drawn(contents)) == 2 + SEGMENTS
+    contents.velocity_mps[0] = (3.0, 0.0)
+    assert len(drawn(contents)) == 3 + SEGMENTS

@@ -1,0 +1,32 @@
+"""MuJoCo's solids as rerun draws them, by numbers that are known."""
+
+import mujoco
+import numpy as np
+
+from swarm_mj.replay.solids import FLOOR_M, fixed_solids
+
+SCENE = """
+<mujoco><worldbody>
+  <geom name="box" type="box" size="1 2 3" pos="4 5 6" rgba="1 0 0 1"/>
+  <geom name="floor" type="plane" size="7 8 1"/>
+  <geom name="pole" type="capsule" size="0.5 2" pos="0 0 10"/>
+  <geom name="ball" type="sphere" size="3"/>
+  <body><freejoint/><geom name="robot" size="1"/></body>
+</worldbody></mujoco>
+"""
+
+
+def numbers(batch):
+    return np.ravel(batch.as_arrow_array().to_pylist()).tolist()
+
+
+def test_what_stands_still_is_drawn_where_it_stands():
+    solids = fixed_solids(mujoco.MjModel.from_xml_string(SCENE))
+    assert solids.keys() == {"box", "floor", "pole", "ball"}
+    assert numbers(solids["box"].half_sizes) == [1, 2, 3]
+    assert numbers(solids["box"].centers) == [4, 5, 6]
+    assert numbers(solids["box"].colors) == [0xFF0000FF]
+    assert numbers(solids["floor"].half_sizes) == [7, 8, FLOOR_M]
+    assert numbers(solids["floor"].centers) == [0, 0, -FLOOR_M]
+    assert numbers(solids["pole"].translations) == [0, 0, 8]  # its lower end
+    assert numbers(solids["ball"].half_sizes) == [3, 3, 3]
