@@ -66,5 +66,5 @@ def _mark_function(
     _mark(action, {**dict.fromkeys(texts, function), "preamble": filled})
 
 
-def _mark(action: Any, how: Any) -> None:  # noqa: ANN401 - shtab reads an attribute that it adds
-    action.complete = how
+def _mark(action: argparse.Action, how: object) -> None:
+    vars(action)["complete"] = how  # where shtab reads it

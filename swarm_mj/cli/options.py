@@ -48,12 +48,12 @@ class Parser(argparse.ArgumentParser):
 
 
 class _Formatter(argparse.HelpFormatter):
-    def _format_args(self, action: argparse.Action, default_metavar: Any) -> str:  # noqa: ANN401 - argparse asks with None, too
+    def _format_args(self, action: argparse.Action, default_metavar: str | None) -> str:
         """`NAME ...` rather than `NAME [NAME ...]`."""
         return (
             f"{action.metavar} ..."
             if action.nargs == "+"
-            else super()._format_args(action, default_metavar)
+            else super()._format_args(action, default_metavar or "")
         )
 
 
@@ -136,7 +136,7 @@ def declare(parser: argparse.ArgumentParser, kind: type[Any]) -> None:
 
 
 def add_option(
-    group: Any,  # noqa: ANN401 - argparse names no public type of groups
+    group: argparse._ActionsContainer,
     spec: Field[Any],
     dest: str,
     default: str,
@@ -171,7 +171,7 @@ def add_option(
         added = group.add_argument(dest, **how)
     else:
         added = group.add_argument(dest, nargs="?", **how)
-    added.spec = spec  # for who completes what is typed
+    vars(added)["spec"] = spec  # for who completes what is typed
 
 
 def flag_of(spec: Field[Any]) -> str:
