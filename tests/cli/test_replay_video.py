@@ -171,18 +171,18 @@ def num_red(path):
 
 def test_a_scene_of_ones_own_is_shown_when_it_is_named_again(here, capsys):
     """The name in a replay's file may be anybody's: it is told, and not loaded."""
-    Path("my_scene.py").write_text(PILLAR)
+    Path("scene_of_a_replay.py").write_text(PILLAR)
     flight = ["fly", "--task", "stationary", "--robots", "5", "--windows", "6", "--range-ratio"]
-    scene = ["--scene", "my_scene:pillar"]
+    scene = ["--scene", "scene_of_a_replay:pillar"]
     assert main([*flight, "0.5", "--policy", "tdma", "--record", "a.rrd", *scene]) == 0
     video = ["replay", "a.rrd", "--video"]
     capsys.readouterr()
     assert main([*video, "bare.mp4", *SMALL]) == 0
     said = capsys.readouterr().err
-    assert said.endswith("flown in the scene 'my_scene:pillar'; --scene shows it, too.\n")
+    assert said.endswith("flown in the scene 'scene_of_a_replay:pillar'; --scene shows it, too.\n")
     assert main([*video, "whole.mp4", *SMALL, *scene]) == 0
     assert "bare arena" not in capsys.readouterr().err
     assert num_red(here / "bare.mp4") == 0
     assert num_red(here / "whole.mp4") > 20
-    assert main([*video, "none.mp4", *SMALL, "--scene", "my_scene:pilar"]) == 2
+    assert main([*video, "none.mp4", *SMALL, "--scene", "scene_of_a_replay:pilar"]) == 2
     assert "pillar" in capsys.readouterr().err
