@@ -5,7 +5,7 @@ from functools import partial
 from numbers import Integral
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from swarm_mj.control.controller import Controller, costed
 from swarm_mj.control.motion import controller_of, initial_velocity
@@ -16,15 +16,17 @@ from swarm_mj.mission.placement import connected_positions
 from swarm_mj.mission.robot_failures import draw_survivors, failure_window
 from swarm_mj.parts import is_ours
 from swarm_mj.physics.scene import Scene
-from swarm_mj.physics.state import RobotStates
+from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
 from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.protocol.buffers import Buffers, check_robots, empty_buffers, observe_self
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, RequestResponse, WindowProtocol
-from swarm_mj.radio.free_space import Channel
-from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.radio.composed import ComposedChannel
+from swarm_mj.radio.free_space import Channel, VaryingChannel
+from swarm_mj.radio.mission_radio import channel_of
+from swarm_mj.radio.obstruction import blocked
 
 CALLED_WITH = {  # what own parts are given
     "channel": ("position_m", "recipient"),
@@ -46,7 +48,7 @@ class Swarm:
         mission: Mission,
         seeds: Sequence[int],
         *,
-        channel: Channel | None = None,
+        channel: Channel | VaryingChannel | None = None,
         controller: Controller | None = None,
         scene: Scene | None = None,
         num_threads: int = 1,
@@ -56,7 +58,7 @@ class Swarm:
         Args:
             mission: The numbers of every mission.
             seeds: One per mission; its length is B.
-            channel: Who decodes whom; the mission's `FreeSpaceRadio` unless given.
+            channel: Who decodes whom; the mission's own unless given.
             controller: What drives the robots; that of the mission's task unless given.
             scene: What changes the arena before it is compiled; nothing unless given. All missions
                 stand in the same arena.
@@ -70,17 +72,19 @@ class Swarm:
         check_kind("mission", mission, Mission, 'paper("flocking")')
         parts = {"channel": channel, "controller": controller, "scene": scene}
         for what, part in parts.items():
-            check_callable(what, part, CALLED_WITH[what])
+            if not isinstance(part, VaryingChannel):
+                check_callable(what, part, CALLED_WITH[what])
         _check_seeds(seeds)
         if not isinstance(num_threads, Integral) or not 1 <= num_threads <= MAX_THREADS:
             limits = f"from 1 to {MAX_THREADS}"
             raise ValueError(f"num_threads must be a whole number {limits}, not {num_threads!r}")
         self.mission = mission
-        self.channel = radio_of(mission) if channel is None else channel
         self.controller = controller_of(mission) if controller is None else controller
         self._costed = costed(self.controller)
         self.scene = scene
         self._physics = Physics(mission, len(seeds), scene=scene, num_threads=num_threads)
+        self._obstacles = self._physics.obstacles
+        self.channel = channel_of(mission, self._obstacles) if channel is None else channel
         self._num_missions = len(seeds)
         self.restart(seeds)
 
@@ -97,15 +101,12 @@ class Swarm:
         streams = zip(*(_streams(seed) for seed in seeds), strict=True)
         placement, motion, policy, outage, channel = streams
         mission = self.mission
-        position_m = [
-            connected_positions(mission.num_robots, mission.half_side_m, mission.range_m, rng)
-            for rng in placement
-        ]
-        velocity_mps = [initial_velocity(mission, rng) for rng in placement]
-        self._physics.place(np.stack(position_m), np.stack(velocity_mps))
         for part, rngs in ((self.controller, motion), (self.channel, channel)):
             if isinstance(part, Started):
                 part.start(mission.num_robots, rngs)
+        position_m = [self._place(b, rng) for b, rng in enumerate(placement)]
+        velocity_mps = [initial_velocity(mission, rng) for rng in placement]
+        self._physics.place(np.stack(position_m), np.stack(velocity_mps))
         self._policy_rngs = policy
         self._survivors = draw_survivors(mission, outage)
         self.now = np.zeros(len(seeds))  # t [windows]
@@ -114,6 +115,24 @@ class Swarm:
         self.phases: tuple[Phase, ...] = ()
         self._read_only = self.buffers.read_only()
         self._started: Policy | None = None
+
+    def _place(self, b: int, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
+        """Where mission b's robots begin: connected in its own channel, if that can be asked."""
+        mission, channel = self.mission, self.channel
+        asks = isinstance(channel, ComposedChannel)
+        stands = len(self._obstacles.kind) > 0
+        return connected_positions(
+            mission.num_robots,
+            mission.half_side_m,
+            mission.range_m,
+            rng,
+            partial(channel.is_connected, mission=b) if asks else None,
+            self._is_blocked if stands else None,
+        )
+
+    def _is_blocked(self, position_m: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
+        """Which robots would touch an obstacle there."""
+        return blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, self._obstacles)
 
     @property
     def states(self) -> RobotStates:

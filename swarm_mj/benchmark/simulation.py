@@ -28,7 +28,7 @@ from swarm_mj.policies.planner.snapshots import take_snapshots
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.round_robin import RoundRobin
 from swarm_mj.protocol.costs import mean_hops, window_costs
-from swarm_mj.protocol.window import window
+from swarm_mj.protocol.window import channel_at, window
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.swarm import Swarm
 
@@ -64,6 +64,7 @@ def simulation_rows(
     swarm.start(policy)
     recipient = swarm.decide(policy)
     phases = window(swarm.buffers, swarm.states, recipient, swarm.channel, swarm.now)
+    channel = channel_at(swarm.channel, swarm.now)
     parts = {
         "  the policy decides": lambda: swarm.decide(policy),
         "  MuJoCo moves the robots": swarm.move,
@@ -71,7 +72,7 @@ def simulation_rows(
         "  costs are measured": lambda: window_costs(
             swarm.buffers, swarm.states, phases, swarm.now, is_broadcast=False
         ),
-        "the radio alone": lambda: swarm.channel(swarm.states.position_m, recipient),
+        "the radio alone": lambda: channel(swarm.states.position_m, recipient),
         "hops of news are counted (fly only)": lambda: mean_hops(swarm.buffers),
     }
     window_us = microseconds(lambda: swarm.step(policy), seconds) / num_missions

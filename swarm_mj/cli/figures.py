@@ -14,6 +14,7 @@ from swarm_mj.cli.terminal import plain_console
 from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS
 from swarm_mj.evaluation.results import Result, read_results
 from swarm_mj.fields import setting
+from swarm_mj.mission.specification import OPEN
 from swarm_mj.parts import OwnParts
 from swarm_mj.policies.registry import directories
 
@@ -84,7 +85,9 @@ def _papers(path: Path) -> list[Result]:
     results = read_results(path)
     for row, result in enumerate(results, start=1):
         parts = OwnParts(channel=result.channel, controller=result.controller, scene=result.scene)
-        for kind, name in parts.named.items():
+        added = parts.named | ({"radio": result.radio} if result.radio else {})
+        added |= {"arena": result.arena} if result.arena != OPEN else {}
+        for kind, name in added.items():
             raise ValueError(
                 f"figures compare with the paper's values, but row {row} of {path} was flown with "
                 f"the {kind} {name}; leave such rows out, or chart them with "

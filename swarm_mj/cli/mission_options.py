@@ -54,9 +54,13 @@ def mission_flags(mission: Mission) -> str:
 
 def _add(parser: argparse.ArgumentParser, *, is_many: bool = False) -> None:
     about = "Each takes several values; those multiply." if is_many else None
-    group = parser.add_argument_group("missions" if is_many else "mission", about)
+    usual = "missions" if is_many else "mission"
+    groups: dict[str, Any] = {}
     for spec in SPECS:
-        add_option(group, spec, f"mission.{spec.name}", _default_of(spec), is_many=is_many)
+        title = spec.metadata.get("group", usual)
+        if title not in groups:
+            groups[title] = parser.add_argument_group(title, about if title == usual else None)
+        add_option(groups[title], spec, f"mission.{spec.name}", _default_of(spec), is_many=is_many)
 
 
 def _default_of(spec: Field[Any]) -> str:

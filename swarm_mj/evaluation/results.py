@@ -34,6 +34,8 @@ class Result:
     episodes: int
     seed: int  # of the first mission; the others follow one by one
     probability: float | None  # of a transmission, for the policies that have one
+    arena: str = "open"  # what stands in the area
+    radio: str | None = None  # what the channel has beyond free space; None is nothing
     channel: str | None = None  # the user's own, as module:Name; None is the mission's
     controller: str | None = None  # as above
     scene: str | None = None  # as above

@@ -95,6 +95,7 @@ def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
         | study.parts.named
         | {
             "policy": policy,
+            "radio": regime.beyond_free_space or None,
             "episodes": study.episodes,
             "seed": study.seed,
             "probability": study.parameters[regime, policy].get("probability"),

@@ -6,6 +6,7 @@ robot's credit is 0.
 """
 
 import copy
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -14,15 +15,17 @@ from swarm_mj.compiled import compiled
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.protocol.own_channel import decoded
 from swarm_mj.protocol.timestamps import merge_timestamps, observe_own
-from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, respondents
-from swarm_mj.radio.free_space import Channel, FreeSpaceRadio
+from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, channel_at, respondents
+from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
+
+Kind = TypeVar("Kind", bound=Channel | VaryingChannel)
 
 
 def credits_of(
     timestamp: Float[np.ndarray, "B N N"],
     position_m: Float[np.ndarray, "B N 2"],
     recipient: Int[np.ndarray, "B N"],
-    channel: Channel,
+    channel: Channel | VaryingChannel,
     now: Float[np.ndarray, "B"],
 ) -> Float[np.ndarray, "B N"]:
     """The age that the team would not have lost in a window without each robot.
@@ -44,7 +47,7 @@ def credits_of(
     alone = recipient[mission]  # one row per sender: everyone's recipients without it
     alone[np.arange(sender.size), sender] = sender
     rows = np.concatenate([np.arange(len(now)), mission])
-    if not isinstance(channel, FreeSpaceRadio):
+    if not isinstance(channel, (FreeSpaceRadio, VaryingChannel)):
         channel = _Rows(channel, rows)
     gained = gain(
         timestamp, position_m[rows], np.concatenate([recipient, alone]), channel, now[rows], rows
@@ -54,9 +57,10 @@ def credits_of(
     return credit
 
 
-def as_it_is(channel: Channel) -> Channel:
+def as_it_is(channel: Kind) -> Kind:
     """A channel that later draws of this one do not change, to replay a window with."""
-    return copy.deepcopy(channel) if isinstance(channel, Started) else channel
+    draws = isinstance(channel, Started) and not isinstance(channel, VaryingChannel)
+    return copy.deepcopy(channel) if draws else channel
 
 
 class _Rows:
@@ -90,7 +94,7 @@ def gain(
     timestamp: Float[np.ndarray, "B N N"],
     position_m: Float[np.ndarray, "W N 2"],
     recipient: Int[np.ndarray, "W N"],
-    channel: Channel,
+    channel: Channel | VaryingChannel,
     now: Float[np.ndarray, "W"],
     mission: Int[np.ndarray, "W"],
 ) -> Float[np.ndarray, "W"]:
@@ -99,9 +103,10 @@ def gain(
     Arguments are as in `credits_of`, one row a window; `mission` says which mission's T each window
     starts from. Returns the sum over pairs of robots of what T rises by [windows].
     """
-    heard = channel(position_m, recipient)
+    first, second = (channel_at(channel, now + n * SLOT_WINDOWS, mission) for n in (1, 2))
+    heard = first(position_m, recipient)
     answered = respondents(Phase(recipient=recipient, heard=heard))
-    heard_answer = channel(position_m, answered)
+    heard_answer = second(position_m, answered)
     gained = np.empty(len(mission))
     _replay(timestamp, mission, heard, heard_answer, now, gained)
     return gained

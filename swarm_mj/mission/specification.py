@@ -6,12 +6,12 @@ Where the paper's text and its authors' code differ, each difference is a field 
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
 
-from swarm_mj.fields import FieldOf, check, check_names, setting
+from swarm_mj.fields import FieldOf, as_typed, check, check_names, setting
 
 Task = Literal["stationary", "random-walk", "flocking", "formation", "coverage"]
 PhysicsMode = Literal["exact", "contact"]
@@ -19,11 +19,15 @@ Boundary = Literal["reflect", "none"]
 WallHit = Literal["mirror", "clip"]
 HalfDuplex = Literal["strict", "eavesdroppers"]
 FlockingSet = Literal["heard", "moving"]
+PathLossLaw = Literal["free-space", "log-distance", "two-ray"]
+FadingLaw = Literal["none", "rayleigh", "rician"]
 
 # Ratios are fractions of this distance, whatever the team's size (IV-B).
 MISSION_DISTANCE_M = 1000.0
 MISSION_DURATION_S = 50.0  # 500 windows of 100 ms: the duration that velocity ratios mean (IV-B)
 SQUARE_METRES_PER_KM2 = 1e6
+OPEN = "open"  # the arena of the paper's missions: nothing stands in it
+CHANNEL = "channel"  # a heading of the help
 
 
 def _quantity(
@@ -42,6 +46,18 @@ def _quantity(
 def _choice(default: str, label: str, source: str, choices: object, help: str = "") -> FieldOf:
     """One of several names, given as a `Literal`."""
     return setting(default, help, label=label, source=source, choices=get_args(choices))
+
+
+def _radio(default: float, label: str, unit: str, low: float, high: float, help: str) -> FieldOf:
+    """A number of the channel beyond free space, an option under its own heading."""
+    spec = {"label": label, "unit": unit, "source": "not the paper's", "low": low, "high": high}
+    return setting(default, help, group=CHANNEL, **spec)
+
+
+def _radio_choice(default: str, label: str, source: str, choices: object, help: str) -> FieldOf:
+    """One of several laws of the channel."""
+    allowed = get_args(choices)
+    return setting(default, help, group=CHANNEL, label=label, source=source, choices=allowed)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +113,57 @@ class Mission:
         "robots switched off half-way, unannounced",
     )
 
+    arena: str = setting(
+        OPEN,
+        "what stands in the area: open, blocks, forest, rooms, or an MJCF file",
+        metavar="NAME",
+        label="arena",
+    )
+
+    # The channel beyond the paper's free space (`radio.mission_radio.channel_of`).
+    path_loss: PathLossLaw = _radio_choice(
+        "free-space", "path loss", "Eq. 1", PathLossLaw, "how power falls with distance"
+    )
+    loss_exponent: float = _radio(
+        3.0, "path loss exponent", "1", 1.0, 10.0, "slope of log-distance: 2 is free space's"
+    )
+    reference_m: float = _radio(
+        20.0, "reference distance", "m", 0.1, 10_000.0, "where log-distance begins"
+    )
+    antenna_height_m: float = _radio(
+        1.0, "antenna height", "m", 0.1, 100.0, "above the floor, for two-ray"
+    )
+    shadowing_db: float = _radio(
+        0.0, "shadowing", "dB", 0.0, 30.0, "standard deviation of log-normal shadowing"
+    )
+    shadowing_distance_m: float = _radio(
+        20.0, "shadowing distance", "m", 0.1, 10_000.0, "over which its correlation falls to 1/e"
+    )
+    fading: FadingLaw = _radio_choice(
+        "none", "fading", "not the paper's", FadingLaw, "of every link, anew in each slot"
+    )
+    rician_k: float = _radio(
+        4.0, "Rician K", "1", 0.0, 10_000.0, "power in line of sight over scattered; 0: Rayleigh"
+    )
+    erasure: float = _radio(
+        0.0, "erasure probability", "1", 0.0, 0.99, "share of packets lost at each receiver"
+    )
+    burst_begin: float = _radio(
+        0.0, "burst begin", "per slot", 0.0, 0.5, "probability that a receiver goes deaf"
+    )
+    burst_end: float = _radio(
+        0.05, "burst end", "per slot", 0.001, 0.5, "probability that it hears again"
+    )
+    strong_share: float = _radio(
+        0.0,
+        "share of strong radios",
+        "of the team",
+        0.0,
+        1.0,
+        "robots with more transmit power",
+    )
+    strong_db: float = _radio(6.0, "strong radios", "dB", 0.0, 60.0, "how much more that is")
+
     physics: PhysicsMode = _choice(
         "exact",
         "physics",
@@ -122,6 +189,11 @@ class Mission:
 
     def __post_init__(self) -> None:
         check(self)
+        if self.arena != OPEN and self.physics == "exact":
+            raise ValueError(
+                f"exact physics knows no collisions, and arena {self.arena} has obstacles; choose "
+                "physics contact, or arena open"
+            )
         for name, value in vars(self).items():
             if isinstance(value, np.generic):  # which JSON does not know
                 object.__setattr__(self, name, value.item())
@@ -147,6 +219,29 @@ class Mission:
         return self.velocity_ratio * MISSION_DISTANCE_M / MISSION_DURATION_S
 
     @property
+    def beyond_free_space(self) -> str:
+        """What the channel has that the paper's has not, in words; empty if it is free space."""
+        usual = {spec.name: spec.default for spec in fields(self)}
+        parts = {  # each with the fields that it takes, the one that switches it on first
+            "path_loss": ("loss_exponent", "reference_m")
+            if self.path_loss == "log-distance"
+            else ("antenna_height_m",),
+            "shadowing_db": ("shadowing_distance_m",),
+            "fading": ("rician_k",) if self.fading == "rician" else (),
+            "erasure": (),
+            "burst_begin": ("burst_end",),
+            "num_strong": ("strong_db",),
+        }
+        on = [name for name in parts if getattr(self, name) not in (usual.get(name), 0)]
+        named = [name for part in on for name in (part, *parts[part])]
+        return ", ".join(f"{name} {as_typed(getattr(self, name))}" for name in named)
+
+    @property
+    def num_strong(self) -> int:
+        """How many robots transmit with more power: the first ones, to the nearest."""
+        return round(self.strong_share * self.num_robots) if self.strong_db > 0.0 else 0
+
+    @property
     def has_walls(self) -> bool:
         """Whether robots are reflected at the boundary of the area."""
         return self.boundary == "reflect"
@@ -157,7 +252,8 @@ def paper(task: Task = "flocking", **overrides: Any) -> Mission:
 
     Args:
         task: What the robots do; a flock has no boundary unless `overrides` give it one.
-        **overrides: Any field of `Mission`.
+        **overrides: Any field of `Mission`. In an arena with obstacles physics are `contact` and
+            flocks have a boundary, unless they say otherwise.
 
     Returns:
         The mission.
@@ -166,8 +262,11 @@ def paper(task: Task = "flocking", **overrides: Any) -> Mission:
         ValueError: A value is outside its range.
         TypeError: An override is no field of `Mission`.
     """
-    boundary: Boundary = "none" if task == "flocking" else "reflect"
-    return replace(Mission(task=task, boundary=boundary), **overrides)
+    is_open = overrides.get("arena", OPEN) == OPEN
+    boundary: Boundary = "none" if task == "flocking" and is_open else "reflect"
+    physics: PhysicsMode = "exact" if is_open else "contact"
+    usual = Mission(task=task, boundary=boundary, physics=physics)
+    return replace(usual, **overrides)
 
 
 def reference(task: Task = "flocking", **overrides: Any) -> Mission:
@@ -195,7 +294,7 @@ def reference(task: Task = "flocking", **overrides: Any) -> Mission:
         "tree_recomputed": task != "stationary",
         "tree_root_transmits": True,
     }
-    return replace(paper(task), **(code | overrides))
+    return paper(task, **(code | overrides))
 
 
 PRESETS: dict[str, Callable[..., Mission]] = {"paper": paper, "reference": reference}

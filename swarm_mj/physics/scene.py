@@ -8,22 +8,18 @@ from mujoco._specs import MjSpec
 
 from swarm_mj.io.assets import asset
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
-from swarm_mj.physics.state import RobotStates
+from swarm_mj.physics.arenas import ELASTIC_SOLIMP, arena_of
+from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
 
 Scene = Callable[[MjSpec, Mission], None]  # changes the arena before it is compiled
 
 CONTACT_STEP_S = 0.01  # longest step of the `contact` physics: ten per window of 100 ms
-ROBOT_RADIUS_M = 0.5  # assets/robot.xml
 ROBOT_MASS_KG = 1.0  # assets/robot.xml
 WALL_THICKNESS_M = 2.0  # half of it, assets/arena.xml
 WALL_HEIGHT_M = 5.0  # half of it, assets/arena.xml
 SQUARES_PER_M = 5.0 / 1000.0  # repeats of the floor's texture, assets/arena.xml
 BEACON_RADIUS_M = 8.0  # assets/robot.xml, for an area of 1 km; larger areas have larger beacons
 CAMERA_HEIGHT_PER_SIDE = 1.3  # sees the whole area at a field of view of 45 degrees
-
-# An overdamped limit that turns v into -v within one Euler step: a = -2 v / h (MuJoCo, solreflimit
-# in the direct form). Tight impedance, or part of the speed is lost.
-ELASTIC_SOLIMP = [0.9999, 0.9999, 0.001, 0.5, 2.0]
 
 
 def timestep_s(mission: Mission) -> float:
@@ -69,8 +65,10 @@ def compose(
     robot = MjSpec.from_file(str(asset("robot.xml")))
     _fit_robot(robot, mission)
     for i in range(mission.num_robots):
-        frame = spec.worldbody.add_frame(pos=[0.0, 0.0, 1.0])
+        frame = spec.worldbody.add_frame(pos=[0.0, 0.0, ROBOT_HEIGHT_M])
         spec.attach(robot.copy(), frame=frame, prefix=f"r{i}/")
+    if (arena := arena_of(mission)) is not None:
+        _change(spec, mission, arena)
     if scene is not None:
         _change(spec, mission, scene)
     if start is not None:

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+ROBOT_RADIUS_M = 0.5  # assets/robot.xml
+ROBOT_HEIGHT_M = 1.0  # of its centre, and of its antenna, above the floor
+
 
 @dataclass(frozen=True, kw_only=True)
 class RobotStates:

@@ -16,7 +16,9 @@ from mujoco import batch
 
 from swarm_mj.compiled import compiled
 from swarm_mj.mission import Mission
+from swarm_mj.physics.obstacles import Obstacles
 from swarm_mj.physics.scene import ROBOT_MASS_KG, Scene, compose, num_substeps, timestep_s
+from swarm_mj.physics.solid_geoms import obstacles_of
 from swarm_mj.physics.state import RobotStates
 
 OPEN, MIRROR, CLIP = 0, 1, 2  # what happens at the boundary
@@ -62,6 +64,11 @@ class Physics:
         if mission.has_walls and mission.physics == "exact":
             self._wall = MIRROR if mission.wall_hit == "mirror" else CLIP
         self._states = RobotStates(position_m=np.zeros(shape), velocity_mps=np.zeros(shape))
+
+    @property
+    def obstacles(self) -> Obstacles:
+        """What stands in the way in the scene."""
+        return obstacles_of(self._model)
 
     @property
     def states(self) -> RobotStates:

@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.fields import name_of
 from swarm_mj.protocol.buffers import check_robots
+from swarm_mj.radio.composed import SlotChannel
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio
 
 
@@ -27,7 +28,7 @@ def decoded(
     Raises:
         ValueError: A user's own channel answered what is no robot, or a robot that is silent.
     """
-    if isinstance(channel, FreeSpaceRadio):
+    if isinstance(channel, (FreeSpaceRadio, SlotChannel)):
         return channel(position_m, recipient.copy())  # in the one layout it is compiled for
     heard = np.asarray(channel(position_m.copy(), recipient.copy()))
     what = f"channel {name_of(channel)}: sender heard"

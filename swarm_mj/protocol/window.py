@@ -15,7 +15,7 @@ from swarm_mj.compiled import compiled
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST, Buffers, merge, observe_self, record_attempt
 from swarm_mj.protocol.own_channel import decoded
-from swarm_mj.radio.free_space import Channel
+from swarm_mj.radio.free_space import Channel, VaryingChannel
 
 SLOTS_PER_WINDOW = 2  # a transmission takes one, and so do its responses
 SLOT_WINDOWS = 1.0 / SLOTS_PER_WINDOW  # Delta t: what a slot lasts [windows]
@@ -49,7 +49,7 @@ class WindowProtocol(Protocol):
         buffers: Buffers,
         decide: Decide,
         move: Move,
-        channel: Channel,
+        channel: Channel | VaryingChannel,
         now: Float[np.ndarray, "B"],
     ) -> tuple[Phase, Phase]:
         """Plays one window.
@@ -83,7 +83,7 @@ class RequestResponse:
         buffers: Buffers,
         decide: Decide,
         move: Move,
-        channel: Channel,
+        channel: Channel | VaryingChannel,
         now: Float[np.ndarray, "B"],
     ) -> tuple[Phase, Phase]:
         """Plays one window; arguments as in `WindowProtocol`."""
@@ -111,7 +111,7 @@ class DoubleBroadcast:
         buffers: Buffers,
         decide: Decide,
         move: Move,
-        channel: Channel,
+        channel: Channel | VaryingChannel,
         now: Float[np.ndarray, "B"],
     ) -> tuple[Phase, Phase]:
         """Plays one window; arguments as in `WindowProtocol`."""
@@ -130,7 +130,7 @@ class DoubleBroadcast:
         buffers: Buffers,
         states: RobotStates,
         recipient: Int[np.ndarray, "B N"],
-        channel: Channel,
+        channel: Channel | VaryingChannel,
         now: Float[np.ndarray, "B"],
     ) -> Phase:
         if self.needs_addressees:
@@ -146,7 +146,7 @@ def window(
     buffers: Buffers,
     states: RobotStates,
     recipient: Int[np.ndarray, "B N"],
-    channel: Channel,
+    channel: Channel | VaryingChannel,
     now: Float[np.ndarray, "B"],
     *,
     silence_is_attempt: bool = False,
@@ -170,11 +170,11 @@ def window(
     now = now + SLOT_WINDOWS
     observe_self(buffers, states, now)
     record_attempt(buffers, recipient, now, states.is_active, silence_is_attempt=silence_is_attempt)
-    transmission = _send(buffers, states, recipient, channel)
+    transmission = _send(buffers, states, recipient, channel, now)
 
     now = now + SLOT_WINDOWS
     observe_self(buffers, states, now)
-    response = _send(buffers, states, respondents(transmission), channel)
+    response = _send(buffers, states, respondents(transmission), channel, now)
     return transmission, response
 
 
@@ -182,7 +182,7 @@ def transmit(
     buffers: Buffers,
     states: RobotStates,
     recipient: Int[np.ndarray, "B N"],
-    channel: Channel,
+    channel: Channel | VaryingChannel,
     now: Float[np.ndarray, "B"],
     *,
     silence_is_attempt: bool = False,
@@ -205,7 +205,7 @@ def transmit(
     """
     observe_self(buffers, states, now)
     record_attempt(buffers, recipient, now, states.is_active, silence_is_attempt=silence_is_attempt)
-    return _send(buffers, states, recipient, channel)
+    return _send(buffers, states, recipient, channel, now)
 
 
 def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
@@ -215,12 +215,38 @@ def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
     return answered
 
 
+def channel_at(
+    channel: Channel | VaryingChannel,
+    now: Float[np.ndarray, "B"],
+    mission: Int[np.ndarray, "B"] | None = None,
+) -> Channel:
+    """The channel of the slot that ends at t.
+
+    Args:
+        channel: One that stays as it is, or one that is another in every slot.
+        now: t at the end of the slot, row by row [windows].
+        mission: Whose row each is; None is all missions in order.
+
+    Returns:
+        The channel for these rows.
+    """
+    if not isinstance(channel, VaryingChannel):
+        return channel
+    slot = np.rint(now * SLOTS_PER_WINDOW).astype(np.int64) - 1
+    return channel.at(slot, np.arange(len(now)) if mission is None else mission)
+
+
 def _send(
-    buffers: Buffers, states: RobotStates, recipient: Int[np.ndarray, "B N"], channel: Channel
+    buffers: Buffers,
+    states: RobotStates,
+    recipient: Int[np.ndarray, "B N"],
+    channel: Channel | VaryingChannel,
+    now: Float[np.ndarray, "B"],
 ) -> Phase:
     """Sends everyone's packet through the channel (Eq. 6) and merges what was decoded."""
     sent_to = _of_active(states.is_active, recipient)
-    heard = _of_active(states.is_active, decoded(channel, states.position_m, sent_to))
+    at_once = channel_at(channel, now)
+    heard = _of_active(states.is_active, decoded(at_once, states.position_m, sent_to))
     merge(buffers, heard)
     return Phase(recipient=sent_to.copy(), heard=heard)
 

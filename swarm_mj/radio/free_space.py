@@ -37,6 +37,23 @@ class Channel(Protocol):
         ...
 
 
+@runtime_checkable
+class VaryingChannel(Protocol):
+    """A channel that is another one in every slot, and the same again when a slot is replayed."""
+
+    def at(self, slot: Int[np.ndarray, "B"], mission: Int[np.ndarray, "B"], /) -> Channel:
+        """The channel of one slot.
+
+        Args:
+            slot: Of each row, counted from 0, the mission's first; a window has two.
+            mission: Of each row, counted from 0.
+
+        Returns:
+            Who decodes whom, for as many rows.
+        """
+        ...
+
+
 def path_loss_db(distance_m: float, frequency_hz: float) -> float:
     """Free-space path loss over a distance [dB] (Eq. 1)."""
     return 20.0 * math.log10(distance_m) + 20.0 * math.log10(frequency_hz) - 147.55

@@ -143,6 +143,17 @@ def test_the_lower_bound_stands_below(printed):
     assert "ower bound" not in unknown
 
 
+def test_regimes_of_other_channels_and_arenas_are_tables_of_their_own(printed):
+    plain, city = (some_result("a", 1.0, arena=arena) for arena in ("open", "blocks"))
+    lines = printed(
+        [plain, city, some_result("a", 3.0, arena="open", radio="fading rayleigh")], 100
+    )
+    text = "\n".join(lines)
+    assert text.count("lower bound (connectivity)") == 3
+    assert ",\narena blocks\n" in text
+    assert ",\nradio fading rayleigh" in text
+
+
 def test_a_tasks_own_cost_has_a_column_and_a_sentence(printed):
     cost = {"task_cost_name": "formation error", "task_cost_unit": "m", "task_cost_mean": 321.5}
     cost |= {"task_cost_sem": 1.25, "task_cost_difference_mean": -4.5}

@@ -146,7 +146,7 @@ def test_help_names_the_figures_and_formats(swarm_mj):
     assert "None" not in text
 
 
-@pytest.mark.parametrize("kind", ["channel", "controller", "scene"])
+@pytest.mark.parametrize("kind", ["channel", "controller", "scene", "radio", "arena"])
 def test_results_of_ones_own_parts_are_not_drawn_beside_the_papers(swarm_mj, tmp_path, kind):
     everything = SYNTHETIC["everything"]()
     everything[2] = replace(everything[2], **{kind: "mine:Part"})

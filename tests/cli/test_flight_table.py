@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from swarm_mj.cli.flight_table import flight_numbers, flight_table
+from swarm_mj.cli.flight_table import flight_numbers, flight_table, flight_title
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import WITHOUT_PAYLOAD, make_policy
 from swarm_mj.rollout import Summary
@@ -152,3 +152,10 @@ def test_a_task_with_a_cost_of_its_own_shows_that_instead_of_velocities():
     assert rows["formation error, mean"] == "200.00 m"
     assert rows["first to last window"] == "300.25 to 100.50 m"
     assert "velocity" not in text
+
+
+def test_the_title_names_the_arena_and_what_the_channel_adds():
+    assert flight_title(paper("flocking"), "tdma", 3) == "flocking, tdma, 40 robots, seed 3"
+    mission = paper("random-walk", arena="blocks", fading="rayleigh")
+    title = flight_title(mission, "tdma", 3)
+    assert title == "random-walk, tdma, 40 robots, seed 3, arena blocks, fading rayleigh"

@@ -84,3 +84,37 @@ def test_hopeless_density_is_an_error_that_says_what_to_do():
         connected_positions(40, 500.0, 0.5, np.random.default_rng(0))
     assert "1000 m by 1000 m" in str(refusal.value)
     assert "raise the range ratio or the density" in str(refusal.value)
+
+
+def test_a_team_is_redrawn_until_its_own_channel_connects_it():
+    asked = []
+
+    def third_time(position_m):
+        asked.append(position_m)
+        return len(asked) == 3
+
+    drawn = connected_positions(5, 100.0, 1.0, np.random.default_rng(0), third_time)
+    assert drawn is asked[2]
+
+
+def test_a_channel_that_connects_nobody_is_an_error_that_says_so():
+    with pytest.raises(ValueError, match=r"a range of 250 m in free space, and less in their"):
+        connected_positions(40, 500.0, 250.0, np.random.default_rng(0), lambda _: False)
+
+
+def test_robots_that_touch_an_obstacle_are_drawn_anew_and_the_others_stay():
+    rng = np.random.default_rng(3)
+    plain_m = np.random.default_rng(3).uniform(-100.0, 100.0, (30, 2))
+    drawn = connected_positions(
+        30, 100.0, 500.0, rng, is_blocked_at=lambda position_m: position_m[:, 0] < 0.0
+    )
+    assert np.all(drawn[:, 0] >= 0.0)
+    stays = plain_m[:, 0] >= 0.0
+    np.testing.assert_array_equal(drawn[stays], plain_m[stays])
+
+
+def test_an_area_without_free_space_is_an_error_that_says_so():
+    with pytest.raises(ValueError, match=r"5 of 5 robots found no free space in 1000 draws"):
+        connected_positions(
+            5, 9.0, 99.0, np.random.default_rng(0), is_blocked_at=lambda p: np.ones(len(p), bool)
+        )

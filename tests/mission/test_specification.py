@@ -118,13 +118,17 @@ def test_presets_go_by_name():
     assert set(PRESETS) == {"paper", "reference"}
 
 
+# What the paper's missions have none of.
+NOTHING_UNLESS_ASKED = {"switched_off", "shadowing_db", "erasure", "burst_begin", "strong_share"}
+
+
 @pytest.mark.parametrize("spec", QUANTITIES, ids=lambda spec: spec.name)
 def test_every_quantity_names_its_unit_and_source(spec):
     assert spec.metadata["label"]
     assert spec.metadata["unit"]
     assert spec.metadata["source"]
     assert spec.metadata["low"] <= spec.default < spec.metadata["high"]
-    assert (spec.metadata["low"] == spec.default) == (spec.name == "switched_off")
+    assert (spec.metadata["low"] == spec.default) == (spec.name in NOTHING_UNLESS_ASKED)
 
 
 @pytest.mark.parametrize("spec", QUANTITIES, ids=lambda spec: spec.name)
@@ -178,11 +182,18 @@ def test_every_range_keeps_out_what_no_mission_can_have():
         "sinr_threshold_db",
         "noise_dbm",
         "frequency_hz",
-        "switched_off",
+        "loss_exponent",
+        "reference_m",
+        "antenna_height_m",
+        "shadowing_distance_m",
+        "rician_k",
+        "burst_end",
+        "strong_db",
+        *NOTHING_UNLESS_ASKED,
     }
     for spec in QUANTITIES:
         in_decibel = spec.metadata["unit"].startswith("dB")  # these may well be negative
-        may_be_none = spec.name == "switched_off"
+        may_be_none = spec.name in {*NOTHING_UNLESS_ASKED, "rician_k"}
         assert in_decibel or may_be_none or not spec.metadata["low"] <= 0 <= spec.metadata["high"]
 
 
@@ -225,3 +236,24 @@ def test_any_field_can_be_overridden(preset, name):
 def test_a_mission_cannot_change():
     with pytest.raises(FrozenInstanceError):
         paper().num_robots = 3
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({}, ""),
+        ({"rician_k": 9.0, "burst_end": 0.2, "loss_exponent": 4.0}, ""),  # of parts that are off
+        ({"fading": "rayleigh"}, "fading rayleigh"),
+        ({"fading": "rician", "rician_k": 9.0}, "fading rician, rician_k 9"),
+        ({"path_loss": "two-ray"}, "path_loss two-ray, antenna_height_m 1"),
+        (
+            {"shadowing_db": 6.0, "erasure": 0.1},
+            "shadowing_db 6, shadowing_distance_m 20, erasure 0.1",
+        ),
+        ({"strong_share": 0.25, "num_robots": 8}, "num_strong 2, strong_db 6"),
+        ({"strong_share": 0.25, "strong_db": 0.0}, ""),
+        ({"burst_begin": 0.02}, "burst_begin 0.02, burst_end 0.05"),
+    ],
+)
+def test_what_the_channel_has_beyond_free_space_is_told_in_words(fields, said):
+    assert paper(**fields).beyond_free_space == said

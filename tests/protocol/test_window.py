@@ -18,6 +18,7 @@ from swarm_mj.protocol.window import (
     DoubleBroadcast,
     Phase,
     RequestResponse,
+    channel_at,
     respondents,
     transmit,
     window,
@@ -366,3 +367,33 @@ def test_robots_are_named_by_integers(kind):
     ):
         check_robots("recipient", np.array([[0, 1]], dtype=kind), (1, 2))
     check_robots("recipient", np.array([[0, 1]]), (1, 2))
+
+
+class Schedule:
+    """A channel that is told the slot; in odd ones nobody hears anybody."""
+
+    def __init__(self):
+        self.asked = []
+
+    def at(self, slot, mission):
+        self.asked.append((slot.tolist(), mission.tolist()))
+        return to_nobody if slot[0] % 2 else to_everyone
+
+
+def test_a_varying_channel_is_asked_for_each_slot_of_a_window():
+    channel, buffers = Schedule(), empty_buffers(2, 3)
+    recipient = np.array([[-1, 1, 2], [-1, 1, 2]])
+    first, second = window(buffers, standing(3, 2), recipient, channel, np.array([4.0, 4.0]))
+    assert channel.asked == [([8, 8], [0, 1]), ([9, 9], [0, 1])]
+    assert first.heard.tolist() == [[0, 0, 0]] * 2
+    assert second.heard.tolist() == [[0, 1, 2]] * 2
+
+
+def test_rows_of_a_varying_channel_may_be_any_missions():
+    channel = Schedule()
+    channel_at(channel, np.array([0.5, 0.5, 1.0]), np.array([1, 0, 1]))
+    assert channel.asked == [([0, 0, 1], [1, 0, 1])]
+
+
+def test_a_channel_that_does_not_vary_is_itself():
+    assert channel_at(to_everyone, np.array([0.5])) is to_everyone

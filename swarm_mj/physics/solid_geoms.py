@@ -1,0 +1,71 @@
+"""The obstacles of a scene: geoms in one group, each with the power that it takes from a packet.
+
+A geom of group `OBSTACLE_GROUP` that stands still is an obstacle. Its penetration loss is its first
+`user` number [dB]; without one, that of its material's name (`LOSS_DB`), or `USUAL_LOSS_DB`.
+"""
+
+import numpy as np
+from mujoco._functions import mj_kinematics
+from mujoco._structs import MjData, MjModel
+
+from swarm_mj.physics.obstacles import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    ELLIPSOID,
+    SPHERE,
+    Obstacles,
+)
+
+OBSTACLE_GROUP = 1
+MESH = 7  # as MuJoCo numbers it
+KINDS = (SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX)
+
+# Per obstacle crossed. Walls: COST 231 (1999), section 4.7, at 1.8 GHz. A building counts as two
+# outer walls of 7 dB and the rooms between them; a tree as 12 m of leaves at about 0.5 dB/m (ITU-R
+# P.833).
+LOSS_DB = {"light wall": 3.4, "heavy wall": 6.9, "building": 25.0, "tree": 6.0}
+USUAL_LOSS_DB = 10.0
+
+
+def obstacles_of(model: MjModel) -> Obstacles:
+    """What stands in the way in a compiled scene; perhaps nothing.
+
+    Raises:
+        ValueError: A loss is negative or not finite.
+    """
+    data = MjData(model)
+    mj_kinematics(model, data)
+    stands_still = model.body_weldid[model.geom_bodyid] == 0
+    is_solid = np.isin(model.geom_type, (*KINDS, MESH))
+    found = np.flatnonzero(stands_still & is_solid & (model.geom_group == OBSTACLE_GROUP))
+    kind, size_m = model.geom_type[found].copy(), model.geom_size[found].copy()
+    centre_m = data.geom_xpos[found].copy()
+    rotation = data.geom_xmat[found].reshape(-1, 3, 3).copy()
+    for o in np.flatnonzero(kind == MESH):
+        middle_m, half_m = np.split(model.geom_aabb[found[o]], 2)
+        centre_m[o] += rotation[o] @ middle_m
+        kind[o], size_m[o] = BOX, half_m
+    return Obstacles(
+        kind=kind.astype(np.int64),
+        centre_m=centre_m,
+        rotation=rotation,
+        size_m=size_m,
+        reach_m=np.maximum(model.geom_rbound[found], 0.0),
+        power_left=10.0 ** (-np.array([_loss_db(model, int(g)) for g in found]) / 10.0),
+    )
+
+
+def _loss_db(model: MjModel, g: int) -> float:
+    """A geom's penetration loss [dB]."""
+    material = int(model.geom_matid[g])
+    named = model.mat(material).name if material >= 0 else ""
+    loss_db = LOSS_DB.get(named, USUAL_LOSS_DB)
+    if model.nuser_geom > 0:
+        loss_db = float(model.geom_user[g, 0])
+    if not (np.isfinite(loss_db) and loss_db >= 0.0):
+        name = model.geom(g).name or f"number {g}"
+        raise ValueError(
+            f"the penetration loss of geom {name} must be 0 dB or more, not {loss_db:g}"
+        )
+    return loss_db

@@ -1,0 +1,216 @@
+"""A channel composed of named parts: path loss, obstruction, shadowing, fading, losses.
+
+The SINR rule on top stays the paper's (Eqs. 3-4). What varies with time is a function of the
+mission's key and of the slot, so a slot that is played again is the same slot.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int, UInt64
+
+from swarm_mj.compiled import compiled
+from swarm_mj.radio.counters import keyed_uniform, link_key, mixed
+from swarm_mj.radio.fading import NO_BURSTS, NO_FADING, Bursts, fade, is_in_burst
+from swarm_mj.radio.kernels import is_received, sinr
+from swarm_mj.radio.link_gains import LinkGains
+
+_FADES, _ERASURES, _BURSTS = np.uint64(1), np.uint64(2), np.uint64(3)  # what a key is used for
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reception:
+    """What decides whether a packet of a given mean power decodes."""
+
+    noise_mw: float  # sigma [mW]
+    threshold: float  # least SINR that decodes, linear [1]
+    rician_k: float = NO_FADING  # 0 is Rayleigh; linear [1]
+    erasure: float = 0.0  # probability that a packet is lost on a link, whatever its power [1]
+    bursts: Bursts = NO_BURSTS
+    recipient_hears_while_sending: bool = False  # as `FreeSpaceRadio`'s
+
+
+class _Rule(NamedTuple):
+    """`Reception`, as compiled loops take it."""
+
+    noise_mw: float
+    threshold: float
+    rician_k: float
+    erasure: float
+    begin: float
+    end: float
+    hears_while_sending: bool
+
+
+class ComposedChannel:
+    """The channel of B missions; `at` gives that of one slot."""
+
+    def __init__(self, gains: LinkGains, reception: Reception) -> None:
+        self.gains = gains
+        self.reception = reception
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:  # noqa: ARG002 - as a policy's
+        """Starts new missions; one generator each."""
+        self._key = np.array([rng.integers(2**64, dtype=np.uint64) for rng in rngs])
+        self.gains.start(rngs)
+
+    def at(self, slot: Int[np.ndarray, "W"], mission: Int[np.ndarray, "W"]) -> "SlotChannel":
+        """Who decodes whom in one slot.
+
+        Args:
+            slot: Of each row, counted from 0.
+            mission: Of each row.
+
+        Returns:
+            A channel of W rows.
+        """
+        return SlotChannel(self, slot, mission)
+
+    def is_connected(self, position_m: Float[np.ndarray, "N 2"], mission: int) -> bool:
+        """Whether everyone reaches everyone over links whose packets decode without fades.
+
+        Args:
+            position_m: Where the robots of one mission are [m].
+            mission: Which one; its shadowing is its own.
+        """
+        everyone = np.ones((1, len(position_m)), dtype=np.bool_)
+        row = np.array([mission])
+        received_mw = self.gains.received_mw(position_m[None], row, everyone)[mission]
+        rule = self.reception
+        return _is_strongly_connected(received_mw, rule.noise_mw * rule.threshold)
+
+    def decode(
+        self,
+        position_m: Float[np.ndarray, "W N 2"],
+        recipient: Int[np.ndarray, "W N"],
+        slot: Int[np.ndarray, "W"],
+        mission: Int[np.ndarray, "W"],
+    ) -> Int[np.ndarray, "W N"]:
+        """The sender that each robot decodes; itself is nobody."""
+        is_sender = recipient != np.arange(recipient.shape[1])
+        received_mw = self.gains.received_mw(position_m, mission, is_sender)
+        heard = np.empty_like(recipient)
+        rule = self.reception
+        _decode(
+            received_mw,
+            recipient,
+            slot,
+            mission,
+            self._key,
+            _Rule(
+                rule.noise_mw,
+                rule.threshold,
+                rule.rician_k,
+                rule.erasure,
+                rule.bursts.begin,
+                rule.bursts.end,
+                rule.recipient_hears_while_sending,
+            ),
+            heard,
+        )
+        return heard
+
+
+@dataclass(frozen=True)
+class SlotChannel:
+    """A `Channel` of one slot."""
+
+    channel: ComposedChannel
+    slot: Int[np.ndarray, "W"]
+    mission: Int[np.ndarray, "W"]
+
+    def __call__(
+        self, position_m: Float[np.ndarray, "W N 2"], recipient: Int[np.ndarray, "W N"]
+    ) -> Int[np.ndarray, "W N"]:
+        """Whose packet each robot decodes; arguments as in `Channel`."""
+        return self.channel.decode(position_m, recipient, self.slot, self.mission)
+
+
+@compiled()
+def _decode(
+    received_mw: Float[np.ndarray, "B N N"],
+    recipient: Int[np.ndarray, "W N"],
+    slot: Int[np.ndarray, "W"],
+    mission: Int[np.ndarray, "W"],
+    mission_key: UInt64[np.ndarray, "B"],
+    rule: _Rule,
+    heard: Int[np.ndarray, "W N"],
+) -> None:
+    """Fills `heard`: the strongest packet at each receiver, if it clears the threshold."""
+    num_rows, num_robots = recipient.shape
+    sender = np.empty(num_robots, dtype=np.int64)
+    for w in range(num_rows):
+        key = np.uint64(mission_key[mission[w]])
+        num_senders = 0
+        for i in range(num_robots):
+            if recipient[w, i] != i:
+                sender[num_senders] = i
+                num_senders += 1
+        for j in range(num_robots):
+            i = _strongest(
+                j, sender[:num_senders], recipient[w], received_mw[mission[w]], key, slot[w], rule
+            )
+            heard[w, j] = j if i == j or _is_lost(i, j, key, slot[w], rule) else i
+
+
+@compiled()
+def _strongest(
+    j: int,
+    sender: Int[np.ndarray, "S"],
+    recipient: Int[np.ndarray, "N"],
+    received_mw: Float[np.ndarray, "N N"],
+    key: np.uint64,
+    slot: int,
+    rule: _Rule,
+) -> int:
+    """Whose packet j decodes by Eqs. 3-4; itself is nobody."""
+    fades = mixed(mixed(key, _FADES), np.uint64(slot))
+    total_mw, strongest_mw, strongest = 0.0, 0.0, j
+    is_silent = recipient[j] == j
+    for i in sender:
+        if i != j:
+            power_mw = received_mw[i, j]
+            if rule.rician_k != NO_FADING:
+                power_mw *= fade(link_key(fades, i, j), rule.rician_k)
+            total_mw += power_mw
+            may_hear = is_silent or (rule.hears_while_sending and recipient[i] == j)
+            if may_hear and power_mw > strongest_mw:
+                strongest_mw, strongest = power_mw, i
+    ratio = sinr(strongest_mw, total_mw - strongest_mw, rule.noise_mw)
+    return strongest if is_received(ratio, rule.threshold) else j
+
+
+@compiled()
+def _is_lost(i: int, j: int, key: np.uint64, slot: int, rule: _Rule) -> bool:
+    """Whether j loses i's packet although it is strong enough."""
+    if rule.erasure > 0.0:
+        erasures = mixed(mixed(key, _ERASURES), np.uint64(slot))
+        if keyed_uniform(mixed(mixed(erasures, np.uint64(i)), np.uint64(j))) < rule.erasure:
+            return True
+    bursts = mixed(mixed(key, _BURSTS), np.uint64(j))
+    return rule.begin > 0.0 and is_in_burst(bursts, slot, rule.begin, rule.end)
+
+
+@compiled()
+def _is_strongly_connected(received_mw: Float[np.ndarray, "N N"], least_mw: float) -> bool:
+    """Whether robot 0 reaches everyone and is reached by everyone, over links of that power."""
+    num_robots = received_mw.shape[0]
+    members = np.empty(num_robots, dtype=np.int64)
+    for is_backwards in (False, True):
+        is_met = np.zeros(num_robots, dtype=np.bool_)
+        members[0], is_met[0] = 0, True
+        num_members, num_spread = 1, 0
+        while num_spread < num_members:
+            i = members[num_spread]
+            num_spread += 1
+            for j in range(num_robots):
+                power_mw = received_mw[j, i] if is_backwards else received_mw[i, j]
+                if not is_met[j] and power_mw >= least_mw:
+                    is_met[j] = True
+                    members[num_members] = j
+                    num_members += 1
+        if num_members < num_robots:
+            return False
+    return True

@@ -1,0 +1,82 @@
+"""Shipped arenas: they grow with the team, robots start in free space and never enter a wall."""
+
+import numpy as np
+import pytest
+
+from swarm_mj.mission import paper, reference
+from swarm_mj.physics.arenas import ARENAS
+from swarm_mj.physics.scene import compose
+from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP, obstacles_of
+from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M
+from swarm_mj.policies import make_policy
+from swarm_mj.radio.obstruction import blocked
+from swarm_mj.swarm import Swarm
+
+WITH_OBSTACLES = [name for name in ARENAS if name != "open"]
+PILLAR = f"""<mujoco><worldbody>
+  <geom name="pillar" type="cylinder" size="20 5" pos="0 0 5" group="{OBSTACLE_GROUP}"/>
+</worldbody></mujoco>"""
+
+
+def obstacles(mission):
+    return obstacles_of(compose(mission).compile())
+
+
+def test_the_open_arena_is_the_papers():
+    assert len(obstacles(paper()).kind) == 0
+
+
+@pytest.mark.parametrize(("arena", "num"), [("blocks", 25), ("forest", 100)])
+def test_40_robots_have_so_many_obstacles_on_their_square_kilometre(arena, num):
+    assert len(obstacles(paper(arena=arena)).kind) == num
+
+
+@pytest.mark.parametrize("arena", WITH_OBSTACLES)
+def test_arenas_grow_with_the_team_and_keep_within_the_area(arena):
+    small, large = (paper(arena=arena, num_robots=n) for n in (40, 160))
+    assert len(obstacles(large).kind) > 2 * len(obstacles(small).kind)
+    for mission in (small, large):
+        found = obstacles(mission)
+        assert np.all(np.abs(found.centre_m[:, :2]) <= mission.half_side_m)
+
+
+@pytest.mark.parametrize("arena", WITH_OBSTACLES)
+def test_robots_stay_out_of_obstacles_and_never_stop(arena):
+    """Within a body radius: a robot's middle never enters; it turns round and keeps its speed."""
+    fast = {"velocity_ratio": 0.6, "range_ratio": 0.6}
+    mission = paper("random-walk", arena=arena, num_robots=20, num_windows=500, **fast)
+    swarm = Swarm(mission, [1, 2])
+    found, policy = obstacles(mission), make_policy("tdma", mission)
+    num_touches = 0
+    for _ in range(mission.num_windows):
+        swarm.step(policy)
+        position_m = swarm.states.position_m.reshape(-1, 2)
+        assert not np.any(blocked(position_m, ROBOT_HEIGHT_M, 1e-3, found))
+        num_touches += np.sum(blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, found))
+    assert num_touches > 0  # somebody was turned round
+
+
+@pytest.mark.parametrize("preset", [paper, reference])
+def test_arenas_fly_in_contact_physics_and_flocks_have_a_boundary(preset):
+    mission = preset("flocking", arena="blocks")
+    assert (mission.physics, mission.boundary) == ("contact", "reflect")
+    with pytest.raises(ValueError, match=r"choose physics contact, or arena open"):
+        preset("flocking", arena="blocks", physics="exact")
+
+
+def test_an_arena_may_be_a_file(tmp_path):
+    file = tmp_path / "pillar.xml"
+    file.write_text(PILLAR)
+    found = obstacles(paper(arena=str(file)))
+    assert found.size_m[0, :2].tolist() == [20.0, 5.0]
+
+
+def test_an_unknown_arena_or_a_broken_file_is_an_error_that_says_so(tmp_path):
+    with pytest.raises(
+        ValueError, match=r"open, blocks, forest, rooms, or an MJCF file, not 'sea'"
+    ):
+        compose(paper(arena="sea"))
+    file = tmp_path / "broken.xml"
+    file.write_text(PILLAR.replace('size="20 5"', 'size="twenty"'))
+    with pytest.raises(ValueError, match=r"broken.xml: .*line 2"):
+        compose(paper(arena=str(file)))

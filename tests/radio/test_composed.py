@@ -1,0 +1,159 @@
+"""The composed channel against free space, loops in NumPy, and replays of its slots."""
+
+import math
+
+import numpy as np
+import pytest
+
+from swarm_mj.mission import paper, reference
+from swarm_mj.radio.composed import ComposedChannel, Reception
+from swarm_mj.radio.fading import Bursts
+from swarm_mj.radio.link_gains import LinkGains
+from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.radio.path_loss import FREE_SPACE
+from swarm_mj.radio.shadowing import Shadowing
+
+NUM_ROBOTS = 12
+
+
+def channel(seeds, *, mission=None, shadowing=None, **reception):
+    radio = radio_of(mission or paper("stationary"))
+    at_1_m_mw = np.full(NUM_ROBOTS, radio.received_at_1_m_mw)
+    made = ComposedChannel(
+        LinkGains(at_1_m_mw, FREE_SPACE, shadowing, None),
+        Reception(
+            noise_mw=radio.noise_mw,
+            threshold=radio.threshold,
+            recipient_hears_while_sending=radio.recipient_hears_while_sending,
+            **reception,
+        ),
+    )
+    made.start(NUM_ROBOTS, [np.random.default_rng(seed) for seed in seeds])
+    return made
+
+
+def scenes(seed, num_missions):
+    rng = np.random.default_rng(seed)
+    position_m = rng.uniform(-300.0, 300.0, (num_missions, NUM_ROBOTS, 2))
+    anybody = rng.integers(-1, NUM_ROBOTS, (num_missions, NUM_ROBOTS))
+    is_silent = rng.random(anybody.shape) < 0.7
+    return position_m, np.where(is_silent, np.arange(NUM_ROBOTS), anybody)
+
+
+@pytest.mark.parametrize("mission", [paper("stationary"), reference("stationary")])
+def test_without_parts_it_is_the_papers_radio(mission):
+    made = channel(range(20), mission=mission)
+    for seed in range(10):
+        position_m, recipient = scenes(seed, 20)
+        heard = made.at(np.full(20, seed), np.arange(20))(position_m, recipient)
+        np.testing.assert_array_equal(heard, radio_of(mission)(position_m, recipient))
+
+
+def test_a_lone_rayleigh_packet_decodes_by_the_law():
+    """At half the range the mean SNR is 4 times the threshold: P = exp(-1 / 4)."""
+    made = channel(range(200), rician_k=0.0)
+    position_m = np.zeros((200, NUM_ROBOTS, 2))
+    position_m[:, 1:, 0] = 125.0
+    recipient = np.tile(np.arange(NUM_ROBOTS), (200, 1))
+    recipient[:, 0] = -1
+    heard = [made.at(np.full(200, s), np.arange(200))(position_m, recipient) for s in range(5)]
+    decoded = np.mean(np.array(heard)[:, :, 1:] == 0)
+    assert decoded == pytest.approx(math.exp(-0.25), abs=0.02)
+
+
+def test_erasures_lose_their_share_and_nothing_else():
+    made, plain = channel(range(50), erasure=0.3), channel(range(50))
+    position_m, recipient = scenes(1, 50)
+    slot, mission = np.zeros(50, dtype=int), np.arange(50)
+    num_kept = num_sent = 0
+    for s in range(20):
+        without = plain.at(slot + s, mission)(position_m, recipient)
+        heard = made.at(slot + s, mission)(position_m, recipient)
+        is_kept = heard == without
+        assert np.all(is_kept | (heard == np.arange(NUM_ROBOTS)))
+        received = without != np.arange(NUM_ROBOTS)
+        num_kept, num_sent = num_kept + np.sum(is_kept & received), num_sent + np.sum(received)
+    assert num_kept / num_sent == pytest.approx(0.7, abs=4 * math.sqrt(0.21 / num_sent))
+
+
+def test_a_receiver_in_a_burst_decodes_nobody():
+    made, plain = channel([4], bursts=Bursts(begin=0.05, end=0.1)), channel([4])
+    position_m = np.zeros((1, NUM_ROBOTS, 2))
+    position_m[0, :, 0] = np.arange(NUM_ROBOTS)
+    recipient = np.arange(NUM_ROBOTS)[None].copy()
+    recipient[0, 0] = -1
+    assert np.all(plain.at(np.zeros(1, int), np.zeros(1, int))(position_m, recipient) == 0)
+    is_good = np.array(
+        [
+            made.at(np.array([s]), np.zeros(1, int))(position_m, recipient)[0, 1:] == 0
+            for s in range(2000)
+        ]
+    )
+    assert np.mean(is_good) == pytest.approx(2 / 3, abs=0.06)
+    stays = np.mean(is_good[1:] == is_good[:-1])
+    assert stays == pytest.approx(1 - 2 * (2 / 3) * 0.05, abs=0.02)
+
+
+HARD = {
+    "rician_k": 2.0,
+    "erasure": 0.2,
+    "bursts": Bursts(begin=0.05, end=0.2),
+    "shadowing": Shadowing(std_db=6.0, correlation_m=20.0),
+}
+
+
+def test_a_mission_does_not_depend_on_those_beside_it():
+    many, alone = channel(range(5), **HARD), channel([3], **HARD)
+    for slot in range(30):
+        position_m, recipient = scenes(slot, 5)
+        together = many.at(np.full(5, slot), np.arange(5))(position_m, recipient)
+        single = alone.at(np.array([slot]), np.zeros(1, int))(position_m[3:4], recipient[3:4])
+        np.testing.assert_array_equal(together[3], single[0])
+
+
+def test_a_slot_that_is_played_again_is_the_same_slot():
+    made = channel(range(3), **HARD)
+    position_m, recipient = scenes(0, 3)
+    first = [made.at(np.full(3, s), np.arange(3))(position_m, recipient) for s in range(8)]
+    rows = np.array([2, 0, 0, 1])
+    for s in reversed(range(8)):
+        again = made.at(np.full(4, s), rows)(position_m[rows], recipient[rows])
+        np.testing.assert_array_equal(again, first[s][rows])
+
+
+def test_one_robots_silence_changes_no_other_links_fade():
+    """Credit replays a window without one robot: the others' fades must stay."""
+    made = channel(range(40), rician_k=0.0)
+    position_m, recipient = scenes(5, 40)
+    position_m[:, 0] = 1e7  # so far off that nobody notices its packets
+    heard = []
+    for recipient[:, 0] in (0, -1):
+        at_once = made.at(np.full(40, 6), np.arange(40))
+        heard.append(at_once(position_m, recipient)[:, 1:])
+    np.testing.assert_array_equal(heard[0], heard[1])
+
+
+def test_a_team_is_connected_if_everyone_reaches_everyone():
+    """Robots in a row 200 m apart reach their neighbours only; the last one stands at 1000 m."""
+    made = channel([0])
+    row_m = np.zeros((NUM_ROBOTS, 2))
+    row_m[:, 0] = 200.0 * np.arange(NUM_ROBOTS)
+    assert made.is_connected(row_m, 0)
+    row_m[-1, 0] += 100.0
+    assert not made.is_connected(row_m, 0)
+
+
+def test_being_heard_is_not_enough_to_be_connected():
+    """Robot 0 sends with 20 dB more: at 2000 m it is heard by others, which it does not hear."""
+    radio = radio_of(paper("stationary"))
+    at_1_m_mw = np.full(NUM_ROBOTS, radio.received_at_1_m_mw)
+    at_1_m_mw[0] *= 100.0
+    made = ComposedChannel(
+        LinkGains(at_1_m_mw, FREE_SPACE, None, None),
+        Reception(noise_mw=radio.noise_mw, threshold=radio.threshold),
+    )
+    made.start(NUM_ROBOTS, [np.random.default_rng(0)])
+    position_m = np.zeros((NUM_ROBOTS, 2))
+    for apart_m, is_connected in ((240.0, True), (2000.0, False)):
+        position_m[0, 0] = apart_m
+        assert made.is_connected(position_m, 0) == is_connected

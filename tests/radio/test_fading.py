@@ -1,0 +1,80 @@
+"""Fades and bursts against their laws: exponential, non-central chi squared, Gilbert-Elliott."""
+
+import numba
+import numpy as np
+import pytest
+from scipy import stats
+
+from swarm_mj.radio.counters import mixed
+from swarm_mj.radio.fading import Bursts, fade, is_in_burst
+
+NUM = 20_000
+
+
+@numba.njit
+def fades(key, rician_k, num):
+    drawn = np.empty(num)
+    for n in range(num):
+        drawn[n] = fade(mixed(np.uint64(key), np.uint64(n)), rician_k)
+    return drawn
+
+
+@numba.njit
+def burst_slots(key, begin, end, num):
+    return np.array([is_in_burst(np.uint64(key), slot, begin, end) for slot in range(num)])
+
+
+def test_rayleigh_outage_is_1_minus_exp():
+    """P(SNR < x) = 1 - exp(-x / mean SNR)."""
+    drawn = fades(1, 0.0, NUM)
+    for x in (0.05, 0.3, 1.0, 2.5):
+        expected = 1 - np.exp(-x)
+        error = 4 * np.sqrt(expected * (1 - expected) / NUM)
+        assert np.mean(drawn < x) == pytest.approx(expected, abs=error)
+
+
+@pytest.mark.parametrize("rician_k", [0.5, 4.0, 20.0])
+def test_rician_power_is_non_central_chi_squared(rician_k):
+    """Twice (K + 1) times the power has 2 degrees of freedom and non-centrality 2 K."""
+    drawn = fades(2, rician_k, NUM)
+    law = stats.ncx2(2, 2 * rician_k, scale=1 / (2 * (rician_k + 1)))
+    assert stats.kstest(drawn, law.cdf).pvalue > 0.001
+    assert np.mean(drawn) == pytest.approx(1.0, abs=0.05)
+
+
+def test_bursts_have_their_mean_loss_and_mean_length():
+    bursts = Bursts(begin=0.02, end=0.1)
+    state = burst_slots(3, bursts.begin, bursts.end, 100_000).astype(int)
+    num_ends = np.sum(np.diff(state) == -1)
+    assert bursts.mean_loss == pytest.approx(0.02 / 0.12)
+    assert np.mean(state) == pytest.approx(bursts.mean_loss, rel=0.1)
+    assert np.sum(state) / num_ends == pytest.approx(bursts.mean_slots, rel=0.1)
+    assert bursts.mean_slots == pytest.approx(10.0)
+
+
+def test_bursts_begin_in_the_stationary_distribution():
+    @numba.njit
+    def first_slots(num):
+        return np.array([is_in_burst(np.uint64(key), 0, 0.02, 0.05) for key in range(num)])
+
+    assert np.mean(first_slots(NUM)) == pytest.approx(2 / 7, abs=4 * np.sqrt(0.2 / NUM))
+
+
+def test_bursts_are_the_same_whatever_slot_is_asked_for_first():
+    @numba.njit
+    def backwards(num):
+        slots = np.zeros(num, dtype=np.bool_)
+        for slot in range(num - 1, -1, -1):
+            slots[slot] = is_in_burst(np.uint64(9), slot, 0.1, 0.2)
+        return slots
+
+    np.testing.assert_array_equal(backwards(300), burst_slots(9, 0.1, 0.2, 300))
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "said"),
+    [(-0.1, 0.5, "begins"), (0.1, 0.0, "ends"), (0.7, 0.6, "at most 1 together")],
+)
+def test_bursts_out_of_range_are_refused(begin, end, said):
+    with pytest.raises(ValueError, match=said):
+        Bursts(begin=begin, end=end)
