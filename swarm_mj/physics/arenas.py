@@ -93,6 +93,7 @@ def _from_file(spec: MjSpec, mission: Mission) -> None:
     except ValueError as error:
         said = " ".join(str(error).split())
         raise ValueError(f"arena {mission.arena}: {said}") from error
+    spec.nuser_geom = max(spec.nuser_geom, theirs.nuser_geom)  # or their losses would be cut off
     spec.attach(theirs, frame=spec.worldbody.add_frame(), prefix="arena/")
 
 

@@ -1,7 +1,8 @@
 """The obstacles of a scene: geoms in one group, each with the power that it takes from a packet.
 
 A geom of group `OBSTACLE_GROUP` that stands still is an obstacle. Its penetration loss is its first
-`user` number [dB]; without one, that of its material's name (`LOSS_DB`), or `USUAL_LOSS_DB`.
+`user` number [dB]; without one, or with 0, that of its material's name (`LOSS_DB`), or
+`USUAL_LOSS_DB`.
 """
 
 import numpy as np
@@ -61,7 +62,7 @@ def _loss_db(model: MjModel, g: int) -> float:
     material = int(model.geom_matid[g])
     named = model.mat(material).name if material >= 0 else ""
     loss_db = LOSS_DB.get(named, USUAL_LOSS_DB)
-    if model.nuser_geom > 0:
+    if model.nuser_geom > 0 and model.geom_user[g, 0] != 0.0:  # 0 where a geom has none
         loss_db = float(model.geom_user[g, 0])
     if not (np.isfinite(loss_db) and loss_db >= 0.0):
         name = model.geom(g).name or f"number {g}"

@@ -71,6 +71,13 @@ def test_an_arena_may_be_a_file(tmp_path):
     assert found.size_m[0, :2].tolist() == [20.0, 5.0]
 
 
+def test_losses_of_a_file_are_kept_without_a_word(tmp_path, recwarn):
+    file = tmp_path / "pillar.xml"
+    file.write_text(PILLAR.replace('group="1"', 'group="1" user="3"'))
+    assert (-10 * np.log10(obstacles(paper(arena=str(file))).power_left)).round(6) == [3.0]
+    assert not recwarn.list
+
+
 def test_an_unknown_arena_or_a_broken_file_is_an_error_that_says_so(tmp_path):
     with pytest.raises(
         ValueError, match=r"open, blocks, forest, rooms, or an MJCF file, not 'sea'"

@@ -39,7 +39,8 @@ def test_losses_come_from_the_geom_or_its_material_or_are_usual():
     material = '<asset><material name="heavy wall"/><material name="paper"/></asset>'
     body = f'{geom} material="heavy wall"/>{geom} material="paper"/>{geom}/>'
     assert losses_db(body, head=material) == [6.9, USUAL_LOSS_DB, USUAL_LOSS_DB]
-    assert losses_db(f'{geom} user="3.5"/>', head='<size nuser_geom="1"/>') == [3.5]
+    both = f'{geom} user="3.5"/>{geom}/>'
+    assert losses_db(both, head='<size nuser_geom="1"/>') == [3.5, USUAL_LOSS_DB]
 
 
 @pytest.mark.parametrize("loss", ["-1", "inf"])
