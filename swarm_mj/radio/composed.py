@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int, UInt64
+from jaxtyping import Bool, Float, Int, UInt64
 
 from swarm_mj.compiled import compiled
 from swarm_mj.radio.counters import keyed_uniform, link_key, mixed
@@ -79,7 +79,9 @@ class ComposedChannel:
         row = np.array([mission])
         received_mw = self.gains.received_mw(position_m[None], row, everyone)[mission]
         rule = self.reception
-        return _is_strongly_connected(received_mw, rule.noise_mw * rule.threshold)
+        is_linked = received_mw >= rule.noise_mw * rule.threshold
+        both_ways = (is_linked, np.ascontiguousarray(is_linked.T))
+        return all(_reaches_everyone(links) for links in both_ways)
 
     def decode(
         self,
@@ -194,23 +196,18 @@ def _is_lost(i: int, j: int, key: np.uint64, slot: int, rule: _Rule) -> bool:
 
 
 @compiled()
-def _is_strongly_connected(received_mw: Float[np.ndarray, "N N"], least_mw: float) -> bool:
-    """Whether robot 0 reaches everyone and is reached by everyone, over links of that power."""
-    num_robots = received_mw.shape[0]
-    members = np.empty(num_robots, dtype=np.int64)
-    for is_backwards in (False, True):
-        is_met = np.zeros(num_robots, dtype=np.bool_)
-        members[0], is_met[0] = 0, True
-        num_members, num_spread = 1, 0
-        while num_spread < num_members:
-            i = members[num_spread]
-            num_spread += 1
-            for j in range(num_robots):
-                power_mw = received_mw[j, i] if is_backwards else received_mw[i, j]
-                if not is_met[j] and power_mw >= least_mw:
-                    is_met[j] = True
-                    members[num_members] = j
-                    num_members += 1
-        if num_members < num_robots:
-            return False
-    return True
+def _reaches_everyone(is_linked: Bool[np.ndarray, "N N"]) -> bool:
+    """Whether robot 0 reaches everyone over links from row to column."""
+    num_robots = is_linked.shape[0]
+    is_met, members = np.zeros(num_robots, dtype=np.bool_), np.empty(num_robots, dtype=np.int64)
+    members[0], is_met[0] = 0, True
+    num_members, num_spread = 1, 0
+    while num_spread < num_members:
+        i = members[num_spread]
+        num_spread += 1
+        for j in range(num_robots):
+            if is_linked[i, j] and not is_met[j]:
+                is_met[j] = True
+                members[num_members] = j
+                num_members += 1
+    return num_members == num_robots

@@ -79,9 +79,7 @@ def num_crossed(
     crossed = 0
     length_m2 = along_m[0] ** 2 + along_m[1] ** 2 + along_m[2] ** 2
     for o in range(obstacles.kind.shape[0]):
-        if _is_near(start_m, along_m, length_m2, obstacles.centre_m[o], obstacles.reach_m[o]) and (
-            _crosses(start_m, along_m, o, obstacles)
-        ):
+        if _is_crossed(start_m, along_m, length_m2, o, obstacles):
             crossed += 1
     return crossed
 
@@ -96,11 +94,23 @@ def power_through(
     if length_m2 == 0.0:
         return left
     for o in range(obstacles.kind.shape[0]):
-        if _is_near(start_m, along_m, length_m2, obstacles.centre_m[o], obstacles.reach_m[o]) and (
-            _crosses(start_m, along_m, o, obstacles)
-        ):
+        if _is_crossed(start_m, along_m, length_m2, o, obstacles):
             left *= obstacles.power_left[o]
     return left
+
+
+@compiled()
+def _is_crossed(
+    start_m: Float[np.ndarray, "3"],
+    along_m: Float[np.ndarray, "3"],
+    length_m2: float,
+    o: int,
+    obstacles: Obstacles,
+) -> bool:
+    """Whether a line crosses an obstacle; most are too far off, which is quickly seen."""
+    if not _is_near(start_m, along_m, length_m2, obstacles.centre_m[o], obstacles.reach_m[o]):
+        return False
+    return _crosses(start_m, along_m, o, obstacles)
 
 
 @compiled()
