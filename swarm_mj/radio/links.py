@@ -3,12 +3,14 @@
 Index order: `i` sends, `j` receives.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.compiled import compiled
+from swarm_mj.radio.decode_curves import DB_PER_NEPER, KNOWN, Curves, probability_by_margin
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.kernels import MIN_DISTANCE_M, decode_probability, received_power, sinr
 
@@ -22,6 +24,8 @@ class Links(NamedTuple):
     distance_over_std: Float[np.ndarray, "N N"]  # of the belief; inf if the positions are known [1]
     noise_mw: float
     threshold: float  # least SINR that decodes, linear [1]
+    std_db: Float[np.ndarray, "N N"]  # of the belief in the powers, positions apart [dB]
+    curves: Curves  # `KNOWN`: nothing is doubtful but the positions
 
 
 class Air(NamedTuple):
@@ -59,7 +63,18 @@ def links_between(
     if spread_m is not None:
         variance_m2 = spread_m[:, None] ** 2 + spread_m[None, :] ** 2
         np.divide(distance_m, np.sqrt(variance_m2), out=distance_over_std, where=variance_m2 > 0.0)
-    return Links(received_mw, distance_over_std, radio.noise_mw, radio.threshold)
+    std_db = np.zeros_like(distance_m)
+    return Links(received_mw, distance_over_std, radio.noise_mw, radio.threshold, std_db, KNOWN)
+
+
+@compiled()
+def chance(links: Links, ratio: float, i: int, j: int) -> float:
+    """How probably j decodes i at this SINR, linear [1]."""
+    over_std = links.distance_over_std[i, j]
+    if links.curves.shape[0] == 0:
+        return decode_probability(ratio, links.threshold, over_std)
+    std_db = math.hypot(links.std_db[i, j], DB_PER_NEPER / over_std)
+    return probability_by_margin(links.curves, ratio / links.threshold, std_db)
 
 
 @compiled()
@@ -127,7 +142,7 @@ def listen(
         heard: Whom each robot may decode, overwritten; itself is nobody.
         probability: That it does; overwritten.
     """
-    received_mw, distance_over_std = links.received_mw, links.distance_over_std
+    received_mw = links.received_mw
     total_mw, strongest_mw, strongest = air.total_mw, air.strongest_mw, air.strongest
     for j in range(listens.shape[0]):
         heard[j], probability[j] = j, 0.0
@@ -137,20 +152,18 @@ def listen(
             sender, signal_mw = stronger(i, added_mw, strongest[j], strongest_mw[j])
             if signal_mw > 0.0:
                 ratio = sinr(signal_mw, total_mw[j] + added_mw - signal_mw, links.noise_mw)
-                over_std = distance_over_std[sender, j]
-                probability[j] = decode_probability(ratio, links.threshold, over_std)
+                probability[j] = chance(links, ratio, sender, j)
                 heard[j] = sender if probability[j] > 0.0 else j
 
 
 @compiled()
 def lone_probabilities(links: Links) -> Float[np.ndarray, "N N"]:
     """How probably j decodes i when nobody else transmits."""
-    received_mw, distance_over_std = links.received_mw, links.distance_over_std
+    received_mw = links.received_mw
     probability = np.zeros_like(received_mw)
     for i in range(len(probability)):
         for j in range(len(probability)):
             if received_mw[i, j] > 0.0:
                 ratio = sinr(received_mw[i, j], 0.0, links.noise_mw)
-                over_std = distance_over_std[i, j]
-                probability[i, j] = decode_probability(ratio, links.threshold, over_std)
+                probability[i, j] = chance(links, ratio, i, j)
     return probability

@@ -19,12 +19,13 @@ from jaxtyping import Bool, Float, Float32
 
 from swarm_mj.compiled import compiled
 from swarm_mj.protocol.timestamps import merge_expected, observe_own, rise
-from swarm_mj.radio.kernels import decode_probability, sinr
+from swarm_mj.radio.kernels import sinr
 from swarm_mj.radio.links import (
     NOBODY,
     Air,
     Links,
     air_of,
+    chance,
     listen,
     lone_probabilities,
     silent_air,
@@ -203,7 +204,7 @@ def _value(
     also: int,
 ) -> float:
     """What the slot is worth when this robot transmits beside those in the air."""
-    received_mw, distance_over_std = links.received_mw, links.distance_over_std
+    received_mw = links.received_mw
     total_mw, strongest_mw, strongest = air.total_mw, air.strongest_mw, air.strongest
     value = 0.0
     for j in range(gain.shape[0]):
@@ -212,8 +213,7 @@ def _value(
             sender, signal_mw = stronger(also, added_mw, strongest[j], strongest_mw[j])
             if signal_mw > 0.0 and gain[sender, j] != 0.0:
                 ratio = sinr(signal_mw, total_mw[j] + added_mw - signal_mw, links.noise_mw)
-                over_std = distance_over_std[sender, j]
-                value += gain[sender, j] * decode_probability(ratio, links.threshold, over_std)
+                value += gain[sender, j] * chance(links, ratio, sender, j)
     return value
 
 

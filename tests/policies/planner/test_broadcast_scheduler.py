@@ -13,6 +13,7 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.planner.broadcast_scheduler import Foresight, Weights, schedule
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.window import SLOT_WINDOWS, transmit
+from swarm_mj.radio.decode_curves import KNOWN
 from swarm_mj.radio.links import Links, links_between
 from swarm_mj.radio.mission_radio import radio_of
 
@@ -253,7 +254,7 @@ def test_who_is_unknown_is_not_told_to_speak(share):
 
 def test_who_is_alone_in_the_world_says_nothing():
     weights = Weights(np.ones((2, 2), np.float32), 0.5)
-    links = Links(np.zeros((2, 2)), np.full((2, 2), math.inf), 1.0, 1.0)
+    links = Links(np.zeros((2, 2)), np.full((2, 2), math.inf), 1.0, 1.0, np.zeros((2, 2)), KNOWN)
     timestamp, speaks = np.zeros((2, 2), np.float32), np.ones((3, 2), dtype=bool)
     schedule(timestamp, 0.0, links, weights, Foresight(2, 2), np.ones(3, bool), speaks)
     assert not np.any(speaks)

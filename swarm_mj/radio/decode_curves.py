@@ -1,0 +1,105 @@
+"""How probably a packet decodes when its power is not known exactly: by margin and by doubt.
+
+The margin is the SINR of the mean powers over the threshold, in dB. A fade, an error of the belief
+in these powers, or both make of the rule of Eq. 4 a probability that rises with the margin.
+"""
+
+import math
+
+import numpy as np
+from jaxtyping import Float
+
+from swarm_mj.compiled import compiled
+from swarm_mj.radio.fading import NO_FADING
+
+MARGIN_STEP_DB = 0.25
+FINE_STEP_DB = 0.01  # at which a fade's own distribution is worked out
+MAX_MARGIN_DB = 40.0  # beyond which a packet decodes as it does there
+STD_STEP_DB = 0.5
+MAX_STD_DB = 12.0
+DB_PER_NEPER = 20.0 / math.log(10.0)  # of an amplitude, or of a distance in free space
+MANY = 100.0  # the K from which a Rician amplitude is normal, to a good approximation
+SIGMAS, SIGMA_STEP = 4.0, 0.05  # how far a normal distribution is followed, and how finely
+
+Curves = Float[np.ndarray, "S M"]  # a probability for each standard deviation and each margin
+
+KNOWN = np.zeros((0, 0))  # instead of curves: powers are known but for the positions
+
+
+def decode_curves(rician_k: float = NO_FADING, success: float = 1.0) -> Curves:
+    """The probability that a packet decodes.
+
+    Args:
+        rician_k: Of the fades, linear; 0 is Rayleigh [1].
+        success: Probability that a packet of enough power decodes at all [1].
+
+    Returns:
+        It, for standard deviations of the believed power from 0 to `MAX_STD_DB`, and for margins
+        from minus to plus `MAX_MARGIN_DB`.
+    """
+    margin_db = np.arange(-MAX_MARGIN_DB, MAX_MARGIN_DB + MARGIN_STEP_DB / 2, MARGIN_STEP_DB)
+    z = np.arange(-SIGMAS, SIGMAS + SIGMA_STEP / 2, SIGMA_STEP)
+    weight = np.exp(-0.5 * z**2)
+    weight /= weight.sum()
+    std_db = np.arange(0.0, MAX_STD_DB + STD_STEP_DB / 2, STD_STEP_DB)
+    num_fine = round(2.0 * MAX_MARGIN_DB / FINE_STEP_DB)
+    fine_db = np.arange(-num_fine, num_fine + 1) * FINE_STEP_DB
+    exceeds = _fade_exceeds(fine_db, rician_k)
+    rows = [
+        np.interp(margin_db[:, None] + std * z[None, :], fine_db, exceeds) @ weight
+        for std in std_db.tolist()
+    ]
+    return success * np.stack(rows)
+
+
+@compiled()
+def probability_by_margin(curves: Curves, ratio: float, std_db: float) -> float:
+    """How probably a packet decodes.
+
+    Args:
+        curves: From `decode_curves`.
+        ratio: SINR of the mean powers over the threshold, linear [1].
+        std_db: Standard deviation of the belief in these powers [dB].
+
+    Returns:
+        The probability, by linear interpolation between margins.
+    """
+    row = int(min(std_db, MAX_STD_DB) / STD_STEP_DB + 0.5)
+    margin_db = 10.0 * math.log10(max(ratio, 1e-9))
+    place = (margin_db + MAX_MARGIN_DB) / MARGIN_STEP_DB
+    last = curves.shape[1] - 1
+    if place >= last:
+        return curves[row, last]
+    if place <= 0.0:
+        return 0.0
+    below = int(place)
+    share = place - below
+    return (1.0 - share) * curves[row, below] + share * curves[row, below + 1]
+
+
+def _fade_exceeds(margin_db: Float[np.ndarray, "M"], rician_k: float) -> Float[np.ndarray, "M"]:
+    """The probability that a fade leaves more than what a margin can spare."""
+    least = 10.0 ** (-margin_db / 10.0)  # of the mean power
+    if rician_k == NO_FADING:
+        return (least <= 1.0).astype(np.float64)
+    if rician_k > MANY:
+        z = (np.sqrt(least) - 1.0) * math.sqrt(2.0 * rician_k)
+        return np.array([0.5 * math.erfc(value / math.sqrt(2.0)) for value in z.tolist()])
+    return _rician_exceeds(least, rician_k)
+
+
+def _rician_exceeds(least: Float[np.ndarray, "M"], rician_k: float) -> Float[np.ndarray, "M"]:
+    """The Marcum Q function Q_1, as a mixture of Poisson's distributions."""
+    count = np.arange(int(rician_k + 12.0 * math.sqrt(rician_k) + 30.0))
+    log_factorial = np.array([math.lgamma(n + 1.0) for n in count.tolist()])
+    of_sight = np.exp(-rician_k + _times_log(count, rician_k) - log_factorial)
+    y = ((1.0 + rician_k) * least)[:, None]
+    of_scatter = np.exp(-y + count * np.log(y) - log_factorial)
+    return np.cumsum(of_scatter, axis=1) @ of_sight
+
+
+def _times_log(count: np.ndarray, value: float) -> np.ndarray:
+    """The logarithms of the powers of a value that may be 0, whose power 0 is 1."""
+    if value == 0.0:
+        return np.where(count == 0, 0.0, -np.inf)
+    return count * math.log(value)
