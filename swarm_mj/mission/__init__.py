@@ -1,8 +1,8 @@
-"""The mission (IV-B): its numbers, the two presets, and what is drawn before it begins."""
+"""The mission (IV-B): its numbers, its presets, and what is drawn before it begins."""
 
+from swarm_mj.mission.presets import PRESETS, paper, reference
 from swarm_mj.mission.specification import (
     MISSION_DISTANCE_M,
-    PRESETS,
     Boundary,
     FlockingSet,
     HalfDuplex,
@@ -10,8 +10,6 @@ from swarm_mj.mission.specification import (
     PhysicsMode,
     Task,
     WallHit,
-    paper,
-    reference,
 )
 
 __all__ = [

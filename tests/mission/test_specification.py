@@ -7,7 +7,7 @@ from dataclasses import FrozenInstanceError, fields
 import numpy as np
 import pytest
 
-from swarm_mj.mission import PRESETS, Mission, paper, reference
+from swarm_mj.mission import Mission, paper, reference
 from swarm_mj.mission import specification as mission_module
 
 # As users load it: without the type checks that these tests run under, which would answer first.
@@ -16,7 +16,6 @@ Unchecked = runpy.run_path(mission_module.__file__)["Mission"]
 QUANTITIES = [spec for spec in fields(Mission) if "low" in spec.metadata]
 CHOICES = [spec for spec in fields(Mission) if "choices" in spec.metadata]
 SUSPECTS = [0, 1, -1, -(10**12), 10**15, math.nan, math.inf, -math.inf]
-TASKS = ["stationary", "random-walk", "flocking"]
 
 
 def beyond(spec):
@@ -71,51 +70,8 @@ def test_ratios_mean_one_kilometre_whatever_the_team():
     assert small.max_velocity_mps == pytest.approx(10.0)  # 500 m in 50 s
 
 
-@pytest.mark.parametrize("task", TASKS)
-def test_paper_follows_the_text(task):
-    mission = paper(task)
-    assert (mission.preset, mission.task) == ("paper", task)
-    assert mission.max_acceleration_mps2 == 20.0
-    assert mission.wall_hit == "mirror"
-    assert mission.half_duplex == "strict"
-    assert mission.flocking_set == "heard"
-    assert not mission.silence_is_attempt
-    assert not mission.moves_each_transmission
-    assert not mission.tree_recomputed
-    assert not mission.tree_root_transmits
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_reference_follows_the_code(task):
-    mission = reference(task)
-    assert (mission.preset, mission.task) == ("reference", task)
-    assert mission.max_acceleration_mps2 == 10.0
-    assert mission.wall_hit == "clip"
-    assert mission.half_duplex == "eavesdroppers"
-    assert mission.flocking_set == "moving"
-    assert mission.silence_is_attempt
-    assert mission.moves_each_transmission
-    assert mission.tree_recomputed == (task in ("random-walk", "flocking"))  # "for mobile teams"
-    assert mission.tree_root_transmits
-
-
-@pytest.mark.parametrize("preset", [paper, reference])
-def test_only_a_flock_flies_without_walls(preset):
-    assert preset("stationary").has_walls
-    assert preset("random-walk").has_walls
-    assert not preset("flocking").has_walls
-    assert preset("flocking", boundary="reflect").has_walls
-    assert not preset("random-walk", boundary="none").has_walls
-
-
 def test_the_bare_mission_is_the_papers_text_with_walls():
     assert Mission() == paper("flocking", boundary="reflect")
-
-
-def test_presets_go_by_name():
-    assert PRESETS["paper"]("stationary") == paper("stationary")
-    assert PRESETS["reference"]("stationary") == reference("stationary")
-    assert set(PRESETS) == {"paper", "reference"}
 
 
 # What the paper's missions have none of.
@@ -211,26 +167,6 @@ def test_unknown_choices_are_refused(spec):
 def test_unknown_names_are_refused(preset):
     with pytest.raises(TypeError, match="num_robotz"):
         preset(num_robotz=40)
-
-
-OTHER = {
-    "num_robots": 12,
-    "range_ratio": 0.5,
-    "max_acceleration_mps2": 5.0,
-    "wall_hit": "mirror",
-    "half_duplex": "strict",
-    "flocking_set": "heard",
-    "silence_is_attempt": False,
-    "moves_each_transmission": False,
-    "tree_recomputed": True,
-    "tree_root_transmits": False,
-}
-
-
-@pytest.mark.parametrize("preset", [paper, reference])
-@pytest.mark.parametrize("name", OTHER)
-def test_any_field_can_be_overridden(preset, name):
-    assert getattr(preset("stationary", **{name: OTHER[name]}), name) == OTHER[name]
 
 
 def test_a_mission_cannot_change():
