@@ -55,30 +55,15 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
     """
     torch.set_num_threads(training.threads)
     rng = np.random.default_rng(training.seed)
-    batches = make_batches(
-        training.mission,
-        training.robots,
-        training.features,
-        training.missions,
-        training.groups,
-        rng,
-        training.parts,
-    )
-    ppo = training.ppo
-    is_robot = training.arm == "robot"
-    env: VecEnv = RobotEnv(batches) if is_robot else TeamEnv(batches, training.reward)
-    buffer = ActiveRolloutBuffer if training.drops_silence else DictRolloutBuffer
-    batch_size = _batch_size(training, env.num_envs)
-    if training.reward == "velocity-variance":  # as in the authors' code
-        env = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=ppo.discount)
+    env, ppo = _make_env(training, rng), training.ppo
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "You have specified a mini-batch size")  # one is smaller
         model = PPO(
-            GnnActorCritic if is_robot else TeamActorCritic,
+            GnnActorCritic if training.arm == "robot" else TeamActorCritic,
             env,
             learning_rate=ppo.learning_rate,
             n_steps=ppo.num_steps,
-            batch_size=batch_size,
+            batch_size=_batch_size(training, env.num_envs),
             n_epochs=ppo.num_epochs,
             gamma=ppo.discount,
             gae_lambda=ppo.gae_lambda,
@@ -89,11 +74,32 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
             max_grad_norm=ppo.max_gradient_norm,
             seed=training.seed % 2**32,
             normalize_advantage=not training.drops_silence,
-            rollout_buffer_class=buffer,
+            rollout_buffer_class=(
+                ActiveRolloutBuffer if training.drops_silence else DictRolloutBuffer
+            ),
             policy_kwargs=_policy_settings(training),
         )
     model.lr_schedule = lambda _: decayed_rate(ppo, model._n_updates)  # passes so far
     return model, rng
+
+
+def _make_env(training: Training, rng: np.random.Generator) -> VecEnv:
+    """Fresh missions, with rewards as PPO gets them; the generator draws their seeds."""
+    batches = make_batches(
+        training.mission,
+        training.robots,
+        training.features,
+        training.missions,
+        training.groups,
+        rng,
+        training.parts,
+    )
+    if training.arm == "robot":
+        return RobotEnv(batches)
+    env = TeamEnv(batches, training.reward)
+    if training.reward == "velocity-variance":  # as in the authors' code
+        return VecNormalize(env, norm_obs=False, norm_reward=True, gamma=training.ppo.discount)
+    return env
 
 
 def _batch_size(training: Training, num_envs: int) -> int:
