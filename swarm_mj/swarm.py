@@ -126,8 +126,9 @@ class Swarm:
             mission.half_side_m,
             mission.range_m,
             rng,
-            partial(channel.is_connected, mission=b) if asks else None,
+            partial(channel.largest_part, mission=b) if asks else None,
             self._is_blocked if stands else None,
+            keeps_largest=stands,
         )
 
     def _is_blocked(self, position_m: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:

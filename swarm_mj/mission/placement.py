@@ -36,8 +36,10 @@ def connected_positions(
     half_side_m: float,
     range_m: float,
     rng: np.random.Generator,
-    is_connected_at: Callable[[Float[np.ndarray, "N 2"]], bool] | None = None,
+    largest_part_at: Callable[[Float[np.ndarray, "N 2"]], Bool[np.ndarray, "N"]] | None = None,
     is_blocked_at: Callable[[Float[np.ndarray, "N 2"]], Bool[np.ndarray, "N"]] | None = None,
+    *,
+    keeps_largest: bool = False,
 ) -> Float[np.ndarray, "N 2"]:
     """Positions uniform in the area at which the team is connected (IV-B).
 
@@ -46,9 +48,11 @@ def connected_positions(
         half_side_m: Positions lie within plus or minus this [m].
         range_m: Range of the disk graph [m].
         rng: Where the positions are drawn from.
-        is_connected_at: Whether a team at these positions [m] is connected in its own channel;
-            None asks whether the disk graph is.
-        is_blocked_at: Which robots at these positions [m] touch an obstacle; those are drawn anew.
+        largest_part_at: The largest connected part of a team at these positions [m] in its own
+            channel; None asks whether the disk graph is connected.
+        is_blocked_at: Which robots cannot be at these positions [m]; those are drawn anew.
+        keeps_largest: Whether only robots outside the largest part are drawn anew, not the whole
+            team: between obstacles hardly any team is connected that is drawn at once.
 
     Returns:
         Positions [m].
@@ -57,17 +61,19 @@ def connected_positions(
         ValueError: All draws were disconnected, or the area has hardly any free space.
     """
     num_draws = min(MAX_DRAWS, MAX_ROBOTS_DRAWN // num_robots)
+    position_m, is_kept = np.empty((num_robots, 2)), np.zeros(num_robots, dtype=np.bool_)
     for _ in range(num_draws):
-        position_m = rng.uniform(-half_side_m, half_side_m, size=(num_robots, 2))
-        if is_blocked_at is not None:
-            _draw_free(position_m, half_side_m, rng, is_blocked_at)
-        if is_connected_at is None:
+        _draw_free(position_m, is_kept, half_side_m, rng, is_blocked_at)
+        if largest_part_at is None:
             if is_connected(position_m, range_m):
                 return position_m
-        elif is_connected_at(position_m):
-            return position_m
+        else:
+            part = largest_part_at(position_m)
+            if np.all(part):
+                return position_m
+            is_kept = part & keeps_largest
     reach = f"a range of {range_m:g} m"
-    if is_connected_at is not None:
+    if largest_part_at is not None:
         reach += " in free space, and less in their channel,"
     raise ValueError(
         f"no connected team in {num_draws} draws: {num_robots} robots with {reach} "
@@ -78,19 +84,22 @@ def connected_positions(
 
 def _draw_free(
     position_m: Float[np.ndarray, "N 2"],
+    is_kept: Bool[np.ndarray, "N"],
     half_side_m: float,
     rng: np.random.Generator,
-    is_blocked_at: Callable[[Float[np.ndarray, "N 2"]], Bool[np.ndarray, "N"]],
+    is_blocked_at: Callable[[Float[np.ndarray, "N 2"]], Bool[np.ndarray, "N"]] | None,
 ) -> None:
-    """Draws those robots anew that touch an obstacle, until none does."""
+    """Draws where all others stand, and those anew that cannot be there, until all can."""
+    is_due = ~is_kept
     for _ in range(MAX_FREE_DRAWS):
-        is_blocked = is_blocked_at(position_m)
-        if not np.any(is_blocked):
+        fresh = rng.uniform(-half_side_m, half_side_m, size=(int(np.sum(is_due)), 2))
+        position_m[is_due] = fresh
+        if is_blocked_at is None:
             return
-        fresh_m = rng.uniform(-half_side_m, half_side_m, size=(int(np.sum(is_blocked)), 2))
-        position_m[is_blocked] = fresh_m
-    num_blocked = int(np.sum(is_blocked_at(position_m)))
+        is_due = is_blocked_at(position_m)
+        if not np.any(is_due):
+            return
     raise ValueError(
-        f"{num_blocked} of {len(position_m)} robots found no free space in {MAX_FREE_DRAWS} draws; "
-        "choose an arena with more room between its obstacles"
+        f"{int(np.sum(is_due))} of {len(position_m)} robots found no free space in "
+        f"{MAX_FREE_DRAWS} draws; choose an arena with more room between its obstacles"
     )

@@ -68,20 +68,25 @@ class ComposedChannel:
         """
         return SlotChannel(self, slot, mission)
 
-    def is_connected(self, position_m: Float[np.ndarray, "N 2"], mission: int) -> bool:
-        """Whether everyone reaches everyone over links whose packets decode without fades.
+    def largest_part(
+        self, position_m: Float[np.ndarray, "N 2"], mission: int
+    ) -> Bool[np.ndarray, "N"]:
+        """The largest group in which everyone reaches everyone.
+
+        Links are those whose packets decode in silence and without fades.
 
         Args:
             position_m: Where the robots of one mission are [m].
             mission: Which one; its shadowing is its own.
+
+        Returns:
+            Who belongs to it; of groups that are equally large, the one with the first robot.
         """
         everyone = np.ones((1, len(position_m)), dtype=np.bool_)
         row = np.array([mission])
         received_mw = self.gains.received_mw(position_m[None], row, everyone)[mission]
         rule = self.reception
-        is_linked = received_mw >= rule.noise_mw * rule.threshold
-        both_ways = (is_linked, np.ascontiguousarray(is_linked.T))
-        return all(_reaches_everyone(links) for links in both_ways)
+        return _largest_part(received_mw >= rule.noise_mw * rule.threshold)
 
     def decode(
         self,
@@ -196,11 +201,27 @@ def _is_lost(i: int, j: int, key: np.uint64, slot: int, rule: _Rule) -> bool:
 
 
 @compiled()
-def _reaches_everyone(is_linked: Bool[np.ndarray, "N N"]) -> bool:
-    """Whether robot 0 reaches everyone over links from row to column."""
+def _largest_part(is_linked: Bool[np.ndarray, "N N"]) -> Bool[np.ndarray, "N"]:
+    """The largest group in which everyone reaches everyone over links from row to column."""
+    num_robots = is_linked.shape[0]
+    largest = np.zeros(num_robots, dtype=np.bool_)
+    is_placed = np.zeros(num_robots, dtype=np.bool_)
+    is_heard = np.ascontiguousarray(is_linked.T)
+    for first in range(num_robots):
+        if not is_placed[first]:
+            part = reached_from(is_linked, first) & reached_from(is_heard, first)
+            is_placed |= part
+            if np.sum(part) > np.sum(largest):
+                largest = part
+    return largest
+
+
+@compiled()
+def reached_from(is_linked: Bool[np.ndarray, "N N"], start: int) -> Bool[np.ndarray, "N"]:
+    """Whom a robot reaches over links from row to column; itself in any case."""
     num_robots = is_linked.shape[0]
     is_met, members = np.zeros(num_robots, dtype=np.bool_), np.empty(num_robots, dtype=np.int64)
-    members[0], is_met[0] = 0, True
+    members[0], is_met[start] = start, True
     num_members, num_spread = 1, 0
     while num_spread < num_members:
         i = members[num_spread]
@@ -210,4 +231,4 @@ def _reaches_everyone(is_linked: Bool[np.ndarray, "N N"]) -> bool:
                 is_met[j] = True
                 members[num_members] = j
                 num_members += 1
-    return num_members == num_robots
+    return is_met

@@ -77,10 +77,10 @@ def num_crossed(
 ) -> int:
     """How many obstacles a line crosses."""
     crossed = 0
-    length_m2 = along_m[0] ** 2 + along_m[1] ** 2 + along_m[2] ** 2
-    for o in range(obstacles.kind.shape[0]):
-        if _is_crossed(start_m, along_m, length_m2, o, obstacles):
-            crossed += 1
+    o = _next_crossed(start_m, along_m, 0, obstacles)
+    while o < obstacles.kind.shape[0]:
+        crossed += 1
+        o = _next_crossed(start_m, along_m, o + 1, obstacles)
     return crossed
 
 
@@ -90,43 +90,41 @@ def power_through(
 ) -> float:
     """The share of the power that reaches the end of a line, linear [1]."""
     left = 1.0
-    length_m2 = along_m[0] ** 2 + along_m[1] ** 2 + along_m[2] ** 2
-    if length_m2 == 0.0:
-        return left
-    for o in range(obstacles.kind.shape[0]):
-        if _is_crossed(start_m, along_m, length_m2, o, obstacles):
-            left *= obstacles.power_left[o]
+    o = _next_crossed(start_m, along_m, 0, obstacles)
+    while o < obstacles.kind.shape[0]:
+        left *= obstacles.power_left[o]
+        o = _next_crossed(start_m, along_m, o + 1, obstacles)
     return left
 
 
 @compiled()
-def _is_crossed(
+def _next_crossed(
     start_m: Float[np.ndarray, "3"],
     along_m: Float[np.ndarray, "3"],
-    length_m2: float,
-    o: int,
+    first: int,
     obstacles: Obstacles,
-) -> bool:
-    """Whether a line crosses an obstacle; most are too far off, which is quickly seen."""
-    if not _is_near(start_m, along_m, length_m2, obstacles.centre_m[o], obstacles.reach_m[o]):
-        return False
-    return _crosses(start_m, along_m, o, obstacles)
+) -> int:
+    """The next obstacle that a line crosses, from this one on; as many as there are if none.
 
-
-@compiled()
-def _is_near(
-    start_m: Float[np.ndarray, "3"],
-    along_m: Float[np.ndarray, "3"],
-    length_m2: float,
-    centre_m: Float[np.ndarray, "3"],
-    reach_m: float,
-) -> bool:
-    """Whether a line comes as near to a point as that."""
-    x, y, z = centre_m[0] - start_m[0], centre_m[1] - start_m[1], centre_m[2] - start_m[2]
-    share = (x * along_m[0] + y * along_m[1] + z * along_m[2]) / length_m2
-    share = min(max(share, 0.0), 1.0)
-    x, y, z = x - share * along_m[0], y - share * along_m[1], z - share * along_m[2]
-    return x * x + y * y + z * z <= reach_m * reach_m
+    Most are too far off, which is seen in plain numbers: a view of an array would cost as much as
+    all of the arithmetic.
+    """
+    start_x, start_y, start_z = start_m[0], start_m[1], start_m[2]
+    along_x, along_y, along_z = along_m[0], along_m[1], along_m[2]
+    length_m2 = along_x * along_x + along_y * along_y + along_z * along_z
+    per_m2 = 1.0 / length_m2 if length_m2 > 0.0 else 0.0
+    num_obstacles = obstacles.kind.shape[0]
+    for o in range(first, num_obstacles):
+        x = obstacles.centre_m[o, 0] - start_x
+        y = obstacles.centre_m[o, 1] - start_y
+        z = obstacles.centre_m[o, 2] - start_z
+        share = min(max((x * along_x + y * along_y + z * along_z) * per_m2, 0.0), 1.0)
+        x, y, z = x - share * along_x, y - share * along_y, z - share * along_z
+        if x * x + y * y + z * z <= obstacles.reach_m[o] ** 2 and _crosses(
+            start_m, along_m, o, obstacles
+        ):
+            return o
+    return num_obstacles
 
 
 @compiled()
@@ -137,42 +135,45 @@ def _crosses(
     obstacles: Obstacles,
 ) -> bool:
     """Whether a line has a point in common with an obstacle."""
-    kind, size = obstacles.kind[o], obstacles.size_m[o]
-    frame, centre_m = obstacles.rotation[o], obstacles.centre_m[o]
+    kind, centre_m, size_m = obstacles.kind[o], obstacles.centre_m, obstacles.size_m
     x, y, z = _turned(
-        start_m[0] - centre_m[0], start_m[1] - centre_m[1], start_m[2] - centre_m[2], frame
+        start_m[0] - centre_m[o, 0],
+        start_m[1] - centre_m[o, 1],
+        start_m[2] - centre_m[o, 2],
+        o,
+        obstacles,
     )
-    u, v, w = _turned(along_m[0], along_m[1], along_m[2], frame)
+    u, v, w = _turned(along_m[0], along_m[1], along_m[2], o, obstacles)
     if kind == BOX:
-        low, high = _within(x, u, size[0], 0.0, 1.0)
-        low, high = _within(y, v, size[1], low, high)
-        low, high = _within(z, w, size[2], low, high)
+        low, high = _within(x, u, size_m[o, 0], 0.0, 1.0)
+        low, high = _within(y, v, size_m[o, 1], low, high)
+        low, high = _within(z, w, size_m[o, 2], low, high)
         return low <= high
     if kind == ELLIPSOID:
-        x, y, z, u, v, w = (
-            *(x / size[0], y / size[1], z / size[2]),
-            *(u / size[0], v / size[1], w / size[2]),
-        )
+        x, y, z = x / size_m[o, 0], y / size_m[o, 1], z / size_m[o, 2]
+        u, v, w = u / size_m[o, 0], v / size_m[o, 1], w / size_m[o, 2]
         return _meets_ball(x, y, z, u, v, w, 1.0)
+    radius_m, half_m = size_m[o, 0], size_m[o, 1]
     if kind == SPHERE:
-        return _meets_ball(x, y, z, u, v, w, size[0])
-    low, high = _within(z, w, size[1], 0.0, 1.0)
-    low, high = _within_ball(x, y, 0.0, u, v, 0.0, size[0], low, high)
+        return _meets_ball(x, y, z, u, v, w, radius_m)
+    low, high = _within(z, w, half_m, 0.0, 1.0)
+    low, high = _within_ball(x, y, 0.0, u, v, 0.0, radius_m, low, high)
     if kind == CYLINDER or low <= high:
         return low <= high
-    is_met = _meets_ball(x, y, z - size[1], u, v, w, size[0])  # a capsule's ends
-    return is_met or _meets_ball(x, y, z + size[1], u, v, w, size[0])
+    is_met = _meets_ball(x, y, z - half_m, u, v, w, radius_m)  # a capsule's ends
+    return is_met or _meets_ball(x, y, z + half_m, u, v, w, radius_m)
 
 
 @compiled()
 def _turned(
-    a: float, b: float, c: float, frame: Float[np.ndarray, "3 3"]
+    a: float, b: float, c: float, o: int, obstacles: Obstacles
 ) -> tuple[float, float, float]:
     """A vector of the scene as an obstacle sees it."""
+    frame = obstacles.rotation
     return (
-        frame[0, 0] * a + frame[1, 0] * b + frame[2, 0] * c,
-        frame[0, 1] * a + frame[1, 1] * b + frame[2, 1] * c,
-        frame[0, 2] * a + frame[1, 2] * b + frame[2, 2] * c,
+        frame[o, 0, 0] * a + frame[o, 1, 0] * b + frame[o, 2, 0] * c,
+        frame[o, 0, 1] * a + frame[o, 1, 1] * b + frame[o, 2, 1] * c,
+        frame[o, 0, 2] * a + frame[o, 1, 2] * b + frame[o, 2, 2] * c,
     )
 
 

@@ -86,20 +86,42 @@ def test_hopeless_density_is_an_error_that_says_what_to_do():
     assert "raise the range ratio or the density" in str(refusal.value)
 
 
-def test_a_team_is_redrawn_until_its_own_channel_connects_it():
+def parts(*largest):
+    """A channel in which these are connected, ask by ask; and where the teams stood."""
     asked = []
 
-    def third_time(position_m):
-        asked.append(position_m)
-        return len(asked) == 3
+    def largest_part(position_m):
+        asked.append(position_m.copy())
+        return np.array(largest[len(asked) - 1])
 
-    drawn = connected_positions(5, 100.0, 1.0, np.random.default_rng(0), third_time)
-    assert drawn is asked[2]
+    return largest_part, asked
 
 
-def test_a_channel_that_connects_nobody_is_an_error_that_says_so():
+def test_a_team_is_redrawn_until_its_own_channel_connects_it():
+    largest_part, asked = parts([True, False], [False, True], [True, True])
+    drawn = connected_positions(2, 100.0, 1.0, np.random.default_rng(0), largest_part)
+    np.testing.assert_array_equal(drawn, asked[2])
+    assert len({*np.ravel(asked)}) == 12  # nobody stayed
+
+
+def test_where_the_largest_part_is_kept_the_others_are_drawn_to_it():
+    largest_part, asked = parts([True, True, False], [False, True, True], [True, True, True])
+    rng = np.random.default_rng(0)
+    drawn = connected_positions(3, 100.0, 1.0, rng, largest_part, keeps_largest=True)
+    np.testing.assert_array_equal(asked[1][:2], asked[0][:2])
+    np.testing.assert_array_equal(drawn[1:], asked[1][1:])
+    assert np.all(asked[1][2] != asked[0][2])
+    assert np.all(drawn[0] != asked[0][0])
+
+
+@pytest.mark.parametrize("keeps_largest", [False, True])
+def test_a_channel_that_connects_nobody_is_an_error_that_says_so(keeps_largest):
+    def alone(_position_m):
+        return np.arange(40) == 0
+
+    rng = np.random.default_rng(0)
     with pytest.raises(ValueError, match=r"a range of 250 m in free space, and less in their"):
-        connected_positions(40, 500.0, 250.0, np.random.default_rng(0), lambda _: False)
+        connected_positions(40, 500.0, 250.0, rng, alone, keeps_largest=keeps_largest)
 
 
 def test_robots_that_touch_an_obstacle_are_drawn_anew_and_the_others_stay():

@@ -138,9 +138,11 @@ def test_a_team_is_connected_if_everyone_reaches_everyone():
     made = channel([0])
     row_m = np.zeros((NUM_ROBOTS, 2))
     row_m[:, 0] = 200.0 * np.arange(NUM_ROBOTS)
-    assert made.is_connected(row_m, 0)
+    assert np.all(made.largest_part(row_m, 0))
     row_m[-1, 0] += 100.0
-    assert not made.is_connected(row_m, 0)
+    assert made.largest_part(row_m, 0).tolist() == [True] * 11 + [False]
+    row_m[5:, 0] += 100.0  # 5 robots, 6, and the last one
+    assert made.largest_part(row_m, 0).tolist() == [False] * 5 + [True] * 6 + [False]
 
 
 def test_being_heard_is_not_enough_to_be_connected():
@@ -156,4 +158,4 @@ def test_being_heard_is_not_enough_to_be_connected():
     position_m = np.zeros((NUM_ROBOTS, 2))
     for apart_m, is_connected in ((240.0, True), (2000.0, False)):
         position_m[0, 0] = apart_m
-        assert made.is_connected(position_m, 0) == is_connected
+        assert np.all(made.largest_part(position_m, 0)) == is_connected
