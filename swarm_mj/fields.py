@@ -5,7 +5,7 @@ line at once.
 """
 
 import inspect
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import MISSING, Field, field, fields
 from difflib import get_close_matches
 from functools import partial
@@ -29,10 +29,10 @@ def setting(default: object = MISSING, help: str = "", **metadata: Any) -> Field
         default: The value unless given; without one, it must be given.
         help: What it means, on the command line; without it, the field is no option.
         **metadata: `label`, the name in words; `unit`; `source`, where the default comes from;
-            `low` and `high`, the range; `choices`; and what `cli.options` shows: `group`, the
-            heading it stands under; `metavar`; `shown`, the default in words; `is_positional`, for
-            an option without a flag; `ending`, of the files that completion offers; `convert`, what
-            makes a value of what was typed.
+            `low` and `high`, the range; `choices`, and `is_joined` where several may be joined by
+            commas; and what `cli.options` shows: `group`, the heading it stands under; `metavar`;
+            `shown`, the default in words; `is_positional`, for an option without a flag; `ending`,
+            of the files that completion offers; `convert`, what makes a value of what was typed.
     """
     return field(default=default, metadata=metadata | ({"help": help} if help else {}))
 
@@ -149,10 +149,8 @@ def check_value(spec: Field[Any], value: Any, called: str = "") -> None:  # noqa
     allowed = spec.metadata
     label = called or allowed.get("label", spec.name)
     kind, described = KINDS.get(kind_of(spec), (object, ""))
-    if "choices" in allowed and value not in allowed["choices"]:
-        known = allowed["choices"]
-        hint = did_you_mean(value, known)
-        raise ValueError(f"{label} must be one of {', '.join(known)}, not {value!r}{hint}")
+    if "choices" in allowed:
+        _check_choice(label, value, allowed["choices"], is_joined=allowed.get("is_joined", False))
     is_number = not isinstance(value, bool)  # Python's True is 1
     is_allowed = isinstance(value, kind) and (is_number or kind in (bool, object))
     limits = ""
@@ -162,3 +160,15 @@ def check_value(spec: Field[Any], value: Any, called: str = "") -> None:  # noqa
     if not is_allowed:
         shown = repr(value) if isinstance(value, str) else value
         raise ValueError(f"{label} must be {described}{limits}, not {shown}")
+
+
+def _check_choice(label: str, value: Any, choices: Sequence[str], *, is_joined: bool) -> None:  # noqa: ANN401 - any field's value
+    """Passes if a value is one of the choices, or several of them joined by commas."""
+    several = is_joined and isinstance(value, str)
+    for each in value.split(",") if several else [value]:
+        if each not in choices:
+            joined = ", or several joined by commas" if is_joined else ""
+            raise ValueError(
+                f"{label} must be one of {', '.join(choices)}{joined}, not {each!r}"
+                f"{did_you_mean(each, choices)}"
+            )

@@ -19,7 +19,13 @@ from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
 from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
-from swarm_mj.protocol.buffers import Buffers, check_robots, empty_buffers, observe_self
+from swarm_mj.protocol.buffers import (
+    Buffers,
+    check_robots,
+    empty_buffers,
+    grant_start,
+    observe_self,
+)
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, RequestResponse, WindowProtocol
@@ -112,6 +118,8 @@ class Swarm:
         self.now = np.zeros(len(seeds))  # t [windows]
         self.buffers: Buffers = empty_buffers(len(seeds), mission.num_robots)
         observe_self(self.buffers, self.states, self.now)
+        if mission.grants("start"):
+            grant_start(self.buffers, self.states)
         self.phases: tuple[Phase, ...] = ()
         self._read_only = self.buffers.read_only()
         self._started: Policy | None = None

@@ -155,6 +155,18 @@ def test_iv_b_start_is_connected_inside_and_known_to_nobody_else():
     assert swarm.phases == ()
 
 
+def test_start_is_known_to_everyone_where_the_mission_grants_it():
+    mission = small("random-walk", known="start")
+    swarm = Swarm(mission, [3, 4])
+    assert np.all(swarm.buffers.is_known)
+    for i in range(8):
+        np.testing.assert_array_equal(swarm.buffers.position_m[:, i], swarm.states.position_m)
+        np.testing.assert_array_equal(swarm.buffers.velocity_mps[:, i], swarm.states.velocity_mps)
+    costs = swarm.step(Silent())
+    assert costs.is_complete.all()
+    assert costs.age_windows.tolist() == [1.0 - 1.0 / 8.0] * 2  # all but oneself is from t = 0
+
+
 class Witness(CentralisedPolicy):
     """Notes what it is shown, and what the robots know of themselves by then; stays silent."""
 

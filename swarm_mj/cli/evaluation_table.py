@@ -11,7 +11,7 @@ from rich.table import Table
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
-from swarm_mj.mission.specification import OPEN
+from swarm_mj.mission.specification import NOTHING, OPEN
 
 MIN_WIDTH = 100  # of a table; narrower consoles wrap its lines rather than cut numbers off
 NAME_WIDTH = 17  # of a policy that fits in there; a longer directory's name widens the table
@@ -51,6 +51,7 @@ def _regime(result: Result) -> str:
     """A table's title."""
     parts = {name: getattr(result, name) for name in ("radio", "channel", "controller", "scene")}
     parts |= {"arena": result.arena} if result.arena != OPEN else {}
+    parts |= {"known": result.known} if result.known != NOTHING else {}
     own = "".join(f",\n{kind} {name}" for kind, name in parts.items() if name)
     fate = f", {result.switched_off:.0%} of the robots off half-way" if result.switched_off else ""
     return (

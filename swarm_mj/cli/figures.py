@@ -14,7 +14,7 @@ from swarm_mj.cli.terminal import plain_console
 from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS
 from swarm_mj.evaluation.results import Result, read_results
 from swarm_mj.fields import setting
-from swarm_mj.mission.specification import OPEN
+from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.parts import OwnParts
 from swarm_mj.policies.registry import directories
 
@@ -87,6 +87,7 @@ def _papers(path: Path) -> list[Result]:
         parts = OwnParts(channel=result.channel, controller=result.controller, scene=result.scene)
         added = parts.named | ({"radio": result.radio} if result.radio else {})
         added |= {"arena": result.arena} if result.arena != OPEN else {}
+        added |= {"prior knowledge": result.known} if result.known != NOTHING else {}
         for kind, name in added.items():
             raise ValueError(
                 f"figures compare with the paper's values, but row {row} of {path} was flown with "

@@ -11,7 +11,7 @@ from swarm_mj.cli.terminal import named_values
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
 from swarm_mj.mission.robot_failures import num_failures
-from swarm_mj.mission.specification import OPEN
+from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
 from swarm_mj.rollout import Summary
 
@@ -44,7 +44,8 @@ def flight_title(mission: Mission, policy: str, seed: int) -> str:
         team += f", {mission.switched_off:.0%} of them off half-way"
     arena = f", arena {mission.arena}" if mission.arena != OPEN else ""
     radio = f", {radio}" if (radio := mission.beyond_free_space) else ""
-    return f"{mission.task}, {policy}, {team}, seed {seed}{arena}{radio}"
+    known = f", known {mission.known}" if mission.known != NOTHING else ""
+    return f"{mission.task}, {policy}, {team}, seed {seed}{arena}{radio}{known}"
 
 
 def flight_table(title: str, mission: Mission, numbers: dict[str, Any], wall_s: float) -> Table:

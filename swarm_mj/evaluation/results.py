@@ -10,6 +10,7 @@ from swarm_mj.fields import check_value, kind_of
 from swarm_mj.io import atomic
 from swarm_mj.io.reading import read_rows
 from swarm_mj.mission import Mission
+from swarm_mj.mission.specification import NOTHING
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +37,7 @@ class Result:
     probability: float | None  # of a transmission, for the policies that have one
     arena: str = "open"  # what stands in the area
     radio: str | None = None  # what the channel has beyond free space; None is nothing
+    known: str = NOTHING  # what robots were told beforehand
     channel: str | None = None  # the user's own, as module:Name; None is the mission's
     controller: str | None = None  # as above
     scene: str | None = None  # as above

@@ -20,6 +20,7 @@ HalfDuplex = Literal["strict", "eavesdroppers"]
 FlockingSet = Literal["heard", "moving"]
 PathLossLaw = Literal["free-space", "log-distance", "two-ray"]
 FadingLaw = Literal["none", "rayleigh", "rician"]
+Grant = Literal["map", "statistics", "start"]  # what robots may be told beforehand
 
 # Ratios are fractions of this distance, whatever the team's size (IV-B).
 MISSION_DISTANCE_M = 1000.0
@@ -27,6 +28,8 @@ MISSION_DURATION_S = 50.0  # 500 windows of 100 ms: the duration that velocity r
 SQUARE_METRES_PER_KM2 = 1e6
 OPEN = "open"  # the arena of the paper's missions: nothing stands in it
 CHANNEL = "channel"  # a heading of the help
+NOTHING = "nothing"  # is told beforehand, beyond free space
+KNOWABLE = (NOTHING, *get_args(Grant))
 
 
 def _quantity(
@@ -57,6 +60,13 @@ def _radio_choice(default: str, label: str, source: str, choices: object, help: 
     """One of several laws of the channel."""
     allowed = get_args(choices)
     return setting(default, help, group=CHANNEL, label=label, source=source, choices=allowed)
+
+
+def in_order(known: str) -> str:
+    """Grants as they are kept: each once, in one order, joined by commas."""
+    grants = dict.fromkeys(known.split(","))
+    named = [name for name in KNOWABLE if name in grants]
+    return ",".join([*named, *(name for name in grants if name not in KNOWABLE)])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,6 +172,16 @@ class Mission:
         "robots with more transmit power",
     )
     strong_db: float = _radio(6.0, "strong radios", "dB", 0.0, 60.0, "how much more that is")
+    known: str = setting(
+        NOTHING,
+        "what robots are told beforehand, several joined by commas",
+        group=CHANNEL,
+        label="what is known",
+        source="not the paper's",
+        choices=KNOWABLE,
+        is_joined=True,
+        convert=in_order,
+    )
 
     physics: PhysicsMode = _choice(
         "exact",
@@ -188,6 +208,10 @@ class Mission:
 
     def __post_init__(self) -> None:
         check(self)
+        object.__setattr__(self, "known", in_order(self.known))
+        if NOTHING in self.known.split(",") and self.known != NOTHING:
+            some = ", ".join(get_args(Grant))
+            raise ValueError(f"what is known must be nothing or some of {some}, not {self.known}")
         if self.arena != OPEN and self.physics == "exact":
             raise ValueError(
                 f"exact physics knows no collisions, and arena {self.arena} has obstacles; choose "
@@ -234,6 +258,10 @@ class Mission:
         on = [name for name in parts if getattr(self, name) not in (usual.get(name), 0)]
         named = [name for part in on for name in (part, *parts[part])]
         return ", ".join(f"{name} {as_typed(getattr(self, name))}" for name in named)
+
+    def grants(self, what: Grant) -> bool:
+        """Whether robots are told this beforehand."""
+        return what in self.known.split(",")
 
     @property
     def num_strong(self) -> int:

@@ -13,9 +13,10 @@ from swarm_mj.compiled import compiled
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.timestamps import is_newer
 
-NO_PARENT = -1  # of oneself, and of a teammate never heard of
+NO_PARENT = -1  # of oneself, and of a teammate never heard of over the radio
 BROADCAST = -1  # the recipient of a packet for everyone who hears it
 NEVER = 0.0  # T_0 and L_0: the clock's first tick is half a window, so 0 is before everything
+AT_START = 1e-300  # T of what was granted of t = 0: after T_0, and lost in any sum with a time
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +58,18 @@ def empty_buffers(num_missions: int, num_robots: int) -> Buffers:
         parent=np.full(shape, NO_PARENT, dtype=np.int32),
         last_attempt=np.full(shape, NEVER),
     )
+
+
+def grant_start(buffers: Buffers, states: RobotStates) -> None:
+    """Everyone is told how everyone starts; nobody passed it on, so it has no parent.
+
+    Args:
+        buffers: Empty ones, written in place.
+        states: True states at the start.
+    """
+    buffers.timestamp[:] = AT_START
+    buffers.position_m[:] = states.position_m[:, None]
+    buffers.velocity_mps[:] = states.velocity_mps[:, None]
 
 
 def observe_self(buffers: Buffers, states: RobotStates, now: Float[np.ndarray, "B"]) -> None:

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.compiled import compiled
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.protocol.buffers import NEVER, Buffers
+from swarm_mj.protocol.buffers import AT_START, NEVER, Buffers
 from swarm_mj.protocol.window import Phase
 
 
@@ -123,7 +123,7 @@ def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets
 def mean_hops(
     buffers: Buffers, is_active: Bool[np.ndarray, "B N"] | None = None
 ) -> Float[np.ndarray, "B"]:
-    """Mean depth of known teammates in the parent trees (II-B), 0 before anyone is known [hops].
+    """Mean depth of teammates in the parent trees (II-B), 0 before anyone was heard of [hops].
 
     Args:
         buffers: What everyone knows.
@@ -264,7 +264,8 @@ def _mean_depth(
             depth[:] = -1
             depth[i] = 0
             for j in range(num_robots):
-                if timestamp[b, i, j] > NEVER and j != i:
+                is_granted = timestamp[b, i, j] == AT_START  # and has come over no radio
+                if timestamp[b, i, j] > NEVER and j != i and not is_granted:
                     k = j
                     length = 0
                     while depth[k] < 0:

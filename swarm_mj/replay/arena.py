@@ -77,7 +77,7 @@ def draw_beliefs(sheet: Sheet) -> None:
 def draw_tree_on_map(sheet: Sheet) -> None:
     """The ego robot's parent tree between the robots' true positions."""
     log = sheet.log
-    row, child = np.nonzero(log.is_other_known)
+    row, child = np.nonzero(log.has_parent)
     parent = log.parent[row, child]
     sheet.lines("arena/tree", log.position_m[row, parent], log.position_m[row, child], row)
 

@@ -26,7 +26,7 @@ def draw_tree(sheet: Sheet, colours: UInt8[np.ndarray, "T N 3"]) -> None:
     across = np.arange(1, int(max_hops) + 1) * (TREE_WIDTH / int(max_hops))
     strips = [[(x, -10.0), (x, TREE_HEIGHT + 10.0)] for x in across]
     sheet.fixed_layer("tree/hops", strips=strips)
-    row, child = np.nonzero(log.is_other_known)
+    row, child = np.nonzero(log.has_parent)
     sheet.lines("tree/edges", place[row, log.parent[row, child]], place[row, child], row)
     row, node = np.nonzero(~np.isnan(place[..., 0]))
     sheet.layer("tree/nodes", row, positions=place[row, node], colors=colours[row, node])

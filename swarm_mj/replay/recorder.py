@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.physics.scene import Scene
+from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.rollout import WindowRecord
 from swarm_mj.swarm import Swarm
@@ -54,6 +55,11 @@ class Log:
     def known_age(self) -> Float[np.ndarray, "T N"]:
         """The ego robot's ages, nan of robots that it has not heard of [windows]."""
         return np.where(self.is_known, self.ego_age, np.nan)
+
+    @property
+    def has_parent(self) -> Bool[np.ndarray, "T N"]:
+        """Whether what the ego robot knows of j came over the radio."""
+        return self.is_other_known & (self.parent != NO_PARENT)
 
     @property
     def is_other_known(self) -> Bool[np.ndarray, "T N"]:

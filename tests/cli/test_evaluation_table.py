@@ -144,12 +144,13 @@ def test_the_lower_bound_stands_below(printed):
 
 
 def test_regimes_of_other_channels_and_arenas_are_tables_of_their_own(printed):
-    plain, city = (some_result("a", 1.0, arena=arena) for arena in ("open", "blocks"))
-    lines = printed(
-        [plain, city, some_result("a", 3.0, arena="open", radio="fading rayleigh")], 100
-    )
+    plain = {"arena": "open", "known": "nothing"}
+    others = ({}, {"arena": "blocks"}, {"radio": "fading rayleigh"}, {"known": "map,start"})
+    lines = printed([some_result("a", 1.0, **plain | other) for other in others], 100)
     text = "\n".join(lines)
-    assert text.count("lower bound (connectivity)") == 3
+    assert text.count("lower bound (connectivity)") == 4
+    assert text.count("known ") == 1
+    assert ",\nknown map,start\n" in text
     assert ",\narena blocks\n" in text
     assert ",\nradio fading rayleigh" in text
 

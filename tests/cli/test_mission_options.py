@@ -55,6 +55,12 @@ def test_sweeps_multiply_and_values_follow_one_flag_or_several():
     )
 
 
+def test_what_is_known_is_swept_and_has_one_order():
+    assert missions("--known", "nothing", "start,map", "--known", "map,start", "map") == tuple(
+        paper("flocking", known=known) for known in ("nothing", "map,start", "map")
+    )
+
+
 def test_how_many_fail_is_swept_too():
     assert missions("--robots", 10, "--switched-off", 0, 0.2) == (
         paper("flocking", num_robots=10),
@@ -68,6 +74,7 @@ def test_how_many_fail_is_swept_too():
         paper("stationary"),
         paper("flocking", boundary="reflect", range_ratio=1 / 3, num_windows=7),
         reference("random-walk", physics="contact", switched_off=0.1),
+        paper("stationary", fading="rayleigh", known="statistics,start"),
     ],
 )
 def test_the_flags_of_a_mission_make_it_again(wanted):

@@ -17,6 +17,7 @@ TEXTS = {
     "preset": "reference",
     "boundary": "none",
     "physics": "contact",
+    "known": "map,start",
     "config": '{"a": "b, \\"c\\""}',
 }
 

@@ -193,3 +193,34 @@ def test_a_mission_cannot_change():
 )
 def test_what_the_channel_has_beyond_free_space_is_told_in_words(fields, said):
     assert paper(**fields).beyond_free_space == said
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ("nothing", "nothing"),
+        ("start", "start"),
+        ("start,map,statistics,map", "map,statistics,start"),
+    ],
+)
+def test_what_is_known_has_one_order(given, kept):
+    mission = Unchecked(known=given)
+    assert mission.known == kept
+    granted = [what for what in ("map", "statistics", "start") if mission.grants(what)]
+    assert granted == [what for what in kept.split(",") if what != "nothing"]
+
+
+@pytest.mark.parametrize(
+    ("given", "complaint"),
+    [
+        ("mapp", "not 'mapp'; did you mean map?"),
+        ("map,", "or several joined by commas, not ''"),
+        ("map statistics", "not 'map statistics'"),
+        ("map,nothing", "nothing or some of map, statistics, start, not nothing,map"),
+        (3, "not 3"),
+    ],
+)
+def test_what_cannot_be_known_is_refused(given, complaint):
+    with pytest.raises(ValueError, match=r"^what is known must be") as refusal:
+        Unchecked(known=given)
+    assert complaint in str(refusal.value)

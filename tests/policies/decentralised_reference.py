@@ -82,9 +82,15 @@ class Mind:
     schedule: list[bool] = field(default_factory=list)  # whether it transmits, by slots
     after: np.ndarray | None = None  # T that its plan leads to
 
+    @property
+    def is_told(self):
+        """Whether it was told before the mission where everyone starts."""
+        return "start" in self.mission.known
+
     def length(self, epoch):
         """The discovery, two early ones, then all others [windows]."""
         epochs = self.settings.epochs
+        epoch += self.is_told  # then there is no discovery
         if epoch >= 3:
             return max(epochs.min_regular_windows, round(epochs.regular_rounds * len(self.order)))
         rounds = epochs.first_rounds if epoch == 0 else epochs.early_rounds
@@ -119,9 +125,11 @@ class Mind:
         self.epoch += 1
         self.begins += self.length(self.epoch)
         self.current, self.upcoming = self.upcoming, None
+        if self.epoch == 0 and self.is_told:
+            self.current = self.snapshot(row, now, self.length(0) / 2)
         if self.current is not None:
             self.plan()
-        if self.epoch >= 1:
+        if self.current is not None or self.epoch >= 1:
             ahead = self.length(self.epoch) + self.length(self.epoch + 1) / 2
             self.upcoming = self.snapshot(row, now, ahead)
 

@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import (
+    AT_START,
     NEVER,
     NO_PARENT,
     Buffers,
     empty_buffers,
+    grant_start,
     merge,
     observe_self,
     record_attempt,
@@ -222,3 +224,31 @@ def test_missions_side_by_side_do_not_mix(seed, num_robots):
 def test_never_is_before_the_first_tick():
     assert NEVER == 0.0 < 0.5
     assert NO_PARENT == -1
+
+
+def test_what_is_granted_of_the_start_is_known_and_as_old_as_the_mission():
+    states = RobotStates(
+        position_m=np.array([[[1.0, 2.0], [3.0, 4.0]]]),
+        velocity_mps=np.array([[[0.5, 0.0], [0.0, 0.25]]]),
+    )
+    buffers = empty_buffers(1, 2)
+    grant_start(buffers, states)
+    assert buffers.is_known.all()
+    np.testing.assert_array_equal(0.5 - buffers.timestamp, np.full((1, 2, 2), 0.5))  # to the digit
+    for i in range(2):
+        np.testing.assert_array_equal(buffers.position_m[:, i], states.position_m)
+        np.testing.assert_array_equal(buffers.velocity_mps[:, i], states.velocity_mps)
+    assert (buffers.parent == NO_PARENT).all()
+
+
+def test_eq8_the_first_packet_replaces_what_was_granted():
+    buffers = empty_buffers(1, 2)
+    buffers.timestamp[:] = AT_START
+    observe_self(
+        buffers,
+        RobotStates(position_m=np.ones((1, 2, 2)), velocity_mps=np.ones((1, 2, 2))),
+        np.array([0.5]),
+    )
+    merge(buffers, np.array([[0, 0]]))
+    assert buffers.timestamp[0].tolist() == [[0.5, AT_START], [0.5, 0.5]]
+    assert buffers.parent[0].tolist() == [[NO_PARENT, NO_PARENT], [1, NO_PARENT]]

@@ -4,7 +4,8 @@ Identities, the team's size, its area, orders and the clock are common before th
 that also hold the same snapshot of the team therefore agree on a schedule without a word. Any robot
 may transmit in every slot, and nobody answers. Time is divided into epochs:
 
-1. In the first two, the discovery, robots transmit in turns (`discovery.py`).
+1. In the first two, the discovery, robots transmit in turns (`discovery.py`). There is none where
+   robots are told before the mission where everyone starts.
 2. At the start of every epoch but the first, each robot takes a snapshot of the team from its own
    buffer. Packets carry the best snapshot for the next epoch and the one that the sender flies by.
    A robot that decodes a better one takes it over and passes it on. The best has most robots heard
@@ -177,20 +178,30 @@ class _Team:
         """Flies by the snapshots taken for this epoch, and takes those for the next."""
         self._ended, self._ended_continues = self._plans, self._continues
         self._plans = {}
+        is_common = self._epoch == 0 and _is_common(buffers, b)
+        if is_common:  # there is nothing to discover
+            self._starts = tuple(start - self._starts[1] for start in self._starts[1:])
+            self._upcoming = self._snapshots(buffers, b, now, self._length(0) / 2.0)
+            self._will_hold = np.zeros_like(self._everyone)  # all snapshots are the same
         self._current, self._holds = self._upcoming, self._will_hold
-        if self._epoch > 0:
+        if self._epoch > 0 or is_common:
             length, next_length = (self._length(self._epoch + ahead) for ahead in (0, 1))
-            self._upcoming = take_snapshots(
-                buffers.position_m[b],
-                buffers.velocity_mps[b],
-                buffers.timestamp[b],
-                buffers.is_known[b],
-                now,
-                self._window_s,
-                length + next_length / 2.0,
-                self._settings.snapshots,
-            )
-            self._will_hold, self._continues = self._everyone, self._holds
+            self._upcoming = self._snapshots(buffers, b, now, length + next_length / 2.0)
+            self._will_hold = self._holds if is_common else self._everyone
+            self._continues = self._holds
+
+    def _snapshots(self, buffers: Buffers, b: int, now: float, windows_ahead: float) -> Snapshots:
+        """What every robot would plan by so far ahead."""
+        return take_snapshots(
+            buffers.position_m[b],
+            buffers.velocity_mps[b],
+            buffers.timestamp[b],
+            buffers.is_known[b],
+            now,
+            self._window_s,
+            windows_ahead,
+            self._settings.snapshots,
+        )
 
     def _plan(self, owner: int) -> Plan:
         """The plan that follows from someone's snapshot."""
@@ -232,6 +243,12 @@ class _Team:
 
     def _length(self, epoch: int) -> int:
         return self._start(epoch + 1) - self._start(epoch)
+
+
+def _is_common(buffers: Buffers, b: int) -> bool:
+    """Whether all robots know of all robots, and the same: how they were at one moment."""
+    timestamp = buffers.timestamp[b]
+    return bool(np.all(buffers.is_known[b]) and np.all(timestamp == timestamp[0, 0]))
 
 
 def epoch_starts(num_robots: int, settings: EpochSettings) -> tuple[int, ...]:

@@ -66,6 +66,24 @@ def test_eq9_sharing_is_planning_apart_in_a_team_of_40(task):
     assert flight.num_taken > 0
 
 
+@pytest.mark.parametrize("task", ["stationary", "flocking"])
+def test_eq9_sharing_is_planning_apart_where_everyone_knows_how_all_start(task):
+    mission = paper(task, num_robots=10, known="start")
+    flight = Witnessed(mission, 10)
+    flight.fly(windows_before(4, 10) + 2)
+    assert flight.num_taken > 0
+
+
+def test_a_team_that_knows_how_all_start_plans_from_the_first_slot():
+    """One robot transmits first, whom most hear; without the plan four would, in the discovery."""
+    flight = Flight(paper("stationary", num_robots=10, known="start"), 4)
+    transmitted = flight.fly(1)
+    assert np.sum(transmitted[0]) >= 1
+    (plan,) = flight.team._plans.values()
+    assert plan.is_complete
+    np.testing.assert_array_equal(transmitted, [plan.transmits(slot) for slot in (0, 1)])
+
+
 SMALL = paper("stationary", num_robots=6)
 
 
