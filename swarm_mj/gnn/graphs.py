@@ -11,8 +11,9 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Shaped
 
+from swarm_mj.compiled import compiled
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
-from swarm_mj.protocol.buffers import Buffers
+from swarm_mj.protocol.buffers import NEVER, Buffers
 from swarm_mj.protocol.local_views import LocalViews
 
 REFERENCE_WINDOWS = 500.0  # what the authors' code divides times by, whatever the mission [windows]
@@ -72,16 +73,18 @@ class PaperFeatures(FeatureExtractor):
         """The buffers as they are; positions from the area's middle, velocities per mission."""
         buffers, mission = views.buffers, self._mission
         duration_s = mission.num_windows * mission.window_s
-        is_oneself = np.broadcast_to(np.eye(views.num_robots, dtype=np.bool_), buffers.parent.shape)
-        return _everyone_addressable(
-            buffers,
-            is_oneself,
-            buffers.is_known | is_oneself,
-            buffers.timestamp / mission.num_windows,
-            buffers.position_m / mission.side_m,
-            buffers.velocity_mps * (duration_s / mission.side_m),
-            buffers.last_attempt / mission.num_windows,
+        node = np.empty((*buffers.shape, views.num_robots), dtype=PAPER_NODE)
+        _fill_paper(
+            buffers.timestamp,
+            buffers.position_m,
+            buffers.velocity_mps,
+            buffers.last_attempt,
+            1.0 / mission.num_windows,
+            1.0 / mission.side_m,
+            duration_s / mission.side_m,
+            node,
         )
+        return _everyone_addressable(buffers, node)
 
 
 class ReferenceFeatures(FeatureExtractor):
@@ -97,30 +100,83 @@ class ReferenceFeatures(FeatureExtractor):
 
     def graphs(self, views: LocalViews) -> Graphs:
         """The buffers as the authors' code shows them to its network."""
-        buffers, now = views.buffers, views.now[:, None, None]
-        return _everyone_addressable(
-            buffers,
-            (buffers.timestamp - now) / REFERENCE_WINDOWS,
-            np.zeros(buffers.timestamp.shape),
-            _from_own(buffers.position_m) / MISSION_DISTANCE_M,
-            _from_own(buffers.velocity_mps) / MISSION_DISTANCE_M,
-            (buffers.last_attempt - now) / REFERENCE_WINDOWS,
+        buffers = views.buffers
+        node = np.empty((*buffers.shape, views.num_robots), dtype=REFERENCE_NODE)
+        _fill_reference(
+            buffers.timestamp,
+            buffers.position_m,
+            buffers.velocity_mps,
+            buffers.last_attempt,
+            views.now,
+            node,
         )
+        return _everyone_addressable(buffers, node)
 
 
-def _from_own(vectors: Float[np.ndarray, "B N N axis"]) -> Float[np.ndarray, "B N N axis"]:
-    """Each robot's vectors minus its own."""
-    own = np.diagonal(vectors, axis1=1, axis2=2).swapaxes(1, 2)
-    return vectors - own[:, :, None]
+# The numbers of a node, in the order of the names.
+STATE = ("timestamp", "x", "y", "velocity_x", "velocity_y", "last_attempt")
+PAPER_NODE = np.dtype([(field, np.float32) for field in ("is_oneself", "is_known", *STATE)])
+REFERENCE_NODE = np.dtype([(field, np.float32) for field in (STATE[0], "zero", *STATE[1:])])
 
 
-def _everyone_addressable(buffers: Buffers, *features: Shaped[np.ndarray, "B N N ..."]) -> Graphs:
-    """Graphs with these features, numbers or vectors, in which every robot may be addressed."""
+@compiled()
+def _fill_paper(
+    timestamp: Float[np.ndarray, "B N N"],
+    position_m: Float[np.ndarray, "B N N 2"],
+    velocity_mps: Float[np.ndarray, "B N N 2"],
+    last_attempt: Float[np.ndarray, "B N N"],
+    per_window: float,
+    per_m: float,
+    per_mps: float,
+    node: Shaped[np.ndarray, "B N N"],
+) -> None:
+    num_missions, num_robots = timestamp.shape[:2]
+    for b in range(num_missions):
+        for i in range(num_robots):
+            for k in range(num_robots):
+                of_k = node[b, i, k]
+                of_k.is_oneself = k == i
+                of_k.is_known = k == i or timestamp[b, i, k] > NEVER
+                of_k.timestamp = timestamp[b, i, k] * per_window
+                of_k.x = position_m[b, i, k, 0] * per_m
+                of_k.y = position_m[b, i, k, 1] * per_m
+                of_k.velocity_x = velocity_mps[b, i, k, 0] * per_mps
+                of_k.velocity_y = velocity_mps[b, i, k, 1] * per_mps
+                of_k.last_attempt = last_attempt[b, i, k] * per_window
+
+
+@compiled()
+def _fill_reference(
+    timestamp: Float[np.ndarray, "B N N"],
+    position_m: Float[np.ndarray, "B N N 2"],
+    velocity_mps: Float[np.ndarray, "B N N 2"],
+    last_attempt: Float[np.ndarray, "B N N"],
+    now: Float[np.ndarray, "B"],
+    node: Shaped[np.ndarray, "B N N"],
+) -> None:
+    per_window, per_m = 1.0 / REFERENCE_WINDOWS, 1.0 / MISSION_DISTANCE_M
+    num_missions, num_robots = timestamp.shape[:2]
+    for b in range(num_missions):
+        for i in range(num_robots):
+            own_x_m, own_y_m = position_m[b, i, i, 0], position_m[b, i, i, 1]
+            own_x_mps, own_y_mps = velocity_mps[b, i, i, 0], velocity_mps[b, i, i, 1]
+            for k in range(num_robots):
+                of_k = node[b, i, k]
+                of_k.timestamp = (timestamp[b, i, k] - now[b]) * per_window
+                of_k.zero = 0.0
+                of_k.x = (position_m[b, i, k, 0] - own_x_m) * per_m
+                of_k.y = (position_m[b, i, k, 1] - own_y_m) * per_m
+                of_k.velocity_x = (velocity_mps[b, i, k, 0] - own_x_mps) * per_m
+                of_k.velocity_y = (velocity_mps[b, i, k, 1] - own_y_mps) * per_m
+                of_k.last_attempt = (last_attempt[b, i, k] - now[b]) * per_window
+
+
+def _everyone_addressable(buffers: Buffers, node: Shaped[np.ndarray, "B N N"]) -> Graphs:
+    """Graphs with these nodes, in which every robot may be addressed."""
     num_missions, num_robots = buffers.shape
     rows = (num_missions * num_robots, num_robots)
-    columns = [values.reshape(*rows, -1) for values in features]
     return Graphs(
-        node=np.concatenate(columns, axis=2, dtype=np.float32, casting="same_kind"),
+        node=node.view(np.float32).reshape(*rows, -1),
         parent=buffers.parent.reshape(rows),
         may_address=np.ones(rows, dtype=np.bool_),
         has_turn=np.zeros(rows[0], dtype=np.bool_),
