@@ -26,7 +26,7 @@ from swarm_mj.io.atomic import write_csv
 from swarm_mj.io.interrupt import heard_interrupt
 from swarm_mj.io.owned import owned
 from swarm_mj.io.provenance import commit, version
-from swarm_mj.mission import PRESETS, Mission
+from swarm_mj.mission import PAPERS, Mission
 from swarm_mj.policies.registry import HAVE_PROBABILITY, make_policy
 from swarm_mj.policies.tuning import TABLE, Tuned, read_table
 from swarm_mj.swarm import Swarm
@@ -72,7 +72,7 @@ def grid_of(policy: str, preset: str) -> tuple[float, ...]:
 
 def regimes(preset: str, num_windows: int) -> Iterator[Mission]:
     """The regimes of the paper's four result figures; those of Fig. 3 are among Fig. 4's."""
-    make = PRESETS[preset]
+    make = PAPERS[preset]
     for range_ratio in (0.2, 0.25, 0.5, 0.75, 1.0):
         yield make("stationary", range_ratio=range_ratio, num_windows=num_windows)
     for num_robots in (10, 20, 40, 60, 80):
@@ -86,7 +86,7 @@ def searches(policies: Sequence[str], num_windows: int) -> list[Search]:
     return [
         Search(policy=policy, mission=mission, grid=grid_of(policy, preset))
         for policy in policies
-        for preset in PRESETS
+        for preset in PAPERS
         for mission in regimes(preset, num_windows)
     ]
 

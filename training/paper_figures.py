@@ -24,7 +24,7 @@ from swarm_mj.fields import setting
 from swarm_mj.io.atomic import write_bytes
 from swarm_mj.io.provenance import commit
 from swarm_mj.io.reading import read_file
-from swarm_mj.mission import PRESETS
+from swarm_mj.mission import PAPERS
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -33,7 +33,7 @@ ROOT = Path(__file__).resolve().parent.parent
 class Settings:
     """What is evaluated, and where it goes."""
 
-    presets: tuple[str, ...] = setting(("paper", "reference"), "whose", choices=tuple(PRESETS))
+    presets: tuple[str, ...] = setting(("paper", "reference"), "whose", choices=tuple(PAPERS))
     figures: tuple[str, ...] = setting(
         ("fig4", "fig5", "fig6"), "which results", choices=tuple(RESULT_FIGURES)
     )

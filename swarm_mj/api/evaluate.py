@@ -135,7 +135,7 @@ class Evaluation:
 
 def evaluate(
     policies: str | Path | Sequence[str | Path] = DEFAULT_POLICIES,
-    task: str | Mission = "flocking",
+    task: str | Mission | None = None,
     *,
     num_missions: int = 100,
     seed: int = 1000,
@@ -157,7 +157,7 @@ def evaluate(
     Args:
         policies: Names of `POLICIES`, folders of learned ones, or `module:Name` of your own;
             `__main__:Name` is a class of this script or notebook. "all" is all of `POLICIES`.
-        task: What the robots do, by name; or a mission of one's own.
+        task: What the robots do, by name; or a mission of one's own. None is as in `fly`.
         num_missions: So many for each policy.
         seed: Of the first mission; the others follow one by one.
         baseline: The policy that the others are compared to, mission by mission; the first unless

@@ -36,7 +36,7 @@ KEYWORDS = ("policy", "record", "observer", *SHARED)
 
 
 def fly(
-    task: str | Mission = "flocking",
+    task: str | Mission | None = None,
     *,
     policy: str | Path | Policy = "planner",
     seed: int = 1,
@@ -56,7 +56,8 @@ def fly(
     far it is. Ctrl-C ends the flight after a whole window and keeps what was flown.
 
     Args:
-        task: What the robots do, by name; or a mission of one's own.
+        task: What the robots do, by name; or a mission of one's own. None is "flocking", and
+            "random-walk" in the presets "indoor", "urban" and "open-field".
         policy: Who transmits when: a name of `POLICIES`, the folder of a learned one, an object, or
             `module:Name` of your own.
         seed: The same seed is the same mission.
@@ -114,13 +115,16 @@ def names_of(features: str | Sequence[str]) -> tuple[str, ...]:
 
 
 def mission_of(
-    function: str, task: str | Mission, mission_fields: Mapping[str, Any], known: tuple[str, ...]
+    function: str,
+    task: str | Mission | None,
+    mission_fields: Mapping[str, Any],
+    known: tuple[str, ...],
 ) -> Mission:
     """The mission that a function's arguments name.
 
     Args:
         function: Its name, for messages.
-        task: What the robots do, by name; or the mission itself.
+        task: What the robots do, by name; or the mission itself. None is as usual.
         mission_fields: Other fields of the mission.
         known: The function's other arguments, any of which may have been meant.
 
@@ -130,7 +134,7 @@ def mission_of(
     """
     check_names(function, mission_fields, (*MISSION_FIELDS, *known))
     if not isinstance(task, Mission):
-        return make_mission(task=task, **mission_fields)
+        return make_mission(**({} if task is None else {"task": task}), **mission_fields)
     if mission_fields:
         fields_given = ", ".join(f"{name}={value!r}" for name, value in mission_fields.items())
         raise TypeError(

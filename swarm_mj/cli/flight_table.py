@@ -9,7 +9,7 @@ from rich.table import Table
 
 from swarm_mj.cli.terminal import named_values
 from swarm_mj.control.motion import Flocking
-from swarm_mj.mission import Mission
+from swarm_mj.mission import PRESETS, WORLDS, Mission
 from swarm_mj.mission.robot_failures import num_failures
 from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
@@ -42,10 +42,21 @@ def flight_title(mission: Mission, policy: str, seed: int) -> str:
     team = f"{mission.num_robots} robots"
     if mission.switched_off:
         team += f", {mission.switched_off:.0%} of them off half-way"
-    arena = f", arena {mission.arena}" if mission.arena != OPEN else ""
-    radio = f", {radio}" if (radio := mission.beyond_free_space) else ""
-    known = f", known {mission.known}" if mission.known != NOTHING else ""
-    return f"{mission.task}, {policy}, {team}, seed {seed}{arena}{radio}{known}"
+    known = [f"known {mission.known}"] if mission.known != NOTHING else []
+    return ", ".join((mission.task, policy, team, f"seed {seed}", *_world(mission), *known))
+
+
+def _world(mission: Mission) -> list[str]:
+    """Where it was flown: a world's arena and channel by the preset, all others by themselves."""
+    arena, radio = f"arena {mission.arena}", mission.beyond_free_space
+    if mission.preset not in WORLDS:
+        return [*([arena] if mission.arena != OPEN else []), *([radio] if radio else [])]
+    usual, changed = PRESETS[mission.preset](), []
+    if mission.arena != usual.arena:
+        changed.append(arena)
+    if radio != usual.beyond_free_space:
+        changed.append(radio or "free space")
+    return [f"preset {mission.preset}", *changed]
 
 
 def flight_table(title: str, mission: Mission, numbers: dict[str, Any], wall_s: float) -> Table:

@@ -8,7 +8,7 @@ from typing import Any
 
 from swarm_mj.cli.options import add_option, flag_of, nested
 from swarm_mj.fields import FieldOf, as_typed
-from swarm_mj.mission import PRESETS, Mission, paper
+from swarm_mj.mission import PRESETS, WORLDS, Mission, paper
 
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]
 
@@ -36,9 +36,9 @@ def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
 
 def make_mission(**given: Any) -> Mission:
     """A mission of the preset and task that are given, or usual, changed by the other fields."""
-    preset, task = (given.pop(name, getattr(Mission(), name)) for name in ("preset", "task"))
-    replace(Mission(), preset=preset, task=task)  # refuses what is unknown
-    return PRESETS[preset](task, **given)
+    preset = given.pop("preset", Mission().preset)
+    replace(Mission(), preset=preset, task=given.get("task", Mission().task))  # refuses the unknown
+    return PRESETS[preset](**given)
 
 
 def mission_flags(mission: Mission) -> str:
@@ -68,6 +68,8 @@ def _default_of(spec: Field[Any]) -> str:
     flocks, others = (
         as_typed(getattr(paper(task), spec.name)) for task in ("flocking", "stationary")
     )
-    if flocks == others or spec.name == "task":
+    if spec.name == "task":
+        return f"{flocks}; {PRESETS[next(iter(WORLDS))]().task} under {', '.join(WORLDS)}"
+    if flocks == others:
         return flocks
     return f"{others}; {flocks} for flocks, as in the paper"

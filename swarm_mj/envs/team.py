@@ -65,7 +65,7 @@ class Team:
         Args:
             mission: The mission, or its task.
             num_missions: B.
-            preset: Of a task's mission: "paper", which None is, or "reference".
+            preset: Of a task's mission: "paper", which None is, or any other of `PRESETS`.
             features: What robots see of each teammate: the name of a feature set, or
                 `module:Name` of your own.
             reward: "aoi", minus the age of information [windows]; "velocity-variance", minus the

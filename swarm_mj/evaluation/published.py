@@ -18,7 +18,7 @@ from pathlib import Path
 import msgspec
 
 from swarm_mj.io.reading import read_rows
-from swarm_mj.mission import PRESETS, Mission
+from swarm_mj.mission import PAPERS, Mission
 
 MOST_BYTES = 1_000_000  # of the table
 METHODS = {
@@ -85,17 +85,17 @@ def points() -> tuple[Point, ...]:
 
 
 def published(policy: str, mission: Mission) -> dict[str, Point]:
-    """What the paper reports for one of `POLICIES` in a regime, under either preset.
+    """What the paper reports for one of `POLICIES` in a regime, under either of its presets.
 
     Returns:
         The points by cost, `aoi` and `velocity_variance`; empty where the paper has none, as where
         the regime is not its preset's in all that its figure does not sweep.
     """
-    if mission.task not in SWEEPS:
+    if mission.task not in SWEEPS or mission.preset not in PAPERS:
         return {}
     sweep = SWEEPS[mission.task]
     free = {name: getattr(mission, name) for name in {sweep.x_name, *sweep.irrelevant}}
-    if mission != PRESETS[mission.preset](mission.task, **free):
+    if mission != PAPERS[mission.preset](mission.task, **free):
         return {}
     x = getattr(mission, sweep.x_name)
     found = (p for p in points() if p.figure == sweep.figure and p.policy == policy)

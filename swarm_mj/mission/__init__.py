@@ -1,6 +1,6 @@
 """The mission (IV-B): its numbers, its presets, and what is drawn before it begins."""
 
-from swarm_mj.mission.presets import PRESETS, paper, reference
+from swarm_mj.mission.presets import PAPERS, PRESETS, WORLDS, paper, reference
 from swarm_mj.mission.specification import (
     MISSION_DISTANCE_M,
     Boundary,
@@ -14,7 +14,9 @@ from swarm_mj.mission.specification import (
 
 __all__ = [
     "MISSION_DISTANCE_M",
+    "PAPERS",
     "PRESETS",
+    "WORLDS",
     "Boundary",
     "FlockingSet",
     "HalfDuplex",

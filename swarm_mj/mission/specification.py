@@ -12,6 +12,7 @@ import numpy as np
 
 from swarm_mj.fields import FieldOf, as_typed, check, check_names, setting
 
+Preset = Literal["paper", "reference", "indoor", "urban", "open-field"]
 Task = Literal["stationary", "random-walk", "flocking", "formation", "coverage"]
 PhysicsMode = Literal["exact", "contact"]
 Boundary = Literal["reflect", "none"]
@@ -81,9 +82,9 @@ class Mission:
     preset: str = _choice(
         "paper",
         "preset",
-        "text or code",
-        Literal["paper", "reference"],
-        "the paper's text, or what its authors' code does",
+        "text, code, or a world",
+        Preset,
+        "the paper's text, what its authors' code does, or an arena with its channel",
     )
     task: Task = _choice("flocking", "task", "IV", Task, "what the robots do")
     num_robots: int = _quantity(

@@ -10,11 +10,12 @@ from pathlib import Path
 
 from swarm_mj.fields import check, check_value, setting
 from swarm_mj.io.reading import read_rows
-from swarm_mj.mission import Mission
+from swarm_mj.mission import WORLDS, Mission
 
 TABLE = Path(__file__).with_name("tuned.csv")
 MOST_BYTES = 10_000_000
 TUNED_AS = {"formation": "random-walk", "coverage": "random-walk"}  # teams within walls, too
+TUNED_AS |= dict.fromkeys(WORLDS, "paper")  # whose numbers these have but for arena and channel
 REGIME = ("preset", "task", "num_robots", "range_ratio", "velocity_ratio")
 
 
@@ -50,13 +51,14 @@ def tuned_probability(policy_name: str, mission: Mission) -> float:
     """A policy's tuned probability in the regime that is nearest to a mission's.
 
     Nearest by the ratios of team size, range and velocity, among the regimes of the same preset
-    and task: the mission's own where the table has it. Tasks that nobody tuned for take another's.
+    and task: the mission's own where the table has it. Tasks and presets that nobody tuned for take
+    another's.
 
     Raises:
         ValueError: The policy was not tuned for the mission's preset and task.
     """
-    task = TUNED_AS.get(mission.task, mission.task)
-    group = (policy_name, mission.preset, task)
+    preset, task = (TUNED_AS.get(name, name) for name in (mission.preset, mission.task))
+    group = (policy_name, preset, task)
     rows = [row for row in _table() if (row.policy, row.preset, row.task) == group]
     if not rows:
         raise ValueError(

@@ -235,7 +235,10 @@ def test_one_mission_of_one_window_has_results(swarm_mj, tmp_path):
             ["--switched-off", "0.95"],
             "switched off must be a number from 0 to 0.9 [of the team], not 0.95",
         ),
-        (["--preset", "mine"], "preset must be one of paper, reference, not 'mine'"),
+        (
+            ["--preset", "mine"],
+            "preset must be one of paper, reference, indoor, urban, open-field, not 'mine'",
+        ),
         (["--policy", "magic"], "policy must be one of"),
         (["--baseline", "magic"], "baseline must be one of the policies evaluated"),
         (["--range-ratio", "0.02", "--csv", "r.csv", "--jobs", "2"], "too sparse"),

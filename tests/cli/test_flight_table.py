@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from swarm_mj.cli.flight_table import flight_numbers, flight_table, flight_title
-from swarm_mj.mission import paper
+from swarm_mj.mission import PRESETS, paper
 from swarm_mj.policies.registry import WITHOUT_PAYLOAD, make_policy
 from swarm_mj.rollout import Summary
 
@@ -159,3 +159,19 @@ def test_the_title_names_the_arena_and_what_the_channel_adds():
     mission = paper("random-walk", arena="blocks", fading="rayleigh", known="map")
     title = flight_title(mission, "tdma", 3)
     assert title == "random-walk, tdma, 40 robots, seed 3, arena blocks, fading rayleigh, known map"
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({}, ""),
+        ({"num_robots": 40, "fading": "rician"}, ""),
+        ({"arena": "forest"}, ", arena forest"),
+        ({"arena": "open"}, ", arena open"),
+        ({"path_loss": "free-space", "shadowing_db": 0.0}, ", fading rician, rician_k 8"),
+        ({"path_loss": "free-space", "shadowing_db": 0.0, "fading": "none"}, ", free space"),
+    ],
+)
+def test_the_title_names_a_world_and_what_was_changed_in_it(given, said):
+    title = flight_title(PRESETS["urban"](**given), "tdma", 3)
+    assert title == f"random-walk, tdma, 40 robots, seed 3, preset urban{said}"

@@ -140,7 +140,10 @@ def test_contact_physics_flies(swarm_mj, tmp_path, boundary):
             "task must be one of stationary, random-walk, flocking, formation, coverage, not",
         ),
         (["--policy", "magic"], "policy must be one of random-flooding, round-robin, mst"),
-        (["--preset", "mine"], "preset must be one of paper, reference, not 'mine'"),
+        (
+            ["--preset", "mine"],
+            "preset must be one of paper, reference, indoor, urban, open-field, not 'mine'",
+        ),
         (["--physics", "quantum"], "physics must be one of exact, contact, not 'quantum'"),
         (["--boundary", "torus"], "boundary must be one of reflect, none, not 'torus'"),
         (

@@ -2,9 +2,10 @@
 
 import pytest
 
+from swarm_mj.api.fly import mission_of
 from swarm_mj.cli import parse
 from swarm_mj.cli.mission_options import mission_flags
-from swarm_mj.mission import paper, reference
+from swarm_mj.mission import PRESETS, WORLDS, paper, reference
 
 
 def mission(*arguments):
@@ -22,6 +23,14 @@ def test_the_default_is_the_presets_own_mission_for_every_command(preset, make, 
     assert mission(*options) == make(task)
     assert missions(*options) == (make(task),)
     assert parse(["scene", *options])[1].mission == make(task)
+
+
+@pytest.mark.parametrize("preset", WORLDS)
+def test_robots_of_a_world_walk_unless_told_otherwise(preset):
+    assert mission("--preset", preset) == PRESETS[preset]("random-walk")
+    assert missions("--preset", preset) == (PRESETS[preset]("random-walk"),)
+    assert mission("--preset", preset, "--task", "flocking") == PRESETS[preset]("flocking")
+    assert mission_of("fly", None, {"preset": preset}, ()) == PRESETS[preset]("random-walk")
 
 
 def test_flocks_have_no_boundary_unless_they_are_given_one():
@@ -74,6 +83,9 @@ def test_how_many_fail_is_swept_too():
         paper("stationary"),
         paper("flocking", boundary="reflect", range_ratio=1 / 3, num_windows=7),
         reference("random-walk", physics="contact", switched_off=0.1),
+        PRESETS["urban"](),
+        PRESETS["urban"]("stationary", arena="open", num_robots=9),
+        PRESETS["open-field"]("flocking", path_loss="free-space", fading="none"),
         paper("stationary", fading="rayleigh", known="statistics,start"),
     ],
 )

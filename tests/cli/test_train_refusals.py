@@ -41,7 +41,10 @@ REFUSED = [
     ),
     ((*NEW, "--edges", "none"), "edges"),
     ((*NEW, "--task", "swim"), "task must be one of stationary, random-walk, flocking, formation"),
-    ((*NEW, "--preset", "mine"), "preset must be one of paper, reference, not 'mine'"),
+    (
+        (*NEW, "--preset", "mine"),
+        "preset must be one of paper, reference, indoor, urban, open-field, not 'mine'",
+    ),
     ((*NEW, "--boundary", "torus"), "boundary must be one of reflect, none, not 'torus'"),
     ((*NEW, "--robots", "1"), "a whole number from 2 to 1000 [robots], not 1"),
     ((*NEW, "--robots", "10", "201"), "robots must be a whole number from 2 to 200, not 201"),

@@ -7,7 +7,7 @@ import pytest
 
 from swarm_mj.evaluation import published as module
 from swarm_mj.evaluation.published import BASELINES, METHODS, points, published
-from swarm_mj.mission import PRESETS, paper, reference
+from swarm_mj.mission import PAPERS, PRESETS, WORLDS, paper, reference
 from swarm_mj.policies.registry import POLICIES
 
 FILE = Path(module.__file__).with_name("published.csv")
@@ -52,9 +52,14 @@ def test_standard_error_is_a_tenth_of_the_deviation():
     assert point.sem == pytest.approx(0.97449)
 
 
-@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("preset", WORLDS)
+def test_the_paper_reports_nothing_of_other_worlds(preset):
+    assert published("round-robin", PRESETS[preset]()) == {}
+
+
+@pytest.mark.parametrize("preset", PAPERS)
 def test_each_figures_regime_has_its_value(preset):
-    make = PRESETS[preset]
+    make = PAPERS[preset]
 
     def means(policy, task, **overrides):
         return {cost: p.mean for cost, p in published(policy, make(task, **overrides)).items()}

@@ -106,7 +106,10 @@ def with_cells(path, **cells):
         ({"seed": "9" * 30}, "seed must be a whole number, not '999"),
         ({"config": "x" * 10_001}, "config must be a text"),
         ({"task": "swim"}, "line 3: task must be one of stationary, random-walk, flocking"),
-        ({"preset": "mine"}, "preset must be one of paper, reference, not 'mine'"),
+        (
+            {"preset": "mine"},
+            "preset must be one of paper, reference, indoor, urban, open-field, not 'mine'",
+        ),
         ({"range_ratio": "0"}, r"range ratio must be a number from 0.01 to 10 \[of 1 km\], not 0"),
     ],
 )

@@ -1,8 +1,12 @@
 """Presets against the paper's text, its authors' code and the sources of their channels."""
 
+import math
+
 import pytest
 
-from swarm_mj.mission import PRESETS, paper, reference
+from swarm_mj.mission import PAPERS, PRESETS, WORLDS, paper, reference
+from swarm_mj.physics.solid_geoms import LOSS_DB
+from swarm_mj.radio.path_loss import log_distance
 
 TASKS = ["stationary", "random-walk", "flocking"]
 
@@ -47,7 +51,8 @@ def test_only_a_flock_flies_without_walls(preset):
 def test_presets_go_by_name():
     assert PRESETS["paper"]("stationary") == paper("stationary")
     assert PRESETS["reference"]("stationary") == reference("stationary")
-    assert set(PRESETS) == {"paper", "reference"}
+    assert set(PAPERS) == {"paper", "reference"}
+    assert set(PRESETS) == {"paper", "reference", "indoor", "urban", "open-field"}
 
 
 OTHER = {
@@ -68,3 +73,41 @@ OTHER = {
 @pytest.mark.parametrize("name", OTHER)
 def test_any_field_can_be_overridden(preset, name):
     assert getattr(preset("stationary", **{name: OTHER[name]}), name) == OTHER[name]
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_a_world_is_the_papers_text_but_for_its_arena_and_channel(name):
+    mission, paper_s = PRESETS[name](), paper("random-walk")
+    differs = {key for key, value in vars(mission).items() if value != getattr(paper_s, key)}
+    about_arena = {"arena", "physics"} if mission.arena != "open" else set()
+    assert differs - {"preset"} - about_arena <= {
+        *("path_loss", "loss_exponent", "reference_m", "antenna_height_m"),
+        *("shadowing_db", "shadowing_distance_m", "fading", "rician_k"),
+    }
+    assert mission.preset == name
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_whatever_is_given_beside_a_world_overrides_it(name):
+    given = {"fading": "none", "num_robots": 7, "path_loss": "free-space", "arena": "open"}
+    mission = PRESETS[name]("flocking", **given)
+    assert {key: getattr(mission, key) for key in given} == given
+    assert (mission.task, mission.physics, mission.boundary) == ("flocking", "exact", "none")
+
+
+def test_channels_of_worlds_are_their_sources():
+    """TR 38.901: UMi at 100 m and 2.4 GHz loses 32.4 + 42 + 7.6 dB; K are 9, 7 and 7 dB."""
+    urban = PRESETS["urban"]()
+    law = log_distance(urban.loss_exponent, urban.reference_m)
+    assert law.loss_db(100.0, urban.frequency_hz) == pytest.approx(82.0, abs=0.1)
+    in_db = {name: 10.0 * math.log10(PRESETS[name]().rician_k) for name in WORLDS}
+    assert in_db == pytest.approx({"indoor": 7.0, "urban": 9.0, "open-field": 7.0}, abs=0.05)
+
+
+def test_a_block_takes_about_what_umi_loses_without_line_of_sight():
+    """At 200 m, 2.4 GHz: 35.3 log10(200) + 22.4 + 21.3 log10(2.4) dB without line of sight."""
+    urban = PRESETS["urban"]()
+    law = log_distance(urban.loss_exponent, urban.reference_m)
+    without_db = 35.3 * math.log10(200.0) + 22.4 + 21.3 * math.log10(2.4)
+    through_db = law.loss_db(200.0, urban.frequency_hz) + LOSS_DB["building"]
+    assert through_db == pytest.approx(without_db, abs=2.0)

@@ -1,9 +1,11 @@
 """Shipped arenas: they grow with the team, robots start in free space and never enter a wall."""
 
+from itertools import combinations, groupby
+
 import numpy as np
 import pytest
 
-from swarm_mj.mission import paper, reference
+from swarm_mj.mission import PRESETS, paper, reference
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.physics.scene import compose
 from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP, obstacles_of
@@ -87,3 +89,23 @@ def test_an_unknown_arena_or_a_broken_file_is_an_error_that_says_so(tmp_path):
     file.write_text(PILLAR.replace('size="20 5"', 'size="twenty"'))
     with pytest.raises(ValueError, match=r"broken.xml: .*line 2"):
         compose(paper(arena=str(file)))
+
+
+def test_robots_of_the_urban_preset_lose_each_other_behind_blocks_and_find_each_other_again():
+    """Pairs that are linked, then not for 2 s at least, then linked again, for as long each."""
+    swarm = Swarm(PRESETS["urban"](num_robots=20), [1])
+    gains, rule = swarm.channel.gains, swarm.channel.reception
+    everyone, linked = np.ones((1, 20), dtype=bool), []
+    for _ in range(500):
+        position_m = swarm.move().position_m
+        received_mw = gains.received_mw(position_m, np.zeros(1, dtype=int), everyone)[0]
+        linked.append(received_mw >= rule.noise_mw * rule.threshold)
+    num_found = 0
+    for i, j in combinations(range(20), 2):
+        runs = [
+            (is_linked, len(list(run)))
+            for is_linked, run in groupby(links[i, j] for links in linked)
+        ]
+        lasting = [is_linked for is_linked, length in runs if length >= 20]
+        num_found += [True, False, True] in [lasting[k : k + 3] for k in range(len(lasting))]
+    assert num_found > 5

@@ -2,7 +2,7 @@ import itertools
 
 import pytest
 
-from swarm_mj.mission import paper, reference
+from swarm_mj.mission import PRESETS, WORLDS, paper, reference
 from swarm_mj.policies import tuning
 from swarm_mj.policies.tuning import TABLE, Tuned, read_table, tuned_probability
 
@@ -131,3 +131,11 @@ def test_a_broken_table_is_a_clear_error(tmp_path, text, complaint):
     path.write_text(text)
     with pytest.raises(ValueError, match=complaint):
         read_table(path)
+
+
+@pytest.mark.parametrize("preset", WORLDS)
+@pytest.mark.parametrize("policy", POLICIES)
+def test_worlds_take_what_was_tuned_for_the_papers_text(policy, preset):
+    for task in ("stationary", "random-walk", "coverage"):
+        tuned = tuned_probability(policy, PRESETS[preset](task))
+        assert tuned == tuned_probability(policy, paper(task))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from swarm_mj.evaluation.published import SWEEPS, points
-from swarm_mj.mission import PRESETS, Mission, Task
+from swarm_mj.mission import PAPERS, Mission, Task
 from swarm_mj.policies.registry import WITHOUT_PAYLOAD
 
 FLOCK = "fig2"  # a mission's start and end, drawn by `flock`; the others are below
@@ -82,7 +82,7 @@ class ResultFigure:
 
     def mission(self, preset: str) -> Mission:
         """The missions' numbers as a preset has them; x is any."""
-        return PRESETS[preset](self.task)
+        return PAPERS[preset](self.task)
 
     def command(self, preset: str) -> str:
         """The command that makes the figure's results."""

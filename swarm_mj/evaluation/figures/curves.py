@@ -13,7 +13,7 @@ from swarm_mj.evaluation.figures.contents import OPTIONS, ResultFigure
 from swarm_mj.evaluation.published import points
 from swarm_mj.evaluation.results import Result, carries_more
 from swarm_mj.io.reading import read_json
-from swarm_mj.mission import PRESETS
+from swarm_mj.mission import PAPERS
 
 # A figure compares policies, so all else is the same.
 AGREED = ("episodes", "seed", "version")  # the commits stand in the caption
@@ -38,15 +38,18 @@ class Curve:
 
 
 def preset_of(results: Sequence[Result]) -> str:
-    """The one preset of all results; raises ValueError if there are several, or it is unknown."""
+    """The one preset of all results, one of the paper's; raises ValueError if it is not."""
     presets = list(dict.fromkeys(result.preset for result in results))
     if len(presets) > 1:
         raise ValueError(
             f"results are of the presets {' and '.join(presets)}; draw one at a time, from files "
             "of one preset each"
         )
-    if presets[0] not in PRESETS:
-        raise ValueError(f"preset must be one of {', '.join(PRESETS)}, not {presets[0]!r}")
+    if presets[0] not in PAPERS:
+        raise ValueError(
+            f"the paper's figures need a preset of the paper's, {' or '.join(PAPERS)}, not "
+            f"{presets[0]!r}"
+        )
     return presets[0]
 
 

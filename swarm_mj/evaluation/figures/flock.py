@@ -14,7 +14,7 @@ from matplotlib.ticker import MultipleLocator
 from swarm_mj.evaluation.figures.style import FAINT, RAMP, WIDTH_IN, styled, write_caption
 from swarm_mj.evaluation.results import CARRIES_MORE
 from swarm_mj.io.provenance import commit, version
-from swarm_mj.mission import PRESETS, Mission
+from swarm_mj.mission import PAPERS, Mission
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import velocity_variance
 from swarm_mj.rollout import rollout
@@ -65,7 +65,7 @@ def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
     An arrow's colour is how far the robot's velocity is from the team's mean. Raises ValueError as
     `fly_flock` does.
     """
-    mission = PRESETS[preset]("flocking")
+    mission = PAPERS[preset]("flocking")
     start, end = fly_flock(mission, policy_name, seed)
     with styled():
         drawing = Figure(figsize=(WIDTH_IN, HEIGHT_IN))

@@ -4,7 +4,7 @@ import json
 from dataclasses import asdict, fields, replace
 
 from swarm_mj.evaluation.results import Result
-from swarm_mj.mission import PRESETS
+from swarm_mj.mission import PAPERS
 
 SAID = {"version": "1.2.3", "commit": "abc123", "baseline": "tdma", "episodes": 4, "seed": 50}
 
@@ -12,7 +12,7 @@ SAID = {"version": "1.2.3", "commit": "abc123", "baseline": "tdma", "episodes": 
 def result(policy, task="stationary", preset="reference", config=None, **overrides):
     """One row: `overrides` are fields of the mission, or of the result."""
     names = {field.name for field in fields(Result)}
-    mission = asdict(PRESETS[preset](task))
+    mission = asdict(PAPERS[preset](task))
     mission |= {name: value for name, value in overrides.items() if name in mission}
     empty = {field.name: 1.0 if field.type is float else None for field in fields(Result)}
     row = empty | {name: value for name, value in mission.items() if name in names}

@@ -113,7 +113,7 @@ def test_missions_that_differ_from_the_preset_in_their_config_alone_are_refused(
 def test_two_presets_and_unknown_ones_are_refused():
     with pytest.raises(ValueError, match="presets reference and paper; draw one at a time"):
         preset_of([*everything("reference"), *everything("paper")])
-    with pytest.raises(ValueError, match="one of paper, reference, not 'mine'"):
+    with pytest.raises(ValueError, match="paper or reference, not 'mine'"):
         preset_of([replace(result("mst"), preset="mine")])
     assert preset_of(everything("paper")) == "paper"
 
