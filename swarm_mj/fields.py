@@ -75,6 +75,8 @@ def as_typed(value: object) -> str:
     """A setting's value as it is typed."""
     if isinstance(value, tuple):
         return " ".join(map(as_typed, value))
+    if value is None:
+        return "none"
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 

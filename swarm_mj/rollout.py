@@ -42,6 +42,7 @@ class Summary:
     hops_mean: Float[np.ndarray, "B"]  # depth of the parent trees [hops]
     complete_window: Float[np.ndarray, "B"]  # everyone had first heard of everyone, or nan
     packets_sent: Float[np.ndarray, "B"]  # requests or broadcasts
+    packets_transmitted: Float[np.ndarray, "B"]  # all that were on the air, responses too
     packets_attempted: Float[np.ndarray, "B"]  # requests
     packets_delivered: Float[np.ndarray, "B"]
     packets_lost: Float[np.ndarray, "B"]

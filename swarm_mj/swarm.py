@@ -28,6 +28,8 @@ from swarm_mj.protocol.buffers import (
 )
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
 from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.packets import fitting, packet_of
+from swarm_mj.protocol.partial_packets import with_room
 from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, RequestResponse, WindowProtocol
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import Channel, VaryingChannel
@@ -116,7 +118,8 @@ class Swarm:
         self._policy_rngs = policy
         self._survivors = draw_survivors(mission, outage)
         self.now = np.zeros(len(seeds))  # t [windows]
-        self.buffers: Buffers = empty_buffers(len(seeds), mission.num_robots)
+        room = fitting(packet_of(mission), mission, "T, M and P").num_entries
+        self.buffers: Buffers = with_room(empty_buffers(len(seeds), mission.num_robots), room)
         observe_self(self.buffers, self.states, self.now)
         if mission.grants("start"):
             grant_start(self.buffers, self.states)
@@ -160,7 +163,9 @@ class Swarm:
             TypeError: It is no policy.
         """
         check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
+        room = policy.packet(self.mission).num_entries
         policy.start(self.mission.num_robots, self._policy_rngs)
+        self.buffers = with_room(self.buffers, room)
         self._started = policy
 
     def decide(self, policy: Policy) -> Int[np.ndarray, "B N"]:
@@ -192,6 +197,8 @@ class Swarm:
             TypeError: It is no policy.
         """
         check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
+        if policy is not self._started:
+            self.start(policy)
         return self._play(policy.window(self.mission), lambda: self.decide(policy))
 
     def exchange(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:

@@ -12,11 +12,12 @@ from swarm_mj.swarm import Swarm
 
 ADDRESSED = ("attempted", "delivered", "overheard", "answered")
 BROADCAST = ("sent", "heard", "receptions")
+TRANSMITTED = {"transmitted": [4.0, 2.0]}  # in each window
 
 
 def packets_of(**counts):
     """Counts of one kind of packets in two missions; those of the other kind are nan."""
-    nothing = {name: [np.nan, np.nan] for name in (*ADDRESSED, *BROADCAST)}
+    nothing = {name: [np.nan, np.nan] for name in (*ADDRESSED, *BROADCAST)} | TRANSMITTED
     return Packets(**{name: np.array(count) for name, count in (nothing | counts).items()})
 
 
@@ -55,6 +56,7 @@ def test_summary_by_hand():
     np.testing.assert_allclose(summary.velocity_variance_last, [0.0, 6.0])
     np.testing.assert_allclose(summary.hops_mean, [1.5, 1.0])
     np.testing.assert_allclose(summary.packets_sent, [5.0, 4.0])
+    np.testing.assert_allclose(summary.packets_transmitted, [12.0, 6.0])
     np.testing.assert_allclose(summary.packets_attempted, [5.0, 4.0])
     np.testing.assert_allclose(summary.packets_delivered, [3.0, 2.0])
     np.testing.assert_allclose(summary.packets_lost, [2.0, 2.0])

@@ -103,7 +103,7 @@ def fly(
     return Run(
         mission=mission,
         config=flight_config(mission, name, chosen, seed=seed, observer=observer) | named,
-        summary=Numbers(flight_summary(chosen, flown)),
+        summary=Numbers(flight_summary(mission, chosen, flown)),
         windows=tuple(flown.windows),
         log=recorder.log() if recorder else None,
     )

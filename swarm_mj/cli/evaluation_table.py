@@ -12,6 +12,7 @@ from rich.table import Table
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
 from swarm_mj.mission.specification import NOTHING, OPEN
+from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 
 MIN_WIDTH = 100  # of a table; narrower consoles wrap its lines rather than cut numbers off
 NAME_WIDTH = 17  # of a policy that fits in there; a longer directory's name widens the table
@@ -41,7 +42,7 @@ def print_results(results: Sequence[Result], **where: Any) -> None:
         of_regime = sorted(group, key=lambda result: result.aoi_mean)
         console.print(regime)
         wide.print(_table(of_regime))
-        for line in _bound(of_regime):
+        for line in (*_sent(of_regime), *_bound(of_regime)):
             console.print(line)
         console.print()
     console.print(_legend(results))
@@ -50,6 +51,8 @@ def print_results(results: Sequence[Result], **where: Any) -> None:
 def _regime(result: Result) -> str:
     """A table's title."""
     parts = {name: getattr(result, name) for name in ("radio", "channel", "controller", "scene")}
+    rate = result.bit_rate
+    parts |= {"bit rate": bits_per_second(rate)} if rate is not None else {}
     parts |= {"arena": result.arena} if result.arena != OPEN else {}
     parts |= {"known": result.known} if result.known != NOTHING else {}
     own = "".join(f",\n{kind} {name}" for kind, name in parts.items() if name)
@@ -83,7 +86,7 @@ COLUMNS: dict[str, Callable[[Result], str]] = {
         f"{_interval(r.aoi_difference_ci_low, r.aoi_difference_ci_high)}"
     ),
     "packets\nreached": lambda r: f"{_number(r.packets_per_window)}\n{_number(_reached(r), '.0%')}",
-    "hearers": lambda r: _number(r.hearers_per_packet),
+    "hearers\nbytes": lambda r: f"{_number(r.hearers_per_packet)}\n{_number(r.packet_bytes, ',d')}",
 }
 
 
@@ -124,6 +127,16 @@ def _reached(result: Result) -> float | None:
     return result.heard_ratio if result.delivery_ratio is None else result.delivery_ratio
 
 
+def _sent(results: Sequence[Result]) -> list[str]:
+    """What each team sends in a second, where that is known."""
+    told = [
+        f"{result.policy} {BITS_PER_BYTE * result.bytes_per_second / 1000.0:,.1f}"
+        for result in results
+        if result.bytes_per_second is not None
+    ]
+    return [f"sent by the team [kbit/s]: {', '.join(told)}"] if told else []
+
+
 def _published(result: Result) -> str:
     """The paper's age and, of flocks, its velocity variance below."""
     age = _with_error(result.published_aoi_mean, result.published_aoi_sem)
@@ -153,6 +166,7 @@ def _legend(results: Sequence[Result]) -> str:
         f"Difference: AoI minus that of {first.baseline}, mission by mission.",
         "Packets: sent in a window, and the share that reached its addressee or, of broadcasts, "
         "at least one robot; hearers: robots that decoded a broadcast, on average.",
+        "Bytes: of a packet.",
     ]
     for result in filter(_has_own_cost, results):
         named = f"{result.task_cost_name} [{result.task_cost_unit}]"
@@ -171,7 +185,7 @@ def _legend(results: Sequence[Result]) -> str:
     return " ".join(sentences)
 
 
-def _number(value: float | None, form: str = ".2f") -> str:
+def _number(value: float | int | None, form: str = ".2f") -> str:
     return NONE if value is None else format(value, form)
 
 

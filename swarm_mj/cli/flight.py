@@ -108,10 +108,10 @@ def compile_ahead(
         on_window()
 
 
-def flight_summary(policy: Policy, flown: Flown) -> dict[str, Any]:
+def flight_summary(mission: Mission, policy: Policy, flown: Flown) -> dict[str, Any]:
     """What a flight cost, how long it took, and whether it ended early for whatever reason."""
     took = {"wall_seconds": flown.wall_s, "interrupted": flown.code != DONE}
-    return flight_numbers(policy, summarise(flown.windows)) | took
+    return flight_numbers(mission, policy, summarise(flown.windows)) | took
 
 
 def flight_config(
@@ -122,6 +122,7 @@ def flight_config(
         **asdict(mission),
         "policy": policy_name,
         **policy.parameters,
+        "packet_bytes": policy.packet(mission).num_bytes,
         "seed": seed,
         "observer": observer,
         "version": version(),

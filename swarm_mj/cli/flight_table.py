@@ -13,13 +13,14 @@ from swarm_mj.mission import PRESETS, WORLDS, Mission
 from swarm_mj.mission.robot_failures import num_failures
 from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
+from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 from swarm_mj.rollout import Summary
 
 AGREED = 0.01  # of the first window's velocity variance: a flock with less has agreed
 AGE = "age of information: how old a robot's news of another is, over all pairs; less is better"
 
 
-def flight_numbers(policy: Policy, summary: Summary) -> dict[str, Any]:
+def flight_numbers(mission: Mission, policy: Policy, summary: Summary) -> dict[str, Any]:
     """The summary of the one mission flown, and what flew it; what does not exist is None."""
     numbers: dict[str, Any] = {"num_windows": summary.num_windows}
     for name, value in asdict(summary).items():
@@ -30,7 +31,11 @@ def flight_numbers(policy: Policy, summary: Summary) -> dict[str, Any]:
             number = float(value[0])
             numbers[name] = None if math.isnan(number) else int(number) if is_count else number
     first, last = numbers["velocity_variance_first"], numbers["velocity_variance_last"]
+    packet_bytes = policy.packet(mission).num_bytes
+    flown_s = numbers["num_windows"] * mission.window_s
     return numbers | {
+        "packet_bytes": packet_bytes,
+        "bytes_per_second": packet_bytes * numbers["packets_transmitted"] / flown_s,
         "velocity_variance_left": last / first if first > 0.0 else None,
         "payload": policy.payload,
         "is_centralised": isinstance(policy, CentralisedPolicy),
@@ -43,7 +48,9 @@ def flight_title(mission: Mission, policy: str, seed: int) -> str:
     if mission.switched_off:
         team += f", {mission.switched_off:.0%} of them off half-way"
     known = [f"known {mission.known}"] if mission.known != NOTHING else []
-    return ", ".join((mission.task, policy, team, f"seed {seed}", *_world(mission), *known))
+    rate = [] if mission.bit_rate is None else [bits_per_second(mission.bit_rate)]
+    flown = (mission.task, policy, team, f"seed {seed}")
+    return ", ".join((*flown, *_world(mission), *known, *rate))
 
 
 def _world(mission: Mission) -> list[str]:
@@ -60,7 +67,7 @@ def _world(mission: Mission) -> list[str]:
 
 
 def flight_table(title: str, mission: Mission, numbers: dict[str, Any], wall_s: float) -> Table:
-    """What a flight cost, by its `flight_numbers`, and took here [s]: at most 15 rows."""
+    """What a flight cost, by its `flight_numbers`, and took here [s]: at most 16 rows."""
     return named_values(title, flight_rows(mission, numbers, wall_s), caption=AGE)
 
 
@@ -75,6 +82,7 @@ def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> 
         "radio hops that news travelled, mean": f"{hops:.2f}" if hops else "-",
         **_packets(numbers),
         "packets carry": _payload(numbers["payload"]),
+        "  bytes each; sent by the team": _sizes(numbers),
         "who decides": decider if numbers["is_centralised"] else "each robot by itself",
         **_task_costs(mission, numbers),
     }
@@ -118,6 +126,12 @@ def _payload(payload: str) -> str:
     """What packets carry: the buffer is all that a robot knows, T, M and P (II-B)."""
     buffer = "the sender's buffer"
     return buffer if payload == "none" else f"{buffer} and {payload}"
+
+
+def _sizes(numbers: Mapping[str, Any]) -> str:
+    """What a packet weighs, and all of them in a second."""
+    rate = bits_per_second(BITS_PER_BYTE * numbers["bytes_per_second"])
+    return f"{numbers['packet_bytes']:,}; {rate}"
 
 
 def _task_costs(mission: Mission, numbers: Mapping[str, Any]) -> dict[str, str]:

@@ -102,7 +102,7 @@ def run(options: Options) -> int:
             mission, options.policy, policy, seed=options.seed, observer=options.observer
         )
         config |= options.named
-        numbers = flight_summary(policy, flown)
+        numbers = flight_summary(mission, policy, flown)
         summary = {"config": config} | numbers | {"replay": str(path) if path else None}
         try:  # either may fail
             with console.status("Writing ..."):

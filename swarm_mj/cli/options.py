@@ -27,7 +27,21 @@ def _path(text: str) -> Path:
     return Path(text)
 
 
-CONVERT: dict[Any, Callable[[str], Any]] = {Path: _path}
+def _bit_rate(text: str) -> float | None:
+    """A rate such as 250000, 250k or 6M, or `none`."""
+    if text.lower() == "none":
+        return None
+    unit = BIT_RATES.get(text[-1:].lower(), 1.0)
+    try:
+        return float(text if unit == 1.0 else text[:-1]) * unit
+    except ValueError:
+        example = "250k, 1M or none"
+        raise argparse.ArgumentTypeError(f"name bits per second, {example}, not {text!r}") from None
+
+
+BIT_RATES = {"k": 1e3, "m": 1e6, "g": 1e9}  # what a letter behind a number stands for
+# What makes a value of what was typed, by the value's type or unit.
+CONVERT: dict[Any, Callable[[str], Any]] = {Path: _path, "bit/s": _bit_rate}
 
 
 class Parser(argparse.ArgumentParser):
@@ -154,18 +168,18 @@ def add_option(
         is_many: Whether it takes several values, after one flag or several.
         is_required: Whether it must be given.
     """
-    text = _help(spec, default)
-    if kind_of(spec) is bool:
+    text, kind, known = _help(spec, default), kind_of(spec), spec.metadata
+    if kind is bool:
         group.add_argument(flag_of(spec), dest=dest, action="store_true", help=text)
         return
     how: dict[str, Any] = {
-        "type": spec.metadata.get("convert") or CONVERT.get(kind_of(spec), kind_of(spec)),
+        "type": known.get("convert") or CONVERT.get(known.get("unit")) or CONVERT.get(kind, kind),
         "metavar": _metavar(spec),
         "help": text,
     }
     if is_many or get_origin(spec.type) is tuple:
         how |= {"nargs": "+", "action": "extend"}
-    if not spec.metadata.get("is_positional"):
+    if not known.get("is_positional"):
         added = group.add_argument(flag_of(spec), dest=dest, required=is_required, **how)
     elif spec.default is MISSING:
         added = group.add_argument(dest, **how)

@@ -19,6 +19,7 @@ from swarm_mj.io.packages import is_installed, missing
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
 from swarm_mj.policies.registry import POLICIES, is_learned, make_policy, normalised
+from swarm_mj.protocol.packets import Packet, times
 
 WINDOWS = {
     "broadcasts": "two broadcasts, which nobody answers",
@@ -33,14 +34,15 @@ broadcasts: robots may transmit in both halves of a window, to all who hear; nob
 request: a robot addresses a teammate in the first half, which answers in the second.
 T, M, P: all that the sender knows of its teammates: when it was seen, the state, who told it.
 snapshots: two pictures of the whole team, on which robots agree to plan alike.
-p: the probability of a transmission, unless you give --probability; here that tuned for"""
+p: the probability of a transmission, unless you give --probability.
+Bytes and probabilities here are those for"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """The options of `swarm-mj policies`."""
 
-    EPILOG: ClassVar = "The probabilities p depend on the mission, so the options may name one."
+    EPILOG: ClassVar = "Probabilities and bytes depend on the mission, so the options may name one."
     name: str | None = setting(
         None,
         "say more of this one: a policy, a directory of a learned one, or module:Name of your own",
@@ -81,6 +83,8 @@ def facts_of(name: str, policy: Policy, mission: Mission) -> dict[str, Any]:
         "window": "broadcasts" if is_broadcast else "request",
         "uses": policy.uses,
         "payload": policy.payload,
+        "packet_bytes": policy.packet(mission).num_bytes,
+        "packet_fields": _fields(policy.packet(mission)),
         "probability": policy.parameters.get("probability"),
         "parameters": dict(policy.parameters),
         "class": f"{kind.__module__}.{kind.__qualname__}",
@@ -107,7 +111,29 @@ def _cells(each: dict[str, Any]) -> tuple[str, ...]:
     probability = each["probability"]
     name = each["name"].replace(" --", "\n  --")
     name += "" if probability is None else f"\n  p = {as_typed(probability)}"
-    return name, each["uses"], "\n".join(_carried(each["payload"])), each["window"]
+    carried = [*_carried(each["payload"]), f"{each['packet_bytes']:,} bytes"]
+    return name, each["uses"], "\n".join(carried), each["window"]
+
+
+def _fields(packet: Packet) -> list[dict[str, Any]]:
+    """A packet's table of fields: how wide, how many, and how far apart two numbers are."""
+    entries = [times(field, packet.num_entries) for field in packet.entry]
+    return [
+        {"name": field.name, "bits": field.bits, "count": field.count}
+        | ({"step": field.step, "unit": field.unit} if field.unit else {})
+        for field in (*packet.header, *entries, *packet.payload)
+    ]
+
+
+def _packet_table(fields: list[dict[str, Any]]) -> Table:
+    table = Table(title="a packet", title_justify="left")
+    table.add_column("field")
+    for column in ("bits", "numbers", "step"):
+        table.add_column(column, justify="right")
+    for each in fields:
+        step = f"{each['step']:.3g} {each['unit']}" if "step" in each else ""
+        table.add_row(each["name"], str(each["bits"]), f"{each['count']:,}", step)
+    return table
 
 
 def _carried(payload: str) -> tuple[str, ...]:
@@ -121,12 +147,15 @@ def _print_one(each: dict[str, Any], mission: Mission) -> None:
         "what it uses": each["uses"] or "it does not say: give its class a text `uses`",
         "in a window": WINDOWS[each["window"]],
         "packets carry": ", ".join(_carried(each["payload"])),
+        "packet": f"{each['packet_bytes']:,} bytes",
         **{name: as_typed(value) for name, value in each["parameters"].items()},
         "source": each["class"],
     }
     if each["probability"] is not None:
         rows["probability"] += f", tuned for {_described(mission)}"
-    Console(highlight=False).print(named_values(each["name"], rows))
+    shown = Console(highlight=False)
+    shown.print(named_values(each["name"], rows))
+    shown.print(_packet_table(each["packet_fields"]))
     console = plain_console()
     console.print(each["description"])
     policy = each["name"] if each["name"] in POLICIES else shlex.quote(each["name"])

@@ -22,6 +22,7 @@ from swarm_mj.swarm import Swarm
 MEANS = ("aoi", "velocity_variance", "hops")  # over windows
 TOTALS = {  # totals, and what `protocol.costs.Packets` calls them
     "packets_sent": "sent",
+    "packets_transmitted": "transmitted",
     "packets_delivered": "delivered",
     "packets_heard": "heard",
     "receptions": "receptions",
@@ -58,6 +59,7 @@ class BatchCosts:
     task_cost_last: list[Cost | None]  # as above, after the last window
     complete_window: list[Count | None]  # everyone had first heard of everyone
     packets_sent: list[Count]  # requests or broadcasts
+    packets_transmitted: list[Count]  # all that were on the air, responses too
     packets_delivered: list[Count | None]  # requests that their addressee decoded; None: broadcasts
     packets_heard: list[Count | None]  # broadcasts that somebody decoded; None: addressed packets
     receptions: list[Count | None]  # times that a robot decoded a broadcast; None: as above

@@ -41,6 +41,7 @@ class Result:
     channel: str | None = None  # the user's own, as module:Name; None is the mission's
     controller: str | None = None  # as above
     scene: str | None = None  # as above
+    bit_rate: float | None = None  # of the radio [bit/s]; None: packets of any size fit
     payload: str | None = None  # what packets carry beyond T, M and P (II-B); "none" or its name
 
     aoi_mean: float
@@ -75,6 +76,8 @@ class Result:
     task_cost_last_sem: float | None = None
 
     packets_per_window: float  # requests or broadcasts, no responses
+    packet_bytes: int | None = None  # of a packet; none of the older files has it
+    bytes_per_second: float | None = None  # sent by the team, responses too
     delivery_ratio: float | None  # of requests: decoded by their addressee
     heard_ratio: float | None = None  # of broadcasts: decoded by at least one robot
     hearers_per_packet: float | None = None  # robots that decoded a broadcast, on average

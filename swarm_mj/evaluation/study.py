@@ -115,15 +115,17 @@ class Study:
         return {pair: self.make_policy(pair[1], pair[0]).parameters for pair in self.pairs}
 
     def make_policy(self, policy: str, regime: Mission) -> Policy:
-        """A policy as it is evaluated in a regime."""
+        """A policy as it is evaluated in a regime; raises ValueError if its packets never fit."""
         is_deterministic = self.is_deterministic and is_learned(policy)
-        return make_policy(
+        made = make_policy(
             policy,
             regime,
             self.probability,
             is_deterministic=is_deterministic,
             features=self.features,
         )
+        made.packet(regime)
+        return made
 
     def task_cost(self, regime: Mission) -> tuple[str, str] | None:
         """What a regime's controller calls its task's cost, and the unit; None if it has none."""

@@ -18,6 +18,7 @@ from swarm_mj.evaluation.statistics import (
 )
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
+from swarm_mj.policies.policy import Policy
 from swarm_mj.protocol.window import SLOT_WINDOWS
 
 COSTS = ("aoi", "velocity_variance")  # of each mission
@@ -60,6 +61,7 @@ def summarise(
                 **_costs(own),
                 **_task_costs(own, study.task_cost(regime)),
                 **_packets(own, regime),
+                **_bytes(own, regime, study.make_policy(policy, regime)),
                 **_completeness(own),
                 **_differences(own, merged[regime, study.compared_to]),
                 **_published(policy, None if study.parts.named else regime),
@@ -151,6 +153,14 @@ def _packets(costs: BatchCosts, regime: Mission) -> dict[str, Any]:
         "heard_ratio": _per_packet(costs.packets_heard, sent),
         "hearers_per_packet": _per_packet(costs.receptions, sent),
     }
+
+
+def _bytes(costs: BatchCosts, regime: Mission, policy: Policy) -> dict[str, Any]:
+    """What a packet weighs, and all of them in a second of a mission."""
+    packet_bytes = policy.packet(regime).num_bytes
+    flown_s = len(costs.aoi) * regime.num_windows * regime.window_s
+    sent = sum(costs.packets_transmitted)
+    return {"packet_bytes": packet_bytes, "bytes_per_second": packet_bytes * sent / flown_s}
 
 
 def _per_packet(counts: Sequence[int | None], sent: int) -> float | None:

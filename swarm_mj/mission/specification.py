@@ -184,6 +184,18 @@ class Mission:
         convert=in_order,
     )
 
+    bit_rate: float | None = setting(
+        None,
+        "a packet that does not fit into a slot of 50 ms cannot be sent; such as 250k or 6M",
+        group=CHANNEL,
+        label="bit rate",
+        unit="bit/s",
+        source="not the paper's",
+        low=1.0,
+        high=1e12,
+        metavar="RATE",
+    )
+
     physics: PhysicsMode = _choice(
         "exact",
         "physics",

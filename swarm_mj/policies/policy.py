@@ -13,6 +13,7 @@ from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.packets import Packet, PacketField, fitting, packet_of
 from swarm_mj.protocol.window import DoubleBroadcast, RequestResponse, WindowProtocol
 
 Parameters = Mapping[str, bool | int | float | str]  # what a policy was made with, by name
@@ -35,6 +36,22 @@ class Policy:
     def payload(self) -> str:
         """What packets carry beyond T, M and P (II-B); "none" is what the paper's carry."""
         return "none"
+
+    def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:  # noqa: ARG002
+        """What packets carry beyond T, M and P, field by field; nothing unless a policy says so.
+
+        Args:
+            mission: Its team's size, area and velocities say how wide fields must be.
+        """
+        return ()
+
+    def packet(self, mission: Mission) -> Packet:
+        """What a packet holds: all of the sender's buffer, or as much of it as a slot has room for.
+
+        Raises:
+            ValueError: A slot does not even hold one entry and the payload.
+        """
+        return fitting(packet_of(mission, self.payload_fields(mission)), mission, name_of(self))
 
     @property
     def parameters(self) -> Parameters:

@@ -42,7 +42,7 @@ class Buffers:
 
     def read_only(self) -> "Buffers":
         """The same arrays, seen through views that cannot be written."""
-        views = {spec.name: getattr(self, spec.name).view() for spec in fields(self)}
+        views = {spec.name: getattr(self, spec.name).view() for spec in fields(Buffers)}
         for view in views.values():
             view.flags.writeable = False
         return Buffers(**views)
@@ -115,7 +115,11 @@ def record_attempt(
     _write_attempt(buffers.last_attempt, recipient, now, silence_is_attempt, is_active)
 
 
-def merge(buffers: Buffers, heard: Int[np.ndarray, "B N"]) -> None:
+def merge(
+    buffers: Buffers,
+    heard: Int[np.ndarray, "B N"],
+    is_sent: Bool[np.ndarray, "B N N"] | None = None,
+) -> None:
     """Takes over whatever is strictly newer in the packet each robot decoded (Eq. 8).
 
     A packet holds its sender's buffer as it was before the phase. Information that comes straight
@@ -124,12 +128,15 @@ def merge(buffers: Buffers, heard: Int[np.ndarray, "B N"]) -> None:
     Args:
         buffers: Written in place.
         heard: The sender that each robot decoded; itself is nobody.
+        is_sent: `[b, i, k]`: whether i's packet has an entry of k; None: packets are whole.
 
     Raises:
         ValueError: A sender is no robot, or there is not one per robot.
     """
     check_robots("sender heard", heard, buffers.shape)
-    _merge_newer(buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent, heard)
+    _merge_newer(
+        buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent, heard, is_sent
+    )
 
 
 def check_robots(
@@ -210,6 +217,29 @@ def _write_attempt(
                 last_attempt[b, i, j] = now[b]
 
 
+# In these two, None for `is_sent` is compiled apart, without the test.
+@compiled()
+def _is_taken(
+    sent: float, held: float, is_sent: Bool[np.ndarray, "B N N"] | None, b: int, j: int, k: int
+) -> bool:
+    """Whether j's packet has an entry of k, and that is newer than what its receiver holds."""
+    if is_sent is not None and not is_sent[b, j, k]:
+        return False
+    return is_newer(sent, held)
+
+
+@compiled()
+def _new_parent(
+    sent: int, is_sent: Bool[np.ndarray, "B N N"] | None, b: int, i: int, j: int, k: int
+) -> int:
+    """The parent of k for i, which decoded j; the sender, if the parent's own entry is left out."""
+    if k == j:
+        return i
+    if is_sent is not None and not is_sent[b, j, sent]:
+        return j
+    return sent
+
+
 @compiled()
 def _merge_newer(
     timestamp: Float[np.ndarray, "B N N"],
@@ -217,6 +247,7 @@ def _merge_newer(
     velocity_mps: Float[np.ndarray, "B N N 2"],
     parent: Int[np.ndarray, "B N N"],
     heard: Int[np.ndarray, "B N"],
+    is_sent: Bool[np.ndarray, "B N N"] | None,
 ) -> None:
     num_missions, num_robots = heard.shape
     for b in range(num_missions):
@@ -235,10 +266,10 @@ def _merge_newer(
             j = heard[b, i]
             if j != i:
                 for k in range(num_robots):
-                    if is_newer(sent_timestamp[j, k], timestamp[b, i, k]):
+                    if _is_taken(sent_timestamp[j, k], timestamp[b, i, k], is_sent, b, j, k):
                         timestamp[b, i, k] = sent_timestamp[j, k]
                         position_m[b, i, k, 0] = sent_position_m[j, k, 0]
                         position_m[b, i, k, 1] = sent_position_m[j, k, 1]
                         velocity_mps[b, i, k, 0] = sent_velocity_mps[j, k, 0]
                         velocity_mps[b, i, k, 1] = sent_velocity_mps[j, k, 1]
-                        parent[b, i, k] = i if k == j else sent_parent[j, k]
+                        parent[b, i, k] = _new_parent(sent_parent[j, k], is_sent, b, i, j, k)

@@ -21,6 +21,7 @@ class Packets:
     """
 
     sent: Float[np.ndarray, "B"]  # requests or broadcasts, no responses
+    transmitted: Float[np.ndarray, "B"]  # all that were on the air, responses too
 
     attempted: Float[np.ndarray, "B"]  # requests, each to one recipient
     delivered: Float[np.ndarray, "B"]  # of these, decoded by the recipient
@@ -36,7 +37,10 @@ class Packets:
         return self.attempted - self.delivered
 
 
-PACKETS = ("sent", "attempted", "delivered", "lost", "overheard", "answered", "heard", "receptions")
+PACKETS = (
+    *("sent", "transmitted", "attempted", "delivered", "lost", "overheard", "answered"),
+    *("heard", "receptions"),
+)
 
 
 def age_of_information(
@@ -102,6 +106,7 @@ def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets
     if is_broadcast:
         return Packets(
             sent=first.sent + second.sent,
+            transmitted=first.sent + second.sent,
             attempted=none,
             delivered=none,
             overheard=none,
@@ -111,6 +116,7 @@ def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets
         )
     return Packets(
         sent=first.sent,
+        transmitted=first.sent + second.sent,
         attempted=first.sent,
         delivered=first.delivered,
         overheard=first.overheard + second.overheard,

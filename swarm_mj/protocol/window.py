@@ -15,6 +15,7 @@ from swarm_mj.compiled import compiled
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST, Buffers, merge, observe_self, record_attempt
 from swarm_mj.protocol.own_channel import decoded
+from swarm_mj.protocol.partial_packets import entries_sent
 from swarm_mj.radio.free_space import Channel, VaryingChannel
 
 SLOTS_PER_WINDOW = 2  # a transmission takes one, and so do its responses
@@ -247,7 +248,7 @@ def _send(
     sent_to = _of_active(states.is_active, recipient)
     at_once = channel_at(channel, now)
     heard = _of_active(states.is_active, decoded(at_once, states.position_m, sent_to))
-    merge(buffers, heard)
+    merge(buffers, heard, entries_sent(buffers, sent_to))
     return Phase(recipient=sent_to.copy(), heard=heard)
 
 

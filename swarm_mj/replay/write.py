@@ -4,12 +4,14 @@ import json
 from dataclasses import asdict, fields
 from pathlib import Path
 
+import numpy as np
 import rerun as rr
 import rerun_bindings as bindings
 
 from swarm_mj.io.atomic import write_bytes
 from swarm_mj.mission import Mission
 from swarm_mj.parts import OwnParts
+from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 from swarm_mj.replay import arena, charts, palette
 from swarm_mj.replay.digest import with_digest
 from swarm_mj.replay.footage import facts_of
@@ -60,7 +62,8 @@ def _recorded(log: Log, mission: Mission, config: dict[str, object], name: str) 
         facts = facts_of(log, mission, str(config.get("policy") or ""), _seed(config), _own(config))
         recording.send_property(FACTS, rr.AnyValues(json=json.dumps(asdict(facts))))
         draw(Sheet(recording, log, shown, mission.window_s), mission, packets)
-        lines = [f"- **{key}**: {value}" for key, value in config.items()]
+        said = config | _sent(log, mission, config)
+        lines = [f"- **{key}**: {value}" for key, value in said.items()]
         about = "\n".join([f"# {name}", *lines])
         recording.log("about", rr.TextDocument(about, media_type="text/markdown"), static=True)
     return stream.read() or b""
@@ -69,6 +72,16 @@ def _recorded(log: Log, mission: Mission, config: dict[str, object], name: str) 
 def _own(config: dict[str, object]) -> OwnParts:
     kinds = (spec.name for spec in fields(OwnParts))
     return OwnParts(**{kind: str(config[kind]) for kind in kinds if config.get(kind) is not None})
+
+
+def _sent(log: Log, mission: Mission, config: dict[str, object]) -> dict[str, object]:
+    """What the team sent in a second, if it is known what a packet weighs."""
+    packet_bytes = config.get("packet_bytes")
+    if not isinstance(packet_bytes, int):
+        return {}
+    num_packets = np.sum(log.recipient != np.arange(log.recipient.shape[2]))
+    bits = BITS_PER_BYTE * packet_bytes * num_packets
+    return {"sent by the team": bits_per_second(bits / (len(log.window) * mission.window_s))}
 
 
 def _seed(config: dict[str, object]) -> int:

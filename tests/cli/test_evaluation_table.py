@@ -31,6 +31,8 @@ LARGEST = {
     "aoi_difference_ci_high": -111.111,
     "velocity_variance_mean": 12.3456,
     "packets_per_window": 79.987,
+    "packet_bytes": 164_283,
+    "bytes_per_second": 11_111_111.1,
     "heard_ratio": 1.0,
     "hearers_per_packet": 39.125,
     "payload": "snapshots",
@@ -96,7 +98,7 @@ def test_what_does_not_exist_is_a_dash(printed):
     nothing = NOTHING | {"task": "flocking"}
     above, below = rows(printed([some_result("mst", 2.0, **nothing)], 100), "mst")
     assert above == ["mst", "2.00", "1.00", "-", "1.00", "-", "1.0000", "-"]
-    assert below == ["1.00", "-"]  # p95; no packet was sent, so no share of them arrived
+    assert below == ["1.00", "-", "-"]  # p95; no packet was sent, so no share of them arrived
 
 
 def test_broadcasts_have_hearers_and_addressed_packets_arrive(printed):
@@ -119,6 +121,23 @@ def test_who_carries_more_than_the_paper_s_packets_is_marked_and_explained(print
     _, below = rows(lines, "planner")
     assert below[: len(mark)] == mark
     assert ("+: packets carry more than T, M, P" in " ".join(lines)) == bool(mark)
+
+
+def test_what_packets_weigh_and_what_teams_send(printed):
+    """1000 bytes a second are 8 kbit/s; files made before it was counted say nothing of it."""
+    known = some_result("mst", 1.0, packet_bytes=7263, bytes_per_second=1000.0)
+    older = some_result("tdma", 2.0, packet_bytes=None, bytes_per_second=None)
+    lines = printed([known, older], 100)
+    assert "7,263" in rows(lines, "mst")[1]
+    assert "sent by the team [kbit/s]: mst 8.0" in lines
+
+
+def test_regimes_of_other_bit_rates_are_tables_of_their_own(printed):
+    lines = printed([some_result("mst", 1.0, bit_rate=rate) for rate in (250e3, 1e6)], 100)
+    assert [line for line in lines if line.startswith("bit rate")] == [
+        "bit rate 250 kbit/s,",
+        "bit rate 1 Mbit/s,",
+    ]
 
 
 def test_an_option_stands_below_its_policy(printed):

@@ -16,7 +16,7 @@ MISSION = paper("stationary", num_robots=3, num_windows=4, range_ratio=5.0)
 def test_a_flight_that_ended_early_is_called_interrupted(code):
     policy = make_policy("tdma", MISSION)
     windows = list(rollout(Swarm(MISSION, [1]), policy))
-    told = flight_summary(policy, Flown(windows, code, "", 2.5))
+    told = flight_summary(paper("stationary"), policy, Flown(windows, code, "", 2.5))
     assert (told["num_windows"], told["wall_seconds"]) == (4, 2.5)
     assert told["interrupted"] == (code != DONE)
 

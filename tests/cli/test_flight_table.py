@@ -12,9 +12,15 @@ from swarm_mj.policies.registry import WITHOUT_PAYLOAD, make_policy
 from swarm_mj.rollout import Summary
 
 NAN = np.array([np.nan])
-BROADCAST = {"packets_sent": 200.0, "packets_heard": 150.0, "hearers_per_packet": 2.5}
+BROADCAST = {
+    "packets_sent": 200.0,
+    "packets_transmitted": 200.0,
+    "packets_heard": 150.0,
+    "hearers_per_packet": 2.5,
+}
 ADDRESSED = {
     "packets_sent": 200.0,
+    "packets_transmitted": 250.0,
     "packets_attempted": 200.0,
     "packets_delivered": 50.0,
     "packets_lost": 150.0,
@@ -47,14 +53,14 @@ def shown(policy_name, task, its):
     """The table's rows as a mapping, and all its text."""
     mission = paper(task, num_robots=6)
     policy = make_policy(policy_name, mission)
-    table = flight_table("a title", mission, flight_numbers(policy, its), 1.5)
+    table = flight_table("a title", mission, flight_numbers(mission, policy, its), 1.5)
     console = Console(width=80, highlight=False)
     with console.capture() as printed:
         console.print(table)
     text = printed.get()
     assert max(map(len, text.splitlines())) <= 80
     cells = [line.split("│")[1:3] for line in text.splitlines() if "│" in line]
-    assert len(cells) <= 14
+    assert len(cells) <= 15
     return {name.strip(): value.strip() for name, value in cells}, text
 
 
@@ -76,8 +82,16 @@ def test_addressed_packets_are_delivered_or_lost():
     assert "at least one" not in text
 
 
+def test_bytes_are_those_of_all_packets_on_the_air():
+    """Six robots: header 3 and 6 entries of 9 are 57 bytes; 250 of them in 10 s are 11.4 kbit/s."""
+    rows, _ = shown("mst", "flocking", summary(**ADDRESSED))
+    assert rows["bytes each; sent by the team"] == "57; 11.4 kbit/s"
+    numbers = flight_numbers(paper(num_robots=6), make_policy("mst", paper()), summary(**ADDRESSED))
+    assert (numbers["packet_bytes"], numbers["bytes_per_second"]) == (57, 57 * 25.0)
+
+
 def test_nothing_sent_has_no_shares():
-    silent = {"packets_sent": 0.0, "packets_heard": 0.0}
+    silent = {"packets_sent": 0.0, "packets_transmitted": 0.0, "packets_heard": 0.0}
     rows, _ = shown("tdma", "flocking", summary(**silent, complete_window=np.nan))
     assert rows["packets broadcast"] == "0 (0.0 a window)"
     assert rows["heard by at least one robot"] == "0"
@@ -128,13 +142,13 @@ def test_velocities_are_those_of_moving_teams_and_agreement_that_of_flocks():
 
 
 def test_numbers_for_a_file():
-    numbers = flight_numbers(make_policy("planner", paper()), summary(**BROADCAST))
+    numbers = flight_numbers(paper(), make_policy("planner", paper()), summary(**BROADCAST))
     assert numbers["packets_sent"] == 200
     assert numbers["packets_lost"] is None
     assert numbers["velocity_variance_left"] == pytest.approx(0.0005)
     assert (numbers["payload"], numbers["is_centralised"]) == ("snapshots", False)
     still = summary(**ADDRESSED, velocity_variance_first=0.0, velocity_variance_last=0.0)
-    numbers = flight_numbers(make_policy("mst", paper()), still)
+    numbers = flight_numbers(paper(), make_policy("mst", paper()), still)
     assert numbers["velocity_variance_left"] is None
     assert (numbers["payload"], numbers["is_centralised"]) == ("none", True)
 
@@ -159,6 +173,8 @@ def test_the_title_names_the_arena_and_what_the_channel_adds():
     mission = paper("random-walk", arena="blocks", fading="rayleigh", known="map")
     title = flight_title(mission, "tdma", 3)
     assert title == "random-walk, tdma, 40 robots, seed 3, arena blocks, fading rayleigh, known map"
+    title = flight_title(paper("flocking", bit_rate=250e3), "tdma", 3)
+    assert title == "flocking, tdma, 40 robots, seed 3, 250 kbit/s"
 
 
 @pytest.mark.parametrize(

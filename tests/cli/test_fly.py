@@ -160,6 +160,12 @@ def test_contact_physics_flies(swarm_mj, tmp_path, boundary):
         (["--json", "summary"], "--json must be named *.json, not summary"),
         (["--no-record", "--view"], "--view needs a replay"),
         (["--no-record", "--record", "a.rrd"], "not allowed with"),
+        (["--bit-rate", "fast"], "argument --bit-rate: name bits per second, 250k, 1M or none"),
+        (["--bit-rate", "0"], "bit rate must be a number from 1 to 1e+12 [bit/s], not 0"),
+        (
+            ["--policy", "tdma", "--bit-rate", "2k"],
+            "need 16 bytes for a single entry, but a slot holds 12 at 2 kbit/s; choose a bit rate",
+        ),
         (["--wings", "2"], "unrecognized arguments: --wings 2"),
     ],
 )

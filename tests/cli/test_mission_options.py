@@ -39,6 +39,20 @@ def test_flocks_have_no_boundary_unless_they_are_given_one():
     assert mission("--boundary", "reflect") == paper("flocking", boundary="reflect")
 
 
+@pytest.mark.parametrize(
+    ("typed", "rate"), [("250000", 250e3), ("250k", 250e3), ("6M", 6e6), ("1.5g", 1.5e9)]
+)
+def test_bit_rates_may_have_a_letter_and_what_is_shown_can_be_typed(typed, rate):
+    given = mission("--task", "stationary", "--bit-rate", typed)
+    assert given == paper("stationary", bit_rate=rate)
+    assert mission(*mission_flags(given).split()) == given
+
+
+def test_one_of_several_bit_rates_may_be_none():
+    rates = [each.bit_rate for each in missions("--bit-rate", "250k", "none")]
+    assert rates == [250e3, None]
+
+
 def test_every_option_reaches_its_field():
     given = mission(
         "--task", "random-walk", "--robots", "7", "--velocity-ratio", "0.5", "--range-ratio",

@@ -52,6 +52,10 @@ REFUSED = [
     ((*NEW, "--robots", "many"), "argument --robots: invalid int value: 'many'"),
     ((*NEW, "--range-ratio", "0.02"), "too sparse"),
     ((*NEW, "--range-ratio", "nan"), "not nan"),
+    (
+        (*NEW, "--robots", "10", "--bit-rate", "10k"),
+        "whole packets, here of 94 bytes, but a slot holds 62; choose a higher --bit-rate",
+    ),
     ((*NEW, "--windows", "0"), "from 1 to 100000 [windows], not 0"),
     ((*NEW, "--seed", "-1"), "seed must be a whole number from 0 to 9223372036854775807, not -1"),
     ((*NEW, "--seed", "9223372036854775808"), "not 9223372036854775808"),

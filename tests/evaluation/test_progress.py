@@ -25,6 +25,7 @@ def some_costs(number):
         task_cost_last=[None, 1e9],
         complete_window=[None, 7],
         packets_sent=[1, 2],
+        packets_transmitted=[1, 3],
         packets_delivered=[0, None],
         packets_heard=[None, 2],
         receptions=[None, 5],

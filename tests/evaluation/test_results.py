@@ -29,7 +29,7 @@ def some_result(**overrides):
         kinds = get_args(spec.type) or (spec.type,)
         text = TEXTS.get(spec.name, f"some {spec.name}")
         values[spec.name] = {str: text, int: position, float: position / 300.0}[kinds[0]]
-    return Result(**values | overrides)
+    return Result(**values | {"bit_rate": 250e3} | overrides)
 
 
 OPTIONAL = [spec.name for spec in fields(Result) if NoneType in get_args(spec.type)]

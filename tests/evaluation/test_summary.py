@@ -35,6 +35,7 @@ def costs(aoi, **overrides):
         "task_cost_last": [age / 20.0 for age in aoi],
         "complete_window": [None] * n,
         "packets_sent": [1000] * n,
+        "packets_transmitted": [1500] * n,
         "packets_delivered": [250] * n,
         "packets_heard": [None] * n,
         "receptions": [None] * n,

@@ -1,0 +1,176 @@
+"""What a packet weighs: its fields, how wide each is, and how many entries fit into a slot.
+
+The paper's packets hold the sender's buffer: T, M and P of every robot (II-B). The simulation hands
+these numbers over as they are. The widths here are what they would take on the air, and a test
+holds every field to the precision that it promises. What the radio itself adds, such as preambles
+and checksums, is not counted.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from swarm_mj.mission import Mission
+from swarm_mj.protocol.buffers import NO_PARENT
+from swarm_mj.protocol.window import SLOT_WINDOWS
+
+BITS_PER_BYTE = 8
+POSITION_BITS, VELOCITY_BITS = 16, 8  # per axis
+AGE_BITS = 16  # ages of up to 32,767 windows; older ones count as that old
+
+
+@dataclass(frozen=True, kw_only=True)
+class PacketField:
+    """Numbers of one kind in a packet: code n stands for `low` + n `step`.
+
+    Raises:
+        ValueError: It has no width, a width that no whole number has, or a negative count.
+    """
+
+    name: str
+    bits: int  # of one number
+    count: int = 1  # numbers in a packet, or in an entry of it
+    low: float = 0.0  # the least number
+    step: float = 1.0  # from one number to the next
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.bits <= 64 or self.count < 0:
+            raise ValueError(
+                f"packet field {self.name!r} needs 1 to 64 bits and a count of 0 or more, not "
+                f"{self.bits} bits {self.count} times"
+            )
+
+    @property
+    def num_bits(self) -> int:
+        """Of all its numbers."""
+        return self.bits * self.count
+
+    def codes(self, values: Float[np.ndarray, "*shape"]) -> Int[np.ndarray, "*shape"]:
+        """What is sent for numbers: the nearest code, or the last one for what is beyond it."""
+        codes = np.rint((values - self.low) / self.step)
+        return np.clip(codes, 0, 2**self.bits - 1).astype(np.int64)
+
+    def values(self, codes: Int[np.ndarray, "*shape"]) -> Float[np.ndarray, "*shape"]:
+        """What is understood: within half a step of what was meant."""
+        return self.low + self.step * codes
+
+    def rounded(self, values: Float[np.ndarray, "*shape"]) -> Float[np.ndarray, "*shape"]:
+        """Numbers as they arrive."""
+        return self.values(self.codes(values))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Packet:
+    """A policy's packet: a header, an entry of T, M and P for each robot told of, a payload.
+
+    The header has a bit for every robot, which says whether its entry follows.
+    """
+
+    header: tuple[PacketField, ...]
+    entry: tuple[PacketField, ...]
+    num_entries: int  # at most
+    payload: tuple[PacketField, ...] = ()  # beyond T, M and P
+
+    @property
+    def num_bytes(self) -> int:
+        """Of a packet with all these entries."""
+        entries = self.num_entries * _num_bits(self.entry)
+        bits = _num_bits(self.header) + entries + _num_bits(self.payload)
+        return -(-bits // BITS_PER_BYTE)
+
+
+def packet_of(mission: Mission, payload: tuple[PacketField, ...] = ()) -> Packet:
+    """The packet that holds a whole buffer of a mission's robots, and a payload."""
+    header = (
+        identity("sender", mission),
+        identity("addressee", mission),
+        PacketField(name="robots told of", bits=1, count=mission.num_robots),
+    )
+    entry = (
+        age("age (T)"),
+        position("position (M)", mission, POSITION_BITS),
+        _symmetric("velocity (M)", VELOCITY_BITS, mission.max_velocity_mps, "m/s"),
+        identity("parent (P)", mission),
+    )
+    return Packet(header=header, entry=entry, num_entries=mission.num_robots, payload=payload)
+
+
+def identity(name: str, mission: Mission) -> PacketField:
+    """A robot, or none: one byte for up to 255 robots, two for more."""
+    bits = BITS_PER_BYTE * (1 if mission.num_robots < 2**BITS_PER_BYTE else 2)
+    return PacketField(name=name, bits=bits, low=float(NO_PARENT))
+
+
+def age(name: str) -> PacketField:
+    """How long ago something was observed; observations are half a window apart, so it is exact."""
+    return PacketField(name=name, bits=AGE_BITS, step=SLOT_WINDOWS, unit="windows")
+
+
+def position(name: str, mission: Mission, bits: int) -> PacketField:
+    """Where robots can get to; with 16 bits it steps by 1.5 cm for 40 robots within walls.
+
+    Teams without walls leave their area, at most with their largest velocity.
+    """
+    duration_s = mission.num_windows * mission.window_s
+    outside_m = 0.0 if mission.has_walls else mission.max_velocity_mps * duration_s
+    return _symmetric(name, bits, mission.half_side_m + outside_m, "m")
+
+
+def times(field: PacketField, count: int) -> PacketField:
+    """A field, so many times."""
+    return replace(field, count=field.count * count)
+
+
+def _symmetric(name: str, bits: int, most: float, unit: str) -> PacketField:
+    """Two axes from -most to most; 0 is among the codes, so what rests is seen to rest."""
+    step = most / (2 ** (bits - 1) - 1)
+    low = -step * 2 ** (bits - 1)
+    return PacketField(name=name, bits=bits, count=2, low=low, step=step, unit=unit)
+
+
+def slot_bytes(mission: Mission) -> int | None:
+    """What a slot holds at the mission's bit rate; None if it holds any packet."""
+    if mission.bit_rate is None:
+        return None
+    bits = mission.bit_rate * mission.window_s * SLOT_WINDOWS
+    return math.floor(round(bits / BITS_PER_BYTE, 6))
+
+
+def bits_per_second(rate: float) -> str:
+    """A bit rate in words, by the usual prefix."""
+    for prefix, unit in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
+        if rate >= unit:
+            return f"{rate / unit:.4g} {prefix}bit/s"
+    return f"{rate:.4g} bit/s"
+
+
+def fitting(packet: Packet, mission: Mission, policy: str) -> Packet:
+    """A packet with as many entries as a slot of the mission holds.
+
+    Args:
+        packet: Whole.
+        mission: Whose bit rate counts.
+        policy: Whose packet it is, for the message.
+
+    Raises:
+        ValueError: The slot does not hold the payload and one entry.
+    """
+    rate, capacity = mission.bit_rate, slot_bytes(mission)
+    if rate is None or capacity is None or packet.num_bytes <= capacity:
+        return packet
+    least = replace(packet, num_entries=1)
+    if least.num_bytes > capacity:
+        needed = least.num_bytes * BITS_PER_BYTE / (mission.window_s * SLOT_WINDOWS)
+        raise ValueError(
+            f"packets of {policy} need {least.num_bytes} bytes for a single entry, but a slot "
+            f"holds {capacity} at {bits_per_second(rate)}; choose a bit rate of {needed:g} or more"
+        )
+    spare = BITS_PER_BYTE * (capacity - least.num_bytes)
+    return replace(packet, num_entries=1 + spare // _num_bits(packet.entry))
+
+
+def _num_bits(fields: tuple[PacketField, ...]) -> int:
+    return sum(each.num_bits for each in fields)

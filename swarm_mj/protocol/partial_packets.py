@@ -1,0 +1,74 @@
+"""Packets that do not hold the whole buffer: which entries are sent (II-B, with a bit rate).
+
+A robot always sends its own entry, and beside it those whose T has risen most since it last sent
+them. So every entry gets its turn, and what nobody would learn from is not sent. An entry names its
+parent as it is if the parent's own entry is in the packet, and otherwise the sender: so what a
+receiver holds remains a tree, although some robots on the way are left out.
+"""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from swarm_mj.compiled import compiled
+from swarm_mj.protocol.buffers import NEVER, Buffers
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartialBuffers(Buffers):
+    """Buffers of which so many entries fit into a packet."""
+
+    num_entries: int
+    told: Float[np.ndarray, "B N N"]  # T^{i,j} as i last sent it [windows], or NEVER
+
+
+def with_room(buffers: Buffers, num_entries: int) -> Buffers:
+    """The same buffers, of which so many entries fit into a packet."""
+    if num_entries >= buffers.shape[1]:
+        return buffers
+    if isinstance(buffers, PartialBuffers):
+        return replace(buffers, num_entries=num_entries)
+    arrays = {spec.name: getattr(buffers, spec.name) for spec in fields(Buffers)}
+    told = np.full(buffers.timestamp.shape, NEVER)
+    return PartialBuffers(**arrays, num_entries=num_entries, told=told)
+
+
+def entries_sent(
+    buffers: Buffers, recipient: Int[np.ndarray, "B N"]
+) -> Bool[np.ndarray, "B N N"] | None:
+    """Which entries everyone sends in this slot, and notes that it has; None is all of them.
+
+    Args:
+        buffers: Whose `told` is written, if packets are partial.
+        recipient: Whom each robot addresses; itself is silence.
+
+    Returns:
+        `[b, i, k]`: whether i's packet has an entry of k.
+    """
+    if not isinstance(buffers, PartialBuffers):
+        return None
+    is_sent = np.zeros(buffers.timestamp.shape, dtype=np.bool_)
+    _choose(buffers.timestamp, recipient, buffers.num_entries, buffers.told, is_sent)
+    return is_sent
+
+
+@compiled()
+def _choose(
+    timestamp: Float[np.ndarray, "B N N"],
+    recipient: Int[np.ndarray, "B N"],
+    num_entries: int,
+    told: Float[np.ndarray, "B N N"],
+    is_sent: Bool[np.ndarray, "B N N"],
+) -> None:
+    num_missions, num_robots = recipient.shape
+    for b in range(num_missions):
+        for i in range(num_robots):
+            if recipient[b, i] == i:
+                continue
+            rise = timestamp[b, i] - told[b, i]
+            rise[i] = np.inf
+            for k in np.argsort(-rise)[:num_entries]:
+                if rise[k] > 0.0:
+                    is_sent[b, i, k] = True
+                    told[b, i, k] = timestamp[b, i, k]
