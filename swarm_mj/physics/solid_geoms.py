@@ -37,9 +37,7 @@ def obstacles_of(model: MjModel) -> Obstacles:
     """
     data = MjData(model)
     mj_kinematics(model, data)
-    stands_still = model.body_weldid[model.geom_bodyid] == 0
-    is_solid = np.isin(model.geom_type, (*KINDS, MESH))
-    found = np.flatnonzero(stands_still & is_solid & (model.geom_group == OBSTACLE_GROUP))
+    found = np.array(obstacle_geoms(model), dtype=int)
     kind, size_m = model.geom_type[found].copy(), model.geom_size[found].copy()
     centre_m = data.geom_xpos[found].copy()
     rotation = data.geom_xmat[found].reshape(-1, 3, 3).copy()
@@ -53,12 +51,24 @@ def obstacles_of(model: MjModel) -> Obstacles:
         rotation=rotation,
         size_m=size_m,
         reach_m=np.maximum(model.geom_rbound[found], 0.0),
-        power_left=10.0 ** (-np.array([_loss_db(model, int(g)) for g in found]) / 10.0),
+        power_left=10.0 ** (-np.array([loss_db_of(model, int(g)) for g in found]) / 10.0),
     )
 
 
-def _loss_db(model: MjModel, g: int) -> float:
-    """A geom's penetration loss [dB]."""
+def obstacle_geoms(model: MjModel) -> list[int]:
+    """Which geoms are obstacles."""
+    stands_still = model.body_weldid[model.geom_bodyid] == 0
+    is_solid = np.isin(model.geom_type, (*KINDS, MESH))
+    is_obstacle = stands_still & is_solid & (model.geom_group == OBSTACLE_GROUP)
+    return np.flatnonzero(is_obstacle).tolist()
+
+
+def loss_db_of(model: MjModel, g: int) -> float:
+    """An obstacle's penetration loss [dB].
+
+    Raises:
+        ValueError: It is negative or not finite.
+    """
     material = int(model.geom_matid[g])
     named = model.mat(material).name if material >= 0 else ""
     loss_db = LOSS_DB.get(named, USUAL_LOSS_DB)

@@ -3,18 +3,20 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.frame import frame
 from swarm_mj.replay.links import fates
+from swarm_mj.replay.looks import NO_SURPRISES, look
 from swarm_mj.replay.shots import shots
+from swarm_mj.replay.strokes import strokes_at_once
 from swarm_mj.swarm import Swarm
 
 
 @dataclass(frozen=True, kw_only=True)
 class Contents:
-    """N robots, L packets between them, and the square of ground that the picture shows."""
+    """N robots, L packets, S lines of links that surprise, and the ground that a picture shows."""
 
     position_m: Float[np.ndarray, "N 2"]  # p [m]
     velocity_mps: Float[np.ndarray, "N 2"]  # v; only its direction is drawn
@@ -23,6 +25,9 @@ class Contents:
     start_m: Float[np.ndarray, "L 2"]  # where packets begin and end [m]
     end_m: Float[np.ndarray, "L 2"]
     link_colour: UInt8[np.ndarray, "L 3"]
+    strokes_m: Float[np.ndarray, "S 2 2"]  # links that surprise, from start to end [m]
+    stroke_colour: UInt8[np.ndarray, "S 3"]
+    is_cut_off: Bool[np.ndarray, "N"]  # whether it can exchange no news with the observer
     centre_m: Float[np.ndarray, "2"]  # of the square [m]
     reach_m: float  # half its side [m]
 
@@ -69,6 +74,11 @@ def contents_of(
     seen = shots(fates(_flown(swarm, index, is_broadcast)), position_m[None])
     half_side_m = swarm.mission.half_side_m
     square = frame(position_m[None], half_side_m)
+    granted = look(swarm, index)
+    group = np.zeros(num_robots, dtype=int) if granted is None else granted.group
+    surprises = NO_SURPRISES if granted is None else granted.surprises
+    lines_m, line_colour = strokes_at_once(surprises, position_m)
+    is_on = _is_on(swarm, index)
     return Contents(
         position_m=position_m,
         velocity_mps=states.velocity_mps[index].copy(),
@@ -77,6 +87,9 @@ def contents_of(
         start_m=seen.start_m,
         end_m=seen.end_m,
         link_colour=seen.colour,
+        strokes_m=lines_m,
+        stroke_colour=line_colour,
+        is_cut_off=is_on & is_on[observer] & (group != group[observer]),
         centre_m=square.centre_m[0],
         reach_m=max(half_side_m, square.reach_m),  # as wide wherever the team is
     )
@@ -97,6 +110,10 @@ def _colours(
 ) -> UInt8[np.ndarray, "N 3"]:
     age = swarm.now[index] - swarm.buffers.timestamp[index, observer]
     is_known = swarm.buffers.is_known[index, observer]
-    is_active = swarm.states.is_active
-    is_on = np.ones(len(age), dtype=bool) if is_active is None else is_active[index]
+    is_on = _is_on(swarm, index)
     return palette.robot_colours(age, full_scale, is_known, is_on, observer)
+
+
+def _is_on(swarm: Swarm, index: int) -> Bool[np.ndarray, "N"]:
+    is_active = swarm.states.is_active
+    return np.ones(swarm.mission.num_robots, bool) if is_active is None else is_active[index]

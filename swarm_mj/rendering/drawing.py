@@ -3,17 +3,22 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int16
 from PIL import Image, ImageDraw, ImageFont
 
+from swarm_mj.mission import Mission
+from swarm_mj.mission.specification import OPEN
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
-from swarm_mj.replay.palette import Colour
+from swarm_mj.replay.palette import Colour, dim
+from swarm_mj.replay.strokes import BROKEN, STROKES
 
 CURVES: tuple[Colour, ...] = (palette.MEAN_AGE, palette.VARIANCE)  # of one flight, and a second
 FAINT = 0.45  # what is still to come, and texts that matter less
+SHADE = 0.35  # of columns behind a curve
 NUM_SHADES = 48
 
 
@@ -52,16 +57,24 @@ def draw_title(
     left, top, pad = box.left, box.top, size // 2
     draw.text((left + pad, top + pad), facts.policy, palette.TEXT, font(round(1.3 * size)))
     about = f"{mission.task}, {mission.num_robots} robots, seed {facts.seed}"
-    about = "\n".join([about, *facts.own_parts])
+    about = "\n".join([about, *_world(mission), *facts.own_parts])
     draw.text((left + pad, top + pad + 1.7 * size), about, palette.SENT, font(round(0.8 * size)))
     now = footage.window[row]
     time = f"{now * mission.window_s:.1f} s, window {now}"
     age = f"age {footage.age_mean[row]:.1f}"
     right = box.right - pad
     draw.text((right, top + pad), age, curve, font(round(1.3 * size)), anchor="ra")
-    draw.text(
-        (right, top + pad + 1.7 * size), time, palette.SENT, font(round(0.8 * size)), anchor="ra"
-    )
+    small, below = font(round(0.8 * size)), top + pad + 1.7 * size
+    draw.text((right, below), time, palette.SENT, small, anchor="ra")
+    if (num := int(np.sum(footage.is_cut_off[row]))) > 0:
+        told = f"{num} cut off from r{facts.observer}"
+        draw.text((right, below + size), told, palette.TOO_WEAK, small, anchor="ra")
+
+
+def _world(mission: Mission) -> list[str]:
+    """What the mission has that the paper's has not, in words."""
+    arena = [] if mission.arena == OPEN else [f"arena {Path(mission.arena).name}"]
+    return arena + [part for part in mission.beyond_free_space.split(", ") if part]
 
 
 def draw_legend(
@@ -69,8 +82,8 @@ def draw_legend(
 ) -> None:
     """The ramp of ages, and what the colours of packets mean."""
     small = font(round(0.8 * size))
-    who = " and ".join(dict.fromkeys(f"r{each.facts.observer}" for each in footages))
-    draw.text((box.left, box.top), f"age of what {who} (white) knows", palette.TEXT, small)
+    who = f"age of what {_observers(footages)} (white) knows"
+    draw.text((box.left, box.top), who, palette.TEXT, small)
     y, high = box.top + 1.25 * size, 0.55 * size
     edges = np.linspace(box.left, box.right, NUM_SHADES + 1)
     shades = palette.age_colours(
@@ -82,16 +95,41 @@ def draw_legend(
     draw.text((box.left, y), "0", palette.SENT, small)
     draw.text((box.right, y), f"{full_scale:g} windows or more", palette.SENT, small, anchor="ra")
     samples = {"never heard of": palette.UNKNOWN} | _packet_colours(footages)
+    samples |= _surprise_colours(footages)
     column = box.width / 2
     for k, (text, colour) in enumerate(samples.items()):
         x, line = box.left + (k % 2) * column, y + (1.35 + 1.1 * (k // 2)) * size
-        middle, radius = line + 0.45 * size, 0.3 * size
-        if colour == palette.UNKNOWN:  # of a robot; the others are packets'
-            box_of = (x + 0.5 * size - radius, middle - radius, x + 0.5 * size + radius)
-            draw.ellipse((*box_of, middle + radius), colour)
-        else:
-            draw.line((x, middle, x + size, middle), colour, max(2, size // 6))
+        _draw_sample(draw, colour, x, line + 0.45 * size, size)
         draw.text((x + 1.3 * size, line), text, palette.SENT, small)
+
+
+def _draw_sample(
+    draw: ImageDraw.ImageDraw, colour: Colour, x: float, middle: float, size: int
+) -> None:
+    """A disc for robots, and a line for packets and links; of those too weak, a broken one."""
+    if colour in (palette.UNKNOWN, palette.CUT_OFF):
+        centre, radius = x + 0.5 * size, 0.3 * size
+        disc = (centre - radius, middle - radius, centre + radius, middle + radius)
+        draw.ellipse(disc, colour)
+        return
+    is_broken = colour == STROKES["too_weak"]
+    for a, b in [(0.0, BROKEN), (1.0 - BROKEN, 1.0)] if is_broken else [(0.0, 1.0)]:
+        line = (x + a * size, middle, x + b * size, middle)
+        draw.line(line, colour, max(2, size // 6))
+
+
+def draw_shortfalls(
+    draw: ImageDraw.ImageDraw,
+    at: Float[np.ndarray, "K 2"],
+    margin_db: Int16[np.ndarray, "K"],
+    size: int,
+) -> None:
+    """By how much links are too weak, at these places; one that would cover another is left out."""
+    small, shown = font(round(0.75 * size)), []
+    for (x, y), margin in zip(at.tolist(), margin_db.tolist(), strict=True):
+        if all(abs(x - u) > 3.0 * size or abs(y - v) > 0.8 * size for u, v in shown):
+            draw.text((x, y), f"{margin} dB", palette.TOO_WEAK, small, anchor="mm")
+            shown.append((x, y))
 
 
 def _packet_colours(footages: Sequence[Footage]) -> dict[str, Colour]:
@@ -103,6 +141,24 @@ def _packet_colours(footages: Sequence[Footage]) -> dict[str, Colour]:
         colours |= {"delivered": palette.DELIVERED, "lost": palette.LOST}
         colours |= {"answered": palette.ANSWERED, "overheard": palette.OVERHEARD}
     return colours
+
+
+def _surprise_colours(footages: Sequence[Footage]) -> dict[str, Colour]:
+    """What links that surprise look like, if there are any, and robots that are cut off."""
+    found = [each.looks.surprises.by_kind for each in footages if each.looks is not None]
+    texts = {"believed, too weak": "too_weak", "works, unbelieved": "unbelieved"}
+    colours = {
+        text: STROKES[kind]
+        for text, kind in texts.items()
+        if any(len(of[kind].row) for of in found)
+    }
+    if any(np.any(each.is_cut_off) for each in footages):
+        colours["cut off from " + _observers(footages)] = palette.CUT_OFF
+    return colours
+
+
+def _observers(footages: Sequence[Footage]) -> str:
+    return " and ".join(dict.fromkeys(f"r{each.facts.observer}" for each in footages))
 
 
 class AgePlot:
@@ -117,20 +173,24 @@ class AgePlot:
         self._end_s = max(each.window[-1] * each.facts.mission.window_s for each in footages)
         self._top = palette.nice_top(max(float(np.max(each.age_mean)) for each in footages))
         self._curves = [self._curve(each) for each in footages]
+        self._cut_off = footages[0] if len(footages) == 1 else None
 
     def draw_axes(self, draw: ImageDraw.ImageDraw) -> None:
         """What does not change: title, numbers, and the whole curves, faintly."""
         small, inner = font(round(0.8 * self._size)), self._inner
         title = "mean age of information [windows]"
-        draw.text((inner.left, self._box.top), title, palette.TEXT, small)
         draw.rectangle((inner.left, inner.top, inner.right, inner.bottom), palette.GRID)
+        if self._cut_off is not None and np.any(self._cut_off.is_cut_off):
+            title += f"; red: share of robots that are cut off from {_observers([self._cut_off])}"
+            self._draw_cut_off(draw, self._cut_off)
+        draw.text((inner.left, self._box.top), title, palette.TEXT, small)
         for y, value in ((inner.top, f"{self._top:g}"), (inner.bottom, "0")):
             draw.text((inner.left - 4, y), value, palette.SENT, small, anchor="rm")
         below = inner.bottom + 2
         draw.text((inner.left, below), "0", palette.SENT, small)
         draw.text((inner.right, below), f"{self._end_s:g} s", palette.SENT, small, anchor="ra")
         for curve, colour in zip(self._curves, CURVES, strict=False):
-            draw.line([tuple(point) for point in curve.tolist()], palette.dim(colour, FAINT), 1)
+            draw.line([tuple(point) for point in curve.tolist()], dim(colour, FAINT), 1)
 
     def draw_until(self, draw: ImageDraw.ImageDraw, rows: Sequence[int]) -> None:
         """The curves so far, and where they are now."""
@@ -141,6 +201,15 @@ class AgePlot:
                 draw.line(points, colour, width, joint="curve")
             x, y = points[-1]
             draw.ellipse((x - radius, y - radius, x + radius, y + radius), colour)
+
+    def _draw_cut_off(self, draw: ImageDraw.ImageDraw, footage: Footage) -> None:
+        """The share of robots cut off from the observer, as columns: the plot's height is all."""
+        inner, share = self._inner, np.mean(footage.is_cut_off, axis=1)
+        x = inner.left + inner.width * footage.window * footage.facts.mission.window_s / self._end_s
+        for left, right, part in zip([inner.left, *x[:-1]], x, share, strict=True):
+            if part > 0.0:
+                top = inner.bottom - part * inner.height
+                draw.rectangle((left, top, right, inner.bottom), dim(palette.CUT_OFF, SHADE))
 
     def _curve(self, footage: Footage) -> Float[np.ndarray, "T 2"]:
         """A flight's ages as points of the picture."""

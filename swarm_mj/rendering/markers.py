@@ -18,7 +18,10 @@ ROBOT, OBSERVER, HEADING, LINE = 0.0085, 0.0115, 0.022, 0.0025
 SMALLEST = 520  # [pixels] in height: robots are not drawn smaller than on such a picture
 ROBOT_HEIGHT = 0.6  # of a marker, by its radius
 NO_TURN = np.eye(3).ravel()
-GEOMS_PER_ROBOT = 2 + 4 * SEGMENTS  # a disc, a heading, and arcs of all that a window can have
+HALO, HALO_HEIGHT = 1.7, 0.15  # of a robot that is cut off, by the robot's
+STROKES_PER_ROBOT = 40  # lines of links that surprise; of very dense teams, some are left out
+# A disc, a heading, a halo, arcs of all that a window can have, and lines.
+GEOMS_PER_ROBOT = 3 + 4 * SEGMENTS + STROKES_PER_ROBOT
 
 
 class Markers:
@@ -35,6 +38,7 @@ class Markers:
         picture_m = self._enlarged * camera.pixel_m * camera.height
         self._draw_robots(contents, picture_m)
         self._draw_links(contents, picture_m)
+        self._draw_strokes(contents, picture_m)
 
     def _draw_robots(self, contents: Contents, picture_m: float) -> None:
         """A disc for each robot, as large on the picture whatever the area; and its heading."""
@@ -43,7 +47,11 @@ class Markers:
         for i, (where, way) in enumerate(zip(contents.position_m, way_m, strict=True)):
             radius_m = (OBSERVER if i == contents.observer else ROBOT) * picture_m
             height_m = ROBOT_HEIGHT * radius_m
-            self._add_disc(np.append(where, height_m), radius_m, height_m, contents.colour[i])
+            self._add_disc(np.append(where, height_m), radius_m, radius_m, contents.colour[i])
+            if contents.is_cut_off[i]:
+                flat_m = HALO_HEIGHT * radius_m
+                colour = np.array(palette.CUT_OFF)
+                self._add_disc(np.append(where, flat_m), HALO * radius_m, flat_m, colour)
             if np.any(way):
                 ends = np.append(where, height_m), np.append(where + way, height_m)
                 self._add_line(*ends, np.array(palette.HEADING))
@@ -55,10 +63,19 @@ class Markers:
             for start, end in itertools.pairwise(points):
                 self._add_line(start, end, colour)
 
+    def _draw_strokes(self, contents: Contents, picture_m: float) -> None:
+        """Links that surprise as straight lines, as many as there is room for."""
+        room = self._scene.maxgeom - self._scene.ngeom
+        height_m = ROBOT_HEIGHT * ROBOT * picture_m
+        lifted = np.pad(contents.strokes_m, ((0, 0), (0, 0), (0, 1)), constant_values=height_m)
+        for (start, end), colour in zip(lifted[:room], contents.stroke_colour[:room], strict=True):
+            self._add_line(start, end, colour)
+
     def _add_disc(
-        self, where: Float[np.ndarray, "3"], radius_m: float, height_m: float, colour: np.ndarray
+        self, where: Float[np.ndarray, "3"], radius_m: float, half_m: float, colour: np.ndarray
     ) -> None:
-        size = np.array([radius_m, radius_m, height_m])
+        """A disc that reaches so far above and below its middle."""
+        size = np.array([radius_m, half_m, 0.0])
         kind = mjtGeom.mjGEOM_CYLINDER.value
         mjv_initGeom(self._next_geom(), kind, size, where, NO_TURN, _rgba(colour))
 

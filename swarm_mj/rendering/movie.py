@@ -9,11 +9,20 @@ from jaxtyping import Int, UInt8
 from PIL import Image, ImageDraw
 
 from swarm_mj.rendering.contents import Contents
-from swarm_mj.rendering.drawing import CURVES, AgePlot, Box, blank, draw_legend, draw_title
+from swarm_mj.rendering.drawing import (
+    CURVES,
+    AgePlot,
+    Box,
+    blank,
+    draw_legend,
+    draw_shortfalls,
+    draw_title,
+)
 from swarm_mj.rendering.scene import SceneRenderer
 from swarm_mj.rendering.style import Style
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
+from swarm_mj.replay.strokes import strokes_at_once
 
 MOST_MISSIONS = 2  # side by side
 STRIP = 0.22  # of the height, below the scenes
@@ -91,9 +100,13 @@ class Movie:
         for k, (footage, row, box) in enumerate(
             zip(self._footages, rows, self._boxes, strict=True)
         ):
-            scene = self._renderers[k].frame(self._contents(k, row))
+            contents = self._contents(k, row)
+            scene = self._renderers[k].frame(contents)
             picture.paste(Image.fromarray(scene), (box.left, box.top))
             draw_title(draw, footage, row, box, self._text, CURVES[k])
+            at_m, margin_db = footage.shortfalls(row)
+            at = self._renderers[k].camera(contents).pixels(np.pad(at_m, ((0, 0), (0, 1))))
+            draw_shortfalls(draw, at + np.array([box.left, box.top]), margin_db, self._text)
         for box in self._boxes[1:]:
             draw.line((box.left, 0, box.left, self._bottom), palette.BACKGROUND, SEAM)
         self._plot.draw_until(draw, rows)
@@ -108,6 +121,7 @@ class Movie:
     def _contents(self, k: int, row: int) -> Contents:
         footage, seen = self._footages[k], self._footages[k].shots
         first, last = np.searchsorted(seen.row, [row, row + 1])
+        lines_m, line_colour = strokes_at_once(footage.surprises(row), footage.position_m[row])
         return Contents(
             position_m=footage.position_m[row],
             velocity_mps=footage.velocity_mps[row],
@@ -116,6 +130,9 @@ class Movie:
             start_m=seen.start_m[first:last],
             end_m=seen.end_m[first:last],
             link_colour=seen.colour[first:last],
+            strokes_m=lines_m,
+            stroke_colour=line_colour,
+            is_cut_off=footage.is_cut_off[row],
             centre_m=self._frames[k].centre_m[row],
             reach_m=self._frames[k].reach_m,
         )

@@ -21,6 +21,7 @@ from mujoco._structs import MjData, MjModel, MjrRect, MjvCamera, MjvOption, MjvS
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene, compose
+from swarm_mj.physics.solid_geoms import obstacle_geoms
 from swarm_mj.rendering.camera import ELEVATION_DEG, FOV_Y_DEG, Camera, look_at
 from swarm_mj.rendering.contents import Contents
 from swarm_mj.rendering.markers import GEOMS_PER_ROBOT, Markers
@@ -32,7 +33,7 @@ TILE_M = 200.0  # the floor's texture, two squares by two, assets/arena.xml
 GROUND = 10.0  # an open floor's side, by the area's: a team that flies apart has left the area
 # What faces up has its own colour exactly, what stands upright half of it.
 AMBIENT, SUN = 0.5, 0.5
-WALL_OPACITY = 0.3  # a wall in front hides no robot
+WALL_OPACITY, OBSTACLE_OPACITY = 0.3, 0.35  # what stands in front hides no robot
 SLICES, STACKS = 14, 5  # of round things
 
 
@@ -161,7 +162,7 @@ def _close(renderer: "ref[SceneRenderer]") -> None:
 
 
 def light(model: MjModel, width: int, height: int) -> None:
-    """Light from above, and the size of the pictures."""
+    """Light from above, obstacles of glass, and the size of the pictures."""
     visual = model.vis
     visual.global_.offwidth, visual.global_.offheight = width, height
     visual.global_.fovy = FOV_Y_DEG
@@ -169,6 +170,10 @@ def light(model: MjModel, width: int, height: int) -> None:
     visual.headlight.ambient[:], visual.headlight.diffuse[:] = AMBIENT, 0.0
     model.light_diffuse[:], model.light_ambient[:] = SUN, 0.0
     model.light_dir[:] = (0.0, 0.0, -1.0)
+    for g in obstacle_geoms(model):
+        material = model.geom_matid[g]
+        colour = model.geom_rgba[g] if material < 0 else model.mat_rgba[material]
+        colour[3] = min(colour[3], OBSTACLE_OPACITY)
 
 
 def prepare(spec: MjSpec, mission: Mission) -> None:

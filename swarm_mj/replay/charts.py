@@ -10,6 +10,7 @@ from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay import palette
 from swarm_mj.replay.dendrogram import dendrogram
 from swarm_mj.replay.links import Links, broadcast_counts, transmitters
+from swarm_mj.replay.looks import Looks
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet
 
@@ -64,6 +65,10 @@ def draw_plots(sheet: Sheet, packets: dict[str, Links]) -> None:
         _plot(sheet, "plots/task/cost", cost.name, palette.VARIANCE, cost.value)
     for name, (colour, per_window) in packet_counts(log, packets).items():
         _plot(sheet, f"plots/radio/{name}", name, colour, rate(per_window))
+    if log.looks is not None:
+        for name, (colour, per_look) in surprise_counts(log, log.looks).items():
+            path = "plots/world/" + name.replace(" ", "_")
+            _plot(sheet, path, name, colour, per_look, log.looks.window)
 
 
 def shown_cost(log: Log) -> TaskCost | None:
@@ -82,6 +87,22 @@ def packet_counts(
         return {"sent": (palette.SENT, sent), "heard": (palette.BROADCAST, heard)}
     fates = ("delivered", "lost", "overheard", "answered")
     return {fate: (getattr(palette, fate.upper()), packets[fate].per_window) for fate in fates}
+
+
+def surprise_counts(
+    log: Log, looks: Looks
+) -> dict[str, tuple[palette.Colour, Int[np.ndarray, "C"]]]:
+    """What is plotted of a world beyond free space: names, colours, and counts at each look."""
+    counts = {
+        kind: np.bincount(found.row, minlength=len(looks.window))
+        for kind, found in looks.surprises.by_kind.items()
+    }
+    num_cut_off = np.sum(log.is_cut_off, axis=1)[looks.window - log.window[0]]
+    return {
+        "believed, too weak": (palette.TOO_WEAK, counts["too_weak"]),
+        "works, unbelieved": (palette.UNBELIEVED, counts["unbelieved"]),
+        f"robots cut off from r{log.ego}": (palette.EGO, num_cut_off),
+    }
 
 
 def draw_states(sheet: Sheet) -> None:
@@ -141,6 +162,13 @@ def walk(parent: Int[np.ndarray, "N"]) -> Int[np.ndarray, "N"]:
     return np.array(order)
 
 
-def _plot(sheet: Sheet, path: str, name: str, colour: palette.Colour, values: np.ndarray) -> None:
+def _plot(
+    sheet: Sheet,
+    path: str,
+    name: str,
+    colour: palette.Colour,
+    values: np.ndarray,
+    window: Int[np.ndarray, "K"] | None = None,
+) -> None:
     sheet.fixed(path, rr.SeriesLines(colors=[colour], names=[name], widths=[1.6]))
-    sheet.timed(path, rr.Scalars.columns(scalars=values))
+    sheet.timed(path, rr.Scalars.columns(scalars=values), window)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, Int16, UInt8
 
 from swarm_mj.mission import Mission
 from swarm_mj.parts import OwnParts
@@ -11,8 +11,11 @@ from swarm_mj.physics.scene import Scene
 from swarm_mj.replay import palette
 from swarm_mj.replay.frame import Frame, frame
 from swarm_mj.replay.links import fates
+from swarm_mj.replay.looks import NO_SURPRISES, Looks, Surprises
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.shots import Shots, shots
+
+SAID_AT = 0.64  # of the way to the other robot: there, links of one robot have parted
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +51,8 @@ class Footage:
     is_on: Bool[np.ndarray, "T N"]  # whether a robot was switched on
     shots: Shots
     age_mean: Float[np.ndarray, "T"]  # Eq. 10 [windows]
+    is_cut_off: Bool[np.ndarray, "T N"]  # whether it can exchange no news with the observer
+    looks: Looks | None = None  # at the channel; None in free space
     scene: Scene | None = None  # what changed the arena; files have its name only
 
     @property
@@ -60,6 +65,18 @@ class Footage:
         low_m, high_m = (end(self.position_m, axis=(0, 1)) for end in (np.min, np.max))
         centre_m = np.tile((low_m + high_m) / 2.0, (len(self.window), 1))
         return Frame(centre_m=centre_m, reach_m=max(1.0, float(np.max(high_m - low_m)) / 2.0))
+
+    def surprises(self, row: int) -> Surprises:
+        """Links that surprise in one window, counted from 0."""
+        return NO_SURPRISES if self.looks is None else self.looks.at(int(self.window[row]))
+
+    def shortfalls(self, row: int) -> tuple[Float[np.ndarray, "K 2"], Int16[np.ndarray, "K"]]:
+        """By how much the observer's own links are too weak [dB], and where that is said [m]."""
+        links, own = self.surprises(row).by_kind["too_weak"], self.facts.observer
+        links = links.chosen((links.sender == own) | (links.receiver == own))
+        other = np.where(links.sender == own, links.receiver, links.sender)
+        near_m, far_m = self.position_m[row, own], self.position_m[row, other]
+        return near_m + SAID_AT * (far_m - near_m), links.margin_db
 
     def colours(self, full_scale: float | None = None) -> UInt8[np.ndarray, "T N 3"]:
         """The robots' colours, by the replay's own scale of ages unless one is given [windows]."""
@@ -102,5 +119,7 @@ def footage_of(
         is_on=log.is_on,
         shots=shots(fates(log), log.position_m),
         age_mean=log.age_mean,
+        is_cut_off=log.is_cut_off,
+        looks=log.looks,
         scene=log.scene,
     )

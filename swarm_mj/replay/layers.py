@@ -6,6 +6,7 @@ import rerun as rr
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.palette import Colour, dim
+from swarm_mj.replay.strokes import STROKES
 
 
 def screen(points: float) -> float:
@@ -33,8 +34,12 @@ LAYERS = {
     "arena/area/grid": Layer(rr.LineStrips2D, palette.GRID, 0.5, -20.0),
     "arena/area/outline": Layer(rr.LineStrips2D, palette.OUTLINE, 1.5, -19.0),
     "arena/area/walls": Layer(rr.LineStrips2D, palette.WALL, 1.5, -19.0),
+    "arena/world/filling": Layer(rr.LineStrips2D, palette.OBSTACLE, 0.5, -11.0),
+    "arena/world/obstacle": Layer(rr.LineStrips2D, palette.WALL, 0.8, -10.0),
     "arena/trail": Layer(rr.LineStrips2D, palette.TRAIL, 1.0, -5.0),
     "arena/radio/range": Layer(rr.Ellipses2D, palette.RANGE, 0.6, 1.0),
+    "arena/world/unbelieved": Layer(rr.LineStrips2D, STROKES["unbelieved"], 0.6, 2.0),
+    "arena/world/too_weak": Layer(rr.LineStrips2D, STROKES["too_weak"], 0.5, 2.5),
     "arena/belief/error": Layer(rr.LineStrips2D, dim(palette.BELIEF, 0.8), 0.6, 3.0),
     "arena/belief/ring": Layer(rr.Ellipses2D, palette.BELIEF, 0.8, 4.0),
     "arena/tree": Layer(rr.LineStrips2D, palette.TREE, 0.8, 6.0),
@@ -45,6 +50,7 @@ LAYERS = {
     "arena/radio/lost": Layer(rr.Arrows2D, palette.LOST, 1.8, 19.0),
     "arena/radio/delivered": Layer(rr.Arrows2D, palette.DELIVERED, 2.0, 20.0),
     "arena/radio/answered": Layer(rr.Arrows2D, palette.ANSWERED, 1.5, 21.0),
+    "arena/world/cut_off": Layer(rr.Points2D, palette.CUT_OFF, 12.0, 24.0),
     "arena/radio/transmitter": Layer(rr.Points2D, palette.BROADCAST, 9.0, 25.0),
     "arena/heading": Layer(rr.LineStrips2D, palette.HEADING, 0.8, 29.0),
     "arena/robots": Layer(rr.Points2D, None, 5.5, 30.0),

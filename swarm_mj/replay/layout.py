@@ -16,6 +16,7 @@ from swarm_mj.replay.charts import (
     packet_counts,
     rate,
     shown_cost,
+    surprise_counts,
 )
 from swarm_mj.replay.frame import Frame
 from swarm_mj.replay.links import Links
@@ -46,12 +47,11 @@ def layout(log: Log, frame: Frame, packets: dict[str, Links]) -> Layout:
     reach, follows = MARGIN * frame.reach_m, ", follows the team" if frame.moves else ""
     name = f"Map, squares of {square_m(frame):g} m{follows}"
     shown = _drawing("/", name, (-reach, reach), (-reach, reach), contents=["/arena/**"])
-    samples = _drawing(
-        "/legend", "Legend", (0.0, legend.WIDTH), (-3.5, legend.HEIGHT), titlebar=False
-    )
+    height = legend.height(log)
+    samples = _drawing("/legend", "Legend", (0.0, legend.WIDTH), (-3.5, height), titlebar=False)
     charts = _charts(log, packets)
     mission = rrb.Horizontal(
-        rrb.Vertical(shown, samples, row_shares=[4, 1]),
+        rrb.Vertical(shown, samples, row_shares=[4, height / legend.TWO_ROWS]),
         rrb.Vertical(*charts, row_shares=[4, *[3] * (len(charts) - 1)]),
         column_shares=[11, 10],
         name="Mission",
@@ -127,6 +127,12 @@ def _charts(log: Log, packets: dict[str, Links]) -> list[rrb.View | rrb.Containe
         _plot("age", f"Age of information [windows]: team ± std (green), {ego} (white)", ages),
         _plot("radio", radio, rates),
     ]
+    if log.looks is not None:
+        ego_cut_off = f"robots cut off from {ego} (white)"
+        name = f"Links believed, too weak (red), working, unbelieved (green); {ego_cut_off}"
+        charts.append(
+            _plot("world", name, [of for _, of in surprise_counts(log, log.looks).values()])
+        )
     if (cost := shown_cost(log)) is not None:
         name = f"{cost.name[:1].upper()}{cost.name[1:]} [{cost.unit}]"
         charts.append(_plot("task", name, [cost.value]))

@@ -11,12 +11,15 @@ from swarm_mj.replay.layers import LAYERS, screen
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet
 from swarm_mj.replay.shots import LOST_SHARE
+from swarm_mj.replay.strokes import BROKEN
 
-WIDTH, HEIGHT = 100.0, 13.5  # of the view, in units of its own, y down
+WIDTH = 100.0  # of the view, in units of its own, y down
 LEFT, RAMP = 4.0, 31.0  # where the ramp of ages begins, and how long it is
 COLUMN, ROW = 14.2, 8.4  # from one sample to the next, to the right of the ramp
 SAMPLE = 5.0  # the length of a sample
 RADII = {"radio/range": 2.0, "belief/ring": 0.8}  # of sampled rings
+LAST, LAST_OF_TWO_LINES = 5.1, 7.2  # the height of the last row, with its texts
+TWO_ROWS = ROW + LAST
 BELOW = 2.6  # from a sample to its text
 NUM_SHADES = 60
 
@@ -32,16 +35,39 @@ def draw_legend(sheet: Sheet, full_scale: float) -> None:
             _write(sheet, f"{path}/text", [text], [(x, y + BELOW)])
 
 
-def _samples(log: Log) -> tuple[dict[str, str], dict[str, str]]:
-    """Two rows of texts, of the radio and of what else is shown, and the layers that they name."""
+def height(log: Log) -> float:
+    """Of the view."""
+    last = LAST if log.looks is None else LAST_OF_TWO_LINES
+    return (len(_samples(log)) - 1) * ROW + last
+
+
+def _samples(log: Log) -> list[dict[str, str]]:
+    """Rows of texts, of the radio, of what else is shown and of a world beyond free space.
+
+    With each text goes the layer that it names.
+    """
     others = {"heading": "heading", f"r{log.ego}'s belief": "belief/ring"} if log.has_motion else {}
     others[f"r{log.ego}'s tree"] = "tree"
-    reach = {"radio range": "radio/range"}
+    of_world = _samples_of_world(log)
+    # Elsewhere, the circle is what the range would be.
+    reach = {"radio range" if log.looks is None else "range in\nfree space": "radio/range"}
     if log.is_broadcast:
         packets = {"transmits": "radio/transmitter", "is heard by": "radio/heard"}
-        return packets | reach, others
+        return [packets | reach, others, *of_world]
     fates = ("delivered", "lost", "answered", "overheard")
-    return {fate: f"radio/{fate}" for fate in fates}, others | reach
+    return [{fate: f"radio/{fate}" for fate in fates}, others | reach, *of_world]
+
+
+def _samples_of_world(log: Log) -> list[dict[str, str]]:
+    """A row, if there is anything to name in it."""
+    if log.looks is None:
+        return []
+    texts = {"too_weak": "believed,\ntoo weak", "unbelieved": "works,\nunbelieved"}
+    found = {kind: len(links.row) > 0 for kind, links in log.looks.surprises.by_kind.items()}
+    row = {text: f"world/{kind}" for kind, text in texts.items() if found[kind]}
+    if np.any(log.is_cut_off):
+        row[f"cut off\nfrom r{log.ego}"] = "world/cut_off"
+    return [row] if row else []
 
 
 def _draw_sample(sheet: Sheet, path: str, name: str, x: float, y: float) -> None:
@@ -49,8 +75,11 @@ def _draw_sample(sheet: Sheet, path: str, name: str, x: float, y: float) -> None
     layer = LAYERS[f"arena/{name}"]
     start, radius = (x - SAMPLE / 2, y), RADII.get(name, 0.0)
     share = LOST_SHARE if name == "radio/lost" else 1.0
+    way = [(x - SAMPLE / 2, x + SAMPLE / 2)]
+    if name == "world/too_weak":
+        way = [(a, a + BROKEN * SAMPLE) for a in (x - SAMPLE / 2, x + (0.5 - BROKEN) * SAMPLE)]
     shapes = {
-        rr.LineStrips2D: {"strips": [[start, (x + SAMPLE / 2, y)]]},
+        rr.LineStrips2D: {"strips": [[(a, y), (b, y)] for a, b in way]},
         rr.Arrows2D: {"origins": [start], "vectors": [(share * SAMPLE, 0.0)]},
         rr.Ellipses2D: {"centers": [(x, y)], "half_sizes": [(radius, radius)]},
         rr.Points2D: {"positions": [(x, y)]},

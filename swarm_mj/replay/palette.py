@@ -17,6 +17,7 @@ GRID: Colour = (30, 36, 46)
 WALL: Colour = (112, 122, 138)
 OUTLINE: Colour = (44, 52, 66)
 RANGE: Colour = (44, 55, 74)
+OBSTACLE: Colour = (34, 40, 51)
 TEXT: Colour = (255, 255, 255)
 TRAIL: Colour = (50, 60, 76)
 BELIEF: Colour = (104, 118, 144)
@@ -32,6 +33,10 @@ SENT: Colour = (196, 203, 214)
 LOST: Colour = (240, 98, 42)
 OVERHEARD: Colour = (204, 121, 167)
 ANSWERED: Colour = (86, 180, 233)
+
+TOO_WEAK: Colour = (232, 70, 94)  # what the world takes of what is believed
+UNBELIEVED: Colour = (0, 148, 108)  # what it gives beyond
+CUT_OFF: Colour = (150, 38, 56)
 
 MEAN_AGE: Colour = (53, 183, 121)
 WORST_AGE: Colour = (150, 158, 172)

@@ -5,15 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from rerun.chunk import RrdReader
 
 from swarm_mj.io.reading import read_json
 from swarm_mj.replay.arcs import SEGMENTS
 from swarm_mj.replay.digest import has_digest
 from swarm_mj.replay.footage import Facts, Footage
+from swarm_mj.replay.looks import Looks, Surprises, in_turn
 from swarm_mj.replay.sheet import TIMELINE
 from swarm_mj.replay.shots import LOOKS, Shots, in_order
+from swarm_mj.replay.strokes import PIECES, STROKES
 
 FACTS = "footage"  # the recording's property that holds them
 
@@ -57,6 +59,8 @@ def read_footage(path: Path) -> Footage:
             position_m=position_m[..., :2],
             velocity_mps=_headings(path, position_m),
             age=_numbers(path, "/scene/robots", "age").reshape(shape),
+            is_cut_off=_is_cut_off(path).reshape(shape),
+            looks=_looks(path),
             is_on=_numbers(path, "/scene/robots", "is_on").reshape(shape) > 0.0,
             shots=_shots(path),
             age_mean=_numbers(path, "/plots/age/mean", "Measurements:values"),
@@ -98,8 +102,40 @@ def _shots(path: Path) -> Shots:
     return in_order(rows, starts, ends, colours)
 
 
-def _has(path: Path, entity: str) -> bool:
-    return any(not chunk.is_static for chunk in RrdReader(path).stream().filter(content=entity))
+def _is_cut_off(path: Path) -> Bool[np.ndarray, "K"]:
+    """Of each robot in each window; nobody is in free space, and in files of an earlier version."""
+    if _has(path, "/scene/robots", "is_cut_off"):
+        return _numbers(path, "/scene/robots", "is_cut_off") > 0.0
+    return np.zeros(len(_numbers(path, "/scene/robots", "age")), dtype=bool)
+
+
+def _looks(path: Path) -> Looks | None:
+    """Links that surprise, of missions beyond free space."""
+    if not all(_has(path, f"/scene/world/{kind}", "margin_db") for kind in STROKES):
+        return None
+    found = [_surprises(path, kind) for kind in STROKES]
+    window = _timed(path, f"/scene/world/{next(iter(STROKES))}", TIMELINE)
+    return Looks(
+        window=window.to_numpy(zero_copy_only=False).astype(np.int64), surprises=in_turn(found)
+    )
+
+
+def _surprises(path: Path, kind: str) -> Surprises:
+    entity = f"/scene/world/{kind}"
+    names = ("sender", "receiver", "loss_db", "margin_db")
+    columns = {name: _timed(path, entity, name) for name in names}
+    per_look = np.diff(columns["sender"].offsets.to_numpy())
+    numbers = {name: _flat(column).to_numpy().astype(np.int16) for name, column in columns.items()}
+    row = np.repeat(np.arange(len(per_look)), per_look)
+    strokes = Surprises(row=row, is_too_weak=np.full(len(row), kind == "too_weak"), **numbers)
+    return strokes.chosen(np.s_[:: PIECES[kind]])
+
+
+def _has(path: Path, entity: str, component: str = "") -> bool:
+    return any(
+        not chunk.is_static and component in ("", *chunk.to_record_batch().schema.names)
+        for chunk in RrdReader(path).stream().filter(content=entity)
+    )
 
 
 def _numbers(path: Path, entity: str, component: str) -> Float[np.ndarray, "K"]:

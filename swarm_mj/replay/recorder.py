@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.physics.scene import Scene
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.costs import TaskCost
+from swarm_mj.replay.looks import Looks, Surprises, joined, look, stride_of
 from swarm_mj.rollout import WindowRecord
 from swarm_mj.swarm import Swarm
 
@@ -45,6 +46,8 @@ class Log:
     velocity_variance_m2ps2: Float[np.ndarray, "T"]  # Eq. 17
     scene: Scene | None = None  # what changed the arena, if anything did
     task_cost: TaskCost | None = None  # one value a window; None if the controller has none
+    group: Int[np.ndarray, "T N"] | None = None  # the first robot that each exchanges news with
+    looks: Looks | None = None  # at the channel; it and the groups are None in free space
 
     @property
     def has_motion(self) -> bool:
@@ -65,6 +68,14 @@ class Log:
     def is_other_known(self) -> Bool[np.ndarray, "T N"]:
         """Whether the ego robot has heard of j, which is not itself."""
         return self.is_known & (np.arange(self.is_known.shape[1]) != self.ego)
+
+    @property
+    def is_cut_off(self) -> Bool[np.ndarray, "T N"]:
+        """Whether a robot can exchange no news with the ego robot, over whatever hops."""
+        if self.group is None:
+            return np.zeros(self.is_on.shape, dtype=bool)
+        is_apart = self.group != self.group[:, [self.ego]]
+        return is_apart & self.is_on & self.is_on[:, [self.ego]]
 
 
 class Recorder:
@@ -92,6 +103,9 @@ class Recorder:
         self._rows: list[dict[str, np.ndarray]] = []
         self._age: list[np.ndarray] = []
         self._task_costs: list[TaskCost] = []
+        self._look_stride = stride_of(swarm, self._stride)
+        self._looks: list[Surprises] = []
+        self._group: dict[str, np.ndarray] = {}  # at the latest look
 
     def add(self, flown: WindowRecord) -> None:
         """Records the window that was just flown."""
@@ -103,6 +117,9 @@ class Recorder:
         own = self._ego
         if len(self._rows) % self._stride == 0:
             self._age.append(age.astype(np.float32))
+        if len(self._rows) % self._look_stride == 0 and (seen := look(self._swarm)) is not None:
+            self._looks.append(seen.surprises)
+            self._group = {"group": seen.group.astype(np.int16)}
         shown = {
             "position_m": states.position_m[0],
             "velocity_mps": states.velocity_mps[0],
@@ -117,6 +134,7 @@ class Recorder:
             "age_std": np.std(others),
             "age_max": np.max(others),
             "velocity_variance_m2ps2": flown.costs.velocity_variance_m2ps2[0],
+            **self._group,
         }
         if flown.costs.task_cost is not None:
             self._task_costs.append(flown.costs.task_cost)
@@ -127,7 +145,8 @@ class Recorder:
     def num_bytes(self) -> int:
         """What is recorded so far takes of memory; every window takes the same."""
         row = sum(value.nbytes for value in self._rows[0].values()) if self._rows else 0
-        return len(self._rows) * row + sum(age.nbytes for age in self._age)
+        looks = sum(each.num_bytes for each in self._looks)
+        return len(self._rows) * row + sum(age.nbytes for age in self._age) + looks
 
     def log(self) -> Log:
         """Everything recorded so far; raises ValueError if that is nothing."""
@@ -145,8 +164,13 @@ class Recorder:
             # An interrupt between the two appends of `add` leaves one matrix too many.
             age=np.stack(self._age[: len(age_window)]),
             task_cost=self._task_cost(len(window)),
+            looks=self._seen(window[:: self._look_stride]),
             **columns,
         )
+
+    def _seen(self, window: Int[np.ndarray, "C"]) -> Looks | None:
+        """The looks at the channel, if it can be looked at."""
+        return joined(self._looks[: len(window)], window) if self._looks else None
 
     def _task_cost(self, num_windows: int) -> TaskCost | None:
         """What the task cost in each window of the mission recorded."""

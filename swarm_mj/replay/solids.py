@@ -10,7 +10,10 @@ from mujoco._enums import mjtGeom, mjtTextureRole
 from mujoco._functions import mj_kinematics, mju_mat2Quat
 from mujoco._structs import MjData, MjModel
 
+from swarm_mj.physics.solid_geoms import obstacle_geoms
+
 FLOOR_M = 0.5  # half the thickness of a drawn plane: rerun has solids only
+GLASS = "transparentfillmajorwireframe"  # obstacles hide no robot
 FAR_M = 1e4  # half the side of a plane that has no end
 
 
@@ -23,9 +26,13 @@ def fixed_solids(model: MjModel) -> dict[str, rr.AsComponents]:
     mj_kinematics(model, data)
     stands_still = model.body_weldid[model.geom_bodyid] == 0
     return {
-        model.geom(g).name or f"geom{g}": _solid(model, data, int(g))
-        for g in np.flatnonzero(stands_still)
+        name_of(model, g): _solid(model, data, g) for g in np.flatnonzero(stands_still).tolist()
     }
+
+
+def name_of(model: MjModel, g: int) -> str:
+    """A geom's name, made up if it has none."""
+    return model.geom(g).name or f"geom{g}"
 
 
 def _solid(model: MjModel, data: MjData, g: int) -> rr.AsComponents:
@@ -42,7 +49,7 @@ def _solid(model: MjModel, data: MjData, g: int) -> rr.AsComponents:
         turn,
         colors=[_colour(model, g)],
         quaternions=[rr.Quaternion(xyzw=np.roll(quaternion, -1))],
-        fill_mode="solid",
+        fill_mode=GLASS if g in obstacle_geoms(model) else "solid",
     )
 
 

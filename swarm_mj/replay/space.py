@@ -3,9 +3,11 @@
 import numpy as np
 import rerun as rr
 from jaxtyping import UInt8
+from mujoco._structs import MjModel
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import compose
+from swarm_mj.physics.solid_geoms import loss_db_of, obstacle_geoms
 from swarm_mj.replay import palette
 from swarm_mj.replay.arcs import arcs
 from swarm_mj.replay.arena import HEADING_SHARE, RING_SHARE, grid
@@ -13,7 +15,7 @@ from swarm_mj.replay.layers import screen
 from swarm_mj.replay.links import Links
 from swarm_mj.replay.sheet import Sheet
 from swarm_mj.replay.shots import LOOKS, ends_of
-from swarm_mj.replay.solids import fixed_solids
+from swarm_mj.replay.solids import fixed_solids, name_of
 
 RADIUS_SHARE = 1.4 * RING_SHARE  # of a body, by half the view's width
 OBSERVER = 1.3  # times larger
@@ -21,23 +23,8 @@ ROBOT_HEIGHT = 0.8  # of a body, by its radius
 GRID_M = 0.2  # above the floor
 
 
-def draw_space(
-    sheet: Sheet,
-    mission: Mission,
-    packets: dict[str, Links],
-    colours: UInt8[np.ndarray, "T N 3"],
-) -> None:
-    """Draws it: what stands still once, the rest window by window.
-
-    Args:
-        sheet: To draw on.
-        mission: Its numbers.
-        packets: By their fate.
-        colours: The robots'.
-    """
-    if sheet.frame.moves:
-        away = np.pad(-sheet.frame.centre_m, ((0, 0), (0, 1)))
-        sheet.timed("scene", rr.Transform3D.columns(translation=away))
+def stage(sheet: Sheet, mission: Mission) -> MjModel:
+    """MuJoCo's scene as it is drawn."""
     spec = compose(mission, scene=sheet.log.scene)
     if not mission.has_walls:
         # An open area's floor is as large as what is ever seen.
@@ -45,8 +32,31 @@ def draw_space(
         for geom in (geom for geom in spec.geoms if geom.name == "floor"):
             geom.pos = [*(low + high) / 2.0, 0.0]
             geom.size = [*(high - low) / 2.0 + 1.5 * sheet.frame.reach_m, 1.0]
-    for name, solid in fixed_solids(spec.compile()).items():
+    return spec.compile()
+
+
+def draw_space(
+    sheet: Sheet,
+    model: MjModel,
+    packets: dict[str, Links],
+    colours: UInt8[np.ndarray, "T N 3"],
+) -> None:
+    """Draws it: what stands still once, the rest window by window.
+
+    Args:
+        sheet: To draw on.
+        model: MuJoCo's, of `stage`.
+        packets: By their fate.
+        colours: The robots'.
+    """
+    if sheet.frame.moves:
+        away = np.pad(-sheet.frame.centre_m, ((0, 0), (0, 1)))
+        sheet.timed("scene", rr.Transform3D.columns(translation=away))
+    for name, solid in fixed_solids(model).items():
         sheet.fixed(f"scene/area/{name}", solid)
+    for g in obstacle_geoms(model):  # for those who point at one
+        loss = rr.AnyValues(loss_db=loss_db_of(model, g))
+        sheet.fixed(f"scene/area/{name_of(model, g)}", loss)
     lines = [[(*start, GRID_M), (*end, GRID_M)] for start, end in grid(sheet.frame)]
     style = {"colors": [palette.OUTLINE], "radii": screen(0.5)}
     sheet.fixed("scene/grid", rr.LineStrips3D(lines, **style))
@@ -72,6 +82,9 @@ def _draw_bodies(sheet: Sheet, colours: UInt8[np.ndarray, "T N 3"]) -> None:
     age = log.known_age.astype(np.float32).ravel()
     known = rr.AnyValues.columns(age=age, is_on=log.is_on.ravel())
     sheet.timed("scene/robots", known.partition([num_robots] * num_windows))
+    if log.looks is not None:
+        cut_off = rr.AnyValues.columns(is_cut_off=log.is_cut_off.ravel())
+        sheet.timed("scene/robots", cut_off.partition([num_robots] * num_windows))
     if log.has_motion:
         speed = np.linalg.norm(log.velocity_mps, axis=2, keepdims=True)
         way = HEADING_SHARE * sheet.frame.reach_m * log.velocity_mps / np.maximum(speed, 1e-9)

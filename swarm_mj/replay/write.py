@@ -11,6 +11,7 @@ import rerun_bindings as bindings
 from swarm_mj.io.atomic import write_bytes
 from swarm_mj.mission import Mission
 from swarm_mj.parts import OwnParts
+from swarm_mj.physics.solid_geoms import obstacles_of
 from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 from swarm_mj.replay import arena, charts, palette
 from swarm_mj.replay.digest import with_digest
@@ -22,7 +23,8 @@ from swarm_mj.replay.links import Links, fates
 from swarm_mj.replay.read import FACTS, check_replay
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet
-from swarm_mj.replay.space import draw_space
+from swarm_mj.replay.space import draw_space, stage
+from swarm_mj.replay.world import draw_looks, draw_obstacles
 
 APPLICATION = "swarm_mj"
 
@@ -101,7 +103,11 @@ def draw(sheet: Sheet, mission: Mission, packets: dict[str, Links]) -> None:
         arena.draw_beliefs(sheet)
     arena.draw_tree_on_map(sheet)
     arena.draw_radio(sheet, packets, mission.range_m)
-    draw_space(sheet, mission, packets, colours)
+    model = stage(sheet, mission)
+    draw_space(sheet, model, packets, colours)
+    draw_obstacles(sheet, obstacles_of(model))
+    if log.looks is not None:
+        draw_looks(sheet, log.looks)
     draw_legend(sheet, full_scale)
     charts.draw_tree(sheet, colours)
     charts.draw_age_matrix(sheet, full_scale)

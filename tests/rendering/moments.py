@@ -21,6 +21,9 @@ def moment(position_m, links=(), *, observer=0, reach_m=500.0):
         start_m=where[start],
         end_m=where[end],
         link_colour=np.tile(np.array(GREEN, dtype=np.uint8), (len(start), 1)),
+        strokes_m=np.zeros((0, 2, 2)),
+        stroke_colour=np.zeros((0, 3), dtype=np.uint8),
+        is_cut_off=np.zeros(len(where), dtype=bool),
         centre_m=np.zeros(2),
         reach_m=reach_m,
     )

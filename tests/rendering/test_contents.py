@@ -7,6 +7,7 @@ from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.rendering.contents import contents_of
 from swarm_mj.replay import palette
+from swarm_mj.replay.looks import look
 from swarm_mj.swarm import Swarm
 
 
@@ -57,6 +58,17 @@ def test_a_broadcast_leads_to_all_who_hear_it(swarm):
     num_heard = sum(int(np.sum(phase.heard[1] != np.arange(8))) for phase in swarm.phases)
     assert len(contents.start_m) == num_heard
     assert {tuple(colour) for colour in contents.link_colour.tolist()} <= {palette.BROADCAST}
+
+
+def test_links_that_surprise_are_seen_and_who_is_cut_off():
+    mission = paper("random-walk", num_robots=10, arena="blocks", shadowing_db=6.0)
+    city = Swarm(mission, [3, 4])
+    for _ in range(60):
+        city.move()
+    seen, contents = look(city, 1), contents_of(city, 1, observer=2)
+    kinds = {kind: len(of.row) for kind, of in seen.surprises.by_kind.items()}
+    assert len(contents.strokes_m) == 2 * kinds["too_weak"] + kinds["unbelieved"]
+    np.testing.assert_array_equal(contents.is_cut_off, seen.group != seen.group[2])
 
 
 def test_robots_that_failed_are_dark(swarm):

@@ -6,10 +6,20 @@ import numpy as np
 from PIL import ImageDraw
 
 from swarm_mj.mission import paper
-from swarm_mj.rendering.drawing import AgePlot, Box, blank, draw_legend, draw_title
+from swarm_mj.rendering.drawing import (
+    SHADE,
+    AgePlot,
+    Box,
+    blank,
+    draw_legend,
+    draw_shortfalls,
+    draw_title,
+)
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Facts, Footage
+from swarm_mj.replay.looks import Looks, Surprises
 from swarm_mj.replay.shots import Shots
+from swarm_mj.replay.strokes import STROKES
 
 BOX = Box(20, 10, 380, 150)
 
@@ -41,6 +51,7 @@ def footage(age_mean, *, is_broadcast=False):
         is_on=np.ones((num, 2), dtype=bool),
         shots=packets,
         age_mean=np.array(age_mean, dtype=float),
+        is_cut_off=np.zeros((num, 2), dtype=bool),
     )
 
 
@@ -73,6 +84,65 @@ def test_the_legend_names_what_is_drawn_only():
         assert np.any(has(picture, (253, 231, 37)))  # the ramp's fresh end
     assert np.any(has(samples[False], palette.LOST))
     assert not np.any(has(samples[True], palette.LOST))
+
+
+def with_one_too_weak(seen):
+    """The same footage, in which robot 1 is cut off from robot 0 as their link is too weak."""
+    number = np.zeros(1, dtype=np.int16)
+    link = Surprises(
+        row=np.zeros(1, dtype=int),
+        sender=number,
+        receiver=number + 1,
+        is_too_weak=np.ones(1, dtype=bool),
+        loss_db=number + 99,
+        margin_db=number - 11,
+    )
+    is_cut_off = np.tile([False, True], (len(seen.window), 1))
+    looks = Looks(window=np.array([1]), surprises=link)
+    return replace(seen, looks=looks, is_cut_off=is_cut_off)
+
+
+def test_the_legend_names_links_that_surprise_if_there_are_any():
+    found = []
+    for seen in (footage([1.0]), with_one_too_weak(footage([1.0]))):
+        picture = blank(400, 160)
+        draw_legend(ImageDraw.Draw(picture), [seen], 10.0, BOX, 12)
+        colours = (STROKES["too_weak"], palette.CUT_OFF, STROKES["unbelieved"])
+        found.append([bool(np.any(has(picture, colour, 0))) for colour in colours])
+    assert found == [[False] * 3, [True, True, False]]
+
+
+def test_the_plot_has_columns_for_who_is_cut_off():
+    """One of two robots: half of the plot's height."""
+    red = palette.dim(palette.CUT_OFF, SHADE)
+    heights = []
+    for seen in (footage([10.0] * 5), with_one_too_weak(footage([10.0] * 5))):
+        picture = blank(400, 160)
+        AgePlot([seen], BOX, 10).draw_axes(ImageDraw.Draw(picture))
+        heights.append(np.sum(np.any(has(picture, red, 0), axis=1)))
+    none, half = heights
+    assert none == 0
+    inner = BOX.height - 10 - 14
+    assert abs(half - inner / 2) <= 2
+
+
+def test_a_shortfall_that_would_cover_another_is_left_out():
+    at, margin_db = np.array([[50.0, 50.0], [52.0, 51.0], [300.0, 90.0]]), np.array([-3, -4, -5])
+    picture = blank(400, 160)
+    draw_shortfalls(ImageDraw.Draw(picture), at, margin_db.astype(np.int16), 12)
+    rows, columns = np.nonzero(np.asarray(picture).max(axis=2) > 100)
+    is_left = columns < 200
+    assert abs(np.mean(columns[is_left]) - 50.0) < 3.0
+    assert abs(np.mean(rows[~is_left]) - 90.0) < 3.0
+
+
+def test_the_title_counts_who_is_cut_off():
+    is_red = []
+    for seen in (footage([1.0]), with_one_too_weak(footage([1.0]))):
+        picture = blank(400, 160)
+        draw_title(ImageDraw.Draw(picture), seen, 0, Box(0, 0, 400, 160), 12, (0, 255, 0))
+        is_red.append(bool(np.any(has(picture, palette.TOO_WEAK, 20))))
+    assert is_red == [False, True]
 
 
 def test_the_title_stays_in_its_part_of_the_picture():

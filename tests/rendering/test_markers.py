@@ -1,11 +1,14 @@
 """What is added to a scene for robots and packets."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 from moments import moment
 
 from swarm_mj.rendering.camera import look_at
 from swarm_mj.rendering.markers import Markers
+from swarm_mj.replay import palette
 from swarm_mj.replay.arcs import SEGMENTS
 
 
@@ -23,6 +26,26 @@ def test_the_observer_is_the_largest_and_white():
     assert discs[0].size[0] == discs[2].size[0]
     np.testing.assert_array_equal(discs[1].rgba, 1.0)
     np.testing.assert_allclose([disc.pos[:2] for disc in discs], [(0, 0), (100, 0), (0, 100)])
+
+
+def test_a_robot_that_is_cut_off_has_a_flat_red_halo():
+    contents = moment([(0.0, 0.0), (100.0, 0.0)])
+    contents.is_cut_off[1] = True
+    _, robot, halo = drawn(contents)
+    np.testing.assert_allclose(halo.pos[:2], (100, 0))
+    np.testing.assert_allclose(halo.rgba[:3] * 255.0, palette.CUT_OFF)
+    assert halo.size[0] > robot.size[0]
+    assert halo.size[2] < 0.3 * robot.size[2]
+
+
+def test_links_that_surprise_are_drawn_until_there_is_no_room():
+    contents = moment([(0.0, 0.0), (100.0, 0.0)])
+    for num in (3, 500):
+        lines = np.tile([[(0.0, 0.0), (100.0, 0.0)]], (num, 1, 1))
+        colour = np.tile(np.array([[255, 0, 0]], np.uint8), (num, 1))
+        geoms = drawn(replace(contents, strokes_m=lines, stroke_colour=colour))
+        assert len(geoms) == min(2 + num, 100)
+        np.testing.assert_array_equal(geoms[-1].rgba, (1, 0, 0, 1))
 
 
 def test_a_packet_is_an_arc_of_lines_and_a_heading_one_more():

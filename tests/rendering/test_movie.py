@@ -23,8 +23,7 @@ pytestmark = pytest.mark.usefixtures("opengl")
 STYLE = Style(width=480, height=320, seconds=1.0, fps=6)
 
 
-def flown(policy_name, num_windows=20):
-    mission = paper("flocking", num_robots=8, num_windows=num_windows)
+def flown(policy_name, mission):
     swarm = Swarm(mission, [1])
     policy = make_policy(policy_name, mission)
     recorder = Recorder(swarm, is_broadcast=policy.window(mission).is_broadcast)
@@ -35,12 +34,12 @@ def flown(policy_name, num_windows=20):
 
 @pytest.fixture(scope="module")
 def tdma():
-    return flown("tdma")
+    return flown("tdma", paper("flocking", num_robots=8, num_windows=20))
 
 
 @pytest.fixture(scope="module")
 def mst():
-    return flown("mst", 12)
+    return flown("mst", paper("flocking", num_robots=8, num_windows=12))
 
 
 def test_there_are_as_many_pictures_as_asked_for_and_they_move(tdma):
@@ -99,6 +98,21 @@ def test_a_mission_s_video_is_whole(tdma, suffix, tmp_path):
     (tmp_path / f"a{suffix}").write_bytes(content)
     check_video(tmp_path / f"a{suffix}", suffix, STYLE)
     assert len(seen) == 6
+
+
+def test_links_that_surprise_and_their_shortfalls_are_seen():
+    mission = paper("random-walk", num_robots=10, num_windows=6, arena="blocks", shadowing_db=6.0)
+    city = flown("tdma", mission)
+    assert len(city.shortfalls(5)[1]) > 0
+    without = replace(city, looks=None, is_cut_off=np.zeros_like(city.is_cut_off))
+    num_red = []
+    for footage in (city, without):
+        with Movie([footage], STYLE) as movie:
+            picture = movie.picture([5])[:250].astype(int)
+        num_red.append(np.sum(picture[..., 0] - picture[..., 1:].max(axis=2) > 60))
+    seen, unseen = num_red
+    assert seen > 100
+    assert unseen == 0
 
 
 def test_a_scene_of_one_s_own_is_seen(tdma):

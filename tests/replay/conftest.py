@@ -71,6 +71,13 @@ def failing():
 
 
 @pytest.fixture(scope="session")
+def blocked():
+    """Robots that run between city blocks, under shadowing: some get cut off from the others."""
+    walk = {"task": "random-walk", "velocity_ratio": 0.6, "num_robots": 14}
+    return record("random-flooding", 0.2, arena="blocks", shadowing_db=6.0, **walk)
+
+
+@pytest.fixture(scope="session")
 def replay(two_way, tmp_path_factory):
     path = tmp_path_factory.mktemp("replays") / "mission.rrd"
     write_replay(two_way.log, two_way.mission, {"seed": 5, "policy": "mst", "ratio": 0.25}, path)
@@ -81,6 +88,13 @@ def replay(two_way, tmp_path_factory):
 def flood_replay(flooded, tmp_path_factory):
     path = tmp_path_factory.mktemp("replays") / "flood.rrd"
     write_replay(flooded.log, flooded.mission, {"seed": 5}, path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def blocked_replay(blocked, tmp_path_factory):
+    path = tmp_path_factory.mktemp("replays") / "blocked.rrd"
+    write_replay(blocked.log, blocked.mission, {"seed": 5}, path)
     return path
 
 

@@ -4,7 +4,13 @@ import numpy as np
 from reading import column, rows_of_strips
 
 from swarm_mj.mission.geometry import spanning_tree
-from swarm_mj.replay.charts import packet_counts, radio_states, rate, walk
+from swarm_mj.replay.charts import (
+    packet_counts,
+    radio_states,
+    rate,
+    surprise_counts,
+    walk,
+)
 from swarm_mj.replay.links import fates
 
 FATES = ["delivered", "lost", "overheard", "answered"]
@@ -61,6 +67,22 @@ def test_the_packet_plot_counts_as_the_costs_do(two_way, flooded):
         assert list(counts) == list(curves)
         for name, (_, per_window) in counts.items():
             np.testing.assert_array_equal(per_window, recorded.counted(name))
+
+
+def test_the_plot_of_the_world_counts_links_and_robots(blocked, blocked_replay):
+    log = blocked.log
+    expected = {"believed, too weak": [], "works, unbelieved": [], "robots cut off from r4": []}
+    weak, works, cut_off = expected.values()
+    for window in log.looks.window.tolist():
+        is_weak = log.looks.at(window).is_too_weak.tolist()
+        weak.append(is_weak.count(True))
+        works.append(is_weak.count(False))
+        team = log.group[window - 1].tolist()
+        cut_off.append(sum(of != team[4] for of in team))
+    counts = surprise_counts(log, log.looks)
+    assert {name: of.tolist() for name, (_, of) in counts.items()} == expected
+    shown = column(blocked_replay, "/plots/world/robots_cut_off_from_r4", "Scalars:scalars")
+    assert shown.flatten().to_pylist() == cut_off
 
 
 def test_rows_of_the_matrix_own_and_columns_are_owned(replay, two_way):

@@ -12,7 +12,7 @@ from swarm_mj.replay.footage import footage_of
 from swarm_mj.replay.read import read_footage
 from swarm_mj.replay.write import write_replay
 
-RECORDED = ["two_way", "flooded", "still", "failing"]
+RECORDED = ["two_way", "flooded", "still", "failing", "blocked"]
 
 
 @pytest.mark.parametrize("name", RECORDED)
@@ -26,6 +26,8 @@ def test_a_replay_holds_what_a_video_shows(name, request, tmp_path):
     np.testing.assert_allclose(read.position_m, made.position_m, rtol=1e-6, atol=1e-4)
     np.testing.assert_array_equal(read.age, made.age)
     np.testing.assert_array_equal(read.is_on, log.is_on)
+    np.testing.assert_array_equal(read.is_cut_off, log.is_cut_off)
+    assert (read.looks is None) == (made.looks is None)
     np.testing.assert_allclose(read.age_mean, made.age_mean)
     speed = np.maximum(np.linalg.norm(made.velocity_mps, axis=2, keepdims=True), 1e-9)
     length = np.maximum(np.linalg.norm(read.velocity_mps, axis=2, keepdims=True), 1e-9)
@@ -36,6 +38,49 @@ def test_a_replay_holds_what_a_video_shows(name, request, tmp_path):
     for end in ("start_m", "end_m"):
         shown, expected = (getattr(each.shots, end) for each in (read, made))
         np.testing.assert_allclose(shown, expected, rtol=1e-5, atol=1e-2)
+
+
+def test_a_replay_holds_the_links_that_surprise(blocked, blocked_replay):
+    read, made = read_footage(blocked_replay).looks, blocked.log.looks
+    np.testing.assert_array_equal(read.window, made.window)
+    for window in made.window.tolist():
+        for kind, expected in made.at(window).by_kind.items():
+            found = read.at(window).by_kind[kind]
+            for name in ("sender", "receiver", "loss_db", "margin_db"):
+                np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+    assert all(len(of.row) > 0 for of in made.surprises.by_kind.values())
+
+
+def test_a_replay_from_before_there_were_such_links_is_shown_without(blocked, tmp_path):
+    earlier = replace(blocked.log, looks=None)
+    write_replay(earlier, blocked.mission, {"seed": 5}, tmp_path / "old.rrd")
+    footage = read_footage(tmp_path / "old.rrd")
+    assert footage.looks is None
+    assert not np.any(footage.is_cut_off)
+    assert len(footage.surprises(3).row) == 0
+
+
+def test_shortfalls_are_said_on_the_way_to_the_robots_that_the_observer_misses(blocked):
+    log = blocked.log
+    footage = footage_of(log, blocked.mission, "random-flooding", 5)
+    num_said = 0
+    for row, window in enumerate(log.window.tolist()):
+        at_m, margin_db = footage.shortfalls(row)
+        found = log.looks.at(window)
+        missed = [
+            (set((i, j)) - {log.ego}, margin)
+            for i, j, margin, weak in zip(
+                found.sender, found.receiver, found.margin_db, found.is_too_weak, strict=True
+            )
+            if weak and log.ego in (i, j)
+        ]
+        assert margin_db.tolist() == [margin for _, margin in missed]
+        near_m = log.position_m[row, log.ego]
+        for at, ((other,), _) in zip(at_m, missed, strict=True):
+            far_m = log.position_m[row, other]
+            np.testing.assert_allclose(at, 0.36 * near_m + 0.64 * far_m)
+            num_said += 1
+    assert num_said > 0
 
 
 def test_colours_are_by_age_white_for_the_observer_and_dark_for_the_fallen(failing):

@@ -16,26 +16,33 @@ def entities(path):
 
 
 def test_every_layer_is_drawn_by_some_mission_and_nothing_else(
-    replay, flood_replay, two_way, tmp_path
+    replay, flood_replay, blocked_replay, two_way, tmp_path
 ):
     unbounded = replace(two_way.mission, boundary="none")
     write_replay(two_way.log, unbounded, {"seed": 5}, tmp_path / "free.rrd")
     drawn = entities(replay) | entities(flood_replay) | entities(tmp_path / "free.rrd")
+    assert not any("world" in name for name in drawn)
+    drawn |= entities(blocked_replay)
     assert drawn == set(LAYERS)
 
 
 def test_the_ground_lies_below_beliefs_these_below_packets_and_these_below_robots():
     order = {name: layer.order for name, layer in LAYERS.items()}
     ground = [
-        order[name] for name in order if name.startswith("arena/area") or name == "arena/trail"
+        order[name]
+        for name in order
+        if name.startswith(("arena/area", "arena/trail", "arena/world/filling", "arena/world/obs"))
     ]
+    links = [order[name] for name in ("arena/world/unbelieved", "arena/world/too_weak")]
     beliefs = [order[name] for name in ("arena/belief/error", "arena/belief/ring", "arena/tree")]
     packets = [
         order[name]
         for name in order
         if name.startswith("arena/radio") and name != "arena/radio/range"
     ]
-    assert max(ground) < min(beliefs) <= max(beliefs) < min(packets) < max(packets)
+    assert max(ground) < min(links) <= max(links) < min(beliefs)
+    assert min(beliefs) <= max(beliefs) < min(packets) < max(packets)
+    assert order["arena/world/cut_off"] < order["arena/radio/transmitter"]
     assert max(packets) < order["arena/robots"] < order["arena/ego"]
 
 

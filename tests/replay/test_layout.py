@@ -16,6 +16,9 @@ EVERYWHERE = {
 OF_ADDRESSED = "Packets in 10 windows: delivered (green), lost (orange), answered (blue)"
 OF_BROADCASTS = "Packets in 10 windows: sent (grey), heard by anyone (blue)"
 OF_FLOCKS = "Velocity variance [m²/s²]"
+OF_WORLDS = (
+    "Links believed, too weak (red), working, unbelieved (green); robots cut off from r4 (white)"
+)
 
 
 def views(path):
@@ -39,6 +42,7 @@ def views(path):
         ("replay", {OF_ADDRESSED, OF_FLOCKS}),
         ("flood_replay", {OF_BROADCASTS, OF_FLOCKS}),
         ("still_replay", {OF_ADDRESSED}),
+        ("blocked_replay", {OF_BROADCASTS, OF_FLOCKS, OF_WORLDS}),
     ],
 )
 def test_views_are_of_what_the_mission_has(replay_name, names, request):

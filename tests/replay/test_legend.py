@@ -1,11 +1,14 @@
 """The legend names everything that the map shows, and nothing else."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from reading import static
 from rerun.chunk import RrdReader
 
-from swarm_mj.replay.legend import HEIGHT, WIDTH
+from swarm_mj.replay.legend import WIDTH, height
+from swarm_mj.replay.write import write_replay
 
 ADDRESSED = {"delivered", "lost", "answered", "overheard"}
 BROADCAST = {"transmits", "is heard by"}
@@ -39,11 +42,33 @@ def test_of_a_team_at_rest(still_replay):
     assert texts(still_replay) == ADDRESSED | ALWAYS
 
 
-@pytest.mark.parametrize("name", ["replay", "flood_replay", "still_replay"])
-def test_texts_stand_within_the_view_and_none_on_another(name, request):
-    path = request.getfixturevalue(name)
+def test_beyond_free_space(blocked_replay):
+    surprising = {"believed,\ntoo weak", "works,\nunbelieved", "cut off\nfrom r4"}
+    others = MOVING | {"r4's tree", "range in\nfree space"}
+    assert texts(blocked_replay) == BROADCAST | others | surprising
+
+
+def test_nothing_surprises_where_packets_only_fade(blocked, tmp_path):
+    of_none = blocked.log.looks.surprises.chosen(np.s_[:0])
+    looks = replace(blocked.log.looks, surprises=of_none)
+    log = replace(blocked.log, looks=looks, group=np.zeros_like(blocked.log.group))
+    write_replay(log, blocked.mission, {"seed": 5}, tmp_path / "a.rrd")
+    assert texts(tmp_path / "a.rrd") == BROADCAST | MOVING | {"r4's tree", "range in\nfree space"}
+
+
+@pytest.mark.parametrize(
+    ("name", "flight"),
+    [
+        ("replay", "two_way"),
+        ("flood_replay", "flooded"),
+        ("still_replay", "still"),
+        ("blocked_replay", "blocked"),
+    ],
+)
+def test_texts_stand_within_the_view_and_none_on_another(name, flight, request):
+    path, log = request.getfixturevalue(name), request.getfixturevalue(flight).log
     places = np.array([static(path, of, "Points2D:positions") for of in labels(path)])
-    assert np.all((places > 0.0) & (places < [WIDTH, HEIGHT]))
+    assert np.all((places > 0.0) & (places < [WIDTH, height(log)]))
     assert len(np.unique(places, axis=0)) == len(texts(path))
 
 

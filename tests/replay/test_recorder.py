@@ -6,6 +6,7 @@ import pytest
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay import recorder
+from swarm_mj.replay.looks import look
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.rollout import rollout
 from swarm_mj.swarm import Swarm
@@ -76,6 +77,34 @@ def test_a_log_is_the_swarm_s_state_field_by_field():
     for field, rows in seen.items():
         np.testing.assert_array_equal(getattr(log, field), rows, err_msg=field)
     np.testing.assert_allclose(log.velocity_variance_m2ps2, variance, rtol=1e-9)
+
+
+def test_looks_are_taken_every_few_windows_and_groups_stand_until_the_next():
+    mission = paper("random-walk", num_robots=10, num_windows=12, arena="blocks", shadowing_db=6.0)
+    swarm = Swarm(mission, [3])
+    record, seen = Recorder(swarm, ego=2), []
+    for window in rollout(swarm, make_policy("tdma", mission)):
+        record.add(window)
+        seen.append(look(swarm))
+    log = record.log()
+    np.testing.assert_array_equal(log.looks.window, [1, 6, 11])
+    np.testing.assert_array_equal(log.group, [seen[5 * (w // 5)].group for w in range(12)])
+    for window in (1, 6, 11):
+        shown, expected = log.looks.at(window), seen[window - 1].surprises
+        np.testing.assert_array_equal(shown.sender, expected.sender)
+        np.testing.assert_array_equal(shown.margin_db, expected.margin_db)
+    is_apart = np.array([[of != team[2] for of in team] for team in log.group])
+    np.testing.assert_array_equal(log.is_cut_off, is_apart)
+    kept = [*record._age, *(value for row in record._rows for value in row.values())]
+    found = sum(seen[w].surprises.num_bytes for w in (0, 5, 10))
+    assert record.num_bytes == sum(each.nbytes for each in kept) + found
+
+
+def test_free_space_is_not_looked_at():
+    log, _ = flown_log()
+    assert log.looks is None
+    assert log.group is None
+    assert not np.any(log.is_cut_off)
 
 
 def test_what_is_kept_does_not_keep_what_is_not():

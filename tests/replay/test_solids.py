@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+import rerun as rr
 
 from swarm_mj.replay.solids import FLOOR_M, fixed_solids
 
@@ -18,6 +19,15 @@ SCENE = """
 
 def numbers(batch):
     return np.ravel(batch.as_arrow_array().to_pylist()).tolist()
+
+
+def test_obstacles_are_of_glass_and_the_rest_is_not():
+    scene = SCENE.replace('name="box"', 'name="box" group="1"')
+    solids = fixed_solids(mujoco.MjModel.from_xml_string(scene))
+    modes = {name: numbers(solid.fill_mode)[0] for name, solid in solids.items()}
+    glass = modes.pop("box")
+    assert set(modes.values()) == {rr.components.FillMode.Solid.value}
+    assert glass == rr.components.FillMode.TransparentFillMajorWireframe.value
 
 
 def test_what_stands_still_is_drawn_where_it_stands():

@@ -1,0 +1,93 @@
+"""What a world beyond free space adds to a replay: obstacles, links that surprise, who is cut off.
+
+The map and the view in 3-D draw the same things in the same colours.
+"""
+
+import numpy as np
+import rerun as rr
+from jaxtyping import Float
+
+from swarm_mj.physics.obstacles import Obstacles
+from swarm_mj.physics.state import ROBOT_HEIGHT_M
+from swarm_mj.replay import palette
+from swarm_mj.replay.footprints import filling, footprints
+from swarm_mj.replay.layers import LAYERS, screen
+from swarm_mj.replay.looks import Looks, Surprises
+from swarm_mj.replay.sheet import Sheet
+from swarm_mj.replay.space import RADIUS_SHARE, ROBOT_HEIGHT
+from swarm_mj.replay.strokes import STROKES, strokes
+
+NUMBERS = ("sender", "receiver", "loss_db", "margin_db")  # of links, that the file keeps
+FILL_SHARE = 0.008  # of half the map's width: between the lines that fill an obstacle
+HALO, HALO_M = 1.7, 2.0  # of a robot that is cut off, by the robot's radius; its height [m]
+
+
+def draw_obstacles(sheet: Sheet, obstacles: Obstacles) -> None:
+    """The obstacles on the map."""
+    outlines = footprints(obstacles, ROBOT_HEIGHT_M)
+    if outlines:
+        apart_m = FILL_SHARE * sheet.frame.reach_m
+        lines = [line for outline in outlines for line in filling(outline, apart_m)]
+        path = "arena/world/filling"
+        filled = rr.LineStrips2D(
+            lines,
+            colors=[palette.OBSTACLE],
+            radii=0.55 * apart_m,
+            draw_order=LAYERS[path].order,
+        )
+        sheet.fixed(path, filled)
+        sheet.fixed_layer("arena/world/obstacle", strips=outlines)
+
+
+def draw_looks(sheet: Sheet, looks: Looks) -> None:
+    """Links that surprise, and who is cut off from the ego robot."""
+    radius_m = RADIUS_SHARE * sheet.frame.reach_m
+    position_m = sheet.log.position_m[looks.window - sheet.log.window[0]]
+    for kind, links in looks.surprises.by_kind.items():
+        lines_m, link = strokes(kind, links, position_m)
+        _draw_links(sheet, looks, kind, links.chosen(link), lines_m, ROBOT_HEIGHT * radius_m)
+    _draw_cut_off(sheet, HALO * radius_m)
+
+
+def _draw_links(
+    sheet: Sheet,
+    looks: Looks,
+    kind: str,
+    links: Surprises,
+    lines_m: Float[np.ndarray, "S 2 2"],
+    height_m: float,
+) -> None:
+    """Lines on the map, and in space so high; who points at one reads its link's numbers."""
+    lines = lines_m.astype(np.float32)
+    lifted = np.pad(lines, ((0, 0), (0, 0), (0, 1)), constant_values=np.float32(height_m))
+    on_map, in_space = f"arena/world/{kind}", f"scene/world/{kind}"
+    sheet.fixed_layer(on_map)
+    width = LAYERS[on_map].width
+    style = rr.LineStrips3D.from_fields(colors=[STROKES[kind]], radii=screen(width))
+    sheet.fixed(in_space, style)
+    numbers = {name: getattr(links, name) for name in NUMBERS}
+    per_look = np.bincount(links.row, minlength=len(looks.window))
+    columns = {
+        on_map: rr.LineStrips2D.columns(strips=lines),
+        in_space: rr.LineStrips3D.columns(strips=lifted),
+    }
+    known = rr.AnyValues.columns(**numbers).partition(per_look)
+    for path, strips in columns.items():
+        sheet.timed(path, [*strips.partition(per_look), *known], looks.window)
+
+
+def _draw_cut_off(sheet: Sheet, radius_m: float) -> None:
+    """A halo around each robot that is cut off from the ego robot."""
+    log = sheet.log
+    row, robot = np.nonzero(log.is_cut_off)
+    where_m = log.position_m[row, robot]
+    sheet.layer("arena/world/cut_off", row, positions=where_m)
+    path = "scene/world/cut_off"
+    flat = np.pad(where_m.astype(np.float32), ((0, 0), (0, 1)))
+    style = rr.Cylinders3D.from_fields(colors=[palette.CUT_OFF], fill_mode="solid")
+    sheet.fixed(path, style)
+    columns = rr.Cylinders3D.columns(
+        centers=flat, radii=np.full(len(row), radius_m), lengths=np.full(len(row), HALO_M)
+    )
+    per_window = np.bincount(row, minlength=len(log.window))
+    sheet.timed(path, columns.partition(per_window))

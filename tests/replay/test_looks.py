@@ -1,0 +1,146 @@
+"""Links that surprise: by lone packets through the channel itself, and by hand behind one wall."""
+
+from dataclasses import replace
+
+import networkx
+import numpy as np
+import pytest
+from mujoco import mjtGeom
+
+from swarm_mj.mission import paper
+from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP
+from swarm_mj.replay import looks
+from swarm_mj.replay.looks import EVERY, NO_SURPRISES, in_turn, joined, look, stride_of
+from swarm_mj.swarm import Swarm
+
+CITY = {"arena": "blocks", "shadowing_db": 6.0, "num_robots": 14, "strong_share": 0.3}
+WALL_DB = 3.0
+
+
+def lone_links(swarm, index):
+    """Who decodes whom if only one robot transmits: without fades, what mean powers grant."""
+    num_robots = swarm.mission.num_robots
+    position_m, robots = swarm.states.position_m[index : index + 1], np.arange(num_robots)
+    channel = swarm.channel.at(np.zeros(1, dtype=int), np.array([index]))
+    heard = [
+        channel(position_m, np.where(robots == i, -1, robots)[None])[0] for i in range(num_robots)
+    ]
+    return np.array([heard[i] == i for i in range(num_robots)]) & ~np.eye(num_robots, dtype=bool)
+
+
+def apart_m(swarm, index):
+    where = swarm.states.position_m[index]
+    return np.linalg.norm(where[:, None] - where, axis=2)
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_surprises_are_where_lone_packets_and_the_range_disagree(index):
+    swarm = Swarm(paper("random-walk", **CITY), [3, 4])
+    seen = look(swarm, index)
+    decodes, is_near = lone_links(swarm, index), apart_m(swarm, index) <= swarm.mission.range_m
+    expected = {}
+    for i in range(14):
+        for j in range(14):
+            if i != j and decodes[i, j] != is_near[i, j] and (j, i) not in expected:
+                expected[i, j] = bool(is_near[i, j])
+    found = seen.surprises
+    pairs = zip(found.sender.tolist(), found.receiver.tolist(), strict=True)
+    assert dict(zip(pairs, found.is_too_weak.tolist(), strict=True)) == expected
+    assert set(expected.values()) == {True, False}
+    assert np.all((found.margin_db < 0) == found.is_too_weak)
+    together = networkx.strongly_connected_components(networkx.DiGraph(decodes.astype(int)))
+    assert {frozenset(np.flatnonzero(seen.group == g).tolist()) for g in set(seen.group)} == set(
+        map(frozenset, together)
+    )
+
+
+def wall(spec, _mission):
+    spec.worldbody.add_geom(
+        type=mjtGeom.mjGEOM_BOX,
+        pos=[0, 0, 5],
+        size=[0.1, 2000, 5],
+        group=OBSTACLE_GROUP,
+        userdata=[WALL_DB],
+    )
+
+
+def test_losses_behind_a_wall_by_hand():
+    """88.0 dB over 250 m in free space, where the margin is 0; a wall takes 3 dB more."""
+    swarm = Swarm(paper("stationary", num_robots=20), [1], scene=wall)
+    where, distance_m = swarm.states.position_m[0], apart_m(swarm, 0)
+    found, expected = look(swarm).surprises, {}
+    for i in range(20):
+        for j in range(i + 1, 20):
+            is_behind = where[i, 0] * where[j, 0] < 0.0
+            margin_db = 20.0 * np.log10(250.0 / distance_m[i, j]) - WALL_DB * is_behind
+            if distance_m[i, j] <= 250.0 and margin_db < 0.0:
+                expected[i, j] = round(88.013 - margin_db), int(np.floor(margin_db))
+    assert len(expected) > 0
+    numbers = zip(found.loss_db.tolist(), found.margin_db.tolist(), strict=True)
+    pairs = zip(found.sender.tolist(), found.receiver.tolist(), strict=True)
+    assert dict(zip(pairs, numbers, strict=True)) == expected
+
+
+def test_a_strong_radio_surprises_in_its_own_direction_only():
+    mission = paper("stationary", num_robots=12, strong_share=0.5, strong_db=3.0)
+    found = look(Swarm(mission, [2])).surprises
+    assert not np.any(found.is_too_weak)
+    assert np.all(found.sender < 6)
+    assert len(found.sender) > 0
+    is_one_way = found.receiver >= 6
+    assert set(is_one_way.tolist()) == {True, False}
+    assert np.all(found.sender[~is_one_way] < found.receiver[~is_one_way])
+
+
+def test_free_space_and_a_channel_of_one_s_own_cannot_surprise():
+    mission = paper("stationary", num_robots=6)
+    assert look(Swarm(mission, [0])) is None
+    assert look(Swarm(mission, [0], channel=lambda _, recipient: recipient)) is None
+    faded = look(Swarm(replace(mission, fading="rayleigh", erasure=0.2), [0]))
+    assert len(faded.surprises.row) == 0
+    assert np.all(faded.group == 0)
+
+
+def test_robots_that_are_off_have_no_links():
+    swarm = Swarm(paper("stationary", **CITY), [3])
+    swarm._physics.deactivate(np.arange(14)[None] != 5)
+    seen = look(swarm)
+    assert not np.any((seen.surprises.sender == 5) | (seen.surprises.receiver == 5))
+    assert np.sum(seen.group == 5) == 1
+
+
+def test_looking_changes_nothing():
+    heard = []
+    for is_looked_at in (False, True):
+        swarm = Swarm(paper("random-walk", **CITY, fading="rayleigh"), [3, 4])
+        rng = np.random.default_rng(0)
+        for _ in range(6):
+            swarm.exchange(rng.integers(0, 14, (2, 14)))
+            heard.append([phase.heard.copy() for phase in swarm.phases])
+            if is_looked_at:
+                look(swarm)
+                look(swarm, 1)
+    np.testing.assert_array_equal(heard[:6], heard[6:])
+
+
+def test_a_fast_team_is_looked_at_more_often():
+    """5 windows of 0.1 s are 1.5 m at 3 m/s; half a per cent of a side of 1 km are 5 m."""
+    slow, fast = (
+        Swarm(paper("random-walk", num_robots=40, velocity_ratio=ratio), [0])
+        for ratio in (0.15, 1.2)
+    )
+    assert (stride_of(slow), stride_of(slow, 9), stride_of(fast)) == (EVERY, 9, 2)
+
+
+def test_each_look_stands_for_the_windows_until_the_next_one():
+    one = replace(
+        NO_SURPRISES,
+        row=np.zeros(1, dtype=int),
+        is_too_weak=np.ones(1, dtype=bool),
+        **dict.fromkeys(("sender", "receiver", "loss_db", "margin_db"), np.ones(1, np.int16)),
+    )
+    seen = joined([one, NO_SURPRISES, one], np.array([1, 6, 11]))
+    found = [len(seen.at(window).row) for window in (1, 5, 6, 10, 11, 99)]
+    assert found == [1, 1, 0, 0, 1, 1]
+    assert in_turn([seen.surprises, seen.surprises]).row.tolist() == [0, 0, 2, 2]
+    assert looks.NO_SURPRISES.num_bytes == 0
