@@ -12,6 +12,7 @@ from swarm_mj.control.motion import controller_of, initial_velocity
 from swarm_mj.fields import check_callable, check_kind
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started
+from swarm_mj.mission.geometry import overlaps_earlier
 from swarm_mj.mission.placement import connected_positions
 from swarm_mj.mission.robot_failures import draw_survivors, failure_window
 from swarm_mj.parts import is_ours
@@ -138,13 +139,16 @@ class Swarm:
             mission.range_m,
             rng,
             partial(channel.largest_part, mission=b) if asks else None,
-            self._is_blocked if stands else None,
+            self._is_blocked if stands or mission.robots_collide else None,
             keeps_largest=stands,
         )
 
     def _is_blocked(self, position_m: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
-        """Which robots would touch an obstacle there."""
-        return blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, self._obstacles)
+        """Which robots would touch an obstacle there, or another robot if they collide."""
+        is_blocked = blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, self._obstacles)
+        if self.mission.robots_collide:
+            is_blocked |= overlaps_earlier(position_m, 2.0 * ROBOT_RADIUS_M)
+        return is_blocked
 
     @property
     def states(self) -> RobotStates:

@@ -19,6 +19,7 @@ from swarm_mj.cli.progress import WorkBar
 from swarm_mj.io.interrupt import deferred_interrupt
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
+from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import is_directory, is_own_policy, make_policy
 from swarm_mj.replay.recorder import Recorder
@@ -95,7 +96,8 @@ def compile_ahead(
         on_window: Called after each window.
         **how: The other arguments of `make_policy`.
     """
-    is_bound = is_directory(policy_name)  # perhaps to teams of one size
+    # A directory's policy may be for teams of one size, and a file's arena does not shrink.
+    is_bound = is_directory(policy_name) or mission.arena not in ARENAS
     smallest = replace(
         mission,
         num_robots=mission.num_robots if is_bound else 3,

@@ -7,7 +7,7 @@ from itertools import product
 from typing import Any
 
 from swarm_mj.cli.options import add_option, flag_of, nested
-from swarm_mj.fields import FieldOf, as_typed
+from swarm_mj.fields import FieldOf, as_typed, kind_of
 from swarm_mj.mission import PRESETS, WORLDS, Mission, paper
 
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]
@@ -46,7 +46,7 @@ def mission_flags(mission: Mission) -> str:
     usual = replace(PRESETS[mission.preset](mission.task), preset=Mission().preset)
     named = {spec: getattr(mission, spec.name) for spec in SPECS}
     return " ".join(
-        f"{flag_of(spec)} {as_typed(value)}"
+        flag_of(spec) if value is True else f"{flag_of(spec)} {as_typed(value)}"
         for spec, value in named.items()
         if spec.name == "task" or value != getattr(usual, spec.name)
     )
@@ -71,5 +71,5 @@ def _default_of(spec: Field[Any]) -> str:
     if spec.name == "task":
         return f"{flocks}; {PRESETS[next(iter(WORLDS))]().task} under {', '.join(WORLDS)}"
     if flocks == others:
-        return flocks
+        return flocks if kind_of(spec) is not bool else ""
     return f"{others}; {flocks} for flocks, as in the paper"

@@ -101,5 +101,5 @@ def _draw_free(
             return
     raise ValueError(
         f"{int(np.sum(is_due))} of {len(position_m)} robots found no free space in "
-        f"{MAX_FREE_DRAWS} draws; choose an arena with more room between its obstacles"
+        f"{MAX_FREE_DRAWS} draws; choose an area with more room for them"
     )

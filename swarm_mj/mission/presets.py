@@ -18,7 +18,8 @@ def paper(task: Task = "flocking", **overrides: Any) -> Mission:
     Args:
         task: What the robots do; a flock has no boundary unless `overrides` give it one.
         **overrides: Any field of `Mission`. In an arena with obstacles physics are `contact` and
-            flocks have a boundary, unless they say otherwise.
+            flocks have a boundary, unless they say otherwise; where robots collide, physics are
+            `contact`, too.
 
     Returns:
         The mission.
@@ -29,7 +30,8 @@ def paper(task: Task = "flocking", **overrides: Any) -> Mission:
     """
     is_open = overrides.get("arena", OPEN) == OPEN
     boundary: Boundary = "none" if task == "flocking" and is_open else "reflect"
-    physics: PhysicsMode = "exact" if is_open else "contact"
+    collide = not is_open or overrides.get("robots_collide", False)
+    physics: PhysicsMode = "contact" if collide else "exact"
     usual = Mission(task=task, boundary=boundary, physics=physics)
     return replace(usual, **overrides)
 

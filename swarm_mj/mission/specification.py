@@ -203,6 +203,9 @@ class Mission:
         PhysicsMode,
         "Eq. 15 to rounding error, or forces and bounces",
     )
+    robots_collide: bool = setting(
+        False, "robots bounce off each other, too, in contact physics", label="robots collide"
+    )
     boundary: Boundary = _choice(
         "reflect", "boundary", "IV-A", Boundary, "what the edge of the area does to robots"
     )
@@ -229,6 +232,11 @@ class Mission:
             raise ValueError(
                 f"exact physics knows no collisions, and arena {self.arena} has obstacles; choose "
                 "physics contact, or arena open"
+            )
+        if self.robots_collide and self.physics == "exact":
+            raise ValueError(
+                "exact physics knows no collisions, so robots cannot collide in it; choose physics "
+                "contact, or let them pass through each other"
             )
         for name, value in vars(self).items():
             if isinstance(value, np.generic):  # which JSON does not know

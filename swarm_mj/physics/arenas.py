@@ -11,7 +11,8 @@ from mujoco._enums import mjtGeom
 from mujoco._specs import MjSpec
 
 from swarm_mj.mission import Mission
-from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP
+from swarm_mj.mission.specification import OPEN
+from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP, obstacles_of
 
 Arena = Callable[[MjSpec, Mission], None]  # adds what stands in the area
 
@@ -28,9 +29,6 @@ COLOURS = {
     "light wall": [0.45, 0.50, 0.58, 1.0],
     "tree": [0.20, 0.38, 0.30, 1.0],
 }
-# An overdamped limit that turns v into -v within one Euler step: a = -2 v / h (MuJoCo, solref in
-# the direct form). Tight impedance, or part of the speed is lost.
-ELASTIC_SOLIMP = [0.9999, 0.9999, 0.001, 0.5, 2.0]
 
 
 def arena_of(mission: Mission) -> Arena | None:
@@ -79,7 +77,7 @@ def forest(spec: MjSpec, mission: Mission) -> None:
 
 
 ARENAS: dict[str, Arena | None] = {
-    "open": None,
+    OPEN: None,
     "blocks": blocks,
     "forest": forest,
     "rooms": rooms,
@@ -87,12 +85,25 @@ ARENAS: dict[str, Arena | None] = {
 
 
 def _from_file(spec: MjSpec, mission: Mission) -> None:
-    """What an MJCF file of the user's holds."""
+    """What an MJCF file of the user's holds.
+
+    Raises:
+        ValueError: MuJoCo does not take it, something moves in it, or it has no obstacle.
+    """
     try:
         theirs = MjSpec.from_file(mission.arena)
+        obstacles = obstacles_of(theirs.compile())
     except ValueError as error:
         said = " ".join(str(error).split())
         raise ValueError(f"arena {mission.arena}: {said}") from error
+    if theirs.joints:
+        moves = theirs.joints[0].parent.name or "a body without a name"
+        raise ValueError(f"arena {mission.arena}: {moves} has a joint, but obstacles stand still")
+    if len(obstacles.kind) == 0:
+        raise ValueError(
+            f"arena {mission.arena} has no obstacle, as none of its geoms is of group "
+            f'{OBSTACLE_GROUP}; give walls group="{OBSTACLE_GROUP}", or choose arena {OPEN}'
+        )
     spec.nuser_geom = max(spec.nuser_geom, theirs.nuser_geom)  # or their losses would be cut off
     spec.attach(theirs, frame=spec.worldbody.add_frame(), prefix="arena/")
 
@@ -110,7 +121,7 @@ def _add(
     centre_m: tuple[float, float],
     size_m: tuple[float, float],
 ) -> None:
-    """Adds an upright obstacle that bounces robots off."""
+    """Adds an upright obstacle."""
     if spec.material(material) is None:
         spec.add_material(name=material, rgba=COLOURS[material])
     spec.worldbody.add_geom(
@@ -121,9 +132,6 @@ def _add(
         group=OBSTACLE_GROUP,
         contype=1,
         conaffinity=0,
-        solref=[0.0, -2.0 / spec.option.timestep],
-        solimp=ELASTIC_SOLIMP,
-        priority=1,
     )
 
 

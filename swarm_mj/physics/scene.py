@@ -4,11 +4,12 @@ import math
 from collections.abc import Callable
 
 from mujoco._enums import mjtDisableBit
-from mujoco._specs import MjSpec
+from mujoco._specs import MjsGeom, MjSpec
 
 from swarm_mj.io.assets import asset
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
-from swarm_mj.physics.arenas import ELASTIC_SOLIMP, arena_of
+from swarm_mj.physics.arenas import arena_of
+from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
 
 Scene = Callable[[MjSpec, Mission], None]  # changes the arena before it is compiled
@@ -19,6 +20,10 @@ WALL_THICKNESS_M = 2.0  # half of it, assets/arena.xml
 WALL_HEIGHT_M = 5.0  # half of it, assets/arena.xml
 SQUARES_PER_M = 5.0 / 1000.0  # repeats of the floor's texture, assets/arena.xml
 BEACON_RADIUS_M = 8.0  # assets/robot.xml, for an area of 1 km; larger areas have larger beacons
+ROBOTS_BIT = 2  # of the masks that say who collides; what scenes add has 1
+# An overdamped limit that turns v into -v within one Euler step: a = -2 v / h (MuJoCo, solref in
+# the direct form). Tight impedance, or part of the speed is lost.
+ELASTIC_SOLIMP = [0.9999, 0.9999, 0.001, 0.5, 2.0]
 CAMERA_HEIGHT_PER_SIDE = 1.3  # sees the whole area at a field of view of 45 degrees
 
 
@@ -31,11 +36,13 @@ def num_substeps(mission: Mission) -> int:
     """MuJoCo steps per window.
 
     In `contact` so many that none is longer than 10 ms, nor long enough to leave the area by more
-    than the robot's radius: a limit acts one step after it was crossed.
+    than the robot's radius: a limit acts one step after it was crossed. Robots that collide come
+    towards each other twice as fast.
     """
     if mission.physics == "exact":
         return 1
-    longest_s = min(CONTACT_STEP_S, ROBOT_RADIUS_M / mission.max_velocity_mps)
+    longest_m = ROBOT_RADIUS_M / (2.0 if mission.robots_collide else 1.0)
+    longest_s = min(CONTACT_STEP_S, longest_m / mission.max_velocity_mps)
     return math.ceil(mission.window_s / longest_s - 1e-9)
 
 
@@ -67,6 +74,8 @@ def compose(
     for i in range(mission.num_robots):
         frame = spec.worldbody.add_frame(pos=[0.0, 0.0, ROBOT_HEIGHT_M])
         spec.attach(robot.copy(), frame=frame, prefix=f"r{i}/")
+    if mission.robots_collide:
+        spec.option.disableflags &= ~int(mjtDisableBit.mjDSBL_CONTACT)
     if (arena := arena_of(mission)) is not None:
         _change(spec, mission, arena)
     if scene is not None:
@@ -91,7 +100,18 @@ def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
         return
     spec.option.disableflags &= ~int(mjtDisableBit.mjDSBL_CONTACT)
     for i in range(mission.num_robots):
-        spec.geom(f"r{i}/hull").conaffinity = 1  # it meets what the scene adds, but no robot
+        spec.geom(f"r{i}/hull").conaffinity |= 1  # it meets what the scene adds, but no robot
+    for geom in spec.geoms:
+        if geom.group == OBSTACLE_GROUP:
+            _bounce(geom, mission, priority=1)  # as it says, whatever it meets
+
+
+def _bounce(geom: MjsGeom, mission: Mission, priority: int = 0) -> None:
+    """What touches it keeps its speed, as at the boundary: no friction, the normal one reversed."""
+    geom.condim = 1
+    geom.solref = [0.0, -2.0 / timestep_s(mission)]
+    geom.solimp = ELASTIC_SOLIMP
+    geom.priority = priority
 
 
 def _movable(spec: MjSpec) -> list[str]:
@@ -151,6 +171,10 @@ def _fit_robot(robot: MjSpec, mission: Mission) -> None:
         else:
             actuator.set_to_motor()
             actuator.ctrlrange = [-force_n, force_n]
+    if mission.robots_collide:
+        hull = robot.geom("hull")
+        hull.contype = hull.conaffinity = ROBOTS_BIT
+        _bounce(hull, mission)
     if mission.physics == "contact" and mission.has_walls:
         for joint in robot.joints:
             joint.limited = True

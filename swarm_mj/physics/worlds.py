@@ -16,10 +16,11 @@ from mujoco import batch
 
 from swarm_mj.compiled import compiled
 from swarm_mj.mission import Mission
+from swarm_mj.mission.geometry import overlaps_earlier
 from swarm_mj.physics.obstacles import Obstacles
 from swarm_mj.physics.scene import ROBOT_MASS_KG, Scene, compose, num_substeps, timestep_s
 from swarm_mj.physics.solid_geoms import obstacles_of
-from swarm_mj.physics.state import RobotStates
+from swarm_mj.physics.state import ROBOT_RADIUS_M, RobotStates
 
 OPEN, MIRROR, CLIP = 0, 1, 2  # what happens at the boundary
 
@@ -85,10 +86,13 @@ class Physics:
             velocity_mps: v_0 [m/s].
 
         Raises:
-            ValueError: There is not one state per robot, or one is not finite.
+            ValueError: There is not one state per robot, one is not finite, or robots that collide
+                stand in each other.
         """
         self._check_vectors("position", position_m)
         self._check_vectors("velocity", velocity_mps)
+        if self._mission.robots_collide:
+            _check_apart(position_m)
         self._batch.reset()
         self._qpos[...] = position_m
         self._qvel[...] = velocity_mps
@@ -167,6 +171,20 @@ class Physics:
         self._states = replace(
             self._states, position_m=self._qpos.copy(), velocity_mps=self._qvel.copy()
         )
+
+
+def _check_apart(position_m: Float[np.ndarray, "B N 2"]) -> None:
+    """Raises ValueError if bodies overlap: such a start would fling them apart."""
+    for b, team_m in enumerate(position_m):
+        overlaps = np.flatnonzero(overlaps_earlier(team_m, 2.0 * ROBOT_RADIUS_M))
+        if len(overlaps) > 0:
+            j = int(overlaps[0])
+            apart_m = np.linalg.norm(team_m[:j] - team_m[j], axis=1)
+            raise ValueError(
+                f"robots {int(np.argmin(apart_m))} and {j} of mission {b} start "
+                f"{np.min(apart_m):.2g} m apart, and collide below {2.0 * ROBOT_RADIUS_M:g} m; "
+                "place them farther apart"
+            )
 
 
 @compiled()

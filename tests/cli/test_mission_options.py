@@ -98,6 +98,8 @@ def test_how_many_fail_is_swept_too():
         paper("flocking", boundary="reflect", range_ratio=1 / 3, num_windows=7),
         reference("random-walk", physics="contact", switched_off=0.1),
         PRESETS["urban"](),
+        PRESETS["urban"](robots_collide=True),
+        paper("random-walk", robots_collide=True),
         PRESETS["urban"]("stationary", arena="open", num_robots=9),
         PRESETS["open-field"]("flocking", path_loss="free-space", fading="none"),
         paper("stationary", fading="rayleigh", known="statistics,start"),

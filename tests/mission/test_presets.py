@@ -75,6 +75,14 @@ def test_any_field_can_be_overridden(preset, name):
     assert getattr(preset("stationary", **{name: OTHER[name]}), name) == OTHER[name]
 
 
+@pytest.mark.parametrize("preset", [paper, reference])
+def test_robots_that_collide_fly_in_contact_physics(preset):
+    assert preset(robots_collide=True).physics == "contact"
+    assert preset(robots_collide=False).physics == "exact"
+    with pytest.raises(ValueError, match=r"so robots cannot collide in it; choose physics contact"):
+        preset(robots_collide=True, physics="exact")
+
+
 @pytest.mark.parametrize("name", WORLDS)
 def test_a_world_is_the_papers_text_but_for_its_arena_and_channel(name):
     mission, paper_s = PRESETS[name](), paper("random-walk")

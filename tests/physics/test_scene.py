@@ -5,7 +5,7 @@ import pytest
 from swarm_mj.io.assets import asset
 from swarm_mj.mission import Mission, paper
 from swarm_mj.physics.scene import compose, num_substeps, timestep_s
-from swarm_mj.physics.state import RobotStates
+from swarm_mj.physics.state import ROBOT_RADIUS_M, RobotStates
 
 # Half the side of the square in which 40 robots share a square kilometre, by hand [m].
 HALF_SIDE_M = {10: 250.0, 40: 500.0, 90: 750.0}
@@ -263,3 +263,10 @@ def test_a_scene_changes_neither_the_time_nor_exact_physics():
     spec = compose(paper(num_robots=3), scene=careless)
     assert spec.option.timestep == pytest.approx(0.1)
     assert spec.option.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT
+
+
+def test_robots_that_collide_come_no_farther_in_a_step_than_a_radius_together():
+    for velocity_ratio, slowest in ((0.15, 10), (5.0, 40)):  # 3 m/s and 100 m/s per axis
+        mission = paper("random-walk", robots_collide=True, velocity_ratio=velocity_ratio)
+        assert num_substeps(mission) == slowest
+        assert 2.0 * mission.max_velocity_mps * timestep_s(mission) <= ROBOT_RADIUS_M + 1e-9

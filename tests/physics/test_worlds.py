@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mujoco import mjtGeom
@@ -5,6 +7,8 @@ from mujoco import mjtGeom
 from swarm_mj.mission import paper, reference
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import Physics
+from swarm_mj.policies.tdma import Tdma
+from swarm_mj.swarm import Swarm
 
 NUM_MISSIONS, NUM_ROBOTS = 6, 10
 BODY_RADIUS_M = 0.5  # assets/robot.xml
@@ -310,3 +314,93 @@ def test_robots_meet_what_a_scene_adds_but_no_other_robot():
         ends.append(states.position_m)
     np.testing.assert_array_equal(*ends)
     np.testing.assert_allclose(ends[0][0, :, 0], [106.0, 100.0], atol=1e-6)
+
+
+def collided(*states):
+    """Velocities of robots that collide, from (x, y, vx, vy) each, after 2 s, and before."""
+    now = np.array([states])
+    worlds = Physics(paper("random-walk", num_robots=len(states), robots_collide=True), 1)
+    worlds.place(now[..., :2].copy(), now[..., 2:].copy())
+    for _ in range(20):
+        after = worlds.step(np.zeros((1, len(states), 2)))
+    return after.velocity_mps[0], now[0, :, 2:]
+
+
+def test_robots_of_equal_mass_that_meet_head_on_exchange_their_velocities():
+    after, _ = collided((0.0, 0.0, 2.0, 0.0), (4.0, 0.0, -1.0, 0.0))
+    np.testing.assert_allclose(after, [[-1.0, 0.0], [2.0, 0.0]], atol=1e-3)
+
+
+def test_a_collision_keeps_momentum_and_energy_and_what_is_across():
+    """Centres 0.5 m off each other's line: the bodies of 1 m meet at 30 degrees to it."""
+    after, before = collided((0.0, 0.0, 3.0, 0.0), (4.0, 0.5, 0.0, 0.0))
+    np.testing.assert_allclose(after.sum(axis=0), before.sum(axis=0), atol=1e-9)
+    assert np.sum(after**2) == pytest.approx(np.sum(before**2), rel=1e-3)
+    turned = np.arctan2(after[1, 1], after[1, 0])  # the other flies off along the line of centres
+    assert turned == pytest.approx(np.pi / 6.0, abs=0.05)
+    assert after[0] @ after[1] == pytest.approx(0.0, abs=0.02)  # at right angles, as in billiards
+
+
+@pytest.mark.parametrize("velocity_ratio", [0.5, 5.0])
+def test_a_crowd_that_collides_keeps_its_energy_and_nobody_is_in_another(velocity_ratio):
+    """20 robots on 45 m by 45 m, at 5 m/s per axis and at 50."""
+    mission = crowded("contact", velocity_ratio=velocity_ratio, robots_collide=True)
+    mission = replace(mission, num_robots=20, density_per_km2=10_000.0)
+    rng = np.random.default_rng(2)
+    grid_m = np.stack(np.meshgrid(np.arange(5), np.arange(4)), axis=-1).reshape(1, -1, 2) * 8.0 - 15
+    start_mps = rng.uniform(-0.5, 0.5, grid_m.shape) * mission.max_velocity_mps
+    worlds = Physics(mission, 1)
+    worlds.place(grid_m, start_mps)
+    num_changes, last = 0, start_mps
+    for _ in range(200):
+        states = worlds.step(np.zeros_like(grid_m))
+        apart_m = np.linalg.norm(states.position_m[0][:, None] - states.position_m[0], axis=-1)
+        apart_m[np.diag_indices(20)] = np.inf
+        assert apart_m.min() > 2 * BODY_RADIUS_M - 1.5 * mission.max_velocity_mps * 0.01
+        num_changes += np.sum(np.abs(np.abs(states.velocity_mps) - np.abs(last)) > 1e-6)
+        last = states.velocity_mps
+    assert num_changes > 20  # other than at the boundary, which only turns signs
+    fastest = np.abs(last).max() >= mission.max_velocity_mps * (1 - 1e-9)
+    assert fastest or np.sum(last**2) == pytest.approx(np.sum(start_mps**2), rel=1e-3)
+
+
+def test_robots_that_collide_may_not_start_in_each_other():
+    worlds = Physics(paper("random-walk", num_robots=3, robots_collide=True), 2)
+    position_m = np.array([[[0.0, 0.0], [5.0, 0.0], [9.0, 0.0]]] * 2)
+    worlds.place(position_m, np.zeros_like(position_m))
+    position_m[1, 2] = [5.0, 0.75]
+    said = r"robots 1 and 2 of mission 1 start 0.75 m apart, and collide below 1 m; place them"
+    with pytest.raises(ValueError, match=said):
+        worlds.place(position_m, np.zeros_like(position_m))
+
+
+def hall(half_m):
+    """MJCF of walls in which robots of 0.5 m turn where the boundary would turn them."""
+    far_m = half_m + BODY_RADIUS_M + 2.0
+    walls = [(far_m, 0, 2, 900), (-far_m, 0, 2, 900), (0, far_m, 900, 2), (0, -far_m, 900, 2)]
+    geoms = (
+        f'<geom type="box" group="1" pos="{x} {y} 5" size="{w} {h} 5"/>' for x, y, w, h in walls
+    )
+    return f"<mujoco><worldbody>{''.join(geoms)}</worldbody></mujoco>"
+
+
+@pytest.mark.parametrize("task", ["random-walk", "flocking"])
+def test_a_walker_and_a_flock_turn_round_at_walls_as_at_the_boundary(task, tmp_path):
+    """The same seed between walls and in the bounded area: the same ways, to a few millimetres."""
+    fast = {"num_robots": 5, "density_per_km2": 400.0, "velocity_ratio": 1.0, "physics": "contact"}
+    bounded = paper(task, boundary="reflect", **fast)
+    file = tmp_path / "hall.xml"
+    file.write_text(hall(bounded.half_side_m))
+    swarms = [
+        Swarm(mission, [1, 2, 3])
+        for mission in (bounded, paper(task, boundary="none", arena=str(file), **fast))
+    ]
+    policy, num_turns = Tdma(), 0
+    for _ in range(100):
+        before = swarms[0].states.velocity_mps
+        for swarm in swarms:
+            swarm.step(policy)
+        one, other = (swarm.states for swarm in swarms)
+        np.testing.assert_allclose(other.position_m, one.position_m, atol=0.05)
+        num_turns += np.sum((one.velocity_mps * before < 0) & (np.abs(before) > 5.0))
+    assert num_turns > 3

@@ -1,0 +1,82 @@
+"""Arenas and channels that cannot be: one clear line each, exit code 2, and nothing is written."""
+
+import pytest
+
+GEOM = '<geom name="pillar" type="box" size="20 20 5" pos="0 0 5" group="1"/>'
+
+
+def mjcf(geom):
+    return f"<mujoco>\n<worldbody>\n{geom}\n</worldbody>\n</mujoco>\n"
+
+
+FILES = {
+    "full": (
+        mjcf(GEOM.replace("20 20 5", "2000 2000 5")),
+        "6 of 6 robots found no free space in 1000 draws; choose an area with more room for them",
+    ),
+    "empty": (
+        mjcf(GEOM.replace('group="1"', "")),
+        "arena world.xml has no obstacle, as none of its geoms is of group 1; give walls "
+        'group="1", or choose arena open',
+    ),
+    "unclosed": (mjcf(GEOM.replace("/>", ">")), "arena world.xml: XML parse error"),
+    "no number": (mjcf(GEOM.replace("20 20 5", "20 wide 5")), "line 3"),
+    "no size": (mjcf(GEOM.replace("20 20 5", "20 0 5")), "size 1 must be positive in geom"),
+    "no mesh": (mjcf('<geom type="mesh" mesh="hall"/>'), "arena world.xml: Error: "),
+    "gain": (
+        mjcf(GEOM.replace("group", 'user="-3" group')),
+        "arena world.xml: the penetration loss of geom pillar must be 0 dB or more, not -3",
+    ),
+    "moving": (
+        mjcf(f'<body name="cart"><joint type="slide"/>{GEOM}</body>'),
+        "arena world.xml: cart has a joint, but obstacles stand still",
+    ),
+    "text": ("a wall here, please", "arena world.xml: XML parse error"),
+}
+
+OPTIONS = {
+    "--rician-k -1": "Rician K must be a number from 0 to 10000 [1], not -1",
+    "--shadowing-db -1": "shadowing must be a number from 0 to 30 [dB], not -1",
+    "--loss-exponent 0": "path loss exponent must be a number from 1 to 10 [1], not 0",
+    "--strong-db -6": "strong radios must be a number from 0 to 60 [dB], not -6",
+    "--erasure 1": "erasure probability must be a number from 0 to 0.99 [1], not 1",
+    "--burst-begin 0.6": "burst begin must be a number from 0 to 0.5 [per slot], not 0.6",
+    "--arena sea": "open, blocks, forest, rooms, or an MJCF file, not 'sea'",
+    "--arena blocks --physics exact": "choose physics contact, or arena open",
+    "--preset urban --physics exact": "arena blocks has obstacles; choose physics contact, or",
+    "--robots-collide --physics exact": "exact physics knows no collisions, so robots cannot",
+}
+
+
+def refusal(swarm_mj, *options):
+    """The one line that is said."""
+    done = swarm_mj("fly", "--robots", 6, "--windows", 3, *options)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    (line,) = done.stderr.strip().splitlines()
+    return line
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_bad_arena_is_one_clear_line(swarm_mj, tmp_path, name):
+    text, complaint = FILES[name]
+    (tmp_path / "world.xml").write_text(text)
+    line = refusal(swarm_mj, "--arena", "world.xml")
+    assert complaint in line
+    is_mujocos = name in ("unclosed", "no number", "no size", "no mesh")
+    assert not is_mujocos or "line " in line.lower()
+    assert [path.name for path in tmp_path.iterdir()] == ["world.xml"]
+
+
+def test_a_hall_that_would_fill_a_smaller_teams_area_is_flown(swarm_mj, tmp_path):
+    """6 robots have 387 m by 387 m, and the 3 that compile ahead would have 274 m."""
+    (tmp_path / "world.xml").write_text(mjcf(GEOM.replace("20 20 5", "150 150 5")))
+    short = ("--robots", 6, "--windows", 3, "--range-ratio", 0.5, "--no-record")
+    done = swarm_mj("fly", *short, "--arena", "world.xml", "--policy", "tdma")
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("options", OPTIONS)
+def test_a_world_that_cannot_be_is_one_clear_line(swarm_mj, tmp_path, options):
+    assert OPTIONS[options] in refusal(swarm_mj, *options.split())
+    assert list(tmp_path.iterdir()) == []
