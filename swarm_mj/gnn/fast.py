@@ -3,15 +3,17 @@
 Linear maps commute with the choice of an edge's ends and with the mean over edges, so they are
 applied to nodes first, and a layer on a concatenation is a sum of layers. Two linear layers with
 nothing between them are one: the last of each perceptron is composed with the first of all those
-behind it. Input edges are encoded once for each direction, as they are all alike.
+behind it. Input edges are encoded once for each direction, as they are all alike. Only nodes that
+are asked for go through the last layers, and edges of one hidden layer are compiled on a CPU.
 """
 
 from typing import NamedTuple
 
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
+from swarm_mj.gnn.edge_means import EdgeMeans
 from swarm_mj.gnn.network import AggregationGnn, Core
 from swarm_mj.gnn.shape import Edges
 
@@ -20,17 +22,21 @@ IS_UPWARD = {"paper": (True,), "reference": (False,), "both": (True, False)}  # 
 
 
 class FastAggregationGnn(AggregationGnn):
-    """An `AggregationGnn` that composes layers; about twice as fast on many graphs."""
+    """An `AggregationGnn` that composes layers and leaves out what nobody asks for."""
 
     def forward(
-        self, node: Float[Tensor, "R N F"], parent: Int[Tensor, "R N"]
+        self,
+        node: Float[Tensor, "R N F"],
+        parent: Int[Tensor, "R N"],
+        is_wanted: Bool[Tensor, "R N"] | None = None,
     ) -> Float[Tensor, "R N O"]:
         """As `AggregationGnn.forward`, to which the linear variant and a depth of 1 are left."""
         self.check(node, parent)
         is_composed = self.shape.has_core and self.shape.depth > 1
         evaluate = Composed(self) if is_composed else super().forward
         num_chunks = -(-parent.numel() // NODES_AT_ONCE) if node.device.type == "cpu" else 1
-        chunks = zip(node.chunk(max(1, num_chunks)), parent.chunk(max(1, num_chunks)), strict=True)
+        rows = (node, parent) if is_wanted is None else (node, parent, is_wanted)
+        chunks = zip(*(each.chunk(max(1, num_chunks)) for each in rows), strict=True)
         return torch.cat([evaluate(*chunk) for chunk in chunks])
 
 
@@ -78,7 +84,7 @@ class Composed:
         """Composes the weights as they are now; gradients flow back to them."""
         assert isinstance(network.core, Core)
         self._edges: Edges = network.shape.edges
-        self._shape = network.shape
+        self._depth, self._num_blocks = network.shape.depth, network.shape.receptive_field
         self._encoder, self._decoder = network.encoder.node.layers, network.decoder.node.layers
         self._edge, self._node = network.core.edge.layers, network.core.node.layers
         of_edge, of_receiver, of_sender = self._edge[0].weight.chunk(3, dim=1)
@@ -90,7 +96,7 @@ class Composed:
             receiver=Layer(of_receiver, self._edge[0].bias),
             sender=Layer(of_sender, none),
         )
-        later = [entries.after(self._node[-1])] * self._shape.receptive_field
+        later = [entries.after(self._node[-1])] * self._num_blocks
         self._stages = [entries.after(self._encoder[-1]), *later]
         self._edge_again = Layer(of_edge, none).after(self._edge[-1])
         self._mean = Layer(of_mean, none).after(self._edge[-1])
@@ -103,18 +109,50 @@ class Composed:
         self._encoded_edges = network.encoder.edge(feature) @ of_edge.T
 
     def __call__(
-        self, node: Float[Tensor, "R N F"], parent: Int[Tensor, "R N"]
+        self,
+        node: Float[Tensor, "R N F"],
+        parent: Int[Tensor, "R N"],
+        is_wanted: Bool[Tensor, "R N"] | None = None,
     ) -> Float[Tensor, "R N O"]:
         """Evaluates the network; arguments as in `AggregationGnn.forward`."""
-        links = Links(parent, self._edges, node)
+        wanted = None if is_wanted is None else is_wanted.flatten().nonzero().squeeze(1)
         v = hidden(self._encoder[0](node.flatten(0, 1)), self._encoder[1:-1])
-        e = None
-        output = self._output_bias
-        for stage, (entries, out) in enumerate(zip(self._stages, self._outputs, strict=True)):
-            if stage > 0:
+        own = picked(v, wanted)
+        output = self._output_bias + self._decode(0, own)
+        if self._depth == 2 and self._num_blocks == 1 and node.device.type == "cpu":
+            output = output + self._decode(1, self._only_block(v, own, parent, is_wanted))
+        else:
+            links, e = Links(parent, self._edges, node), None
+            for stage in range(1, self._num_blocks + 1):
                 v, e = self._gn_block(self._stages[stage - 1], links, v, e)
-            output = output + out(hidden(entries.decoder(v), self._decoder[1:-1]))
-        return output.view(*parent.shape, self._shape.num_outputs)
+                output = output + self._decode(stage, picked(v, wanted))
+        if wanted is not None:
+            output = output.new_zeros(parent.numel(), output.shape[1]).index_copy(0, wanted, output)
+        return output.view(*parent.shape, output.shape[1])
+
+    def _decode(self, stage: int, node: Float[Tensor, "n C"]) -> Float[Tensor, "n O"]:
+        """A stage's part of the network's numbers."""
+        decoded = hidden(self._stages[stage].decoder(node), self._decoder[1:-1])
+        return self._outputs[stage](decoded)
+
+    def _only_block(
+        self,
+        node: Float[Tensor, "n C"],
+        wanted: Float[Tensor, "w C"],
+        parent: Int[Tensor, "R N"],
+        is_wanted: Bool[Tensor, "R N"] | None,
+    ) -> Float[Tensor, "w C"]:
+        """As `_gn_block`, if no other follows and edges have one hidden layer."""
+        entries = self._stages[0]
+        mean, share = EdgeMeans.apply(
+            entries.receiver(wanted),
+            (node @ entries.sender.weight.T).unflatten(0, parent.shape),
+            self._encoded_edges + entries.sender.bias,
+            parent,
+            torch.tensor(IS_UPWARD[self._edges]),
+            torch.ones_like(parent, dtype=torch.bool) if is_wanted is None else is_wanted,
+        )
+        return self._update_nodes(entries.node(wanted), mean, share.sign())
 
     def _gn_block(
         self,
@@ -127,8 +165,23 @@ class Composed:
         ends = links.from_ends(entries.receiver(node), entries.sender(node))
         edge = list(self._encoded_edges) if edge is None else [self._edge_again(e) for e in edge]
         edge = [hidden(x.add_(e), self._edge[1:-1]) for x, e in zip(ends, edge, strict=True)]
-        entered = links.add_mean_(entries.node(node), [self._mean(e) for e in edge])
-        return hidden(entered, self._node[1:-1]), edge
+        return self._update_nodes(entries.node(node), links.mean(edge), links.has_edge), edge
+
+    def _update_nodes(
+        self,
+        entered: Float[Tensor, "n C"],
+        mean: Float[Tensor, "n C"],
+        has_edge: Float[Tensor, "n"],
+    ) -> Float[Tensor, "n C"]:
+        """NN_v, from its first layer's part for the node and the edges' mean before their last."""
+        entered = entered.addmm_(mean, self._mean.weight.T)
+        entered = entered.addr_(has_edge, self._mean.bias)  # without edges the mean is 0
+        return hidden(entered, self._node[1:-1])
+
+
+def picked(x: Float[Tensor, "n *C"], rows: Int[Tensor, "w"] | None) -> Float[Tensor, "w *C"]:
+    """These rows; None is all of them."""
+    return x if rows is None else x.index_select(0, rows)
 
 
 class Links:
@@ -148,6 +201,7 @@ class Links:
         degree = torch.zeros_like(count)
         for is_up in self._is_upward:
             degree = degree.index_add(0, self._parent, count) if is_up else degree + count
+        self.has_edge = degree.clamp(max=1)
         share = degree.clamp(min=1).reciprocal()
         self._share = [count * (share[self._parent] if up else share) for up in self._is_upward]
 
@@ -162,11 +216,10 @@ class Links:
             for is_up in self._is_upward
         ]
 
-    def add_mean_(
-        self, node: Float[Tensor, "n C"], edge: list[Float[Tensor, "n C"]]
-    ) -> Float[Tensor, "n C"]:
-        """Adds to each node, in place, the mean over the edges it receives; overwrites `edge`."""
+    def mean(self, edge: list[Float[Tensor, "n C"]]) -> Float[Tensor, "n C"]:
+        """For each node, the mean over the edges that it receives; 0 without any."""
+        total = torch.zeros_like(edge[0])
         for is_up, share, rows in zip(self._is_upward, self._share, edge, strict=True):
-            rows.mul_(share[:, None])
-            node = node.index_add_(0, self._parent, rows) if is_up else node.add_(rows)
-        return node
+            part = rows * share[:, None]
+            total = total.index_add_(0, self._parent, part) if is_up else total.add_(part)
+        return total

@@ -6,7 +6,7 @@ This is the definition. `gnn.fast` computes the same numbers in fewer steps.
 from typing import NamedTuple
 
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from swarm_mj.gnn.shape import Edges, GnnShape
@@ -121,7 +121,10 @@ class AggregationGnn(nn.Module):
         self.output = nn.Linear((shape.receptive_field + 1) * width, shape.num_outputs)
 
     def forward(
-        self, node: Float[Tensor, "R N F"], parent: Int[Tensor, "R N"]
+        self,
+        node: Float[Tensor, "R N F"],
+        parent: Int[Tensor, "R N"],
+        is_wanted: Bool[Tensor, "R N"] | None = None,
     ) -> Float[Tensor, "R N O"]:
         """Maps the features of the nodes of R graphs to numbers for each node.
 
@@ -131,9 +134,10 @@ class AggregationGnn(nn.Module):
         Args:
             node: Features.
             parent: Index of each node's parent in the same graph, or -1: no edge.
+            is_wanted: Whose numbers are asked for; None is everyone's.
 
         Returns:
-            The numbers.
+            The numbers; 0 where nobody asked for them.
 
         Raises:
             ValueError: Features of another number than the network's, or a parent that is no node.
@@ -146,7 +150,8 @@ class AggregationGnn(nn.Module):
         for _ in range(self.shape.receptive_field):
             v, e = gn_block(self.core, v, e, edges)
             stages.append(self.decoder.node(v))
-        return self.output(torch.cat(stages, dim=1)).view(*parent.shape, self.shape.num_outputs)
+        output = self.output(torch.cat(stages, dim=1)).view(*parent.shape, self.shape.num_outputs)
+        return output if is_wanted is None else output.masked_fill(~is_wanted[:, :, None], 0.0)
 
     def check(self, node: Tensor, parent: Tensor) -> None:
         """Raises ValueError on graphs that would give numbers without a meaning."""

@@ -34,10 +34,11 @@ class ActiveRolloutBuffer(DictRolloutBuffer):
         """
         num_rows = self.buffer_size * self.n_envs
         if not self.generator_ready:
+            # Window by window, where they lie: most of them are never looked at.
             for name, rows in self.observations.items():
-                self.observations[name] = self.swap_and_flatten(rows)
+                self.observations[name] = rows.reshape(num_rows, *rows.shape[2:])
             for name in ("actions", "values", "log_probs", "advantages", "returns"):
-                setattr(self, name, self.swap_and_flatten(getattr(self, name)))
+                setattr(self, name, getattr(self, name).reshape(num_rows, 1))
             self.generator_ready = True
         is_active = self.actions[:, 0] != self.observations["owner"][:, 0]
         is_kept = is_active | (np.random.random(num_rows) < SILENT_SHARE)  # noqa: NPY002 - as SB3

@@ -72,7 +72,7 @@ class GnnActorCritic(ActorCriticPolicy):
         """Logits over recipients, and a value for every node, of every robot's graph."""
         node, parent = obs["node"].flatten(0, -3), obs["parent"].long().flatten(0, -2)
         may_address, has_turn = obs["may_address"].bool().flatten(0, -2), obs["has_turn"].bool()
-        output = self.network(node, parent)
+        output = self.network(node, parent, may_address)
         if self._shares_trunk:
             output, values = output[:, :, :-1], output[:, :, -1]  # the last number of each node
         else:
@@ -96,7 +96,7 @@ class GnnActorCritic(ActorCriticPolicy):
     ) -> tuple[Int[Tensor, "E *robots"], Float[Tensor, "E"], Float[Tensor, "E"]]:
         """Actions, values and the actions' log-probabilities."""
         logits, value = self.logits_and_value(obs)
-        actions = logits.argmax(-1) if deterministic else gumbel_sample(logits)
+        actions = logits.argmax(-1) if deterministic else boltzmann_sample(logits)
         return actions, value, log_probability(logits, actions)
 
     def evaluate_actions(
@@ -143,10 +143,11 @@ class TeamActorCritic(GnnActorCritic):
         return logits.unflatten(0, shape), value
 
 
-def gumbel_sample(logits: Float[Tensor, "*rows N"]) -> Int[Tensor, "*rows"]:
-    """A draw from each row's Boltzmann distribution: the largest of logits and Gumbel noise."""
-    exponential = torch.empty_like(logits).exponential_()
-    return (logits - exponential.log()).argmax(-1)
+def boltzmann_sample(logits: Float[Tensor, "*rows N"]) -> Int[Tensor, "*rows"]:
+    """A draw from each row's Boltzmann distribution, by its cumulated probabilities."""
+    cumulated = logits.double().softmax(-1).cumsum(-1)
+    uniform = torch.rand(*logits.shape[:-1], 1, device=logits.device)  # below 1 by more than ...
+    return (cumulated <= uniform * cumulated[..., -1:]).sum(-1)  # ... a double's rounding
 
 
 def log_probability(

@@ -199,6 +199,8 @@ def padded(graphs: Sequence[Graphs], num_nodes: int) -> Observation:
 
     def rows_of(name: str, fill: int, dtype: type) -> np.ndarray:
         parts = [getattr(each, name) for each in graphs]
+        if all(part.shape[1] == num_nodes for part in parts):
+            return np.concatenate(parts, dtype=dtype)
         shape = (sum(map(len, parts)), num_nodes, *parts[0].shape[2:])
         rows, start = np.full(shape, fill, dtype=dtype), 0
         for part in parts:

@@ -80,7 +80,7 @@ class LearnedPolicy(DecentralisedPolicy):
         )
         device, silence_logit = next(self._network.parameters()).device, self._silence_logit
         with torch.inference_mode(), _one_thread():
-            output = self._network(node.to(device), parent.to(device)).cpu()
+            output = self._network(*(each.to(device) for each in (node, parent, may_address))).cpu()
             return recipient_logits(
                 output, self._owner, may_address, silence_logit, has_turn
             ).numpy()

@@ -34,9 +34,16 @@ def some_graphs(seed, num_graphs, num_nodes):
     return torch.from_numpy(node), torch.from_numpy(parent)
 
 
-def outputs_and_gradients(network, node, parent):
+def some_wanted(seed, num_graphs, num_nodes):
+    """Two nodes in three, of the first graph none and of the second all."""
+    is_wanted = torch.from_numpy(np.random.default_rng(seed).random((num_graphs, num_nodes)) < 0.67)
+    is_wanted[0], is_wanted[1] = False, True
+    return is_wanted
+
+
+def outputs_and_gradients(network, node, parent, is_wanted=None):
     node = node.clone().requires_grad_()
-    output = network(node, parent)
+    output = network(node, parent, is_wanted)
     output.square().sum().backward()
     return {"output": output.detach(), "node": node.grad} | {
         name: torch.zeros_like(x) if x.grad is None else x.grad
@@ -52,6 +59,19 @@ def test_the_fast_network_is_the_plain_one(edges, is_linear, depth, receptive_fi
     graphs = some_graphs(depth, 4, 7)
     expected, found = (outputs_and_gradients(network, *graphs) for network in (plain, fast))
     assert expected.keys() == found.keys()
+    for name in expected:
+        torch.testing.assert_close(found[name], expected[name], rtol=1e-9, atol=1e-11, msg=name)
+
+
+@pytest.mark.parametrize(("edges", "is_linear", "depth", "receptive_field"), SHAPES)
+def test_what_is_wanted_is_as_it_was_and_the_rest_is_0(edges, is_linear, depth, receptive_field):
+    plain, fast = plain_and_fast(
+        edges=edges, is_linear=is_linear, depth=depth, receptive_field=receptive_field
+    )
+    graphs, is_wanted = some_graphs(depth, 5, 7), some_wanted(depth, 5, 7)
+    expected, found = (outputs_and_gradients(each, *graphs, is_wanted) for each in (plain, fast))
+    assert torch.equal(expected["output"][is_wanted], plain(*graphs)[is_wanted])
+    assert not torch.any(expected["output"][~is_wanted])
     for name in expected:
         torch.testing.assert_close(found[name], expected[name], rtol=1e-9, atol=1e-11, msg=name)
 
@@ -72,8 +92,10 @@ def test_a_batch_in_parts_equals_the_whole(is_linear, monkeypatch):
     _, fast = plain_and_fast(is_linear=is_linear)
     graphs = some_graphs(6, 7, 5)
     whole = fast(*graphs)
+    is_wanted = some_wanted(6, 7, 5)
     monkeypatch.setattr(swarm_mj.gnn.fast, "NODES_AT_ONCE", 11)
     torch.testing.assert_close(fast(*graphs), whole)
+    torch.testing.assert_close(fast(*graphs, is_wanted), whole * is_wanted[:, :, None])
 
 
 def test_later_weights_count():

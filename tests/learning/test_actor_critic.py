@@ -8,7 +8,7 @@ import torch
 from small_runs import small_training
 from torch.distributions import Categorical
 
-from swarm_mj.learning.actor_critic import entropy, gumbel_sample, log_probability
+from swarm_mj.learning.actor_critic import boltzmann_sample, entropy, log_probability
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import make_model
 from swarm_mj.learning.vec_env import missions_of
@@ -140,7 +140,7 @@ def test_draws_have_the_frequencies_of_the_boltzmann_distribution():
     torch.manual_seed(1)
     logits = torch.tensor([1.0, 0.0, -2.0, 2.5, -1e9])
     count = 40_000
-    drawn = torch.bincount(gumbel_sample(logits.expand(count, 5)), minlength=5) / count
+    drawn = torch.bincount(boltzmann_sample(logits.expand(count, 5)), minlength=5) / count
     expected = torch.softmax(logits, 0)
     error = (expected * (1 - expected) / count).sqrt()
     assert torch.all((drawn - expected).abs() <= 4.0 * error)
@@ -149,7 +149,7 @@ def test_draws_have_the_frequencies_of_the_boltzmann_distribution():
 
 def test_draws_of_different_robots_are_independent():
     torch.manual_seed(1)
-    both = gumbel_sample(torch.zeros(20_000, 2, 2)).float()
+    both = boltzmann_sample(torch.zeros(20_000, 2, 2)).float()
     correlation = torch.corrcoef(both.T)[0, 1]
     assert abs(correlation) < 4.0 / np.sqrt(20_000)
 
