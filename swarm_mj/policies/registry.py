@@ -17,6 +17,7 @@ from swarm_mj.policies.aloha import Aloha
 from swarm_mj.policies.gossip import InnovationGossip
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle, LookaheadOracle
 from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
+from swarm_mj.policies.planner.payloads import snapshot_form
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.without_payload import PlannerWithoutPayload
@@ -42,6 +43,7 @@ def _planner(mission: Mission) -> Planner:
     return Planner(
         radio_of(mission),
         PlannerSettings(),
+        snapshot_form(mission),
         window_s=mission.window_s,
         range_m=mission.range_m,
         side_m=mission.side_m,

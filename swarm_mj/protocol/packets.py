@@ -139,6 +139,11 @@ def slot_bytes(mission: Mission) -> int | None:
     return math.floor(round(bits / BITS_PER_BYTE, 6))
 
 
+def least_bit_rate(num_bytes: int, mission: Mission) -> float:
+    """At which a slot holds so many bytes [bit/s]."""
+    return num_bytes * BITS_PER_BYTE / (mission.window_s * SLOT_WINDOWS)
+
+
 def bits_per_second(rate: float) -> str:
     """A bit rate in words, by the usual prefix."""
     for prefix, unit in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
@@ -163,7 +168,7 @@ def fitting(packet: Packet, mission: Mission, policy: str) -> Packet:
         return packet
     least = replace(packet, num_entries=1)
     if least.num_bytes > capacity:
-        needed = least.num_bytes * BITS_PER_BYTE / (mission.window_s * SLOT_WINDOWS)
+        needed = least_bit_rate(least.num_bytes, mission)
         raise ValueError(
             f"packets of {policy} need {least.num_bytes} bytes for a single entry, but a slot "
             f"holds {capacity} at {bits_per_second(rate)}; choose a bit rate of {needed:g} or more"

@@ -11,6 +11,7 @@ import numpy as np
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.planner.broadcast_scheduler import schedule
+from swarm_mj.policies.planner.payloads import snapshot_form
 from swarm_mj.policies.planner.plan import foresight_of
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
@@ -243,6 +244,7 @@ def planner_of(mission, settings):
     return Planner(
         radio_of(mission),
         settings,
+        snapshot_form(mission),
         window_s=mission.window_s,
         range_m=mission.range_m,
         side_m=mission.side_m,

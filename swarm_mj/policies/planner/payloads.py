@@ -1,44 +1,151 @@
-"""What the planner's packets carry beyond T, M and P, field by field."""
+"""What the planner's packets carry beyond T, M and P: two snapshots, whole or lean.
+
+Whole snapshots hold N² ages, those that the plan before leads to, so packets grow with the square
+of the team. Where a slot does not hold them, lean ones go without: every plan then begins with a
+team that knows nothing. They are also coarser: ages step by a window or more, positions by 25 cm
+for 40 robots within walls. Robots fly by snapshots as they arrive, so that all plan alike.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from swarm_mj.mission import Mission
+from swarm_mj.policies.planner.snapshots import Snapshots
+from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.packets import (
     POSITION_BITS,
     PacketField,
     age,
+    bits_per_second,
     identity,
+    least_bit_rate,
+    packet_of,
     position,
+    slot_bytes,
     times,
 )
 
 NUM_SNAPSHOTS = 2  # the one that the sender flies by, and the best for the next epoch
 SPEED_BITS = 16
 TABLE_BITS, TABLE_STEP_WINDOWS = 16, 1 / 16  # ages of up to 4,096 windows
+RANK_BITS = 32
+LEAN_AGE_BITS, LEAN_POSITION_BITS = 8, 12
+LEAN_ROUNDS = 4  # ages of up to so many rounds of N windows are told apart
 
 
-def snapshot_fields(mission: Mission) -> tuple[PacketField, ...]:
-    """Two snapshots, each with the N² ages that the plan before it leads to.
+@dataclass(frozen=True, kw_only=True)
+class SnapshotForm:
+    """How much of two snapshots packets carry, and how precisely."""
 
-    How far positions err follows from their ages and one number, how much velocities differ.
+    payload: str  # what it is called
+    age: PacketField
+    position: PacketField
+    others: tuple[PacketField, ...]  # of one snapshot
+    has_table: bool  # whether a plan begins with what the plan before leads to
+    is_coarse: bool  # whether what arrives is rounded
+
+    @property
+    def fields(self) -> tuple[PacketField, ...]:
+        """Of both snapshots."""
+        one = (*self.others, self.age, self.position)
+        return tuple(times(field, NUM_SNAPSHOTS) for field in one)
+
+    def arrived(self, snapshots: Snapshots, now: float, windows_ahead: float) -> Snapshots:
+        """Snapshots as they arrive.
+
+        Args:
+            snapshots: As they were taken.
+            now: t then [windows].
+            windows_ahead: From then to the middle of their epoch [windows].
+        """
+        if not self.is_coarse:
+            return snapshots
+        taken = now - snapshots.timestamp
+        told = self.age.rounded(taken)
+        grown = (told + windows_ahead) / (taken + windows_ahead)
+        return replace(
+            snapshots,
+            timestamp=np.maximum(now - told, NEVER),
+            position_m=self.position.rounded(snapshots.position_m),
+            position_std_m=snapshots.position_std_m * grown,
+        )
+
+
+def snapshot_form(mission: Mission) -> SnapshotForm:
+    """The richest form of which packets fit into the mission's slots.
+
+    Raises:
+        ValueError: None does.
     """
+    capacity, whole, lean = slot_bytes(mission), whole_form(mission), lean_form(mission)
+    if capacity is None or packet_of(mission, whole.fields).num_bytes <= capacity:
+        return whole
+    least = packet_of(mission, lean.fields).num_bytes
+    if mission.bit_rate is not None and least > capacity:
+        raise ValueError(
+            f"packets of planner need {least:,} bytes at least, but a slot holds {capacity:,} at "
+            f"{bits_per_second(mission.bit_rate)}; choose a bit rate of "
+            f"{least_bit_rate(least, mission):g} or more, or planner --payload none"
+        )
+    return lean
+
+
+def whole_form(mission: Mission) -> SnapshotForm:
+    """Snapshots as precise as T and M, and the N² ages that the plan before leads to."""
     num_robots = mission.num_robots
+    table = PacketField(
+        name="expected age, of all pairs",
+        bits=TABLE_BITS,
+        count=num_robots**2,
+        step=TABLE_STEP_WINDOWS,
+        unit="windows",
+    )
+    return SnapshotForm(
+        payload="snapshots",
+        age=times(age("age in the snapshot"), num_robots),
+        position=times(position("position in the snapshot", mission, POSITION_BITS), num_robots),
+        others=(*_common(mission), table),
+        has_table=True,
+        is_coarse=False,
+    )
+
+
+def lean_form(mission: Mission) -> SnapshotForm:
+    """Snapshots without the N² ages, and coarser; what followed from exact ages is sent as well."""
+    num_robots = mission.num_robots
+    lean_age = PacketField(
+        name="age in the snapshot",
+        bits=LEAN_AGE_BITS,
+        count=num_robots,
+        step=max(1.0, LEAN_ROUNDS * num_robots / 2**LEAN_AGE_BITS),
+        unit="windows",
+    )
+    lean_position = position("position in the snapshot", mission, LEAN_POSITION_BITS)
+    return SnapshotForm(
+        payload="lean snapshots",
+        age=lean_age,
+        position=times(lean_position, num_robots),
+        others=(
+            *_common(mission),
+            PacketField(name="robots heard of lately", bits=1, count=num_robots),
+            PacketField(name="their mean age", bits=RANK_BITS),
+        ),
+        has_table=False,
+        is_coarse=True,
+    )
+
+
+def _common(mission: Mission) -> tuple[PacketField, ...]:
+    """How far positions err follows from their ages and one number, how much velocities differ."""
     most_mps = 2.0 * mission.max_velocity_mps
-    snapshot = (
+    return (
         identity("owner of the snapshot", mission),
-        PacketField(name="robots known to the owner", bits=1, count=num_robots),
-        times(age("age in the snapshot"), num_robots),
-        times(position("position in the snapshot", mission, POSITION_BITS), num_robots),
+        PacketField(name="robots known to the owner", bits=1, count=mission.num_robots),
         PacketField(
             name="spread of velocities",
             bits=SPEED_BITS,
             step=most_mps / 2**SPEED_BITS,
             unit="m/s",
         ),
-        PacketField(
-            name="expected age, of all pairs",
-            bits=TABLE_BITS,
-            count=num_robots**2,
-            step=TABLE_STEP_WINDOWS,
-            unit="windows",
-        ),
     )
-    return tuple(times(each, NUM_SNAPSHOTS) for each in snapshot)

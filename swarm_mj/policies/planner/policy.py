@@ -23,7 +23,8 @@ search for it.
 
 A packet carries, beyond T, M and P, two snapshots (`payloads.py`): who took each, N ages, N
 positions, how much velocities differ, and the N² timestamps that the last plan leads to. That makes
-7.3 kB for 40 robots, 27 kB for 80, and 165 kB for 200.
+7.3 kB for 40 robots, 27 kB for 80, and 164 kB for 200. Where a mission's slots hold less, packets
+carry lean snapshots.
 """
 
 import math
@@ -34,7 +35,7 @@ from jaxtyping import Bool, Int
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.planner.discovery import Discovery
-from swarm_mj.policies.planner.payloads import snapshot_fields
+from swarm_mj.policies.planner.payloads import SnapshotForm, snapshot_form
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.settings import EpochSettings, PlannerSettings
 from swarm_mj.policies.planner.snapshots import Snapshots, take_snapshots
@@ -62,6 +63,7 @@ class Planner(BroadcastPolicy):
         self,
         radio: FreeSpaceRadio,
         settings: PlannerSettings,
+        form: SnapshotForm,
         *,
         window_s: float,
         range_m: float,
@@ -72,12 +74,14 @@ class Planner(BroadcastPolicy):
         Args:
             radio: The mission's channel.
             settings: What was tuned.
+            form: How much of a snapshot packets carry.
             window_s: Duration of a window [s].
             range_m: Distance up to which a lone packet decodes [m].
             side_m: Side of the area that the robots start in [m].
         """
         self._radio = radio
         self._settings = settings
+        self._form = form
         self._window_s = window_s
         self._range_m = range_m
         self._num_reaches = side_m**2 / (math.pi * range_m**2)
@@ -85,11 +89,11 @@ class Planner(BroadcastPolicy):
     @property
     def payload(self) -> str:
         """Packets carry two snapshots of the team, taken earlier."""
-        return "snapshots"
+        return self._form.payload
 
     def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:
         """Of these snapshots; arguments as in `Policy.payload_fields`."""
-        return snapshot_fields(mission)
+        return snapshot_form(mission).fields
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draws each mission's orders of turns and forgets; arguments as in `Policy.start`."""
@@ -98,6 +102,7 @@ class Planner(BroadcastPolicy):
                 self._radio,
                 self._window_s,
                 self._settings,
+                self._form,
                 Discovery(num_robots, self._num_reaches, self._range_m, self._settings, rng),
             )
             for rng in rngs
@@ -116,11 +121,13 @@ class _Team:
         radio: FreeSpaceRadio,
         window_s: float,
         settings: PlannerSettings,
+        form: SnapshotForm,
         discovery: Discovery,
     ) -> None:
         self._radio = radio
         self._window_s = window_s
         self._settings = settings
+        self._form = form
         self._discovery = discovery
         self._everyone = np.arange(discovery.num_robots)
         self._starts = epoch_starts(discovery.num_robots, settings.epochs)
@@ -199,7 +206,7 @@ class _Team:
 
     def _snapshots(self, buffers: Buffers, b: int, now: float, windows_ahead: float) -> Snapshots:
         """What every robot would plan by so far ahead."""
-        return take_snapshots(
+        taken = take_snapshots(
             buffers.position_m[b],
             buffers.velocity_mps[b],
             buffers.timestamp[b],
@@ -209,13 +216,15 @@ class _Team:
             windows_ahead,
             self._settings.snapshots,
         )
+        return self._form.arrived(taken, now, windows_ahead)
 
     def _plan(self, owner: int) -> Plan:
         """The plan that follows from someone's snapshot."""
         if owner not in self._plans and self._current is not None:
             before = self._ended.get(int(self._ended_continues[owner]))
             is_at_rest = not np.any(self._current.position_std_m[owner])
-            if is_at_rest and self._epoch % self._settings.epochs.forget_every == 0:
+            forgets = is_at_rest and self._epoch % self._settings.epochs.forget_every == 0
+            if forgets or not self._form.has_table:
                 before = None
             start = self._start(self._epoch)
             end = start + self._length(self._epoch)
