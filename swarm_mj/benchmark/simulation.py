@@ -7,12 +7,15 @@ the same run is the yardstick.
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import product
 from timeit import repeat, timeit
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Int
+from mujoco._enums import mjtGeom
 from mujoco._functions import mj_step
+from mujoco._specs import MjSpec
 from mujoco._structs import MjData
 
 from swarm_mj.evaluation.batch import fly_batch
@@ -20,7 +23,9 @@ from swarm_mj.evaluation.jobs import run_jobs
 from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission, paper
-from swarm_mj.physics.scene import compose
+from swarm_mj.physics.arenas import BLOCK_M, HALF_HEIGHT_M
+from swarm_mj.physics.scene import Scene, compose
+from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.policy import regular_length
 from swarm_mj.policies.planner.settings import PlannerSettings
@@ -83,6 +88,44 @@ def simulation_rows(
     yield Row(PLAIN_STEP, step_us, ends_section=True)
     for name, part in parts.items():
         yield Row(name, microseconds(part, seconds / 4) / num_missions)
+
+
+def world_rows(num_missions: int, *, seconds: float = 2.0) -> Iterator[Row]:
+    """Times the same walks where there is more than free space, per window of one mission.
+
+    The two sides of a ratio are measured in turn, so that a machine's moods reach both; each
+    measurement takes about so many seconds.
+    """
+
+    def window_us(scene: Scene | None = None, **world: Any) -> tuple[float, float]:
+        """A window, and of it what MuJoCo takes."""
+        swarm = Swarm(replace(MISSION, **world), range(num_missions), scene=scene)
+        policy = RoundRobin()
+        whole_us = microseconds(lambda: swarm.step(policy), seconds / 2)
+        return whole_us / num_missions, microseconds(swarm.move, seconds / 4) / num_missions
+
+    (exact_us, _), (faded_us, _) = window_us(), window_us(fading="rayleigh")
+    yield Row("free space", exact_us)
+    yield Row("Rayleigh fading", faded_us)
+    yield Row("  times free space", faded_us / exact_us, "{:.2f}", ends_section=True)
+    (plain_us, plain_move_us) = window_us(physics="contact")
+    (among_us, among_move_us) = window_us(twenty_blocks, physics="contact")
+    yield Row("free space, contact physics", plain_us)
+    yield Row("  of these, MuJoCo moves the robots", plain_move_us)
+    yield Row("20 obstacles, contact physics", among_us)
+    yield Row("  of these, MuJoCo moves the robots", among_move_us)
+    yield Row("  times none", among_us / plain_us, "{:.2f}")
+
+
+def twenty_blocks(spec: MjSpec, mission: Mission) -> None:
+    """A scene: five rows of four city blocks, as in arena `blocks`."""
+    for x, y in product(np.linspace(-0.4, 0.4, 5), np.linspace(-0.375, 0.375, 4)):
+        spec.worldbody.add_geom(
+            type=mjtGeom.mjGEOM_BOX,
+            pos=[x * mission.side_m, y * mission.side_m, HALF_HEIGHT_M],
+            size=[BLOCK_M / 2.0, BLOCK_M / 2.0, HALF_HEIGHT_M],
+            group=OBSTACLE_GROUP,
+        )
 
 
 def evaluation_rows(num_episodes: int, *, num_jobs: int = 2, seconds: float = 2.0) -> Iterator[Row]:

@@ -13,14 +13,17 @@ from swarm_mj.benchmark.simulation import (
     evaluation_rows,
     plain_step_us,
     simulation_rows,
+    world_rows,
 )
 from swarm_mj.cli.terminal import plain_console, tell_cores
 from swarm_mj.fields import setting
 
+WORLD_MISSIONS = 32  # side by side, among obstacles and under fading
 BUSY = 0.3  # the spread from which on numbers say little
 LEGEND = """\
 window: 100 ms of a mission. The indented rows below the line are its parts.
 plain MuJoCo step: mj_step of the same scene, without radio: the yardstick.
+obstacles: they cost most in MuJoCo, which looks for contacts in each of its ten steps a window.
 plan: what the planner's robots compute once in an epoch of half as many windows as robots.
 team decision: the network decides for all robots of a team, in one window."""
 
@@ -97,6 +100,9 @@ def _measure(options: Options, say: Callable[[str], None]) -> Iterator[_Measured
         columns.append(list(rows))
     head = ("missions side by side", *map(str, options.missions))
     yield _Measured("Simulation: 40 robots walk at random, policy round-robin", columns, head)
+    say("Measuring obstacles and fading ...")
+    rows = world_rows(WORLD_MISSIONS, seconds=options.seconds)
+    yield _Measured(f"World: one window of one of {WORLD_MISSIONS} such missions", [list(rows)])
     if options.episodes:
         say(f"Measuring an evaluation of {options.episodes} missions ...")
         rows = evaluation_rows(options.episodes, num_jobs=options.jobs, seconds=options.seconds)

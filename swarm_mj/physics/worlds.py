@@ -61,6 +61,7 @@ class Physics:
         self._qpos = self._batch.bind("qpos").reshape(shape)
         self._qvel = self._batch.bind("qvel").reshape(shape)
         self._ctrl = self._batch.bind("ctrl").reshape(shape)
+        self._rests = scene is None  # whoever stands stays; what a scene adds may push
         self._wall = OPEN
         if mission.has_walls and mission.physics == "exact":
             self._wall = MIRROR if mission.wall_hit == "mirror" else CLIP
@@ -156,6 +157,8 @@ class Physics:
         )
 
     def _step_contact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
+        if self._rests and not np.any(self._qvel) and not np.any(acceleration_mps2):
+            return
         limit_mps = self._mission.max_velocity_mps
         limit_mps2 = self._mission.max_acceleration_mps2
         window_s, step_s = self._mission.window_s, timestep_s(self._mission)

@@ -1,5 +1,6 @@
 """The benchmark measures what it says; how fast is no test's business."""
 
+import numpy as np
 import pytest
 
 from swarm_mj.benchmark.simulation import (
@@ -7,7 +8,12 @@ from swarm_mj.benchmark.simulation import (
     PLAIN_STEP,
     evaluation_rows,
     simulation_rows,
+    twenty_blocks,
+    world_rows,
 )
+from swarm_mj.mission import paper
+from swarm_mj.physics.scene import compose
+from swarm_mj.physics.solid_geoms import obstacles_of
 
 
 def test_a_timing_is_consistent():
@@ -17,6 +23,22 @@ def test_a_timing_is_consistent():
     assert rows["windows simulated per second"] == pytest.approx(1e6 / window_us)
     assert rows[IN_STEPS] == pytest.approx(window_us / rows[PLAIN_STEP])
     assert rows["the radio alone"] < window_us
+
+
+def test_worlds_are_timed_against_free_space_in_the_same_physics():
+    rows = {row.name: row.value for row in world_rows(2, seconds=0.05)}
+    assert all(value > 0 for value in rows.values())
+    fading = rows["Rayleigh fading"] / rows["free space"]
+    assert rows["  times free space"] == pytest.approx(fading)
+    obstacles = rows["20 obstacles, contact physics"] / rows["free space, contact physics"]
+    assert rows["  times none"] == pytest.approx(obstacles)
+
+
+def test_twenty_blocks_are_obstacles():
+    mission = paper("random-walk", physics="contact")
+    found = obstacles_of(compose(mission, scene=twenty_blocks).compile())
+    assert len(found.kind) == 20
+    assert np.all(np.abs(found.centre_m[:, :2]) + 55.0 <= mission.half_side_m)
 
 
 def test_an_evaluations_timing_is_consistent():

@@ -41,7 +41,7 @@ def test_the_defaults_that_the_help_shows_are_the_usual_settings(capsys):
         f"side by side, 1 to 4096 (default: {robot.missions}, team: {team.missions})",
         "is the same policy, 0 or more (default: 0)",
         "stationary, random-walk, flocking, formation, coverage (default: stationary)",
-        "paper, reference (default: paper)",
+        "paper, reference, indoor, urban, open-field (default: paper)",
         "several are trained on together, 2 to 200 (default: 40)",
         "reflect, none (default: the preset's own)",
         f"of each team size, 1 to 10000 (default: {robot.held_out})",

@@ -404,3 +404,34 @@ def test_a_walker_and_a_flock_turn_round_at_walls_as_at_the_boundary(task, tmp_p
         np.testing.assert_allclose(other.position_m, one.position_m, atol=0.05)
         num_turns += np.sum((one.velocity_mps * before < 0) & (np.abs(before) > 5.0))
     assert num_turns > 3
+
+
+class CountsSteps:
+    """MuJoCo's worlds, and how often they were stepped."""
+
+    def __init__(self, worlds):
+        self.worlds, self.num_steps = worlds, 0
+
+    def step(self):
+        self.worlds.step()
+        self.num_steps += 1
+
+
+@pytest.mark.parametrize("arena", ["open", "blocks"])
+def test_a_team_at_rest_is_not_stepped_and_is_where_steps_would_leave_it(arena):
+    mission = paper("stationary", num_robots=10, arena=arena, physics="contact")
+    position_m = np.linspace(-240.0, -221.0, 20).reshape(1, 10, 2)
+    still, pushed = np.zeros_like(position_m), np.zeros_like(position_m)
+    pushed[0, 3, 0] = 1.0
+    ends = []
+    for scene in (None, lambda _spec, _mission: None):  # a scene's worlds are always stepped
+        worlds = Physics(mission, 1, scene=scene)
+        worlds.place(position_m, still)
+        worlds._batch = CountsSteps(worlds._batch)
+        num_steps = []
+        for push in (still, still, pushed, still):
+            worlds.step(push)
+            num_steps.append(worlds._batch.num_steps)
+        assert num_steps == ([0, 0, 10, 20] if scene is None else [10, 20, 30, 40])
+        ends.append(worlds.states.position_m)
+    np.testing.assert_array_equal(*ends)
