@@ -85,6 +85,7 @@ class ExtendedFeatures(FeatureExtractor):
             may_address,
         )
         is_known = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
+        _write_neighbours(believed_m, is_known, range_m, node["neighbours"])
         for field, ranges in TURN_RANGES.items():
             write_turns(believed_m, is_known, views.now, ranges * range_m, node[field])
         now, threshold = views.now.astype(np.int64), from_db(self._mission.sinr_threshold_db)
@@ -119,10 +120,18 @@ def _logarithm(windows: float) -> float:
     return math.log1p(windows) / math.log1p(LONG_WINDOWS)
 
 
+# Ages are of whole and half windows, so almost all of them are looked up.
+LOG_AGES = np.array([math.log1p(n / 2) / math.log1p(LONG_WINDOWS) for n in range(1000)])
+
+
 @compiled()
 def _log_age(now: float, then: float) -> float:
     """The age on this scale: 0 is now, 1 is long ago or never."""
-    return 1.0 if then <= NEVER else min(1.0, _logarithm(now - then))
+    age = now - then
+    if then <= NEVER or age >= LONG_WINDOWS:
+        return 1.0
+    place = int(2.0 * age)
+    return LOG_AGES[place] if place == 2.0 * age and place >= 0 else _logarithm(age)
 
 
 @compiled(fastmath=True)
@@ -151,22 +160,26 @@ def _fill(
     node: Shaped[np.ndarray, "B N N"],
     may_address: Bool[np.ndarray, "B N N"],
 ) -> None:
-    """All features but those of turns by distance or interference."""
+    """All features but neighbours and turns by distance or interference."""
     num_missions, num_robots = timestamp.shape[:2]
+    rank, own = np.empty(num_robots), np.empty(num_robots, dtype=np.float32)
     for b in range(num_missions):
+        for k in range(num_robots):
+            rank[k] = ((k - int(now[b])) % num_robots) / num_robots
         for i in range(num_robots):
-            own, believed_m = timestamp[b, i].astype(np.float32), position_m[b, i]
-            is_known = timestamp[b, i] > NEVER
-            is_known[i] = True
-            known_share = is_known.sum() / num_robots
+            num_known = 0
             for k in range(num_robots):
-                ranges = math.sqrt(squared_distance(believed_m, k, i)) / range_m
-                is_near = is_known[k] and k != i and ranges <= 1.0
+                own[k] = timestamp[b, i, k]
+                num_known += k == i or timestamp[b, i, k] > NEVER
+            for k in range(num_robots):
+                ranges = math.sqrt(squared_distance(position_m[b, i], k, i)) / range_m
+                is_known = k == i or timestamp[b, i, k] > NEVER
+                is_near = is_known and k != i and ranges <= 1.0
                 of_k = node[b, i, k]
                 of_k.is_oneself = k == i
-                of_k.is_known = is_known[k]
+                of_k.is_known = is_known
                 of_k.timestamp_age = _log_age(now[b], timestamp[b, i, k])
-                of_k.distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known[k] else 0.0
+                of_k.distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known else 0.0
                 of_k.is_near = is_near
                 of_k.heard_age = _log_age(now[b], memory.heard[b, i, k])
                 of_k.attempt_age = _log_age(now[b], last_attempt[b, i, k])
@@ -175,11 +188,10 @@ def _fill(
                 if is_near:
                     news = _news(own, memory.neighbour[b, i, k], memory.said[b, i])
                     of_k.news, of_k.unsaid_news = news
-                of_k.turn_rank = ((k - int(now[b])) % num_robots) / num_robots
-                of_k.neighbours = _count_near(believed_m, is_known, k, range_m) / CROWD
-                of_k.known_share = known_share
+                of_k.turn_rank = rank[k]
+                of_k.known_share = num_known / num_robots
                 of_k.team_size = num_robots / TEAM
-                may_address[b, i, k] = k == i or not is_known[k] or ranges <= ADDRESS_RANGES
+                may_address[b, i, k] = k == i or not is_known or ranges <= ADDRESS_RANGES
             _fill_oneself(i, _log_age(now[b], memory.sent[b, i]), node[b, i])
 
 
@@ -190,20 +202,32 @@ def _fill_oneself(i: int, spoken_log_age: float, node: Shaped[np.ndarray, "N"]) 
     for k in range(node.shape[0]):
         news += node[k].news
         unsaid_news += node[k].unsaid_news
-        node[k].news = _logarithm(node[k].news)
-        node[k].unsaid_news = _logarithm(node[k].unsaid_news)
+        if node[k].is_near > 0.0:  # nobody else has news, and its logarithm is 0, too
+            node[k].news = _logarithm(node[k].news)
+            node[k].unsaid_news = _logarithm(node[k].unsaid_news)
     node[i].heard_age = spoken_log_age
     node[i].news, node[i].unsaid_news = _logarithm(news), _logarithm(unsaid_news)
 
 
 @compiled()
-def _count_near(
-    believed_m: Float[np.ndarray, "N 2"], is_known: Bool[np.ndarray, "N"], k: int, range_m: float
-) -> int:
-    """How many known robots are within range of robot k, by belief; none if k is unknown."""
-    count = 0
-    if is_known[k]:
-        for j in range(is_known.shape[0]):
-            if is_known[j] and j != k:
-                count += squared_distance(believed_m, j, k) <= range_m * range_m
-    return count
+def _write_neighbours(
+    believed_m: Float[np.ndarray, "B N N 2"],
+    is_known: Bool[np.ndarray, "B N N"],
+    range_m: float,
+    neighbours: Float32[np.ndarray, "B N N"],
+) -> None:
+    """How many known robots are within range of each, by belief; unknown robots have none."""
+    num_missions, num_robots = is_known.shape[:2]
+    # Columns of their own, with which the inner loop is compiled to vectors.
+    x_m, y_m, known = np.empty(num_robots), np.empty(num_robots), np.empty(num_robots, np.int64)
+    for b in range(num_missions):
+        for i in range(num_robots):
+            for k in range(num_robots):
+                x_m[k], y_m[k] = believed_m[b, i, k, 0], believed_m[b, i, k, 1]
+                known[k] = is_known[b, i, k]
+            for k in range(num_robots):
+                count = -1  # for it finds itself
+                for j in range(num_robots):
+                    dx, dy = x_m[j] - x_m[k], y_m[j] - y_m[k]
+                    count += known[j] * (dx * dx + dy * dy <= range_m * range_m)
+                neighbours[b, i, k] = count * known[k] / CROWD

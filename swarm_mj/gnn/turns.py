@@ -8,10 +8,9 @@ without a word.
 """
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
+from jaxtyping import Bool, Float, Float32
 
 from swarm_mj.compiled import compiled
-from swarm_mj.mission.geometry import squared_distance
 
 
 @compiled()
@@ -32,36 +31,36 @@ def write_turns(
         has_turn: 1 where robot k has a turn by robot i's beliefs, else 0; overwritten.
     """
     num_missions, num_robots = is_known.shape[:2]
-    taken = np.empty(num_robots, dtype=np.int64)
-    has_turn[...] = 0.0
+    # Columns of their own, with which the inner loop is compiled to vectors.
+    x_m, y_m, is_close = np.empty(num_robots), np.empty(num_robots), np.empty(num_robots)
     for b in range(num_missions):
         for i in range(num_robots):
-            num_taken = _join(believed_m[b, i], is_known[b, i], int(now[b]), radius_m**2, taken)
-            for k in taken[:num_taken]:
-                has_turn[b, i, k] = 1.0
+            for k in range(num_robots):
+                x_m[k], y_m[k] = believed_m[b, i, k, 0], believed_m[b, i, k, 1]
+                has_turn[b, i, k] = is_close[k] = 0.0
+            _join(x_m, y_m, is_known[b, i], int(now[b]), radius_m**2, is_close, has_turn[b, i])
 
 
 @compiled()
 def _join(
-    believed_m: Float[np.ndarray, "N 2"],
+    x_m: Float[np.ndarray, "N"],
+    y_m: Float[np.ndarray, "N"],
     is_known: Bool[np.ndarray, "N"],
     now: int,
     least_m2: float,
-    taken: Int[np.ndarray, "N"],
-) -> int:
-    """Fills `taken` with the robots that have a turn; returns how many they are."""
+    is_close: Float[np.ndarray, "N"],
+    has_turn: Float32[np.ndarray, "N"],
+) -> None:
+    """Marks the robots that have a turn, and all that are too close to one of them."""
     num_robots = is_known.shape[0]
-    num_taken = 0
+    half_round = (now + num_robots // 2) % num_robots
     for place in range(num_robots + 1):
-        k = now % num_robots if place == 0 else (now + num_robots // 2 + place - 1) % num_robots
+        k = now % num_robots if place == 0 else half_round + place - 1
+        k -= num_robots if k >= num_robots else 0
         if not is_known[k]:
             break
-        is_free = True
-        for m in range(num_taken):
-            if k == taken[m] or squared_distance(believed_m, k, taken[m]) < least_m2:
-                is_free = False
-                break
-        if is_free:
-            taken[num_taken] = k
-            num_taken += 1
-    return num_taken
+        if is_close[k] == 0.0 and has_turn[k] == 0.0:
+            has_turn[k] = 1.0
+            for j in range(num_robots):
+                dx, dy = x_m[j] - x_m[k], y_m[j] - y_m[k]
+                is_close[j] = 1.0 if dx * dx + dy * dy < least_m2 else is_close[j]

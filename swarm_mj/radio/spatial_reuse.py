@@ -48,14 +48,15 @@ def write_joined(
     at_1_m = threshold * range_m * range_m
     has_joined[...] = 0.0
     for b in range(num_missions):
-        owner = turn[b] % num_robots
+        owner, half_round = turn[b] % num_robots, (turn[b] + num_robots // 2) % num_robots
         for i in range(num_robots):
             slot = _silent_slot(num_robots)
             if is_known[b, i, owner]:
                 has_joined[b, i, owner] = 1.0
                 _join(owner, believed_m[b, i], at_1_m, threshold, slot)
             for place in range(num_robots):
-                k = (turn[b] + num_robots // 2 + place) % num_robots
+                k = half_round + place
+                k -= num_robots if k >= num_robots else 0
                 if not (is_known[b, i, owner] and is_known[b, i, k]):
                     break
                 if _may_join(k, believed_m[b, i], at_1_m, threshold, slot):
