@@ -139,14 +139,14 @@ class Swarm:
             mission.range_m,
             rng,
             partial(channel.largest_part, mission=b) if asks else None,
-            self._is_blocked if stands or mission.robots_collide else None,
+            self._is_blocked if stands or mission.collide else None,
             keeps_largest=stands,
         )
 
     def _is_blocked(self, position_m: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
         """Which robots would touch an obstacle there, or another robot if they collide."""
         is_blocked = blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, self._obstacles)
-        if self.mission.robots_collide:
+        if self.mission.collide:
             is_blocked |= overlaps_earlier(position_m, 2.0 * ROBOT_RADIUS_M)
         return is_blocked
 

@@ -576,7 +576,7 @@ def test_a_scene_that_mujoco_does_not_take_is_told_in_one_line():
 
 def test_robots_that_collide_start_apart():
     """40 robots on 63 m by 63 m: of teams drawn at random, nearly half have two that overlap."""
-    mission = paper("random-walk", robots_collide=True, density_per_km2=10_000.0)
+    mission = paper("random-walk", collide=True, density_per_km2=10_000.0)
     for position_m in Swarm(mission, range(20)).states.position_m:
         apart_m = np.linalg.norm(position_m[:, None] - position_m, axis=-1)
         assert np.min(apart_m[np.triu_indices(40, 1)]) >= 1.0

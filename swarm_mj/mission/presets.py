@@ -30,8 +30,8 @@ def paper(task: Task = "flocking", **overrides: Any) -> Mission:
     """
     is_open = overrides.get("arena", OPEN) == OPEN
     boundary: Boundary = "none" if task == "flocking" and is_open else "reflect"
-    collide = not is_open or overrides.get("robots_collide", False)
-    physics: PhysicsMode = "contact" if collide else "exact"
+    is_touching = not is_open or overrides.get("collide", False)
+    physics: PhysicsMode = "contact" if is_touching else "exact"
     usual = Mission(task=task, boundary=boundary, physics=physics)
     return replace(usual, **overrides)
 

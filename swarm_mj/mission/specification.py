@@ -203,7 +203,7 @@ class Mission:
         PhysicsMode,
         "Eq. 15 to rounding error, or forces and bounces",
     )
-    robots_collide: bool = setting(
+    collide: bool = setting(
         False, "robots bounce off each other, too, in contact physics", label="robots collide"
     )
     boundary: Boundary = _choice(
@@ -233,7 +233,7 @@ class Mission:
                 f"exact physics knows no collisions, and arena {self.arena} has obstacles; choose "
                 "physics contact, or arena open"
             )
-        if self.robots_collide and self.physics == "exact":
+        if self.collide and self.physics == "exact":
             raise ValueError(
                 "exact physics knows no collisions, so robots cannot collide in it; choose physics "
                 "contact, or let them pass through each other"

@@ -41,7 +41,7 @@ def num_substeps(mission: Mission) -> int:
     """
     if mission.physics == "exact":
         return 1
-    longest_m = ROBOT_RADIUS_M / (2.0 if mission.robots_collide else 1.0)
+    longest_m = ROBOT_RADIUS_M / (2.0 if mission.collide else 1.0)
     longest_s = min(CONTACT_STEP_S, longest_m / mission.max_velocity_mps)
     return math.ceil(mission.window_s / longest_s - 1e-9)
 
@@ -74,7 +74,7 @@ def compose(
     for i in range(mission.num_robots):
         frame = spec.worldbody.add_frame(pos=[0.0, 0.0, ROBOT_HEIGHT_M])
         spec.attach(robot.copy(), frame=frame, prefix=f"r{i}/")
-    if mission.robots_collide:
+    if mission.collide:
         spec.option.disableflags &= ~int(mjtDisableBit.mjDSBL_CONTACT)
     if (arena := arena_of(mission)) is not None:
         _change(spec, mission, arena)
@@ -171,7 +171,7 @@ def _fit_robot(robot: MjSpec, mission: Mission) -> None:
         else:
             actuator.set_to_motor()
             actuator.ctrlrange = [-force_n, force_n]
-    if mission.robots_collide:
+    if mission.collide:
         hull = robot.geom("hull")
         hull.contype = hull.conaffinity = ROBOTS_BIT
         _bounce(hull, mission)

@@ -92,7 +92,7 @@ class Physics:
         """
         self._check_vectors("position", position_m)
         self._check_vectors("velocity", velocity_mps)
-        if self._mission.robots_collide:
+        if self._mission.collide:
             _check_apart(position_m)
         self._batch.reset()
         self._qpos[...] = position_m

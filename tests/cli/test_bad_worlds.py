@@ -44,7 +44,7 @@ OPTIONS = {
     "--arena sea": "open, blocks, forest, rooms, or an MJCF file, not 'sea'",
     "--arena blocks --physics exact": "choose physics contact, or arena open",
     "--preset urban --physics exact": "arena blocks has obstacles; choose physics contact, or",
-    "--robots-collide --physics exact": "exact physics knows no collisions, so robots cannot",
+    "--collide --physics exact": "exact physics knows no collisions, so robots cannot",
 }
 
 

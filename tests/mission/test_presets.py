@@ -77,10 +77,10 @@ def test_any_field_can_be_overridden(preset, name):
 
 @pytest.mark.parametrize("preset", [paper, reference])
 def test_robots_that_collide_fly_in_contact_physics(preset):
-    assert preset(robots_collide=True).physics == "contact"
-    assert preset(robots_collide=False).physics == "exact"
+    assert preset(collide=True).physics == "contact"
+    assert preset(collide=False).physics == "exact"
     with pytest.raises(ValueError, match=r"so robots cannot collide in it; choose physics contact"):
-        preset(robots_collide=True, physics="exact")
+        preset(collide=True, physics="exact")
 
 
 @pytest.mark.parametrize("name", WORLDS)

@@ -267,6 +267,6 @@ def test_a_scene_changes_neither_the_time_nor_exact_physics():
 
 def test_robots_that_collide_come_no_farther_in_a_step_than_a_radius_together():
     for velocity_ratio, slowest in ((0.15, 10), (5.0, 40)):  # 3 m/s and 100 m/s per axis
-        mission = paper("random-walk", robots_collide=True, velocity_ratio=velocity_ratio)
+        mission = paper("random-walk", collide=True, velocity_ratio=velocity_ratio)
         assert num_substeps(mission) == slowest
         assert 2.0 * mission.max_velocity_mps * timestep_s(mission) <= ROBOT_RADIUS_M + 1e-9

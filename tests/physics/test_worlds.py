@@ -319,7 +319,7 @@ def test_robots_meet_what_a_scene_adds_but_no_other_robot():
 def collided(*states):
     """Velocities of robots that collide, from (x, y, vx, vy) each, after 2 s, and before."""
     now = np.array([states])
-    worlds = Physics(paper("random-walk", num_robots=len(states), robots_collide=True), 1)
+    worlds = Physics(paper("random-walk", num_robots=len(states), collide=True), 1)
     worlds.place(now[..., :2].copy(), now[..., 2:].copy())
     for _ in range(20):
         after = worlds.step(np.zeros((1, len(states), 2)))
@@ -344,7 +344,7 @@ def test_a_collision_keeps_momentum_and_energy_and_what_is_across():
 @pytest.mark.parametrize("velocity_ratio", [0.5, 5.0])
 def test_a_crowd_that_collides_keeps_its_energy_and_nobody_is_in_another(velocity_ratio):
     """20 robots on 45 m by 45 m, at 5 m/s per axis and at 50."""
-    mission = crowded("contact", velocity_ratio=velocity_ratio, robots_collide=True)
+    mission = crowded("contact", velocity_ratio=velocity_ratio, collide=True)
     mission = replace(mission, num_robots=20, density_per_km2=10_000.0)
     rng = np.random.default_rng(2)
     grid_m = np.stack(np.meshgrid(np.arange(5), np.arange(4)), axis=-1).reshape(1, -1, 2) * 8.0 - 15
@@ -365,7 +365,7 @@ def test_a_crowd_that_collides_keeps_its_energy_and_nobody_is_in_another(velocit
 
 
 def test_robots_that_collide_may_not_start_in_each_other():
-    worlds = Physics(paper("random-walk", num_robots=3, robots_collide=True), 2)
+    worlds = Physics(paper("random-walk", num_robots=3, collide=True), 2)
     position_m = np.array([[[0.0, 0.0], [5.0, 0.0], [9.0, 0.0]]] * 2)
     worlds.place(position_m, np.zeros_like(position_m))
     position_m[1, 2] = [5.0, 0.75]
