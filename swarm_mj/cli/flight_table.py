@@ -9,9 +9,10 @@ from rich.table import Table
 
 from swarm_mj.cli.terminal import named_values
 from swarm_mj.control.motion import Flocking
-from swarm_mj.mission import PRESETS, WORLDS, Mission
+from swarm_mj.mission import Mission
+from swarm_mj.mission.presets import where_flown
 from swarm_mj.mission.robot_failures import num_failures
-from swarm_mj.mission.specification import NOTHING, OPEN
+from swarm_mj.mission.specification import NOTHING
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
 from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 from swarm_mj.rollout import Summary
@@ -50,20 +51,7 @@ def flight_title(mission: Mission, policy: str, seed: int) -> str:
     known = [f"known {mission.known}"] if mission.known != NOTHING else []
     rate = [] if mission.bit_rate is None else [bits_per_second(mission.bit_rate)]
     flown = (mission.task, policy, team, f"seed {seed}")
-    return ", ".join((*flown, *_world(mission), *known, *rate))
-
-
-def _world(mission: Mission) -> list[str]:
-    """Where it was flown: a world's arena and channel by the preset, all others by themselves."""
-    arena, radio = f"arena {mission.arena}", mission.beyond_free_space
-    if mission.preset not in WORLDS:
-        return [*([arena] if mission.arena != OPEN else []), *([radio] if radio else [])]
-    usual, changed = PRESETS[mission.preset](), []
-    if mission.arena != usual.arena:
-        changed.append(arena)
-    if radio != usual.beyond_free_space:
-        changed.append(radio or "free space")
-    return [f"preset {mission.preset}", *changed]
+    return ", ".join((*flown, *where_flown(mission), *known, *rate))
 
 
 def flight_table(title: str, mission: Mission, numbers: dict[str, Any], wall_s: float) -> Table:

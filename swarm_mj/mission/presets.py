@@ -116,3 +116,16 @@ WORLDS: dict[str, dict[str, Any]] = {
 }
 PAPERS: dict[str, Callable[..., Mission]] = {"paper": paper, "reference": reference}
 PRESETS = PAPERS | {name: partial(world, name) for name in WORLDS}
+
+
+def where_flown(mission: Mission) -> list[str]:
+    """Where it was flown: a world's arena and channel by the preset, all others by themselves."""
+    arena, radio = f"arena {mission.arena}", mission.beyond_free_space
+    if mission.preset not in WORLDS:
+        return [*([arena] if mission.arena != OPEN else []), *([radio] if radio else [])]
+    usual, changed = PRESETS[mission.preset](), []
+    if mission.arena != usual.arena:
+        changed.append(arena)
+    if radio != usual.beyond_free_space:
+        changed.append(radio or "free space")
+    return [f"preset {mission.preset}", *changed]

@@ -75,7 +75,7 @@ def contents_of(
     half_side_m = swarm.mission.half_side_m
     square = frame(position_m[None], half_side_m)
     granted = look(swarm, index)
-    group = np.zeros(num_robots, dtype=int) if granted is None else granted.group
+    group = np.zeros(num_robots, np.int16) if granted is None else granted.group
     surprises = NO_SURPRISES if granted is None else granted.surprises
     lines_m, line_colour = strokes_at_once(surprises, position_m)
     is_on = _is_on(swarm, index)

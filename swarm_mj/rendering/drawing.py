@@ -3,14 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, Int16
 from PIL import Image, ImageDraw, ImageFont
 
-from swarm_mj.mission import Mission
-from swarm_mj.mission.specification import OPEN
+from swarm_mj.mission.presets import where_flown
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.palette import Colour, dim
@@ -20,6 +18,7 @@ CURVES: tuple[Colour, ...] = (palette.MEAN_AGE, palette.VARIANCE)  # of one flig
 FAINT = 0.45  # what is still to come, and texts that matter less
 SHADE = 0.35  # of columns behind a curve
 NUM_SHADES = 48
+ROOMY = 6  # samples that a legend has room for without moving them together
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,8 @@ def draw_title(
     left, top, pad = box.left, box.top, size // 2
     draw.text((left + pad, top + pad), facts.policy, palette.TEXT, font(round(1.3 * size)))
     about = f"{mission.task}, {mission.num_robots} robots, seed {facts.seed}"
-    about = "\n".join([about, *_world(mission), *facts.own_parts])
+    where = ", ".join(where_flown(mission)).split(", ")
+    about = "\n".join([about, *filter(None, where), *facts.own_parts])
     draw.text((left + pad, top + pad + 1.7 * size), about, palette.SENT, font(round(0.8 * size)))
     now = footage.window[row]
     time = f"{now * mission.window_s:.1f} s, window {now}"
@@ -69,12 +69,6 @@ def draw_title(
     if (num := int(np.sum(footage.is_cut_off[row]))) > 0:
         told = f"{num} cut off from r{facts.observer}"
         draw.text((right, below + size), told, palette.TOO_WEAK, small, anchor="ra")
-
-
-def _world(mission: Mission) -> list[str]:
-    """What the mission has that the paper's has not, in words."""
-    arena = [] if mission.arena == OPEN else [f"arena {Path(mission.arena).name}"]
-    return arena + [part for part in mission.beyond_free_space.split(", ") if part]
 
 
 def draw_legend(
@@ -97,8 +91,9 @@ def draw_legend(
     samples = {"never heard of": palette.UNKNOWN} | _packet_colours(footages)
     samples |= _surprise_colours(footages)
     column = box.width / 2
+    start, step = (1.35, 1.1) if len(samples) <= ROOMY else (1.25, 0.97)
     for k, (text, colour) in enumerate(samples.items()):
-        x, line = box.left + (k % 2) * column, y + (1.35 + 1.1 * (k // 2)) * size
+        x, line = box.left + (k % 2) * column, y + (start + step * (k // 2)) * size
         _draw_sample(draw, colour, x, line + 0.45 * size, size)
         draw.text((x + 1.3 * size, line), text, palette.SENT, small)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pyarrow as pa
 import rerun as rr
-from jaxtyping import Int, UInt8
+from jaxtyping import Float, Int, UInt8
 
 from swarm_mj.mission.geometry import ROOT, spanning_tree
 from swarm_mj.protocol.costs import TaskCost
@@ -66,9 +66,9 @@ def draw_plots(sheet: Sheet, packets: dict[str, Links]) -> None:
     for name, (colour, per_window) in packet_counts(log, packets).items():
         _plot(sheet, f"plots/radio/{name}", name, colour, rate(per_window))
     if log.looks is not None:
-        for name, (colour, per_look) in surprise_counts(log, log.looks).items():
+        for name, (colour, share) in surprise_shares(log, log.looks).items():
             path = "plots/world/" + name.replace(" ", "_")
-            _plot(sheet, path, name, colour, per_look, log.looks.window)
+            _plot(sheet, path, name, colour, share, log.looks.window)
 
 
 def shown_cost(log: Log) -> TaskCost | None:
@@ -89,20 +89,29 @@ def packet_counts(
     return {fate: (getattr(palette, fate.upper()), packets[fate].per_window) for fate in fates}
 
 
-def surprise_counts(
+def surprise_shares(
     log: Log, looks: Looks
-) -> dict[str, tuple[palette.Colour, Int[np.ndarray, "C"]]]:
-    """What is plotted of a world beyond free space: names, colours, and counts at each look."""
-    counts = {
-        kind: np.bincount(found.row, minlength=len(looks.window))
+) -> dict[str, tuple[palette.Colour, Float[np.ndarray, "C"]]]:
+    """What is plotted of a world beyond free space: names, colours, and shares at each look [%]."""
+    at = looks.window - log.window[0]
+    links = {
+        kind: np.bincount(found.row, minlength=len(at))
         for kind, found in looks.surprises.by_kind.items()
     }
-    num_cut_off = np.sum(log.is_cut_off, axis=1)[looks.window - log.window[0]]
+    none = np.zeros(len(log.window), dtype=int)
+    num_believed = (none if log.num_believed is None else log.num_believed)[at]
+    num_working = (none if log.num_working is None else log.num_working)[at]
+    num_others = np.maximum(1, np.sum(log.is_on[at], axis=1) - 1)
+    is_cut_off = np.sum(log.is_cut_off[at], axis=1)
     return {
-        "believed, too weak": (palette.TOO_WEAK, counts["too_weak"]),
-        "works, unbelieved": (palette.UNBELIEVED, counts["unbelieved"]),
-        f"robots cut off from r{log.ego}": (palette.EGO, num_cut_off),
+        "believed, too weak": (palette.TOO_WEAK, _percent(links["too_weak"], num_believed)),
+        "works, unbelieved": (palette.UNBELIEVED, _percent(links["unbelieved"], num_working)),
+        f"cut off from r{log.ego}": (palette.EGO, _percent(is_cut_off, num_others)),
     }
+
+
+def _percent(part: Int[np.ndarray, "C"], of: Int[np.ndarray, "C"]) -> Float[np.ndarray, "C"]:
+    return 100.0 * part / np.maximum(1, of)
 
 
 def draw_states(sheet: Sheet) -> None:

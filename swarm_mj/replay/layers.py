@@ -6,7 +6,6 @@ import rerun as rr
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.palette import Colour, dim
-from swarm_mj.replay.strokes import STROKES
 
 
 def screen(points: float) -> float:
@@ -38,8 +37,8 @@ LAYERS = {
     "arena/world/obstacle": Layer(rr.LineStrips2D, palette.WALL, 0.8, -10.0),
     "arena/trail": Layer(rr.LineStrips2D, palette.TRAIL, 1.0, -5.0),
     "arena/radio/range": Layer(rr.Ellipses2D, palette.RANGE, 0.6, 1.0),
-    "arena/world/unbelieved": Layer(rr.LineStrips2D, STROKES["unbelieved"], 0.6, 2.0),
-    "arena/world/too_weak": Layer(rr.LineStrips2D, STROKES["too_weak"], 0.5, 2.5),
+    "arena/world/unbelieved": Layer(rr.LineStrips2D, None, 0.6, 2.0),
+    "arena/world/too_weak": Layer(rr.LineStrips2D, None, 0.5, 2.5),
     "arena/belief/error": Layer(rr.LineStrips2D, dim(palette.BELIEF, 0.8), 0.6, 3.0),
     "arena/belief/ring": Layer(rr.Ellipses2D, palette.BELIEF, 0.8, 4.0),
     "arena/tree": Layer(rr.LineStrips2D, palette.TREE, 0.8, 6.0),

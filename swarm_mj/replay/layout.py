@@ -16,7 +16,7 @@ from swarm_mj.replay.charts import (
     packet_counts,
     rate,
     shown_cost,
-    surprise_counts,
+    surprise_shares,
 )
 from swarm_mj.replay.frame import Frame
 from swarm_mj.replay.links import Links
@@ -128,11 +128,9 @@ def _charts(log: Log, packets: dict[str, Links]) -> list[rrb.View | rrb.Containe
         _plot("radio", radio, rates),
     ]
     if log.looks is not None:
-        ego_cut_off = f"robots cut off from {ego} (white)"
-        name = f"Links believed, too weak (red), working, unbelieved (green); {ego_cut_off}"
-        charts.append(
-            _plot("world", name, [of for _, of in surprise_counts(log, log.looks).values()])
-        )
+        shares = [share for _, share in surprise_shares(log, log.looks).values()]
+        name = "believed, too weak (red); works, unbelieved (green); cut off (white)"
+        charts.append(_plot("world", f"Share [%]: {name}", shares))
     if (cost := shown_cost(log)) is not None:
         name = f"{cost.name[:1].upper()}{cost.name[1:]} [{cost.unit}]"
         charts.append(_plot("task", name, [cost.value]))

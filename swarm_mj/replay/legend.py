@@ -11,7 +11,7 @@ from swarm_mj.replay.layers import LAYERS, screen
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet
 from swarm_mj.replay.shots import LOST_SHARE
-from swarm_mj.replay.strokes import BROKEN
+from swarm_mj.replay.strokes import BROKEN, STROKES
 
 WIDTH = 100.0  # of the view, in units of its own, y down
 LEFT, RAMP = 4.0, 31.0  # where the ramp of ages begins, and how long it is
@@ -84,7 +84,9 @@ def _draw_sample(sheet: Sheet, path: str, name: str, x: float, y: float) -> None
         rr.Ellipses2D: {"centers": [(x, y)], "half_sizes": [(radius, radius)]},
         rr.Points2D: {"positions": [(x, y)]},
     }
-    sheet.fixed(path, layer.kind.from_fields(**layer.style, **shapes[layer.kind]))
+    kind = name.removeprefix("world/")
+    colour = {"colors": [STROKES[kind]]} if kind in STROKES else {}
+    sheet.fixed(path, layer.kind.from_fields(**layer.style, **colour, **shapes[layer.kind]))
 
 
 def _draw_ramp(sheet: Sheet, full_scale: float) -> None:

@@ -55,8 +55,10 @@ class Surprises:
 class Look:
     """What there is to see at one moment of one mission."""
 
-    group: Int[np.ndarray, "N"]  # the first of the robots that each is connected with
+    group: Int16[np.ndarray, "N"]  # the first of the robots that each is connected with
     surprises: Surprises
+    num_believed: int  # links that are believed in, one for both directions
+    num_working: int  # and that decode
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,12 +118,19 @@ def look(swarm: Swarm, index: int = 0) -> Look | None:
     return Look(
         group=groups(is_true),
         surprises=_surprises(is_true, is_believed, true_mw, sent_mw, least_mw),
+        num_believed=_num_links(is_believed),
+        num_working=_num_links(is_true),
     )
 
 
-def groups(is_linked: Bool[np.ndarray, "N N"]) -> Int[np.ndarray, "N"]:
+def _num_links(is_linked: Bool[np.ndarray, "N N"]) -> int:
+    np.fill_diagonal(is_linked, val=False)
+    return int(np.sum(np.triu(is_linked | is_linked.T)))
+
+
+def groups(is_linked: Bool[np.ndarray, "N N"]) -> Int16[np.ndarray, "N"]:
     """The first of the robots that each reaches and is reached from over links, row to column."""
-    group = np.full(len(is_linked), -1)
+    group = np.full(len(is_linked), -1, dtype=np.int16)
     turned = np.ascontiguousarray(is_linked.T)
     for i in range(len(group)):
         if group[i] < 0:

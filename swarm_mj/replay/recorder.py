@@ -16,6 +16,7 @@ from swarm_mj.swarm import Swarm
 # Longer or larger flights keep the age matrix of every k-th window only.
 MAX_AGE_MATRIX_BYTES = 64e6
 AGE_BYTES = 4  # float32
+STANDS = ("group", "num_believed", "num_working")  # of a look, until the next one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +48,9 @@ class Log:
     scene: Scene | None = None  # what changed the arena, if anything did
     task_cost: TaskCost | None = None  # one value a window; None if the controller has none
     group: Int[np.ndarray, "T N"] | None = None  # the first robot that each exchanges news with
-    looks: Looks | None = None  # at the channel; it and the groups are None in free space
+    num_believed: Int[np.ndarray, "T"] | None = None  # links that policies believe in
+    num_working: Int[np.ndarray, "T"] | None = None  # links whose packets decode but for fades
+    looks: Looks | None = None  # at the channel; all four are None in free space
 
     @property
     def has_motion(self) -> bool:
@@ -105,7 +108,7 @@ class Recorder:
         self._task_costs: list[TaskCost] = []
         self._look_stride = stride_of(swarm, self._stride)
         self._looks: list[Surprises] = []
-        self._group: dict[str, np.ndarray] = {}  # at the latest look
+        self._latest: dict[str, object] = {}  # of looks, what stands until the next one
 
     def add(self, flown: WindowRecord) -> None:
         """Records the window that was just flown."""
@@ -119,7 +122,7 @@ class Recorder:
             self._age.append(age.astype(np.float32))
         if len(self._rows) % self._look_stride == 0 and (seen := look(self._swarm)) is not None:
             self._looks.append(seen.surprises)
-            self._group = {"group": seen.group.astype(np.int16)}
+            self._latest = {name: getattr(seen, name) for name in STANDS}
         shown = {
             "position_m": states.position_m[0],
             "velocity_mps": states.velocity_mps[0],
@@ -134,7 +137,7 @@ class Recorder:
             "age_std": np.std(others),
             "age_max": np.max(others),
             "velocity_variance_m2ps2": flown.costs.velocity_variance_m2ps2[0],
-            **self._group,
+            **self._latest,
         }
         if flown.costs.task_cost is not None:
             self._task_costs.append(flown.costs.task_cost)

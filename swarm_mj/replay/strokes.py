@@ -15,6 +15,8 @@ STROKES: dict[str, Colour] = {
     "unbelieved": palette.UNBELIEVED,
     "too_weak": dim(palette.TOO_WEAK, 0.7),
 }
+FAINTEST, FAINTEST_DB = 0.35, -30.0  # of a link that is too weak by so much or more
+BRIGHTEST = 0.85  # of one that is hardly too weak
 PIECES = {"unbelieved": 1, "too_weak": 2}  # that a line is drawn in
 
 
@@ -38,13 +40,23 @@ def strokes(
     return pieces_m.reshape(-1, 2, 2), np.repeat(each, PIECES[kind])
 
 
+def shades(kind: str, links: Surprises) -> UInt8[np.ndarray, "L 3"]:
+    """The colours of links of this kind: the more is missing, the darker."""
+    colour = np.tile(np.array(STROKES[kind], dtype=np.uint8), (len(links.row), 1))
+    if kind != "too_weak":
+        return colour
+    shares = np.interp(links.margin_db, [FAINTEST_DB, 0.0], [FAINTEST, BRIGHTEST])
+    return (shares[:, None] * np.array(palette.TOO_WEAK)).astype(np.uint8)
+
+
 def strokes_at_once(
     links: Surprises, position_m: Float[np.ndarray, "N 2"]
 ) -> tuple[Float[np.ndarray, "S 2 2"], UInt8[np.ndarray, "S 3"]]:
     """Lines of one look's links of all kinds [m], and their colours."""
     here = replace(links, row=np.zeros(len(links.row), dtype=int))
-    drawn = {
-        kind: strokes(kind, found, position_m[None])[0] for kind, found in here.by_kind.items()
-    }
-    colours = [np.tile(np.array(STROKES[kind], np.uint8), (len(drawn[kind]), 1)) for kind in drawn]
-    return np.concatenate(list(drawn.values())), np.concatenate(colours)
+    lines, colours = [], []
+    for kind, found in here.by_kind.items():
+        line_m, link = strokes(kind, found, position_m[None])
+        lines.append(line_m)
+        colours.append(shades(kind, found)[link])
+    return np.concatenate(lines), np.concatenate(colours)

@@ -15,7 +15,7 @@ from swarm_mj.replay.layers import LAYERS, screen
 from swarm_mj.replay.looks import Looks, Surprises
 from swarm_mj.replay.sheet import Sheet
 from swarm_mj.replay.space import RADIUS_SHARE, ROBOT_HEIGHT
-from swarm_mj.replay.strokes import STROKES, strokes
+from swarm_mj.replay.strokes import shades, strokes
 
 NUMBERS = ("sender", "receiver", "loss_db", "margin_db")  # of links, that the file keeps
 FILL_SHARE = 0.008  # of half the map's width: between the lines that fill an obstacle
@@ -63,13 +63,13 @@ def _draw_links(
     on_map, in_space = f"arena/world/{kind}", f"scene/world/{kind}"
     sheet.fixed_layer(on_map)
     width = LAYERS[on_map].width
-    style = rr.LineStrips3D.from_fields(colors=[STROKES[kind]], radii=screen(width))
-    sheet.fixed(in_space, style)
+    sheet.fixed(in_space, rr.LineStrips3D.from_fields(radii=screen(width)))
     numbers = {name: getattr(links, name) for name in NUMBERS}
     per_look = np.bincount(links.row, minlength=len(looks.window))
+    colours = shades(kind, links)
     columns = {
-        on_map: rr.LineStrips2D.columns(strips=lines),
-        in_space: rr.LineStrips3D.columns(strips=lifted),
+        on_map: rr.LineStrips2D.columns(strips=lines, colors=colours),
+        in_space: rr.LineStrips3D.columns(strips=lifted, colors=colours),
     }
     known = rr.AnyValues.columns(**numbers).partition(per_look)
     for path, strips in columns.items():

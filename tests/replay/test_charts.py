@@ -8,7 +8,7 @@ from swarm_mj.replay.charts import (
     packet_counts,
     radio_states,
     rate,
-    surprise_counts,
+    surprise_shares,
     walk,
 )
 from swarm_mj.replay.links import fates
@@ -69,20 +69,26 @@ def test_the_packet_plot_counts_as_the_costs_do(two_way, flooded):
             np.testing.assert_array_equal(per_window, recorded.counted(name))
 
 
-def test_the_plot_of_the_world_counts_links_and_robots(blocked, blocked_replay):
+def test_the_plot_of_the_world_has_shares_of_links_and_robots(blocked, blocked_replay):
     log = blocked.log
-    expected = {"believed, too weak": [], "works, unbelieved": [], "robots cut off from r4": []}
+    expected = {"believed, too weak": [], "works, unbelieved": [], "cut off from r4": []}
     weak, works, cut_off = expected.values()
     for window in log.looks.window.tolist():
-        is_weak = log.looks.at(window).is_too_weak.tolist()
-        weak.append(is_weak.count(True))
-        works.append(is_weak.count(False))
+        where, seen = log.position_m[window - 1], log.looks.at(window)
+        num_near = sum(
+            np.linalg.norm(where[i] - where[j]) <= 250.0 for i in range(14) for j in range(i)
+        )
+        num_weak = seen.is_too_weak.tolist().count(True)
+        num_extra = len(seen.row) - num_weak
+        weak.append(100.0 * num_weak / num_near)
+        works.append(100.0 * num_extra / (num_near - num_weak + num_extra))
         team = log.group[window - 1].tolist()
-        cut_off.append(sum(of != team[4] for of in team))
-    counts = surprise_counts(log, log.looks)
-    assert {name: of.tolist() for name, (_, of) in counts.items()} == expected
-    shown = column(blocked_replay, "/plots/world/robots_cut_off_from_r4", "Scalars:scalars")
-    assert shown.flatten().to_pylist() == cut_off
+        cut_off.append(100.0 * sum(of != team[4] for of in team) / 13)
+    shares = surprise_shares(log, log.looks)
+    for name, values in expected.items():
+        np.testing.assert_allclose(shares[name][1], values)
+    shown = column(blocked_replay, "/plots/world/cut_off_from_r4", "Scalars:scalars")
+    np.testing.assert_allclose(shown.flatten().to_numpy(), cut_off)
 
 
 def test_rows_of_the_matrix_own_and_columns_are_owned(replay, two_way):

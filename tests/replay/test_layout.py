@@ -16,9 +16,7 @@ EVERYWHERE = {
 OF_ADDRESSED = "Packets in 10 windows: delivered (green), lost (orange), answered (blue)"
 OF_BROADCASTS = "Packets in 10 windows: sent (grey), heard by anyone (blue)"
 OF_FLOCKS = "Velocity variance [m²/s²]"
-OF_WORLDS = (
-    "Links believed, too weak (red), working, unbelieved (green); robots cut off from r4 (white)"
-)
+OF_WORLDS = "Share [%]: believed, too weak (red); works, unbelieved (green); cut off (white)"
 
 
 def views(path):

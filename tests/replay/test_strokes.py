@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from swarm_mj.replay import palette
 from swarm_mj.replay.looks import Surprises
-from swarm_mj.replay.strokes import BROKEN, STROKES, strokes, strokes_at_once
+from swarm_mj.replay.strokes import BROKEN, STROKES, shades, strokes, strokes_at_once
 
 WHERE = np.array([[0.0, 0.0], [100.0, 0.0], [0.0, 50.0]])
 
@@ -37,5 +38,14 @@ def test_a_link_is_where_its_robots_are_at_its_look():
 
 def test_all_kinds_at_once_each_in_its_colour():
     lines, colour = strokes_at_once(links((0, 1), (0, 2), row=[4, 4]), WHERE)
-    assert colour.tolist() == [list(STROKES[k]) for k in ("unbelieved", "too_weak", "too_weak")]
+    assert colour[0].tolist() == list(STROKES["unbelieved"])
+    assert colour[1].tolist() == colour[2].tolist() == [int(0.85 * c) for c in palette.TOO_WEAK]
     np.testing.assert_allclose(lines[0], [(0, 0), (0, 50)])
+
+
+def test_the_more_is_missing_the_darker():
+    found = links((0, 1), (0, 1), (0, 1), (0, 1))
+    found.margin_db[:] = (-1, -15, -30, -99)
+    brightness = shades("too_weak", found).astype(int).sum(axis=1)
+    assert np.all(np.diff(brightness[:3]) < 0)
+    assert brightness[2] == brightness[3]
