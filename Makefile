@@ -16,7 +16,7 @@ help:
 	@echo "make bench   time the simulation on this machine"
 	@echo "make figures remake all figures; evaluates what training/results/ lacks of the paper's"
 	@echo "make video   remake the moving picture (needs OpenGL, or libosmesa6)"
-	@echo "make picture remake the picture of a replay (needs a Vulkan driver)"
+	@echo "make picture remake the pictures of replays (needs a Vulkan driver)"
 	@echo "make docs    build this documentation as a site; make docs-serve shows it while you write"
 	@echo "make setup   create .venv from pinned constraints; PYTHON=python3.12 chooses another"
 	@echo "make lock    write tools/hashes.txt anew from the pinned constraints"
@@ -94,6 +94,9 @@ picture: setup
 	$(BIN)/swarm-mj fly --record replays/readme.rrd --force
 	$(BIN)/python tools/picture.py replays/readme.rrd --window 476 --size 1600x1066 --zoom 3 \
 	  --out assets/pictures/replay.png --force
+	$(BIN)/swarm-mj fly --preset urban --robots 20 --seed 3 --record replays/city.rrd --force
+	$(BIN)/python tools/picture.py replays/city.rrd --window 380 --size 1600x1066 --zoom 3 \
+	  --out assets/pictures/city.png --force
 
 # Material's own notice about a coming version of MkDocs would be the only warning.
 docs docs-serve: export NO_MKDOCS_2_WARNING = 1

@@ -18,7 +18,8 @@ LEFT, RAMP = 4.0, 31.0  # where the ramp of ages begins, and how long it is
 COLUMN, ROW = 14.2, 8.4  # from one sample to the next, to the right of the ramp
 SAMPLE = 5.0  # the length of a sample
 RADII = {"radio/range": 2.0, "belief/ring": 0.8}  # of sampled rings
-LAST, LAST_OF_TWO_LINES = 5.1, 7.2  # the height of the last row, with its texts
+LAST = 5.1  # the height of the last row, with its texts
+LINE = 1.9  # of a text's second line
 TWO_ROWS = ROW + LAST
 BELOW = 2.6  # from a sample to its text
 NUM_SHADES = 60
@@ -29,7 +30,7 @@ def draw_legend(sheet: Sheet, full_scale: float) -> None:
     _draw_ramp(sheet, full_scale)
     for row, samples in enumerate(_samples(sheet.log)):
         for column, (text, layer) in enumerate(samples.items()):
-            x, y = LEFT + RAMP + (column + 0.9) * COLUMN, row * ROW
+            x, y = LEFT + RAMP + (column + 0.9) * COLUMN, row * _row(sheet.log)
             path = "legend/" + re.sub(r"\W", "_", text)
             _draw_sample(sheet, path, layer, x, y)
             _write(sheet, f"{path}/text", [text], [(x, y + BELOW)])
@@ -37,8 +38,13 @@ def draw_legend(sheet: Sheet, full_scale: float) -> None:
 
 def height(log: Log) -> float:
     """Of the view."""
-    last = LAST if log.looks is None else LAST_OF_TWO_LINES
-    return (len(_samples(log)) - 1) * ROW + last
+    last = LAST if log.looks is None else LAST + LINE
+    return (len(_samples(log)) - 1) * _row(log) + last
+
+
+def _row(log: Log) -> float:
+    """From one row of samples to the next; beyond free space, texts have two lines."""
+    return ROW if log.looks is None else ROW + LINE
 
 
 def _samples(log: Log) -> list[dict[str, str]]:
