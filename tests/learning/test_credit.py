@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm_mj.learning.credit import as_it_is, credits_of, gain
-from swarm_mj.mission import paper, reference
+from swarm_mj.mission import PRESETS, paper, reference
 from swarm_mj.protocol.window import window
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import radio_of
@@ -61,6 +61,23 @@ def test_credits_are_those_of_a_replay_without_each_robot(seed, preset, task, sh
     expected = credits_by_replay(swarm, buffers, recipient, now)
     np.testing.assert_allclose(found, expected, atol=1e-9)
     assert np.all(found[recipient == np.arange(num_robots)] == 0.0)
+
+
+def test_a_window_replayed_for_credit_meets_the_same_fades_and_losses():
+    """Every robot silenced in turn, among obstacles, under fading, shadowing, bursts, erasures."""
+    losses = {"erasure": 0.2, "burst_begin": 0.05, "fading": "rayleigh", "num_robots": 8}
+    swarm = Swarm(PRESETS["urban"]("stationary", **losses), [1, 2])
+    rng, num_credited = np.random.default_rng(4), 0
+    for _ in range(12):
+        buffers, now = copy.deepcopy(swarm.buffers), swarm.now
+        recipient = random_recipients(rng, (2, 8), 0.3)
+        swarm.exchange(recipient)
+        position_m = swarm.states.position_m
+        found = credits_of(buffers.timestamp, position_m, recipient, swarm.channel, now)
+        expected = credits_by_replay(swarm, buffers, recipient, now)
+        np.testing.assert_allclose(found, expected, atol=1e-9)
+        num_credited += np.sum(found != 0.0)
+    assert num_credited > 10
 
 
 def standing(position_m):

@@ -133,6 +133,22 @@ def test_one_robots_silence_changes_no_other_links_fade():
     np.testing.assert_array_equal(heard[0], heard[1])
 
 
+def test_fades_and_shadowing_are_the_same_in_both_directions():
+    """Two robots 200 m apart, each alone on the air in the same slot: both hear, or neither."""
+    rows = np.arange(30)
+    made = channel(rows, rician_k=2.0, shadowing=Shadowing(std_db=6.0, correlation_m=20.0))
+    position_m = np.zeros((30, NUM_ROBOTS, 2))
+    position_m[:, 1:, 0] = 200.0
+    hears = {}
+    for sender, listener in ((0, 1), (1, 0)):
+        recipient = np.tile(np.arange(NUM_ROBOTS), (30, 1))
+        recipient[:, sender] = -1
+        slots = [made.at(np.full(30, s), rows)(position_m, recipient) for s in range(20)]
+        hears[sender] = np.array(slots)[:, :, listener] == sender
+    np.testing.assert_array_equal(hears[0], hears[1])
+    assert 0.2 < np.mean(hears[0]) < 0.9
+
+
 def test_a_team_is_connected_if_everyone_reaches_everyone():
     """Robots in a row 200 m apart reach their neighbours only; the last one stands at 1000 m."""
     made = channel([0])
