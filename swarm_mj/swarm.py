@@ -34,7 +34,8 @@ from swarm_mj.protocol.partial_packets import with_room
 from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, RequestResponse, WindowProtocol
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import Channel, VaryingChannel
-from swarm_mj.radio.mission_radio import channel_of
+from swarm_mj.radio.link_models import TrueLinks
+from swarm_mj.radio.mission_radio import belief_of, channel_of, radio_of
 from swarm_mj.radio.obstruction import blocked
 
 CALLED_WITH = {  # what own parts are given
@@ -94,6 +95,9 @@ class Swarm:
         self._physics = Physics(mission, len(seeds), scene=scene, num_threads=num_threads)
         self._obstacles = self._physics.obstacles
         self.channel = channel_of(mission, self._obstacles) if channel is None else channel
+        self.belief = belief_of(mission, self._obstacles)
+        own = self.channel if isinstance(self.channel, ComposedChannel) else None
+        self._truth = TrueLinks(radio=radio_of(mission), channel=own)
         self._num_missions = len(seeds)
         self.restart(seeds)
 
@@ -161,13 +165,17 @@ class Swarm:
         return LocalViews(buffers=self._read_only, now=self.now, phases=self.phases)
 
     def start(self, policy: Policy) -> None:
-        """Gives a policy the missions' random streams and lets it forget earlier missions.
+        """Tells a policy what it may know, gives it random streams and lets it forget all else.
 
         Raises:
             TypeError: It is no policy.
         """
         check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
         room = policy.packet(self.mission).num_entries
+        if isinstance(policy, CentralisedPolicy):
+            policy.inform(self._truth)
+        elif isinstance(policy, DecentralisedPolicy):
+            policy.inform(self.belief)
         policy.start(self.mission.num_robots, self._policy_rngs)
         self.buffers = with_room(self.buffers, room)
         self._started = policy

@@ -580,3 +580,52 @@ def test_robots_that_collide_start_apart():
     for position_m in Swarm(mission, range(20)).states.position_m:
         apart_m = np.linalg.norm(position_m[:, None] - position_m, axis=-1)
         assert np.min(apart_m[np.triu_indices(40, 1)]) >= 1.0
+
+
+class Told(Silent):
+    """Notes what it is told of the channel, and whether it had begun."""
+
+    def __init__(self):
+        self.told = []
+
+    def inform(self, belief):
+        self.told.append((belief, hasattr(self, "rngs")))
+
+
+class ToldTheTruth(Witness):
+    def __init__(self):
+        super().__init__()
+        self.told = []
+
+    def inform(self, truth):
+        self.told.append(truth)
+
+
+def wall_across(spec, mission):
+    """An obstacle of the user's own."""
+    half_m = mission.half_side_m
+    spec.worldbody.add_geom(type=6, pos=[0, 0, 5], size=[1, half_m / 2, 5], group=1)
+
+
+@pytest.mark.parametrize(("known", "has_law"), [("nothing", False), ("map", True)])
+def test_policies_are_told_of_the_channel_by_their_kind_before_they_start(known, has_law):
+    """The scene's own wall is on the map."""
+    swarm = Swarm(small("stationary", known=known, physics="contact"), [1], scene=wall_across)
+    policy, centre = Told(), ToldTheTruth()
+    swarm.step(policy)
+    ((belief, has_begun),) = policy.told
+    assert belief is swarm.belief
+    assert (belief.law is not None) == has_law
+    assert not has_begun
+    swarm.step(centre)
+    (truth,) = centre.told
+    assert truth.channel is swarm.channel
+
+
+def test_of_a_channel_of_ones_own_nobody_is_told():
+    channel, centre = to_nobody, ToldTheTruth()
+    swarm = Swarm(small("stationary"), [1], channel=channel)
+    swarm.step(centre)
+    (truth,) = centre.told
+    assert truth.channel is None
+    assert swarm.belief.law is None

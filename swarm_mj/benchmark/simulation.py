@@ -34,6 +34,7 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.round_robin import RoundRobin
 from swarm_mj.protocol.costs import mean_hops, window_costs
 from swarm_mj.protocol.window import channel_at, window
+from swarm_mj.radio.link_models import Belief
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.swarm import Swarm
 
@@ -175,7 +176,7 @@ def _planning(mission: Mission) -> Callable[[], object]:
     for _ in range(2 * mission.num_robots):
         swarm.step(tdma)
     buffers, now = swarm.buffers, float(swarm.now[0])
-    radio, settings = radio_of(mission), PlannerSettings()
+    belief, settings = Belief(radio=radio_of(mission)), PlannerSettings()
 
     def plan() -> object:
         snapshots = take_snapshots(
@@ -190,7 +191,7 @@ def _planning(mission: Mission) -> Callable[[], object]:
         )
         is_free = np.ones(2 * num_windows, dtype=bool)
         timestamp = buffers.timestamp[0]
-        return Plan(radio, settings, snapshots, 0, timestamp, now, is_free).outcome()
+        return Plan(belief, settings, snapshots, 0, timestamp, now, is_free).outcome()
 
     return plan
 

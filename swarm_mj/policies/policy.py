@@ -15,6 +15,7 @@ from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.packets import Packet, PacketField, fitting, packet_of
 from swarm_mj.protocol.window import DoubleBroadcast, RequestResponse, WindowProtocol
+from swarm_mj.radio.link_models import Belief, TrueLinks
 
 Parameters = Mapping[str, bool | int | float | str]  # what a policy was made with, by name
 
@@ -70,6 +71,13 @@ class Policy:
 class DecentralisedPolicy(Policy, ABC):
     """A policy that every robot evaluates on its own view (Eq. 9)."""
 
+    def inform(self, belief: Belief) -> None:
+        """Is told, before `start`, what robots know of the channel; policies that reckon say more.
+
+        Args:
+            belief: The same for all robots of all missions.
+        """
+
     @abstractmethod
     def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
         """Whom each robot addresses; row [b, i] may depend on view [b, i] only.
@@ -122,6 +130,13 @@ class BroadcastPolicy(DecentralisedPolicy):
 
 class CentralisedPolicy(Policy, ABC):
     """A policy that is told the truth: everyone's buffer and everyone's true state."""
+
+    def inform(self, truth: TrueLinks) -> None:
+        """Is told, before `start`, what there is to know of the channel before its fades.
+
+        Args:
+            truth: The true links of all missions.
+        """
 
     @abstractmethod
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:

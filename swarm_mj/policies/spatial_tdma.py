@@ -11,7 +11,9 @@ from jaxtyping import Bool
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.tdma import draw_order, slot_of
 from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.radio.spatial_reuse import keep_joined
+from swarm_mj.radio.link_models import Belief
+from swarm_mj.radio.power_law import PowerLaw
+from swarm_mj.radio.spatial_reuse import keep_joined, told_of
 
 
 class SpatialTdma(BroadcastPolicy):
@@ -21,7 +23,8 @@ class SpatialTdma(BroadcastPolicy):
     Each robot applies the rule to its own buffer, alone, and robots that believe the same decide
     the same. Until a robot has heard of everyone it speaks in its own turn only: so the team begins
     as `Tdma` does, and no robot that joins overlooks a listener of the owner's. Uses the robot's
-    own buffer, identity, the team's size, the order, the clock and the radio's range and threshold.
+    own buffer, identity, the team's size, the order, the clock, the radio's range and threshold.
+    Of what the mission grants of the channel it uses the mean powers.
     """
 
     uses = "as tdma, and the positions in its buffer: robots far enough apart share a slot"
@@ -35,10 +38,17 @@ class SpatialTdma(BroadcastPolicy):
         """
         self._range_m = range_m
         self._threshold = threshold
+        self._law: PowerLaw | None = None
+
+    def inform(self, belief: Belief) -> None:
+        """Takes the powers that robots believe in; they are reckoned in units of the noise."""
+        law, noise_mw = belief.law, belief.radio.noise_mw
+        self._law = None if law is None else law._replace(at_1_m=law.at_1_m / noise_mw)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draws every mission's order; arguments as in `Policy.start`."""
         self._order = draw_order(num_robots, rngs)
+        self._told = None if self._law is None else told_of(self._law, len(rngs))
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Each robot whose turn it is or that may join."""
@@ -51,5 +61,6 @@ class SpatialTdma(BroadcastPolicy):
             self._range_m,
             self._threshold,
             is_sending,
+            self._told,
         )
         return is_sending

@@ -82,11 +82,17 @@ class ComposedChannel:
         Returns:
             Who belongs to it; of groups that are equally large, the one with the first robot.
         """
+        rule = self.reception
+        is_linked = self.mean_powers_mw(position_m, mission) >= rule.noise_mw * rule.threshold
+        return _largest_part(is_linked)
+
+    def mean_powers_mw(
+        self, position_m: Float[np.ndarray, "N 2"], mission: int
+    ) -> Float[np.ndarray, "N N"]:
+        """The power of each robot at each other before fades; arguments as above [mW]."""
         everyone = np.ones((1, len(position_m)), dtype=np.bool_)
         row = np.array([mission])
-        received_mw = self.gains.received_mw(position_m[None], row, everyone)[mission]
-        rule = self.reception
-        return _largest_part(received_mw >= rule.noise_mw * rule.threshold)
+        return self.gains.received_mw(position_m[None], row, everyone)[mission].copy()
 
     def decode(
         self,

@@ -1,6 +1,7 @@
 """The channel that a mission's numbers make (IV-B), and the paper's part of it."""
 
 import numpy as np
+from jaxtyping import Float
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.obstacles import Obstacles
@@ -8,14 +9,17 @@ from swarm_mj.radio.composed import ComposedChannel, Reception
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT, Bursts
 from swarm_mj.radio.free_space import FreeSpaceRadio, from_db, transmit_power_dbm
 from swarm_mj.radio.link_gains import LinkGains
+from swarm_mj.radio.link_models import Belief
 from swarm_mj.radio.path_loss import FREE_SPACE, PathLoss, log_distance, two_ray_ground
+from swarm_mj.radio.power_law import power_law
 from swarm_mj.radio.shadowing import Shadowing
 
 
 def radio_of(mission: Mission) -> FreeSpaceRadio:
     """The mission's radio in free space: its power makes the range exact in silence (IV-B).
 
-    It is the true channel of the paper's missions, and what robots believe in all others.
+    It is the true channel of the paper's missions, and what robots believe in all others, unless
+    they are told more (`belief_of`).
     """
     power_dbm = transmit_power_dbm(
         mission.range_m, mission.frequency_hz, mission.noise_dbm, mission.sinr_threshold_db
@@ -45,23 +49,60 @@ def channel_of(
     stands = obstacles is not None and len(obstacles.kind) > 0
     if not mission.beyond_free_space and not stands:
         return radio
-    at_1_m_mw = np.full(mission.num_robots, radio.received_at_1_m_mw)
-    at_1_m_mw[: mission.num_strong] *= from_db(mission.strong_db)
     shadowing = None
     if mission.shadowing_db > 0.0:
         shadowing = Shadowing(
             std_db=mission.shadowing_db, correlation_m=mission.shadowing_distance_m
         )
     return ComposedChannel(
-        LinkGains(at_1_m_mw, _path_loss(mission), shadowing, obstacles if stands else None),
-        Reception(
-            noise_mw=radio.noise_mw,
-            threshold=radio.threshold,
-            rician_k=_rician_k(mission),
-            erasure=mission.erasure,
-            bursts=Bursts(begin=mission.burst_begin, end=mission.burst_end),
-            recipient_hears_while_sending=radio.recipient_hears_while_sending,
+        LinkGains(
+            _at_1_m_mw(mission), _path_loss(mission), shadowing, obstacles if stands else None
         ),
+        _reception(mission),
+    )
+
+
+def belief_of(mission: Mission, obstacles: Obstacles | None = None) -> Belief:
+    """What the robots of a mission take the channel for: free space, and what they were told.
+
+    Args:
+        mission: Its numbers, and what it grants.
+        obstacles: What stands in the way in its scene.
+
+    Returns:
+        The belief.
+    """
+    radio = radio_of(mission)
+    stands = obstacles is not None and len(obstacles.kind) > 0 and mission.grants("map")
+    knows_law = mission.grants("statistics") and mission.beyond_free_space != ""
+    if not knows_law:
+        everyone_mw = np.full(mission.num_robots, radio.received_at_1_m_mw)
+        law = power_law(everyone_mw, obstacles=obstacles) if stands else None
+        return Belief(radio=radio, law=law)
+    return Belief(
+        radio=radio,
+        law=power_law(_at_1_m_mw(mission), _path_loss(mission), obstacles if stands else None),
+        reception=_reception(mission),
+        shadowing_db=mission.shadowing_db,
+    )
+
+
+def _at_1_m_mw(mission: Mission) -> Float[np.ndarray, "N"]:
+    """Power of each robot's packets after one metre [mW]."""
+    at_1_m_mw = np.full(mission.num_robots, radio_of(mission).received_at_1_m_mw)
+    at_1_m_mw[: mission.num_strong] *= from_db(mission.strong_db)
+    return at_1_m_mw
+
+
+def _reception(mission: Mission) -> Reception:
+    radio = radio_of(mission)
+    return Reception(
+        noise_mw=radio.noise_mw,
+        threshold=radio.threshold,
+        rician_k=_rician_k(mission),
+        erasure=mission.erasure,
+        bursts=Bursts(begin=mission.burst_begin, end=mission.burst_end),
+        recipient_hears_while_sending=radio.recipient_hears_while_sending,
     )
 
 

@@ -2,7 +2,8 @@
 
 The common rule: in each slot the owner of the turn broadcasts. Beginning half a round away in the
 order, one robot after the other joins if by Eqs. 1-4 nobody who decodes a packet so far would lose
-it, the robot itself included, and somebody would gain one. Noise is the unit of power.
+it, the robot itself included, and somebody would gain one. Noise is the unit of power, and powers
+are mean ones: those of free space, or by a law. Without a law, code for one is not even compiled.
 """
 
 from typing import NamedTuple
@@ -13,8 +14,29 @@ from jaxtyping import Bool, Float, Float32, Int
 from swarm_mj.compiled import compiled
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.radio.kernels import is_received, received_power, sinr
+from swarm_mj.radio.power_law import PowerLaw, write_powers
 
 NOISE = 1.0
+
+
+class Told(NamedTuple):
+    """Powers that robots were told of, as far as they were asked for and while beliefs stand."""
+
+    law: PowerLaw  # [noise]
+    believed_m: Float[np.ndarray, "B N 2"]  # where the robot asked last believes all to be [m]
+    is_done: Bool[np.ndarray, "B N"]  # whose powers are worked out for that
+    power: Float[np.ndarray, "B N N"]  # [noise]
+
+
+def told_of(law: PowerLaw, num_missions: int) -> Told:
+    """No powers so far, by this law."""
+    num_robots = len(law.at_1_m)
+    return Told(
+        law,
+        np.full((num_missions, num_robots, 2), np.nan),
+        np.zeros((num_missions, num_robots), dtype=np.bool_),
+        np.empty((num_missions, num_robots, num_robots)),
+    )
 
 
 class _Slot(NamedTuple):
@@ -34,7 +56,7 @@ def write_joined(
     threshold: float,
     has_joined: Float32[np.ndarray, "B N N"],
 ) -> None:
-    """Writes who sends by the rule, in the order of identities and by each robot's own beliefs.
+    """Writes who sends in free space by the rule, in the order of identities, as each believes.
 
     Args:
         believed_m: Where robot i believes the others to be [m].
@@ -53,15 +75,15 @@ def write_joined(
             slot = _silent_slot(num_robots)
             if is_known[b, i, owner]:
                 has_joined[b, i, owner] = 1.0
-                _join(owner, believed_m[b, i], at_1_m, threshold, slot)
+                _join(owner, believed_m[b, i], at_1_m, None, threshold, slot)
             for place in range(num_robots):
                 k = half_round + place
                 k -= num_robots if k >= num_robots else 0
                 if not (is_known[b, i, owner] and is_known[b, i, k]):
                     break
-                if _may_join(k, believed_m[b, i], at_1_m, threshold, slot):
+                if _may_join(k, believed_m[b, i], at_1_m, None, threshold, slot):
                     has_joined[b, i, k] = 1.0
-                    _join(k, believed_m[b, i], at_1_m, threshold, slot)
+                    _join(k, believed_m[b, i], at_1_m, None, threshold, slot)
 
 
 @compiled()
@@ -72,6 +94,7 @@ def keep_joined(
     range_m: float,
     threshold: float,
     is_sending: Bool[np.ndarray, "B N"],
+    told: Told | None = None,
 ) -> None:
     """Leaves those among the senders who send by the rule and their own beliefs.
 
@@ -82,6 +105,7 @@ def keep_joined(
         range_m: Distance at which a lone transmission just decodes [m].
         threshold: Least SINR that decodes, linear [1].
         is_sending: Who may send; overwritten by who does. The owner of the turn always does.
+        told: What robots believe of the powers; None is free space.
     """
     num_missions, num_robots = order.shape
     at_1_m = threshold * range_m * range_m
@@ -93,7 +117,8 @@ def keep_joined(
             asked[place] = order[b, (half_round + place) % num_robots]
         for i in range(num_robots):
             is_sending[b, i] = i == owner or (
-                is_sending[b, i] and _joins(i, owner, asked, believed_m[b, i], at_1_m, threshold)
+                is_sending[b, i]
+                and _joins(i, owner, asked, believed_m[b, i], at_1_m, told, b, threshold)
             )
 
 
@@ -104,21 +129,46 @@ def _joins(
     asked: Int[np.ndarray, "N"],
     believed_m: Float[np.ndarray, "N 2"],
     at_1_m: float,
+    told: Told | None,
+    b: int,
     threshold: float,
 ) -> bool:
     """Whether robot i joins the owner of the turn, by the rule and its own beliefs."""
     slot = _silent_slot(asked.shape[0])
-    _join(owner, believed_m, at_1_m, threshold, slot)
+    power = None if told is None else told.power[b]
+    if told is not None:
+        _forget_unless_equal(believed_m, told, b)
+        _work_out(owner, told, b)
+        _work_out(i, told, b)
+    _join(owner, believed_m, at_1_m, power, threshold, slot)
     # A robot that may not join the owner alone may not join it with others either.
-    if not _may_join(i, believed_m, at_1_m, threshold, slot):
+    if not _may_join(i, believed_m, at_1_m, power, threshold, slot):
         return False
     # A sender that is asked again may not join either: nobody would gain by it.
     for k in asked:
-        if _may_join(k, believed_m, at_1_m, threshold, slot):
-            _join(k, believed_m, at_1_m, threshold, slot)
+        if told is not None and slot.signal[k] == 0.0:
+            _work_out(k, told, b)
+        if _may_join(k, believed_m, at_1_m, power, threshold, slot):
+            _join(k, believed_m, at_1_m, power, threshold, slot)
         if k == i:
             break
     return slot.is_sender[i]
+
+
+@compiled()
+def _forget_unless_equal(believed_m: Float[np.ndarray, "N 2"], told: Told, b: int) -> None:
+    """Forgets the powers in mission b if they were worked out for other beliefs."""
+    if np.any(told.believed_m[b] != believed_m):
+        told.believed_m[b] = believed_m
+        told.is_done[b] = False
+
+
+@compiled()
+def _work_out(k: int, told: Told, b: int) -> None:
+    """Makes sure of the powers of k's packets in mission b."""
+    if not told.is_done[b, k]:
+        write_powers(k, told.believed_m[b], told.law, told.power[b, k])
+        told.is_done[b, k] = True
 
 
 @compiled()
@@ -128,7 +178,12 @@ def _silent_slot(num_robots: int) -> _Slot:
 
 @compiled()
 def _may_join(
-    k: int, believed_m: Float[np.ndarray, "N 2"], at_1_m: float, threshold: float, slot: _Slot
+    k: int,
+    believed_m: Float[np.ndarray, "N 2"],
+    at_1_m: float,
+    power: Float[np.ndarray, "N N"] | None,
+    threshold: float,
+    slot: _Slot,
 ) -> bool:
     """Whether nobody would lose a packet and somebody would gain one if k were a sender too."""
     is_sender, signal, total = slot
@@ -137,7 +192,7 @@ def _may_join(
     is_of_use = False
     for j in range(signal.shape[0]):
         if j != k and not is_sender[j]:
-            received = received_power(at_1_m, squared_distance(believed_m, k, j))
+            received = _power(k, j, believed_m, at_1_m, power)
             if signal[j] > 0.0:
                 if received > signal[j]:
                     return False
@@ -151,15 +206,34 @@ def _may_join(
 
 @compiled()
 def _join(
-    k: int, believed_m: Float[np.ndarray, "N 2"], at_1_m: float, threshold: float, slot: _Slot
+    k: int,
+    believed_m: Float[np.ndarray, "N 2"],
+    at_1_m: float,
+    power: Float[np.ndarray, "N N"] | None,
+    threshold: float,
+    slot: _Slot,
 ) -> None:
     """Makes k a sender: whom everyone decodes, and what is in the air."""
     is_sender, signal, total = slot
     is_sender[k] = True
     for j in range(signal.shape[0]):
         if j != k:
-            received = received_power(at_1_m, squared_distance(believed_m, k, j))
+            received = _power(k, j, believed_m, at_1_m, power)
             is_free = not is_sender[j] and signal[j] == 0.0
             if is_free and is_received(sinr(received, total[j], NOISE), threshold):
                 signal[j] = received
             total[j] += received
+
+
+@compiled()
+def _power(
+    k: int,
+    j: int,
+    believed_m: Float[np.ndarray, "N 2"],
+    at_1_m: float,
+    power: Float[np.ndarray, "N N"] | None,
+) -> float:
+    """The power of k's packets at j: that of free space, or as it was worked out."""
+    if power is None:
+        return received_power(at_1_m, squared_distance(believed_m, k, j))
+    return power[k, j]

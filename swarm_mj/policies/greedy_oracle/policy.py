@@ -16,7 +16,8 @@ from swarm_mj.policies.greedy_oracle.schedule import (
 from swarm_mj.policies.policy import CentralisedPolicy
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import FreeSpaceRadio
-from swarm_mj.radio.links import Links, links_between
+from swarm_mj.radio.link_models import TrueLinks
+from swarm_mj.radio.links import Links
 
 
 class _Oracle(CentralisedPolicy):
@@ -26,16 +27,20 @@ class _Oracle(CentralisedPolicy):
         """Prepares the policy.
 
         Args:
-            radio: The mission's channel.
+            radio: What is true unless the policy is informed otherwise.
         """
-        self._radio = radio
+        self._truth = TrueLinks(radio=radio)
+
+    def inform(self, truth: TrueLinks) -> None:
+        """Reckons with the true channel from now on."""
+        self._truth = truth
 
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """The window's schedule; robots move before they talk, which it does not foresee."""
         windows = [
-            self._window(timestamp, float(now), links_between(self._radio, position_m))
-            for timestamp, now, position_m in zip(
-                views.buffers.timestamp, views.now, states.position_m, strict=True
+            self._window(timestamp, float(now), self._truth.links(position_m, b))
+            for b, (timestamp, now, position_m) in enumerate(
+                zip(views.buffers.timestamp, views.now, states.position_m, strict=True)
             )
         ]
         return np.stack(windows)
@@ -54,7 +59,9 @@ class GreedyOracle(_Oracle):
     where the authors' code would let that robot hear.
     """
 
-    uses = "all buffers and all true positions, at every moment"
+    uses = (
+        "all buffers, all true positions and the true channel but for its fades, at every moment"
+    )
 
     def _window(
         self, timestamp: Float[np.ndarray, "N N"], now: float, links: Links

@@ -17,7 +17,7 @@ OUT_OF_REACH = np.inf  # instead of a number of hops
 
 @dataclass(frozen=True, kw_only=True)
 class LinkGraph:
-    """What follows from links alone; it is symmetric, as the links are."""
+    """What follows from links alone; it is symmetric where all transmit with the same power."""
 
     probability: Float[np.ndarray, "N N"]  # that j decodes i when nobody else transmits
     is_linked: Bool[np.ndarray, "N N"]  # whether that is often enough to count

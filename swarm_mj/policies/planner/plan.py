@@ -8,8 +8,7 @@ from swarm_mj.policies.planner.settings import PlannerSettings, ScheduleSettings
 from swarm_mj.policies.planner.snapshots import Snapshots
 from swarm_mj.policies.planner.weights import heuristic_weights
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
-from swarm_mj.radio.free_space import FreeSpaceRadio
-from swarm_mj.radio.links import links_between
+from swarm_mj.radio.link_models import Belief
 
 
 def foresight_of(num_robots: int, *, is_certain: bool, settings: ScheduleSettings) -> Foresight:
@@ -29,7 +28,7 @@ class Plan:
 
     def __init__(
         self,
-        radio: FreeSpaceRadio,
+        belief: Belief,
         settings: PlannerSettings,
         snapshots: Snapshots,
         owner: int,
@@ -40,7 +39,7 @@ class Plan:
         """Prepares the plan.
 
         Args:
-            radio: The mission's channel.
+            belief: What the robots take the channel for.
             settings: Of the planner, for its schedules and weights.
             snapshots: Those taken for this epoch.
             owner: The robot whose snapshot counts.
@@ -54,8 +53,8 @@ class Plan:
         round_windows = max(num_robots, settings.schedule.min_round_windows)
         age = now - snapshots.timestamp[owner]
         is_gone = age > settings.schedule.gone_rounds * round_windows
-        self._links = links_between(
-            radio, snapshots.position_m[owner], position_std_m, is_known & ~(is_gone & ~is_fresh)
+        self._links = belief.links(
+            snapshots.position_m[owner], position_std_m, is_known & ~(is_gone & ~is_fresh)
         )
         self._weights = heuristic_weights(self._links, settings.weights)
         self._foresight = foresight_of(

@@ -45,17 +45,19 @@ from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.packets import PacketField
 from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW
 from swarm_mj.radio.free_space import FreeSpaceRadio
+from swarm_mj.radio.link_models import Belief
 
 
 class Planner(BroadcastPolicy):
     """Every robot plans for the whole team from a snapshot that its teammates hold too.
 
     Uses the robot's own buffer, the snapshots in the packets that it decoded, its identity, the
-    team's size and area, the clock, the radio's numbers and common orders of turns.
+    team's size and area, the clock, the radio's numbers and common orders of turns, and what the
+    mission grants of the channel.
     """
 
     uses = (
-        "its buffer, the clock, common orders, the area, the radio exactly; and "
+        "its buffer, the clock, common orders, the area, the radio as far as it was told of it; and "
         "snapshots of the team that packets carry"
     )
 
@@ -72,14 +74,14 @@ class Planner(BroadcastPolicy):
         """Prepares the policy.
 
         Args:
-            radio: The mission's channel.
+            radio: What robots believe in unless the policy is informed otherwise.
             settings: What was tuned.
             form: How much of a snapshot packets carry.
             window_s: Duration of a window [s].
             range_m: Distance up to which a lone packet decodes [m].
             side_m: Side of the area that the robots start in [m].
         """
-        self._radio = radio
+        self._belief = Belief(radio=radio)
         self._settings = settings
         self._form = form
         self._window_s = window_s
@@ -95,11 +97,15 @@ class Planner(BroadcastPolicy):
         """Of these snapshots; arguments as in `Policy.payload_fields`."""
         return snapshot_form(mission).fields
 
+    def inform(self, belief: Belief) -> None:
+        """Plans by this belief from now on."""
+        self._belief = belief
+
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draws each mission's orders of turns and forgets; arguments as in `Policy.start`."""
         self._teams = [
             _Team(
-                self._radio,
+                self._belief,
                 self._window_s,
                 self._settings,
                 self._form,
@@ -118,13 +124,13 @@ class _Team:
 
     def __init__(
         self,
-        radio: FreeSpaceRadio,
+        belief: Belief,
         window_s: float,
         settings: PlannerSettings,
         form: SnapshotForm,
         discovery: Discovery,
     ) -> None:
-        self._radio = radio
+        self._belief = belief
         self._window_s = window_s
         self._settings = settings
         self._form = form
@@ -232,7 +238,7 @@ class _Team:
             is_fresh = self._current.is_fresh[owner]
             slots = range(SLOTS_PER_WINDOW * start, SLOTS_PER_WINDOW * end)
             self._plans[owner] = Plan(
-                self._radio,
+                self._belief,
                 self._settings,
                 self._current,
                 owner,

@@ -25,14 +25,14 @@ from swarm_mj.policies.tdma import slot_of
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import FreeSpaceRadio
-from swarm_mj.radio.links import links_between
+from swarm_mj.radio.link_models import Belief
 
 
 class PlannerWithoutPayload(BroadcastPolicy):
     """Every robot that knows where everyone rests plans for the whole team; others take turns.
 
-    Uses the robot's own buffer, its identity, the team's size, the clock, the radio's numbers and a
-    common order of turns.
+    Uses the robot's own buffer, its identity, the team's size, the clock, the radio's numbers, what
+    the mission grants of the channel and a common order of turns.
     """
 
     uses = (
@@ -46,13 +46,18 @@ class PlannerWithoutPayload(BroadcastPolicy):
         """Prepares the policy.
 
         Args:
-            radio: The mission's channel.
+            radio: What robots believe in unless the policy is informed otherwise.
             settings: Of the planner, for its schedules and weights.
             turns: What robots follow that cannot plan.
         """
-        self._radio = radio
+        self._belief = Belief(radio=radio)
         self._settings = settings
         self._turns = turns
+
+    def inform(self, belief: Belief) -> None:
+        """Plans by this belief from now on, and so do the turns."""
+        self._belief = belief
+        self._turns.inform(belief)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draws each mission's order of turns and forgets; arguments as in `Policy.start`."""
@@ -76,7 +81,7 @@ class PlannerWithoutPayload(BroadcastPolicy):
         """The plan that follows from these positions; robots that hold the same share it."""
         key = position_m.tobytes()
         if key not in self._plans[b]:
-            self._plans[b][key] = _StandingPlan(self._radio, self._settings, position_m)
+            self._plans[b][key] = _StandingPlan(self._belief, self._settings, position_m)
         return self._plans[b][key]
 
 
@@ -88,12 +93,12 @@ class _StandingPlan:
 
     def __init__(
         self,
-        radio: FreeSpaceRadio,
+        belief: Belief,
         settings: PlannerSettings,
         position_m: Float[np.ndarray, "N 2"],
     ) -> None:
         num_robots = len(position_m)
-        self._links = links_between(radio, position_m)
+        self._links = belief.links(position_m)
         self._weights = heuristic_weights(self._links, settings.weights)
         self._foresight = foresight_of(num_robots, is_certain=True, settings=settings.schedule)
         self._chunk_slots = settings.schedule.chunk_slots

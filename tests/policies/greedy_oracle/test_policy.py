@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from standing_teams import after_windows, flooded_team, knowledge_after, single_pairs
+from standing_teams import Team, after_windows, flooded_team, knowledge_after, single_pairs
 
 from swarm_mj.mission import paper, reference
+from swarm_mj.physics.obstacles import BOX, Obstacles
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle, LookaheadOracle
 from swarm_mj.policies.greedy_oracle.schedule import lookahead_window
@@ -14,8 +15,9 @@ from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.radio.link_models import TrueLinks
 from swarm_mj.radio.links import links_between
-from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.radio.mission_radio import channel_of, radio_of
 from swarm_mj.rollout import rollout, summarise
 from swarm_mj.swarm import Swarm
 
@@ -142,3 +144,24 @@ def test_oracle_beats_every_policy_but_planners_on_average_and_lookahead_the_ora
     }
     assert age["greedy-oracle"] < min(age[name] for name in others)
     assert age["oracle-lookahead"] <= age["greedy-oracle"]
+
+
+@pytest.mark.parametrize("kind", ["greedy-oracle", "oracle-lookahead"])
+def test_an_oracle_addresses_nobody_behind_a_wall_that_it_is_told_of(kind):
+    """Two robots, 100 m apart, with 40 dB between them."""
+    wall = Obstacles(
+        kind=np.array([BOX]),
+        centre_m=np.array([[50.0, 0.0, 0.0]]),
+        rotation=np.eye(3)[None],
+        size_m=np.array([[1.0, 1e4, 1e4]]),
+        reach_m=np.array([2e4]),
+        power_left=np.array([1e-4]),
+    )
+    mission = paper("stationary", num_robots=2)
+    channel, policy = channel_of(mission, wall), make_policy(kind, mission)
+    channel.start(2, [np.random.default_rng(0)])
+    position_m, timestamp = np.array([[0.0, 0.0], [100.0, 0.0]]), np.diag([9.0, 9.0])
+    team = Team(radio=radio_of(mission), position_m=position_m, timestamp=timestamp, now=9.0)
+    assert decided(policy, team)[0].tolist() in ([1, 1], [0, 0])
+    policy.inform(TrueLinks(radio=radio_of(mission), channel=channel))
+    assert decided(policy, team)[0].tolist() == [0, 1]

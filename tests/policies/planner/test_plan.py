@@ -15,6 +15,7 @@ from swarm_mj.policies.planner.snapshots import Snapshots, take_snapshots
 from swarm_mj.policies.planner.weights import heuristic_weights
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.window import transmit
+from swarm_mj.radio.link_models import Belief
 from swarm_mj.radio.links import links_between
 
 seeds = st.integers(0, 2**32 - 1)
@@ -54,7 +55,9 @@ def team_of(num_robots, seed):
 
 def plan_of(team, snapshots, owner=0, is_free=None, settings=SETTINGS):
     free = np.ones(24, dtype=bool) if is_free is None else is_free
-    return Plan(team.radio, settings, snapshots, owner, team.timestamp, team.now, free)
+    return Plan(
+        Belief(radio=team.radio), settings, snapshots, owner, team.timestamp, team.now, free
+    )
 
 
 def scheduled(**numbers):
@@ -150,7 +153,9 @@ def test_what_was_expected_of_the_lost_is_corrected(seed, num_robots):
     team, owner = team_of(num_robots, seed), seed % num_robots
     snapshots = snapshots_of(team, seed)
     expected = np.random.default_rng(seed).integers(0, 40, (num_robots, num_robots)) / 2
-    planned = Plan(team.radio, SETTINGS, snapshots, owner, expected, NOW, np.ones(0, dtype=bool))
+    planned = Plan(
+        Belief(radio=team.radio), SETTINGS, snapshots, owner, expected, NOW, np.ones(0, dtype=bool)
+    )
     heard, is_fresh = snapshots.timestamp[owner], snapshots.is_fresh[owner]
     for i in range(num_robots):
         for k in range(num_robots):
@@ -218,10 +223,10 @@ def test_who_was_not_heard_of_for_three_rounds_is_planned_without():
     now = SETTINGS.schedule.gone_rounds * SETTINGS.schedule.min_round_windows + 2.0
     snapshots.timestamp[:] = now - 1.0
     free = np.ones(24, dtype=bool)
-    whole = Plan(team.radio, SETTINGS, snapshots, 0, team.timestamp, now, free)
+    whole = Plan(Belief(radio=team.radio), SETTINGS, snapshots, 0, team.timestamp, now, free)
     assert all_transmitters(whole)[:, 2].any()
     snapshots.timestamp[0, 2], snapshots.is_fresh[0, 2] = 1.0, False
-    without = Plan(team.radio, SETTINGS, snapshots, 0, team.timestamp, now, free)
+    without = Plan(Belief(radio=team.radio), SETTINGS, snapshots, 0, team.timestamp, now, free)
     assert not all_transmitters(without)[:, 2].any()
 
 

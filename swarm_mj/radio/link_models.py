@@ -1,0 +1,97 @@
+"""What policies reckon with in place of the channel: the robots' belief, and the true statistics.
+
+Neither foresees a fade. Index order: `i` sends, `j` receives.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from swarm_mj.radio.composed import ComposedChannel, Reception
+from swarm_mj.radio.decode_curves import KNOWN, Curves, decode_curves
+from swarm_mj.radio.fading import NO_FADING
+from swarm_mj.radio.free_space import FreeSpaceRadio
+from swarm_mj.radio.links import Links, doubtful, links_between
+from swarm_mj.radio.path_loss import FREE_SPACE_EXPONENT
+from swarm_mj.radio.power_law import PowerLaw, powers_between
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Belief:
+    """The channel as the robots of a mission believe it to be, all of them alike."""
+
+    radio: FreeSpaceRadio
+    law: PowerLaw | None = None  # of mean powers [mW]; None is that of free space
+    reception: Reception | None = None  # the statistics of fades and losses; None: there are none
+    shadowing_db: float = 0.0  # standard deviation of what nobody knows of the powers [dB]
+
+    def links(
+        self,
+        position_m: Float[np.ndarray, "N 2"],
+        spread_m: Float[np.ndarray, "N"] | None = None,
+        is_known: Bool[np.ndarray, "N"] | None = None,
+    ) -> Links:
+        """The links between robots at believed positions; arguments as of `links_between`."""
+        links = links_between(self.radio, position_m, spread_m, is_known)
+        if self.law is not None:
+            links = _by_law(links, self.law, position_m, self.radio)
+        return _with_chances(links, self.reception, self.shadowing_db)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrueLinks:
+    """What there is to know of a channel before its fades: mean powers and statistics."""
+
+    radio: FreeSpaceRadio
+    channel: ComposedChannel | None = None  # None is the radio in free space
+
+    def links(self, position_m: Float[np.ndarray, "N 2"], mission: int) -> Links:
+        """The links between robots at true positions.
+
+        Args:
+            position_m: Where the robots of one mission are [m].
+            mission: Which one; its shadowing is its own.
+
+        Returns:
+            The links.
+        """
+        links = links_between(self.radio, position_m)
+        if self.channel is None:
+            return links
+        received_mw = self.channel.mean_powers_mw(position_m, mission)
+        return _with_chances(links._replace(received_mw=received_mw), self.channel.reception, 0.0)
+
+
+def _by_law(
+    links: Links, law: PowerLaw, position_m: Float[np.ndarray, "N 2"], radio: FreeSpaceRadio
+) -> Links:
+    """Links of the same beliefs, but with the powers of a law.
+
+    The steeper the path loss, the more dB an error of the distance is worth.
+    """
+    is_counted = links.received_mw > 0.0
+    is_far = links.received_mw < radio.received_at_1_m_mw / law.breakpoint_m**2
+    steepness = np.where(is_far, law.exponent / FREE_SPACE_EXPONENT, 1.0)
+    return links._replace(
+        received_mw=powers_between(position_m, law) * is_counted,
+        distance_over_std=links.distance_over_std / steepness,
+    )
+
+
+def _with_chances(links: Links, reception: Reception | None, std_db: float) -> Links:
+    """The same links with the chances of their packets, where they are not certain."""
+    curves = KNOWN if reception is None else _curves(reception, is_certain=std_db == 0.0)
+    if curves is KNOWN:
+        return links
+    return doubtful(links, curves, np.full(links.received_mw.shape, std_db))
+
+
+@cache
+def _curves(reception: Reception, *, is_certain: bool) -> Curves:
+    """How probably packets decode by these statistics; `KNOWN` if certainly, or not at all."""
+    success = (1.0 - reception.erasure) * (1.0 - reception.bursts.mean_loss)
+    if is_certain and reception.rician_k == NO_FADING and success == 1.0:
+        return KNOWN
+    return decode_curves(reception.rician_k, success)
