@@ -34,8 +34,7 @@ from swarm_mj.protocol.partial_packets import with_room
 from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, RequestResponse, WindowProtocol
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import Channel, VaryingChannel
-from swarm_mj.radio.link_models import TrueLinks
-from swarm_mj.radio.mission_radio import belief_of, channel_of, radio_of
+from swarm_mj.radio.mission_radio import belief_of, channel_of, truth_of
 from swarm_mj.radio.obstruction import blocked
 
 CALLED_WITH = {  # what own parts are given
@@ -96,8 +95,7 @@ class Swarm:
         self._obstacles = self._physics.obstacles
         self.channel = channel_of(mission, self._obstacles) if channel is None else channel
         self.belief = belief_of(mission, self._obstacles)
-        own = self.channel if isinstance(self.channel, ComposedChannel) else None
-        self._truth = TrueLinks(radio=radio_of(mission), channel=own)
+        self._truth = truth_of(mission, self.channel)
         self._num_missions = len(seeds)
         self.restart(seeds)
 

@@ -7,9 +7,15 @@ from swarm_mj.mission import Mission
 from swarm_mj.physics.obstacles import Obstacles
 from swarm_mj.radio.composed import ComposedChannel, Reception
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT, Bursts
-from swarm_mj.radio.free_space import FreeSpaceRadio, from_db, transmit_power_dbm
+from swarm_mj.radio.free_space import (
+    Channel,
+    FreeSpaceRadio,
+    VaryingChannel,
+    from_db,
+    transmit_power_dbm,
+)
 from swarm_mj.radio.link_gains import LinkGains
-from swarm_mj.radio.link_models import Belief
+from swarm_mj.radio.link_models import Belief, TrueLinks
 from swarm_mj.radio.path_loss import FREE_SPACE, PathLoss, log_distance, two_ray_ground
 from swarm_mj.radio.power_law import power_law
 from swarm_mj.radio.shadowing import Shadowing
@@ -85,6 +91,12 @@ def belief_of(mission: Mission, obstacles: Obstacles | None = None) -> Belief:
         reception=_reception(mission),
         shadowing_db=mission.shadowing_db,
     )
+
+
+def truth_of(mission: Mission, channel: Channel | VaryingChannel) -> TrueLinks:
+    """What there is to know of a mission's channel; of a user's own, nothing but free space."""
+    own = channel if isinstance(channel, ComposedChannel) else None
+    return TrueLinks(radio=radio_of(mission), channel=own)
 
 
 def _at_1_m_mw(mission: Mission) -> Float[np.ndarray, "N"]:

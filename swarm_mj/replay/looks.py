@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, Int16
 
 from swarm_mj.radio.composed import ComposedChannel, reached_from
-from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.swarm import Swarm
 
@@ -103,11 +102,10 @@ def look(swarm: Swarm, index: int = 0) -> Look | None:
     channel = swarm.channel
     if not isinstance(channel, ComposedChannel):
         return None
-    mission, position_m = swarm.mission, swarm.states.position_m[index : index + 1]
+    mission, position_m = swarm.mission, swarm.states.position_m[index]
     radio = radio_of(mission)
-    everyone = np.ones((1, mission.num_robots), dtype=np.bool_)
-    true_mw = channel.gains.received_mw(position_m, np.array([index]), everyone)[index]
-    believed_mw = links_between(radio, position_m[0]).received_mw
+    true_mw = channel.mean_powers_mw(position_m, index)
+    believed_mw = swarm.belief.links(position_m).received_mw
     least_mw = channel.reception.noise_mw * channel.reception.threshold
     is_on = swarm.states.is_active
     here = np.ones(mission.num_robots, dtype=bool) if is_on is None else is_on[index]

@@ -54,6 +54,13 @@ def test_surprises_are_where_lone_packets_and_the_range_disagree(index):
     )
 
 
+def test_what_was_told_before_the_mission_does_not_surprise():
+    told = {"arena": "blocks", "num_robots": 14, "strong_share": 0.3, "path_loss": "two-ray"}
+    for known, surprises in (("nothing", True), ("map", True), ("map,statistics", False)):
+        seen = look(Swarm(paper("random-walk", **told, known=known), [3])).surprises
+        assert (len(seen.row) > 0) == surprises
+
+
 def wall(spec, _mission):
     spec.worldbody.add_geom(
         type=mjtGeom.mjGEOM_BOX,

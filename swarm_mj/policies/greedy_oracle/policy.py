@@ -59,9 +59,7 @@ class GreedyOracle(_Oracle):
     where the authors' code would let that robot hear.
     """
 
-    uses = (
-        "all buffers, all true positions and the true channel but for its fades, at every moment"
-    )
+    uses = "all buffers, all true positions and the true channel but for its fades, at every moment"
 
     def _window(
         self, timestamp: Float[np.ndarray, "N N"], now: float, links: Links

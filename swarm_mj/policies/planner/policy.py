@@ -57,8 +57,8 @@ class Planner(BroadcastPolicy):
     """
 
     uses = (
-        "its buffer, the clock, common orders, the area, the radio as far as it was told of it; and "
-        "snapshots of the team that packets carry"
+        "its buffer, the clock, common orders, the area, the radio as far as it was told of it; "
+        "and snapshots of the team that packets carry"
     )
 
     def __init__(
