@@ -45,7 +45,7 @@ def flight_numbers(mission: Mission, policy: Policy, summary: Summary) -> dict[s
 
 def flight_title(mission: Mission, policy: str, seed: int) -> str:
     """What was flown, in a line."""
-    team = f"{mission.num_robots} robots"
+    team = f"{mission.num_robots} robots" + (" that collide" if mission.collide else "")
     if mission.switched_off:
         team += f", {mission.switched_off:.0%} of them off half-way"
     known = [f"known {mission.known}"] if mission.known != NOTHING else []
