@@ -3,9 +3,11 @@
     python tools/results_table.py training/results/paper-*.csv
 
 One table per file, task, preset, fraction switched off and cost: policies down, the swept number
-across, mean ± standard error over missions, published values in brackets.
+across, mean ± standard error over missions, published values in brackets. A file of several bit
+rates has one table per team size, with the rates across.
 """
 
+import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +18,7 @@ from swarm_mj.cli import script
 from swarm_mj.evaluation.published import SWEEPS
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, read_results
 from swarm_mj.fields import setting
+from swarm_mj.protocol.packets import bits_per_second
 
 COSTS = {
     "aoi": ("age of information [windows]", 1),
@@ -33,8 +36,8 @@ def table(results: Sequence[Result], cost: str) -> str:
     Returns:
         Markdown; the policies of least cost first.
     """
-    swept = SWEEPS[results[0].task].x_name
-    xs = sorted({getattr(result, swept) for result in results})
+    swept = "bit_rate" if _is_by_rate(results) else SWEEPS[results[0].task].x_name
+    xs = sorted({getattr(result, swept) for result in results}, key=_place)
     if len({(result.policy, getattr(result, swept)) for result in results}) < len(results):
         raise ValueError(f"results must have each policy once at each {swept}")
     cells = {(result.policy, getattr(result, swept)): _cell(result, cost) for result in results}
@@ -46,7 +49,7 @@ def table(results: Sequence[Result], cost: str) -> str:
     )
     label, _ = COSTS[cost]
     rows = [
-        [f"{swept.replace('_', ' ')}, {label}", *(f"{x:g}" for x in xs)],
+        [f"{swept.replace('_', ' ')}, {label}", *(_shown(swept, x) for x in xs)],
         ["---"] * (len(xs) + 1),
         *(
             [_name(policy, results), *(cells.get((policy, x), "") for x in xs)]
@@ -54,6 +57,23 @@ def table(results: Sequence[Result], cost: str) -> str:
         ),
     ]
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+
+
+def _is_by_rate(results: Sequence[Result]) -> bool:
+    """Whether the bit rate is what was swept."""
+    return len({result.bit_rate for result in results}) > 1
+
+
+def _place(x: float | None) -> float:
+    """Where a column stands; no limit comes last."""
+    return math.inf if x is None else x
+
+
+def _shown(swept: str, x: float | None) -> str:
+    """A column's head."""
+    if x is None:
+        return "no limit"
+    return bits_per_second(x) if swept == "bit_rate" else f"{x:g}"
 
 
 def _name(policy: str, results: Sequence[Result]) -> str:
@@ -77,10 +97,11 @@ def _plus_minus(result: Result, name: str, digits: int) -> str:
     return f"{value:.{digits}f}" if sem is None else f"{value:.{digits}f} ± {sem:.{digits}f}"
 
 
-def _kind(result: Result) -> tuple[str, ...]:
+def _kind(result: Result, *, is_by_rate: bool) -> tuple[str, ...]:
     """What makes tables of their own, in words."""
-    fate = f"{result.switched_off:.0%} of the robots off half-way"
-    return (result.task, f"preset {result.preset}", *([fate] if result.switched_off else []))
+    fate = [f"{result.switched_off:.0%} of the robots off half-way"] if result.switched_off else []
+    team = [f"{result.num_robots} robots"] if is_by_rate else []
+    return (result.task, f"preset {result.preset}", *team, *fate)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,8 +117,9 @@ def run(options: Options) -> int:
     """Prints the tables; returns the exit code."""
     for path in options.files:
         results = read_results(path)
-        for kind in sorted({_kind(result) for result in results}):
-            own = [result for result in results if _kind(result) == kind]
+        kinds = [_kind(result, is_by_rate=_is_by_rate(results)) for result in results]
+        for kind in sorted(set(kinds)):
+            own = [result for result, its in zip(results, kinds, strict=True) if its == kind]
             for cost in COSTS if own[0].task == "flocking" else ["aoi"]:
                 print(f"{', '.join(kind)}\n\n{table(own, cost)}\n")
     return 0

@@ -1,9 +1,9 @@
 """Packets that do not hold the whole buffer: which entries are sent (II-B, with a bit rate).
 
 A robot always sends its own entry, and beside it those whose T has risen most since it last sent
-them. So every entry gets its turn, and what nobody would learn from is not sent. An entry names its
-parent as it is if the parent's own entry is in the packet, and otherwise the sender: so what a
-receiver holds remains a tree, although some robots on the way are left out.
+them, of equals the freshest. So every entry gets its turn. An entry names its parent as it is if
+the parent's own entry is in the packet, and otherwise the sender: so what a receiver holds remains
+a tree, although some robots on the way are left out.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -13,6 +13,8 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.compiled import compiled
 from swarm_mj.protocol.buffers import NEVER, Buffers
+
+TIE_BREAK = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,9 +68,10 @@ def _choose(
         for i in range(num_robots):
             if recipient[b, i] == i:
                 continue
-            rise = timestamp[b, i] - told[b, i]
-            rise[i] = np.inf
-            for k in np.argsort(-rise)[:num_entries]:
-                if rise[k] > 0.0:
+            # Rises are halves of a window: what is added decides between equal ones only.
+            urgency = timestamp[b, i] - told[b, i] + TIE_BREAK * timestamp[b, i]
+            urgency[i] = np.inf
+            for k in np.argsort(-urgency)[:num_entries]:
+                if timestamp[b, i, k] > NEVER:
                     is_sent[b, i, k] = True
                     told[b, i, k] = timestamp[b, i, k]

@@ -1,6 +1,7 @@
 """The list of policies: what they say of themselves, on the terminal, as JSON, and on the pages."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -45,6 +46,25 @@ def test_json_says_of_every_policy_what_it_is(capsys):
     assert all(each["uses"] and each["description"] for each in listed.values())
     for name in ("random-flooding", "mst", "aloha", "gossip"):
         assert listed[name]["probability"] == tuned_probability(name, MISSION)
+
+
+@pytest.mark.parametrize(
+    ("robots", "bytes_of"), [(40, {"planner": 7263}), (80, {"planner": 27318})]
+)
+def test_every_policy_says_what_its_packets_weigh(capsys, robots, bytes_of):
+    """A packet's table of fields adds up to its bytes."""
+    listed = json.loads(printed(capsys, "--json", "--robots", str(robots)))
+    for each in listed:
+        buffer_bytes = 1 + 1 + robots // 8 + 9 * robots
+        assert each["packet_bytes"] == bytes_of.get(each["name"], buffer_bytes), each["name"]
+        bits = sum(field["bits"] * field["count"] for field in each["packet_fields"])
+        assert math.ceil(bits / 8) == each["packet_bytes"]
+
+
+def test_a_policy_s_packet_is_that_of_the_bit_rate_named(capsys):
+    shown = printed(capsys, "planner", "--bit-rate", "250k")
+    assert "lean snapshots" in shown
+    assert "721 bytes" in shown
 
 
 def test_probabilities_are_those_of_the_mission_named(capsys):

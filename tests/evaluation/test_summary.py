@@ -116,6 +116,13 @@ def test_talk_by_hand():
     assert (round_robin.complete_window_median, round_robin.complete_share) == (None, 0.0)
 
 
+def test_bytes_by_hand():
+    """1500 packets of 367 bytes, responses too, in missions of 500 windows of 0.1 s."""
+    mst, _ = results()
+    assert mst.packet_bytes == 367
+    assert mst.bytes_per_second == pytest.approx(1500 * 367 / 50.0)
+
+
 def test_broadcasts_by_hand():
     """1500 packets, 600 of them heard, 2400 times; nothing is delivered to anyone."""
     broadcast = costs(

@@ -8,6 +8,7 @@ from swarm_mj.mission import paper, reference
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.registry import POLICIES, make_policy
+from swarm_mj.protocol.packets import PacketField
 from swarm_mj.swarm import Swarm
 
 MISSION = paper("flocking", num_robots=8)
@@ -69,6 +70,28 @@ def test_eq9_a_decentralised_robot_decides_on_its_own_view(name, preset):
 @pytest.mark.parametrize("name", POLICIES)
 def test_ii_b_policies_say_whether_packets_carry_more_than_the_buffer(name):
     assert make_policy(name, MISSION).payload == PAYLOAD.get(name, "none")
+
+
+class Heavy(DecentralisedPolicy):
+    """Whose packets carry a map of 1000 bytes."""
+
+    payload = "a map"
+
+    def payload_fields(self, mission):
+        return (PacketField(name="cell", bits=8, count=25 * mission.num_robots),)
+
+    def recipients(self, views):
+        return views.silence
+
+
+def test_a_payload_counts_and_where_it_does_not_fit_the_policy_does_not_fly():
+    """Beside 7 bytes of header and an entry of 9, whose 16 bytes are the least."""
+    assert Heavy().packet(paper()).num_bytes == 367 + 1000
+    fits = paper(bit_rate=1016 * 160.0)
+    assert Heavy().packet(fits).num_entries == 1
+    Swarm(fits, [1]).start(Heavy())
+    with pytest.raises(ValueError, match="packets of Heavy need 1016 bytes for a single entry"):
+        Swarm(paper(bit_rate=1015 * 160.0), [1]).start(Heavy())
 
 
 @pytest.mark.parametrize("name", DECENTRALISED)

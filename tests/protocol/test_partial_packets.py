@@ -32,7 +32,13 @@ def test_entries_that_rose_most_since_they_were_told_go_first_and_ones_own_alway
     buffers.timestamp[0, 0] = [10.0, 8.5, 7.5, 6.0, 5.0]  # rises: own, 0.5, 0.5, 6, 5
     assert sent_by_0(buffers) == [0, 3, 4]
     assert sent_by_0(buffers) == [0, 1, 2]
-    assert sent_by_0(buffers) == [0]  # the rest is told
+    assert sent_by_0(buffers) == [0, 1, 2]  # all is told: the freshest again
+
+
+def test_who_was_never_heard_of_has_no_entry():
+    buffers = five_robots(num_entries=4)
+    buffers.timestamp[0, 0, 1:] = [NEVER, 7.0, NEVER, NEVER]
+    assert sent_by_0(buffers) == [0, 2]
 
 
 def test_whoever_is_silent_tells_nothing():
@@ -44,7 +50,7 @@ def test_whoever_is_silent_tells_nothing():
 def test_a_receiver_learns_what_is_in_the_packet_and_its_parents_form_a_tree():
     """Robot 3's parent, 2, is in the packet of four entries; robot 2's, 1, is left out."""
     buffers = five_robots(num_entries=4)
-    buffers.told[0, 0, 1] = 8.0
+    buffers.told[0, 0, 1] = 8.0  # all of it
     heard = np.array([[0, 1, 2, 3, 0]])
     merge(buffers, heard, entries_sent(buffers, np.array([ALL])))
     assert buffers.timestamp[0, 4].tolist() == [9.0, NEVER, 7.0, 6.0, 5.0]

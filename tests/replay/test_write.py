@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+from reading import static
 from rerun.chunk import RrdReader
 
 from swarm_mj.replay.read import check_replay, windows
@@ -54,6 +55,15 @@ def test_the_config_is_kept_as_properties(replay):
     assert kept["seed"] == [5]
     assert kept["policy"] == ["mst"]
     assert kept["ratio"] == [0.25]
+
+
+def test_the_sheet_says_what_the_team_sent(two_way, tmp_path):
+    """Requests and answers of 100 bytes, in 30 windows of 0.1 s."""
+    path = tmp_path / "r.rrd"
+    write_replay(two_way.log, two_way.mission, {"policy": "mst", "packet_bytes": 100}, path)
+    kbit_per_second = 0.8 * two_way.counted("transmitted").sum() / 3.0
+    (about,) = static(path, "/about", "TextDocument:text")
+    assert f"- **sent by the team**: {kbit_per_second:.4g} kbit/s" in about
 
 
 def test_rerun_s_own_verifier_accepts_the_file(replay):

@@ -39,6 +39,30 @@ def test_policies_down_the_swept_number_across_the_least_cost_first(tool, tmp_pa
     )
 
 
+def test_bit_rates_stand_across_and_team_sizes_apart(tool, tmp_path, capsys):
+    rows = [
+        result("tdma", aoi_mean=age, bit_rate=rate, num_robots=robots)
+        for robots, rate, age in [
+            (40, None, 1.0),
+            (40, 250e3, 2.0),
+            (80, None, 3.0),
+            (80, 1e6, 4.0),
+        ]
+    ]
+    write_csv(tmp_path / "rates.csv", rows)
+    assert tool.main([str(tmp_path / "rates.csv")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    heads = [line for line in lines if line.startswith("| bit rate")]
+    assert [head.split("|")[2:4] for head in heads] == [
+        [" 250 kbit/s ", " no limit "],
+        [" 1 Mbit/s ", " no limit "],
+    ]
+    assert [line.split(", ")[-1] for line in lines if "preset" in line] == [
+        "40 robots",
+        "80 robots",
+    ]
+
+
 def test_who_carries_more_than_the_paper_s_packets_is_named_so(tool):
     rows = [
         result("planner", aoi_mean=1.0, payload="snapshots"),
