@@ -54,7 +54,7 @@ def draw_space(
         sheet.timed("scene", rr.Transform3D.columns(translation=away))
     for name, solid in fixed_solids(model).items():
         sheet.fixed(f"scene/area/{name}", solid)
-    for g in obstacle_geoms(model):  # for those who point at one
+    for g in obstacle_geoms(model):  # for those who click on one
         loss = rr.AnyValues(loss_db=loss_db_of(model, g))
         sheet.fixed(f"scene/area/{name_of(model, g)}", loss)
     lines = [[(*start, GRID_M), (*end, GRID_M)] for start, end in grid(sheet.frame)]
@@ -78,7 +78,7 @@ def _draw_bodies(sheet: Sheet, colours: UInt8[np.ndarray, "T N 3"]) -> None:
     where = _lifted(log.position_m, height_m / 2.0)
     columns = rr.Cylinders3D.columns(centers=where, colors=shown.reshape(-1, 3))
     sheet.timed("scene/robots", columns.partition([num_robots] * num_windows))
-    # For those who point at a robot, and for videos.
+    # For those who click on a robot, and for videos.
     age = log.known_age.astype(np.float32).ravel()
     known = rr.AnyValues.columns(age=age, is_on=log.is_on.ravel())
     sheet.timed("scene/robots", known.partition([num_robots] * num_windows))

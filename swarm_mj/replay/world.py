@@ -57,7 +57,7 @@ def _draw_links(
     lines_m: Float[np.ndarray, "S 2 2"],
     height_m: float,
 ) -> None:
-    """Lines on the map, and in space so high; who points at one reads its link's numbers."""
+    """Lines on the map, and in space so high; who clicks on one reads its link's numbers."""
     lines = lines_m.astype(np.float32)
     lifted = np.pad(lines, ((0, 0), (0, 0), (0, 1)), constant_values=np.float32(height_m))
     on_map, in_space = f"arena/world/{kind}", f"scene/world/{kind}"
