@@ -186,7 +186,7 @@ class Mission:
 
     bit_rate: float | None = setting(
         None,
-        "a packet that does not fit into a slot of 50 ms cannot be sent; such as 250k or 6M",
+        "in bit/s, as 250k or 6M; what does not fit into a slot of 50 ms is not sent",
         group=CHANNEL,
         label="bit rate",
         unit="bit/s",
