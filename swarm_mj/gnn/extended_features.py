@@ -18,7 +18,7 @@ from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import from_db
-from swarm_mj.radio.spatial_reuse import write_joined
+from swarm_mj.radio.spatial_reuse import believes_as_the_last, write_joined
 
 ADDRESS_RANGES = 1.2  # a teammate believed farther away is not worth addressing [ranges]
 LONG_WINDOWS = 500.0  # ages count by their logarithm, up to 1 at this one [windows]
@@ -222,6 +222,10 @@ def _write_neighbours(
     x_m, y_m, known = np.empty(num_robots), np.empty(num_robots), np.empty(num_robots, np.int64)
     for b in range(num_missions):
         for i in range(num_robots):
+            if believes_as_the_last(believed_m[b], is_known[b], i):
+                for k in range(num_robots):
+                    neighbours[b, i, k] = neighbours[b, i - 1, k]
+                continue
             for k in range(num_robots):
                 x_m[k], y_m[k] = believed_m[b, i, k, 0], believed_m[b, i, k, 1]
                 known[k] = is_known[b, i, k]

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32
 
 from swarm_mj.compiled import compiled
+from swarm_mj.radio.spatial_reuse import believes_as_the_last
 
 
 @compiled()
@@ -35,6 +36,10 @@ def write_turns(
     x_m, y_m, is_close = np.empty(num_robots), np.empty(num_robots), np.empty(num_robots)
     for b in range(num_missions):
         for i in range(num_robots):
+            if believes_as_the_last(believed_m[b], is_known[b], i):
+                for k in range(num_robots):
+                    has_turn[b, i, k] = has_turn[b, i - 1, k]
+                continue
             for k in range(num_robots):
                 x_m[k], y_m[k] = believed_m[b, i, k, 0], believed_m[b, i, k, 1]
                 has_turn[b, i, k] = is_close[k] = 0.0

@@ -70,20 +70,56 @@ def write_joined(
     at_1_m = threshold * range_m * range_m
     has_joined[...] = 0.0
     for b in range(num_missions):
-        owner, half_round = turn[b] % num_robots, (turn[b] + num_robots // 2) % num_robots
         for i in range(num_robots):
-            slot = _silent_slot(num_robots)
-            if is_known[b, i, owner]:
-                has_joined[b, i, owner] = 1.0
-                _join(owner, believed_m[b, i], at_1_m, None, threshold, slot)
-            for place in range(num_robots):
-                k = half_round + place
-                k -= num_robots if k >= num_robots else 0
-                if not (is_known[b, i, owner] and is_known[b, i, k]):
-                    break
-                if _may_join(k, believed_m[b, i], at_1_m, None, threshold, slot):
-                    has_joined[b, i, k] = 1.0
-                    _join(k, believed_m[b, i], at_1_m, None, threshold, slot)
+            if believes_as_the_last(believed_m[b], is_known[b], i):
+                for k in range(num_robots):
+                    has_joined[b, i, k] = has_joined[b, i - 1, k]
+            else:
+                its, known = believed_m[b, i], is_known[b, i]
+                _join_in_turn(its, known, int(turn[b]), at_1_m, threshold, has_joined[b, i])
+
+
+@compiled()
+def _join_in_turn(
+    believed_m: Float[np.ndarray, "N 2"],
+    is_known: Bool[np.ndarray, "N"],
+    turn: int,
+    at_1_m: float,
+    threshold: float,
+    has_joined: Float32[np.ndarray, "N"],
+) -> None:
+    """Marks who sends by one robot's beliefs."""
+    num_robots = is_known.shape[0]
+    owner, half_round = turn % num_robots, (turn + num_robots // 2) % num_robots
+    if not is_known[owner]:
+        return
+    slot = _silent_slot(num_robots)
+    has_joined[owner] = 1.0
+    _join(owner, believed_m, at_1_m, None, threshold, slot)
+    for place in range(num_robots):
+        k = half_round + place
+        k -= num_robots if k >= num_robots else 0
+        if not is_known[k]:
+            break
+        if _may_join(k, believed_m, at_1_m, None, threshold, slot):
+            has_joined[k] = 1.0
+            _join(k, believed_m, at_1_m, None, threshold, slot)
+
+
+@compiled()
+def believes_as_the_last(
+    believed_m: Float[np.ndarray, "N N 2"], is_known: Bool[np.ndarray, "N N"], i: int
+) -> bool:
+    """Whether robot i knows whom the robot before it knows, in the same places.
+
+    What follows from that alone is then the same: robots at rest that know everyone need it once.
+    """
+    for k in range(is_known.shape[0] if i > 0 else 0):
+        x_is_same = believed_m[i, k, 0] == believed_m[i - 1, k, 0]
+        y_is_same = believed_m[i, k, 1] == believed_m[i - 1, k, 1]
+        if not (x_is_same and y_is_same) or is_known[i, k] != is_known[i - 1, k]:
+            return False
+    return i > 0
 
 
 @compiled()

@@ -9,7 +9,7 @@ from spatial_rule import agreed_senders, radio
 from swarm_mj.mission import paper
 from swarm_mj.physics.obstacles import BOX, Obstacles
 from swarm_mj.radio.mission_radio import belief_of, channel_of
-from swarm_mj.radio.spatial_reuse import keep_joined, told_of, write_joined
+from swarm_mj.radio.spatial_reuse import believes_as_the_last, keep_joined, told_of, write_joined
 
 seeds = st.integers(0, 2**32 - 1)
 thresholds = st.sampled_from([0.3, 1.25, 4.0])
@@ -106,3 +106,13 @@ def test_each_robot_reckons_with_its_own_beliefs_of_what_it_was_told():
     args = (believed_m, np.arange(4)[None], np.array([0]), 250.0, belief.radio.threshold)
     keep_joined(*args, is_sending, told_of(law, 1))
     assert is_sending[0].tolist() == [True, False, True, False]
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_robots_believe_alike_only_if_places_and_acquaintances_are_the_same(axis):
+    believed_m = np.tile(np.arange(10.0).reshape(5, 2), (5, 1, 1))
+    is_known = np.ones((5, 5), dtype=np.bool_)
+    believed_m[2:, 4, axis] += 1e-9
+    is_known[4:, 1] = False
+    alike = [believes_as_the_last(believed_m, is_known, i) for i in range(5)]
+    assert alike == [False, True, False, True, False]
