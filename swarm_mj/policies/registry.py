@@ -17,10 +17,10 @@ from swarm_mj.policies.aloha import Aloha
 from swarm_mj.policies.gossip import InnovationGossip
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle, LookaheadOracle
 from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
-from swarm_mj.policies.planner.payloads import snapshot_form
+from swarm_mj.policies.planner.payloads import links_fit, snapshot_form
 from swarm_mj.policies.planner.policy import Planner
+from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.planner.settings import PlannerSettings
-from swarm_mj.policies.planner.without_payload import PlannerWithoutPayload
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.policies.policy_folder import is_mlp
 from swarm_mj.policies.random_flooding import RandomFlooding
@@ -39,7 +39,9 @@ def _spatial_tdma(mission: Mission) -> SpatialTdma:
     return SpatialTdma(range_m=mission.range_m, threshold=from_db(mission.sinr_threshold_db))
 
 
-def _planner(mission: Mission) -> Planner:
+def _planner(mission: Mission) -> Planner | RestingPlanner:
+    if mission.task == "stationary":
+        return _resting_planner(mission, learns=links_fit(mission))
     return Planner(
         radio_of(mission),
         PlannerSettings(),
@@ -47,6 +49,12 @@ def _planner(mission: Mission) -> Planner:
         window_s=mission.window_s,
         range_m=mission.range_m,
         side_m=mission.side_m,
+    )
+
+
+def _resting_planner(mission: Mission, *, learns: bool) -> RestingPlanner:
+    return RestingPlanner(
+        radio_of(mission), PlannerSettings(), _spatial_tdma(mission), learns=learns
     )
 
 
@@ -67,9 +75,7 @@ RULES: dict[str, Callable[..., Policy]] = {
     "tdma": lambda _: Tdma(),
     "spatial-tdma": _spatial_tdma,
     "planner": _planner,
-    WITHOUT_PAYLOAD: lambda mission: PlannerWithoutPayload(
-        radio_of(mission), PlannerSettings(), _spatial_tdma(mission)
-    ),
+    WITHOUT_PAYLOAD: lambda mission: _resting_planner(mission, learns=False),
     "greedy-oracle": lambda mission: GreedyOracle(radio_of(mission)),
     "oracle-lookahead": lambda mission: LookaheadOracle(radio_of(mission)),
 }

@@ -119,6 +119,11 @@ def position(name: str, mission: Mission, bits: int) -> PacketField:
     return _symmetric(name, bits, mission.half_side_m + outside_m, "m")
 
 
+def bits_for(count: int) -> int:
+    """How many bits tell so many things apart."""
+    return max(1, (count - 1).bit_length())
+
+
 def times(field: PacketField, count: int) -> PacketField:
     """A field, so many times."""
     return replace(field, count=field.count * count)

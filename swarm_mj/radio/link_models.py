@@ -60,8 +60,9 @@ class TrueLinks:
         links = links_between(self.radio, position_m)
         if self.channel is None:
             return links
-        received_mw = self.channel.mean_powers_mw(position_m, mission)
-        return _with_chances(links._replace(received_mw=received_mw), self.channel.reception, 0.0)
+        powers_mw = self.channel.mean_powers_mw(position_m, mission)
+        links = links._replace(received_mw=powers_mw, interference_mw=powers_mw)
+        return _with_chances(links, self.channel.reception, 0.0)
 
 
 def _by_law(
@@ -74,8 +75,10 @@ def _by_law(
     is_counted = links.received_mw > 0.0
     is_far = links.received_mw < radio.received_at_1_m_mw / law.breakpoint_m**2
     steepness = np.where(is_far, law.exponent / FREE_SPACE_EXPONENT, 1.0)
+    received_mw = powers_between(position_m, law) * is_counted
     return links._replace(
-        received_mw=powers_between(position_m, law) * is_counted,
+        received_mw=received_mw,
+        interference_mw=received_mw,
         distance_over_std=links.distance_over_std / steepness,
     )
 

@@ -31,6 +31,12 @@ class Links(NamedTuple):
     threshold: float  # least SINR that decodes, linear [1]
     curves: Curves  # of `decode_curves`; `KNOWN`: nothing is doubtful but the positions
     row: Int[np.ndarray, "N N"]  # of these curves: how doubtful the power is
+    interference_mw: Float[np.ndarray, "N N"]  # what i's packet adds to the air at j [mW]
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether powers fade, or are known up to an error, even where positions are known."""
+        return len(self.curves) > 0
 
 
 class Air(NamedTuple):
@@ -69,7 +75,9 @@ def links_between(
         variance_m2 = spread_m[:, None] ** 2 + spread_m[None, :] ** 2
         np.divide(distance_m, np.sqrt(variance_m2), out=distance_over_std, where=variance_m2 > 0.0)
     nothing = np.zeros(distance_m.shape, dtype=np.int64)
-    return Links(received_mw, distance_over_std, radio.noise_mw, radio.threshold, KNOWN, nothing)
+    return Links(
+        received_mw, distance_over_std, radio.noise_mw, radio.threshold, KNOWN, nothing, received_mw
+    )
 
 
 def doubtful(links: Links, curves: Curves, std_db: Float[np.ndarray, "N N"]) -> Links:
@@ -115,10 +123,10 @@ def silent_air(num_robots: int) -> Air:
 @compiled()
 def transmit(links: Links, air: Air, i: int) -> None:
     """Adds i's packet to the air."""
-    received_mw = links.received_mw
+    received_mw, interference_mw = links.received_mw, links.interference_mw
     total_mw, strongest_mw, strongest = air.total_mw, air.strongest_mw, air.strongest
     for j in range(received_mw.shape[0]):
-        total_mw[j] += received_mw[i, j]
+        total_mw[j] += interference_mw[i, j]
         if received_mw[i, j] > strongest_mw[j]:
             strongest_mw[j], strongest[j] = received_mw[i, j], i
 
@@ -158,7 +166,7 @@ def listen(
         heard: Whom each robot may decode, overwritten; itself is nobody.
         probability: That it does; overwritten.
     """
-    received_mw = links.received_mw
+    received_mw, interference_mw = links.received_mw, links.interference_mw
     total_mw, strongest_mw, strongest = air.total_mw, air.strongest_mw, air.strongest
     for j in range(listens.shape[0]):
         heard[j], probability[j] = j, 0.0
@@ -167,7 +175,8 @@ def listen(
             added_mw = received_mw[i, j]
             sender, signal_mw = stronger(i, added_mw, strongest[j], strongest_mw[j])
             if signal_mw > 0.0:
-                ratio = sinr(signal_mw, total_mw[j] + added_mw - signal_mw, links.noise_mw)
+                others_mw = total_mw[j] + interference_mw[i, j] - interference_mw[sender, j]
+                ratio = sinr(signal_mw, others_mw, links.noise_mw)
                 probability[j] = chance(links, ratio, sender, j)
                 heard[j] = sender if probability[j] > 0.0 else j
 

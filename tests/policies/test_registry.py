@@ -15,7 +15,7 @@ from swarm_mj.policies.gossip import InnovationGossip
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle, LookaheadOracle
 from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
 from swarm_mj.policies.planner.policy import Planner
-from swarm_mj.policies.planner.without_payload import PlannerWithoutPayload
+from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.registry import (
     POLICIES,
@@ -146,7 +146,7 @@ def test_ii_b_the_planner_can_go_without_payload():
         ("tdma", Tdma, None),
         ("spatial-tdma", SpatialTdma, None),
         ("planner", Planner, None),
-        ("planner --payload none", PlannerWithoutPayload, None),
+        ("planner --payload none", RestingPlanner, None),
         ("greedy-oracle", GreedyOracle, None),
         ("oracle-lookahead", LookaheadOracle, None),
     ],
@@ -154,6 +154,15 @@ def test_ii_b_the_planner_can_go_without_payload():
 def test_policies_by_name(name, kind, probability):
     assert type(make_policy(name, MISSION)) is kind
     assert type(make_policy(name, MISSION, probability)) is kind
+
+
+def test_the_planner_of_a_team_at_rest_learns_links_if_slots_hold_them():
+    rest = paper("stationary", num_robots=10)
+    policy = make_policy("planner", rest)
+    assert type(policy) is RestingPlanner
+    assert policy.payload == "links"
+    slow = paper("stationary", num_robots=10, bit_rate=100e3)
+    assert make_policy("planner", slow).payload == "none"
 
 
 @pytest.mark.parametrize("name", TUNED)

@@ -95,9 +95,8 @@ def test_eq3_the_air_is_what_the_radio_makes_of_it(seed, num_robots, has_one_mor
 def test_eq3_packets_add_up_by_hand():
     """Robot 0 receives 6 and 2 mW over 1 mW of noise, and needs 2: 6 / 3 is enough, 6 / 3.5 not."""
     received_mw = np.array([[0.0, 0.0, 0.0], [6.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
-    links = Links(
-        received_mw, np.full((3, 3), math.inf), 1.0, 2.0, KNOWN, np.zeros((3, 3), dtype=np.int64)
-    )
+    row = np.zeros((3, 3), dtype=np.int64)
+    links = Links(received_mw, np.full((3, 3), math.inf), 1.0, 2.0, KNOWN, row, received_mw)
     transmits, listens = np.array([False, True, True]), np.array([True, False, False])
     air = air_of(links, transmits)
     assert (air.total_mw[0], air.strongest_mw[0], air.strongest[0]) == (8.0, 6.0, 1)

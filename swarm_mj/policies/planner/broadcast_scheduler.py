@@ -204,7 +204,7 @@ def _value(
     also: int,
 ) -> float:
     """What the slot is worth when this robot transmits beside those in the air."""
-    received_mw = links.received_mw
+    received_mw, interference_mw = links.received_mw, links.interference_mw
     total_mw, strongest_mw, strongest = air.total_mw, air.strongest_mw, air.strongest
     value = 0.0
     for j in range(gain.shape[0]):
@@ -212,7 +212,8 @@ def _value(
             added_mw = received_mw[also, j]
             sender, signal_mw = stronger(also, added_mw, strongest[j], strongest_mw[j])
             if signal_mw > 0.0 and gain[sender, j] != 0.0:
-                ratio = sinr(signal_mw, total_mw[j] + added_mw - signal_mw, links.noise_mw)
+                others_mw = total_mw[j] + interference_mw[also, j] - interference_mw[sender, j]
+                ratio = sinr(signal_mw, others_mw, links.noise_mw)
                 value += gain[sender, j] * chance(links, ratio, sender, j)
     return value
 

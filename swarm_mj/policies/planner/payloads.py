@@ -1,9 +1,12 @@
-"""What the planner's packets carry beyond T, M and P: two snapshots, whole or lean.
+"""What the planner's packets carry beyond T, M and P: two snapshots, whole or lean, or links.
 
 Whole snapshots hold N² ages, those that the plan before leads to, so packets grow with the square
 of the team. Where a slot does not hold them, lean ones go without: every plan then begins with a
 team that knows nothing. They are also coarser: ages step by a window or more, positions by 25 cm
 for 40 robots within walls. Robots fly by snapshots as they arrive, so that all plan alike.
+
+Teams at rest need no snapshots. Their packets carry what robots observed of links, and two tables
+made of it: the one that the sender flies by, and the best of the next.
 """
 
 from dataclasses import dataclass, replace
@@ -11,12 +14,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from swarm_mj.mission import Mission
+from swarm_mj.policies.planner.link_evidence import MAX_KINDS, MOST_TIMES, NUM_BINS
+from swarm_mj.policies.planner.link_tables import LAWS, STEP_DB
 from swarm_mj.policies.planner.snapshots import Snapshots
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.packets import (
     POSITION_BITS,
     PacketField,
     age,
+    bits_for,
     bits_per_second,
     identity,
     least_bit_rate,
@@ -30,6 +36,7 @@ NUM_SNAPSHOTS = 2  # the one that the sender flies by, and the best for the next
 SPEED_BITS = 16
 TABLE_BITS, TABLE_STEP_WINDOWS = 16, 1 / 16  # ages of up to 4,096 windows
 RANK_BITS = 32
+LINK_BITS = 8  # of each number that a table says of a link
 LEAN_AGE_BITS, LEAN_POSITION_BITS = 8, 12
 LEAN_ROUNDS = 4  # ages of up to so many rounds of N windows are told apart
 
@@ -133,6 +140,44 @@ def lean_form(mission: Mission) -> SnapshotForm:
         ),
         has_table=False,
         is_coarse=True,
+    )
+
+
+def links_fit(mission: Mission) -> bool:
+    """Whether the mission's slots hold what robots observed of links."""
+    capacity = slot_bytes(mission)
+    return capacity is None or packet_of(mission, link_fields(mission)).num_bytes <= capacity
+
+
+def link_fields(mission: Mission) -> tuple[PacketField, ...]:
+    """What robots observed, as much as they may note, and two tables of links."""
+    num_robots = mission.num_robots
+    num_noted = num_robots * MAX_KINDS
+    num_links = NUM_SNAPSHOTS * num_robots * (num_robots - 1) // 2
+    table = "of a link, in the table"
+    return (
+        PacketField(name="slot since which each robot plans", bits=16, count=num_robots),
+        times(identity("sender of a kind of packet", mission), num_noted),
+        PacketField(name="its margin", bits=bits_for(NUM_BINS), count=num_noted),
+        PacketField(name="whether it was decoded", bits=1, count=num_noted),
+        PacketField(name="how often", bits=bits_for(MOST_TIMES), count=num_noted),
+        times(identity("owner of the table", mission), NUM_SNAPSHOTS),
+        PacketField(name="law of fades and losses", bits=bits_for(len(LAWS)), count=NUM_SNAPSHOTS),
+        PacketField(
+            name=f"mean excess {table}",
+            bits=LINK_BITS,
+            count=num_links,
+            low=-32.0,
+            step=STEP_DB,
+            unit="dB",
+        ),
+        PacketField(
+            name=f"standard deviation {table}",
+            bits=LINK_BITS,
+            count=num_links,
+            step=STEP_DB,
+            unit="dB",
+        ),
     )
 
 

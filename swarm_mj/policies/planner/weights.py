@@ -14,7 +14,8 @@ def heuristic_weights(links: Links, settings: WeightSettings) -> Weights:
     Squares prefer the stalest entries to many small refreshments. A receiver that passes news on to
     many others is worth telling early. The denser the links, the smaller the share of a slot's
     worth that must remain when another robot transmits, and so the more robots transmit at once.
-    Where positions are doubtful or a robot has no link, plans had better not rely on every packet.
+    Where links or positions are doubtful or a robot has no link, plans had better not rely on every
+    packet.
 
     Args:
         links: The radio between the robots.
@@ -26,7 +27,9 @@ def heuristic_weights(links: Links, settings: WeightSettings) -> Weights:
     graph = link_graph(links, settings)
     weight = np.maximum(graph.downstream, 1.0) ** settings.downstream_exponent
     weight *= np.clip(graph.hops, 1.0, len(weight)) ** settings.hops_exponent
-    share = settings.share_unlinked + settings.share_per_link * graph.linked_share
+    share = settings.share_unlinked
+    if not links.is_doubtful:
+        share += settings.share_per_link * graph.linked_share
     share += settings.share_per_std * graph.relative_std
     share += 0.0 if graph.has_no_isolated_node else settings.share_isolated
     return Weights(weight.astype(np.float32), min(share, settings.max_share))

@@ -147,9 +147,8 @@ def test_expected_times_are_mixed_by_chance_by_hand():
     its answer, sent with chance 1/2, brings 12 instead of 0 with chance 1/2. Robot 1 would gain
     11/2 + (12 - 4)/4 = 7.5, so it speaks.
     """
-    links = Links(
-        np.array([[0.0, 1.0], [1.0, 0.0]]), np.ones((2, 2)), 1.0, 1.0, np.zeros((2, 2)), KNOWN
-    )
+    power_mw, row = np.array([[0.0, 1.0], [1.0, 0.0]]), np.zeros((2, 2), dtype=np.int64)
+    links = Links(power_mw, np.ones((2, 2)), 1.0, 1.0, KNOWN, row, power_mw)
     timestamp = np.array([[10, 0], [4, 10]], dtype=np.float32)
     np.testing.assert_array_equal(
         first_pairs(timestamp, 10.0, links, False), [[-1.0, 6.5], [7.5, -1.0]]

@@ -254,14 +254,8 @@ def test_who_is_unknown_is_not_told_to_speak(share):
 
 def test_who_is_alone_in_the_world_says_nothing():
     weights = Weights(np.ones((2, 2), np.float32), 0.5)
-    links = Links(
-        np.zeros((2, 2)),
-        np.full((2, 2), math.inf),
-        1.0,
-        1.0,
-        KNOWN,
-        np.zeros((2, 2), dtype=np.int64),
-    )
+    silence_mw, row = np.zeros((2, 2)), np.zeros((2, 2), dtype=np.int64)
+    links = Links(silence_mw, np.full((2, 2), math.inf), 1.0, 1.0, KNOWN, row, silence_mw)
     timestamp, speaks = np.zeros((2, 2), np.float32), np.ones((3, 2), dtype=bool)
     schedule(timestamp, 0.0, links, weights, Foresight(2, 2), np.ones(3, bool), speaks)
     assert not np.any(speaks)

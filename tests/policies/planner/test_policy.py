@@ -85,6 +85,7 @@ def test_a_team_that_knows_how_all_start_plans_from_the_first_slot():
 
 
 SMALL = paper("stationary", num_robots=6)
+MOVING = paper("random-walk", num_robots=6)
 
 
 @pytest.mark.parametrize(
@@ -110,9 +111,9 @@ def test_eq9_sharing_is_planning_apart_where_snapshots_differ(mission, seed, cha
 
 
 def test_ii_b_packets_carry_snapshots_and_nobody_answers():
-    policy = make_policy("planner", SMALL)
+    policy = make_policy("planner", MOVING)
     assert policy.payload == "snapshots"
-    assert policy.window(SMALL).is_broadcast
+    assert policy.window(MOVING).is_broadcast
 
 
 def test_epochs_by_hand():

@@ -15,6 +15,12 @@ NAME = "planner --payload none"
 REST = paper("stationary", num_robots=10)
 
 
+def only_plan(policy):
+    """The plan that all robots of the first mission follow."""
+    (flight,) = policy._teams[0]._flights.values()
+    return flight.plan
+
+
 def transmitters(swarm, policy, num_windows):
     """Flies on; who transmitted in each slot [slot, mission, robot]."""
     rows = []
@@ -52,7 +58,7 @@ def test_eq9_late_robots_join_the_plan_of_the_others():
     assert not np.all(apart.swarm.buffers.is_known)
     apart.fly(15)
     assert np.all(apart.swarm.buffers.is_known)
-    (plan,) = apart.policy._plans[0].values()
+    plan = only_plan(apart.policy)
     after = transmitters(apart.swarm, apart, 10)[:, 0]
     np.testing.assert_array_equal(after, [plan.transmits(slot) for slot in range(60, 80)])
 
@@ -63,7 +69,7 @@ def test_a_team_at_rest_flies_one_plan_and_it_comes_true(seed):
     swarm, policy = Swarm(REST, [seed]), make_policy(NAME, REST)
     swarm.start(policy)
     flown = transmitters(swarm, policy, 60)
-    (plan,) = policy._plans[0].values()
+    plan = only_plan(policy)
     np.testing.assert_array_equal(flown[-40:, 0], [plan.transmits(h) for h in range(80, 120)])
     assert len(plan._transmits) == 120
     np.testing.assert_array_equal(swarm.buffers.timestamp[0], plan._timestamp / 2)
@@ -116,7 +122,7 @@ def test_who_has_not_heard_of_everyone_speaks_in_its_turn_only():
     swarm.start(policy)
     flown = transmitters(swarm, policy, 30)
     assert np.all(np.sum(flown, axis=2) == 1)
-    assert not policy._plans[0]
+    assert not policy._teams[0]._flights
     swarm = Swarm(REST, [7], channel=to_nobody)
     swarm.start(tdma)
     np.testing.assert_array_equal(transmitters(swarm, tdma, 30), flown)
@@ -139,7 +145,7 @@ def test_a_new_start_forgets_and_the_clock_counts_from_there():
     swarm.start(tdma)
     transmitters(swarm, tdma, 30)
     flown = transmitters(swarm, policy, 10)
-    (plan,) = policy._plans[0].values()
+    plan = only_plan(policy)
     np.testing.assert_array_equal(flown[:, 0], [plan.transmits(slot) for slot in range(20)])
     policy.start(10, [np.random.default_rng(0)])
-    assert not policy._plans[0]
+    assert not policy._teams[0]._flights

@@ -1,0 +1,112 @@
+"""The planner of teams at rest: robots agree from their buffers, and may learn their links.
+
+Where nobody moves, whoever has heard of everyone holds the same positions as every other robot that
+has. A schedule that follows from these positions and the clock is the same on all of them, whatever
+else their buffers say (`resting_team.py`). So every robot takes its turns as in spatial TDMA until
+it has heard of everyone, and from then on transmits when the schedule says so. The schedule begins
+with a team that knows nothing when the mission begins, so that it does not matter when a robot
+joins it. With packets of T, M and P alone robots go on so. With larger ones they learn which links
+are not as they believed, and plan anew.
+
+Where robots move, no two buffers hold the same positions for long, and schedules made from them
+would jam each other. Such a team goes on with spatial TDMA, whose rule bears small differences.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool
+
+from swarm_mj.mission import Mission
+from swarm_mj.policies.planner.payloads import link_fields
+from swarm_mj.policies.planner.resting_team import RestingTeam
+from swarm_mj.policies.planner.settings import PlannerSettings
+from swarm_mj.policies.policy import BroadcastPolicy
+from swarm_mj.policies.spatial_tdma import SpatialTdma
+from swarm_mj.policies.tdma import slot_of
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.packets import PacketField
+from swarm_mj.protocol.window import SLOTS_PER_WINDOW
+from swarm_mj.radio.free_space import FreeSpaceRadio
+from swarm_mj.radio.link_models import Belief
+
+
+class RestingPlanner(BroadcastPolicy):
+    """Every robot that knows where everyone rests plans for the whole team; others take turns.
+
+    Uses the robot's own buffer, its identity, the team's size, the clock, the radio's numbers, what
+    the mission grants of the channel and a common order of turns; and what packets say of links, if
+    it learns.
+    """
+
+    def __init__(
+        self,
+        radio: FreeSpaceRadio,
+        settings: PlannerSettings,
+        turns: SpatialTdma,
+        *,
+        learns: bool,
+    ) -> None:
+        """Prepares the policy.
+
+        Args:
+            radio: What robots believe in unless the policy is informed otherwise.
+            settings: Of the planner.
+            turns: What robots follow that cannot plan.
+            learns: Whether packets carry what robots observed of links.
+        """
+        self._belief = Belief(radio=radio)
+        self._settings = settings
+        self._turns = turns
+        self._learns = learns
+        self.uses = (
+            "its buffer, the clock, a common order, the radio as far as it was told of it; and "
+            "what all robots observed of their links, which packets carry"
+            if learns
+            else "as planner, without a payload: robots at rest agree from their buffers alone, "
+            "others take the turns of spatial-tdma"
+        )
+
+    @property
+    def payload(self) -> str:
+        """Packets carry what robots observed of links, or nothing beyond T, M and P."""
+        return "links" if self._learns else "none"
+
+    def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:
+        """Of what robots observed of links; arguments as in `Policy.payload_fields`."""
+        return link_fields(mission) if self._learns else ()
+
+    def inform(self, belief: Belief) -> None:
+        """Plans by this belief from now on, and so do the turns."""
+        self._belief = belief
+        self._turns.inform(belief)
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Draws each mission's order of turns and forgets; arguments as in `Policy.start`."""
+        self._turns.start(num_robots, rngs)
+        self._teams = [
+            RestingTeam(num_robots, self._belief, self._settings, learns=self._learns) for _ in rngs
+        ]
+        self._first = None  # each mission's slot in which the first decision was asked for
+
+    def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
+        """Whoever does by the schedule it knows, or in its turn."""
+        buffers, slot = views.buffers, slot_of(views.now)
+        if self._first is None:
+            self._first = slot
+        can_plan = np.all(buffers.is_known, axis=2) & ~np.any(buffers.velocity_mps, axis=(2, 3))
+        heard = views.phases[-1].heard if views.phases else views.silence
+        # What a packet says of its sender is what it knew before the slot in which it was sent.
+        known_until = np.rint(buffers.timestamp * SLOTS_PER_WINDOW).astype(np.int64)
+        known_until -= 2 + self._first[:, None, None]
+        transmits = self._turns.transmits(views)
+        for b, team in enumerate(self._teams):
+            transmits[b] = team.transmits(
+                int(slot[b] - self._first[b]),
+                transmits[b],
+                can_plan[b],
+                heard[b],
+                buffers.position_m[b],
+                known_until[b],
+            )
+        return transmits
