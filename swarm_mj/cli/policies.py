@@ -34,6 +34,7 @@ broadcasts: robots may transmit in both halves of a window, to all who hear; nob
 request: a robot addresses a teammate in the first half, which answers in the second.
 T, M, P: all that the sender knows of its teammates: when it was seen, the state, who told it.
 snapshots: two pictures of the whole team, on which robots agree to plan alike.
+links: how often robots decoded and missed each other, and what that says of the channel.
 p: the probability of a transmission, unless you give --probability.
 Bytes and probabilities here are those for"""
 
