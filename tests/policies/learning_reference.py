@@ -1,0 +1,267 @@
+"""Robots at rest that learn their links, one object each, which share nothing but packets.
+
+A mind is handed its own buffer row and what the packets hold that it decoded. It notes, makes
+tables and plans alone.
+"""
+
+import math
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from decentralised_reference import rows
+
+from swarm_mj.policies.planner.broadcast_scheduler import schedule
+from swarm_mj.policies.planner.link_tables import LAWS, LinkTable, fit, learned
+from swarm_mj.policies.planner.payloads import link_fields
+from swarm_mj.policies.planner.plan import foresight_of
+from swarm_mj.policies.planner.resting import RestingPlanner
+from swarm_mj.policies.planner.settings import LearningSettings, PlannerSettings
+from swarm_mj.policies.planner.weights import heuristic_weights
+from swarm_mj.policies.policy import BroadcastPolicy
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.radio.links import links_between
+from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.swarm import Swarm
+
+NUM_SLOTS = 120  # of a mission, at most
+
+# Rounds of 8 windows: tables are made in slots 32, 48, 64 and flown by from 40, 56, 72 on.
+SHORT = PlannerSettings(
+    learning=LearningSettings(
+        first_rounds=2.5,
+        flown_rounds=1.0,
+        spread_rounds=0.5,
+        min_round_windows=8,
+        least_log_odds=1.0,
+    )
+)
+
+
+def learner(mission, settings=SHORT):
+    """The planner that learns, by other numbers."""
+    turns = make_policy("spatial-tdma", mission)
+    return RestingPlanner(radio_of(mission), settings, turns, learns=True)
+
+
+PLANNED = {}  # by exactly what plans follow from, which spares working them out for every robot
+
+
+def planned(links, settings, num_slots):
+    """Who transmits in each slot, in one go, in a team that knows nothing at first."""
+    key = (*(np.asarray(of).tobytes() for of in links), num_slots)
+    if key not in PLANNED:
+        num_robots = len(links.received_mw)
+        transmits = np.zeros((num_slots, num_robots), dtype=bool)
+        nothing = np.zeros((num_robots, num_robots), dtype=np.float32)
+        weights = heuristic_weights(links, settings.weights)
+        foresight = foresight_of(num_robots, is_certain=True, settings=settings.schedule)
+        free = np.ones(num_slots + foresight.slots, dtype=bool)
+        schedule(nothing, 0.0, links, weights, foresight, free, transmits)
+        PLANNED[key] = transmits
+    return PLANNED[key]
+
+
+class Told(NamedTuple):
+    """What a robot says of itself; others pass it on as it is."""
+
+    slot: int  # in which it said so; it knew what it noted in the slots before
+    follows: bool  # whether it had begun to follow plans before
+    notes: frozenset  # how often it noted (sender, bin, whether decoded)
+
+
+class Table(NamedTuple):
+    """A table of links as a packet carries it."""
+
+    rank: tuple[int, int]  # the less the better
+    law: int
+    mean_db: np.ndarray
+    std_db: np.ndarray
+
+    @property
+    def changes_nothing(self):
+        return math.isinf(LAWS[self.law][0]) and not self.std_db.any()
+
+
+class LearningPacket(NamedTuple):
+    """What comes beside T, M and P."""
+
+    told: dict[int, Told]
+    flown: Table | None
+    upcoming: Table | None
+
+
+@dataclass(kw_only=True)
+class LearningMind:
+    """One robot: its identity, what is common before the mission, and its memory."""
+
+    me: int
+    mission: object
+    settings: PlannerSettings
+    told: dict[int, Told] = field(default_factory=dict)  # the youngest, of every robot
+    notes: Counter = field(default_factory=Counter)
+    follows: bool = False
+    flown: Table | None = None
+    upcoming: Table | None = None
+    heard: int | None = None  # whom it decoded in the slot before
+    plan: tuple | None = None  # what it followed then
+    transmitted: bool = False
+    plans: dict = field(default_factory=dict)
+    took_over: int = 0  # how often it found a better table than the one that it flew by
+
+    def packet(self):
+        """What it sends in this slot."""
+        return LearningPacket(dict(self.told), self.flown, self.upcoming)
+
+    def hear(self, sender, packet):
+        """One slot: whom it decoded, if anybody, and what came beside T, M and P."""
+        self.heard = sender
+        if packet is None:
+            return
+        for i, told in packet.told.items():
+            if i not in self.told or told.slot > self.told[i].slot:
+                self.told[i] = told
+        if packet.flown is not None and packet.flown.rank < self.flown.rank:
+            self.flown, self.took_over = packet.flown, self.took_over + 1
+        if packet.upcoming is not None and packet.upcoming.rank < self.upcoming.rank:
+            self.upcoming = packet.upcoming
+
+    def transmits(self, row, slot, in_turn):
+        """Whether it does in the slot that begins now."""
+        seen, position_m, velocity_mps = row
+        if slot > 0:
+            self.note(slot - 1)
+            self.keep_time(slot)
+        self.told[self.me] = Told(slot, self.follows, frozenset(self.notes.items()))
+        self.plan, self.transmitted = None, in_turn
+        if all(seen > 0.0) and not velocity_mps.any():
+            self.follows = True
+            self.plan = self.plan_for(position_m, slot)
+            begin, transmits = self.plan[:2]
+            self.transmitted = bool(transmits[slot - begin, self.me])
+        return self.transmitted
+
+    @property
+    def num_slots(self):
+        """When the first table is flown by, how long each is, and how long it spreads [slots]."""
+        learning = self.settings.learning
+        of_round = 2 * max(self.mission.num_robots, learning.min_round_windows)
+        return [
+            round(rounds * of_round)
+            for rounds in (learning.first_rounds, learning.flown_rounds, learning.spread_rounds)
+        ]
+
+    def keep_time(self, slot):
+        """Makes its table, or flies by the best that it holds, when it is time."""
+        first, length, spread = self.num_slots
+        if slot in range(first - spread, slot + 1, length):
+            self.upcoming = self.table()
+        if slot in range(first, slot + 1, length):
+            self.flown = self.upcoming
+
+    def table(self):
+        """What follows from what it was told; ranked by how young that is."""
+        num_robots = self.mission.num_robots
+        counts = np.zeros((2, num_robots, num_robots, 24), dtype=np.int64)
+        for j, told in self.told.items():
+            for (i, place, is_decoded), times in told.notes:
+                counts[int(is_decoded), j, i, place] = times
+        of = fit(counts[1], counts[0], self.settings.learning)
+        *_, mean, std = link_fields(self.mission)
+        known = sum(self.told[i].slot if i in self.told else -1 for i in range(num_robots))
+        return Table((-known, self.me), of.law, mean.rounded(of.mean_db), std.rounded(of.std_db))
+
+    def plan_for(self, position_m, slot):
+        """When the plan began, who transmits from then on, and the powers it believes in."""
+        first, length, _ = self.num_slots
+        table = None if self.flown is None or self.flown.changes_nothing else self.flown
+        begin = 0 if table is None else slot - (slot - first) % length
+        num_slots = NUM_SLOTS if table is None else length
+        key = None if table is None else (begin, table.rank)
+        if key not in self.plans:
+            prior = links_between(radio_of(self.mission), position_m)
+            believed, links = prior.received_mw, prior
+            if table is not None:
+                believed = believed * 10.0 ** (table.mean_db / 10.0)
+                of = LinkTable(law=table.law, mean_db=table.mean_db, std_db=table.std_db)
+                links = learned(prior, of, self.settings.learning)
+            self.plans[key] = (begin, planned(links, self.settings, num_slots), believed, prior)
+        return self.plans[key]
+
+    def note(self, slot):
+        """What it decoded or missed in a slot of which it knows who transmitted."""
+        knows_all = len(self.told) == self.mission.num_robots and all(
+            told.follows for told in self.told.values()
+        )
+        if self.plan is None or self.transmitted or not knows_all:
+            return
+        begin, transmits, believed_mw, prior = self.plan
+        sending = [k for k in np.flatnonzero(transmits[slot - begin]).tolist() if k != self.me]
+        sender = self.heard
+        if sender is None and sending:
+            sender = max(sending, key=lambda k: believed_mw[k, self.me])
+        if sender is None:
+            return
+        others_mw = sum(believed_mw[k, self.me] for k in sending if k != sender)
+        ratio = prior.received_mw[sender, self.me] / (prior.noise_mw + others_mw)
+        # Bins of 2 dB; the lowest is around -15 dB.
+        place = math.floor((10.0 * math.log10(ratio / prior.threshold) + 16.0) / 2.0)
+        if place < 0 and self.heard is None:
+            return
+        kind = (sender, min(max(place, 0), 23), self.heard is not None)
+        if self.notes[kind] < 255 and (kind in +self.notes or len(+self.notes) < 64):
+            self.notes[kind] += 1
+        self.notes = +self.notes
+
+
+class LearnedApart(BroadcastPolicy):
+    """A flight of the planner that learns, in which each robot is also asked apart."""
+
+    def __init__(self, mission, seed, *, channel=None, settings=SHORT):
+        self.policy = learner(mission, settings)
+        self.turns = make_policy("spatial-tdma", mission)
+        self.swarm = Swarm(mission, [seed], channel=channel)
+        self.minds = [
+            LearningMind(me=i, mission=mission, settings=settings)
+            for i in range(mission.num_robots)
+        ]
+
+    def start(self, num_robots, rngs):
+        copies = [np.random.default_rng() for _ in rngs]
+        for one, other in zip(copies, rngs, strict=True):
+            one.bit_generator.state = other.bit_generator.state
+        self.turns.start(num_robots, copies)
+        self.policy.start(num_robots, rngs)
+
+    def transmits(self, views):
+        decided, in_turn = self.policy.transmits(views), self.turns.transmits(views)
+        if views.phases:
+            self.converse(views.phases[-1].heard[0].tolist())
+        slot = round(2 * float(views.now[0]))
+        for i, mind in enumerate(self.minds):
+            row = rows(views.buffers, i)
+            self.holds_no_more_than_t_says(mind, row[0])
+            expected = mind.transmits(row, slot, bool(in_turn[0, i]))
+            assert decided[0, i] == expected, (slot, i)
+        return decided
+
+    def converse(self, heard):
+        """One slot: all packets are written, then everyone reads the one it decoded."""
+        packets = [mind.packet() for mind in self.minds]
+        for mind, sender in zip(self.minds, heard, strict=True):
+            if sender == mind.me:
+                mind.hear(None, None)
+            else:
+                mind.hear(sender, packets[sender])
+
+    @staticmethod
+    def holds_no_more_than_t_says(mind, seen):
+        """What packets tell of a robot is as old as T."""
+        for i, t in enumerate(seen.tolist()):
+            told = mind.told.get(i)
+            assert t == (0.0 if told is None else (told.slot + 1) / 2)
+
+    def fly(self, num_windows):
+        """Flies on; the mean age of each window."""
+        return [self.swarm.step(self).age_windows[0] for _ in range(num_windows)]

@@ -1,0 +1,178 @@
+"""What robots note of a slot: margins by hand, who counts as missed, and notes that are full."""
+
+import math
+
+import numpy as np
+import pytest
+
+from swarm_mj.policies.planner.link_evidence import (
+    LEAST_MARGIN_DB,
+    MAX_KINDS,
+    MOST_TIMES,
+    NUM_BINS,
+    Evidence,
+    Observation,
+    bin_centres_db,
+    no_observation,
+    observe,
+)
+from swarm_mj.radio.links import NOBODY
+
+ALL = np.ones(4, dtype=bool)
+NOISE_MW, THRESHOLD = 1.0, 10.0  # so a packet of 10 mW has a margin of 0 dB in silence
+
+
+def powers(**of_link):
+    """Power of i at j, 1 nW but where it is given as `i_at_j`-like names: p01 is of 0 at 1 [mW]."""
+    power_mw = np.full((4, 4), 1e-6)
+    for name, value in of_link.items():
+        power_mw[int(name[1]), int(name[2])] = value
+    return power_mw
+
+
+def observed(heard, transmitted, believed_mw, *, prior_mw=None, listens=None, knows_all=ALL):
+    """Whom each robot notes, in which bin, and whether as decoded; None if nothing."""
+    observation, transmitted = no_observation(4), np.array(transmitted, dtype=bool)
+    observe(
+        ~transmitted if listens is None else listens,
+        np.array(heard),
+        transmitted,
+        knows_all,
+        believed_mw,
+        believed_mw if prior_mw is None else prior_mw,
+        NOISE_MW,
+        THRESHOLD,
+        observation,
+    )
+    columns = zip(*(each.tolist() for each in observation), strict=True)
+    return [None if sender == NOBODY else (sender, *rest) for sender, *rest in columns]
+
+
+def test_bins_are_two_db_wide_around_their_centres():
+    centres_db = bin_centres_db()
+    assert centres_db[0] == -15.0
+    assert centres_db[7] == -1.0
+    assert centres_db[8] == 1.0
+    assert len(centres_db) == NUM_BINS
+    assert centres_db[-1] == 31.0
+
+
+def test_a_margin_is_the_sinr_over_the_threshold_by_hand():
+    """Robot 1 hears 0 with 100 mW: 10 dB over what it needs in silence, which is in bin 13, around
+    11 dB. Beside 9 mW of robot 2, noise and interference are 10 times as much: 0 dB, in bin 8."""
+    power_mw = powers(p01=100.0, p21=9.0, p03=100.0, p23=9.0)
+    alone = observed([0, 0, 2, 0], [1, 0, 0, 0], power_mw)
+    assert alone[1] == alone[3] == (0, 13, True)
+    beside = observed([0, 0, 2, 3], [1, 0, 1, 0], power_mw)
+    assert beside == [None, (0, 8, True), None, (0, 8, False)]
+
+
+def test_the_strongest_of_the_others_is_missed_and_in_the_plan_s_own_powers():
+    """Before, 2 was believed weaker at 3 than 0; by what was learned it is stronger. The margin is
+    counted from before: 50 over (1 + 20) times 10, or -6.2 dB, in bin 4."""
+    prior_mw = powers(p03=80.0, p23=50.0)
+    believed_mw = powers(p03=20.0, p23=60.0)
+    noted = observed([0, 1, 2, 3], [1, 0, 1, 0], believed_mw, prior_mw=prior_mw)
+    assert 10.0 * math.log10(50.0 / 210.0) == pytest.approx(-6.2, abs=0.05)
+    assert noted[3] == (2, 4, False)
+
+
+def test_whoever_decoded_notes_whom_it_decoded_even_if_that_is_a_surprise():
+    """The weaker one, or one of whom the plan says that it is silent."""
+    power_mw = powers(p01=100.0, p21=50.0, p31=20.0)
+    transmits = [1, 0, 1, 0]
+    assert observed([0, 2, 2, 3], transmits, power_mw)[1] == (2, 1, True)  # 50 / 1010: -13.1 dB
+    # Robot 3's 20 mW come beside all 150 mW of the plan: -18.8 dB, which the lowest bin takes.
+    assert observed([0, 3, 2, 3], transmits, power_mw)[1] == (3, 0, True)
+
+
+@pytest.mark.parametrize(("margin_db", "is_missed"), [(-15.9, True), (-16.1, False)])
+def test_packets_that_are_too_weak_are_not_missed_but_may_be_decoded(margin_db, is_missed):
+    assert LEAST_MARGIN_DB - 1.0 == -16.0
+    power_mw = powers(p01=10.0 ** (1.0 + margin_db / 10.0))
+    noted = observed([0, 1, 2, 3], [1, 0, 0, 0], power_mw)[1]
+    assert noted == ((0, 0, False) if is_missed else None)
+    assert observed([0, 0, 2, 3], [1, 0, 0, 0], power_mw)[1] == (0, 0, True)
+
+
+def test_what_is_very_strong_is_in_the_last_bin():
+    assert observed([0, 0, 2, 3], [1, 0, 0, 0], powers(p01=1e9))[1] == (0, NUM_BINS - 1, True)
+
+
+def test_who_notes_nothing():
+    """Who transmits or flies no plan, does not know that all fly one, or when nobody transmits."""
+    power_mw = powers(p01=100.0, p02=100.0, p03=100.0)
+    listens = np.array([False, True, True, False])
+    knows_all = np.array([True, True, False, True])
+    heard = [0, 0, 0, 0]
+    noted = observed(heard, [1, 0, 0, 0], power_mw, listens=listens, knows_all=knows_all)
+    assert noted == [None, (0, 13, True), None, None]
+    assert observed([0, 1, 2, 3], [0, 0, 0, 0], power_mw) == [None] * 4
+
+
+def test_the_plan_s_own_belief_that_the_listener_transmits_does_not_count():
+    """One that should transmit by a plan that it has left misses what the others send."""
+    power_mw = powers(p01=100.0)
+    listens = np.array([False, True, False, False])
+    assert observed([0, 1, 2, 3], [1, 1, 0, 0], power_mw, listens=listens)[1] == (0, 13, False)
+
+
+def of_one(sender, margin, is_decoded):
+    """Robot 0 of two observed this, and robot 1 nothing."""
+    return Observation(
+        np.array([sender, NOBODY]), np.array([margin, 0]), np.array([is_decoded, False])
+    )
+
+
+def test_counts_are_a_plain_loop_up_to_each_robot_s_slot():
+    rng = np.random.default_rng(3)
+    evidence, slots = Evidence(5), []
+    for _ in range(60):
+        sender, margin = rng.integers(-1, 5, 5), rng.integers(0, 4, 5)
+        is_decoded = rng.random(5) < 0.5
+        slots.append((sender.tolist(), margin.tolist(), is_decoded.tolist()))
+        evidence.add(Observation(sender, margin, is_decoded))
+    known_until = np.array([-2, 0, 20, 59, 80])
+    expected = np.zeros((2, 5, 5, NUM_BINS), dtype=int)
+    for slot, columns in enumerate(slots):
+        for j, (i, place, is_decoded) in enumerate(zip(*columns, strict=True)):
+            if slot <= known_until[j] and i != NOBODY:
+                expected[int(is_decoded), j, i, place] += 1
+    decoded, missed = evidence.counts(known_until)
+    np.testing.assert_array_equal(decoded, expected[1])
+    np.testing.assert_array_equal(missed, expected[0])
+    assert expected.sum(axis=(0, 2, 3)).tolist()[:2] == [0, slots[0][0][1] != NOBODY]
+
+
+def test_who_observed_nothing_counts_nothing():
+    for counts in Evidence(3).counts(np.full(3, 9)):
+        assert counts.shape == (3, 3, NUM_BINS)
+        assert not counts.any()
+
+
+def test_a_kind_is_noted_255_times_and_no_more():
+    evidence = Evidence(2)
+    for _ in range(MOST_TIMES + 3):
+        evidence.add(of_one(1, 5, True))
+    evidence.add(of_one(1, 5, False))  # another kind is counted on its own
+    decoded, missed = evidence.counts(np.full(2, 1000))
+    assert decoded[0, 1, 5] == decoded.sum() == 255 == MOST_TIMES - 1
+    assert missed[0, 1, 5] == missed.sum() == 1
+    assert evidence.counts(np.full(2, 99))[0].sum() == 100  # those noted first
+
+
+def test_full_notes_take_no_new_kind_but_count_on():
+    """Of 24 bins and two fates with three senders, each noted once, the first 64 stay."""
+    evidence = Evidence(4)
+    kinds = [(i, k, fate) for i in (1, 2, 3) for k in range(NUM_BINS) for fate in (True, False)]
+    rest = np.full(3, NOBODY)
+    for i, k, fate in [*kinds, *kinds]:
+        evidence.add(
+            Observation(
+                np.array([i, *rest]), np.array([k, 0, 0, 0]), np.array([fate, False, False, False])
+            )
+        )
+    counts = dict(zip((True, False), evidence.counts(np.full(4, 1000)), strict=True))
+    times = [int(counts[fate][0, i, k]) for i, k, fate in kinds]
+    assert times == [2] * MAX_KINDS + [0] * (len(kinds) - MAX_KINDS)
+    assert not counts[True][1:].any()
