@@ -45,7 +45,7 @@ class LinkTable:
     def changes_nothing(self) -> bool:
         """Whether the plan may go on: losses that strike all links alike favour no other."""
         fades = LAWS[self.law][0] != NO_FADING
-        return not fades and not np.any(self.std_db)
+        return not (fades or np.any(self.mean_db) or np.any(self.std_db))
 
 
 class Tables:

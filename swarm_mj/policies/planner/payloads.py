@@ -162,6 +162,7 @@ def link_fields(mission: Mission) -> tuple[PacketField, ...]:
         PacketField(name="whether it was decoded", bits=1, count=num_noted),
         PacketField(name="how often", bits=bits_for(MOST_TIMES), count=num_noted),
         times(identity("owner of the table", mission), NUM_SNAPSHOTS),
+        PacketField(name="how much its owner knew", bits=RANK_BITS, count=NUM_SNAPSHOTS),
         PacketField(name="law of fades and losses", bits=bits_for(len(LAWS)), count=NUM_SNAPSHOTS),
         PacketField(
             name=f"mean excess {table}",

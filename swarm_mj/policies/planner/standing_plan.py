@@ -29,7 +29,9 @@ class StandingPlan:
         self.links = links
         self.first_slot = first_slot
         self._weights = heuristic_weights(links, settings.weights)
-        self._foresight = foresight_of(num_robots, is_certain=True, settings=settings.schedule)
+        self._foresight = foresight_of(
+            num_robots, is_certain=not links.is_doubtful, settings=settings.schedule
+        )
         self._chunk_slots = settings.schedule.chunk_slots
         self._timestamp = np.full((num_robots, num_robots), NEVER, dtype=np.float32)
         self._transmits = []  # by slots
