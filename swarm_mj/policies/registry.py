@@ -40,8 +40,14 @@ def _spatial_tdma(mission: Mission) -> SpatialTdma:
 
 
 def _planner(mission: Mission) -> Planner | RestingPlanner:
-    if mission.task == "stationary":
-        return _resting_planner(mission, learns=links_fit(mission))
+    if mission.task != "stationary":
+        return _moving_planner(mission)
+    if not links_fit(mission):
+        return _resting_planner(mission)
+    return _resting_planner(mission, learns=True, moving=_moving_planner(mission))
+
+
+def _moving_planner(mission: Mission) -> Planner:
     return Planner(
         radio_of(mission),
         PlannerSettings(),
@@ -52,10 +58,11 @@ def _planner(mission: Mission) -> Planner | RestingPlanner:
     )
 
 
-def _resting_planner(mission: Mission, *, learns: bool) -> RestingPlanner:
-    return RestingPlanner(
-        radio_of(mission), PlannerSettings(), _spatial_tdma(mission), learns=learns
-    )
+def _resting_planner(
+    mission: Mission, *, learns: bool = False, moving: Planner | None = None
+) -> RestingPlanner:
+    turns = _spatial_tdma(mission)
+    return RestingPlanner(radio_of(mission), PlannerSettings(), turns, learns=learns, moving=moving)
 
 
 # What makes each policy, given the mission and, for these four, a transmission probability.
@@ -75,7 +82,7 @@ RULES: dict[str, Callable[..., Policy]] = {
     "tdma": lambda _: Tdma(),
     "spatial-tdma": _spatial_tdma,
     "planner": _planner,
-    WITHOUT_PAYLOAD: lambda mission: _resting_planner(mission, learns=False),
+    WITHOUT_PAYLOAD: _resting_planner,
     "greedy-oracle": lambda mission: GreedyOracle(radio_of(mission)),
     "oracle-lookahead": lambda mission: LookaheadOracle(radio_of(mission)),
 }

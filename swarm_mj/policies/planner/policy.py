@@ -116,7 +116,11 @@ class Planner(BroadcastPolicy):
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Whoever transmits by its plan, or by the discovery."""
-        return np.stack([team.transmits(views, b) for b, team in enumerate(self._teams)])
+        return np.stack([self.transmits_in(views, b) for b in range(len(self._teams))])
+
+    def transmits_in(self, views: LocalViews, b: int) -> Bool[np.ndarray, "N"]:
+        """The same in one mission alone."""
+        return self._teams[b].transmits(views, b)
 
 
 class _Team:

@@ -9,7 +9,8 @@ joins it. With packets of T, M and P alone robots go on so. With larger ones the
 are not as they believed, and plan anew.
 
 Where robots move, no two buffers hold the same positions for long, and schedules made from them
-would jam each other. Such a team goes on with spatial TDMA, whose rule bears small differences.
+would jam each other. A robot that hears of motion does as the planner of moving teams, or goes on
+with spatial TDMA, whose rule bears small differences, if packets carry T, M and P alone.
 """
 
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from jaxtyping import Bool
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.planner.payloads import link_fields
+from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting_team import RestingTeam
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import BroadcastPolicy
@@ -46,6 +48,7 @@ class RestingPlanner(BroadcastPolicy):
         turns: SpatialTdma,
         *,
         learns: bool,
+        moving: Planner | None = None,
     ) -> None:
         """Prepares the policy.
 
@@ -54,11 +57,13 @@ class RestingPlanner(BroadcastPolicy):
             settings: Of the planner.
             turns: What robots follow that cannot plan.
             learns: Whether packets carry what robots observed of links.
+            moving: What robots follow that hear of motion, in place of turns.
         """
         self._belief = Belief(radio=radio)
         self._settings = settings
         self._turns = turns
         self._learns = learns
+        self._moving = moving
         self.uses = (
             "its buffer, the clock, a common order, the radio as far as it was told of it; and "
             "what all robots observed of their links, which packets carry"
@@ -80,10 +85,15 @@ class RestingPlanner(BroadcastPolicy):
         """Plans by this belief from now on, and so do the turns."""
         self._belief = belief
         self._turns.inform(belief)
+        if self._moving is not None:
+            self._moving.inform(belief)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draws each mission's order of turns and forgets; arguments as in `Policy.start`."""
         self._turns.start(num_robots, rngs)
+        if self._moving is not None:
+            self._moving.start(num_robots, rngs)
+        self._has_moved = np.zeros(len(rngs), dtype=bool)
         self._teams = [
             RestingTeam(num_robots, self._belief, self._settings, learns=self._learns) for _ in rngs
         ]
@@ -109,4 +119,16 @@ class RestingPlanner(BroadcastPolicy):
                 buffers.position_m[b],
                 known_until[b],
             )
+        if self._moving is not None:
+            self._follow_motion(self._moving, views, transmits)
         return transmits
+
+    def _follow_motion(
+        self, moving: Planner, views: LocalViews, transmits: Bool[np.ndarray, "B N"]
+    ) -> None:
+        """Lets robots that know a moving teammate do as in a team that moves."""
+        knows_motion = np.any(views.buffers.velocity_mps, axis=(2, 3))
+        self._has_moved |= np.any(knows_motion, axis=1)
+        for b in np.flatnonzero(self._has_moved).tolist():
+            by_snapshot = moving.transmits_in(views, b)
+            transmits[b, knows_motion[b]] = by_snapshot[knows_motion[b]]

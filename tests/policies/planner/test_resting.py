@@ -149,3 +149,17 @@ def test_a_new_start_forgets_and_the_clock_counts_from_there():
     np.testing.assert_array_equal(flown[:, 0], [plan.transmits(slot) for slot in range(20)])
     policy.start(10, [np.random.default_rng(0)])
     assert not policy._teams[0]._flights
+
+
+def test_a_team_that_should_rest_but_moves_plans_as_teams_that_move():
+    """Robots are pushed to and fro; the age is that of snapshots, not that of turns."""
+
+    def push(buffers, states):
+        return np.where(states.velocity_mps <= 0.0, 1.0, -1.0)
+
+    mission, age = paper("stationary", num_robots=12, range_ratio=0.3), {}
+    for name in ("planner", NAME):
+        swarm, policy = Swarm(mission, [0, 1], controller=push), make_policy(name, mission)
+        swarm.start(policy)
+        age[name] = np.mean([swarm.step(policy).age_windows for _ in range(80)])
+    assert age["planner"] < 0.9 * age[NAME]
