@@ -56,7 +56,9 @@ def planned(links, settings, num_slots):
         transmits = np.zeros((num_slots, num_robots), dtype=bool)
         nothing = np.zeros((num_robots, num_robots), dtype=np.float32)
         weights = heuristic_weights(links, settings.weights)
-        foresight = foresight_of(num_robots, is_certain=True, settings=settings.schedule)
+        foresight = foresight_of(
+            num_robots, is_certain=not links.is_doubtful, settings=settings.schedule
+        )
         free = np.ones(num_slots + foresight.slots, dtype=bool)
         schedule(nothing, 0.0, links, weights, foresight, free, transmits)
         PLANNED[key] = transmits
@@ -81,7 +83,8 @@ class Table(NamedTuple):
 
     @property
     def changes_nothing(self):
-        return math.isinf(LAWS[self.law][0]) and not self.std_db.any()
+        differs = self.mean_db.any() or self.std_db.any()
+        return math.isinf(LAWS[self.law][0]) and not differs
 
 
 class LearningPacket(NamedTuple):

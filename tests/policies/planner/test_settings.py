@@ -9,6 +9,7 @@ import pytest
 from swarm_mj.policies.planner import settings
 from swarm_mj.policies.planner.settings import (
     DiscoverySettings,
+    LearningSettings,
     PlannerSettings,
     WeightSettings,
 )
@@ -52,3 +53,26 @@ def test_the_first_epochs_are_over_before_the_search_begins():
     assert epochs.early_rounds < epochs.regular_rounds < epochs.first_rounds
     assert epochs.min_early_windows < epochs.min_regular_windows
     assert epochs.first_rounds + 2 * epochs.early_rounds < search.start_rounds
+
+
+@pytest.mark.parametrize("num_robots", [2, 8, 20, 40, 100])
+def test_tables_of_links_have_time_to_spread_between_learning_and_flying(num_robots):
+    """And the first is made after a round, in which everyone took its turn."""
+    learning = SETTINGS.learning
+    slots = 2 * max(num_robots, learning.min_round_windows)
+    first, flown, spread = (
+        round(rounds * slots)
+        for rounds in (learning.first_rounds, learning.flown_rounds, learning.spread_rounds)
+    )
+    assert 0 < spread < flown <= first - spread
+    assert first - spread > 2 * num_robots
+    assert learning.cautious_stds <= learning.disturbing_stds
+
+
+def test_learning_is_changed_alone():
+    changed = PlannerSettings(learning=LearningSettings(flown_rounds=2.0))
+    assert changed.learning.flown_rounds == 2.0
+    assert changed.learning.first_rounds == SETTINGS.learning.first_rounds
+    assert changed.schedule == SETTINGS.schedule
+    with pytest.raises(TypeError, match="flown_round"):
+        LearningSettings(flown_round=2.0)
