@@ -77,7 +77,7 @@ def contents_of(
     granted = look(swarm, index)
     group = np.zeros(num_robots, np.int16) if granted is None else granted.group
     surprises = NO_SURPRISES if granted is None else granted.surprises
-    lines_m, line_colour = strokes_at_once(surprises, position_m)
+    lines_m, line_colour = strokes_at_once(surprises, position_m, observer)
     is_on = _is_on(swarm, index)
     return Contents(
         position_m=position_m,

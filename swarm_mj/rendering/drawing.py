@@ -5,20 +5,23 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from jaxtyping import Float, Int16
+from jaxtyping import Float, Int, Int16
 from PIL import Image, ImageDraw, ImageFont
 
 from swarm_mj.mission.presets import where_flown
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.palette import Colour, dim
-from swarm_mj.replay.strokes import BROKEN, STROKES
+from swarm_mj.replay.strokes import PIECES, STROKES, WHOLE
 
 CURVES: tuple[Colour, ...] = (palette.MEAN_AGE, palette.VARIANCE)  # of one flight, and a second
 FAINT = 0.45  # what is still to come, and texts that matter less
 SHADE = 0.35  # of columns behind a curve
 NUM_SHADES = 48
-ROOMY = 6  # samples that a legend has room for without moving them together
+SHORTFALL = "missing to decode"  # what the numbers beside robots say
+TAG = 2  # of dark ground around a number [pixels]
+LABELS_FIRST = 1000  # a number had rather cover so many robots than another number
+ROOM, STEP = 3.7, 1.1  # for a legend's samples, and from one to the next [of the text's size]
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,7 @@ def draw_legend(
 ) -> None:
     """The ramp of ages, and what the colours of packets mean."""
     small = font(round(0.8 * size))
-    who = f"age of what {_observers(footages)} (white) knows"
+    who = f"colour: age of what {_observers(footages)} (white) knows"
     draw.text((box.left, box.top), who, palette.TEXT, small)
     y, high = box.top + 1.25 * size, 0.55 * size
     edges = np.linspace(box.left, box.right, NUM_SHADES + 1)
@@ -88,43 +91,96 @@ def draw_legend(
     y += 1.3 * high
     draw.text((box.left, y), "0", palette.SENT, small)
     draw.text((box.right, y), f"{full_scale:g} windows or more", palette.SENT, small, anchor="ra")
-    samples = {"never heard of": palette.UNKNOWN} | _packet_colours(footages)
-    samples |= _surprise_colours(footages)
-    column = box.width / 2
-    start, step = (1.35, 1.1) if len(samples) <= ROOMY else (1.25, 0.97)
+    samples = {"never heard of": palette.UNKNOWN}
+    if any(np.any(each.velocity_mps) for each in footages):
+        samples["heading"] = palette.HEADING
+    samples |= _packet_colours(footages) | _surprise_colours(footages)
+    _draw_samples(draw, samples, Box(box.left, round(y + 1.3 * size), box.right, box.bottom), size)
+
+
+def _draw_samples(
+    draw: ImageDraw.ImageDraw, samples: dict[str, Colour], box: Box, size: int
+) -> None:
+    """Samples in two columns; the more there are, the closer."""
+    step = min(STEP, ROOM / ((len(samples) + 1) // 2)) * size
+    small = font(round(min(0.8 * size, 0.9 * step)))
     for k, (text, colour) in enumerate(samples.items()):
-        x, line = box.left + (k % 2) * column, y + (start + step * (k // 2)) * size
-        _draw_sample(draw, colour, x, line + 0.45 * size, size)
-        draw.text((x + 1.3 * size, line), text, palette.SENT, small)
+        x, line = box.left + (k % 2) * box.width / 2, box.top + step * (k // 2)
+        if text == SHORTFALL:
+            _draw_tag(draw, "dB", x, line, small)
+        else:
+            _draw_sample(draw, colour, x, line + 0.45 * size, size)
+        draw.text((x + 1.5 * size, line), text, palette.SENT, small)
 
 
 def _draw_sample(
     draw: ImageDraw.ImageDraw, colour: Colour, x: float, middle: float, size: int
 ) -> None:
-    """A disc for robots, and a line for packets and links; of those too weak, a broken one."""
+    """A disc for robots, and a line for packets and links; of those too weak, a dashed one."""
     if colour in (palette.UNKNOWN, palette.CUT_OFF):
-        centre, radius = x + 0.5 * size, 0.3 * size
+        centre, radius = x + 0.6 * size, 0.3 * size
         disc = (centre - radius, middle - radius, centre + radius, middle + radius)
         draw.ellipse(disc, colour)
         return
-    is_broken = colour == STROKES["too_weak"]
-    for a, b in [(0.0, BROKEN), (1.0 - BROKEN, 1.0)] if is_broken else [(0.0, 1.0)]:
-        line = (x + a * size, middle, x + b * size, middle)
-        draw.line(line, colour, max(2, size // 6))
+    pieces = PIECES["too_weak"] if colour == STROKES["too_weak"] else WHOLE
+    for a, b in (x + 1.2 * size * pieces).round().tolist():
+        draw.line((a, middle, b - 1, middle), colour, max(2, size // 6))
 
 
 def draw_shortfalls(
     draw: ImageDraw.ImageDraw,
-    at: Float[np.ndarray, "K 2"],
+    robots: Float[np.ndarray, "N 2"],
+    others: Int16[np.ndarray, "K"],
     margin_db: Int16[np.ndarray, "K"],
     size: int,
 ) -> None:
-    """By how much links are too weak, at these places; one that would cover another is left out."""
-    small, shown = font(round(0.75 * size)), []
-    for (x, y), margin in zip(at.tolist(), margin_db.tolist(), strict=True):
-        if all(abs(x - u) > 3.0 * size or abs(y - v) > 0.8 * size for u, v in shown):
-            draw.text((x, y), f"{margin} dB", palette.TOO_WEAK, small, anchor="mm")
-            shown.append((x, y))
+    """By how much links are too weak, each beside the robot at its far end.
+
+    Args:
+        draw: Where.
+        robots: Where all robots are in the picture [pixels].
+        others: The robots at the far ends.
+        margin_db: Of their links [dB].
+        size: Of the text [pixels].
+    """
+    small, shown = font(round(0.75 * size)), np.zeros((0, 4))
+    for robot, margin in zip(others.tolist(), margin_db.tolist(), strict=True):
+        text = f"{margin} dB"
+        width, high = draw.textlength(text, small) + 2 * TAG, 0.95 * size
+        # To the right, to the left, below or above: where it covers least.
+        sides = np.array([[0.7, -0.5], [-0.7, -0.5], [-0.5, 0.8], [-0.5, -1.8]])
+        sides = sides * size + [[0.0, 0.0], [-width, 0.0], [0.0, 0.0], [0.0, 0.0]]
+        low = robots[robot] + sides
+        boxes = np.hstack([low, low + np.array([width, high])])
+        on_robots = np.hstack([robots - 0.4 * size, robots + 0.4 * size])
+        covered = LABELS_FIRST * _num_met(boxes, shown) + _num_met(boxes, on_robots)
+        best = int(np.argmin(covered))
+        if covered[best] < LABELS_FIRST:
+            x, y = low[best].tolist()
+            _draw_tag(draw, text, x + TAG, y, small)
+            shown = np.vstack([shown, boxes[best]])
+
+
+def _num_met(
+    boxes: Float[np.ndarray, "S 4"], others: Float[np.ndarray, "O 4"]
+) -> Int[np.ndarray, "S"]:
+    """How many of the others each box overlaps."""
+    one, other = boxes[:, None], others[None]
+    is_met = (one[..., :2] < other[..., 2:]) & (other[..., :2] < one[..., 2:])
+    return np.sum(np.all(is_met, axis=2), axis=1)
+
+
+def _draw_tag(
+    draw: ImageDraw.ImageDraw,
+    text: str,
+    x: float,
+    y: float,
+    small: ImageFont.FreeTypeFont | ImageFont.ImageFont,
+) -> None:
+    """A text on a dark ground, so that it is read before anything."""
+    left, top, right, bottom = draw.textbbox((x, y), text, small)
+    draw.rectangle((left - TAG, top - TAG, right + TAG, bottom + TAG), palette.BACKGROUND)
+    draw.text((x, y), text, palette.TOO_WEAK, small)
 
 
 def _packet_colours(footages: Sequence[Footage]) -> dict[str, Colour]:
@@ -141,14 +197,16 @@ def _packet_colours(footages: Sequence[Footage]) -> dict[str, Colour]:
 def _surprise_colours(footages: Sequence[Footage]) -> dict[str, Colour]:
     """What links that surprise look like, if there are any, and robots that are cut off."""
     found = [each.looks.surprises.by_kind for each in footages if each.looks is not None]
-    texts = {"believed, too weak": "too_weak", "works, unbelieved": "unbelieved"}
-    colours = {
-        text: STROKES[kind]
-        for text, kind in texts.items()
-        if any(len(of[kind].row) for of in found)
+    texts = {
+        "too_weak": f"{_observers(footages)}'s link, too weak",
+        "unbelieved": "works, unbelieved",
     }
+    shown = [kind for kind in texts if any(len(of[kind].row) for of in found)]
+    colours = {texts[kind]: STROKES[kind] for kind in shown}
+    if "too_weak" in shown:
+        colours[SHORTFALL] = palette.TOO_WEAK
     if any(np.any(each.is_cut_off) for each in footages):
-        colours["cut off from " + _observers(footages)] = palette.CUT_OFF
+        colours[f"halo: cut off from {_observers(footages)} now"] = palette.CUT_OFF
     return colours
 
 
@@ -176,7 +234,7 @@ class AgePlot:
         title = "mean age of information [windows]"
         draw.rectangle((inner.left, inner.top, inner.right, inner.bottom), palette.GRID)
         if self._cut_off is not None and np.any(self._cut_off.is_cut_off):
-            title += f"; red: share of robots that are cut off from {_observers([self._cut_off])}"
+            title += f"; red: robots cut off from {_observers([self._cut_off])}, full height 100 %"
             self._draw_cut_off(draw, self._cut_off)
         draw.text((inner.left, self._box.top), title, palette.TEXT, small)
         for y, value in ((inner.top, f"{self._top:g}"), (inner.bottom, "0")):
@@ -198,8 +256,9 @@ class AgePlot:
             draw.ellipse((x - radius, y - radius, x + radius, y + radius), colour)
 
     def _draw_cut_off(self, draw: ImageDraw.ImageDraw, footage: Footage) -> None:
-        """The share of robots cut off from the observer, as columns: the plot's height is all."""
-        inner, share = self._inner, np.mean(footage.is_cut_off, axis=1)
+        """The share of the others cut off from the observer, as columns; full height is all."""
+        num_others = footage.facts.mission.num_robots - 1
+        inner, share = self._inner, np.sum(footage.is_cut_off, axis=1) / num_others
         x = inner.left + inner.width * footage.window * footage.facts.mission.window_s / self._end_s
         for left, right, part in zip([inner.left, *x[:-1]], x, share, strict=True):
             if part > 0.0:

@@ -104,9 +104,10 @@ class Movie:
             scene = self._renderers[k].frame(contents)
             picture.paste(Image.fromarray(scene), (box.left, box.top))
             draw_title(draw, footage, row, box, self._text, CURVES[k])
-            at_m, margin_db = footage.shortfalls(row)
-            at = self._renderers[k].camera(contents).pixels(np.pad(at_m, ((0, 0), (0, 1))))
-            draw_shortfalls(draw, at + np.array([box.left, box.top]), margin_db, self._text)
+            ground_m = np.pad(contents.position_m, ((0, 0), (0, 1)))
+            robots = self._renderers[k].camera(contents).pixels(ground_m)
+            robots += np.array([box.left, box.top])
+            draw_shortfalls(draw, robots, *footage.shortfalls(row), self._text)
         for box in self._boxes[1:]:
             draw.line((box.left, 0, box.left, self._bottom), palette.BACKGROUND, SEAM)
         self._plot.draw_until(draw, rows)
@@ -121,7 +122,9 @@ class Movie:
     def _contents(self, k: int, row: int) -> Contents:
         footage, seen = self._footages[k], self._footages[k].shots
         first, last = np.searchsorted(seen.row, [row, row + 1])
-        lines_m, line_colour = strokes_at_once(footage.surprises(row), footage.position_m[row])
+        lines_m, line_colour = strokes_at_once(
+            footage.surprises(row), footage.position_m[row], footage.facts.observer
+        )
         return Contents(
             position_m=footage.position_m[row],
             velocity_mps=footage.velocity_mps[row],

@@ -15,8 +15,6 @@ from swarm_mj.replay.looks import NO_SURPRISES, Looks, Surprises
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.shots import Shots, shots
 
-SAID_AT = 0.64  # of the way to the other robot: there, links of one robot have parted
-
 
 @dataclass(frozen=True, kw_only=True)
 class Facts:
@@ -70,13 +68,11 @@ class Footage:
         """Links that surprise in one window, counted from 0."""
         return NO_SURPRISES if self.looks is None else self.looks.at(int(self.window[row]))
 
-    def shortfalls(self, row: int) -> tuple[Float[np.ndarray, "K 2"], Int16[np.ndarray, "K"]]:
-        """By how much the observer's own links are too weak [dB], and where that is said [m]."""
+    def shortfalls(self, row: int) -> tuple[Int16[np.ndarray, "K"], Int16[np.ndarray, "K"]]:
+        """Robots whose links with the observer are too weak, and their margins, below 0 [dB]."""
         links, own = self.surprises(row).by_kind["too_weak"], self.facts.observer
         links = links.chosen((links.sender == own) | (links.receiver == own))
-        other = np.where(links.sender == own, links.receiver, links.sender)
-        near_m, far_m = self.position_m[row, own], self.position_m[row, other]
-        return near_m + SAID_AT * (far_m - near_m), links.margin_db
+        return np.where(links.sender == own, links.receiver, links.sender), links.margin_db
 
     def colours(self, full_scale: float | None = None) -> UInt8[np.ndarray, "T N 3"]:
         """The robots' colours, by the replay's own scale of ages unless one is given [windows]."""

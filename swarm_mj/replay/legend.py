@@ -11,7 +11,7 @@ from swarm_mj.replay.layers import LAYERS, screen
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet
 from swarm_mj.replay.shots import LOST_SHARE
-from swarm_mj.replay.strokes import BROKEN, STROKES
+from swarm_mj.replay.strokes import PIECES, STROKES, WHOLE
 
 WIDTH = 100.0  # of the view, in units of its own, y down
 LEFT, RAMP = 4.0, 31.0  # where the ramp of ages begins, and how long it is
@@ -81,16 +81,14 @@ def _draw_sample(sheet: Sheet, path: str, name: str, x: float, y: float) -> None
     layer = LAYERS[f"arena/{name}"]
     start, radius = (x - SAMPLE / 2, y), RADII.get(name, 0.0)
     share = LOST_SHARE if name == "radio/lost" else 1.0
-    way = [(x - SAMPLE / 2, x + SAMPLE / 2)]
-    if name == "world/too_weak":
-        way = [(a, a + BROKEN * SAMPLE) for a in (x - SAMPLE / 2, x + (0.5 - BROKEN) * SAMPLE)]
+    kind = name.removeprefix("world/")
+    way = x + SAMPLE * (PIECES.get(kind, WHOLE) - 0.5)
     shapes = {
         rr.LineStrips2D: {"strips": [[(a, y), (b, y)] for a, b in way]},
         rr.Arrows2D: {"origins": [start], "vectors": [(share * SAMPLE, 0.0)]},
         rr.Ellipses2D: {"centers": [(x, y)], "half_sizes": [(radius, radius)]},
         rr.Points2D: {"positions": [(x, y)]},
     }
-    kind = name.removeprefix("world/")
     colour = {"colors": [STROKES[kind]]} if kind in STROKES else {}
     sheet.fixed(path, layer.kind.from_fields(**layer.style, **colour, **shapes[layer.kind]))
 

@@ -15,7 +15,7 @@ from swarm_mj.replay.footage import Facts, Footage
 from swarm_mj.replay.looks import Looks, Surprises, in_turn
 from swarm_mj.replay.sheet import TIMELINE
 from swarm_mj.replay.shots import LOOKS, Shots, in_order
-from swarm_mj.replay.strokes import PIECES, STROKES
+from swarm_mj.replay.strokes import STROKES
 
 FACTS = "footage"  # the recording's property that holds them
 
@@ -128,7 +128,9 @@ def _surprises(path: Path, kind: str) -> Surprises:
     numbers = {name: _flat(column).to_numpy().astype(np.int16) for name, column in columns.items()}
     row = np.repeat(np.arange(len(per_look)), per_look)
     strokes = Surprises(row=row, is_too_weak=np.full(len(row), kind == "too_weak"), **numbers)
-    return strokes.chosen(np.s_[:: PIECES[kind]])
+    # Earlier versions drew some links in two pieces, each with the numbers of its link.
+    link = np.stack([strokes.row, strokes.sender, strokes.receiver])
+    return strokes.chosen(np.any(np.diff(link, prepend=-1), axis=0))
 
 
 def _has(path: Path, entity: str, component: str = "") -> bool:

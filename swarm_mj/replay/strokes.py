@@ -1,4 +1,4 @@
-"""Links that surprise, as lines between robots: whole, or broken in the middle if too weak."""
+"""Links that surprise, as lines between robots: whole, or dashed if too weak."""
 
 from dataclasses import replace
 
@@ -9,35 +9,35 @@ from swarm_mj.replay import palette
 from swarm_mj.replay.looks import Surprises
 from swarm_mj.replay.palette import Colour, dim
 
-BROKEN = 0.36  # of a line's length, drawn at either end
+# Pieces that a line is drawn in, from where to where [of its length].
+WHOLE = np.array([[0.0, 1.0]])
+NUM_DASHES, DASH = 4, 0.6  # the dashes of a line, each so much of the way to the next one's start
+DASHES = (np.arange(NUM_DASHES)[:, None] + [0.0, DASH]) / (NUM_DASHES - 1 + DASH)
 # By kind; what is drawn first may be covered by what follows.
 STROKES: dict[str, Colour] = {
     "unbelieved": palette.UNBELIEVED,
     "too_weak": dim(palette.TOO_WEAK, 0.7),
 }
-FAINTEST, FAINTEST_DB = 0.35, -30.0  # of a link that is too weak by so much or more
+FAINTEST, FAINTEST_DB = 0.5, -30.0  # of a link that is too weak by so much or more
 BRIGHTEST = 0.85  # of one that is hardly too weak
-PIECES = {"unbelieved": 1, "too_weak": 2}  # that a line is drawn in
+PIECES = {"unbelieved": WHOLE, "too_weak": DASHES}
 
 
 def strokes(
-    kind: str, links: Surprises, position_m: Float[np.ndarray, "C N 2"]
+    links: Surprises, position_m: Float[np.ndarray, "C N 2"], pieces: Float[np.ndarray, "P 2"]
 ) -> tuple[Float[np.ndarray, "S 2 2"], Int[np.ndarray, "S"]]:
     """Lines from start to end [m], and the link of each.
 
     Args:
-        kind: One of `STROKES`.
-        links: Of this kind.
+        links: Which are drawn.
         position_m: Where the robots are at each look [m].
+        pieces: That each is drawn in, `WHOLE` or `DASHES`.
     """
     start_m = position_m[links.row, links.sender]
     end_m = position_m[links.row, links.receiver]
-    each = np.arange(len(links.row))
-    if PIECES[kind] == 1:
-        return np.stack([start_m, end_m], axis=1), each
-    way_m = BROKEN * (end_m - start_m)
-    pieces_m = np.stack([start_m, start_m + way_m, end_m - way_m, end_m], axis=1)
-    return pieces_m.reshape(-1, 2, 2), np.repeat(each, PIECES[kind])
+    way_m = (end_m - start_m)[:, None, None]
+    pieces_m = start_m[:, None, None] + pieces[None, :, :, None] * way_m
+    return pieces_m.reshape(-1, 2, 2), np.repeat(np.arange(len(links.row)), len(pieces))
 
 
 def shades(kind: str, links: Surprises) -> UInt8[np.ndarray, "L 3"]:
@@ -50,13 +50,18 @@ def shades(kind: str, links: Surprises) -> UInt8[np.ndarray, "L 3"]:
 
 
 def strokes_at_once(
-    links: Surprises, position_m: Float[np.ndarray, "N 2"]
+    links: Surprises, position_m: Float[np.ndarray, "N 2"], observer: int
 ) -> tuple[Float[np.ndarray, "S 2 2"], UInt8[np.ndarray, "S 3"]]:
-    """Lines of one look's links of all kinds [m], and their colours."""
+    """Lines of one look's links [m], and their colours; of those too weak, the observer's own.
+
+    In a city there are so many of them that nobody could tell which robots each one joins.
+    """
+    is_own = (links.sender == observer) | (links.receiver == observer)
+    links = links.chosen(is_own | ~links.is_too_weak)
     here = replace(links, row=np.zeros(len(links.row), dtype=int))
     lines, colours = [], []
     for kind, found in here.by_kind.items():
-        line_m, link = strokes(kind, found, position_m[None])
+        line_m, link = strokes(found, position_m[None], PIECES[kind])
         lines.append(line_m)
         colours.append(shades(kind, found)[link])
     return np.concatenate(lines), np.concatenate(colours)

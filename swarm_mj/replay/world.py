@@ -5,7 +5,7 @@ The map and the view in 3-D draw the same things in the same colours.
 
 import numpy as np
 import rerun as rr
-from jaxtyping import Float
+from jaxtyping import Int
 
 from swarm_mj.physics.obstacles import Obstacles
 from swarm_mj.physics.state import ROBOT_HEIGHT_M
@@ -15,7 +15,7 @@ from swarm_mj.replay.layers import LAYERS, screen
 from swarm_mj.replay.looks import Looks, Surprises
 from swarm_mj.replay.sheet import Sheet
 from swarm_mj.replay.space import RADIUS_SHARE, ROBOT_HEIGHT
-from swarm_mj.replay.strokes import shades, strokes
+from swarm_mj.replay.strokes import PIECES, WHOLE, shades, strokes
 
 NUMBERS = ("sender", "receiver", "loss_db", "margin_db")  # of links, that the file keeps
 FILL_SHARE = 0.008  # of half the map's width: between the lines that fill an obstacle
@@ -44,36 +44,34 @@ def draw_looks(sheet: Sheet, looks: Looks) -> None:
     radius_m = RADIUS_SHARE * sheet.frame.reach_m
     position_m = sheet.log.position_m[looks.window - sheet.log.window[0]]
     for kind, links in looks.surprises.by_kind.items():
-        lines_m, link = strokes(kind, links, position_m)
-        _draw_links(sheet, looks, kind, links.chosen(link), lines_m, ROBOT_HEIGHT * radius_m)
+        lines_m, link = strokes(links, position_m, PIECES[kind])
+        on_map = f"arena/world/{kind}"
+        sheet.fixed_layer(on_map)
+        strips = rr.LineStrips2D.columns(strips=lines_m, colors=shades(kind, links)[link])
+        _draw_links(sheet, on_map, strips, links.chosen(link), looks.window)
+        # In space they are whole, whatever their kind: dashes would make the file larger.
+        lines_m, _ = strokes(links, position_m, WHOLE)
+        height_m = np.float32(ROBOT_HEIGHT * radius_m)
+        lifted = np.pad(lines_m, ((0, 0), (0, 0), (0, 1)), constant_values=height_m)
+        in_space = f"scene/world/{kind}"
+        sheet.fixed(in_space, rr.LineStrips3D.from_fields(radii=screen(LAYERS[on_map].width)))
+        strips = rr.LineStrips3D.columns(strips=lifted, colors=shades(kind, links))
+        _draw_links(sheet, in_space, strips, links, looks.window)
     _draw_cut_off(sheet, HALO * radius_m)
 
 
 def _draw_links(
     sheet: Sheet,
-    looks: Looks,
-    kind: str,
+    path: str,
+    strips: rr.ComponentColumnList,
     links: Surprises,
-    lines_m: Float[np.ndarray, "S 2 2"],
-    height_m: float,
+    window: Int[np.ndarray, "C"],
 ) -> None:
-    """Lines on the map, and in space so high; who clicks on one reads its link's numbers."""
-    lines = lines_m.astype(np.float32)
-    lifted = np.pad(lines, ((0, 0), (0, 0), (0, 1)), constant_values=np.float32(height_m))
-    on_map, in_space = f"arena/world/{kind}", f"scene/world/{kind}"
-    sheet.fixed_layer(on_map)
-    width = LAYERS[on_map].width
-    sheet.fixed(in_space, rr.LineStrips3D.from_fields(radii=screen(width)))
+    """A strip for each of these links; who clicks on one reads its numbers."""
     numbers = {name: getattr(links, name) for name in NUMBERS}
-    per_look = np.bincount(links.row, minlength=len(looks.window))
-    colours = shades(kind, links)
-    columns = {
-        on_map: rr.LineStrips2D.columns(strips=lines, colors=colours),
-        in_space: rr.LineStrips3D.columns(strips=lifted, colors=colours),
-    }
+    per_look = np.bincount(links.row, minlength=len(window))
     known = rr.AnyValues.columns(**numbers).partition(per_look)
-    for path, strips in columns.items():
-        sheet.timed(path, [*strips.partition(per_look), *known], looks.window)
+    sheet.timed(path, [*strips.partition(per_look), *known], window)
 
 
 def _draw_cut_off(sheet: Sheet, radius_m: float) -> None:

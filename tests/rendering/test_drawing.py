@@ -113,27 +113,55 @@ def test_the_legend_names_links_that_surprise_if_there_are_any():
 
 
 def test_the_plot_has_columns_for_who_is_cut_off():
-    """One of two robots: half of the plot's height."""
+    """Robot 0 is cut off from the only other one: all of the plot's height."""
     red = palette.dim(palette.CUT_OFF, SHADE)
     heights = []
     for seen in (footage([10.0] * 5), with_one_too_weak(footage([10.0] * 5))):
         picture = blank(400, 160)
         AgePlot([seen], BOX, 10).draw_axes(ImageDraw.Draw(picture))
         heights.append(np.sum(np.any(has(picture, red, 0), axis=1)))
-    none, half = heights
+    none, whole = heights
     assert none == 0
     inner = BOX.height - 10 - 14
-    assert abs(half - inner / 2) <= 2
+    assert abs(whole - inner) <= 2
 
 
-def test_a_shortfall_that_would_cover_another_is_left_out():
-    at, margin_db = np.array([[50.0, 50.0], [52.0, 51.0], [300.0, 90.0]]), np.array([-3, -4, -5])
+def said(robots, others):
+    """Where red texts are after shortfalls were drawn: rows and columns."""
     picture = blank(400, 160)
-    draw_shortfalls(ImageDraw.Draw(picture), at, margin_db.astype(np.int16), 12)
-    rows, columns = np.nonzero(np.asarray(picture).max(axis=2) > 100)
-    is_left = columns < 200
-    assert abs(np.mean(columns[is_left]) - 50.0) < 3.0
-    assert abs(np.mean(rows[~is_left]) - 90.0) < 3.0
+    margin_db = -np.arange(3, 3 + len(others), dtype=np.int16)
+    numbers = np.array(others, dtype=np.int16), margin_db
+    draw_shortfalls(ImageDraw.Draw(picture), np.array(robots), *numbers, 12)
+    return np.nonzero(has(picture, palette.TOO_WEAK, 60))
+
+
+def test_a_shortfall_is_said_beside_the_robot_at_the_far_end():
+    rows, columns = said([[300.0, 90.0], [50.0, 50.0]], [1])
+    assert 55 < columns.min() <= columns.max() < 100
+    assert abs(np.mean(rows) - 50.0) < 3.0
+
+
+def test_a_shortfall_covers_no_other_robot_if_it_can():
+    rows, columns = said([[300.0, 90.0], [150.0, 50.0], [175.0, 50.0]], [1])
+    assert columns.max() < 145
+    assert abs(np.mean(rows) - 50.0) < 3.0
+
+
+def test_shortfalls_do_not_cover_each_other():
+    """Around one place there is room for four, and what more there is is left out."""
+    four, eight = (len(said([[200.0, 80.0]] * num, range(num))[0]) for num in (4, 8))
+    assert four == eight > 0
+
+
+def test_a_shortfall_stands_on_dark_ground():
+    picture = blank(400, 160)
+    draw = ImageDraw.Draw(picture)
+    draw.rectangle((0, 0, 400, 160), (255, 255, 255))
+    one = np.array([0], dtype=np.int16)
+    draw_shortfalls(draw, np.array([[200.0, 80.0]]), one, one - 9, 12)
+    rows, columns = np.nonzero(has(picture, palette.TOO_WEAK, 60))
+    around = np.asarray(picture)[rows.min() - 1, columns.min() : columns.max()]
+    assert np.all(around == palette.BACKGROUND)
 
 
 def test_the_title_counts_who_is_cut_off():

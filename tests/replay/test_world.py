@@ -9,10 +9,10 @@ from swarm_mj.physics.arenas import BLOCK_M
 
 def test_lines_are_the_links_that_surprise(blocked, blocked_replay):
     looks, position_m = blocked.log.looks, blocked.log.position_m
-    for kind, pieces in (("too_weak", 2), ("unbelieved", 1)):
+    for kind, dashes in (("too_weak", 4), ("unbelieved", 1)):
         links = looks.surprises.by_kind[kind]
         start_m = position_m[looks.window[links.row] - 1, links.sender]
-        for view, axes in (("arena", 2), ("scene", 3)):
+        for view, axes, pieces in (("arena", 2, dashes), ("scene", 3, 1)):
             entity, component = f"/{view}/world/{kind}", f"LineStrips{axes}D:strips"
             expected = pieces * np.bincount(links.row, minlength=len(looks.window))
             np.testing.assert_array_equal(counts(blocked_replay, entity, component), expected)
