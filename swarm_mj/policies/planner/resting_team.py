@@ -82,7 +82,7 @@ class RestingTeam:
             known_until: [j, i]: the slot in which i told what reached j last, or a negative number.
         """
         if self._times is not None and slot > 0:
-            self._note(heard, known_until)
+            self._note(self._times, slot, heard, known_until)
             self._pass_on(heard)
             self._keep_time(self._times, slot, known_until)
             self._joined[can_plan] = np.minimum(self._joined[can_plan], slot)
@@ -101,10 +101,17 @@ class RestingTeam:
         self._transmitted = transmits
         return transmits
 
-    def _note(self, heard: Int[np.ndarray, "N"], known_until: Int[np.ndarray, "N N"]) -> None:
+    def _note(
+        self,
+        times: "CommonTimes",
+        slot: int,
+        heard: Int[np.ndarray, "N"],
+        known_until: Int[np.ndarray, "N N"],
+    ) -> None:
         """What the slot before taught those who followed a plan in it."""
         observation = no_observation(len(self._everyone))
-        knows_all = np.all(self._joined[None, :] <= known_until, axis=1)
+        is_silent = known_until < slot - times.round_slots  # so nothing that it told is awaited
+        knows_all = np.all(is_silent | (self._joined[None, :] <= known_until), axis=1)
         for robots, flight in self._followed:
             observe(
                 robots & ~self._transmitted,
@@ -159,6 +166,7 @@ class CommonTimes:
 
     def __init__(self, num_robots: int, settings: LearningSettings) -> None:
         slots = SLOTS_PER_WINDOW * max(num_robots, settings.min_round_windows)
+        self.round_slots = slots
         self._first = round(settings.first_rounds * slots)
         self._length = round(settings.flown_rounds * slots)
         self._spread = round(settings.spread_rounds * slots)
