@@ -155,7 +155,9 @@ def test_a_team_that_should_rest_but_moves_plans_as_teams_that_move():
     """Robots are pushed to and fro; the age is that of snapshots, not that of turns."""
 
     def push(buffers, states):
-        return np.where(states.velocity_mps <= 0.0, 1.0, -1.0)
+        own = np.arange(buffers.shape[1])
+        assert states.velocity_mps.shape == buffers.velocity_mps[:, own, own].shape
+        return np.where(buffers.velocity_mps[:, own, own] <= 0.0, 1.0, -1.0)
 
     mission, age = paper("stationary", num_robots=12, range_ratio=0.3), {}
     for name in ("planner", NAME):
