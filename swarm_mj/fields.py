@@ -167,7 +167,7 @@ def check_value(spec: Field[Any], value: Any, called: str = "") -> None:  # noqa
 def _check_choice(label: str, value: Any, choices: Sequence[str], *, is_joined: bool) -> None:  # noqa: ANN401 - any field's value
     """Passes if a value is one of the choices, or several of them joined by commas."""
     several = is_joined and isinstance(value, str)
-    for each in value.split(",") if several else [value]:
+    for each in map(str.strip, value.split(",")) if several else [value]:
         if each not in choices:
             joined = ", or several joined by commas" if is_joined else ""
             raise ValueError(

@@ -83,7 +83,9 @@ def _windows(value: float | int | None, mission: Mission, digits: int, word: str
     """A time in windows and in seconds, or that it never came."""
     if value is None:
         return "never"
-    return f"{word} {value:.{digits}f} windows ({value * mission.window_s:.2g} s)".strip()
+    number = f"{value:.{digits}f}"
+    windows = "window" if number == "1" else "windows"
+    return f"{word} {number} {windows} ({value * mission.window_s:.2g} s)".strip()
 
 
 def _packets(numbers: Mapping[str, Any]) -> dict[str, str]:

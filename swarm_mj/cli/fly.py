@@ -25,6 +25,7 @@ from swarm_mj.io.atomic import write_json
 from swarm_mj.io.interrupt import deferred_interrupt, heard_interrupt
 from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
+from swarm_mj.physics.arenas import notes_on
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import (
     check_used,
@@ -93,6 +94,8 @@ def run(options: Options) -> int:
         recorder = _recorder(options, swarm, policy) if path else None
         if was_pressed():
             raise KeyboardInterrupt
+    for note in notes_on(mission):
+        console.print(note)
     bar = WorkBar("Flying", mission.num_windows, "windows", console=console)
     way_on = None if options.yes else "; --yes flies on all the same"
     flown = fly_swarm(swarm, policy, recorder, bar, way_on=way_on)
@@ -112,7 +115,8 @@ def run(options: Options) -> int:
     for label, line in _next_commands(options, path):
         out.print(f"{label:18}{line}")
     if flown.code != DONE:
-        told = f"{flown.ending} after {len(flown.windows)} of {mission.num_windows} windows."
+        flown_of = f"{len(flown.windows)} of {mission.num_windows}"
+        told = f"{flown.ending} after {flown_of} window{'s' * (mission.num_windows != 1)}."
         console.print(told)
         return flown.code
     return run_viewer(view_command(path)) if options.view and path else DONE

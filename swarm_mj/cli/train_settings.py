@@ -19,7 +19,7 @@ from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.parts import GROUP, OwnParts, is_own
 from swarm_mj.policies.policy_config import PolicyConfig
-from swarm_mj.protocol.packets import fitting, packet_of, slot_bytes
+from swarm_mj.protocol.packets import check_whole
 
 PARTS = {
     "": Training,
@@ -171,13 +171,7 @@ def _groups(missions: int, num_sizes: int) -> int:
 def _check(training: Training) -> None:
     """Raises ValueError for settings that are sound one by one, but not together."""
     for size in training.robots:
-        mission = replace(training.mission, num_robots=size)
-        packet = packet_of(mission)
-        if fitting(packet, mission, "T, M and P").num_entries < size:
-            raise ValueError(
-                f"training reckons with whole packets, here of {packet.num_bytes} bytes, but a "
-                f"slot holds {slot_bytes(mission)}; choose a higher --bit-rate, or fewer --robots"
-            )
+        check_whole("training", replace(training.mission, num_robots=size))
     if training.reward == "velocity-variance" and training.mission.task != "flocking":
         raise ValueError(
             "reward velocity-variance depends on who talks only if the robots flock; add --task "

@@ -25,6 +25,7 @@ from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.parts import OwnParts
 from swarm_mj.physics.scene import Scene
 from swarm_mj.protocol.costs import WindowCosts, age_of_information, velocity_variance
+from swarm_mj.protocol.packets import check_whole
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.swarm import CALLED_WITH, Swarm
 
@@ -260,4 +261,6 @@ def _checked(reward: str, mission: Mission, controller: Controller | None) -> st
             "reward credit needs robots that do not fail, but switched_off is "
             f"{mission.switched_off:g}; set it to 0, or choose reward aoi"
         )
+    if reward == "credit":
+        check_whole("reward credit", mission)
     return reward

@@ -64,8 +64,10 @@ def _radio_choice(default: str, label: str, source: str, choices: object, help: 
 
 
 def in_order(known: str) -> str:
-    """Grants as they are kept: each once, in one order, joined by commas."""
-    grants = dict.fromkeys(known.split(","))
+    """Grants as they are kept: each once, in one order, joined by commas; what is none stays."""
+    grants = dict.fromkeys(name.strip() for name in known.split(","))
+    if NOTHING in grants and len(grants) > 1:
+        return known
     named = [name for name in KNOWABLE if name in grants]
     return ",".join([*named, *(name for name in grants if name not in KNOWABLE)])
 

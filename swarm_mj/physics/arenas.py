@@ -4,15 +4,19 @@ Their geoms are obstacles (`physics.solid_geoms`): packets lose power in them an
 physics, robots turn round at them.
 """
 
+import math
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from xml.etree import ElementTree
 
 from mujoco._enums import mjtGeom
 from mujoco._specs import MjSpec
 
+from swarm_mj.fields import did_you_mean
 from swarm_mj.mission import Mission
 from swarm_mj.mission.specification import OPEN
-from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP, obstacles_of
+from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP, idle_obstacles, obstacles_of
 
 Arena = Callable[[MjSpec, Mission], None]  # adds what stands in the area
 
@@ -22,6 +26,7 @@ BLOCK_M = 110.0  # side of a city block; the rest of the pitch is street
 ROOM_M = 170.0  # side of a room
 DOOR_M = 25.0  # width of the door in the middle of every wall between two rooms
 WALL_M = 1.0  # thickness of these walls
+NAMING = ("name", "class", "childclass", "material", "mesh", "file")  # attributes that are text
 TREES_PER_KM2 = 100.0
 TREE_RADIUS_M = 6.0
 COLOURS = {
@@ -37,13 +42,30 @@ def arena_of(mission: Mission) -> Arena | None:
     Raises:
         ValueError: There is no such arena, and no such file.
     """
-    if mission.arena in ARENAS:
-        return ARENAS[mission.arena]
-    if not Path(mission.arena).is_file():
-        raise ValueError(
-            f"arena must be one of {', '.join(ARENAS)}, or an MJCF file, not {mission.arena!r}"
-        )
-    return _from_file
+    name = mission.arena
+    if name in ARENAS:
+        return ARENAS[name]
+    if os.path.isfile(name):
+        return _from_file
+    if os.path.isdir(name):
+        raise ValueError(f"arena {name} is a directory; name an MJCF file in it")
+    if Path(name).suffix or os.sep in name:
+        raise ValueError(f"arena {name}: there is no such file")
+    raise ValueError(
+        f"arena must be one of {', '.join(ARENAS)}, or an MJCF file, not {name!r}"
+        f"{did_you_mean(name, ARENAS)}"
+    )
+
+
+def notes_on(mission: Mission) -> list[str]:
+    """What a user should know of the obstacles in a file: those that nothing can touch."""
+    if arena_of(mission) is not _from_file:
+        return []
+    names = idle_obstacles(_read(mission.arena).compile(), _reach_m(mission))
+    return [
+        f"arena {mission.arena}: {name} does nothing, as it stands {where}"
+        for name, where in names.items()
+    ]
 
 
 def blocks(spec: MjSpec, mission: Mission) -> None:
@@ -90,22 +112,63 @@ def _from_file(spec: MjSpec, mission: Mission) -> None:
     Raises:
         ValueError: MuJoCo does not take it, something moves in it, or it has no obstacle.
     """
+    theirs = _read(mission.arena)
     try:
-        theirs = MjSpec.from_file(mission.arena)
-        obstacles = obstacles_of(theirs.compile())
+        model = theirs.compile()
+        num_obstacles = len(obstacles_of(model).kind)
     except ValueError as error:
-        said = " ".join(str(error).split())
-        raise ValueError(f"arena {mission.arena}: {said}") from error
+        raise _refused(mission.arena, error) from error
     if theirs.joints:
         moves = theirs.joints[0].parent.name or "a body without a name"
         raise ValueError(f"arena {mission.arena}: {moves} has a joint, but obstacles stand still")
-    if len(obstacles.kind) == 0:
+    if num_obstacles == 0:
+        raise ValueError(f"arena {mission.arena} has no obstacle: {_why_none(theirs)}")
+    idle = idle_obstacles(model, _reach_m(mission))
+    if len(idle) == num_obstacles:
+        name, where = next(iter(idle.items()))
         raise ValueError(
-            f"arena {mission.arena} has no obstacle, as none of its geoms is of group "
-            f'{OBSTACLE_GROUP}; give walls group="{OBSTACLE_GROUP}", or choose arena {OPEN}'
+            f"arena {mission.arena}: no obstacle can do anything; {name} stands {where}"
         )
     spec.nuser_geom = max(spec.nuser_geom, theirs.nuser_geom)  # or their losses would be cut off
     spec.attach(theirs, frame=spec.worldbody.add_frame(), prefix="arena/")
+
+
+def _read(file: str) -> MjSpec:
+    """An MJCF file; raises ValueError in our words, as MuJoCo's are of its parser, or of a log."""
+    try:
+        for element in ElementTree.parse(file).iter():
+            for name, value in element.attrib.items():
+                if name not in NAMING and "nan" in value.lower().split():
+                    named = element.get("name", "without a name")
+                    raise ValueError(f"{element.tag} {named} has a nan in {name}")
+        return MjSpec.from_file(file)
+    except ElementTree.ParseError as error:
+        line, said = error.position[0], str(error).partition(":")[0]
+        raise ValueError(f"arena {file}, line {line}: not well-formed XML ({said})") from error
+    except ValueError as error:
+        raise _refused(file, error) from error
+
+
+def _refused(file: str, error: ValueError) -> ValueError:
+    said = " ".join(str(error).split())
+    return ValueError(f"arena {file}: {said}")
+
+
+def _reach_m(mission: Mission) -> float:
+    """How far from the middle, per axis, robots can get [m]."""
+    return mission.half_side_m if mission.has_walls else math.inf
+
+
+def _why_none(theirs: MjSpec) -> str:
+    """Why a file holds no obstacle, and what to do."""
+    grouped = [geom for geom in theirs.geoms if geom.group == OBSTACLE_GROUP]
+    if not theirs.geoms:
+        why = "it has no geom; add walls"
+    elif grouped:
+        why = f"its geoms of group {OBSTACLE_GROUP} are planes or height fields; give it boxes"
+    else:
+        why = f'none of its geoms is of group {OBSTACLE_GROUP}; give walls group="{OBSTACLE_GROUP}"'
+    return f"{why}, or choose arena {OPEN}"
 
 
 def _grid(num: int, pitch_m: float) -> Iterator[tuple[float, float]]:

@@ -6,6 +6,7 @@ A geom of group `OBSTACLE_GROUP` that stands still is an obstacle. Its penetrati
 """
 
 import numpy as np
+from jaxtyping import Float
 from mujoco._functions import mj_kinematics
 from mujoco._structs import MjData, MjModel
 
@@ -17,6 +18,7 @@ from swarm_mj.physics.obstacles import (
     SPHERE,
     Obstacles,
 )
+from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M
 
 OBSTACLE_GROUP = 1
 MESH = 7  # as MuJoCo numbers it
@@ -61,6 +63,39 @@ def obstacle_geoms(model: MjModel) -> list[int]:
     is_solid = np.isin(model.geom_type, (*KINDS, MESH))
     is_obstacle = stands_still & is_solid & (model.geom_group == OBSTACLE_GROUP)
     return np.flatnonzero(is_obstacle).tolist()
+
+
+def idle_obstacles(model: MjModel, reach_m: float) -> dict[str, str]:
+    """Obstacles that neither robots nor their packets can meet, and where they stand.
+
+    Args:
+        model: Compiled.
+        reach_m: How far from the middle, per axis, robots can get [m].
+    """
+    found, idle = obstacles_of(model), {}
+    for o, g in enumerate(obstacle_geoms(model)):
+        half_m = np.abs(found.rotation[o]) @ _half_sides_m(int(found.kind[o]), found.size_m[o])
+        half_m = np.minimum(half_m, found.reach_m[o])
+        name = f"geom {model.geom(g).name or f'number {g}'}"
+        off_m = np.abs(found.centre_m[o] - [0.0, 0.0, ROBOT_HEIGHT_M]) - half_m
+        if np.any(off_m[:2] > reach_m):
+            idle[name] = f"outside the area of {2 * reach_m:.0f} m by {2 * reach_m:.0f} m"
+        elif off_m[2] > ROBOT_RADIUS_M:
+            side = "above" if found.centre_m[o, 2] > ROBOT_HEIGHT_M else "below"
+            idle[name] = f"{side} the robots, which are {ROBOT_HEIGHT_M:g} m above the floor"
+    return idle
+
+
+def _half_sides_m(kind: int, size_m: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    """Of the box around an obstacle, in its own frame [m]."""
+    radius_m, length_m = size_m[0], size_m[1]
+    if kind == SPHERE:
+        return np.full(3, radius_m)
+    if kind == CAPSULE:
+        return np.array([radius_m, radius_m, radius_m + length_m])
+    if kind == CYLINDER:
+        return np.array([radius_m, radius_m, length_m])
+    return size_m
 
 
 def loss_db_of(model: MjModel, g: int) -> float:

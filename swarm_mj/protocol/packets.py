@@ -176,10 +176,21 @@ def fitting(packet: Packet, mission: Mission, policy: str) -> Packet:
         needed = least_bit_rate(least.num_bytes, mission)
         raise ValueError(
             f"packets of {policy} need {least.num_bytes} bytes for a single entry, but a slot "
-            f"holds {capacity} at {bits_per_second(rate)}; choose a bit rate of {needed:g} or more"
+            f"holds {capacity} bytes at {bits_per_second(rate)}; choose a bit rate of {needed:g} "
+            "or more"
         )
     spare = BITS_PER_BYTE * (capacity - least.num_bytes)
     return replace(packet, num_entries=1 + spare // _num_bits(packet.entry))
+
+
+def check_whole(what: str, mission: Mission) -> None:
+    """Raises ValueError, naming what needs it, unless a slot holds a whole buffer."""
+    packet = packet_of(mission)
+    if fitting(packet, mission, "T, M and P").num_entries < mission.num_robots:
+        raise ValueError(
+            f"{what} reckons with whole packets, here of {packet.num_bytes} bytes, but a slot "
+            f"holds {slot_bytes(mission)} bytes; choose a higher bit rate, or fewer robots"
+        )
 
 
 def _num_bits(fields: tuple[PacketField, ...]) -> int:

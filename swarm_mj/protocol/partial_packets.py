@@ -27,10 +27,10 @@ class PartialBuffers(Buffers):
 
 def with_room(buffers: Buffers, num_entries: int) -> Buffers:
     """The same buffers, of which so many entries fit into a packet."""
+    if isinstance(buffers, PartialBuffers):
+        return replace(buffers, num_entries=min(num_entries, buffers.shape[1]))
     if num_entries >= buffers.shape[1]:
         return buffers
-    if isinstance(buffers, PartialBuffers):
-        return replace(buffers, num_entries=num_entries)
     arrays = {spec.name: getattr(buffers, spec.name) for spec in fields(Buffers)}
     told = np.full(buffers.timestamp.shape, NEVER)
     return PartialBuffers(**arrays, num_entries=num_entries, told=told)

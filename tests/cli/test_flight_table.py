@@ -113,6 +113,11 @@ def test_what_packets_carry_and_who_decides(policy, carried, decider):
     assert rows["who decides"] == decider
 
 
+def test_one_window_is_no_windows():
+    rows, _ = shown("tdma", "flocking", summary(**BROADCAST, complete_window=1.0))
+    assert rows["everyone had heard of everyone"] == "after 1 window (0.1 s)"
+
+
 def test_ages_are_told_in_windows_and_seconds_and_explained():
     rows, text = shown("tdma", "flocking", summary(**BROADCAST))
     assert rows["age of information, mean"] == "12.50 windows (1.2 s)"

@@ -164,7 +164,7 @@ def test_contact_physics_flies(swarm_mj, tmp_path, boundary):
         (["--bit-rate", "0"], "bit rate must be a number from 1 to 1e+12 [bit/s], not 0"),
         (
             ["--policy", "tdma", "--bit-rate", "2k"],
-            "need 16 bytes for a single entry, but a slot holds 12 at 2 kbit/s; choose a bit rate",
+            "need 16 bytes for a single entry, but a slot holds 12 bytes at 2 kbit/s; choose",
         ),
         (["--wings", "2"], "unrecognized arguments: --wings 2"),
     ],

@@ -54,7 +54,7 @@ REFUSED = [
     ((*NEW, "--range-ratio", "nan"), "not nan"),
     (
         (*NEW, "--robots", "10", "--bit-rate", "10k"),
-        "whole packets, here of 94 bytes, but a slot holds 62; choose a higher --bit-rate",
+        "whole packets, here of 94 bytes, but a slot holds 62 bytes; choose a higher bit rate",
     ),
     ((*NEW, "--windows", "0"), "from 1 to 100000 [windows], not 0"),
     ((*NEW, "--seed", "-1"), "seed must be a whole number from 0 to 9223372036854775807, not -1"),

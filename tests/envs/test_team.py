@@ -166,6 +166,7 @@ def test_drawn_seeds_are_none_of_an_evaluations():
             "reward must be one of aoi, velocity-variance, task-cost, credit, not 'age'",
         ),
         ({"reward": "credit", "switched_off": 0.2}, "switched_off is 0.2; set it to 0"),
+        ({"reward": "credit", "bit_rate": 5000.0}, "reward credit reckons with whole packets"),
         ({"mission": "stationary", "reward": "task-cost"}, "stationary has none; choose"),
         ({"features": "mine"}, "features must be one of"),
         ({"preset": "mine"}, "preset must be one of"),

@@ -205,6 +205,7 @@ def test_what_the_channel_has_beyond_free_space_is_told_in_words(fields, said):
         ("nothing", "nothing"),
         ("start", "start"),
         ("start,map,statistics,map", "map,statistics,start"),
+        ("start, map", "map,start"),
     ],
 )
 def test_what_is_known_has_one_order(given, kept):
@@ -220,7 +221,7 @@ def test_what_is_known_has_one_order(given, kept):
         ("mapp", "not 'mapp'; did you mean map?"),
         ("map,", "or several joined by commas, not ''"),
         ("map statistics", "not 'map statistics'"),
-        ("map,nothing", "nothing or some of map, statistics, start, not nothing,map"),
+        ("map,nothing", "nothing or some of map, statistics, start, not map,nothing"),
         (3, "not 3"),
     ],
 )

@@ -1,12 +1,14 @@
 """Shipped arenas: they grow with the team, robots start in free space and never enter a wall."""
 
+import re
+from dataclasses import replace
 from itertools import combinations, groupby
 
 import numpy as np
 import pytest
 
 from swarm_mj.mission import PRESETS, paper, reference
-from swarm_mj.physics.arenas import ARENAS
+from swarm_mj.physics.arenas import ARENAS, notes_on
 from swarm_mj.physics.scene import compose
 from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP, obstacles_of
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M
@@ -109,3 +111,57 @@ def test_robots_of_the_urban_preset_lose_each_other_behind_blocks_and_find_each_
         lasting = [is_linked for is_linked, length in runs if length >= 20]
         num_found += [True, False, True] in [lasting[k : k + 3] for k in range(len(lasting))]
     assert num_found > 5
+
+
+def refusal(tmp_path, text, **fields):
+    file = tmp_path / "mine.xml"
+    file.write_text(text)
+    with pytest.raises(ValueError, match=r"mine\.xml") as caught:
+        compose(paper(arena=str(file), **fields))
+    return str(caught.value)
+
+
+def test_names_that_are_no_arena_are_refused_with_what_is_wrong(tmp_path):
+    for name, said in (
+        ("bloks", "not 'bloks'; did you mean blocks?"),
+        ("nofile.xml", "arena nofile.xml: there is no such file"),
+        (str(tmp_path), "is a directory; name an MJCF file in it"),
+    ):
+        with pytest.raises(ValueError, match=re.escape(said)):
+            compose(paper(arena=name))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (PILLAR.replace('"20 5"', '20 5"'), "line 2: not well-formed XML"),
+        ("", "line 1: not well-formed XML"),
+        (PILLAR.replace('group="1"', 'group="1" user="nan"'), "geom pillar has a nan in user"),
+        (PILLAR.replace('group="1"', ""), "none of its geoms is of group 1"),
+        ("<mujoco/>", "has no obstacle: it has no geom"),
+        (PILLAR.replace('cylinder" size="20 5', 'plane" size="20 5 1'), "are planes or height"),
+        (
+            PILLAR.replace("0 0 5", "520.1 0 5"),
+            "pillar stands outside the area of 1000 m by 1000 m",
+        ),
+        (PILLAR.replace("0 0 5", "0 0 6.6"), "pillar stands above the robots, which are 1 m"),
+        (PILLAR.replace("0 0 5", "0 0 -4.6"), "pillar stands below the robots, which are 1 m"),
+    ],
+)
+def test_a_file_that_can_be_no_arena_is_refused_with_what_is_wrong(tmp_path, text, said, capfd):
+    message = refusal(tmp_path, text)
+    assert said in message
+    assert "\n" not in message
+    assert capfd.readouterr().err == ""  # MuJoCo would warn of a nan, and log it
+
+
+def test_obstacles_that_nothing_can_touch_are_named_if_others_can_be(tmp_path):
+    """The pillar's radius is 20 m: at 519 m it stands 1 m within an area of 1 km."""
+    far = '<geom name="far" type="cylinder" size="20 5" pos="-521 0 5" group="1"/></worldbody>'
+    file = tmp_path / "two.xml"
+    file.write_text(PILLAR.replace("0 0 5", "519 0 5").replace("</worldbody>", far))
+    mission = paper("random-walk", arena=str(file))
+    (note,) = notes_on(mission)
+    assert note.endswith("geom far does nothing, as it stands outside the area of 1000 m by 1000 m")
+    assert notes_on(replace(mission, boundary="none")) == []  # robots may get there
+    assert notes_on(paper(arena="blocks")) == []

@@ -107,7 +107,7 @@ def test_entries_that_fit_to_the_byte():
 
 def test_no_room_for_one_entry_is_refused_with_the_rate_that_is_needed():
     mission = paper(bit_rate=15 * 160.0)
-    message = r"of mine need 16 bytes for a single entry, but a slot holds 15 at 2.4 kbit/s; "
+    message = r"of mine need 16 bytes for a single entry, but a slot holds 15 bytes at 2.4 kbit/s; "
     with pytest.raises(ValueError, match=message + "choose a bit rate of 2560 or more"):
         fitting(packet_of(mission), mission, "mine")
 

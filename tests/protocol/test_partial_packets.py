@@ -88,3 +88,18 @@ def test_a_rate_with_room_for_all_changes_nothing():
         swarm, policy = Swarm(mission, [4]), make_policy("gossip", mission)
         courses.append([float(swarm.step(policy).age_windows[0]) for _ in range(30)])
     assert courses[0] == courses[1]
+
+
+def test_room_grows_again_up_to_the_whole_buffer():
+    buffers = with_room(five_robots(3), 10)
+    assert buffers.num_entries == 5
+    assert sent_by_0(buffers) == [0, 1, 2, 3, 4]
+    assert with_room(with_room(five_robots(3), 2), 4).num_entries == 4
+
+
+def test_a_policy_flown_after_one_with_a_payload_has_its_own_room():
+    mission = paper("stationary", num_robots=12, bit_rate=160.0 * 200)
+    swarm = Swarm(mission, [1])
+    swarm.buffers = with_room(swarm.buffers, 3)  # as a policy with a payload leaves them
+    swarm.step(make_policy("tdma", mission))
+    assert swarm.buffers.num_entries == 12

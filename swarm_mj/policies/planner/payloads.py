@@ -24,6 +24,7 @@ from swarm_mj.protocol.packets import (
     age,
     bits_for,
     bits_per_second,
+    fitting,
     identity,
     least_bit_rate,
     packet_of,
@@ -90,9 +91,10 @@ def snapshot_form(mission: Mission) -> SnapshotForm:
         return whole
     least = packet_of(mission, lean.fields).num_bytes
     if mission.bit_rate is not None and least > capacity:
+        fitting(packet_of(mission), mission, "planner")  # or nothing fits, which it says
         raise ValueError(
-            f"packets of planner need {least:,} bytes at least, but a slot holds {capacity:,} at "
-            f"{bits_per_second(mission.bit_rate)}; choose a bit rate of "
+            f"packets of planner need {least:,} bytes at least, but a slot holds {capacity:,} "
+            f"bytes at {bits_per_second(mission.bit_rate)}; choose a bit rate of "
             f"{least_bit_rate(least, mission):g} or more, or planner --payload none"
         )
     return lean

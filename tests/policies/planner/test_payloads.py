@@ -47,11 +47,17 @@ def test_the_richest_form_that_fits_to_the_byte(room, payload):
 
 def test_what_does_not_fit_is_refused_with_the_ways_out():
     message = (
-        "packets of planner need 721 bytes at least, but a slot holds 720 at 115.2 kbit/s; "
+        "packets of planner need 721 bytes at least, but a slot holds 720 bytes at 115.2 kbit/s; "
         "choose a bit rate of 115360 or more, or planner --payload none"
     )
     with pytest.raises(ValueError, match=re.escape(message)):
         snapshot_form(holding(720))
+
+
+def test_a_rate_at_which_nothing_fits_is_not_told_to_fly_without_a_payload():
+    with pytest.raises(ValueError, match=r"for a single entry, but a slot holds 0 bytes") as caught:
+        snapshot_form(paper("random-walk", bit_rate=10.0))
+    assert "--payload" not in str(caught.value)
 
 
 def snapshots_of_three(now):
