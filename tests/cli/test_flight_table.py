@@ -102,7 +102,7 @@ def test_nothing_sent_has_no_shares():
 @pytest.mark.parametrize(
     ("policy", "carried", "decider"),
     [
-        ("planner", "the sender's buffer and snapshots", "each robot by itself"),
+        ("planner", "the sender's buffer and links", "each robot by itself"),
         (WITHOUT_PAYLOAD, "the sender's buffer", "each robot by itself"),
         ("round-robin", "the sender's buffer", "a centre that is told where all are"),
     ],
