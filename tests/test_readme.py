@@ -37,7 +37,8 @@ CUT_SHORT = {
     "train --resume": "--budget 80",
 }
 ONLY_PARSED = "--minutes 30"  # the page trains a shorter while before
-PROGRAM = re.compile(r"^# (?P<name>[a-z_]+\.py)\n")  # a block that is a file says so in line 1
+# A block that is a file says so in line 1.
+FILE = re.compile(r"^(?:# (?P<program>[a-z_]+\.py)|<!-- (?P<scene>[a-z_]+\.xml) -->)\n")
 
 
 class Block(NamedTuple):
@@ -57,7 +58,8 @@ BLOCKS = [
 RUN = {
     page: list(blocks)
     for page, blocks in groupby(
-        (b for b in BLOCKS if b.language in ("python", "sh") and not b.reason), lambda b: b.page
+        (b for b in BLOCKS if b.language in ("python", "sh", "xml") and not b.reason),
+        lambda b: b.page,
     )
 }
 LINES = [
@@ -98,9 +100,10 @@ def test_a_page_runs_from_top_to_bottom(page, page_folder, forks):
             for _, line in (each for each in LINES if each[1] in block.code):
                 run_command(line, page_folder, forks)
             continue
-        if program := PROGRAM.match(block.code):
-            (page_folder / program["name"]).write_text(block.code)
-        exec(compile(block.code, page, "exec"), namespace)
+        if file := FILE.match(block.code):
+            (page_folder / (file["program"] or file["scene"])).write_text(block.code)
+        if block.language == "python":
+            exec(compile(block.code, page, "exec"), namespace)
 
 
 def run_command(line, folder, forks):

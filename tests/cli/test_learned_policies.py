@@ -114,10 +114,12 @@ def test_a_long_name_leaves_the_table_whole(capsys, runs):
     for policy in ("runs/y", name):
         assert main(["evaluate", *SMALL, "--policy", "mst", policy, "--episodes", "3"]) == 0
         printed = capsys.readouterr().out
-        assert re.search(r"median +difference packets +velocity published$", printed, re.MULTILINE)
+        assert re.search(
+            r"median +difference packets hearers +velocity published$", printed, re.MULTILINE
+        )
         assert "…" not in printed
-        (row,) = (line for line in printed.splitlines() if line.startswith(policy))
-        assert "±" in row
+        told = [line for line in printed.splitlines() if line.startswith(policy)]
+        (row,) = (line for line in told if "±" in line)  # what teams send may begin with it, too
         assert len(row.split()) == 10
 
 

@@ -137,7 +137,7 @@ def test_broadcasts_by_hand():
     assert planner.packets_per_window == pytest.approx(1500 / (4 * 500))
     assert (planner.heard_ratio, planner.hearers_per_packet) == (0.4, 1.6)
     assert planner.delivery_ratio is None
-    assert planner.payload == "snapshots"
+    assert planner.payload == "links"
 
 
 def test_differences_are_paired():

@@ -194,8 +194,12 @@ class LearningMind:
 
     def note(self, slot):
         """What it decoded or missed in a slot of which it knows who transmitted."""
+        # Whoever told nothing younger for a round is not waited for.
+        least = (
+            slot + 2 - 2 * max(self.mission.num_robots, self.settings.learning.min_round_windows)
+        )
         knows_all = len(self.told) == self.mission.num_robots and all(
-            told.follows for told in self.told.values()
+            told.follows or told.slot < least for told in self.told.values()
         )
         if self.plan is None or self.transmitted or not knows_all:
             return
