@@ -157,6 +157,12 @@ def bits_per_second(rate: float) -> str:
     return f"{rate:.4g} bit/s"
 
 
+def fits(packet: Packet, mission: Mission) -> bool:
+    """Whether a slot of the mission holds a packet."""
+    capacity = slot_bytes(mission)
+    return capacity is None or packet.num_bytes <= capacity
+
+
 def fitting(packet: Packet, mission: Mission, policy: str) -> Packet:
     """A packet with as many entries as a slot of the mission holds.
 
@@ -169,7 +175,7 @@ def fitting(packet: Packet, mission: Mission, policy: str) -> Packet:
         ValueError: The slot does not hold the payload and one entry.
     """
     rate, capacity = mission.bit_rate, slot_bytes(mission)
-    if rate is None or capacity is None or packet.num_bytes <= capacity:
+    if rate is None or capacity is None or fits(packet, mission):
         return packet
     least = replace(packet, num_entries=1)
     if least.num_bytes > capacity:

@@ -10,11 +10,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from swarm_mj.compiled import compiled
-from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.physics.obstacles import Obstacles
 from swarm_mj.physics.state import ROBOT_HEIGHT_M
 from swarm_mj.radio.obstruction import obstruct
-from swarm_mj.radio.path_loss import PathLoss, power_after
+from swarm_mj.radio.power_law import PowerLaw, write_path_loss
 from swarm_mj.radio.shadowing import (
     NUM_WAVES,
     STEPS_PER_CORRELATION,
@@ -29,29 +28,19 @@ from swarm_mj.radio.shadowing import (
 class LinkGains:
     """Received powers in B missions of N robots, for one place of the robots at a time."""
 
-    def __init__(
-        self,
-        at_1_m_mw: Float[np.ndarray, "N"],
-        path_loss: PathLoss,
-        shadowing: Shadowing | None,
-        obstacles: Obstacles | None,
-    ) -> None:
+    def __init__(self, law: PowerLaw, shadowing: Shadowing | None) -> None:
         """Takes what the powers follow from.
 
         Args:
-            at_1_m_mw: Power of each robot's packets after one metre [mW].
-            path_loss: The law.
+            law: Powers after one metre [mW], path loss and obstacles.
             shadowing: Its numbers, or None.
-            obstacles: Of the scene, or None.
         """
-        self._at_1_m_mw = at_1_m_mw
-        self._path_loss = path_loss
+        self._law = law
         self._shadowing = shadowing
-        self._obstacles = obstacles
 
     def start(self, rngs: Sequence[np.random.Generator]) -> None:
         """Starts new missions, each with its own shadowing and its own generator."""
-        num_missions, num_robots = len(rngs), len(self._at_1_m_mw)
+        num_missions, num_robots = len(rngs), len(self._law.at_1_m)
         self._position_m = np.full((num_missions, num_robots, 2), np.nan)
         self._is_done = np.zeros((num_missions, num_robots), dtype=np.bool_)
         self._received_mw = np.zeros((num_missions, num_robots, num_robots))
@@ -79,15 +68,7 @@ class LinkGains:
         """
         is_asked = np.zeros_like(self._is_done)
         if _ask(position_m, mission, is_sender, self._position_m, self._is_done, is_asked):
-            law = self._path_loss
-            _lose(
-                self._position_m,
-                is_asked,
-                self._at_1_m_mw,
-                law.breakpoint_m,
-                law.exponent,
-                self._received_mw,
-            )
+            _lose(self._position_m, is_asked, self._law, self._received_mw)
             if self._shadowing is not None:
                 _shadow(
                     self._position_m,
@@ -99,10 +80,7 @@ class LinkGains:
                     self._ends,
                     self._received_mw,
                 )
-            if self._obstacles is not None:
-                obstruct(
-                    self._position_m, ROBOT_HEIGHT_M, is_asked, self._obstacles, self._received_mw
-                )
+            _obstruct(self._position_m, is_asked, self._law.obstacles, self._received_mw)
         return self._received_mw
 
 
@@ -137,22 +115,28 @@ def _ask(
 def _lose(
     position_m: Float[np.ndarray, "B N 2"],
     is_asked: Bool[np.ndarray, "B N"],
-    at_1_m_mw: Float[np.ndarray, "N"],
-    breakpoint_m: float,
-    exponent: float,
+    law: PowerLaw,
     received_mw: Float[np.ndarray, "B N N"],
 ) -> None:
-    """What path loss leaves; nobody receives itself."""
-    num_missions, num_robots = is_asked.shape
-    for b in range(num_missions):
-        for i in range(num_robots):
+    """What path loss leaves."""
+    for b in range(is_asked.shape[0]):
+        for i in range(is_asked.shape[1]):
             if is_asked[b, i]:
-                for j in range(num_robots):
-                    apart_m2 = squared_distance(position_m[b], i, j)
-                    received_mw[b, i, j] = power_after(
-                        at_1_m_mw[i], apart_m2, breakpoint_m, exponent
-                    )
-                received_mw[b, i, i] = 0.0
+                write_path_loss(i, position_m[b], law, received_mw[b, i])
+
+
+@compiled()
+def _obstruct(
+    position_m: Float[np.ndarray, "B N 2"],
+    is_asked: Bool[np.ndarray, "B N"],
+    obstacles: Obstacles,
+    received_mw: Float[np.ndarray, "B N N"],
+) -> None:
+    """What obstacles leave."""
+    for b in range(is_asked.shape[0]):
+        for i in range(is_asked.shape[1]):
+            if is_asked[b, i]:
+                obstruct(i, position_m[b], ROBOT_HEIGHT_M, obstacles, received_mw[b, i])
 
 
 @compiled()

@@ -17,7 +17,7 @@ from swarm_mj.radio.free_space import (
 from swarm_mj.radio.link_gains import LinkGains
 from swarm_mj.radio.link_models import Belief, TrueLinks
 from swarm_mj.radio.path_loss import FREE_SPACE, PathLoss, log_distance, two_ray_ground
-from swarm_mj.radio.power_law import power_law
+from swarm_mj.radio.power_law import PowerLaw, power_law
 from swarm_mj.radio.shadowing import Shadowing
 
 
@@ -51,21 +51,14 @@ def channel_of(
     Returns:
         The channel; one of free space if nothing was added.
     """
-    radio = radio_of(mission)
-    stands = obstacles is not None and len(obstacles.kind) > 0
-    if not mission.beyond_free_space and not stands:
-        return radio
+    if not mission.beyond_free_space and not _stands(obstacles):
+        return radio_of(mission)
     shadowing = None
     if mission.shadowing_db > 0.0:
         shadowing = Shadowing(
             std_db=mission.shadowing_db, correlation_m=mission.shadowing_distance_m
         )
-    return ComposedChannel(
-        LinkGains(
-            _at_1_m_mw(mission), _path_loss(mission), shadowing, obstacles if stands else None
-        ),
-        _reception(mission),
-    )
+    return ComposedChannel(LinkGains(_law(mission, obstacles), shadowing), _reception(mission))
 
 
 def belief_of(mission: Mission, obstacles: Obstacles | None = None) -> Belief:
@@ -79,15 +72,14 @@ def belief_of(mission: Mission, obstacles: Obstacles | None = None) -> Belief:
         The belief.
     """
     radio = radio_of(mission)
-    stands = obstacles is not None and len(obstacles.kind) > 0 and mission.grants("map")
-    knows_law = mission.grants("statistics") and mission.beyond_free_space != ""
-    if not knows_law:
+    told = obstacles if mission.grants("map") else None
+    if not (mission.grants("statistics") and mission.beyond_free_space):
         everyone_mw = np.full(mission.num_robots, radio.received_at_1_m_mw)
-        law = power_law(everyone_mw, obstacles=obstacles) if stands else None
+        law = power_law(everyone_mw, obstacles=told) if _stands(told) else None
         return Belief(radio=radio, law=law)
     return Belief(
         radio=radio,
-        law=power_law(_at_1_m_mw(mission), _path_loss(mission), obstacles if stands else None),
+        law=_law(mission, told),
         reception=_reception(mission),
         shadowing_db=mission.shadowing_db,
     )
@@ -99,11 +91,22 @@ def truth_of(mission: Mission, channel: Channel | VaryingChannel) -> TrueLinks:
     return TrueLinks(radio=radio_of(mission), channel=own)
 
 
-def _at_1_m_mw(mission: Mission) -> Float[np.ndarray, "N"]:
-    """Power of each robot's packets after one metre [mW]."""
-    at_1_m_mw = np.full(mission.num_robots, radio_of(mission).received_at_1_m_mw)
-    at_1_m_mw[: mission.num_strong] *= from_db(mission.strong_db)
-    return at_1_m_mw
+def by_robot(mission: Mission, usual_mw: float) -> Float[np.ndarray, "N"]:
+    """A power of each robot's packets where a usual radio has this one [mW]."""
+    power_mw = np.full(mission.num_robots, usual_mw)
+    power_mw[: mission.num_strong] *= from_db(mission.strong_db)
+    return power_mw
+
+
+def _stands(obstacles: Obstacles | None) -> bool:
+    """Whether anything stands in the way."""
+    return obstacles is not None and len(obstacles.kind) > 0
+
+
+def _law(mission: Mission, obstacles: Obstacles | None) -> PowerLaw:
+    """Of the mission's mean powers [mW], shadowing apart, with these obstacles."""
+    at_1_m_mw = by_robot(mission, radio_of(mission).received_at_1_m_mw)
+    return power_law(at_1_m_mw, _path_loss(mission), obstacles)
 
 
 def _reception(mission: Mission) -> Reception:

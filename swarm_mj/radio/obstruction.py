@@ -16,34 +16,31 @@ from swarm_mj.physics.obstacles import BOX, CYLINDER, ELLIPSOID, SPHERE, Obstacl
 
 @compiled()
 def obstruct(
-    position_m: Float[np.ndarray, "B N 2"],
+    i: int,
+    position_m: Float[np.ndarray, "N 2"],
     height_m: float,
-    is_asked: Bool[np.ndarray, "B N"],
     obstacles: Obstacles,
-    received_mw: Float[np.ndarray, "B N N"],
+    power: Float[np.ndarray, "N"],
 ) -> None:
-    """Multiplies the power of the robots asked for, at every robot, by what obstacles leave of it.
+    """Multiplies the power of i's packets, at every other robot, by what obstacles leave of it.
 
     Args:
+        i: The sender.
         position_m: Where the robots are [m].
         height_m: Of their antennas above the floor [m].
-        is_asked: The senders.
-        obstacles: Of the scene.
-        received_mw: Power of i at j, changed in place [mW].
+        obstacles: Of the scene; perhaps none.
+        power: At every robot, changed in place, in any unit.
     """
-    num_missions, num_robots = is_asked.shape
+    if obstacles.kind.shape[0] == 0:
+        return
     start, along = np.empty(3), np.empty(3)
     start[2], along[2] = height_m, 0.0
-    for b in range(num_missions):
-        for i in range(num_robots):
-            if not is_asked[b, i]:
-                continue
-            start[:2] = position_m[b, i]
-            for j in range(num_robots):
-                if j != i:
-                    along[0] = position_m[b, j, 0] - start[0]
-                    along[1] = position_m[b, j, 1] - start[1]
-                    received_mw[b, i, j] *= power_through(start, along, obstacles)
+    start[:2] = position_m[i]
+    for j in range(position_m.shape[0]):
+        if j != i:
+            along[0] = position_m[j, 0] - start[0]
+            along[1] = position_m[j, 1] - start[1]
+            power[j] *= power_through(start, along, obstacles)
 
 
 @compiled()

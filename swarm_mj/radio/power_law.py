@@ -12,7 +12,7 @@ from swarm_mj.compiled import compiled
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.physics.obstacles import Obstacles
 from swarm_mj.physics.state import ROBOT_HEIGHT_M
-from swarm_mj.radio.obstruction import power_through
+from swarm_mj.radio.obstruction import obstruct
 from swarm_mj.radio.path_loss import FREE_SPACE, PathLoss, power_after
 
 NO_OBSTACLES = Obstacles(
@@ -49,17 +49,18 @@ def write_powers(
     i: int, position_m: Float[np.ndarray, "N 2"], law: PowerLaw, power: Float[np.ndarray, "N"]
 ) -> None:
     """Fills `power`: the mean power of i's packets at every robot; nobody receives itself."""
+    write_path_loss(i, position_m, law, power)
+    obstruct(i, position_m, ROBOT_HEIGHT_M, law.obstacles, power)
+
+
+@compiled()
+def write_path_loss(
+    i: int, position_m: Float[np.ndarray, "N 2"], law: PowerLaw, power: Float[np.ndarray, "N"]
+) -> None:
+    """Fills `power` as in an area where nothing stands."""
     for j in range(position_m.shape[0]):
         apart_m2 = squared_distance(position_m, i, j)
         power[j] = power_after(law.at_1_m[i], apart_m2, law.breakpoint_m, law.exponent)
-    if law.obstacles.kind.shape[0] > 0:
-        start, along = np.empty(3), np.empty(3)
-        start[2], along[2] = ROBOT_HEIGHT_M, 0.0
-        start[:2] = position_m[i]
-        for j in range(position_m.shape[0]):
-            along[0] = position_m[j, 0] - start[0]
-            along[1] = position_m[j, 1] - start[1]
-            power[j] *= power_through(start, along, law.obstacles)
     power[i] = 0.0
 
 

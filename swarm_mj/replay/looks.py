@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, Int16
 
 from swarm_mj.radio.composed import ComposedChannel, reached_from
-from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.radio.mission_radio import by_robot, radio_of
 from swarm_mj.swarm import Swarm
 
 EVERY = 5  # windows between looks; in between, the last one is shown
@@ -103,7 +103,6 @@ def look(swarm: Swarm, index: int = 0) -> Look | None:
     if not isinstance(channel, ComposedChannel):
         return None
     mission, position_m = swarm.mission, swarm.states.position_m[index]
-    radio = radio_of(mission)
     true_mw = channel.mean_powers_mw(position_m, index)
     believed_mw = swarm.belief.links(position_m).received_mw
     least_mw = channel.reception.noise_mw * channel.reception.threshold
@@ -111,8 +110,7 @@ def look(swarm: Swarm, index: int = 0) -> Look | None:
     here = np.ones(mission.num_robots, dtype=bool) if is_on is None else is_on[index]
     both = here[:, None] & here
     is_true, is_believed = (both & (power >= least_mw) for power in (true_mw, believed_mw))
-    sent_mw = np.full(mission.num_robots, radio.power_mw)
-    sent_mw[: mission.num_strong] *= 10.0 ** (mission.strong_db / 10.0)
+    sent_mw = by_robot(mission, radio_of(mission).power_mw)
     return Look(
         group=groups(is_true),
         surprises=_surprises(is_true, is_believed, true_mw, sent_mw, least_mw),

@@ -10,7 +10,7 @@ from swarm_mj.radio.composed import ComposedChannel, Reception
 from swarm_mj.radio.fading import Bursts
 from swarm_mj.radio.link_gains import LinkGains
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.radio.path_loss import FREE_SPACE
+from swarm_mj.radio.power_law import power_law
 from swarm_mj.radio.shadowing import Shadowing
 
 NUM_ROBOTS = 12
@@ -20,7 +20,7 @@ def channel(seeds, *, mission=None, shadowing=None, **reception):
     radio = radio_of(mission or paper("stationary"))
     at_1_m_mw = np.full(NUM_ROBOTS, radio.received_at_1_m_mw)
     made = ComposedChannel(
-        LinkGains(at_1_m_mw, FREE_SPACE, shadowing, None),
+        LinkGains(power_law(at_1_m_mw), shadowing),
         Reception(
             noise_mw=radio.noise_mw,
             threshold=radio.threshold,
@@ -167,7 +167,7 @@ def test_being_heard_is_not_enough_to_be_connected():
     at_1_m_mw = np.full(NUM_ROBOTS, radio.received_at_1_m_mw)
     at_1_m_mw[0] *= 100.0
     made = ComposedChannel(
-        LinkGains(at_1_m_mw, FREE_SPACE, None, None),
+        LinkGains(power_law(at_1_m_mw), None),
         Reception(noise_mw=radio.noise_mw, threshold=radio.threshold),
     )
     made.start(NUM_ROBOTS, [np.random.default_rng(0)])

@@ -6,13 +6,15 @@ from swarm_mj.physics.obstacles import BOX, Obstacles
 from swarm_mj.radio import link_gains
 from swarm_mj.radio.link_gains import LinkGains
 from swarm_mj.radio.path_loss import FREE_SPACE, log_distance
+from swarm_mj.radio.power_law import power_law
 from swarm_mj.radio.shadowing import Shadowing
 
 EVERYONE = np.ones((2, 4), dtype=bool)
+SENT = np.array([1.0, 1.0, 4.0, 1.0])  # after one metre
 
 
 def gains(*, law=FREE_SPACE, shadowing=None, obstacles=None):
-    made = LinkGains(np.array([1.0, 1.0, 4.0, 1.0]), law, shadowing, obstacles)
+    made = LinkGains(power_law(SENT, law, obstacles), shadowing)
     made.start([np.random.default_rng(seed) for seed in (1, 2)])
     return made
 
@@ -74,7 +76,7 @@ def test_rows_may_be_any_missions_and_repeat_them():
 def test_a_missions_shadowing_does_not_depend_on_those_beside_it():
     shadowing, position_m = Shadowing(std_db=6.0, correlation_m=20.0), places()
     both = gains(shadowing=shadowing).received_mw(position_m, np.arange(2), EVERYONE)
-    alone = LinkGains(np.array([1.0, 1.0, 4.0, 1.0]), FREE_SPACE, shadowing, None)
+    alone = LinkGains(power_law(SENT), shadowing)
     alone.start([np.random.default_rng(2)])
     one = alone.received_mw(position_m[1:], np.arange(1), EVERYONE[:1])
     np.testing.assert_array_equal(one[0], both[1])

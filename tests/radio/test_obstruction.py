@@ -94,16 +94,17 @@ def test_every_kind_is_crossed_where_mujocos_rays_meet_it(name):
 
 
 def test_only_those_asked_for_lose_power():
-    position_m = np.array([[[-20.0, 0.0], [20.0, 0.0], [-20.0, 30.0]]])
-    received_mw = np.ones((1, 3, 3))
-    obstruct(position_m, 1.0, np.array([[True, False, False]]), boxes((0, 0, 10, 5)), received_mw)
-    np.testing.assert_allclose(received_mw, [[[1, 0.1, 1], [1, 1, 1], [1, 1, 1]]])
+    position_m = np.array([[-20.0, 0.0], [20.0, 0.0], [-20.0, 30.0]])
+    received_mw = np.ones((3, 3))
+    obstruct(0, position_m, 1.0, boxes((0, 0, 10, 5)), received_mw[0])
+    np.testing.assert_allclose(received_mw, [[1, 0.1, 1], [1, 1, 1], [1, 1, 1]])
 
 
 def test_antennas_above_an_obstacle_see_each_other():
-    position_m = np.array([[[-20.0, 0.0], [20.0, 0.0]]])
-    received_mw = np.ones((1, 2, 2))
-    obstruct(position_m, 5.5, np.ones((1, 2), dtype=bool), boxes((0, 0, 10, 5)), received_mw)
+    position_m = np.array([[-20.0, 0.0], [20.0, 0.0]])
+    received_mw = np.ones((2, 2))
+    for i in range(2):
+        obstruct(i, position_m, 5.5, boxes((0, 0, 10, 5)), received_mw[i])
     assert np.all(received_mw == 1.0)
 
 

@@ -44,7 +44,7 @@ def test_the_law_is_that_of_the_channel():
     rng = np.random.default_rng(1)
     position_m = rng.uniform(-300.0, 300.0, (12, 2))
     sent, path_loss, obstacles = rng.uniform(1.0, 4.0, 12), log_distance(2.7, 30.0), wall(0.25)
-    gains = LinkGains(sent, path_loss, None, obstacles)
+    gains = LinkGains(power_law(sent, path_loss, obstacles), None)
     gains.start([rng])
     everyone = np.ones((1, 12), dtype=bool)
     expected = gains.received_mw(position_m[None], np.array([0]), everyone)[0]

@@ -7,7 +7,7 @@ well; then each link's excess follows by Bayes' rule.
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -41,7 +41,7 @@ class LinkTable:
     mean_db: Float[np.ndarray, "N N"]  # excess of each link, as expected [dB]
     std_db: Float[np.ndarray, "N N"]  # and how far that may be wrong [dB]
 
-    @property
+    @cached_property
     def changes_nothing(self) -> bool:
         """Whether the plan may go on: losses that strike all links alike favour no other."""
         fades = LAWS[self.law][0] != NO_FADING

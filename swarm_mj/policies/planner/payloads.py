@@ -24,6 +24,7 @@ from swarm_mj.protocol.packets import (
     age,
     bits_for,
     bits_per_second,
+    fits,
     fitting,
     identity,
     least_bit_rate,
@@ -86,18 +87,17 @@ def snapshot_form(mission: Mission) -> SnapshotForm:
     Raises:
         ValueError: None does.
     """
-    capacity, whole, lean = slot_bytes(mission), whole_form(mission), lean_form(mission)
-    if capacity is None or packet_of(mission, whole.fields).num_bytes <= capacity:
-        return whole
+    whole, lean = whole_form(mission), lean_form(mission)
+    for form in (whole, lean):
+        if fits(packet_of(mission, form.fields), mission):
+            return form
+    fitting(packet_of(mission), mission, "planner")  # or nothing fits, which it says
     least = packet_of(mission, lean.fields).num_bytes
-    if mission.bit_rate is not None and least > capacity:
-        fitting(packet_of(mission), mission, "planner")  # or nothing fits, which it says
-        raise ValueError(
-            f"packets of planner need {least:,} bytes at least, but a slot holds {capacity:,} "
-            f"bytes at {bits_per_second(mission.bit_rate)}; choose a bit rate of "
-            f"{least_bit_rate(least, mission):g} or more, or planner --payload none"
-        )
-    return lean
+    raise ValueError(
+        f"packets of planner need {least:,} bytes at least, but a slot holds "
+        f"{slot_bytes(mission):,} bytes at {bits_per_second(mission.bit_rate or 0.0)}; choose a "
+        f"bit rate of {least_bit_rate(least, mission):g} or more, or planner --payload none"
+    )
 
 
 def whole_form(mission: Mission) -> SnapshotForm:
@@ -147,8 +147,7 @@ def lean_form(mission: Mission) -> SnapshotForm:
 
 def links_fit(mission: Mission) -> bool:
     """Whether the mission's slots hold what robots observed of links."""
-    capacity = slot_bytes(mission)
-    return capacity is None or packet_of(mission, link_fields(mission)).num_bytes <= capacity
+    return fits(packet_of(mission, link_fields(mission)), mission)
 
 
 def link_fields(mission: Mission) -> tuple[PacketField, ...]:

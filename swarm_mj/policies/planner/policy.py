@@ -1,4 +1,6 @@
-"""The common-knowledge planner: every robot computes the whole team's schedule, and flies its part.
+"""The common-knowledge planner of teams that move; teams at rest have `resting.py`.
+
+Every robot computes the whole team's schedule, and flies its part.
 
 Identities, the team's size, its area, orders and the clock are common before the mission. Robots
 that also hold the same snapshot of the team therefore agree on a schedule without a word. Any robot

@@ -104,7 +104,8 @@ class RestingPlanner(BroadcastPolicy):
         buffers, slot = views.buffers, slot_of(views.now)
         if self._first is None:
             self._first = slot
-        can_plan = np.all(buffers.is_known, axis=2) & ~np.any(buffers.velocity_mps, axis=(2, 3))
+        knows_motion = np.any(buffers.velocity_mps, axis=(2, 3))
+        can_plan = np.all(buffers.is_known, axis=2) & ~knows_motion
         heard = views.phases[-1].heard if views.phases else views.silence
         # What a packet says of its sender is what it knew before the slot in which it was sent.
         known_until = np.rint(buffers.timestamp * SLOTS_PER_WINDOW).astype(np.int64)
@@ -120,14 +121,17 @@ class RestingPlanner(BroadcastPolicy):
                 known_until[b],
             )
         if self._moving is not None:
-            self._follow_motion(self._moving, views, transmits)
+            self._follow_motion(self._moving, views, knows_motion, transmits)
         return transmits
 
     def _follow_motion(
-        self, moving: Planner, views: LocalViews, transmits: Bool[np.ndarray, "B N"]
+        self,
+        moving: Planner,
+        views: LocalViews,
+        knows_motion: Bool[np.ndarray, "B N"],
+        transmits: Bool[np.ndarray, "B N"],
     ) -> None:
         """Lets robots that know a moving teammate do as in a team that moves."""
-        knows_motion = np.any(views.buffers.velocity_mps, axis=(2, 3))
         self._has_moved |= np.any(knows_motion, axis=1)
         for b in np.flatnonzero(self._has_moved).tolist():
             by_snapshot = moving.transmits_in(views, b)
