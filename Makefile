@@ -4,8 +4,9 @@ BIN := .venv/bin
 READY := .venv/ready
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
+SCALE ?= quick
 
-.PHONY: help setup fly bench check test attack lock audit format figures picture video docs docs-serve clean
+.PHONY: help setup fly bench check test attack lock audit format figures reproduce picture video docs docs-serve clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
@@ -15,6 +16,7 @@ help:
 	@echo "make format  let the formatter and the linter mend what they can"
 	@echo "make bench   time the simulation on this machine"
 	@echo "make figures remake all figures; evaluates what training/results/ lacks of the paper's"
+	@echo "make reproduce  train and fly the paper's GNNs anew, for make figures; SCALE=full has its budget"
 	@echo "make video   remake the moving picture (needs OpenGL, or libosmesa6)"
 	@echo "make picture remake the pictures of replays (needs a Vulkan driver)"
 	@echo "make docs    build this documentation as a site; make docs-serve shows it while you write"
@@ -83,12 +85,17 @@ format: setup
 
 figures: setup
 	$(BIN)/python training/paper_figures.py $(ARGS)
-	for preset in reference paper; do \
-	  $(BIN)/swarm-mj figures training/results/$$preset-*.csv --out assets/figures/$$preset --force \
-	    || exit; \
+	$(BIN)/swarm-mj figures training/results/reference-*.csv --out assets/figures/reference --force
+	for name in fig2 fig3 fig4 fig5 fig6; do \
+	  $(BIN)/swarm-mj figures training/results/paper-*.csv \
+	    $$(ls training/results/reproduce/$(SCALE)/$$name.csv 2>/dev/null) \
+	    --figure $$name --out assets/figures/paper --force || exit; \
 	done
 	$(BIN)/python training/learning_figure.py
 	$(BIN)/python tools/diagrams.py
+
+reproduce: setup
+	$(BIN)/python training/reproduce.py --scale $(SCALE) $(ARGS)
 
 picture: setup
 	$(BIN)/swarm-mj fly --record replays/readme.rrd --force

@@ -18,6 +18,7 @@ from swarm_mj.mission import PAPERS
 # A figure compares policies, so all else is the same.
 AGREED = ("episodes", "seed", "version")  # the commits stand in the caption
 MOST_HOPS = 1000  # a receptive field
+MOST_DECISIONS = 10**12  # a training
 
 
 class NoPointsError(ValueError):
@@ -93,6 +94,22 @@ def curves(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[C
         ValueError: A cost is not positive.
     """
     return _published(figure, cost) + _ours(figure, cost, results)
+
+
+def budgets(results: Sequence[Result]) -> list[int]:
+    """How many team decisions the policies among results were trained on that say so, ascending.
+
+    Raises:
+        ValueError: A result says anything else.
+    """
+    said = [(result.policy, _config(result).get("decisions")) for result in results]
+    for policy, number in said:
+        if number is not None and not (type(number) is int and 0 < number <= MOST_DECISIONS):
+            raise ValueError(
+                f"decisions of {policy} must be a number from 1 to {MOST_DECISIONS}, not "
+                f"{number!r:.60}"
+            )
+    return sorted({number for _, number in said if number is not None})
 
 
 def _ours(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[Curve]:

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 
 from swarm_mj.evaluation.figures.contents import FLOCK, RESULT_FIGURES, Panel, ResultFigure, Scale
-from swarm_mj.evaluation.figures.curves import Curve, curves, preset_of, results_of
+from swarm_mj.evaluation.figures.curves import Curve, budgets, curves, preset_of, results_of
 from swarm_mj.evaluation.figures.flock import draw_flock
 from swarm_mj.evaluation.figures.labels import MORE, name_ends, name_of
 from swarm_mj.evaluation.figures.style import FAINT, INK, WIDTH_IN, look_of, styled, write_caption
@@ -27,6 +27,7 @@ RING = 1.6  # a published marker's size, of ours
 HEADROOM = 0.06  # of the axis, beyond the highest and the lowest curve
 PLAIN = "{x:g}"  # a number on an axis
 SHORT = 7  # of a commit's digits
+PAPERS_BUDGET = "team decisions each, the paper's on 2,000,000 (III-C)"
 
 
 def draw_figure(
@@ -82,10 +83,15 @@ def caption(figure: ResultFigure, results: Sequence[Result]) -> str:
     commits = list(dict.fromkeys(each.commit[:SHORT] for each in results if each.commit))
     noun = "commit" if len(commits) == 1 else "commits"
     code = f"swarm_mj {result.version}" + (f", {noun} {', '.join(commits)}" if commits else "")
-    return (
+    lines = [
         f"{figure.name}, preset {result.preset}: {result.episodes} missions, seeds {result.seed} "
         f"to {last}, {result.num_windows} windows each; {code}"
-    )
+    ]
+    if its := budgets(results):
+        least, most = (f"{number:,}" for number in (its[0], its[-1]))
+        numbers = most if least == most else f"{least} to {most}"
+        lines.append(f"our GNNs: trained on {numbers} {PAPERS_BUDGET}")
+    return "\n".join(lines)
 
 
 def _draw_curve(axes: Axes, curve: Curve) -> None:

@@ -86,8 +86,12 @@ LOOKS = {
     "gnn": Look(label="gnn (T, M, P only)", colour="#d55e00", marker="*", size=8.0),
     "greedy-oracle": Look(label="greedy oracle", colour="#000000", marker=".", size=5.0, width=0.8),
     "GNN": Look(label="GNN", colour="#cc79a7", marker="X"),
+    "linear GNN": Look(label="GNN, linear", colour="#b3589a", marker="p"),
+    "GNN generalized from 0.25": Look(label="GNN, from 0.25", colour="#b3589a", marker="p"),
     "GNN trained at each size": Look(label="GNN, each size", colour="#cc79a7", marker="X"),
     "GNN generalized from 40": Look(label="GNN, from 40", colour="#b3589a", marker="p"),
+    "GNN with shared reward": Look(label="GNN, shared reward", colour="#7b4173", marker="H"),
+    "GNN with credit per robot": Look(label="GNN, own credit", colour="#7b4173", marker="H"),
     "GNN trained on AoI": Look(label="GNN, on AoI", colour="#cc79a7", marker="X"),
     "GNN trained on velocity variance": Look(
         label="GNN, on variance", colour="#b3589a", marker="p"

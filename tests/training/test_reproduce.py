@@ -1,0 +1,216 @@
+"""The paper's learned results are trained and flown as their files say, and gone on with."""
+
+import csv
+import importlib.util
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from synthetic import result
+
+from swarm_mj.cli import parse
+from swarm_mj.evaluation.figures.contents import RESULT_FIGURES
+from swarm_mj.evaluation.results import read_results, write_csv
+
+ROOT = Path(__file__).parents[2]
+FILE = ROOT / "training" / "reproduce.py"
+EXPERIMENT = """
+[trainings]
+narrow = "--receptive-field 0"
+wide = "--receptive-field 1"
+
+[flights]
+"--robots 5" = {narrow = ["GNN", "linear GNN"], wide = ["GNN"]}
+"--robots 6" = {wide = ["GNN generalized from 5"]}
+
+[quick]
+train = "--robots 5 --windows 5 --missions 2 --held-out 1 --latent 4 --depth 1 --budget 64"
+fly = "--task stationary --windows 5 --episodes 2 --seed 2000"
+
+[full]
+train = "--budget 40"
+fly = "--episodes 3"
+"""
+
+
+def places(folder):
+    """The options that lead to a tiny experiment, and the folders of its results and runs."""
+    (folder / "fig3.toml").write_text(EXPERIMENT)
+    options = ["--figures", "fig3", "--experiments", str(folder)]
+    options += ["--results", str(folder / "results"), "--runs", str(folder / "runs")]
+    return options, folder / "results" / "quick", folder / "runs" / "quick" / "fig3"
+
+
+@pytest.fixture(scope="module")
+def made(forks, tmp_path_factory):
+    """A tiny experiment, made: the folders of its results and runs, and how to do it again."""
+    folder = tmp_path_factory.mktemp("made")
+    options, results, runs = places(folder)
+    done = forks.run(folder, FILE, *options)
+    assert done.returncode == 0, done.stderr
+    return results, runs, lambda: forks.run(folder, FILE, *options)
+
+
+@pytest.fixture(scope="module")
+def program():
+    spec = importlib.util.spec_from_file_location("reproduce", FILE)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["reproduce"] = module  # dataclasses look there
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules["reproduce"]
+
+
+@pytest.fixture
+def folders(tmp_path):
+    return places(tmp_path)
+
+
+@pytest.fixture
+def ask(program, folders, made, monkeypatch):
+    """Runs the program; commands are noted, and leave what the tiny experiment's left, or fail."""
+    seen, broken = [], set()
+
+    def command(arguments):
+        seen.append(arguments)
+        if broken & set(arguments):
+            return 130
+        if arguments[0] == "train":
+            run = Path(arguments[arguments.index("--out") + 1])
+            shutil.copytree(made[1] / run.name, run)
+        else:
+            start, end = arguments.index("--policy") + 1, arguments.index("--task")
+            rows = [result(path, baseline=arguments[start]) for path in arguments[start:end]]
+            write_csv(Path(arguments[arguments.index("--csv") + 1]), rows)
+        return 0
+
+    monkeypatch.setattr(program, "swarm_mj", command)
+    options, *_ = folders
+    return lambda *more: program.script(program.Settings, program.run, [*options, *more]), (
+        seen,
+        broken,
+    )
+
+
+def rows(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_a_tiny_experiment_from_nothing_to_its_tables(made):
+    results, runs, again = made
+    assert names(results) == ["fig3-curves.csv", "fig3-trainings.csv", "fig3.csv"]
+
+    flown = read_results(results / "fig3.csv")
+    assert [(r.policy, r.num_robots, r.baseline) for r in flown] == [
+        ("GNN", 5, "narrow"),
+        ("linear GNN", 5, "narrow"),
+        ("GNN", 5, "narrow"),
+        ("GNN generalized from 5", 6, "wide"),
+    ]
+    configs = [json.loads(result.config) for result in flown]
+    assert [each["training"] for each in configs] == ["narrow", "narrow", "wide", "wide"]
+    assert [each["receptive_field"] for each in configs] == [0, 0, 1, 1]
+    assert {(each["decisions"], each["num_windows"]) for each in configs} == {(64, 5)}
+
+    trained = rows(results / "fig3-trainings.csv")
+    assert [row["training"] for row in trained] == ["narrow", "wide"]
+    settings = [json.loads(row["settings"]) for row in trained]
+    assert [each["network"]["receptive_field"] for each in settings] == [0, 1]
+    assert {row["commit"] for row in trained} == {result.commit for result in flown}
+
+    curves = rows(results / "fig3-curves.csv")
+    for name in ("narrow", "wide"):
+        own = [row["aoi"] for row in curves if row["training"] == name]
+        assert own == [row["aoi"] for row in rows(runs / name / "curve.csv")]
+        assert len(own) == 2  # untrained, and at the end
+
+    done = again()
+    assert done.returncode == 0
+    assert "fig3.csv is there; --force makes it anew" in done.stderr
+
+
+def test_it_goes_on_where_it_broke_off(ask, folders):
+    (run, (seen, broken)), (_, results, runs) = ask, folders
+    broken.add(str(runs / "wide"))
+    assert run() == 130
+    assert not results.exists()
+    broken.clear()
+    broken.add(str(runs / "flights-1.csv"))
+    assert run() == 130
+    assert not results.exists()
+    broken.clear()
+    assert run() == 0
+    made = [Path(each[each.index("--out" if each[0] == "train" else "--csv") + 1]) for each in seen]
+    assert [path.name for path in made] == [
+        *("narrow", "wide"),
+        *("wide", "flights-0.csv", "flights-1.csv"),
+        "flights-1.csv",
+    ]
+    assert len(names(results)) == 3
+
+
+def test_runs_of_another_experiment_or_commit_are_not_gone_on_with(ask, folders, tmp_path, capsys):
+    (run, (seen, broken)), (_, results, runs) = ask, folders
+    broken.add(str(runs / "narrow"))
+    assert run() == 130
+    path = tmp_path / "fig3.toml"
+    path.write_text(EXPERIMENT.replace("--episodes 2", "--episodes 1"))
+    assert run() == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert str(runs) in said
+    assert "give --force to start over" in said
+    begun = json.loads((runs / "begun.json").read_text())
+    path.write_text(EXPERIMENT)
+    (runs / "begun.json").write_text(json.dumps(begun | {"commit": "abc"}))
+    assert run() == 2
+    assert len(seen) == 1
+    assert run("--force") == 130
+    assert json.loads((runs / "begun.json").read_text()) == begun
+    assert not results.exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[full]", "[fool]", "fool"),
+        ("fly =", "flies =", "flies"),
+        ("{wide =", "{wider =", "flies 'wider', but trains only narrow, wide"),
+        ("--depth", "--deepness", "--deepness"),
+        ("--budget 64", "--budget none", "budget"),
+        ('["GNN"]', "1", "Expected `array`"),
+    ],
+)
+def test_a_wrong_experiment_is_refused_before_any_work(ask, tmp_path, capsys, old, new, said):
+    run, (seen, _) = ask
+    (tmp_path / "fig3.toml").write_text(EXPERIMENT.replace(old, new))
+    assert run() == 2
+    assert said in capsys.readouterr().err
+    assert seen == []
+
+
+@pytest.mark.parametrize("scale", ["quick", "full"])
+@pytest.mark.parametrize("figure", ["fig3", "fig4", "fig5", "fig6"])
+def test_an_experiment_flies_all_points_of_its_figure(program, tmp_path, figure, scale):
+    settings = program.Settings(results=tmp_path, runs=tmp_path, scale=scale)
+    work = program.read_work(figure, settings)
+    work.check()
+    shown = RESULT_FIGURES[figure]
+    flown = set()
+    for _, command, _ in work.flights:
+        options = parse(command)[1]
+        assert options.seed == 2000
+        for mission in options.missions:
+            assert (mission.task, mission.preset) == (shown.task, "paper")
+            flown.add(getattr(mission, shown.x_name, None))
+    if shown.sweeps_missions:
+        assert flown == set(shown.xs)
+    budgets = [parse(command)[1].budget for command in work.trainings.values()]
+    assert scale == "quick" or max(budgets) == 2_000_000
+    assert all(budgets)

@@ -1,0 +1,320 @@
+"""Trains and flies the paper's learned policies anew, figure by figure (V).
+
+    python training/reproduce.py --scale quick
+    make reproduce SCALE=quick    # the same; then `make figures` draws what it left
+
+What is trained and flown, and with which options, stands in `training/reproduce/`, one file a
+figure. `quick` takes hours on one core, `full` has the paper's budget and takes weeks.
+What `training/results/reproduce/SCALE` has of the same file is kept; `--force` makes all anew. An
+interrupted run goes on where it broke off, as long as the commit is the same.
+"""
+
+import hashlib
+import json
+import shlex
+import shutil
+import sys
+import tomllib
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from swarm_mj.cli import DONE, parse, script
+from swarm_mj.cli import main as swarm_mj
+from swarm_mj.cli.outputs import Output, check_outputs
+from swarm_mj.evaluation.results import Result, read_results, write_csv
+from swarm_mj.fields import setting
+from swarm_mj.io import atomic
+from swarm_mj.io.provenance import code_digest, commit
+from swarm_mj.io.reading import read_file, read_json, read_plain, read_rows
+from swarm_mj.learning.run_folder import CURVE, POLICY, SETTINGS, read_run
+
+ROOT = Path(__file__).resolve().parent.parent
+FIGURES = ("fig3", "fig6", "fig5", "fig4")  # the most telling first
+SCALES = ("quick", "full")
+BEGUN = "begun.json"  # what a figure's runs were begun with
+MOST_BYTES = 10_000_000  # of a file that is read
+CURVE_COLUMNS = (
+    "training", "decisions", "minutes", "aoi", "aoi_sem", "velocity_variance",
+    "packets_per_window", "delivery_ratio",
+)  # fmt: skip
+TRAINING_COLUMNS = (
+    "training", "options", "decisions", "minutes", "best_decisions", "commit", "experiment",
+    "settings",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How much is made, of what, and where everything goes."""
+
+    scale: str = setting("quick", "how much is trained and flown", choices=SCALES)
+    figures: tuple[str, ...] = setting(FIGURES, "whose policies", choices=FIGURES)
+    experiments: Path = setting(
+        ROOT / "training" / "reproduce",
+        "what is trained and flown for each figure",
+        metavar="DIR",
+        shown="training/reproduce",
+    )
+    results: Path = setting(
+        ROOT / "training" / "results" / "reproduce",
+        "where results go, in a folder of the scale",
+        metavar="DIR",
+        shown="training/results/reproduce",
+    )
+    runs: Path = setting(
+        ROOT / "runs" / "reproduce",
+        "where runs are kept, to go on with",
+        metavar="DIR",
+        shown="runs/reproduce",
+    )
+    jobs: int = setting(1, "processes that fly", low=1, high=256)
+    force: bool = setting(False, "make all anew")
+
+
+class Failed(Exception):  # noqa: N818 - as KeyboardInterrupt
+    """A command has said why, and its exit code is the experiment's."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scale:
+    """The options that all trainings share, and all flights."""
+
+    train: str  # of `swarm-mj train`
+    fly: str  # of `swarm-mj evaluate`
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """A figure's trainings and flights, as its file has them."""
+
+    quick: Scale
+    full: Scale
+    trainings: dict[str, str]  # their own options, by their names
+    flights: dict[str, dict[str, list[str]]]  # by missions' options: trainings and their curves
+
+
+@dataclass(frozen=True, kw_only=True)
+class Work:
+    """One figure at one scale."""
+
+    figure: str
+    settings: Settings
+    experiment: Experiment
+
+    @property
+    def scale(self) -> Scale:
+        """What its trainings and flights share."""
+        return getattr(self.experiment, self.settings.scale)
+
+    @property
+    def folder(self) -> Path:
+        """Where its runs and drafts are."""
+        return self.settings.runs / self.settings.scale / self.figure
+
+    @property
+    def digest(self) -> str:
+        """Of all that stands in its file and counts at this scale."""
+        said = (asdict(self.scale), self.experiment.trainings, self.experiment.flights)
+        return hashlib.sha256(json.dumps(said).encode()).hexdigest()[:12]
+
+    @property
+    def tables(self) -> list[Path]:
+        """What it hands over: what flights cost, the trainings, and their curves."""
+        folder = self.settings.results / self.settings.scale
+        return [folder / f"{self.figure}{end}.csv" for end in ("", "-trainings", "-curves")]
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether the results are there, of the same experiment."""
+        if not all(path.exists() for path in self.tables):
+            return False
+        _, rows = read_rows(self.tables[1], "table of trainings", MOST_BYTES)
+        return {row.get("experiment") for _, row in rows} == {self.digest}
+
+    @cached_property
+    def trainings(self) -> dict[str, list[str]]:
+        """What `swarm-mj` is called with to train each, but to go on."""
+        return {
+            name: ["train", *_typed(self.scale.train, own), "--out", str(self.folder / name)]
+            for name, own in self.experiment.trainings.items()
+        }
+
+    @cached_property
+    def flights(self) -> list[tuple[Path, list[str], dict[str, list[str]]]]:
+        """Each draft, what `swarm-mj` is called with to make it, and each training's curves."""
+        return [
+            (draft, self._evaluate(missions, curves, draft), curves)
+            for number, (missions, curves) in enumerate(self.experiment.flights.items())
+            for draft in [self.folder / f"flights-{number}.csv"]
+        ]
+
+    def _evaluate(self, missions: str, flown: Iterable[str], draft: Path) -> list[str]:
+        for name in flown:
+            if name not in self.experiment.trainings:
+                known = ", ".join(self.experiment.trainings)
+                raise ValueError(f"{self.figure} flies {name!r}, but trains only {known}")
+        policies = [str(self.folder / name / POLICY) for name in flown]
+        options = _typed(self.scale.fly, missions)
+        jobs = ["--jobs", f"{self.settings.jobs}"]
+        return ["evaluate", "--policy", *policies, *options, *jobs, "--csv", str(draft), "--resume"]
+
+    def check(self) -> None:
+        """Passes if all commands can be read, and all tables written.
+
+        Raises:
+            ValueError: Not so, or runs have begun otherwise.
+            SystemExit: A command cannot be read.
+        """
+        check_outputs(*(Output("results", path) for path in self.tables))
+        for command in self.trainings.values():
+            _budget(command)
+        for _, command, _ in self.flights:
+            parse(command)
+        if self.folder.exists() and self._begun() != self._now():
+            raise ValueError(
+                f"{self.folder} was begun with another experiment or at another commit, "
+                f"{self._begun().get('commit')}, not {commit()}; go back to it, or give --force to "
+                "start over"
+            )
+
+    def _now(self) -> dict[str, Any]:
+        return {"experiment": self.digest, "commit": commit(), "code": code_digest()}
+
+    def _begun(self) -> dict[str, Any]:
+        return read_json(read_file(self.folder / BEGUN, "beginning", MOST_BYTES), dict)
+
+    def do(self) -> None:
+        """Trains and flies what is not there yet, and hands over the tables; raises Failed."""
+        atomic.write_json(self.folder / BEGUN, self._now())
+        for number, (name, command) in enumerate(self.trainings.items(), start=1):
+            _say(f"{self.figure}: training {number} of {len(self.trainings)}, {name}")
+            self._train(name, command)
+        for draft, command, _ in self.flights:
+            if not draft.exists():
+                _run(command)
+        self._hand_over()
+
+    def _train(self, name: str, command: list[str]) -> None:
+        """Trains one, or goes on; one that has its budget is left alone."""
+        run = self.folder / name
+        if (run / CURVE).exists() and _rows(run / CURVE)[-1]["decisions"] >= _budget(command):
+            return
+        _run([*command, "--resume"] if (run / SETTINGS).exists() else command)
+
+    def _hand_over(self) -> None:
+        """Writes the tables, that of the flights last: it is drawn."""
+        results, trainings, curves = self.tables
+        rows = {name: _rows(self.folder / name / CURVE) for name in self.trainings}
+        table = [{"training": name} | row for name, its in rows.items() for row in its]
+        atomic.write_csv(
+            curves,
+            CURVE_COLUMNS,
+            ({name: row.get(name) for name in CURVE_COLUMNS} for row in table),
+        )
+        atomic.write_csv(trainings, TRAINING_COLUMNS, map(self._training, rows, rows.values()))
+        write_csv(results, list(self._results(rows)))
+
+    def _training(self, name: str, rows: Sequence[dict[str, Any]]) -> dict[str, object]:
+        """A row of the table of trainings."""
+        best = min(rows, key=lambda row: row["objective"])
+        return {
+            "training": name,
+            "options": shlex.join(_typed(self.scale.train, self.experiment.trainings[name])),
+            "decisions": int(rows[-1]["decisions"]),
+            "minutes": rows[-1]["minutes"],
+            "best_decisions": int(best["decisions"]),
+            "commit": commit(),
+            "experiment": self.digest,
+            "settings": json.dumps(asdict(read_run(self.folder / name).training)),
+        }
+
+    def _results(self, rows: dict[str, list[dict[str, Any]]]) -> Iterator[Result]:
+        """The flights' results under their curves' names, with what was trained."""
+        for draft, _, curves in self.flights:
+            paths = {str(self.folder / name / POLICY): name for name in curves}
+            for result in read_results(draft):
+                name = paths[result.policy]
+                trained = {"training": name, "decisions": int(rows[name][-1]["decisions"])}
+                config = read_json(result.config, dict) | trained
+                for curve in curves[name]:
+                    yield replace(
+                        result,
+                        policy=curve,
+                        baseline=paths[result.baseline],
+                        config=json.dumps(config),
+                    )
+
+
+def run(settings: Settings) -> int:
+    """Runs the experiments; returns the exit code."""
+    works = [read_work(name, settings) for name in settings.figures]
+    if settings.force:
+        for work in works:
+            _remove(work)
+    left = [work for work in works if not work.is_finished]
+    for work in left:
+        work.check()
+    for work in works:
+        if work not in left:
+            _say(f"{work.figure}: {work.tables[0]} is there; --force makes it anew")
+    try:
+        for work in left:
+            work.do()
+    except Failed as failed:
+        return int(str(failed))
+    return DONE
+
+
+def read_work(figure: str, settings: Settings) -> Work:
+    """A figure's experiment; raises ValueError for a file that is no such thing."""
+    path = settings.experiments / f"{figure}.toml"
+    text = read_file(path, "experiment", MOST_BYTES)
+    try:
+        experiment = read_plain(tomllib.loads(text.decode()), Experiment)
+    except ValueError as error:
+        raise ValueError(f"experiment {path} cannot be read: {error}") from error
+    return Work(figure=figure, settings=settings, experiment=experiment)
+
+
+def _remove(work: Work) -> None:
+    """Removes a figure's results and runs; a folder that is not its own is left alone."""
+    for path in work.tables:
+        path.unlink(missing_ok=True)
+    if (work.folder / BEGUN).exists():
+        shutil.rmtree(work.folder)
+
+
+def _typed(*options: str) -> list[str]:
+    return [word for each in options for word in shlex.split(each)]
+
+
+def _budget(command: Sequence[str]) -> int:
+    """How many decisions a training has; raises ValueError if its options do not say."""
+    budget = parse(command)[1].budget
+    if budget is None:
+        raise ValueError(f"a training needs a --budget, and this has none: {shlex.join(command)}")
+    return budget
+
+
+def _rows(path: Path) -> list[dict[str, Any]]:
+    """A run's learning curve."""
+    _, rows = read_rows(path, "learning curve", MOST_BYTES)
+    return [{name: float(cell) if cell else None for name, cell in row.items()} for _, row in rows]
+
+
+def _say(line: str) -> None:
+    sys.stderr.write(f"{line}\n")
+
+
+def _run(command: Sequence[str]) -> None:
+    _say(f"$ swarm-mj {shlex.join(command)}")
+    code = swarm_mj(command)
+    if code:
+        raise Failed(code)
+
+
+if __name__ == "__main__":
+    sys.exit(script(Settings, run))

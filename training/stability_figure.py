@@ -1,0 +1,144 @@
+"""Learning curves of several seeds, trained on the age or on the task's own cost, as a figure.
+
+    python training/stability_figure.py
+
+Draws what `training/reproduce.py` left of Fig. 6's trainings: assets/figures/stability.svg and
+.png.
+"""
+
+import sys
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from swarm_mj.cli import script
+from swarm_mj.cli.outputs import Output, check_outputs
+from swarm_mj.evaluation.figures.contents import AOI, VARIANCE
+from swarm_mj.evaluation.figures.style import WIDTH_IN, look_of, save, styled, write_caption
+from swarm_mj.fields import setting
+from swarm_mj.io.reading import read_rows
+
+ROOT = Path(__file__).resolve().parent.parent
+MOST_BYTES = 10_000_000
+# The published name of what is trained so, by the first part of our trainings' names.
+METHODS = {"age": "GNN trained on AoI", "variance": "GNN trained on velocity variance"}
+PANELS = (AOI, VARIANCE)  # a cost's name is also a column
+HEIGHT_IN = 3.4
+PALE, BAND = 0.45, 0.15  # of a seed's line, of the band from the lowest to the highest
+
+Curves = Mapping[str, Sequence[Mapping[str, Float[np.ndarray, "evaluations"]]]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StabilityFigure:
+    """Where the figure goes, and where its numbers are."""
+
+    out: Path = setting(
+        ROOT / "assets" / "figures" / "stability",
+        "the files, without their endings",
+        shown="assets/figures/stability",
+    )
+    results: Path = setting(
+        ROOT / "training" / "results" / "reproduce" / "quick",
+        "where the trainings' tables are",
+        metavar="DIR",
+        shown="training/results/reproduce/quick",
+    )
+
+    def __call__(self) -> int:
+        """Draws it."""
+        paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
+        check_outputs(*(Output("figure", path) for path in paths))
+        curves = read_curves(self.results / "fig6-curves.csv")
+        figure = draw(curves, read_commit(self.results / "fig6-trainings.csv"))
+        for path in paths:
+            save(figure, path)
+        return 0
+
+
+def read_curves(path: Path) -> Curves:
+    """The learning curves of each kind of training, one a seed, by the names of their columns.
+
+    Raises:
+        ValueError: The file cannot be read, has another kind of training, or curves of a kind were
+            not evaluated after the same numbers of decisions.
+    """
+    _, rows = read_rows(path, "table of curves", MOST_BYTES)
+    columns = ("decisions", *(panel.cost for panel in PANELS))
+    found: dict[str, list[list[float]]] = defaultdict(list)
+    try:
+        for _, row in rows:
+            found[row["training"]].append([float(row[name]) for name in columns])
+    except (KeyError, ValueError) as error:
+        raise ValueError(f"{path} is no table with {', '.join(columns)}: {error}") from error
+    curves = {kind: [] for kind in METHODS}
+    for name, numbers in found.items():
+        kind = name.partition("-")[0]
+        if kind not in curves:
+            raise ValueError(f"{path} has {name!r:.60}, which is none of {', '.join(METHODS)}")
+        curves[kind].append(dict(zip(columns, np.array(numbers).T, strict=True)))
+    for kind, its in curves.items():
+        if not its or {tuple(each["decisions"]) for each in its} != {tuple(its[0]["decisions"])}:
+            raise ValueError(f"{path}: curves of {kind} need the same decisions, one or more curve")
+    return curves
+
+
+def read_commit(path: Path) -> str:
+    """The one commit of a table of trainings; raises ValueError if there are several."""
+    _, rows = read_rows(path, "table of trainings", MOST_BYTES)
+    commits = {row.get("commit", "") for _, row in rows}
+    if len(commits) != 1:
+        raise ValueError(f"{path} needs one commit, not {', '.join(sorted(commits)) or 'none'}")
+    return commits.pop()
+
+
+def draw(curves: Curves, commit: str) -> Figure:
+    """Both costs over the decisions: seeds pale, their mean, a band from lowest to highest."""
+    with styled():
+        drawing = Figure(figsize=(WIDTH_IN, HEIGHT_IN))
+        drawing.subplots_adjust(left=0.075, right=0.985, top=0.78, bottom=0.24, wspace=0.18)
+        for axes, panel in zip(drawing.subplots(1, len(PANELS)), PANELS, strict=True):
+            for kind, its in curves.items():
+                _draw_kind(axes, METHODS[kind], panel.cost, its)
+            axes.set_title(panel.label, loc="left")
+            axes.set_xlabel("team decisions")
+            axes.set_ylim(bottom=0.0)
+            axes.xaxis.set_major_formatter("{x:,.0f}")
+        drawing.text(0.075, 0.93, "Training stability", fontsize=12, fontweight="bold")
+        drawing.legend(
+            *drawing.axes[0].get_legend_handles_labels(),
+            loc="upper left",
+            bbox_to_anchor=(0.075, 0.92),
+            ncols=len(METHODS),
+            frameon=False,
+            fontsize=8,
+            borderpad=0.0,
+            borderaxespad=0.0,
+        )
+        seeds = ", ".join(f"{len(its)} seeds of {kind}" for kind, its in curves.items())
+        caption = f"Held-out missions. {seeds}: each, their mean, and all between; commit {commit}"
+        write_caption(drawing, 0.075, 0.03, caption)
+    return drawing
+
+
+def _draw_kind(
+    axes: Axes, method: str, cost: str, its: Sequence[Mapping[str, Float[np.ndarray, "E"]]]
+) -> None:
+    """One kind of training in one pair of axes."""
+    look, x = look_of(method), its[0]["decisions"]
+    costs = np.array([each[cost] for each in its])
+    for each in costs:
+        axes.plot(x, each, color=look.colour, alpha=PALE, linewidth=0.8)
+    axes.plot(x, costs.mean(axis=0), color=look.colour, marker=look.marker, label=look.label)
+    low, high = costs.min(axis=0), costs.max(axis=0)
+    axes.fill_between(x, low, high, color=look.colour, alpha=BAND, linewidth=0.0)
+
+
+if __name__ == "__main__":
+    sys.exit(script(StabilityFigure, StabilityFigure.__call__))
