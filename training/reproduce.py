@@ -237,8 +237,8 @@ class Work:
             paths = {str(self.folder / name / POLICY): name for name in curves}
             for result in read_results(draft):
                 name = paths[result.policy]
-                trained = {"training": name, "decisions": int(rows[name][-1]["decisions"])}
-                config = read_json(result.config, dict) | trained
+                trained = {"policy": name, "decisions": int(rows[name][-1]["decisions"])}
+                config = read_json(result.config, dict) | trained  # no folder of this machine
                 for curve in curves[name]:
                     yield replace(
                         result,

@@ -115,7 +115,7 @@ def test_a_tiny_experiment_from_nothing_to_its_tables(made):
         ("GNN generalized from 5", 6, "wide"),
     ]
     configs = [json.loads(result.config) for result in flown]
-    assert [each["training"] for each in configs] == ["narrow", "narrow", "wide", "wide"]
+    assert [each["policy"] for each in configs] == ["narrow", "narrow", "wide", "wide"]
     assert [each["receptive_field"] for each in configs] == [0, 0, 1, 1]
     assert {(each["decisions"], each["num_windows"]) for each in configs} == {(64, 5)}
 
