@@ -121,8 +121,10 @@ def draw(curves: Curves, commit: str) -> Figure:
             borderpad=0.0,
             borderaxespad=0.0,
         )
-        seeds = ", ".join(f"{len(its)} seeds of {kind}" for kind, its in curves.items())
-        caption = f"Held-out missions. {seeds}: each, their mean, and all between; commit {commit}"
+        seeds = ", ".join(f"{len(its)} of {kind}" for kind, its in curves.items())
+        caption = (
+            f"Held-out missions; seeds: {seeds}; each, their mean, and all between; commit {commit}"
+        )
         write_caption(drawing, 0.075, 0.03, caption)
     return drawing
 
