@@ -84,7 +84,9 @@ LOOKS = {
     "planner": Look(label="planner", colour="#80391e", marker="d"),
     WITHOUT_PAYLOAD: Look(label="planner, no payload", colour="#a6d854", marker="<"),
     "gnn": Look(label="gnn (T, M, P only)", colour="#d55e00", marker="*", size=8.0),
-    "greedy-oracle": Look(label="greedy oracle", colour="#000000", marker=".", size=5.0, width=0.8),
+    "greedy-oracle": Look(
+        label="oracle (knows all)", colour="#000000", marker=".", size=5.0, width=0.8
+    ),
     "GNN": Look(label="GNN", colour="#cc79a7", marker="X"),
     "linear GNN": Look(label="GNN, linear", colour="#b3589a", marker="p"),
     "GNN generalized from 0.25": Look(label="GNN, from 0.25", colour="#b3589a", marker="p"),

@@ -180,11 +180,11 @@ def test_nothing_that_is_written_overlaps_or_leaves_the_page():
 
 def test_the_oracle_is_a_thin_black_line():
     (axes,) = draw(FIG4, sweep("greedy-oracle", "range_ratio", {0.2: (20.0, 0.5)})).axes
-    line, _, _ = bars(axes)["greedy oracle"]
+    line, _, _ = bars(axes)["oracle (knows all)"]
     others = [
         other.get_linewidth()
         for name, (other, _, _) in bars(axes).items()
-        if name != "greedy oracle"
+        if name != "oracle (knows all)"
     ]
     assert line.get_color() == "#000000"
     assert line.get_linewidth() < min(others)
