@@ -184,6 +184,8 @@ class Work:
         return {"experiment": self.digest, "commit": commit(), "code": code_digest()}
 
     def _begun(self) -> dict[str, Any]:
+        if not (self.folder / BEGUN).exists():
+            raise ValueError(f"{self.folder} is there, but no runs of this; name other --runs")
         return read_json(read_file(self.folder / BEGUN, "beginning", MOST_BYTES), dict)
 
     def do(self) -> None:

@@ -176,6 +176,16 @@ def test_runs_of_another_experiment_or_commit_are_not_gone_on_with(ask, folders,
     assert not results.exists()
 
 
+def test_a_folder_of_something_else_is_left_alone(ask, folders, capsys):
+    (run, (seen, _)), (*_, runs) = ask, folders
+    (runs / "mine").mkdir(parents=True)
+    for force in ((), ("--force",)):
+        assert run(*force) == 2
+        assert "is there, but no runs of this; name other --runs" in capsys.readouterr().err
+    assert (runs / "mine").exists()
+    assert seen == []
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
