@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from swarm_mj.cli.machine import free_addresses, free_memory, free_room, largest_file
 from swarm_mj.evaluation.study import Study
+from swarm_mj.learning.choice import MANY_DECISIONS, NUM_BEST, num_missions
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import is_learned
 from swarm_mj.replay.recorder import AGE_BYTES, MAX_AGE_MATRIX_BYTES
@@ -106,7 +107,9 @@ def training_needs(training: "Training", limits: "Limits") -> Needs:
     """Of `train`: a rollout and the passes over it, held-out missions, checkpoints, replays."""
     missions = [replace(training.mission, num_robots=size) for size in training.robots]
     largest, rollout = max(missions, key=lambda each: each.num_robots), rollout_bytes(training)
-    held_out = missions_memory(largest, training.held_out, is_learned=True)
+    decisions = limits.decisions or MANY_DECISIONS
+    num_flown = num_missions(training, decisions, NUM_BEST + 2)  # to choose
+    held_out = missions_memory(largest, num_flown, is_learned=True)
     under_way = missions_memory(largest, training.missions, is_learned=True) - LIBRARIES - TORCH
     # What leaves out silent rows sorts a copy of the others before it passes over them.
     memory = held_out + under_way + max(2.0 * rollout, rollout + passes_bytes(training))

@@ -14,7 +14,8 @@ from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.terminal import named_values, plain_console, tell_cores, this_command
-from swarm_mj.cli.train_progress import Watch, age_of
+from swarm_mj.cli.train_progress import Watch
+from swarm_mj.cli.train_report import has_stopped_early, report, verdicts
 from swarm_mj.cli.train_settings import (
     add_setting_options,
     asked_settings,
@@ -29,6 +30,7 @@ from swarm_mj.learning.run_folder import (
     BUDGETS,
     CHECKPOINT,
     CURVE,
+    PATIENCE,
     SETTINGS,
     Limits,
     Progress,
@@ -46,7 +48,7 @@ class Options:
 
     EPILOG: ClassVar = (
         "A run that was interrupted, or killed, goes on with --out OUT --resume and ends as if it "
-        "had not been. OUT holds policy, the best so far; settings.json, curve.csv, tensorboard "
+        "had not been. OUT holds policy, the one to fly; settings.json, curve.csv, tensorboard "
         "and checkpoint.pt. Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted "
         "(--resume goes on)."
     )
@@ -54,6 +56,7 @@ class Options:
     resume: bool = setting(False, "go on with the run in OUT")
     budget: int | None = same_as(Limits, "decisions")
     minutes: float | None = same_as(Limits, "minutes")
+    patience: int | None = same_as(Limits, "patience")
     replay_every: int | None = same_as(Limits, "replay_every")
     init: Path | None = setting(None, "begin with a stored policy", metavar="POLICY")
     yes: bool = setting(False, YES)
@@ -82,7 +85,10 @@ def run(options: Options) -> int:
         console.print(f"{ending}; the last checkpoint is kept.\nGo on:    {go_on}", markup=False)
         return FAILED if is_memory else INTERRUPTED
     if not watch.has_begun:
-        console.print("Nothing was left to train: raise --budget or --minutes, which count in all.")
+        console.print(
+            "Nothing was left to train: raise --budget or --minutes, which count in all, or give "
+            "--patience 0 if the run stopped early."
+        )
     if not is_over:
         console.print(f"Interrupted after {progress.decisions:,} decisions; all is kept.")
     return DONE if is_over else INTERRUPTED
@@ -115,7 +121,7 @@ def _new_run(options: Options) -> Run:
     training = asked_settings(options.settings, read_policy(init)[1] if init else None, init)
     return Run(
         training=training,
-        limits=Limits(decisions=BUDGETS[training.arm]),
+        limits=Limits(decisions=BUDGETS[training.arm], patience=PATIENCE[training.arm]),
         command=shlex.join(["swarm-mj", "train", *options.typed]),
         init=init,
     )
@@ -125,9 +131,8 @@ def asked_limits(limits: Limits, options: Options) -> Limits:
     """When a run stops: as before, or usual, unless the options say otherwise."""
     if options.budget is not None or options.minutes is not None:
         limits = replace(limits, decisions=options.budget, minutes=options.minutes)
-    if options.replay_every is not None:
-        limits = replace(limits, replay_every=options.replay_every)
-    return limits
+    others = {"patience": options.patience, "replay_every": options.replay_every}
+    return replace(limits, **{name: x for name, x in others.items() if x is not None})
 
 
 def _print(out: Path, asked: Run, progress: Progress, *, is_over: bool) -> None:
@@ -136,32 +141,16 @@ def _print(out: Path, asked: Run, progress: Progress, *, is_over: bool) -> None:
     sizes = ", ".join(map(str, training.robots))
     title = f"{out}: arm {training.arm}, {training.mission.task}, {sizes} robots"
     rows = {
-        **_evaluated(training, progress),
+        **report(asked, progress),
         "decisions": f"{progress.decisions:,}",
         "minutes": f"{progress.minutes:.1f}",
-        "best policy": str(out / "policy") if progress.best else "none yet",
+        "its folder": str(out / "policy") if progress.best else "none yet",
     }
     console.print(named_values(title, rows))
+    for line in verdicts(asked, progress):
+        console.print(line)
     for label, line in _next_commands(out, asked, progress, is_over=is_over):
         console.print(f"{label:10}{line}")
-
-
-def _evaluated(training: Training, progress: Progress) -> dict[str, str]:
-    """What the held-out missions cost, if they were ever flown."""
-    best = progress.best
-    if best is None:
-        return {}
-    first, decisions = progress.curve[0], f"after {best['decisions']:,.0f} decisions"
-    if best is first:
-        decisions = "the untrained one"
-    rows = {
-        "held-out age, at first": f"{age_of(first)} windows",
-        "held-out age, best policy": f"{age_of(best)} windows, {decisions}; chosen on these",
-    }
-    if training.reward == "velocity-variance":
-        variances = ", ".join(f"{row['velocity_variance']:.4f}" for row in (first, best))
-        rows["velocity variance, of these"] = f"{variances} m²/s²"
-    return rows
 
 
 def _next_commands(
@@ -169,12 +158,16 @@ def _next_commands(
 ) -> list[tuple[str, str]]:
     """What to do next, and the commands that do it."""
     name, policy = this_command(), shlex.quote(str(out / "policy"))
-    training = asked.training
+    training, more = asked.training, ""
+    if has_stopped_early(asked, progress):
+        more = " --patience 0"
+    elif is_over:
+        more = f" --budget {2 * progress.decisions}"
     mission = mission_flags(replace(training.mission, num_robots=training.robots[0]))
     mission += f" {training.own_options}" if training.own else ""
     lines = [
         ("Watch:", f"{this_command('tensorboard')} --logdir {shlex.quote(str(out))}"),
-        ("Go on:", _resume_command(out, training, 2 * progress.decisions if is_over else None)),
+        ("Go on:", _resume_command(out, training, more)),
     ]
     if progress.best is None:
         return lines
@@ -185,7 +178,6 @@ def _next_commands(
     ]
 
 
-def _resume_command(out: Path, training: Training, budget: int | None = None) -> str:
-    more = "" if budget is None else f" --budget {budget}"
+def _resume_command(out: Path, training: Training, more: str = "") -> str:
     more += f" {training.own_options}" if training.own else ""
     return f"{this_command()} train --out {shlex.quote(str(out))} --resume{more}"

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.progress import Task
 
 from swarm_mj.cli.progress import WorkBar
+from swarm_mj.learning.choice import REFERENCES, column
 
 if TYPE_CHECKING:
     from swarm_mj.learning.callback import Status
@@ -42,7 +43,7 @@ class Watch(WorkBar):
             self._start = status
             self._num_rows = len(status.progress.curve)
         self._print_new_row(status)
-        self.what = "Training" if status.evaluated is None else "Evaluating"
+        self.what = status.what
         self.text = _text(status, self._start, self._limits)
         self.move_to(share_done(status, self._limits))
         if self._is_interrupted() and not self.has_stopped:
@@ -59,9 +60,10 @@ class Watch(WorkBar):
             self._num_rows = len(curve)
             row = curve[-1]
             note = "  best so far" if row is status.progress.best else ""
+            others = "".join(f"  {name} {age:.2f}" for name, age in reference_ages(row).items())
             self._console.print(
                 f"{row['decisions']:>11,.0f} decisions {row['minutes']:7.1f} min   "
-                f"held-out age {age_of(row)}{note}"
+                f"held-out age {age_of(row)}{note:13}{others}"
             )
 
 
@@ -93,10 +95,16 @@ def age_of(row: dict[str, float]) -> str:
     return f"{row['aoi']:.2f}{error}"
 
 
+def reference_ages(row: dict[str, float]) -> dict[str, float]:
+    """What hand-written policies cost on the same missions, as far as they were flown [windows]."""
+    ages = ((name, row.get(column("aoi", name))) for name in REFERENCES)
+    return {name: age for name, age in ages if age is not None}
+
+
 def _text(status: "Status", start: "Status", limits: "Limits") -> str:
     parts = [f"{status.decisions:,} decisions"]
     if status.evaluated is not None:
-        parts.append(f"held-out missions {status.evaluated:.0%}")
+        parts.append(f"missions {status.evaluated:.0%}")
     elif not math.isnan(status.aoi):
         parts.append(f"age {status.aoi:.1f}")
     if status.progress.curve:

@@ -35,7 +35,7 @@ HEADINGS = {
     "parts.": GROUP,
     "mission.": "missions",
 }
-NOT_TRAINED = ("num_robots", "physics", "switched_off")  # team sizes are the run's own
+NOT_TRAINED = ("num_robots",)  # team sizes are the run's own
 SPECS: dict[str, Field[Any]] = {
     f"{part}{spec.name}": spec
     for part, owner in PARTS.items()

@@ -136,7 +136,8 @@ class Team:
         self._see()
         self._keep_costs(costs)
         if self.reward == "credit":
-            own = credits_of(before, swarm.states.position_m, recipient, channel, start)
+            states = swarm.states
+            own = credits_of(before, states.position_m, recipient, channel, start, states.is_active)
             return own / self.mission.num_robots**2
         cost = self._costs[COSTS[self.reward]]
         return np.broadcast_to(-cost[:, None], recipient.shape)

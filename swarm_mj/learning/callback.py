@@ -3,17 +3,18 @@
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
-from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.learning import checkpoint
-from swarm_mj.learning.actor_critic import GnnActorCritic
+from swarm_mj.learning.choice import NUM_BEST, Row, candidates, has_stalled, num_missions
 from swarm_mj.learning.held_out import HeldOut, evaluate, record_replay
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
@@ -25,7 +26,13 @@ from swarm_mj.learning.run_folder import (
     Run,
     write_curve,
 )
-from swarm_mj.learning.settings import HELD_OUT_SEED
+from swarm_mj.learning.selection import (
+    REFERENCE_COLUMNS,
+    choose,
+    reference_columns,
+    told_of_choice,
+    told_of_evaluation,
+)
 from swarm_mj.learning.vec_env import missions_of
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.policies.stored import save_policy
@@ -49,6 +56,7 @@ class Status:
     aoi: float  # of the missions in training, in the last window [windows]
     progress: Progress  # with the curve so far; the run's own, so only to be read
     evaluated: float | None  # the share of an evaluation that is flown; None while training
+    what: str = "Training"  # or what is flown
 
 
 # Returns whether to go on; if not, the rollout is finished, or the evaluation left for later.
@@ -64,6 +72,7 @@ class TrainingCallback(BaseCallback):
         run: Run,
         folder: Path,
         progress: Progress,
+        networks: checkpoint.Networks,
         rng: np.random.Generator,
         listener: Listener,
     ) -> None:
@@ -74,11 +83,13 @@ class TrainingCallback(BaseCallback):
         self._limits = run.limits
         self._folder = folder
         self._progress = progress
+        self._networks = networks
         self._rng = rng
         self._listener = listener
         self._env = missions_of(model)
         self._counted_s = time.monotonic()  # up to here, time is in the progress
         self._saved_s = -np.inf
+        self._evaluation_minutes = 0.0  # that the last one took
         self._aoi = float("nan")
         self._goes_on = True
 
@@ -93,11 +104,24 @@ class TrainingCallback(BaseCallback):
         return self._progress.minutes + (time.monotonic() - self._counted_s) / 60.0
 
     def _on_rollout_start(self) -> None:
-        limit = self._limits.minutes
-        is_last = (limit is not None and self.minutes >= limit) or not self._goes_on
+        is_last = self._is_time() or not self._goes_on
         self.between_rollouts(is_last=is_last)
-        if is_last or not self._goes_on:
+        if is_last or not self._goes_on or self.has_stalled:
             raise Stopped
+
+    @property
+    def has_stalled(self) -> bool:
+        """Whether the run no longer learns."""
+        return has_stalled(self._progress.curve, self._limits.patience)
+
+    def _is_time(self) -> bool:
+        """Whether the minutes are over, but for those that the choice of a policy will take."""
+        if self._limits.minutes is None:
+            return False
+        flights = NUM_BEST + 2
+        size = num_missions(self._training, self.decisions, flights)
+        choice = self._evaluation_minutes * flights * size / self._training.held_out
+        return self.minutes + choice >= self._limits.minutes
 
     def _on_step(self) -> bool:
         costs = [transition.costs for transition in self._env.transitions]
@@ -112,13 +136,14 @@ class TrainingCallback(BaseCallback):
         log_p = self._ppo.rollout_buffer.log_probs
         self.logger.record("train/entropy", -float(log_p.mean()))
 
-    def _tell(self, evaluated: float | None = None) -> None:
+    def _tell(self, evaluated: float | None = None, what: str = "Training") -> None:
         status = Status(
             decisions=self.decisions,
             minutes=self.minutes,
             aoi=self._aoi,
             progress=self._progress,
             evaluated=evaluated,
+            what=what,
         )
         self._goes_on = self._listener(status) and self._goes_on
 
@@ -137,7 +162,7 @@ class TrainingCallback(BaseCallback):
             self._evaluate(decisions)
         every = self._limits.replay_every
         if every and decisions >= progress.next_replay and self._goes_on:
-            network = acting_network(self._ppo)
+            network = checkpoint.acting_network(self._ppo)
             record_replay(self._training, network, decisions, self._folder / REPLAYS)
             progress.next_replay = (decisions // every + 1) * every
         is_old = time.monotonic() - self._saved_s >= self._limits.checkpoint_every_s
@@ -147,7 +172,8 @@ class TrainingCallback(BaseCallback):
     def _save(self) -> None:
         self._count_time()
         kept = self._folder / CHECKPOINT
-        checkpoint.save(kept, self._training, self._ppo, self._rng, self._progress)
+        state = (self._ppo, self._rng, self._progress, self._networks)
+        checkpoint.save(kept, self._training, *state)
         self._saved_s = time.monotonic()
 
     def _count_time(self) -> None:
@@ -160,36 +186,67 @@ class TrainingCallback(BaseCallback):
     def _evaluate(self, decisions: int) -> None:
         """Flies the held-out missions, logs, and keeps the policy if it is the best."""
         progress, every = self._progress, self._training.evaluate_every
-        network = acting_network(self._ppo)
-        self._count_time()
-        means = progress.since_evaluation.means()
+        network = checkpoint.acting_network(self._ppo)
         try:
-            held_out = evaluate(self._training, network.to(self._ppo.device), self._on_window)
+            others = self._references()
+            self._count_time()
+            means, begun = progress.since_evaluation.means(), progress.minutes
+            told = partial(self._on_window, "Evaluating")
+            held_out = evaluate(self._training, network.to(self._ppo.device), told)
         except Stopped:
             return
         self._count_time()
+        self._evaluation_minutes = progress.minutes - begun
         progress.since_evaluation = Accumulator()
         progress.next_evaluation = (decisions // every + 1) * every
         known = {name: x for name, x in asdict(held_out).items() if x is not None}
-        row = {"decisions": float(decisions), "minutes": progress.minutes, **known}
+        row = {"decisions": float(decisions), "minutes": progress.minutes, **known, **others}
         progress.curve.append(row | means | progress.optimiser)
         for name, value in progress.curve[-1].items():
             self.logger.record(name if "/" in name else f"held_out/{name}", value)
         self.logger.dump(decisions)
         write_curve(self._folder / CURVE, progress.curve)
+        self._networks[decisions] = network
+        kept = {int(row["decisions"]) for row in candidates(progress.curve)}
+        for dropped in self._networks.keys() - kept:
+            del self._networks[dropped]
         if held_out.objective < progress.best_objective:
-            progress.best_objective = held_out.objective
-            save_policy(self._folder / POLICY, network, self._config(decisions, held_out))
+            progress.best_objective, progress.choice = held_out.objective, None
+            self._keep(progress.curve[-1], held_out, told_of_evaluation(self._training))
         self._tell()
 
-    def _on_window(self, share: float) -> None:
-        self._tell(share)
+    def _references(self) -> Row:
+        """What hand-written policies cost on the held-out missions: flown once in a run."""
+        if self._progress.curve:
+            first = self._progress.curve[0]
+            return {name: first[name] for name in first if name in REFERENCE_COLUMNS}
+        return reference_columns(self._training, partial(self._on_window, "Flying others"))
+
+    def choose(self) -> None:
+        """Chooses the policy that is kept, once nothing is left to train and if none is chosen."""
+        progress, choice = self._progress, self._progress.choice
+        is_chosen = choice is not None and choice.run_decisions == self.decisions
+        if not (self._goes_on and progress.curve) or is_chosen:
+            return
+        told = partial(self._on_window, "Choosing")
+        try:
+            choice, costs = choose(self._training, progress.curve, self._networks, told)
+        except Stopped:
+            return
+        (row,) = (each for each in progress.curve if each["decisions"] == choice.decisions)
+        self._keep(row, costs, told_of_choice(self._training, choice))
+        progress.choice = choice
+        self._save()
+
+    def _on_window(self, what: str, share: float) -> None:
+        self._tell(share, what)
         if not self._goes_on:
             raise Stopped
 
-    def _config(self, decisions: int, held_out: HeldOut) -> PolicyConfig:
-        training = self._training
-        return PolicyConfig(
+    def _keep(self, row: Row, costs: HeldOut, how: dict[str, Any]) -> None:
+        """Stores the policy of an evaluation, with what it costs, and where."""
+        training, decisions = self._training, int(row["decisions"])
+        config = PolicyConfig(
             network=training.network,
             features=training.features,
             silence_logit=training.silence_logit,
@@ -197,23 +254,13 @@ class TrainingCallback(BaseCallback):
                 **asdict(training),
                 "command": self._run.command,
                 "decisions": decisions,
-                "minutes": self._progress.minutes,
+                "minutes": row["minutes"],
             },
-            evaluation={
-                **asdict(held_out),
-                "missions": training.held_out * len(training.robots),
-                "first_seed": HELD_OUT_SEED,
-                "chosen_by": "the least objective of all evaluations on these same missions",
-            },
+            evaluation={**asdict(costs), **how},
             commit=commit(),
             version=version(),
         )
-
-
-def acting_network(model: PPO) -> AggregationGnn:
-    """A copy of the network that acts."""
-    assert isinstance(model.policy, GnnActorCritic)
-    return model.policy.acting_network()
+        save_policy(self._folder / POLICY, self._networks[decisions], config)
 
 
 def _check_finite(model: PPO, decisions: int) -> None:

@@ -16,20 +16,31 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
+from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.io.atomic import write_bytes
 from swarm_mj.io.reading import read_file, read_json
+from swarm_mj.learning.actor_critic import GnnActorCritic
 from swarm_mj.learning.checkpoint_state import check_state
+from swarm_mj.learning.choice import NUM_BEST
 from swarm_mj.learning.mission_batch import ActionHistory
 from swarm_mj.learning.run_folder import Progress
 from swarm_mj.learning.settings import Training
 from swarm_mj.learning.vec_env import missions_of
 
-CHECKPOINT_VERSION = 2
+CHECKPOINT_VERSION = 3
 SPARE_BYTES = 100_000_000  # the curve's, and what else does not depend on the settings
 
 
+Networks = dict[int, AggregationGnn]  # of policies that may be kept, by their decisions
+
+
 def save(
-    path: Path, training: Training, model: PPO, rng: np.random.Generator, progress: Progress
+    path: Path,
+    training: Training,
+    model: PPO,
+    rng: np.random.Generator,
+    progress: Progress,
+    networks: Networks,
 ) -> None:
     """Writes a checkpoint; call it between rollouts. `rng` draws the missions' seeds.
 
@@ -55,14 +66,19 @@ def save(
         "numpy_rng": [name, np.asarray(keys).tolist(), *rest],
         "seeds_rng": rng.bit_generator.state,
         "progress": asdict(progress),
+        "candidates": {at: network.state_dict() for at, network in networks.items()},
     }
     content = io.BytesIO()
     torch.save(state, content)
     write_bytes(path, content.getbuffer())
 
 
-def load(path: Path, training: Training, model: PPO, rng: np.random.Generator) -> Progress:
+def load(
+    path: Path, training: Training, model: PPO, rng: np.random.Generator
+) -> tuple[Progress, Networks]:
     """Puts a model and its missions, made of these settings, back to where a checkpoint was made.
+
+    Returns where the run stands, and the networks of its candidates.
 
     Raises:
         ValueError: The file is damaged, foreign, of a newer version or of other settings.
@@ -73,6 +89,7 @@ def load(path: Path, training: Training, model: PPO, rng: np.random.Generator) -
         if read_json(state["training"], Training) != training:
             raise ValueError("it was made with other settings than the run's")
         progress = check_state(state, model)
+        networks = _networks(state, model)
         _restore(state, model, rng)
     except Exception as error:  # generators of random numbers take states as they please
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
@@ -80,12 +97,28 @@ def load(path: Path, training: Training, model: PPO, rng: np.random.Generator) -
             f"checkpoint {path} is damaged, or another run's ({reason:.200}); begin a new run with "
             "another --out"
         ) from error
-    return progress
+    return progress, networks
+
+
+def acting_network(model: PPO) -> AggregationGnn:
+    """A copy of the network that acts."""
+    assert isinstance(model.policy, GnnActorCritic)
+    return model.policy.acting_network()
+
+
+def _networks(state: dict[str, Any], model: PPO) -> Networks:
+    """The candidates'."""
+    networks = {}
+    for at, weights in state["candidates"].items():
+        networks[at] = acting_network(model)
+        networks[at].load_state_dict(weights)
+    return networks
 
 
 def _most_bytes(model: PPO) -> int:
     """What a checkpoint of a model takes, and much more for its curve."""
-    weights = 3 * sum(weight.nbytes for weight in model.policy.parameters())  # and Adam's two
+    weights = sum(weight.nbytes for weight in model.policy.parameters())
+    weights *= 3 + NUM_BEST + 1  # and Adam's two, and the candidates'
     batches = missions_of(model).batches
     decisions = sum(b.mission.num_windows * b.num_missions * b.mission.num_robots for b in batches)
     return 2 * (weights + np.dtype(np.int16).itemsize * decisions) + SPARE_BYTES

@@ -15,9 +15,11 @@ from stable_baselines3.common.vec_env import VecNormalize
 from torch import Tensor
 
 from swarm_mj.io.reading import read_plain
+from swarm_mj.learning.actor_critic import GnnActorCritic
+from swarm_mj.learning.choice import Amount, Count, candidates
 from swarm_mj.learning.held_out import HeldOut
 from swarm_mj.learning.mission_batch import MissionBatch
-from swarm_mj.learning.run_folder import Amount, Count, Progress
+from swarm_mj.learning.run_folder import Progress
 from swarm_mj.learning.vec_env import missions_of
 
 OPTIONAL = ("aoi_sem",)  # of what a held-out evaluation has
@@ -64,6 +66,7 @@ def check_state(state: Mapping[str, Any], model: PPO) -> Progress:
         if not all(math.isfinite(row[name]) for name in IN_A_ROW):
             raise ValueError("its curve has numbers that are not finite")
     _check_parameters(state["parameters"], model)
+    _check_candidates(state["candidates"], counters.progress, model)
     starts = torch.zeros(model.n_envs, dtype=torch.bool)
     _check_tensors({"episode_starts": state["episode_starts"]}, {"episode_starts": starts})
     _check_tensors({"torch_rng": state["torch_rng"]}, {"torch_rng": torch.get_rng_state()})
@@ -92,6 +95,18 @@ def _check_parameters(given: Mapping[str, Any], model: PPO) -> None:
         _check_tensors(moments, {"step": torch.zeros(()), "exp_avg": like, "exp_avg_sq": like})
         if moments["step"] < 0:
             raise ValueError("its optimiser has made less than no steps")
+
+
+def _check_candidates(
+    given: Mapping[int, Mapping[str, Any]], progress: Progress, model: PPO
+) -> None:
+    """Of the policies that may be kept."""
+    if given.keys() != {int(row["decisions"]) for row in candidates(progress.curve)}:
+        raise ValueError("its candidates are not those of its curve")
+    assert isinstance(model.policy, GnnActorCritic)
+    like = model.policy.acting_network().state_dict()
+    for weights in given.values():
+        _check_tensors(weights, like)
 
 
 def _check_history(history: Mapping[str, Any], batch: MissionBatch) -> None:

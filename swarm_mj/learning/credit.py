@@ -9,13 +9,13 @@ import copy
 from typing import TypeVar
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from swarm_mj.compiled import compiled
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.protocol.own_channel import decoded
 from swarm_mj.protocol.timestamps import merge_timestamps, observe_own
-from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, channel_at, respondents
+from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, channel_at, of_active, respondents
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
 
 Kind = TypeVar("Kind", bound=Channel | VaryingChannel)
@@ -27,6 +27,7 @@ def credits_of(
     recipient: Int[np.ndarray, "B N"],
     channel: Channel | VaryingChannel,
     now: Float[np.ndarray, "B"],
+    is_active: Bool[np.ndarray, "B N"] | None = None,
 ) -> Float[np.ndarray, "B N"]:
     """The age that the team would not have lost in a window without each robot.
 
@@ -39,19 +40,24 @@ def credits_of(
         channel: Who decodes whom; of one that draws or remembers, what `as_it_is` gave before the
             window.
         now: t at the start of the window [windows].
+        is_active: Who took part in the window, and whose age counts; None is everyone.
 
     Returns:
         The credit of every robot, summed over pairs of robots [windows]; it may be negative.
     """
+    if is_active is not None:
+        recipient = of_active(is_active, recipient)
+        # Nobody can gain by news of a robot that has failed: it is not counted in the age.
+        timestamp = np.where(is_active[:, None, :], timestamp, np.inf)
     mission, sender = np.nonzero(recipient != np.arange(recipient.shape[1]))
     alone = recipient[mission]  # one row per sender: everyone's recipients without it
     alone[np.arange(sender.size), sender] = sender
     rows = np.concatenate([np.arange(len(now)), mission])
     if not isinstance(channel, (FreeSpaceRadio, VaryingChannel)):
         channel = _Rows(channel, rows)
-    gained = gain(
-        timestamp, position_m[rows], np.concatenate([recipient, alone]), channel, now[rows], rows
-    )
+    sent_to = np.concatenate([recipient, alone])
+    took_part = None if is_active is None else is_active[rows]
+    gained = gain(timestamp, position_m[rows], sent_to, channel, now[rows], rows, took_part)
     credit = np.zeros(recipient.shape)
     credit[mission, sender] = gained[mission] - gained[len(now) :]
     return credit
@@ -97,6 +103,7 @@ def gain(
     channel: Channel | VaryingChannel,
     now: Float[np.ndarray, "W"],
     mission: Int[np.ndarray, "W"],
+    is_active: Bool[np.ndarray, "W N"] | None = None,
 ) -> Float[np.ndarray, "W"]:
     """How much age W windows of Alg. 1 take from what robots know about others.
 
@@ -104,9 +111,9 @@ def gain(
     starts from. Returns the sum over pairs of robots of what T rises by [windows].
     """
     first, second = (channel_at(channel, now + n * SLOT_WINDOWS, mission) for n in (1, 2))
-    heard = first(position_m, recipient)
+    heard = of_active(is_active, first(position_m, recipient))
     answered = respondents(Phase(recipient=recipient, heard=heard))
-    heard_answer = second(position_m, answered)
+    heard_answer = of_active(is_active, second(position_m, answered))
     gained = np.empty(len(mission))
     _replay(timestamp, mission, heard, heard_answer, now, gained)
     return gained

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,14 @@ from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.learning.settings import HELD_OUT_SEED, Training
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn import LearnedPolicy
+from swarm_mj.policies.policy import Policy
 from swarm_mj.protocol.costs import WindowCosts
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.rollout import rollout
 from swarm_mj.swarm import Swarm
+
+Flown = list[list[WindowCosts]]  # by team size, window by window
+MakePolicy = Callable[[Mission], Policy]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +58,18 @@ def evaluate(
 
     `on_window` is told after every window what share is flown; what it raises ends the evaluation.
     """
-    costs = _fly(training, network, on_window)
+    seeds = seeds_from(HELD_OUT_SEED, training.held_out)
+    flies = partial(held_out_policy, training, network)
+    return means(training, fly(training, flies, seeds, on_window))
+
+
+def seeds_from(first: int, size: int) -> range:
+    """Of so many missions of each team size."""
+    return range(first, first + size)
+
+
+def means(training: Training, costs: Flown) -> HeldOut:
+    """What missions flown cost, all team sizes together."""
     age = [np.array([window.age_windows for window in windows]) for windows in costs]
     variance = [np.array([w.velocity_variance_m2ps2 for w in windows]) for windows in costs]
     objective = [each / size for each, size in zip(age, training.robots, strict=True)]
@@ -91,21 +107,34 @@ def record_replay(
     )
 
 
-def _fly(
-    training: Training, network: AggregationGnn, on_window: Callable[[float], None]
-) -> list[list[WindowCosts]]:
-    """What the held-out missions of each team size cost, window by window."""
+def fly(
+    training: Training,
+    policy_of: MakePolicy,
+    seeds: range,
+    on_window: Callable[[float], None] = lambda _share: None,
+) -> Flown:
+    """What missions of each team size cost with a policy; `on_window` as in `evaluate`."""
     missions = held_out_missions(training)
-    seeds = range(HELD_OUT_SEED, HELD_OUT_SEED + training.held_out)
     sizes = []
     for mission in missions:
         swarm = Swarm(mission, seeds, **training.parts.made(mission))
-        policy = held_out_policy(training, network, mission)
+        policy = policy_of(mission)
         sizes.append([])
         for window in range(1, mission.num_windows + 1):
             sizes[-1].append(swarm.step(policy))
             on_window((len(sizes) - 1 + window / mission.num_windows) / len(missions))
     return sizes
+
+
+def own_costs(costs: Flown, cost: str) -> list[Float[np.ndarray, "B"]]:
+    """What every mission flown costs, by team size: its `aoi`, or its `velocity_variance`."""
+    name = "age_windows" if cost == "aoi" else "velocity_variance_m2ps2"
+    return [np.mean([getattr(each, name) for each in windows], axis=0) for windows in costs]
+
+
+def mean_and_error(by_size: Sequence[Float[np.ndarray, "B"]]) -> tuple[float, float | None]:
+    """Over missions and team sizes: the mean, and its standard error if there is one."""
+    return float(np.mean([each.mean() for each in by_size])), _standard_error(by_size)
 
 
 def _mean(by_size: Sequence[Float[np.ndarray, "windows B"]]) -> float:

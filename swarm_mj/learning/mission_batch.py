@@ -75,9 +75,12 @@ class MissionBatch:
         costs = swarm.exchange(recipient)
         credit = np.zeros(recipient.shape)
         if with_credit:
-            credit = credits_of(before, swarm.states.position_m, recipient, channel, now)
+            states = swarm.states
+            credit = credits_of(
+                before, states.position_m, recipient, channel, now, states.is_active
+            )
         self.history.recipients.append(recipient.astype(np.int16))
-        graphs = self._extractor.graphs(swarm.views)
+        graphs = self._see()
         last_graphs = None
         is_cut = False
         if swarm.now[0] >= self.history.last_window:
@@ -99,15 +102,23 @@ class MissionBatch:
         graphs = self._begin(copy.deepcopy(history))
         for recipient in history.recipients:
             self._swarm.exchange(recipient.astype(np.int64))
-            graphs = self._extractor.graphs(self._swarm.views)
+            graphs = self._see()
         return graphs
+
+    def _see(self) -> Graphs:
+        """What the robots see; one that was switched off may only be silent."""
+        graphs, is_active = self._extractor.graphs(self._swarm.views), self._swarm.states.is_active
+        if is_active is None:
+            return graphs
+        own = np.tile(np.eye(self.mission.num_robots, dtype=np.bool_), (self.num_missions, 1))
+        return replace(graphs, may_address=graphs.may_address & (is_active.reshape(-1, 1) | own))
 
     def _begin(self, history: ActionHistory) -> Graphs:
         """What the robots see at the start of a history's missions."""
         self.history = history
         self._swarm.restart(history.seeds)
         self._extractor.start(self.num_missions, self.mission.num_robots)
-        graphs = self._extractor.graphs(self._swarm.views)
+        graphs = self._see()
         check_width(self._features, self._extractor, graphs)
         return graphs
 

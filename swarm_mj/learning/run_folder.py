@@ -12,6 +12,7 @@ from msgspec import Meta
 from swarm_mj.fields import check, setting
 from swarm_mj.io.atomic import write_csv, write_json
 from swarm_mj.io.reading import read_document, read_file
+from swarm_mj.learning.choice import MANY_DECISIONS, Amount, Choice, Count
 from swarm_mj.learning.settings import Training
 from swarm_mj.protocol.costs import WindowCosts
 
@@ -20,13 +21,9 @@ INIT, POLICY, REPLAYS, TENSORBOARD = "init", "policy", "replays", "tensorboard"
 FORMAT = "swarm_mj training run"
 FORMAT_VERSION = 1
 MOST_BYTES = 1_000_000  # of the settings
-MANY_DECISIONS = 10**12
 BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's way
-
-
-# What is allowed where a run's progress is read back.
-Count = Annotated[int, Meta(ge=0, le=2**62)]
-Amount = Annotated[float, Meta(ge=0.0, le=1e30)]
+PATIENCE = {"robot": 8, "team": 40}  # evaluations
+MOST_EVALUATIONS = 1_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +51,14 @@ class Limits:
         label="replay-every",
         low=1,
         high=MANY_DECISIONS,
+    )
+    patience: int | None = setting(
+        None,
+        "stop after so many evaluations in a row without gain; 0: never",
+        low=0,
+        high=MOST_EVALUATIONS,
+        shown=f"{PATIENCE['robot']}, team: {PATIENCE['team']}",
+        may_lack=True,
     )
     # The least time between two checkpoints.
     checkpoint_every_s: float = setting(10.0, low=0.0, high=1e6)
@@ -114,10 +119,11 @@ class Progress:
     curve: list[dict[str, float]] = field(default_factory=list)  # one row an evaluation
     since_evaluation: Accumulator = field(default_factory=Accumulator)
     optimiser: dict[str, float] = field(default_factory=dict)  # what PPO last logged of itself
+    choice: Choice | None = None  # of the policy that is kept; None: it is of the best evaluation
 
     @property
     def best(self) -> dict[str, float] | None:
-        """The evaluation of the policy that is kept."""
+        """The best evaluation."""
         return min(self.curve, key=lambda row: row["objective"], default=None)
 
 

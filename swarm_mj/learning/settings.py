@@ -157,6 +157,11 @@ class Training:
         return " ".join(f"--{kind} {name:.200}" for kind, name in self.own.items())
 
     @property
+    def cost(self) -> Literal["aoi", "velocity_variance"]:
+        """What the run is to lower, as learning curves call it."""
+        return "aoi" if self.reward == "aoi" else "velocity_variance"
+
+    @property
     def sums_nodes(self) -> bool:
         """Whether a team's value sums all nodes of all graphs, as in the authors' code."""
         return self.mission.preset == "reference"

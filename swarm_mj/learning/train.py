@@ -1,11 +1,12 @@
 """The PPO run (III-C): stable-baselines3's loop, from empty folder to stored policy.
 
 A run's folder holds `settings.json`, `checkpoint.pt`, `curve.csv` (one row an evaluation),
-`tensorboard/`, `policy/` (the best so far), `init/` (the policy it began with, if any) and, on
+`tensorboard/`, `policy/` (the one that is kept), `init/` (the policy it began with, if any) and, on
 request, `replays/`.
 """
 
 import warnings
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -149,13 +150,13 @@ def train(run: Run, folder: Path, *, listener: Listener, is_resumed: bool = Fals
         check_folder(folder)  # a run may have begun, or come further, meanwhile
         check_replaceable(folder / POLICY)
         model, rng = make_model(run.training)
-        progress = _begun(folder, run, model, rng)
+        progress, networks = _begun(folder, run, model, rng)
         model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))
-        callback = TrainingCallback(model, run, folder, progress, rng, listener)
+        callback = TrainingCallback(model, run, folder, progress, networks, rng, listener)
         try:
-            _learn(model, run.limits, callback)
-        except Stopped:
-            pass
+            with suppress(Stopped):
+                _learn(model, run.limits, callback)
+            callback.choose()
         finally:
             model.logger.close()
     return progress
@@ -175,14 +176,17 @@ def _learn(model: PPO, limits: Limits, callback: TrainingCallback) -> None:
     callback.between_rollouts(is_last=True)
 
 
-def _begun(folder: Path, run: Run, model: PPO, rng: np.random.Generator) -> Progress:
+def _begun(
+    folder: Path, run: Run, model: PPO, rng: np.random.Generator
+) -> tuple[Progress, checkpoint.Networks]:
     """Takes a run to its last checkpoint, or else to its beginning; then it can be resumed.
 
     Nothing is written before all that is read has been checked.
     """
     kept, own, progress, init = folder / CHECKPOINT, folder / INIT, Progress(), None
+    networks: checkpoint.Networks = {}
     if kept.exists():
-        progress = checkpoint.load(kept, run.training, model, rng)
+        progress, networks = checkpoint.load(kept, run.training, model, rng)
     elif run.init is not None:
         init = _read_init(own if own.exists() else run.init, run.training)
     write_run(folder, run)
@@ -193,7 +197,7 @@ def _begun(folder: Path, run: Run, model: PPO, rng: np.random.Generator) -> Prog
         model.policy.take_acting_network(init[0])
         if not own.exists():
             save_policy(own, *init)
-    return progress
+    return progress, networks
 
 
 def _read_init(path: Path, training: Training) -> tuple[AggregationGnn, PolicyConfig]:

@@ -245,14 +245,14 @@ def _send(
     now: Float[np.ndarray, "B"],
 ) -> Phase:
     """Sends everyone's packet through the channel (Eq. 6) and merges what was decoded."""
-    sent_to = _of_active(states.is_active, recipient)
+    sent_to = of_active(states.is_active, recipient)
     at_once = channel_at(channel, now)
-    heard = _of_active(states.is_active, decoded(at_once, states.position_m, sent_to))
+    heard = of_active(states.is_active, decoded(at_once, states.position_m, sent_to))
     merge(buffers, heard, entries_sent(buffers, sent_to))
     return Phase(recipient=sent_to.copy(), heard=heard)
 
 
-def _of_active(
+def of_active(
     is_active: Bool[np.ndarray, "B N"] | None, robots: Int[np.ndarray, "B N"]
 ) -> Int[np.ndarray, "B N"]:
     """One robot per robot, but inactive ones get themselves: silence, or nobody heard."""

@@ -50,7 +50,7 @@ def test_a_run_prints_its_evaluations_and_what_it_came_to(whole):
     for line, decisions in zip(lines, (0, 128, 256), strict=True):
         assert line.split()[:2] == [f"{decisions}", "decisions"]
         assert "held-out age" in line
-    for row in ("held-out age, at first", "held-out age, best policy", "decisions", "minutes"):
+    for row in ("policy kept", "spatial-tdma", "greedy-oracle", "decisions", "minutes"):
         assert row in done.stdout
     assert "runs/whole: arm robot, stationary, 4 robots" in done.stdout
 
@@ -181,7 +181,7 @@ def test_a_run_begins_with_a_policy_and_its_network(whole, here, capsys):
 def test_arm_team_trains_a_flock_for_its_velocities(capsys):
     options = ("--arm", "team", "--task", "flocking", "--reward", "velocity-variance")
     assert train("--out", "r", *SMALL, *options, "--budget", 1) == 0
-    assert "velocity variance, of these" in capsys.readouterr().out
+    assert "m²/s²" in capsys.readouterr().out
 
 
 def test_missions_of_several_sizes_are_shared_out_evenly(here, capsys):

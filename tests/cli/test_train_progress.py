@@ -13,13 +13,14 @@ from swarm_mj.learning.run_folder import Limits, Progress
 ROW = {"decisions": 1000.0, "minutes": 0.5, "aoi": 31.5, "aoi_sem": 0.25, "objective": 1.0}
 
 
-def status(decisions, minutes, curve=(), evaluated=None, aoi=math.nan):
+def status(decisions, minutes, curve=(), evaluated=None, aoi=math.nan, what="Training"):
     return Status(
         decisions=decisions,
         minutes=minutes,
         aoi=aoi,
         progress=Progress(curve=list(curve)),
         evaluated=evaluated,
+        what=what,
     )
 
 
@@ -55,7 +56,7 @@ def test_an_age_has_its_error_if_it_has_one():
 def heard_by(is_interrupted, statuses, terminal=False):
     """What is drawn for these, and whether each asked to go on."""
     file = io.StringIO()
-    console = Console(file=file, force_terminal=terminal, width=100)
+    console = Console(file=file, force_terminal=terminal, width=120)
     with Watch(console, Limits(decisions=4_000), is_interrupted) as watch:
         answers = [watch(each) for each in statuses]
     return file.getvalue(), answers, watch
@@ -63,7 +64,11 @@ def heard_by(is_interrupted, statuses, terminal=False):
 
 def test_every_new_evaluation_is_a_line_and_those_of_earlier_sessions_are_not():
     worse = ROW | {"decisions": 2000.0, "aoi": 35.0, "objective": 2.0}
-    better = ROW | {"decisions": 3000.0, "aoi": 25.0, "objective": 0.5}
+    better = (
+        ROW
+        | {"aoi_spatial_tdma": 21.0, "aoi_greedy_oracle": 12.0}
+        | {"decisions": 3000.0, "aoi": 25.0, "objective": 0.5}
+    )
     shown, answers, _ = heard_by(
         lambda: False,
         [
@@ -75,7 +80,8 @@ def test_every_new_evaluation_is_a_line_and_those_of_earlier_sessions_are_not():
     )
     first, second = (" ".join(line.split()) for line in shown.splitlines())
     assert first == "2,000 decisions 0.5 min held-out age 35.00 ± 0.25"
-    assert second == "3,000 decisions 0.5 min held-out age 25.00 ± 0.25 best so far"
+    assert second.startswith("3,000 decisions 0.5 min held-out age 25.00 ± 0.25 best so far ")
+    assert second.endswith(" best so far spatial-tdma 21.00 greedy-oracle 12.00")
     assert answers == [True] * 4
 
 
@@ -90,9 +96,9 @@ def test_the_bar_says_where_the_run_stands():
 
 
 def test_the_bar_says_that_missions_are_evaluated():
-    shown, _, _ = heard_by(lambda: False, [status(0, 0.1, evaluated=0.4)], terminal=True)
-    assert "Evaluating" in shown
-    assert "held-out missions 40%" in shown
+    shown, _, _ = heard_by(lambda: False, [status(0, 0.1, evaluated=0.4, what="Choosing")], True)
+    assert "Choosing" in shown
+    assert "missions 40%" in shown
 
 
 def test_ctrl_c_is_passed_on_and_said_once():

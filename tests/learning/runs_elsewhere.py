@@ -21,6 +21,7 @@ from swarm_mj.cli import main
 from swarm_mj.gnn.sampling import sample
 from swarm_mj.learning.mission_batch import MissionBatch
 from swarm_mj.learning.run_folder import Limits, Progress, Run
+from swarm_mj.learning.selection import reference_columns
 from swarm_mj.learning.train import train
 from swarm_mj.mission import paper
 
@@ -59,8 +60,8 @@ def _interrupted_twice(folder, asked):
 def timed(folder):
     """How the end of a run that was stopped by the clock differs from that of one that was not.
 
-    But for what one evaluation more at every stop brings: rows of the curve, and so the best
-    policy.
+    But for what one evaluation more at every stop brings: rows of the curve, candidates, and so
+    the policy kept.
     """
     training = small_training()
     run(training, folder / "untimed", 192)
@@ -72,7 +73,7 @@ def timed(folder):
         num_sessions += 1
     ends = [end_of(folder / name) for name in ("untimed", "timed")]
     for end in ends:
-        del end["progress"], end["policy file"], end["curve rows"]
+        del end["progress"], end["policy file"], end["curve rows"], end["candidates"]
     return {"difference": difference(*ends), "sessions": num_sessions}
 
 
@@ -129,12 +130,13 @@ def _train_and_die(arguments, moment, moments):
 
 
 def _load_compiled_functions():
-    """Once, for all children: the simulation, the features, the credits, the draws."""
+    """Once, for all children: the simulation, features, credits, draws, the policies compared."""
     mission = paper("stationary", num_robots=4, range_ratio=1.0)
     batch = MissionBatch(mission, "extended", 2, np.random.default_rng(1), first_windows=2)
     for _ in range(2):
         batch.step(np.array([[1, 1, 2, 3], [0, 1, 0, 3]]), with_credit=True)
     sample(np.zeros((2, 3), dtype=np.float32), np.array([0.1, 0.9]))
+    reference_columns(small_training(), lambda _share: None)
 
 
 def _in_a_child(work):

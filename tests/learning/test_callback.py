@@ -10,6 +10,7 @@ from small_runs import StopAfter, go_on, run, small_training
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from swarm_mj.learning import callback
+from swarm_mj.learning.choice import TEST_SEED
 from swarm_mj.learning.run_folder import CURVE, POLICY, REPLAYS, TENSORBOARD, Limits, Run
 from swarm_mj.learning.settings import HELD_OUT_SEED
 from swarm_mj.learning.train import train
@@ -40,7 +41,7 @@ def whole(tmp_path_factory):
     folder, heard = tmp_path_factory.mktemp("run"), []
 
     def listen(status):
-        heard.append((status.decisions, status.evaluated, status.aoi))
+        heard.append((status.decisions, status.evaluated, status.aoi, status.what))
         return True
 
     limits = Limits(decisions=192, replay_every=100)
@@ -83,24 +84,90 @@ def test_a_curve_that_is_ahead_of_the_checkpoint_is_put_right_on_resuming(tmp_pa
     assert path.read_text() == kept
 
 
-def test_the_best_policy_is_the_one_of_the_best_evaluation(whole):
+def test_the_policy_kept_is_the_one_that_was_chosen(whole):
     folder, progress, _ = whole
     _, config = read_policy(folder / POLICY)
-    assert progress.best is not None
-    assert config.training["decisions"] == progress.best["decisions"]
+    assert progress.choice is not None
+    assert config.training["decisions"] == progress.choice.decisions
     assert config.training["command"] == "swarm-mj train --out x"
-    for name in ("aoi", "objective", "packets_per_window"):
-        assert config.evaluation[name] == progress.best[name]
-    assert config.evaluation["first_seed"] == HELD_OUT_SEED
-    assert progress.best["objective"] == min(row["objective"] for row in progress.curve)
+    assert config.evaluation["aoi"] == pytest.approx(progress.choice.kept.mean)
+    assert config.evaluation["first_seed"] == TEST_SEED
 
 
-def test_the_best_policy_flies_as_it_was_evaluated(whole):
+def test_the_policy_kept_flies_as_is_told(whole):
     folder, progress, _ = whole
-    seeds = range(HELD_OUT_SEED, HELD_OUT_SEED + TRAINING.held_out)
+    seeds = range(TEST_SEED, TEST_SEED + progress.choice.num_missions)
     policy = make_policy(str(folder / POLICY), TRAINING.mission)
     summary = summarise(list(rollout(Swarm(TRAINING.mission, seeds), policy)))
-    assert summary.aoi_mean.mean() == pytest.approx(progress.best["aoi"])
+    assert summary.aoi_mean.mean() == pytest.approx(progress.choice.kept.mean)
+
+
+def test_a_run_that_is_interrupted_keeps_its_best_evaluation_and_chooses_later(tmp_path):
+    progress = run(TRAINING, tmp_path / "run", 64, StopAfter(9))
+    assert progress.choice is None
+    _, config = read_policy(tmp_path / "run" / POLICY)
+    assert config.evaluation["first_seed"] == HELD_OUT_SEED
+    assert config.evaluation["objective"] == progress.best["objective"]
+
+    def not_yet(status):
+        return status.what != "Choosing"
+
+    progress = run(TRAINING, tmp_path / "run", 64, not_yet, is_resumed=True)
+    assert (progress.decisions, progress.choice) == (64, None)
+    progress = run(TRAINING, tmp_path / "run", 64, is_resumed=True)
+    assert progress.choice == run(TRAINING, tmp_path / "whole", 64).choice
+
+
+def test_a_run_that_goes_on_chooses_anew(tmp_path):
+    first = run(TRAINING, tmp_path / "run", 64)
+    again = run(TRAINING, tmp_path / "run", 128, is_resumed=True)
+    assert (first.choice.run_decisions, again.choice.run_decisions) == (64, 128)
+    assert again.choice == run(TRAINING, tmp_path / "whole", 128).choice
+
+
+@pytest.mark.parametrize("sitting", [10, 1000])
+def test_a_run_stops_when_evaluations_bring_no_gain_however_often_it_was_interrupted(
+    tmp_path, monkeypatch, sitting
+):
+    """Of 0, 64, 128, ... decisions: the best is at 128, and two more bring less than 0.5 %."""
+    objectives = {0: 3.0, 64: 2.0, 128: 1.0, 192: 0.998, 256: 1.5, 320: 0.1}
+    evaluate = callback.evaluate
+    seen = []
+
+    def judged(*arguments):
+        found = replace(evaluate(*arguments), objective=objectives[len(seen) * 64])
+        seen.append(found)
+        return found
+
+    monkeypatch.setattr(callback, "evaluate", judged)
+    limits, is_resumed = Limits(decisions=640, patience=2), False
+    for _ in range(10):
+        asked = Run(training=TRAINING, limits=limits)
+        listener = StopAfter(sitting)
+        progress = train(asked, tmp_path / "run", listener=listener, is_resumed=is_resumed)
+        is_resumed = True
+        if progress.choice is not None:
+            break
+    assert [row["decisions"] for row in progress.curve] == [0.0, 64.0, 128.0, 192.0, 256.0]
+    asked = Run(training=TRAINING, limits=replace(limits, patience=0))
+    progress = train(asked, tmp_path / "run", listener=StopAfter(17), is_resumed=True)
+    assert progress.curve[-1]["decisions"] == 320.0
+
+
+def test_hand_written_policies_fly_once_and_are_flat_curves(whole):
+    """Their ages are those of the library's own flights."""
+    folder, progress, heard = whole
+    flown = [what for *_, what in heard if what == "Flying others"]
+    assert len(flown) == 3 * TRAINING.mission.num_windows
+    seeds = range(HELD_OUT_SEED, HELD_OUT_SEED + TRAINING.held_out)
+    events = EventAccumulator(str(folder / TENSORBOARD)).Reload()
+    for name in ("tdma", "spatial-tdma", "greedy-oracle"):
+        swarm = Swarm(TRAINING.mission, seeds)
+        summary = summarise(list(rollout(swarm, make_policy(name, TRAINING.mission))))
+        column = f"aoi_{name.replace('-', '_')}"
+        expected = pytest.approx([summary.aoi_mean.mean()] * len(progress.curve))
+        assert [row[column] for row in progress.curve] == expected
+        assert [event.value for event in events.Scalars(f"held_out/{column}")] == expected
 
 
 def test_replays_are_recorded_at_intervals(whole):
@@ -113,9 +180,9 @@ def test_replays_are_recorded_at_intervals(whole):
 
 def test_listeners_hear_of_every_window_and_of_evaluations(whole):
     _, _, heard = whole
-    trained = [decisions for decisions, evaluated, _ in heard if evaluated is None]
+    trained = [decisions for decisions, evaluated, *_ in heard if evaluated is None]
     assert [d for d in trained if d % 64] == [d for d in range(4, 193, 4) if d % 64]
-    shares = [evaluated for _, evaluated, _ in heard if evaluated is not None]
+    shares = [evaluated for _, evaluated, _, what in heard if what == "Evaluating"]
     assert len(shares) == 4 * TRAINING.mission.num_windows
     assert shares.count(1.0) == 4
 
@@ -123,7 +190,7 @@ def test_listeners_hear_of_every_window_and_of_evaluations(whole):
 def test_the_totals_of_an_evaluation_are_of_the_windows_since_the_last(whole):
     """Every window is heard of once after its last evaluation; all have as many missions."""
     _, progress, heard = whole
-    ages = {decisions: aoi for decisions, evaluated, aoi in heard if evaluated is None}
+    ages = {decisions: aoi for decisions, evaluated, aoi, _ in heard if evaluated is None}
     for before, row in zip(progress.curve, progress.curve[1:], strict=False):
         its = [age for at, age in ages.items() if before["decisions"] < at <= row["decisions"]]
         assert len(its) == 16
@@ -140,6 +207,7 @@ def test_a_better_policy_takes_the_place_of_the_last_and_a_worse_one_does_not(
         return replace(evaluate(*arguments), objective=next(objectives))
 
     monkeypatch.setattr(callback, "evaluate", judged)
+    monkeypatch.setattr(callback.TrainingCallback, "choose", lambda _: None)
     progress = run(TRAINING, tmp_path / "run")
     assert progress.best_objective == 1.0
     _, config = read_policy(tmp_path / "run" / POLICY)

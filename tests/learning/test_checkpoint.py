@@ -9,7 +9,7 @@ import pytest
 import torch
 from small_runs import run, small_training
 
-from swarm_mj.learning.checkpoint import load, save
+from swarm_mj.learning.checkpoint import acting_network, load, save
 from swarm_mj.learning.checkpoint_state import IN_A_ROW
 from swarm_mj.learning.run_folder import CHECKPOINT, Accumulator, Progress
 from swarm_mj.learning.train import make_model
@@ -28,7 +28,7 @@ def kept(tmp_path_factory):
 def load_bytes(folder, content, training=TRAINING):
     (folder / "c.pt").write_bytes(content)
     model, rng = make_model(training)
-    return load(folder / "c.pt", training, model, rng)
+    return load(folder / "c.pt", training, model, rng)[0]
 
 
 def changed(kept, folder, change):
@@ -76,7 +76,7 @@ def test_a_file_that_would_run_code_does_not(tmp_path):
 
 def test_another_version_is_refused(kept, tmp_path):
     content = changed(kept, tmp_path, lambda state: state.update(version=99))
-    with pytest.raises(ValueError, match=r"version 99, and this swarm_mj reads 2; resume with"):
+    with pytest.raises(ValueError, match=r"version 99, and this swarm_mj reads 3; resume with"):
         load_bytes(tmp_path, content)
 
 
@@ -115,11 +115,13 @@ def test_progress_comes_back_to_the_last_bit(tmp_path):
     )
     model, rng = make_model(TRAINING)
     model._last_episode_starts = np.ones(model.n_envs, dtype=bool)
-    save(tmp_path / "c.pt", TRAINING, model, rng, progress)
-    again = load(tmp_path / "c.pt", TRAINING, *make_model(TRAINING))
+    save(tmp_path / "c.pt", TRAINING, model, rng, progress, {0: acting_network(model)})
+    again, networks = load(tmp_path / "c.pt", TRAINING, *make_model(TRAINING))
     assert math.isnan(again.curve[1].pop("train/explained_variance"))
     progress.curve[1].pop("train/explained_variance")
     assert again == progress
+    kept, own = networks[0].state_dict(), acting_network(model).state_dict()
+    assert all(torch.equal(kept[name], own[name]) for name in own)
     assert again.best_objective == math.inf
 
 
@@ -128,7 +130,7 @@ def test_a_checkpoint_that_cannot_be_written_is_an_os_error(tmp_path):
     model._last_episode_starts = np.ones(model.n_envs, dtype=bool)
     (tmp_path / "file").touch()
     with pytest.raises(OSError, match="file"):
-        save(tmp_path / "file" / "c.pt", TRAINING, model, rng, Progress())
+        save(tmp_path / "file" / "c.pt", TRAINING, model, rng, Progress(), {})
 
 
 def test_a_run_does_not_begin_over_another(tmp_path):

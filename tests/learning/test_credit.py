@@ -177,3 +177,33 @@ def test_a_channel_that_draws_replays_a_window_with_its_own_numbers():
         np.testing.assert_allclose(found, expected, atol=1e-9)
         num_lost += np.count_nonzero(found < 0.0)
     assert num_lost > 0  # some packet destroyed another
+
+
+def test_credits_are_those_of_a_replay_without_each_robot_also_after_robots_have_failed():
+    """Only pairs of robots that still work count; those that failed neither send nor answer."""
+    rng = np.random.default_rng(5)
+    mission = paper("stationary", num_robots=8, range_ratio=0.5, num_windows=16, switched_off=0.3)
+    swarm, num_credited = Swarm(mission, [1, 2]), 0
+    for _ in range(16):
+        buffers, now = copy.deepcopy(swarm.buffers), swarm.now
+        recipient = random_recipients(rng, (2, 8), 0.3)
+        swarm.exchange(recipient)
+        states = swarm.states
+        if states.is_active is None:
+            continue
+        counted = states.is_active[:, :, None] & states.is_active[:, None, :]
+        total = []
+        for i in range(-1, 8):  # -1: nobody is silenced
+            without = recipient.copy()
+            if i >= 0:
+                without[:, i] = i
+            replayed = copy.deepcopy(buffers)
+            window(replayed, states, without, swarm.channel, now)
+            total.append(np.where(counted, replayed.timestamp, 0.0).sum(axis=(1, 2)))
+        expected = np.stack([total[0] - each for each in total[1:]], axis=1)
+        given_ = (buffers.timestamp, states.position_m, recipient, swarm.channel, now)
+        found = credits_of(*given_, states.is_active)
+        np.testing.assert_allclose(found, expected, atol=1e-9)
+        assert np.all(found[~states.is_active] == 0.0)
+        num_credited += np.sum(found != 0.0)
+    assert num_credited > 10

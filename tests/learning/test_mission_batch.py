@@ -133,3 +133,14 @@ def test_credit_is_what_silence_would_have_cost_the_team():
         without[:, i] = i
         np.testing.assert_allclose(transition.credit[:, i], known(recipients[-1]) - known(without))
     assert np.any(transition.credit > 0.0)
+
+
+def test_robots_that_were_switched_off_may_only_be_silent():
+    mission = paper("stationary", num_robots=5, range_ratio=1.0, num_windows=8, switched_off=0.4)
+    batch = MissionBatch(mission, "paper", 2, np.random.default_rng(1), first_windows=8)
+    for window in range(1, 8):
+        graphs = batch.step(np.tile(np.arange(5), (2, 1)), with_credit=True).graphs
+        choices = graphs.may_address.reshape(2, 5, 5).sum(axis=2)
+        assert np.sum(choices == 1) == (4 if window > 4 else 0)
+        is_off = np.argwhere(choices == 1)
+        assert all(graphs.may_address.reshape(2, 5, 5)[b, i, i] for b, i in is_off)
