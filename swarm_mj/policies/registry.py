@@ -25,9 +25,11 @@ from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Pol
 from swarm_mj.policies.policy_folder import is_mlp
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.round_robin import RoundRobin
+from swarm_mj.policies.sotdma.policy import SelfOrganisedTdma
 from swarm_mj.policies.spatial_tdma import SpatialTdma
 from swarm_mj.policies.tdma import Tdma
 from swarm_mj.policies.tuning import tuned_probability
+from swarm_mj.protocol.packets import fits, packet_of
 from swarm_mj.radio.free_space import from_db
 from swarm_mj.radio.mission_radio import radio_of
 
@@ -37,6 +39,12 @@ PAYLOADS = ("snapshots", "none")
 
 def _spatial_tdma(mission: Mission) -> SpatialTdma:
     return SpatialTdma(range_m=mission.range_m, threshold=from_db(mission.sinr_threshold_db))
+
+
+def _sotdma(mission: Mission) -> SelfOrganisedTdma:
+    return SelfOrganisedTdma(
+        radio_of(mission), _spatial_tdma(mission), reads_packets=fits(packet_of(mission), mission)
+    )
 
 
 def _planner(mission: Mission) -> Planner | RestingPlanner:
@@ -81,6 +89,7 @@ RULES: dict[str, Callable[..., Policy]] = {
     "gossip": lambda _, probability: InnovationGossip(probability),
     "tdma": lambda _: Tdma(),
     "spatial-tdma": _spatial_tdma,
+    "sotdma": _sotdma,
     "planner": _planner,
     WITHOUT_PAYLOAD: _resting_planner,
     "greedy-oracle": lambda mission: GreedyOracle(radio_of(mission)),

@@ -1,0 +1,174 @@
+"""What robots hear of slots: who transmits in which, and who missed their own packets.
+
+A robot's T of a teammate says when that teammate last transmitted, and so which slot of the frame
+it owns. The T of itself in a packet says whether its sender decoded its own last packet. Index
+order: row `[i]` is robot i's own memory; slots count from the start of the mission.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int, Int16, Int32
+
+from swarm_mj.compiled import compiled
+from swarm_mj.protocol.window import SLOTS_PER_WINDOW
+
+LONG_AGO = -1_000_000
+OF_NO_FRAME = -1  # the place of a slot that is left to whoever is in need
+RECENT = 0.1  # the weight of the last packet in the share that were decoded
+
+
+class Frames(NamedTuple):
+    """How the mission's slots are divided into frames."""
+
+    first_slot: int
+    num_slots: int  # of a frame
+    contention_every: int  # one of so many slots is no part of them
+
+
+class Hearsay(NamedTuple):
+    """What every robot remembers."""
+
+    slots: Int[np.ndarray, "N N"]  # of the frame, in which it believes each to transmit
+    announced: Int[np.ndarray, "N N"]  # when it last knows that each transmitted
+    decoded: Int32[np.ndarray, "N N"]  # when it last decoded a packet of each
+    got_through: Int32[np.ndarray, "N N"]  # its own last packet that such a packet knew of
+    sent: Int[np.ndarray, "N"]  # when it last transmitted itself
+    sent_place: Int[np.ndarray, "N"]  # and where in the frame
+    share: Float[np.ndarray, "N"]  # of its packets, lately, that neighbours decoded
+    missed: Int16[np.ndarray, "N F N"]  # its packets in a slot in a row that a neighbour missed
+    missed_at: Int32[np.ndarray, "N F N"]  # when it last learned whether
+
+
+@compiled()
+def place_of(slot: int, frames: Frames) -> int:
+    """Where in its frame a slot lies, or `OF_NO_FRAME`."""
+    since = slot - frames.first_slot
+    if since % frames.contention_every == frames.contention_every - 1:
+        return OF_NO_FRAME
+    return (since - since // frames.contention_every) % frames.num_slots
+
+
+def nothing_heard(slots: Int[np.ndarray, "N N"], num_slots: int) -> Hearsay:
+    """Robots that believe in these slots and remember nothing else."""
+    num_robots, pairs = len(slots), slots.shape
+    of_slots = (num_robots, num_slots, num_robots)
+    return Hearsay(
+        slots=slots,
+        announced=np.full(pairs, LONG_AGO),
+        decoded=np.full(pairs, LONG_AGO, dtype=np.int32),
+        got_through=np.full(pairs, LONG_AGO, dtype=np.int32),
+        sent=np.full(num_robots, LONG_AGO),
+        sent_place=np.full(num_robots, OF_NO_FRAME),
+        share=np.ones(num_robots),
+        missed=np.zeros(of_slots, dtype=np.int16),
+        missed_at=np.full(of_slots, LONG_AGO, dtype=np.int32),
+    )
+
+
+@compiled()
+def _slot_of(timestamp: float) -> int:
+    """The slot in which a robot transmitted that was observed at that time [windows]."""
+    return round(SLOTS_PER_WINDOW * timestamp) - 1
+
+
+@compiled()
+def read_slots(hearsay: Hearsay, timestamp: Float[np.ndarray, "N N"], frames: Frames) -> None:
+    """Takes over the slots that teammates announced by transmitting in them."""
+    num_robots = timestamp.shape[0]
+    for i in range(num_robots):
+        for k in range(num_robots):
+            slot = _slot_of(timestamp[i, k])
+            if k != i and slot >= frames.first_slot and slot > hearsay.announced[i, k]:
+                hearsay.announced[i, k] = slot
+                place = place_of(slot, frames)
+                if place != OF_NO_FRAME:
+                    hearsay.slots[i, k] = place
+
+
+@compiled()
+def read_packets(
+    hearsay: Hearsay,
+    heard: Int[np.ndarray, "N"],
+    timestamp: Float[np.ndarray, "N N"],
+    slot: int,
+    frames: Frames,
+) -> None:
+    """Takes note of what the packets decoded in the last slot say of one's own.
+
+    Args:
+        hearsay: Written in place.
+        heard: Whom each robot decoded; itself is nobody.
+        timestamp: T of everyone; of a sender, what its packet said.
+        slot: That slot.
+        frames: Of the mission.
+    """
+    for i in range(heard.shape[0]):
+        j = heard[i]
+        if j == i:
+            continue
+        known = _slot_of(timestamp[j, i])
+        hearsay.decoded[i, j], hearsay.got_through[i, j] = slot, known
+        sent, place = hearsay.sent[i], hearsay.sent_place[i]
+        if place == OF_NO_FRAME or not frames.first_slot <= sent < slot:
+            continue
+        got_through = known >= sent
+        hearsay.share[i] += RECENT * ((1.0 if got_through else 0.0) - hearsay.share[i])
+        hearsay.missed_at[i, place, j] = slot
+        hearsay.missed[i, place, j] = 0 if got_through else hearsay.missed[i, place, j] + 1
+
+
+@compiled()
+def write_marks(
+    missed: Int16[np.ndarray, "F N"],
+    missed_at: Int32[np.ndarray, "F N"],
+    share: float,
+    least_doubt: float,
+    since: int,
+    is_marked: Bool[np.ndarray, "F N"],
+) -> None:
+    """Marks who does not decode a robot in which slot: who missed too many packets for chance.
+
+    Args:
+        missed: In a row, there.
+        missed_at: When it was last learned.
+        share: Of the robot's packets that neighbours decode.
+        least_doubt: Least probability of so many misses, for which they count as chance.
+        since: Older marks are forgotten.
+        is_marked: Overwritten.
+    """
+    chance = max(1.0 - share, 1e-3)
+    enough = max(1, math.ceil(math.log(least_doubt) / math.log(min(chance, 0.9))))
+    for s in range(missed.shape[0]):
+        for j in range(missed.shape[1]):
+            is_marked[s, j] = missed[s, j] >= enough and missed_at[s, j] >= since
+
+
+@compiled()
+def is_in_need(
+    hearsay: Hearsay,
+    i: int,
+    timestamp: Float[np.ndarray, "N"],
+    is_near: Bool[np.ndarray, "N"],
+    slot: int,
+    patience: float,
+) -> bool:
+    """Whether i has not heard of a neighbour for long, or hears one that has not heard of it.
+
+    Args:
+        hearsay: Of all robots.
+        i: The robot.
+        timestamp: Its T [windows].
+        is_near: Whom it believes to be in range.
+        slot: That begins.
+        patience: How long is long [slots].
+    """
+    for j in range(timestamp.shape[0]):
+        if is_near[j] and j != i:
+            if slot - _slot_of(timestamp[j]) > patience:
+                return True
+            decoded = hearsay.decoded[i, j]
+            if decoded > slot - patience and decoded - hearsay.got_through[i, j] > patience:
+                return True
+    return False

@@ -1,0 +1,88 @@
+"""Self-organised TDMA: frames in which every robot owns a slot that it chose itself.
+
+The idea is that of SOTDMA, the access scheme of ships' transponders (ITU-R M.1371): stations
+announce the slots that they reserve, and choose slots that are free where they are. Here nobody
+needs to announce anything, for T says when a teammate last transmitted, and so which slot is its
+own. So robots agree on who transmits when, however wrong they are about positions.
+
+The mission begins with spatial TDMA. After three rounds everyone works out first slots for all,
+from positions that hardly differ by then. From then on one robot after the other chooses anew: it
+simulates the whole frame, from the positions and slots that it believes in, with itself in each
+slot, and takes the one in which the team's news stays youngest. Neighbours' packets say whether
+they decoded its own; a slot that is missed too often for chance counts as one that they cannot
+hear it in. One slot in sixteen is left to robots that have lost a neighbour.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool
+
+from swarm_mj.mission.batched_rng import Stream, uniform
+from swarm_mj.policies.policy import BroadcastPolicy
+from swarm_mj.policies.sotdma.settings import SotdmaSettings
+from swarm_mj.policies.sotdma.team import Team
+from swarm_mj.policies.spatial_tdma import SpatialTdma
+from swarm_mj.policies.tdma import draw_order, slot_of
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.radio.free_space import FreeSpaceRadio
+from swarm_mj.radio.link_models import Belief
+
+
+class SelfOrganisedTdma(BroadcastPolicy):
+    """TDMA whose slots robots choose themselves, and announce by speaking in them.
+
+    Uses the robot's own buffer, the timestamps in packets that it decoded, its identity, the team's
+    size, the order, the clock and the radio's range and threshold. Of what the mission grants of
+    the channel it uses the mean powers.
+    """
+
+    uses = (
+        "its buffer, a common random order and the clock: robots own slots, which T tells, and "
+        "choose the slot in which the news would stay youngest"
+    )
+
+    def __init__(
+        self,
+        radio: FreeSpaceRadio,
+        turns: SpatialTdma,
+        settings: SotdmaSettings | None = None,
+        *,
+        reads_packets: bool = True,
+    ) -> None:
+        """Prepares the policy.
+
+        Args:
+            radio: What robots believe in unless the policy is informed otherwise.
+            turns: What they follow at first.
+            settings: What was tuned.
+            reads_packets: Whether packets hold all of T, so that they tell who was heard.
+        """
+        self._radio, self._turns = radio, turns
+        self._settings = SotdmaSettings() if settings is None else settings
+        self._reads_packets = reads_packets
+        self._belief = Belief(radio=radio)
+
+    def inform(self, belief: Belief) -> None:
+        """Takes the powers that robots believe in."""
+        self._belief = belief
+        self._turns.inform(belief)
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Draws every mission's order; arguments as in `Policy.start`."""
+        self._turns.start(num_robots, rngs)
+        orders = draw_order(num_robots, rngs)
+        self._teams = [Team(order, self._belief, self._settings) for order in orders]
+        self._uniform = Stream(rngs, uniform, (num_robots,))
+
+    def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
+        """Whoever owns the slot, or is in need where nobody does; at first, by turns."""
+        transmits, slot = self._turns.transmits(views), slot_of(views.now)
+        heard = views.phases[-1].heard if views.phases else views.silence
+        draw = self._uniform.next()
+        for b, team in enumerate(self._teams):
+            told = heard[b] if self._reads_packets else views.silence[b]
+            transmits[b] = team.transmits(
+                int(slot[b]), transmits[b], views.buffers, b, told, draw[b]
+            )
+        return transmits

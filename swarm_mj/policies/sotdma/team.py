@@ -1,0 +1,182 @@
+"""One mission's robots under self-organised TDMA, side by side: row i is robot i's memory."""
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from swarm_mj.policies.sotdma.choices import Rule, chosen, first_slots
+from swarm_mj.policies.sotdma.hearsay import (
+    OF_NO_FRAME,
+    Frames,
+    is_in_need,
+    nothing_heard,
+    place_of,
+    read_packets,
+    read_slots,
+    write_marks,
+)
+from swarm_mj.policies.sotdma.settings import SotdmaSettings
+from swarm_mj.protocol.buffers import Buffers
+from swarm_mj.protocol.window import SLOTS_PER_WINDOW
+from swarm_mj.radio.link_models import Belief
+from swarm_mj.radio.power_law import power_law, powers_between, write_powers
+
+
+class Team:
+    """Robots that choose their slots, each by its own beliefs."""
+
+    def __init__(
+        self, order: Int[np.ndarray, "N"], belief: Belief, settings: SotdmaSettings
+    ) -> None:
+        """Prepares the team.
+
+        Args:
+            order: In which robots choose.
+            belief: What they believe of the channel.
+            settings: What was tuned.
+        """
+        radio = belief.radio
+        self._order = order
+        self._settings = settings
+        at_1_m = np.full(len(order), radio.received_at_1_m_mw)
+        law = power_law(at_1_m) if belief.law is None else belief.law
+        self._law = law._replace(at_1_m=law.at_1_m / radio.noise_mw)
+        num_slots = settings.frame_slots(len(order))
+        self._rule = Rule(
+            threshold=radio.threshold,
+            interference=settings.interference,
+            num_slots=num_slots,
+            frames=settings.simulated_frames,
+            start_age=settings.start_frames * num_slots,
+            least_gain=SLOTS_PER_WINDOW * settings.least_gain_windows,
+        )
+        self._first: int | None = None  # the slot in which the first decision was asked for
+        self._last_place = OF_NO_FRAME
+
+    def transmits(
+        self,
+        slot: int,
+        by_turns: Bool[np.ndarray, "N"],
+        buffers: Buffers,
+        b: int,
+        heard: Int[np.ndarray, "N"],
+        draw: Float[np.ndarray, "N"],
+    ) -> Bool[np.ndarray, "N"]:
+        """Who transmits in a slot.
+
+        Args:
+            slot: That begins; slots are asked for one after the other.
+            by_turns: Who would transmit by the rule of the start.
+            buffers: Of all missions.
+            b: This one.
+            heard: Whom each robot decoded in the last slot; itself is nobody.
+            draw: One number on [0, 1) a robot, for contention.
+        """
+        settings, num_robots = self._settings, len(self._order)
+        if self._first is None:
+            self._first = slot
+            first_slot = slot + settings.first_rounds * num_robots
+            self._frames = Frames(first_slot, self._rule.num_slots, settings.contention_every)
+        frames = self._frames
+        if slot < frames.first_slot:
+            return by_turns
+        timestamp, is_known = (
+            buffers.timestamp[b],
+            buffers.is_known[b] | np.eye(num_robots, dtype=bool),
+        )
+        if slot == frames.first_slot:
+            self._begin(buffers.position_m[b], is_known)
+        hearsay = self._hearsay
+        read_packets(hearsay, heard, timestamp, slot - 1, frames)
+        read_slots(hearsay, timestamp, frames)
+        for i in self._choosers(slot):
+            self._choose(i, slot, buffers.position_m[b, i], is_known[i])
+        place = place_of(slot, frames)
+        if place == OF_NO_FRAME:
+            transmits = self._contends(slot, buffers.position_m[b], is_known, timestamp, draw)
+        else:
+            transmits = np.diagonal(hearsay.slots) == place
+        hearsay.sent[transmits], hearsay.sent_place[transmits] = slot, place
+        return transmits
+
+    def _begin(
+        self, position_m: Float[np.ndarray, "N N 2"], is_known: Bool[np.ndarray, "N N"]
+    ) -> None:
+        """Everyone works out everyone's first slot; those who believe the same need it once."""
+        slots = np.empty(is_known.shape, dtype=np.int64)
+        done = {}
+        for i in range(len(slots)):
+            believed = position_m[i].tobytes(), is_known[i].tobytes()
+            if believed not in done:
+                power = self._powers(position_m[i], is_known[i])
+                done[believed] = first_slots(self._order, is_known[i], power, self._rule)
+            slots[i] = done[believed]
+        self._hearsay = nothing_heard(slots, self._rule.num_slots)
+
+    def _choosers(self, slot: int) -> list[int]:
+        """Who chooses anew in this slot: everyone once in some frames, in the common order."""
+        period = self._settings.frames_per_choice * self._rule.num_slots
+        since, num_robots = slot - self._frames.first_slot, len(self._order)
+        if since < self._rule.num_slots:
+            return []
+        first, end = (-(-(since % period + n) * num_robots // period) for n in (0, 1))
+        return self._order[first:end].tolist()
+
+    def _choose(
+        self,
+        i: int,
+        slot: int,
+        position_m: Float[np.ndarray, "N 2"],
+        is_known: Bool[np.ndarray, "N"],
+    ) -> None:
+        """Robot i chooses its slot."""
+        hearsay, settings = self._hearsay, self._settings
+        is_marked = np.empty(hearsay.missed.shape[1:], dtype=bool)
+        write_marks(
+            hearsay.missed[i],
+            hearsay.missed_at[i],
+            hearsay.share[i],
+            settings.least_doubt,
+            slot - settings.marked_slots,
+            is_marked,
+        )
+        hearsay.slots[i, i] = chosen(
+            i,
+            hearsay.slots[i],
+            hearsay.announced[i],
+            is_known,
+            is_marked,
+            self._chose_lately(slot),
+            self._powers(position_m, is_known),
+            self._rule,
+        )
+
+    def _chose_lately(self, slot: int) -> Int[np.ndarray, "predicted 2"]:
+        """Who chose in which slot, the earliest first."""
+        since = range(slot - self._settings.predicted_slots, slot)
+        pairs = [(k, s) for s in since for k in self._choosers(s)]
+        return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+    def _contends(
+        self,
+        slot: int,
+        position_m: Float[np.ndarray, "N N 2"],
+        is_known: Bool[np.ndarray, "N N"],
+        timestamp: Float[np.ndarray, "N N"],
+        draw: Float[np.ndarray, "N"],
+    ) -> Bool[np.ndarray, "N"]:
+        """Who transmits in a slot of no frame: robots in need, by chance."""
+        settings = self._settings
+        patience = settings.need_frames * self._rule.num_slots
+        transmits = draw < settings.contention_probability
+        for i in np.flatnonzero(transmits).tolist():
+            power = np.empty(len(self._order))
+            write_powers(i, position_m[i], self._law, power)
+            is_near = is_known[i] & (power >= self._rule.threshold)
+            transmits[i] = is_in_need(self._hearsay, i, timestamp[i], is_near, slot, patience)
+        return transmits
+
+    def _powers(
+        self, position_m: Float[np.ndarray, "N 2"], is_known: Bool[np.ndarray, "N"]
+    ) -> Float[np.ndarray, "N N"]:
+        """Of everyone at everyone, as one robot believes; of those that it knows [noise]."""
+        return powers_between(position_m, self._law) * is_known[:, None] * is_known[None, :]
