@@ -26,13 +26,14 @@ from swarm_mj.policies.registry import (
     with_payload,
 )
 from swarm_mj.policies.round_robin import RoundRobin
+from swarm_mj.policies.sotdma.policy import SelfOrganisedTdma
 from swarm_mj.policies.spatial_tdma import SpatialTdma
 from swarm_mj.policies.tdma import Tdma
 from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.swarm import Swarm
 
 MISSION = paper("flocking", num_robots=8)
-SCHEDULES = ["round-robin", "tdma", "spatial-tdma", "planner", "planner --payload none"]
+SCHEDULES = ["round-robin", "tdma", "spatial-tdma", "sotdma", "planner", "planner --payload none"]
 TUNED = ["random-flooding", "mst", "aloha", "gossip"]
 here = pytest.mark.usefixtures("folder")
 
@@ -145,6 +146,7 @@ def test_ii_b_the_planner_can_go_without_payload():
         ("gossip", InnovationGossip, 0.2),
         ("tdma", Tdma, None),
         ("spatial-tdma", SpatialTdma, None),
+        ("sotdma", SelfOrganisedTdma, None),
         ("planner", Planner, None),
         ("planner --payload none", RestingPlanner, None),
         ("greedy-oracle", GreedyOracle, None),

@@ -7,6 +7,7 @@ from swarm_mj.policies.sotdma.choices import Rule, chosen, first_slots
 from swarm_mj.policies.sotdma.hearsay import (
     OF_NO_FRAME,
     Frames,
+    Hearsay,
     is_in_need,
     nothing_heard,
     place_of,
@@ -49,8 +50,8 @@ class Team:
             start_age=settings.start_frames * num_slots,
             least_gain=SLOTS_PER_WINDOW * settings.least_gain_windows,
         )
-        self._first: int | None = None  # the slot in which the first decision was asked for
-        self._last_place = OF_NO_FRAME
+        self._frames: Frames | None = None  # known from the first decision on
+        self._hearsay: Hearsay | None = None  # there is none before the first frame
 
     def transmits(
         self,
@@ -71,28 +72,27 @@ class Team:
             heard: Whom each robot decoded in the last slot; itself is nobody.
             draw: One number on [0, 1) a robot, for contention.
         """
-        settings, num_robots = self._settings, len(self._order)
-        if self._first is None:
-            self._first = slot
-            first_slot = slot + settings.first_rounds * num_robots
-            self._frames = Frames(first_slot, self._rule.num_slots, settings.contention_every)
-        frames = self._frames
+        if self._frames is None:
+            first_slot = slot + self._settings.first_rounds * len(self._order)
+            every = self._settings.contention_every
+            self._frames = Frames(first_slot, self._rule.num_slots, every)
+        frames, timestamp = self._frames, buffers.timestamp[b]
         if slot < frames.first_slot:
             return by_turns
-        timestamp, is_known = (
-            buffers.timestamp[b],
-            buffers.is_known[b] | np.eye(num_robots, dtype=bool),
-        )
-        if slot == frames.first_slot:
-            self._begin(buffers.position_m[b], is_known)
+        is_known = buffers.is_known[b] | np.eye(len(self._order), dtype=bool)
+        if self._hearsay is None:
+            self._hearsay = self._begin(buffers.position_m[b], is_known)
         hearsay = self._hearsay
         read_packets(hearsay, heard, timestamp, slot - 1, frames)
         read_slots(hearsay, timestamp, frames)
-        for i in self._choosers(slot):
-            self._choose(i, slot, buffers.position_m[b, i], is_known[i])
+        for i in self._choosers(slot, frames):
+            chose_lately = self._chose_lately(slot, frames)
+            powers = self._powers(buffers.position_m[b, i], is_known[i])
+            hearsay.slots[i, i] = self._choose(i, slot, hearsay, is_known[i], chose_lately, powers)
         place = place_of(slot, frames)
         if place == OF_NO_FRAME:
-            transmits = self._contends(slot, buffers.position_m[b], is_known, timestamp, draw)
+            is_near = is_known & self._is_in_range(buffers.position_m[b])
+            transmits = self._contends(slot, hearsay, is_near, timestamp, draw)
         else:
             transmits = np.diagonal(hearsay.slots) == place
         hearsay.sent[transmits], hearsay.sent_place[transmits] = slot, place
@@ -100,7 +100,7 @@ class Team:
 
     def _begin(
         self, position_m: Float[np.ndarray, "N N 2"], is_known: Bool[np.ndarray, "N N"]
-    ) -> None:
+    ) -> Hearsay:
         """Everyone works out everyone's first slot; those who believe the same need it once."""
         slots = np.empty(is_known.shape, dtype=np.int64)
         done = {}
@@ -110,70 +110,66 @@ class Team:
                 power = self._powers(position_m[i], is_known[i])
                 done[believed] = first_slots(self._order, is_known[i], power, self._rule)
             slots[i] = done[believed]
-        self._hearsay = nothing_heard(slots, self._rule.num_slots)
+        return nothing_heard(slots, self._rule.num_slots)
 
-    def _choosers(self, slot: int) -> list[int]:
+    def _choosers(self, slot: int, frames: Frames) -> list[int]:
         """Who chooses anew in this slot: everyone once in some frames, in the common order."""
-        period = self._settings.frames_per_choice * self._rule.num_slots
-        since, num_robots = slot - self._frames.first_slot, len(self._order)
-        if since < self._rule.num_slots:
+        period = self._settings.frames_per_choice * frames.num_slots
+        since, num_robots = slot - frames.first_slot, len(self._order)
+        if since < frames.num_slots:
             return []
         first, end = (-(-(since % period + n) * num_robots // period) for n in (0, 1))
         return self._order[first:end].tolist()
+
+    def _chose_lately(self, slot: int, frames: Frames) -> Int[np.ndarray, "predicted 2"]:
+        """Who chose in which slot, the earliest first."""
+        lately = range(slot - self._settings.predicted_slots, slot)
+        pairs = [(k, before) for before in lately for k in self._choosers(before, frames)]
+        return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
     def _choose(
         self,
         i: int,
         slot: int,
-        position_m: Float[np.ndarray, "N 2"],
+        hearsay: Hearsay,
         is_known: Bool[np.ndarray, "N"],
-    ) -> None:
-        """Robot i chooses its slot."""
-        hearsay, settings = self._hearsay, self._settings
+        chose_lately: Int[np.ndarray, "predicted 2"],
+        power: Float[np.ndarray, "N N"],
+    ) -> int:
+        """The slot that robot i chooses."""
         is_marked = np.empty(hearsay.missed.shape[1:], dtype=bool)
         write_marks(
             hearsay.missed[i],
             hearsay.missed_at[i],
             hearsay.share[i],
-            settings.least_doubt,
-            slot - settings.marked_slots,
+            self._settings.least_doubt,
+            slot - self._settings.marked_slots,
             is_marked,
         )
-        hearsay.slots[i, i] = chosen(
-            i,
-            hearsay.slots[i],
-            hearsay.announced[i],
-            is_known,
-            is_marked,
-            self._chose_lately(slot),
-            self._powers(position_m, is_known),
-            self._rule,
-        )
-
-    def _chose_lately(self, slot: int) -> Int[np.ndarray, "predicted 2"]:
-        """Who chose in which slot, the earliest first."""
-        since = range(slot - self._settings.predicted_slots, slot)
-        pairs = [(k, s) for s in since for k in self._choosers(s)]
-        return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        slots, announced = hearsay.slots[i], hearsay.announced[i]
+        return chosen(i, slots, announced, is_known, is_marked, chose_lately, power, self._rule)
 
     def _contends(
         self,
         slot: int,
-        position_m: Float[np.ndarray, "N N 2"],
-        is_known: Bool[np.ndarray, "N N"],
+        hearsay: Hearsay,
+        is_near: Bool[np.ndarray, "N N"],
         timestamp: Float[np.ndarray, "N N"],
         draw: Float[np.ndarray, "N"],
     ) -> Bool[np.ndarray, "N"]:
         """Who transmits in a slot of no frame: robots in need, by chance."""
-        settings = self._settings
-        patience = settings.need_frames * self._rule.num_slots
-        transmits = draw < settings.contention_probability
+        patience = self._settings.need_frames * self._rule.num_slots
+        transmits = draw < self._settings.contention_probability
         for i in np.flatnonzero(transmits).tolist():
-            power = np.empty(len(self._order))
-            write_powers(i, position_m[i], self._law, power)
-            is_near = is_known[i] & (power >= self._rule.threshold)
-            transmits[i] = is_in_need(self._hearsay, i, timestamp[i], is_near, slot, patience)
+            transmits[i] = is_in_need(hearsay, i, timestamp[i], is_near[i], slot, patience)
         return transmits
+
+    def _is_in_range(self, position_m: Float[np.ndarray, "N N 2"]) -> Bool[np.ndarray, "N N"]:
+        """Who decodes each robot's lone packets, as it believes."""
+        power = np.empty(position_m.shape[:2])
+        for i in range(len(power)):
+            write_powers(i, position_m[i], self._law, power[i])
+        return power >= self._rule.threshold
 
     def _powers(
         self, position_m: Float[np.ndarray, "N 2"], is_known: Bool[np.ndarray, "N"]

@@ -1,0 +1,106 @@
+"""What robots remember, by hand: times are in windows, and slot s ends at (s + 1) / 2."""
+
+import numpy as np
+import pytest
+
+from swarm_mj.policies.sotdma.hearsay import (
+    LONG_AGO,
+    OF_NO_FRAME,
+    Frames,
+    is_in_need,
+    nothing_heard,
+    place_of,
+    read_packets,
+    read_slots,
+    write_marks,
+)
+
+FRAMES = Frames(first_slot=10, num_slots=3, contention_every=4)
+
+
+def memory():
+    """Of three robots that believe that robot k transmits in slot k."""
+    return nothing_heard(np.tile(np.arange(3), (3, 1)), 3)
+
+
+def test_every_fourth_slot_is_of_no_frame_and_the_others_count_on():
+    no = OF_NO_FRAME
+    places = [place_of(slot, FRAMES) for slot in range(10, 22)]
+    assert places == [0, 1, 2, no, 0, 1, 2, no, 0, 1, 2, no]
+    frames = Frames(first_slot=0, num_slots=5, contention_every=3)
+    assert [place_of(slot, frames) for slot in range(9)] == [0, 1, no, 2, 3, no, 4, 0, no]
+
+
+def test_t_tells_a_teammates_slot():
+    """Robot 2 transmitted in slot 15, the second of a frame; robot 1 before there were frames;
+    slot 13 is of no frame; older news changes nothing, nor does one's own T."""
+    hearsay = memory()
+    timestamp = np.zeros((3, 3))
+    timestamp[0] = 8.5, 5.0, 8.0  # ends of slots 16, 9 and 15
+    read_slots(hearsay, timestamp, FRAMES)
+    assert hearsay.slots[0].tolist() == [0, 1, 1]
+    assert hearsay.announced[0].tolist() == [LONG_AGO, LONG_AGO, 15]
+    timestamp[0, 2] = 7.0
+    read_slots(hearsay, timestamp, FRAMES)
+    assert hearsay.announced[0, 2] == 15
+    timestamp[1, 2] = 7.0  # slot 13
+    read_slots(hearsay, timestamp, FRAMES)
+    assert hearsay.slots[1].tolist() == [0, 1, 2]
+    assert hearsay.announced[1, 2] == 13
+
+
+def test_a_packet_tells_whether_its_sender_decoded_ones_own():
+    """Robot 0 transmitted in slot 14, place 0. Robot 1 knows of it, robot 2 of slot 10 only."""
+    hearsay = memory()
+    hearsay.sent[0], hearsay.sent_place[0] = 14, 0
+    timestamp = np.zeros((3, 3))
+    timestamp[1, 0], timestamp[2, 0] = 7.5, 5.5
+    for slot, sender in ((15, 1), (16, 2), (19, 2)):
+        read_packets(hearsay, np.array([sender, 1, 2]), timestamp, slot, FRAMES)
+    assert hearsay.missed[0, 0].tolist() == [0, 0, 2]
+    assert hearsay.missed_at[0, 0].tolist() == [LONG_AGO, 15, 19]
+    assert hearsay.decoded[0].tolist() == [LONG_AGO, 15, 19]
+    assert hearsay.got_through[0].tolist() == [LONG_AGO, 14, 10]
+    assert hearsay.share[0] == pytest.approx(1.0 * 0.9 * 0.9)
+    assert np.all(hearsay.missed[0, 1:] == 0)
+    timestamp[2, 0] = 7.5
+    read_packets(hearsay, np.array([2, 1, 2]), timestamp, 20, FRAMES)
+    assert hearsay.missed[0, 0, 2] == 0
+
+
+@pytest.mark.parametrize(("sent", "place"), [(9, 0), (14, OF_NO_FRAME), (15, 0)])
+def test_a_packet_says_nothing_of_what_was_sent_in_no_frame_or_just_now(sent, place):
+    hearsay = memory()
+    hearsay.sent[0], hearsay.sent_place[0] = sent, place
+    read_packets(hearsay, np.array([1, 1, 2]), np.zeros((3, 3)), 15, FRAMES)
+    assert not np.any(hearsay.missed)
+    assert hearsay.share[0] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("share", "enough"),
+    [(1.0, 1), (0.95, 1), (0.7, 2), (0.5, 4), (0.0, 22)],  # 0.3² < 0.1 < 0.3; 0.5⁴ < 0.1; 0.9²²
+)
+def test_a_slot_is_marked_that_was_missed_more_often_than_by_chance(share, enough):
+    missed = np.array([[enough - 1, enough, enough]], dtype=np.int16)
+    missed_at = np.array([[50, 50, 29]], dtype=np.int32)
+    is_marked = np.zeros((1, 3), dtype=bool)
+    write_marks(missed, missed_at, share, 0.1, 30, is_marked)
+    assert is_marked.tolist() == [[False, True, False]]
+
+
+def test_a_robot_is_in_need_that_lost_a_neighbour_or_is_lost_to_one():
+    """At slot 40, with a patience of 6 slots: robot 1 is the neighbour of robot 0."""
+    hearsay, near = memory(), np.array([False, True, False])
+
+    def needs(heard_of_slot, is_near=near):
+        timestamp = np.array([20.0, (heard_of_slot + 1) / 2, 0.0])
+        return is_in_need(hearsay, 0, timestamp, is_near, 40, 6.0)
+
+    assert needs(33)
+    assert not needs(34)
+    assert not needs(33, np.zeros(3, dtype=bool))
+    hearsay.decoded[0, 1], hearsay.got_through[0, 1] = 38, 31
+    assert needs(38)
+    hearsay.got_through[0, 1] = 32
+    assert not needs(38)
