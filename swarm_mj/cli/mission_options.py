@@ -1,6 +1,7 @@
 """The options that make missions: those fields of `Mission` that have a help."""
 
 import argparse
+from collections.abc import Collection, Sequence
 from dataclasses import Field, fields, replace
 from functools import partial
 from itertools import product
@@ -11,6 +12,16 @@ from swarm_mj.fields import FieldOf, as_typed, kind_of
 from swarm_mj.mission import PRESETS, WORLDS, Mission, paper
 
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]
+# Fields that count only where another has this value, or for None any above 0.
+NEEDED: dict[str, tuple[str, str | None]] = {
+    "loss_exponent": ("path_loss", "log-distance"),
+    "reference_m": ("path_loss", "log-distance"),
+    "antenna_height_m": ("path_loss", "two-ray"),
+    "shadowing_distance_m": ("shadowing_db", None),
+    "rician_k": ("fading", "rician"),
+    "burst_end": ("burst_begin", None),
+    "strong_db": ("strong_share", None),
+}
 
 
 def one_mission() -> FieldOf:
@@ -31,7 +42,26 @@ def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
     swept = {spec.name: place for spec in SPECS if (place := f"mission.{spec.name}") in given}
     values = [given[place] for place in swept.values()]
     values = [list(dict.fromkeys(v)) if isinstance(v, list) else [v] for v in values]
-    return tuple(make_mission(**dict(zip(swept, each, strict=True))) for each in product(*values))
+    missions = [make_mission(**dict(zip(swept, each, strict=True))) for each in product(*values)]
+    check_in_use(swept, missions)
+    return tuple(missions)
+
+
+def check_in_use(given: Collection[str], missions: Sequence[Mission]) -> None:
+    """Passes if every field of the channel that was given counts in some mission.
+
+    Raises:
+        ValueError: One does not, for lack of another that switches it on.
+    """
+    flags = {spec.name: flag_of(spec) for spec in SPECS}
+    for name, (switch, value) in NEEDED.items():
+        states = [getattr(mission, switch) for mission in missions]
+        if name in given and not any(s == value if value else s > 0.0 for s in states):
+            shown = value or "above 0"
+            raise ValueError(
+                f"{flags[name]} counts only with {flags[switch]} {shown}; give that too, or leave "
+                f"{flags[name]} out"
+            )
 
 
 def make_mission(**given: Any) -> Mission:

@@ -10,7 +10,7 @@ from functools import reduce
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.cli.mission_options import make_mission
+from swarm_mj.cli.mission_options import check_in_use, make_mission
 from swarm_mj.cli.options import add_option, flag_of
 from swarm_mj.fields import as_typed
 from swarm_mj.gnn.feature_sets import check_named, is_own_set, load_features, num_features
@@ -75,9 +75,9 @@ def asked_settings(
     """
     own, network = _part("", given), _part("network.", given)
     sizes = own.get("robots", (Mission().num_robots,))
-    mission = make_mission(
-        **{"task": "stationary", "num_robots": sizes[0]} | _part("mission.", given)
-    )
+    asked = _part("mission.", given)
+    mission = make_mission(**{"task": "stationary", "num_robots": sizes[0]} | asked)
+    check_in_use(asked, [mission])
     training = usual_settings(own.get("arm", "robot"), mission, sizes)
     if init is not None:
         training = replace(

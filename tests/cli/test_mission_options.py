@@ -3,7 +3,7 @@
 import pytest
 
 from swarm_mj.api.fly import mission_of
-from swarm_mj.cli import parse
+from swarm_mj.cli import main, parse
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.mission import PRESETS, WORLDS, paper, reference
 
@@ -122,3 +122,31 @@ def test_unknown_names_are_refused_by_name(swarm_mj, command):
         "task must be one of stationary, random-walk, flocking, formation, coverage, not 'swim'"
         in done.stderr
     )
+
+
+@pytest.mark.parametrize(
+    ("given", "switch"),
+    [
+        (("--loss-exponent", 3), "--path-loss log-distance"),
+        (("--reference-m", 2), "--path-loss log-distance"),
+        (("--antenna-height-m", 2), "--path-loss two-ray"),
+        (("--shadowing-distance-m", 5), "--shadowing-db above 0"),
+        (("--rician-k", 3), "--fading rician"),
+        (("--burst-end", 0.1), "--burst-begin above 0"),
+        (("--strong-db", 3), "--strong-share above 0"),
+    ],
+)
+@pytest.mark.parametrize("command", ["fly", "evaluate", "train"])
+def test_an_option_that_would_change_nothing_is_refused(command, given, switch, capsys, tmp_path):
+    more = ("--minutes", 1, "--out", tmp_path / "run") if command == "train" else ()
+    assert main([command, *map(str, (*given, *more))]) == 2
+    flag = given[0]
+    assert f"{flag} counts only with {switch}; give that too, or leave {flag} out" in " ".join(
+        capsys.readouterr().err.split()
+    )
+
+
+def test_an_option_may_count_in_some_of_the_missions_only():
+    both = missions("--fading", "none", "rician", "--rician-k", 3)
+    assert [each.fading for each in both] == ["none", "rician"]
+    assert mission("--preset", "urban", "--rician-k", 3).rician_k == 3.0
