@@ -30,7 +30,7 @@ from swarm_mj.io.interrupt import deferred_interrupt, heard_interrupt
 from swarm_mj.io.owned import owned
 from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
-from swarm_mj.policies.registry import directories, listed, normalised, with_payload
+from swarm_mj.policies.registry import listed, normalised, stored_policies, with_payload
 
 OUTPUT = "output"  # a heading of the help
 DEFAULT_POLICIES = ("planner", *BASELINES)
@@ -90,7 +90,7 @@ def run(options: Options) -> int:
     check_outputs(
         Output("--json", options.json, ".json"),
         Output("--csv", options.csv, ".csv"),
-        inputs=directories(options.policy),
+        inputs=stored_policies(options.policy),
         must_be_new=not options.force,
     )
     way_out = "choose fewer --jobs, --robots, --windows or --episodes"

@@ -16,7 +16,7 @@ from swarm_mj.evaluation.results import Result, read_results
 from swarm_mj.fields import setting
 from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.parts import OwnParts
-from swarm_mj.policies.registry import directories
+from swarm_mj.policies.registry import stored_policies
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +105,7 @@ def _paths(options: Options) -> dict[str, list[Path]]:
     }
     check_outputs(
         *(Output("figure", path) for own in paths.values() for path in own),
-        inputs=(*options.results, *directories([options.flock_policy])),
+        inputs=(*options.results, *stored_policies([options.flock_policy])),
         must_be_new=not options.force,
     )
     return paths

@@ -21,7 +21,7 @@ from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies.policy import Policy
-from swarm_mj.policies.registry import is_directory, is_own_policy, make_policy
+from swarm_mj.policies.registry import is_own_policy, is_stored, make_policy
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.rollout import WindowRecord, rollout, summarise
 from swarm_mj.swarm import Swarm
@@ -96,8 +96,8 @@ def compile_ahead(
         on_window: Called after each window.
         **how: The other arguments of `make_policy`.
     """
-    # A directory's policy may be for teams of one size, and a file's arena does not shrink.
-    is_bound = is_directory(policy_name) or mission.arena not in ARENAS
+    # A stored policy may be for teams of one size, and a file's arena does not shrink.
+    is_bound = is_stored(policy_name) or mission.arena not in ARENAS
     smallest = replace(
         mission,
         num_robots=mission.num_robots if is_bound else 3,

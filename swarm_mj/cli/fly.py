@@ -27,12 +27,13 @@ from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import notes_on
 from swarm_mj.policies.policy import Policy
+from swarm_mj.policies.policy_folder import ONE_FILE
 from swarm_mj.policies.registry import (
     check_used,
-    directories,
-    is_directory,
+    is_stored,
     make_policy,
     normalised,
+    stored_policies,
     with_payload,
 )
 from swarm_mj.replay.recorder import Recorder
@@ -145,7 +146,7 @@ def _replay_path(options: Options) -> Path | None:
     check_outputs(
         Output(what, path, ".rrd", way_out),
         Output("--json", options.json, ".json"),
-        inputs=directories([options.policy]),
+        inputs=stored_policies([options.policy]),
         must_be_new=not options.force,
     )
     if options.view and path:
@@ -161,10 +162,10 @@ def _fresh_name(options: Options) -> Path:
 
 
 def _short(policy: str) -> str:
-    """A policy's name without the path: `x` of runs/x/policy."""
-    if not is_directory(policy):
+    """A policy's name without the path: `x` of runs/x/policy and of x.safetensors."""
+    if not is_stored(policy):
         return policy.replace(" --", "-").replace(" ", "-").replace(":", "-")
-    path = Path(policy).resolve()
+    path = Path(policy.removesuffix(ONE_FILE)).resolve()
     return path.parent.name if path.name == "policy" else path.name
 
 

@@ -46,7 +46,7 @@ class Options:
     EPILOG: ClassVar = "Probabilities and bytes depend on the mission, so the options may name one."
     name: str | None = setting(
         None,
-        "say more of this one: a policy, a directory of a learned one, or module:Name of your own",
+        "say more of this one: a policy, where a learned one is, or module:Name of your own",
         is_positional=True,
         metavar="NAME",
         convert=normalised,

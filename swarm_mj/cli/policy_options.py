@@ -9,7 +9,7 @@ from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
 
 NAMED = tuple(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes the other
 NAMES = f"who talks when (`swarm-mj policies` says more): {', '.join(NAMED)}"
-OTHERS = "directories of learned policies, or module:Name of your own"
+OTHERS = "directories or .safetensors files of learned policies, or module:Name of your own"
 HEADING = "policies"
 
 

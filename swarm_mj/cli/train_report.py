@@ -4,6 +4,7 @@ from swarm_mj.cli.train_progress import age_of, reference_ages
 from swarm_mj.learning.choice import REFERENCES, Cost, has_stalled
 from swarm_mj.learning.run_folder import Progress, Run
 
+CLEAR = 2.0  # standard errors, of a difference that is not for chance
 NAMES = {"first": "the policy it began with"}
 
 
@@ -42,7 +43,7 @@ def verdicts(run: Run, progress: Progress) -> list[str]:
         begun = "the policy given by --init" if run.init else "the untrained policy"
         said.append(f"Training did not help: {begun} did best, and is the one kept.")
     return said + [
-        f"The policy kept loses to {NAMES.get(name, name)} by {_behind(run, cost)}."
+        f"The policy kept {_stands(run, name, cost)} on the same missions."
         for name, cost in choice.others.items()
         if cost.behind > 0.0
     ]
@@ -81,8 +82,12 @@ def _cost(run: Run, cost: Cost) -> str:
     return _with_error(run, cost.mean, cost.sem)
 
 
-def _behind(run: Run, cost: Cost) -> str:
-    return f"{_with_error(run, cost.behind, cost.behind_sem)} on the same missions"
+def _stands(run: Run, name: str, cost: Cost) -> str:
+    """How it stands beside another, which costs less."""
+    behind = _with_error(run, cost.behind, cost.behind_sem)
+    if cost.behind > CLEAR * (cost.behind_sem or 0.0):
+        return f"loses to {NAMES.get(name, name)} by {behind}"
+    return f"is no better than {NAMES.get(name, name)}, which is ahead by {behind}"
 
 
 def _with_error(run: Run, value: float, error: float | None) -> str:

@@ -1,4 +1,7 @@
-"""The folder of a stored policy: its weights, what they belong to, and a card for its reader."""
+"""Where a stored policy is: a folder of its weights, what they belong to, and a card; or one file.
+
+The file is the folder's weights, with the other two in its metadata.
+"""
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
@@ -10,6 +13,7 @@ from swarm_mj.io.reading import check_size, format_of, read_file
 
 WEIGHTS, CONFIG, CARD = "model.safetensors", "config.json", "README.md"
 MAX_BYTES = {WEIGHTS: 64_000_000, CONFIG: 1_000_000}
+ONE_FILE = ".safetensors"
 MLP_FORMAT = "swarm_mj mlp policy"  # of a plain network's config; a GNN's is another
 MOST_SHOWN = 8  # policies in a message
 WAY_OUT = "copy it again, or make one with `swarm-mj train`"
@@ -31,7 +35,7 @@ def write_policy(
 
 
 def present_policy(folder: Path) -> Path:
-    """Where a policy's files are, unless a folder's name is that of something else.
+    """Where a policy's files are, or its one file is, unless the name is that of something else.
 
     Raises:
         ValueError: It is.
@@ -42,8 +46,13 @@ def present_policy(folder: Path) -> Path:
             f"policy {folder} does not exist; name a directory that `swarm-mj train` wrote, such "
             "as runs/NAME/policy"
         )
+    if present.suffix == ONE_FILE and present.is_file():
+        return present
     if not present.is_dir():
-        raise ValueError(f"policy {folder} is a file; name the directory that holds the policy")
+        raise ValueError(
+            f"policy {folder} is a file; name the directory that holds the policy, or a "
+            f"{ONE_FILE} file"
+        )
     if not (present / CONFIG).exists():
         _check_none_below(folder)
     return present
@@ -71,13 +80,15 @@ def read_part(folder: Path, name: str) -> bytes:
 
 
 def is_mlp(folder: Path) -> bool:
-    """Whether a folder says that its network is no GNN, but a plain one.
+    """Whether a folder says that its network is no GNN, but a plain one; those have no one file.
 
     Raises:
         ValueError: It is no policy's folder.
         OSError: It cannot be read.
     """
     present = present_policy(folder)
+    if present.is_file():
+        return False
     with suppress(ValueError):  # what is wrong is said when all of it is read
         return format_of(read_part(present, CONFIG)) == MLP_FORMAT
     return False

@@ -1,6 +1,7 @@
 """The one table of policies by their names on the command line.
 
-A learned policy has no name but that of the directory that holds it, except the shipped one, `gnn`.
+A learned policy has no name but that of the directory or file that holds it, except the shipped
+one, `gnn`.
 """
 
 import os
@@ -22,7 +23,7 @@ from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
-from swarm_mj.policies.policy_folder import is_mlp
+from swarm_mj.policies.policy_folder import ONE_FILE, is_mlp
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.round_robin import RoundRobin
 from swarm_mj.policies.sotdma.policy import SelfOrganisedTdma
@@ -100,26 +101,30 @@ POLICIES = (*RULES, SHIPPED)
 
 
 def is_learned(name: str) -> bool:
-    """Whether a policy is a trained network: the shipped one, or one in a directory."""
-    return name == SHIPPED or is_directory(name)
+    """Whether a policy is a trained network: the shipped one, or one in a directory or file."""
+    return name == SHIPPED or is_stored(name)
 
 
-def is_directory(name: str) -> bool:
-    """Whether a policy's name is that of a directory: it has a separator, or there is one."""
-    return name not in POLICIES and (_is_path(name) or os.path.isdir(name))
+def is_stored(name: str) -> bool:
+    """Whether a policy's name is that of a directory or a file that holds one.
+
+    It has a separator, or the ending of such files, or there is a directory of this name.
+    """
+    is_named_so = _is_path(name) or name.endswith(ONE_FILE) or os.path.isdir(name)
+    return name not in POLICIES and is_named_so
 
 
-def directories(names: Iterable[str]) -> list[Path]:
-    """The directories among policies' names."""
-    return [Path(name) for name in names if is_directory(name)]
+def stored_policies(names: Iterable[str]) -> list[Path]:
+    """The directories and files among policies' names."""
+    return [Path(name) for name in names if is_stored(name)]
 
 
 def normalised(name: str) -> str:
-    """A policy's name as typed, but a directory's without what does not change where it leads."""
-    if not is_directory(name):
+    """A policy's name as typed, but a path without what does not change where it leads."""
+    if not is_stored(name):
         return name
     plain = os.path.normpath(name)
-    return plain if is_directory(plain) else os.path.join(os.curdir, plain)
+    return plain if is_stored(plain) else os.path.join(os.curdir, plain)
 
 
 def listed(names: Iterable[str]) -> list[str]:
@@ -158,8 +163,8 @@ def make_policy(
     """A policy by its name on the command line.
 
     Args:
-        name: One of `POLICIES`, a directory with a learned policy, or the `module:Name` of one's
-            own.
+        name: One of `POLICIES`, a directory or a file with a learned policy, or the `module:Name`
+            of one's own.
         mission: Whose preset says how the baseline behaves where paper and code differ, and whose
             numbers normalise what a learned policy sees.
         probability: Of transmission, for the policies that have one; None is the one tuned for
@@ -187,8 +192,9 @@ def make_policy(
         return _learned(name, mission, is_deterministic=is_deterministic, features=features)
     if name not in RULES:
         raise ValueError(
-            f"policy must be one of {', '.join(POLICIES)}, a directory with a learned policy, or "
-            f"module:Name of your own, not {name!r}{did_you_mean(name, POLICIES)}"
+            f"policy must be one of {', '.join(POLICIES)}, a directory or {ONE_FILE} file with a "
+            "learned policy, or module:Name of your own, not "
+            f"{name!r}{did_you_mean(name, POLICIES)}"
         )
     if is_deterministic:
         raise ValueError(f"{name} draws from no network's distribution; leave --deterministic out")
@@ -213,7 +219,7 @@ def check_used(features: Sequence[str], policies: Iterable[Policy]) -> None:
 
 def is_own_policy(name: str) -> bool:
     """Whether a policy is a user's own, named `module:Name`."""
-    return is_own(name) and not is_directory(name)
+    return is_own(name) and not is_stored(name)
 
 
 def _learned(name: str, mission: Mission, **options: Any) -> Policy:

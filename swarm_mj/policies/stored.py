@@ -1,5 +1,6 @@
-"""A policy on disk: a folder of its weights, what they belong to, and a card for its reader."""
+"""A policy on disk: a folder of weights, what they belong to, and a card; or all in one file."""
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from safetensors.torch import load, save
 from swarm_mj.gnn.fast import FastAggregationGnn
 from swarm_mj.gnn.feature_sets import is_own_set, trained_extractor
 from swarm_mj.gnn.network import AggregationGnn
+from swarm_mj.io.atomic import write_bytes
+from swarm_mj.io.reading import check_size, read_file, read_json
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn import LearnedPolicy
 from swarm_mj.policies.model_card import model_card
@@ -17,6 +20,8 @@ from swarm_mj.policies.policy_config import PolicyConfig, from_json, to_json
 from swarm_mj.policies.policy_folder import (
     CARD,
     CONFIG,
+    MAX_BYTES,
+    ONE_FILE,
     WAY_OUT,
     WEIGHTS,
     check_tensors,
@@ -26,33 +31,40 @@ from swarm_mj.policies.policy_folder import (
     write_policy,
 )
 
+METADATA = "swarm_mj policy"  # the entry of a one-file policy's metadata that has config and card
+HEADER_BYTES = 8  # of a safetensors file: how long the JSON behind them is, little-endian
+
 
 def save_policy(
-    folder: Path, network: AggregationGnn, config: PolicyConfig, card: str | None = None
+    path: Path, network: AggregationGnn, config: PolicyConfig, card: str | None = None
 ) -> None:
     """Writes a policy, whole or not at all; whoever is killed leaves the old one or the new one.
 
-    A policy there is replaced; the card is `model_card` of the config unless given.
+    A policy there is replaced; the card is `model_card` of the config unless given. A path that
+    ends in `.safetensors` becomes one file, any other a folder.
 
     Raises:
         ValueError: `load_policy` would not take it, or the folder holds other files than a
             policy's.
-        OSError: The folder cannot be written.
+        OSError: The path cannot be written.
     """
     if config.network != network.shape:
         raise ValueError(f"config describes {config.network}, but the network is {network.shape}")
     tensors = {name: t.detach().cpu().contiguous() for name, t in network.state_dict().items()}
     _check(tensors, _empty(config))
-    contents = {
-        WEIGHTS: save(tensors),
-        CONFIG: to_json(config).encode(),
-        CARD: (model_card(config) if card is None else card).encode(),
-    }
-    write_policy(folder, contents, check=read_policy)
+    text, card = to_json(config), model_card(config) if card is None else card
+    if path.suffix == ONE_FILE:
+        # In one entry: several would be in another order every time.
+        data = save(tensors, {METADATA: json.dumps({CONFIG: text, CARD: card})})
+        check_size(path.name, len(data), MAX_BYTES[WEIGHTS])
+        write_bytes(path, data, check=_read_file)
+        return
+    contents = {WEIGHTS: save(tensors), CONFIG: text.encode(), CARD: card.encode()}
+    write_policy(path, contents, check=read_policy)
 
 
 def load_policy(
-    folder: Path,
+    path: Path,
     mission: Mission,
     *,
     is_deterministic: bool = False,
@@ -62,20 +74,20 @@ def load_policy(
 
     The mission's area, duration and range normalise what the robots see. A deterministic policy
     takes the most probable recipient instead of a draw. Feature sets of one's own are imported only
-    if their names, as `module:Name`, are among `features`: the folder cannot make us run code.
+    if their names, as `module:Name`, are among `features`: a policy cannot make us run code.
 
     Raises:
         ValueError: There is none, or it is damaged, foreign, oversized or of a newer version, or
             its features are not those that may be imported.
         OSError: It cannot be read.
     """
-    network, config = read_policy(folder)
+    network, config = read_policy(path)
     extractor = trained_extractor(
         config.features,
         config.network.num_features,
         mission,
         named=features,
-        where=f"policy {folder}",
+        where=f"policy {path}",
     )
     return LearnedPolicy(
         network,
@@ -86,16 +98,36 @@ def load_policy(
     )
 
 
-def read_policy(folder: Path) -> tuple[AggregationGnn, PolicyConfig]:
+def read_policy(path: Path) -> tuple[AggregationGnn, PolicyConfig]:
     """A policy's network, with its weights, and its config; errors as of `load_policy`."""
-    present = present_policy(folder)
+    present = present_policy(path)
+    if present.is_file():
+        try:
+            return _read_file(present)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}; {WAY_OUT}") from error
     name = CONFIG
     try:
         config = from_json(read_part(present, name))
         name = WEIGHTS
         return _network(config, read_part(present, name)), config
     except ValueError as error:
-        raise ValueError(f"{folder / name}: {error}; {WAY_OUT}") from error
+        raise ValueError(f"{path / name}: {error}; {WAY_OUT}") from error
+
+
+def _read_file(path: Path) -> tuple[AggregationGnn, PolicyConfig]:
+    """As `read_policy`, of one file, whose metadata is in the JSON at its head."""
+    data = read_file(path, "policy", MAX_BYTES[WEIGHTS])
+    size = int.from_bytes(data[:HEADER_BYTES], "little")
+    header = read_json(data[HEADER_BYTES : HEADER_BYTES + size], dict)
+    try:
+        config = from_json(read_json(header["__metadata__"][METADATA], dict)[CONFIG])
+    except (KeyError, TypeError) as error:
+        raise ValueError(
+            "it has weights, but does not say of which policy; if a policy's folder holds it, "
+            "name that"
+        ) from error
+    return _network(config, data), config
 
 
 def _network(config: PolicyConfig, data: bytes) -> AggregationGnn:

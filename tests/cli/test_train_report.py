@@ -52,6 +52,12 @@ def test_losses_are_said_and_wins_are_not_boasted_of():
     )
 
 
+def test_a_difference_within_its_error_is_no_loss():
+    level = {"spatial-tdma": replace(CHOICE.others["spatial-tdma"], behind=0.75)}
+    (said,) = verdicts(RUN, progress(replace(CHOICE, others=level)))
+    assert said.startswith("The policy kept is no better than spatial-tdma, which is ahead by 0.75")
+
+
 @pytest.mark.parametrize(
     ("init", "name"), [(None, "the untrained policy"), ("runs/x/policy", "the policy given")]
 )

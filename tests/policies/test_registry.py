@@ -19,8 +19,8 @@ from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.registry import (
     POLICIES,
-    is_directory,
     is_learned,
+    is_stored,
     make_policy,
     normalised,
     with_payload,
@@ -42,25 +42,28 @@ here = pytest.mark.usefixtures("folder")
 def folder(tmp_path, monkeypatch):
     """A working directory with policies, two of them under names of others."""
     monkeypatch.chdir(tmp_path)
-    for name in ("runs/x/policy", "mine", "mst", "all"):
+    for name in ("runs/x/policy", "mine", "mst", "all", "one.safetensors"):
         save_tiny(tmp_path / name, "paper")
 
 
 @here
 @pytest.mark.parametrize(
     "name",
-    ["runs/x/policy", "./runs/x/policy/", "mine", "mine/", "./mst", "mst/", "runs/../mine", "all"],
+    [
+        *("runs/x/policy", "./runs/x/policy/", "mine", "mine/", "./mst", "mst/", "runs/../mine"),
+        *("all", "one.safetensors", "./one.safetensors"),
+    ],
 )
-def test_a_directory_is_a_learned_policy(tmp_path, name):
+def test_a_directory_or_a_file_is_a_learned_policy(tmp_path, name):
     for typed in (name, normalised(name), str(tmp_path / name)):
-        assert is_directory(typed)
+        assert is_stored(typed)
         assert is_learned(typed)
         assert isinstance(make_policy(typed, MISSION), LearnedPolicy)
 
 
 @here
 def test_a_name_is_a_name_whatever_lies_about():
-    assert not any(map(is_directory, POLICIES))
+    assert not any(map(is_stored, POLICIES))
     assert make_policy("mst", MISSION).parameters["probability"] > 0.0
     assert [normalised(name) for name in POLICIES] == list(POLICIES)
 

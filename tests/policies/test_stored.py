@@ -15,6 +15,7 @@ import pytest
 import torch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 from tiny_policies import FEATURES, save_tiny, tiny_config, tiny_network
 
@@ -318,3 +319,50 @@ def test_torch_is_not_imported_before_a_learned_policy_is_wanted():
         "make_policy('mst', paper()); sys.exit('torch' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.fixture
+def one_file(tmp_path):
+    """A sound policy in one file."""
+    save_tiny(tmp_path / "mine.safetensors")
+    return tmp_path / "mine.safetensors"
+
+
+def test_one_file_is_the_same_policy_as_a_folder(policy, one_file):
+    (ours, config), (its, its_config) = read_policy(one_file), read_policy(policy)
+    assert config == its_config
+    weights = ours.state_dict()
+    assert all(torch.equal(weights[name], tensor) for name, tensor in its.state_dict().items())
+    digests = [load_policy(path, MISSION).parameters for path in (policy, one_file)]
+    assert digests[0] == digests[1]
+    assert [path.name for path in one_file.parent.glob("*.safetensors")] == ["mine.safetensors"]
+
+
+def test_one_file_is_the_same_bytes_every_time_and_has_the_card(one_file, policy):
+    before = one_file.read_bytes()
+    save_tiny(one_file)
+    assert one_file.read_bytes() == before
+    with safe_open(one_file, "pt") as opened:
+        said = json.loads(opened.metadata()["swarm_mj policy"])
+    assert said == {name: (policy / name).read_text() for name in (CONFIG, CARD)}
+
+
+@pytest.mark.parametrize(
+    ("metadata", "complaint"),
+    [
+        (None, "does not say of which policy"),
+        ({"swarm_mj policy": "[]"}, "Expected"),
+        ({"swarm_mj policy": "{}"}, "does not say of which policy"),
+        ({"swarm_mj policy": '{"config.json": "{}"}'}, "format"),
+        ({"format": "pt"}, "does not say of which policy"),
+    ],
+)
+def test_one_file_that_is_no_policy_is_refused(one_file, metadata, complaint):
+    save_file(load_file(one_file), one_file, metadata)
+    refused(one_file, complaint)
+
+
+@pytest.mark.parametrize("kept", [0, 4, 8, 100, 5000])
+def test_one_file_that_was_cut_off_is_refused(one_file, kept):
+    one_file.write_bytes(one_file.read_bytes()[:kept])
+    refused(one_file, "mine.safetensors: ")
