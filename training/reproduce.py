@@ -289,8 +289,20 @@ def _remove(work: Work) -> None:
         shutil.rmtree(work.folder)
 
 
-def _typed(*options: str) -> list[str]:
-    return [word for each in options for word in shlex.split(each)]
+def _typed(shared: str, own: str) -> list[str]:
+    """The words of options; a training's own, or a flight's, take the place of those shared."""
+    groups: dict[str, list[str]] = {}
+    for options in (shared, own):
+        its: dict[str, list[str]] = {}
+        for word in shlex.split(options):
+            if word.startswith("--"):
+                its[word] = []
+            elif not its:
+                raise ValueError(f"options begin with --, and not with {word!r:.60}")
+            else:
+                its[list(its)[-1]].append(word)
+        groups |= its
+    return [word for flag, values in groups.items() for word in (flag, *values)]
 
 
 def _budget(command: Sequence[str]) -> int:

@@ -65,9 +65,11 @@ class StabilityFigure:
 def read_curves(path: Path) -> Curves:
     """The learning curves of each kind of training, one a seed, by the names of their columns.
 
+    Trainings of other kinds are passed over.
+
     Raises:
-        ValueError: The file cannot be read, has another kind of training, or curves of a kind were
-            not evaluated after the same numbers of decisions.
+        ValueError: The file cannot be read, has none of a kind, or curves of a kind were not
+            evaluated after the same numbers of decisions.
     """
     _, rows = read_rows(path, "table of curves", MOST_BYTES)
     columns = ("decisions", *(panel.cost for panel in PANELS))
@@ -80,12 +82,13 @@ def read_curves(path: Path) -> Curves:
     curves = {kind: [] for kind in METHODS}
     for name, numbers in found.items():
         kind = name.partition("-")[0]
-        if kind not in curves:
-            raise ValueError(f"{path} has {name!r:.60}, which is none of {', '.join(METHODS)}")
-        curves[kind].append(dict(zip(columns, np.array(numbers).T, strict=True)))
+        if kind in curves:
+            curves[kind].append(dict(zip(columns, np.array(numbers).T, strict=True)))
     for kind, its in curves.items():
         if not its or {tuple(each["decisions"]) for each in its} != {tuple(its[0]["decisions"])}:
-            raise ValueError(f"{path}: curves of {kind} need the same decisions, one or more curve")
+            raise ValueError(
+                f"{path}: curves of {kind} need the same decisions, and one seed or more"
+            )
     return curves
 
 

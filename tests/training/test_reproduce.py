@@ -176,6 +176,11 @@ def test_runs_of_another_experiment_or_commit_are_not_gone_on_with(ask, folders,
     assert not results.exists()
 
 
+def test_own_options_take_the_place_of_shared_ones(program):
+    typed = program._typed("--robots 10 20 --linear --seed 1", "--seed 2 --robots 40")
+    assert typed == ["--robots", "40", "--linear", "--seed", "2"]
+
+
 def test_a_folder_of_something_else_is_left_alone(ask, folders, capsys):
     (run, (seen, _)), (*_, runs) = ask, folders
     (runs / "mine").mkdir(parents=True)
@@ -194,6 +199,7 @@ def test_a_folder_of_something_else_is_left_alone(ask, folders, capsys):
         ("{wide =", "{wider =", "flies 'wider', but trains only narrow, wide"),
         ("--depth", "--deepness", "--deepness"),
         ("--budget 64", "--budget none", "budget"),
+        ('"--receptive-field 0"', '"wide"', "options begin with --, and not with 'wide'"),
         ('["GNN"]', "1", "Expected `array`"),
     ],
 )

@@ -15,6 +15,7 @@ age-2,0,80,0.5,
 age-2,100,50,0.1,1
 variance-1,0,90,0.4,
 variance-1,100,70,0.2,1
+credit,0,95,0.6,
 """
 TRAININGS = "training,commit\nage-1,abc\nage-2,abc\n"
 
@@ -70,7 +71,7 @@ def test_the_files_are_written_where_the_options_say(program, tmp_path):
     ("old", "new", "said"),
     [
         ("age-2,100,50,0.1,1\n", "", "curves of age need the same decisions"),
-        ("variance-1", "task-1", "which is none of age, variance"),
+        ("variance-1", "task-1", "curves of variance need the same decisions, and one seed"),
         ("velocity_variance", "variance", "is no table with"),
         (",40,", ",forty,", "is no table with"),
     ],
