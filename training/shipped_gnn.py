@@ -5,7 +5,7 @@
 Trains one network on teams at rest and one on walking teams, half an hour each on one core, and
 goes on with runs that have begun. Then flies both beside TDMA and spatial TDMA on missions that
 neither has seen. The one trained at rest cost less in six of seven regimes: it is
-`assets/policies/gnn`.
+`assets/policies/gnn.safetensors`, with its card beside it.
 """
 
 import sys

@@ -232,8 +232,8 @@ def _learned(name: str, mission: Mission, **options: Any) -> Policy:
     need("torch", f"policy {name}", "fly another")
     from swarm_mj.policies.stored import load_policy
 
-    folder = asset(f"policies/{SHIPPED}") if name == SHIPPED else Path(name)
-    return load_policy(folder, mission, **options)
+    path = asset(f"policies/{SHIPPED}.safetensors") if name == SHIPPED else Path(name)
+    return load_policy(path, mission, **options)
 
 
 def _own_policy(

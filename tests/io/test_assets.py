@@ -7,7 +7,7 @@ from swarm_mj.io.assets import asset
 
 def test_files_and_folders_are_found():
     assert asset("arena.xml").is_file()
-    assert (asset("policies/gnn") / "model.safetensors").is_file()
+    assert asset("policies/gnn.safetensors").is_file()
 
 
 def test_what_is_missing_is_named():

@@ -121,7 +121,8 @@ def test_the_shipped_policy_is_the_network_in_assets(tmp_path):
     save_tiny(tmp_path / "gnn", "paper")  # a folder of the same name is another policy
     shipped = make_policy("gnn", MISSION)
     assert is_learned("gnn")
-    assert shipped.parameters == make_policy(str(asset("policies/gnn")), MISSION).parameters
+    stored = make_policy(str(asset("policies/gnn.safetensors")), MISSION)
+    assert shipped.parameters == stored.parameters
     assert shipped.parameters != make_policy("./gnn", MISSION).parameters
     assert shipped.payload == "none"
     with pytest.raises(ValueError, match="gnn takes no transmission probability; leave out"):
