@@ -20,16 +20,19 @@ from matplotlib.figure import Figure
 from swarm_mj.cli import script
 from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.evaluation.figures.contents import AOI, VARIANCE
-from swarm_mj.evaluation.figures.style import WIDTH_IN, look_of, save, styled, write_caption
+from swarm_mj.evaluation.figures.style import WIDTH_IN, save, styled, write_caption
 from swarm_mj.fields import setting
-from swarm_mj.io.reading import read_rows
+from swarm_mj.io.reading import read_json, read_rows
 
 ROOT = Path(__file__).resolve().parent.parent
 MOST_BYTES = 10_000_000
-# The published name of what is trained so, by the first part of our trainings' names.
-METHODS = {"age": "GNN trained on AoI", "variance": "GNN trained on velocity variance"}
+# What a colour is for, by the first part of the trainings' names.
+KINDS = {
+    "age": ("trained on the age of information", "#0072b2"),
+    "variance": ("trained on the velocity variance", "#d55e00"),
+}
 PANELS = (AOI, VARIANCE)  # a cost's name is also a column
-HEIGHT_IN = 3.4
+HEIGHT_IN = 3.5
 PALE, BAND = 0.45, 0.15  # of a seed's line, of the band from the lowest to the highest
 
 Curves = Mapping[str, Sequence[Mapping[str, Float[np.ndarray, "evaluations"]]]]
@@ -56,7 +59,7 @@ class StabilityFigure:
         paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
         check_outputs(*(Output("figure", path) for path in paths))
         curves = read_curves(self.results / "fig6-curves.csv")
-        figure = draw(curves, read_commit(self.results / "fig6-trainings.csv"))
+        figure = draw(curves, read_origin(self.results / "fig6-trainings.csv"))
         for path in paths:
             save(figure, path)
         return 0
@@ -79,7 +82,7 @@ def read_curves(path: Path) -> Curves:
             found[row["training"]].append([float(row[name]) for name in columns])
     except (KeyError, ValueError) as error:
         raise ValueError(f"{path} is no table with {', '.join(columns)}: {error}") from error
-    curves = {kind: [] for kind in METHODS}
+    curves = {kind: [] for kind in KINDS}
     for name, numbers in found.items():
         kind = name.partition("-")[0]
         if kind in curves:
@@ -92,23 +95,32 @@ def read_curves(path: Path) -> Curves:
     return curves
 
 
-def read_commit(path: Path) -> str:
-    """The one commit of a table of trainings; raises ValueError if there are several."""
+def read_origin(path: Path) -> str:
+    """Who was trained, and by which commit, from a table of trainings.
+
+    Raises:
+        ValueError: It cannot be read, or has several commits or team sizes where one is needed.
+    """
     _, rows = read_rows(path, "table of trainings", MOST_BYTES)
-    commits = {row.get("commit", "") for _, row in rows}
-    if len(commits) != 1:
-        raise ValueError(f"{path} needs one commit, not {', '.join(sorted(commits)) or 'none'}")
-    return commits.pop()
+    its = [row for _, row in rows if row.get("training", "").partition("-")[0] in KINDS]
+    commits = {row.get("commit", "") for row in its}
+    sizes = {str(read_json(row.get("settings", ""), dict).get("robots")) for row in its}
+    if len(commits) != 1 or len(sizes) != 1:
+        raise ValueError(
+            f"{path} needs one commit and one team size, not "
+            f"{', '.join(sorted(commits | sizes)) or 'none'}"
+        )
+    return f"teams of {sizes.pop().strip('[]')} robots, shared reward, commit {commits.pop()}"
 
 
-def draw(curves: Curves, commit: str) -> Figure:
+def draw(curves: Curves, origin: str) -> Figure:
     """Both costs over the decisions: seeds pale, their mean, a band from lowest to highest."""
     with styled():
         drawing = Figure(figsize=(WIDTH_IN, HEIGHT_IN))
-        drawing.subplots_adjust(left=0.075, right=0.985, top=0.78, bottom=0.24, wspace=0.18)
+        drawing.subplots_adjust(left=0.075, right=0.97, top=0.76, bottom=0.24, wspace=0.18)
         for axes, panel in zip(drawing.subplots(1, len(PANELS)), PANELS, strict=True):
             for kind, its in curves.items():
-                _draw_kind(axes, METHODS[kind], panel.cost, its)
+                _draw_kind(axes, kind, panel.cost, its)
             axes.set_title(panel.label, loc="left")
             axes.set_xlabel("team decisions")
             axes.set_ylim(bottom=0.0)
@@ -117,32 +129,30 @@ def draw(curves: Curves, commit: str) -> Figure:
         drawing.legend(
             *drawing.axes[0].get_legend_handles_labels(),
             loc="upper left",
-            bbox_to_anchor=(0.075, 0.92),
-            ncols=len(METHODS),
+            bbox_to_anchor=(0.075, 0.91),
+            ncols=len(KINDS),
             frameon=False,
             fontsize=8,
             borderpad=0.0,
             borderaxespad=0.0,
         )
         seeds = ", ".join(f"{len(its)} of {kind}" for kind, its in curves.items())
-        caption = (
-            f"Held-out missions; seeds: {seeds}; each, their mean, and all between; commit {commit}"
-        )
+        caption = f"Held-out missions; seeds: {seeds}; each and their mean; {origin}"
         write_caption(drawing, 0.075, 0.03, caption)
     return drawing
 
 
 def _draw_kind(
-    axes: Axes, method: str, cost: str, its: Sequence[Mapping[str, Float[np.ndarray, "E"]]]
+    axes: Axes, kind: str, cost: str, its: Sequence[Mapping[str, Float[np.ndarray, "E"]]]
 ) -> None:
     """One kind of training in one pair of axes."""
-    look, x = look_of(method), its[0]["decisions"]
+    (label, colour), x = KINDS[kind], its[0]["decisions"]
     costs = np.array([each[cost] for each in its])
     for each in costs:
-        axes.plot(x, each, color=look.colour, alpha=PALE, linewidth=0.8)
-    axes.plot(x, costs.mean(axis=0), color=look.colour, marker=look.marker, label=look.label)
+        axes.plot(x, each, color=colour, alpha=PALE, linewidth=0.8)
+    axes.plot(x, costs.mean(axis=0), color=colour, label=label)
     low, high = costs.min(axis=0), costs.max(axis=0)
-    axes.fill_between(x, low, high, color=look.colour, alpha=BAND, linewidth=0.0)
+    axes.fill_between(x, low, high, color=colour, alpha=BAND, linewidth=0.0)
 
 
 if __name__ == "__main__":

@@ -230,3 +230,12 @@ def test_an_experiment_flies_all_points_of_its_figure(program, tmp_path, figure,
     budgets = [parse(command)[1].budget for command in work.trainings.values()]
     assert scale == "quick" or max(budgets) == 2_000_000
     assert all(budgets)
+
+
+@pytest.mark.parametrize("figure", ["fig3", "fig4", "fig5", "fig6"])
+def test_committed_results_are_of_the_experiment_as_it_stands(program, figure):
+    work = program.read_work(figure, program.Settings())
+    assert work.is_finished, "make reproduce ARGS=--force makes them anew"
+    commits = {row["commit"] for row in rows(work.tables[1])}
+    assert commits == {result.commit for result in read_results(work.tables[0])}
+    assert len(commits) == 1

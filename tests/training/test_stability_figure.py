@@ -17,7 +17,11 @@ variance-1,0,90,0.4,
 variance-1,100,70,0.2,1
 credit,0,95,0.6,
 """
-TRAININGS = "training,commit\nage-1,abc\nage-2,abc\n"
+TRAININGS = """training,commit,settings
+age-1,abc,"{""robots"": [10]}"
+age-2,abc,"{""robots"": [10]}"
+credit,abc,"{""robots"": [40]}"
+"""
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +58,7 @@ def test_seeds_their_mean_and_their_band(program, table):
 def test_the_caption_says_how_many_seeds_and_which_commit(program, table):
     said = [text.get_text() for text in program.draw(program.read_curves(table), "abc").texts]
     assert any("seeds: 2 of age, 1 of variance" in text for text in said)
-    assert any(text.endswith("commit abc") for text in said)
+    assert any(text.endswith("; abc") for text in said)
 
 
 @pytest.mark.usefixtures("table")
@@ -82,8 +86,12 @@ def test_a_table_of_something_else_is_refused(program, table, old, new, said):
         program.read_curves(table)
 
 
-def test_trainings_of_two_commits_are_refused(program, tmp_path):
+def test_the_origin_is_one_commit_and_one_team_size(program, tmp_path):
     path = tmp_path / "fig6-trainings.csv"
-    path.write_text(TRAININGS.replace("age-2,abc", "age-2,def"))
-    with pytest.raises(ValueError, match="needs one commit, not abc, def"):
-        program.read_commit(path)
+    path.write_text(TRAININGS)
+    assert program.read_origin(path) == "teams of 10 robots, shared reward, commit abc"
+    others = (("age-2,abc", "age-2,def"), ("[10]", "[20]"), (TRAININGS.partition("\n")[2], ""))
+    for old, new in others:
+        path.write_text(TRAININGS.replace(old, new, 1))
+        with pytest.raises(ValueError, match="needs one commit and one team size"):
+            program.read_origin(path)
