@@ -140,20 +140,10 @@ class LearningMind:
         self.plan, self.transmitted = None, in_turn
         if all(seen > 0.0) and not velocity_mps.any():
             self.follows = True
-            if self.is_jammed(seen, slot):
-                return self.transmitted
             self.plan = self.plan_for(position_m, slot)
             begin, transmits = self.plan[:2]
             self.transmitted = bool(transmits[slot - begin, self.me])
         return self.transmitted
-
-    def is_jammed(self, seen, slot):
-        """Whether it heard of less than half of the team in a round, since plans are learned."""
-        if self.flown is None:
-            return False
-        round_slots = 2 * max(self.mission.num_robots, self.settings.learning.min_round_windows)
-        told_in = [round(2 * t) - 2 for t in seen.tolist()]
-        return 2 * sum(each >= slot - round_slots for each in told_in) < len(told_in)
 
     @property
     def num_slots(self):

@@ -7,9 +7,7 @@ and what they missed (`link_evidence.py`), and packets carry these counts of all
 as what else they tell of it. At common times every robot makes a table of links from what it then
 knows (`link_tables.py`). Packets carry the best table: that of a robot whose knowledge is youngest.
 At the next common time all fly by a plan made from the best table that they hold. Where the table
-says that links are as they were believed, the plan goes on. If some missed the best table, two
-plans are flown at once, and may jam each other for good. So a robot that has not heard of most of
-the team for a round takes turns, until it has: then the best table reaches everyone.
+says that links are as they were believed, the plan goes on.
 """
 
 from typing import NamedTuple
@@ -88,7 +86,6 @@ class RestingTeam:
             self._pass_on(heard)
             self._keep_time(self._times, slot, known_until)
             self._joined[can_plan] = np.minimum(self._joined[can_plan], slot)
-            can_plan = can_plan & ~self._is_jammed(self._times, slot, known_until)
         members: dict[tuple[bytes, int | None], list[int]] = {}
         for i in np.flatnonzero(can_plan).tolist():
             members.setdefault((position_m[i].tobytes(), self._owner(i)), []).append(i)
@@ -146,15 +143,6 @@ class RestingTeam:
         if times.are_flown(slot) and self._next is not None:
             self._flown, self._holds = self._next, self._will_hold
             self._flights = {key: of for key, of in self._flights.items() if key[1] is None}
-
-    def _is_jammed(
-        self, times: "CommonTimes", slot: int, known_until: Int[np.ndarray, "N N"]
-    ) -> Bool[np.ndarray, "N"]:
-        """Who has not heard of most of the team for a round, since plans are learned."""
-        if self._flown is None:
-            return np.zeros(len(self._everyone), dtype=bool)
-        is_fresh = known_until >= slot - times.round_slots
-        return is_fresh.mean(axis=1) < self._settings.learning.least_fresh_share
 
     def _owner(self, i: int) -> int | None:
         """Whose table i flies by; None if it changes nothing."""

@@ -50,7 +50,7 @@ class SnapshotSettings:
     steady_windows: float = 15.0  # for which a robot is expected to keep its velocity [windows]
     std_per_distance: float = 0.45  # of the distance that robots drift apart: how far beliefs err
     # At rest, a team of which fewer are fresh is not scattered but flies by plans that differ.
-    least_fresh_share: float = 0.5
+    least_fresh_share: float = 0.75
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,9 +108,6 @@ class LearningSettings:
     least_log_odds: float = 5.0  # of what is learned, over what was believed
     cautious_stds: float = 0.5  # by which a packet is expected to be weaker than in the mean
     disturbing_stds: float = 1.0  # by which it is expected to disturb others more
-    least_fresh_share: float = (
-        0.5  # of the team, heard of in a round; with less, plans are in doubt
-    )
     max_std_db: float = 2.0  # so doubtful schedulers take a link to be at most: errors last [dB]
     min_round_windows: int = 20  # in which that round is counted for small teams [windows]
 

@@ -65,25 +65,6 @@ def test_a_robot_that_missed_the_best_table_flies_by_the_best_it_has():
     assert apart.minds[3].flown.rank[1] in owners[:3] + owners[4:]
 
 
-def test_robots_that_hear_nobody_for_a_round_take_turns():
-    """From slot 50 on nobody decodes anything; a round is 16 slots, and a table is flown by."""
-    mission, num_calls = paper("stationary", num_robots=6, shadowing_db=6.0), 0
-    radio = Swarm(mission, [0]).channel
-
-    class Dead:
-        def __call__(self, position_m, recipient):
-            nonlocal num_calls
-            num_calls += 1
-            heard = radio.at(np.array([num_calls - 1]), np.arange(1))(position_m, recipient)
-            return heard if num_calls <= 50 else np.arange(6)[None]
-
-    apart = LearnedApart(mission, 0, channel=Dead())
-    apart.fly(25)
-    assert apart.minds[0].plan is not None
-    apart.fly(9)
-    assert all(mind.plan is None for mind in apart.minds)
-
-
 @pytest.mark.parametrize("seed", range(2))
 def test_in_free_space_the_planner_flies_as_without_a_payload(seed):
     mission = paper("stationary", num_robots=8)
