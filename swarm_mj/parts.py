@@ -117,7 +117,16 @@ class OwnParts:
         return "".join(f", {kind} {name}" for kind, name in self.named.items())
 
     def made(self, mission: Mission) -> dict[str, Any]:
-        """The parts themselves, as `Swarm` takes them; raises ValueError as `make` does."""
+        """The parts themselves, as `Swarm` takes them.
+
+        Raises:
+            ValueError: As for `make`, or a channel would take the place of what the mission asks.
+        """
+        if self.channel is not None and mission.beyond_free_space:
+            raise ValueError(
+                f"channel {self.channel} takes the place of the mission's own, so "
+                f"{mission.beyond_free_space} would change nothing; leave out either"
+            )
         made = {kind: make(kind, name, mission) for kind, name in self.named.items()}
         for kind, part in made.items():
             if isinstance(part, type) or not callable(part):

@@ -101,5 +101,6 @@ def _draw_free(
             return
     raise ValueError(
         f"{int(np.sum(is_due))} of {len(position_m)} robots found no free space in "
-        f"{MAX_FREE_DRAWS} draws; choose an area with more room for them"
+        f"{MAX_FREE_DRAWS} draws over {2 * half_side_m:.0f} m by {2 * half_side_m:.0f} m; choose "
+        "an arena that leaves more room, or fewer robots"
     )

@@ -203,13 +203,13 @@ class Mission:
         "physics",
         "Eq. 15 or forces",
         PhysicsMode,
-        "Eq. 15 to rounding error, or forces and bounces",
+        "Eq. 15 to rounding error, or forces and bounces, as obstacles need",
     )
     collide: bool = setting(
         False, "robots bounce off each other, too, in contact physics", label="robots collide"
     )
     boundary: Boundary = _choice(
-        "reflect", "boundary", "IV-A", Boundary, "what the edge of the area does to robots"
+        "reflect", "boundary", "IV-A", Boundary, "at the area's edge; reflect among obstacles"
     )
     wall_hit: WallHit = _choice("mirror", "wall hit", "IV-A; the code clips", WallHit)
     half_duplex: HalfDuplex = _choice("strict", "half duplex", "Eq. 3", HalfDuplex)

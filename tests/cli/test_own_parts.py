@@ -143,3 +143,13 @@ def test_a_channel_of_ones_own_gives_a_mission_the_same_course_beside_any_other(
         course = [swarm.step(policy).age_windows[seeds.index(3)] for _ in range(150)]
         ages.append(course)
     np.testing.assert_array_equal(*ages)
+
+
+def test_a_channel_of_ones_own_beside_parts_of_the_missions_is_refused(swarm_mj):
+    fly = ("fly", *SMALL, "--channel", "my_parts:Lossy", "--no-record")
+    done = swarm_mj(*fly, "--fading", "rayleigh", "--erasure", 0.3)
+    assert done.returncode == 2
+    assert (
+        "channel my_parts:Lossy takes the place of the mission's own, so fading rayleigh, erasure "
+        "0.3 would change nothing; leave out either"
+    ) in " ".join(done.stderr.split())

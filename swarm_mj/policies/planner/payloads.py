@@ -25,7 +25,6 @@ from swarm_mj.protocol.packets import (
     bits_for,
     bits_per_second,
     fits,
-    fitting,
     identity,
     least_bit_rate,
     packet_of,
@@ -91,12 +90,13 @@ def snapshot_form(mission: Mission) -> SnapshotForm:
     for form in (whole, lean):
         if fits(packet_of(mission, form.fields), mission):
             return form
-    fitting(packet_of(mission), mission, "planner")  # or nothing fits, which it says
     least = packet_of(mission, lean.fields).num_bytes
+    one_entry = replace(packet_of(mission), num_entries=1)
+    other_way = ", or planner --payload none" if fits(one_entry, mission) else ""
     raise ValueError(
         f"packets of planner need {least:,} bytes at least, but a slot holds "
         f"{slot_bytes(mission):,} bytes at {bits_per_second(mission.bit_rate or 0.0)}; choose a "
-        f"bit rate of {least_bit_rate(least, mission):g} or more, or planner --payload none"
+        f"bit rate of {least_bit_rate(least, mission):g} or more{other_way}"
     )
 
 
