@@ -92,6 +92,7 @@ figures: setup
 	    --figure $$name --out assets/figures/paper --force || exit; \
 	done
 	$(BIN)/python training/learning_figure.py
+	$(BIN)/python training/stability_figure.py
 	$(BIN)/python tools/diagrams.py
 
 reproduce: setup

@@ -4,7 +4,7 @@
     make reproduce SCALE=quick    # the same; then `make figures` draws what it left
 
 What is trained and flown, and with which options, stands in `training/reproduce/`, one file a
-figure. `quick` takes hours on one core, `full` has the paper's budget and takes weeks.
+figure. `quick` has a hundredth of the authors' budget, `full` all of it.
 What `training/results/reproduce/SCALE` has of the same file is kept; `--force` makes all anew. An
 interrupted run goes on where it broke off, as long as the commit is the same.
 """
@@ -169,9 +169,7 @@ class Work:
             SystemExit: A command cannot be read.
         """
         check_outputs(*(Output("results", path) for path in self.tables))
-        for command in self.trainings.values():
-            _budget(command)
-        for _, command, _ in self.flights:
+        for command in (*self.trainings.values(), *(each for _, each, _ in self.flights)):
             parse(command)
         if self.folder.exists() and self._begun() != self._now():
             raise ValueError(
@@ -200,11 +198,11 @@ class Work:
         self._hand_over()
 
     def _train(self, name: str, command: list[str]) -> None:
-        """Trains one, or goes on; one that has its budget is left alone."""
-        run = self.folder / name
-        if (run / CURVE).exists() and _rows(run / CURVE)[-1]["decisions"] >= _budget(command):
-            return
-        _run([*command, "--resume"] if (run / SETTINGS).exists() else command)
+        """Trains one, or goes on; one that came to its end is left alone."""
+        run, ended = self.folder / name, self.folder / f"{name}.trained"
+        if not ended.exists():
+            _run([*command, "--resume"] if (run / SETTINGS).exists() else command)
+            atomic.write_text(ended, "")
 
     def _hand_over(self) -> None:
         """Writes the tables, that of the flights last: it is drawn."""
@@ -303,14 +301,6 @@ def _typed(shared: str, own: str) -> list[str]:
                 its[list(its)[-1]].append(word)
         groups |= its
     return [word for flag, values in groups.items() for word in (flag, *values)]
-
-
-def _budget(command: Sequence[str]) -> int:
-    """How many decisions a training has; raises ValueError if its options do not say."""
-    budget = parse(command)[1].budget
-    if budget is None:
-        raise ValueError(f"a training needs a --budget, and this has none: {shlex.join(command)}")
-    return budget
 
 
 def _rows(path: Path) -> list[dict[str, Any]]:
