@@ -43,9 +43,10 @@ def _spatial_tdma(mission: Mission) -> SpatialTdma:
 
 
 def _sotdma(mission: Mission) -> SelfOrganisedTdma:
-    return SelfOrganisedTdma(
-        radio_of(mission), _spatial_tdma(mission), reads_packets=fits(packet_of(mission), mission)
-    )
+    is_whole = fits(packet_of(mission), mission)
+    # By the authors' rule a robot may decode while it transmits, which changes its T in that slot.
+    reads_packets = is_whole and mission.half_duplex == "strict"
+    return SelfOrganisedTdma(radio_of(mission), _spatial_tdma(mission), reads_packets=reads_packets)
 
 
 def _planner(mission: Mission) -> Planner | RestingPlanner:

@@ -31,7 +31,7 @@ def first_slots(
 
     Args:
         order: The robots, in the common order.
-        is_known: Whom the robot that reckons knows; the others' slots mean nothing.
+        is_known: Whom the robot that reckons knows; it does not work out slots for the others.
         power: Between robots it knows [noise].
         rule: Of the choices.
 
@@ -43,9 +43,12 @@ def first_slots(
     is_marked = np.zeros(frame.transmits.shape, dtype=np.bool_)
     for place in range(order.shape[0]):
         k = order[place]
+        slot = place % rule.num_slots
+        slots[k] = slot
         if not is_known[k]:
             continue
-        slot = place if place < rule.num_slots else best_slot(frame, k, 0, 0.0, is_marked)
+        if place >= rule.num_slots:
+            slot = best_slot(frame, k, 0, 0.0, is_marked)
         move(frame, k, NOWHERE, slot)
         slots[k] = slot
     return slots

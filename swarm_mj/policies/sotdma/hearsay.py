@@ -1,7 +1,8 @@
 """What robots hear of slots: who transmits in which, and who missed their own packets.
 
 A robot's T of a teammate says when that teammate last transmitted, and so which slot of the frame
-it owns. The T of itself in a packet says whether its sender decoded its own last packet. Index
+it owns. A packet also says what its sender knows of the robot that decodes it: if T is as young as
+that robot's last packet and P is the sender, then the sender decoded that packet itself. Index
 order: row `[i]` is robot i's own memory; slots count from the start of the mission.
 """
 
@@ -9,13 +10,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Int16, Int32
+from jaxtyping import Bool, Float, Int, Int8, Int32
 
 from swarm_mj.compiled import compiled
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 
 LONG_AGO = -1_000_000
 OF_NO_FRAME = -1  # the place of a slot that is left to whoever is in need
+MOST_MISSED = 100  # that are counted
 RECENT = 0.1  # the weight of the last packet in the share that were decoded
 
 
@@ -37,8 +39,9 @@ class Hearsay(NamedTuple):
     sent: Int[np.ndarray, "N"]  # when it last transmitted itself
     sent_place: Int[np.ndarray, "N"]  # and where in the frame
     share: Float[np.ndarray, "N"]  # of its packets, lately, that neighbours decoded
-    missed: Int16[np.ndarray, "N F N"]  # its packets in a slot in a row that a neighbour missed
-    missed_at: Int32[np.ndarray, "N F N"]  # when it last learned whether
+    judged: Int32[np.ndarray, "N N"]  # the last of its packets of which it learned whether
+    missed: Int8[np.ndarray, "N F N"]  # how many of a slot, in a row, a neighbour did not decode
+    missed_at: Int32[np.ndarray, "N F"]  # when it last learned so
 
 
 @compiled()
@@ -62,8 +65,9 @@ def nothing_heard(slots: Int[np.ndarray, "N N"], num_slots: int) -> Hearsay:
         sent=np.full(num_robots, LONG_AGO),
         sent_place=np.full(num_robots, OF_NO_FRAME),
         share=np.ones(num_robots),
-        missed=np.zeros(of_slots, dtype=np.int16),
-        missed_at=np.full(of_slots, LONG_AGO, dtype=np.int32),
+        judged=np.full(pairs, LONG_AGO, dtype=np.int32),
+        missed=np.zeros(of_slots, dtype=np.int8),
+        missed_at=np.full((num_robots, num_slots), LONG_AGO, dtype=np.int32),
     )
 
 
@@ -81,10 +85,9 @@ def read_slots(hearsay: Hearsay, timestamp: Float[np.ndarray, "N N"], frames: Fr
         for k in range(num_robots):
             slot = _slot_of(timestamp[i, k])
             if k != i and slot >= frames.first_slot and slot > hearsay.announced[i, k]:
-                hearsay.announced[i, k] = slot
                 place = place_of(slot, frames)
                 if place != OF_NO_FRAME:
-                    hearsay.slots[i, k] = place
+                    hearsay.announced[i, k], hearsay.slots[i, k] = slot, place
 
 
 @compiled()
@@ -92,6 +95,7 @@ def read_packets(
     hearsay: Hearsay,
     heard: Int[np.ndarray, "N"],
     timestamp: Float[np.ndarray, "N N"],
+    parent: Int[np.ndarray, "N N"],
     slot: int,
     frames: Frames,
 ) -> None:
@@ -101,6 +105,7 @@ def read_packets(
         hearsay: Written in place.
         heard: Whom each robot decoded; itself is nobody.
         timestamp: T of everyone; of a sender, what its packet said.
+        parent: P, likewise.
         slot: That slot.
         frames: Of the mission.
     """
@@ -111,18 +116,23 @@ def read_packets(
         known = _slot_of(timestamp[j, i])
         hearsay.decoded[i, j], hearsay.got_through[i, j] = slot, known
         sent, place = hearsay.sent[i], hearsay.sent_place[i]
-        if place == OF_NO_FRAME or not frames.first_slot <= sent < slot:
+        is_due = frames.first_slot <= sent < slot and hearsay.judged[i, j] < sent
+        if place == OF_NO_FRAME or not is_due:
             continue
-        got_through = known >= sent
+        hearsay.judged[i, j] = sent
+        got_through = known >= sent and parent[j, i] == j
         hearsay.share[i] += RECENT * ((1.0 if got_through else 0.0) - hearsay.share[i])
-        hearsay.missed_at[i, place, j] = slot
-        hearsay.missed[i, place, j] = 0 if got_through else hearsay.missed[i, place, j] + 1
+        if got_through:
+            hearsay.missed[i, place, j] = 0
+        else:
+            hearsay.missed[i, place, j] = min(hearsay.missed[i, place, j] + 1, MOST_MISSED)
+            hearsay.missed_at[i, place] = slot
 
 
 @compiled()
 def write_marks(
-    missed: Int16[np.ndarray, "F N"],
-    missed_at: Int32[np.ndarray, "F N"],
+    missed: Int8[np.ndarray, "F N"],
+    missed_at: Int32[np.ndarray, "F"],
     share: float,
     least_doubt: float,
     since: int,
@@ -132,7 +142,7 @@ def write_marks(
 
     Args:
         missed: In a row, there.
-        missed_at: When it was last learned.
+        missed_at: When it was last learned, of each slot.
         share: Of the robot's packets that neighbours decode.
         least_doubt: Least probability of so many misses, for which they count as chance.
         since: Older marks are forgotten.
@@ -142,7 +152,7 @@ def write_marks(
     enough = max(1, math.ceil(math.log(least_doubt) / math.log(min(chance, 0.9))))
     for s in range(missed.shape[0]):
         for j in range(missed.shape[1]):
-            is_marked[s, j] = missed[s, j] >= enough and missed_at[s, j] >= since
+            is_marked[s, j] = missed[s, j] >= enough and missed_at[s] >= since
 
 
 @compiled()
@@ -153,6 +163,7 @@ def is_in_need(
     is_near: Bool[np.ndarray, "N"],
     slot: int,
     patience: float,
+    resignation: float,
 ) -> bool:
     """Whether i has not heard of a neighbour for long, or hears one that has not heard of it.
 
@@ -163,10 +174,11 @@ def is_in_need(
         is_near: Whom it believes to be in range.
         slot: That begins.
         patience: How long is long [slots].
+        resignation: After so long the neighbour counts as gone [slots].
     """
     for j in range(timestamp.shape[0]):
         if is_near[j] and j != i:
-            if slot - _slot_of(timestamp[j]) > patience:
+            if patience < slot - _slot_of(timestamp[j]) <= resignation:
                 return True
             decoded = hearsay.decoded[i, j]
             if decoded > slot - patience and decoded - hearsay.got_through[i, j] > patience:

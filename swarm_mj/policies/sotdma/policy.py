@@ -32,14 +32,14 @@ from swarm_mj.radio.link_models import Belief
 class SelfOrganisedTdma(BroadcastPolicy):
     """TDMA whose slots robots choose themselves, and announce by speaking in them.
 
-    Uses the robot's own buffer, the timestamps in packets that it decoded, its identity, the team's
+    Uses the robot's own buffer, T and P in packets that it decoded, its identity, the team's
     size, the order, the clock and the radio's range and threshold. Of what the mission grants of
     the channel it uses the mean powers.
     """
 
     uses = (
-        "its buffer, a common random order and the clock: robots own slots, which T tells, and "
-        "choose the slot in which the news would stay youngest"
+        "its buffer, T and P in packets, a common random order, the clock and the radio: robots "
+        "own slots, which T tells, and choose the slot in which the news would stay youngest"
     )
 
     def __init__(
@@ -56,7 +56,8 @@ class SelfOrganisedTdma(BroadcastPolicy):
             radio: What robots believe in unless the policy is informed otherwise.
             turns: What they follow at first.
             settings: What was tuned.
-            reads_packets: Whether packets hold all of T, so that they tell who was heard.
+            reads_packets: Whether packets hold all of T and P as they were before the slot, so that
+                they tell who was heard.
         """
         self._radio, self._turns = radio, turns
         self._settings = SotdmaSettings() if settings is None else settings

@@ -25,6 +25,7 @@ class SotdmaSettings:
     contention_every: int = 16  # one of so many slots is no part of the frames [slots]
     contention_probability: float = 0.4  # that a robot in need transmits in it [1]
     need_frames: float = 3.0  # a neighbour not heard for longer is in need, or oneself [frames]
+    lost_frames: float = 12.0  # and one not heard for even longer is gone [frames]
 
     def frame_slots(self, num_robots: int) -> int:
         """How many slots the frames of so many robots have."""

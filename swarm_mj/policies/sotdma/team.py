@@ -83,7 +83,7 @@ class Team:
         if self._hearsay is None:
             self._hearsay = self._begin(buffers.position_m[b], is_known)
         hearsay = self._hearsay
-        read_packets(hearsay, heard, timestamp, slot - 1, frames)
+        read_packets(hearsay, heard, timestamp, buffers.parent[b], slot - 1, frames)
         read_slots(hearsay, timestamp, frames)
         for i in self._choosers(slot, frames):
             chose_lately = self._chose_lately(slot, frames)
@@ -159,9 +159,12 @@ class Team:
     ) -> Bool[np.ndarray, "N"]:
         """Who transmits in a slot of no frame: robots in need, by chance."""
         patience = self._settings.need_frames * self._rule.num_slots
+        resignation = self._settings.lost_frames * self._rule.num_slots
         transmits = draw < self._settings.contention_probability
         for i in np.flatnonzero(transmits).tolist():
-            transmits[i] = is_in_need(hearsay, i, timestamp[i], is_near[i], slot, patience)
+            transmits[i] = is_in_need(
+                hearsay, i, timestamp[i], is_near[i], slot, patience, resignation
+            )
         return transmits
 
     def _is_in_range(self, position_m: Float[np.ndarray, "N N 2"]) -> Bool[np.ndarray, "N N"]:

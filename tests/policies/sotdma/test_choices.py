@@ -41,9 +41,15 @@ def test_the_first_of_the_order_have_a_slot_each_and_the_others_choose_in_turn(s
 
 
 def test_robots_that_are_not_known_have_no_part_in_it():
-    order, is_known = np.arange(7), np.arange(7) != 2
+    """But they count as in the slots of their places in the order."""
+    order, is_known = np.arange(7), ~np.isin(np.arange(7), [2, 5])
     slots = first_slots(order, is_known, powers(1, is_known), RULE)
-    assert slots[[0, 1, 3]].tolist() == [0, 1, 3]
+    assert slots[[0, 1, 2, 3, 5]].tolist() == [0, 1, 2, 3, 1]
+    apart = powers(1)
+    apart[[2, 5]] = apart[:, [2, 5]] = 0.0
+    for k in (4, 6):
+        so_far = [slots[j] if j < k and is_known[j] else NOWHERE for j in range(7)]
+        assert slots[k] == best(apart, so_far, k, 0, 0.0)
 
 
 @pytest.mark.parametrize("seed", range(6))

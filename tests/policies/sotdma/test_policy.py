@@ -3,7 +3,7 @@ import copy
 import numpy as np
 import pytest
 
-from swarm_mj.mission import paper
+from swarm_mj.mission import paper, reference
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.sotdma.hearsay import LONG_AGO, OF_NO_FRAME, place_of
@@ -45,7 +45,7 @@ class Apart(BroadcastPolicy):
 
     @staticmethod
     def as_seen_by(i, views):
-        """All that is not robot i's is lost, but T of whom it decoded in the last slot."""
+        """All that is not robot i's is lost, but T and P of whom it decoded in the last slot."""
         seen = copy.deepcopy(views)
         for array in vars(seen.buffers).values():
             array[:, np.arange(views.num_robots) != i] = 0
@@ -56,12 +56,16 @@ class Apart(BroadcastPolicy):
         if seen.phases:
             for b, sender in enumerate(seen.phases[-1].heard[:, i]):
                 seen.buffers.timestamp[b, sender] = views.buffers.timestamp[b, sender]
+                seen.buffers.parent[b, sender] = views.buffers.parent[b, sender]
         return seen
 
 
-@pytest.mark.parametrize("task", ["stationary", "random-walk"])
-def test_eq9_robots_decide_by_their_buffers_and_what_packets_say_of_t(task):
-    mission = paper(task, num_robots=8, range_ratio=0.2)
+@pytest.mark.parametrize(
+    ("preset", "task"),
+    [(paper, "stationary"), (paper, "random-walk"), (reference, "stationary")],
+)
+def test_eq9_robots_decide_by_their_buffers_and_by_t_and_p_in_packets(preset, task):
+    mission = preset(task, num_robots=8, range_ratio=0.2)
     swarm, apart = Swarm(mission, [1, 2]), Apart(mission, [0, 5])
     swarm.start(apart)
     for _ in range(80):
