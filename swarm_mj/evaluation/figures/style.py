@@ -92,8 +92,8 @@ LOOKS = {
     "GNN generalized from 0.25": Look(label="GNN, from 0.25", colour="#b3589a", marker="p"),
     "GNN trained at each size": Look(label="GNN, each size", colour="#cc79a7", marker="X"),
     "GNN generalized from 40": Look(label="GNN, from 40", colour="#b3589a", marker="p"),
-    "GNN with shared reward": Look(label="GNN, shared reward", colour="#7b4173", marker="H"),
-    "GNN with credit per robot": Look(label="GNN, own credit", colour="#7b4173", marker="H"),
+    "GNN with shared reward": Look(label="GNN, shared reward", colour="#5e16d8", marker="H"),
+    "GNN with credit per robot": Look(label="GNN, own credit", colour="#5e16d8", marker="H"),
     "GNN trained on AoI": Look(label="GNN, on AoI", colour="#cc79a7", marker="X"),
     "GNN trained on velocity variance": Look(
         label="GNN, on variance", colour="#b3589a", marker="p"
