@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from swarm_mj.cli.machine import free_addresses, free_memory, free_room, largest_file
 from swarm_mj.evaluation.study import Study
-from swarm_mj.learning.choice import MANY_DECISIONS, NUM_BEST, num_missions
+from swarm_mj.learning.choice import MANY_DECISIONS, OTHER_FLIGHTS, num_missions
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import is_learned
 from swarm_mj.replay.recorder import AGE_BYTES, MAX_AGE_MATRIX_BYTES
@@ -108,7 +108,7 @@ def training_needs(training: "Training", limits: "Limits") -> Needs:
     missions = [replace(training.mission, num_robots=size) for size in training.robots]
     largest, rollout = max(missions, key=lambda each: each.num_robots), rollout_bytes(training)
     decisions = limits.decisions or MANY_DECISIONS
-    num_flown = num_missions(training, decisions, NUM_BEST + 2)  # to choose
+    num_flown = num_missions(training, decisions, 1 + OTHER_FLIGHTS)  # at most, to choose
     held_out = missions_memory(largest, num_flown, is_learned=True)
     under_way = missions_memory(largest, training.missions, is_learned=True) - LIBRARIES - TORCH
     # What leaves out silent rows sorts a copy of the others before it passes over them.

@@ -73,7 +73,7 @@ def run(options: Options) -> int:
         from swarm_mj.learning.train import train  # stable-baselines3 takes its time to import
     try:
         with memory_errors(), deferred_interrupt() as is_interrupted:
-            watch = Watch(console, asked.limits, is_interrupted)
+            watch = Watch(console, asked, is_interrupted)
             with watch:
                 progress = train(asked, options.out, listener=watch, is_resumed=options.resume)
             is_over = not watch.has_stopped
@@ -159,7 +159,7 @@ def _next_commands(
     """What to do next, and the commands that do it."""
     name, policy = this_command(), shlex.quote(str(out / "policy"))
     training, more = asked.training, ""
-    if has_stopped_early(asked, progress):
+    if has_stopped_early(asked, progress) and progress.has_chosen:
         more = " --patience 0"
     elif is_over:
         more = f" --budget {2 * progress.decisions}"

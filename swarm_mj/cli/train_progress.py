@@ -9,11 +9,12 @@ from rich.console import Console
 from rich.progress import Task
 
 from swarm_mj.cli.progress import WorkBar
-from swarm_mj.learning.choice import REFERENCES, column
+from swarm_mj.learning.choice import ORACLE, REFERENCES, column, reference_missions
 
 if TYPE_CHECKING:
     from swarm_mj.learning.callback import Status
-    from swarm_mj.learning.run_folder import Limits
+    from swarm_mj.learning.run_folder import Limits, Run
+    from swarm_mj.learning.settings import Training
 
 FINISHING = "finishing this rollout, then all is kept; Ctrl-C again breaks off at once"
 WHOLE = 1.0  # the bar's total
@@ -22,12 +23,11 @@ WHOLE = 1.0  # the bar's total
 class Watch(WorkBar):
     """The listener of a run, and its bar: shows where it stands, and passes Ctrl-C on."""
 
-    def __init__(
-        self, console: Console, limits: "Limits", is_interrupted: Callable[[], bool]
-    ) -> None:
+    def __init__(self, console: Console, run: "Run", is_interrupted: Callable[[], bool]) -> None:
         """Prepares the bar; `is_interrupted` says whether Ctrl-C was pressed."""
         super().__init__("Training", WHOLE, console=console, shows_time_left=False)
-        self._console, self._limits, self._is_interrupted = console, limits, is_interrupted
+        self._console, self._limits, self._is_interrupted = console, run.limits, is_interrupted
+        self._notes = {ORACLE: f" ({oracle_missions(run.training)})"}
         self._start: Status | None = None  # of this session
         self._num_rows = 0
         self.has_stopped = False  # whether the run was told to stop
@@ -60,7 +60,10 @@ class Watch(WorkBar):
             self._num_rows = len(curve)
             row = curve[-1]
             note = "  best so far" if row is status.progress.best else ""
-            others = "".join(f"  {name} {age:.2f}" for name, age in reference_ages(row).items())
+            others = "".join(
+                f"  {name} {age:.2f}{self._notes.get(name, '')}"
+                for name, age in reference_ages(row).items()
+            )
             self._console.print(
                 f"{row['decisions']:>11,.0f} decisions {row['minutes']:7.1f} min   "
                 f"held-out age {age_of(row)}{note:13}{others}"
@@ -99,6 +102,12 @@ def reference_ages(row: dict[str, float]) -> dict[str, float]:
     """What hand-written policies cost on the same missions, as far as they were flown [windows]."""
     ages = ((name, row.get(column("aoi", name))) for name in REFERENCES)
     return {name: age for name, age in ages if age is not None}
+
+
+def oracle_missions(training: "Training") -> str:
+    """How many of the evaluations' missions of each team size the oracle has flown."""
+    size = reference_missions(training).get(ORACLE, training.held_out)  # a run of old flew all
+    return f"{size} of {training.held_out} missions"
 
 
 def _text(status: "Status", start: "Status", limits: "Limits") -> str:

@@ -1,7 +1,13 @@
 """What `swarm-mj train` says of the policy it kept: its age beside others', and where it loses."""
 
-from swarm_mj.cli.train_progress import age_of, reference_ages
-from swarm_mj.learning.choice import REFERENCES, Cost, has_stalled
+from swarm_mj.cli.train_progress import age_of, oracle_missions, reference_ages
+from swarm_mj.learning.choice import (
+    ORACLE,
+    ORACLE_ROBOTS,
+    REFERENCES,
+    Cost,
+    has_stalled,
+)
 from swarm_mj.learning.run_folder import Progress, Run
 
 CLEAR = 2.0  # standard errors, of a difference that is not for chance
@@ -20,17 +26,15 @@ def report(run: Run, progress: Progress) -> dict[str, str]:
     for name, cost in choice.others.items():
         known = f"; {REFERENCES[name]}" if name in REFERENCES else ""
         rows[NAMES.get(name, name)] = f"{_cost(run, cost)}{known}"
-    return rows | _oracle(progress)
+    return rows | _oracle(run, progress)
 
 
 def verdicts(run: Run, progress: Progress) -> list[str]:
     """What a reader should know beyond the numbers: losses, and how far the choice is fair."""
     said, patience = [], run.limits.patience
     if has_stopped_early(run, progress):
-        said.append(
-            f"Stopped early: the last {patience} evaluations brought no gain. "
-            "--resume --patience 0 trains on."
-        )
+        way_on = " --resume --patience 0 trains on." if progress.has_chosen else ""
+        said.append(f"Stopped early: the last {patience} evaluations brought no gain.{way_on}")
     choice = progress.choice
     if choice is None:
         if progress.best is not None:
@@ -66,16 +70,18 @@ def _of_evaluations(run: Run, progress: Progress) -> dict[str, str]:
     rows[NAMES["first"]] = f"{age_of(first)} windows"
     for name, age in reference_ages(best).items():
         rows[name] = f"{age:.2f} windows; {REFERENCES[name]}"
-    return rows
+    return rows | _oracle(run, progress)
 
 
-def _oracle(progress: Progress) -> dict[str, str]:
-    """The oracle flies the missions of the evaluations only."""
-    name = "greedy-oracle"
-    age = reference_ages(progress.curve[0]).get(name)
-    if age is None:
-        return {}
-    return {name: f"{age:.2f} windows, on the evaluations' missions; {REFERENCES[name]}"}
+def _oracle(run: Run, progress: Progress) -> dict[str, str]:
+    """The oracle flies missions of the evaluations only, and few of them."""
+    age, its_missions = reference_ages(progress.curve[0]).get(ORACLE), oracle_missions(run.training)
+    if age is not None:
+        told = f"{age:.2f} windows, on {its_missions} of the evaluations; {REFERENCES[ORACLE]}"
+        return {ORACLE: told}
+    if max(run.training.robots) > ORACLE_ROBOTS:
+        return {ORACLE: f"not flown: it would take long with more than {ORACLE_ROBOTS} robots"}
+    return {}
 
 
 def _cost(run: Run, cost: Cost) -> str:
@@ -85,7 +91,7 @@ def _cost(run: Run, cost: Cost) -> str:
 def _stands(run: Run, name: str, cost: Cost) -> str:
     """How it stands beside another, which costs less."""
     behind = _with_error(run, cost.behind, cost.behind_sem)
-    if cost.behind > CLEAR * (cost.behind_sem or 0.0):
+    if cost.behind_sem is not None and cost.behind > CLEAR * cost.behind_sem:
         return f"loses to {NAMES.get(name, name)} by {behind}"
     return f"is no better than {NAMES.get(name, name)}, which is ahead by {behind}"
 

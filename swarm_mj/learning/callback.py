@@ -14,7 +14,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_mj.io.provenance import commit, version
 from swarm_mj.learning import checkpoint
-from swarm_mj.learning.choice import NUM_BEST, Row, candidates, has_stalled, num_missions
+from swarm_mj.learning.choice import Row, candidates, has_stalled, reserved_minutes
 from swarm_mj.learning.held_out import HeldOut, evaluate, record_replay
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
@@ -89,7 +89,6 @@ class TrainingCallback(BaseCallback):
         self._env = missions_of(model)
         self._counted_s = time.monotonic()  # up to here, time is in the progress
         self._saved_s = -np.inf
-        self._evaluation_minutes = 0.0  # that the last one took
         self._aoi = float("nan")
         self._goes_on = True
 
@@ -105,7 +104,8 @@ class TrainingCallback(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         is_last = self._is_time() or not self._goes_on
-        self.between_rollouts(is_last=is_last)
+        # Fewer --patience may end a run between evaluations: what it learned last is judged first.
+        self.between_rollouts(is_last=is_last or self.has_stalled)
         if is_last or not self._goes_on or self.has_stalled:
             raise Stopped
 
@@ -116,12 +116,11 @@ class TrainingCallback(BaseCallback):
 
     def _is_time(self) -> bool:
         """Whether the minutes are over, but for those that the choice of a policy will take."""
-        if self._limits.minutes is None:
+        limit, evaluation = self._limits.minutes, self._progress.evaluation_minutes
+        if limit is None:
             return False
-        flights = NUM_BEST + 2
-        size = num_missions(self._training, self.decisions, flights)
-        choice = self._evaluation_minutes * flights * size / self._training.held_out
-        return self.minutes + choice >= self._limits.minutes
+        reserved = reserved_minutes(self._training, self.decisions, evaluation, limit)
+        return self.minutes + reserved >= limit
 
     def _on_step(self) -> bool:
         costs = [transition.costs for transition in self._env.transitions]
@@ -196,7 +195,7 @@ class TrainingCallback(BaseCallback):
         except Stopped:
             return
         self._count_time()
-        self._evaluation_minutes = progress.minutes - begun
+        progress.evaluation_minutes = progress.minutes - begun
         progress.since_evaluation = Accumulator()
         progress.next_evaluation = (decisions // every + 1) * every
         known = {name: x for name, x in asdict(held_out).items() if x is not None}
@@ -224,9 +223,8 @@ class TrainingCallback(BaseCallback):
 
     def choose(self) -> None:
         """Chooses the policy that is kept, once nothing is left to train and if none is chosen."""
-        progress, choice = self._progress, self._progress.choice
-        is_chosen = choice is not None and choice.run_decisions == self.decisions
-        if not (self._goes_on and progress.curve) or is_chosen:
+        progress = self._progress
+        if not (self._goes_on and progress.curve) or progress.has_chosen:
             return
         told = partial(self._on_window, "Choosing")
         try:

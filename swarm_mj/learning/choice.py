@@ -14,20 +14,25 @@ from msgspec import Meta
 
 from swarm_mj.learning.settings import Training
 
+ORACLE = "greedy-oracle"
 # Policies without a payload or training, and what each knows.
 REFERENCES = {
     "tdma": "robots take turns that were agreed beforehand",
     "spatial-tdma": "robots that believe themselves far apart share a turn",
-    "greedy-oracle": "knows where all robots are and what they know",
+    ORACLE: "knows where all robots are and what they know",
 }
 COMPARED = ("tdma", "spatial-tdma")  # at the end, too: the oracle takes longer than the network
+ORACLE_MISSIONS = 4  # of each team size: a window takes it 12 ms at 40 robots, 36 ms at 80 ...
+ORACLE_ROBOTS = 100  # ... and 472 ms at 200: larger teams it does not fly
 JUDGED = ("aoi", "velocity_variance")  # costs that a run can lower
 CHOICE_SEED = 510_000  # of the first mission that chooses; held-out ones end below
 TEST_SEED = 520_000  # of the first that tells the age of what was chosen
 NUM_BEST = 3  # evaluations whose policies are flown again
+OTHER_FLIGHTS = 2 + len(COMPARED)  # at the end: the one that is kept, again, and the first
 NEAR = 1.25  # times the least objective: what is worse than that has lost already
 MOST_MISSIONS = 40  # of each team size, to choose
 FLOWN_SHARE = 0.5  # of a run's decisions, that its choice may take; they cost less than learning
+RESERVED_SHARE = 0.5  # of the minutes of a run, at most, that are kept back for its choice
 MANY_DECISIONS = 10**12
 LEAST_GAIN = 0.005  # of the objective, that counts as learning
 
@@ -64,6 +69,15 @@ def column(cost: str, name: str) -> str:
     return f"{cost}_{name.replace('-', '_')}"
 
 
+def reference_missions(training: Training) -> dict[str, int]:
+    """Held-out missions of each team size that each of `REFERENCES` flies, if it flies any."""
+    flown = dict.fromkeys(REFERENCES, training.held_out)
+    flown[ORACLE] = min(training.held_out, ORACLE_MISSIONS)
+    if max(training.robots) > ORACLE_ROBOTS:
+        del flown[ORACLE]
+    return flown
+
+
 def candidates(curve: Sequence[Row]) -> list[Row]:
     """Evaluations whose policies may be chosen: the best few, and the first, of what was given."""
     best = sorted(curve, key=lambda row: row["objective"])[:NUM_BEST]
@@ -78,10 +92,31 @@ def finalists(curve: Sequence[Row]) -> list[Row]:
 
 
 def num_missions(training: Training, decisions: int, num_flights: int) -> int:
-    """Missions of each team size that a policy of so many flies, within a share of the run."""
+    """Missions of each team size that a policy of so many flies when one of them is chosen.
+
+    All flights together take up to a share of the run, but each has at least the missions of an
+    evaluation: fewer would tell less than is known already.
+    """
     windows = num_flights * len(training.robots) * training.mission.num_windows
     within = int(FLOWN_SHARE * decisions / windows)
     return max(training.held_out, min(MOST_MISSIONS, within))
+
+
+def reserved_minutes(
+    training: Training, decisions: int, evaluation_minutes: float, limit: float
+) -> float:
+    """What is kept back of a run's minutes, for its last evaluation and its choice.
+
+    Args:
+        training: The settings.
+        decisions: Of teams, that the run has made.
+        evaluation_minutes: That an evaluation takes.
+        limit: The run's minutes, of which most are for training.
+    """
+    num_flights = NUM_BEST + 1 + OTHER_FLIGHTS
+    missions = num_flights * num_missions(training, decisions, num_flights)
+    needed = evaluation_minutes * (1 + missions / training.held_out)
+    return min(needed, RESERVED_SHARE * limit)
 
 
 def has_stalled(curve: Sequence[Row], patience: int | None) -> bool:

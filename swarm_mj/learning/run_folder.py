@@ -120,6 +120,12 @@ class Progress:
     since_evaluation: Accumulator = field(default_factory=Accumulator)
     optimiser: dict[str, float] = field(default_factory=dict)  # what PPO last logged of itself
     choice: Choice | None = None  # of the policy that is kept; None: it is of the best evaluation
+    evaluation_minutes: Amount = setting(0.0, may_lack=True)  # that the last one took
+
+    @property
+    def has_chosen(self) -> bool:
+        """Whether the policy that is kept was chosen after all that the run has learned."""
+        return self.choice is not None and self.choice.run_decisions == self.decisions
 
     @property
     def best(self) -> dict[str, float] | None:

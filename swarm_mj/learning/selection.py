@@ -16,6 +16,8 @@ from swarm_mj.learning.choice import (
     CHOICE_SEED,
     COMPARED,
     JUDGED,
+    NEAR,
+    OTHER_FLIGHTS,
     REFERENCES,
     TEST_SEED,
     Choice,
@@ -24,6 +26,7 @@ from swarm_mj.learning.choice import (
     column,
     finalists,
     num_missions,
+    reference_missions,
 )
 from swarm_mj.learning.held_out import (
     HeldOut,
@@ -44,11 +47,11 @@ Samples = list[Float[np.ndarray, "B"]]  # by team size
 
 
 def reference_columns(training: Training, on_window: OnWindow) -> Row:
-    """What `REFERENCES` cost on the held-out missions, by the learning curve's columns."""
-    columns = {}
-    seeds = seeds_from(HELD_OUT_SEED, training.held_out)
-    for n, name in enumerate(REFERENCES):
-        share = partial(_share_of, on_window, n, len(REFERENCES))
+    """What `REFERENCES` cost on held-out missions, by the learning curve's columns."""
+    columns, its_missions = {}, reference_missions(training)
+    for n, (name, size) in enumerate(its_missions.items()):
+        share = partial(_share_of, on_window, n, len(its_missions))
+        seeds = seeds_from(HELD_OUT_SEED, size)
         flown = fly(training, partial(make_policy, name), seeds, share)
         for cost in JUDGED:
             columns[column(cost, name)] = mean_and_error(own_costs(flown, cost))[0]
@@ -66,11 +69,16 @@ def told_of_evaluation(training: Training) -> dict[str, Any]:
 
 def told_of_choice(training: Training, choice: Choice) -> dict[str, Any]:
     """For the card of a policy that was chosen at the end."""
+    how = f"the least objective of all evaluations; no other was within {NEAR - 1.0:.0%} of it"
+    if choice.num_finalists > 1:
+        how = (
+            f"the least objective of {choice.num_finalists} of the best policies on as many other "
+            f"missions, from seed {CHOICE_SEED}"
+        )
     return {
         "missions": choice.num_missions * len(training.robots),
         "first_seed": TEST_SEED,
-        "chosen_by": f"the least objective of {choice.num_finalists} of the best policies on as "
-        f"many other missions, from seed {CHOICE_SEED}",
+        "chosen_by": how,
         "others_on_these_missions": {name: asdict(cost) for name, cost in choice.others.items()},
     }
 
@@ -93,27 +101,28 @@ def choose(
         The choice, and all that it costs.
     """
     rows, run_decisions = finalists(curve), int(curve[-1]["decisions"])
-    num_flights = len(rows) + 2  # at most: the one that is kept flies again, and the first
+    num_flights = len(rows) + OTHER_FLIGHTS  # at most
     size = num_missions(training, run_decisions, num_flights)
-    told = [partial(_share_of, on_window, n, num_flights) for n in range(num_flights)]
+    told = (partial(_share_of, on_window, n, num_flights) for n in range(num_flights))
 
     def flies(row: Row) -> MakePolicy:
         return partial(held_out_policy, training, networks[int(row["decisions"])])
 
     kept, seeds = rows[0], seeds_from(CHOICE_SEED, size)
     if len(rows) > 1:
-        flown = [fly(training, flies(row), seeds, told[n]) for n, row in enumerate(rows)]
+        flown = [fly(training, flies(row), seeds, next(told)) for row in rows]
         objectives = [means(training, costs).objective for costs in flown]
         kept = rows[int(np.argmin(objectives))]
     seeds = seeds_from(TEST_SEED, size)
-    costs = fly(training, flies(kept), seeds, told[-2])
+    costs = fly(training, flies(kept), seeds, next(told))
     own = own_costs(costs, training.cost)
-    others = {
-        name: own_costs(fly(training, partial(make_policy, name), seeds), training.cost)
-        for name in COMPARED
-    }
+    compared: dict[str, MakePolicy] = {name: partial(make_policy, name) for name in COMPARED}
     if kept is not curve[0]:
-        others["first"] = own_costs(fly(training, flies(curve[0]), seeds, told[-1]), training.cost)
+        compared["first"] = flies(curve[0])
+    others = {
+        name: own_costs(fly(training, policy_of, seeds, next(told)), training.cost)
+        for name, policy_of in compared.items()
+    }
     mean, sem = mean_and_error(own)
     choice = Choice(
         decisions=int(kept["decisions"]),

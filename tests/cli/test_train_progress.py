@@ -8,8 +8,13 @@ from rich.console import Console
 
 from swarm_mj.cli.train_progress import Watch, age_of, minutes_left, share_done
 from swarm_mj.learning.callback import Status
-from swarm_mj.learning.run_folder import Limits, Progress
+from swarm_mj.learning.run_folder import Limits, Progress, Run
+from swarm_mj.learning.settings import usual_settings
+from swarm_mj.mission import paper
 
+RUN = Run(
+    training=usual_settings("robot", paper("stationary"), (40,)), limits=Limits(decisions=4_000)
+)
 ROW = {"decisions": 1000.0, "minutes": 0.5, "aoi": 31.5, "aoi_sem": 0.25, "objective": 1.0}
 
 
@@ -56,8 +61,8 @@ def test_an_age_has_its_error_if_it_has_one():
 def heard_by(is_interrupted, statuses, terminal=False):
     """What is drawn for these, and whether each asked to go on."""
     file = io.StringIO()
-    console = Console(file=file, force_terminal=terminal, width=120)
-    with Watch(console, Limits(decisions=4_000), is_interrupted) as watch:
+    console = Console(file=file, force_terminal=terminal, width=120, soft_wrap=True)
+    with Watch(console, RUN, is_interrupted) as watch:
         answers = [watch(each) for each in statuses]
     return file.getvalue(), answers, watch
 
@@ -81,7 +86,7 @@ def test_every_new_evaluation_is_a_line_and_those_of_earlier_sessions_are_not():
     first, second = (" ".join(line.split()) for line in shown.splitlines())
     assert first == "2,000 decisions 0.5 min held-out age 35.00 ± 0.25"
     assert second.startswith("3,000 decisions 0.5 min held-out age 25.00 ± 0.25 best so far ")
-    assert second.endswith(" best so far spatial-tdma 21.00 greedy-oracle 12.00")
+    assert second.endswith(" best so far spatial-tdma 21.00 greedy-oracle 12.00 (4 of 12 missions)")
     assert answers == [True] * 4
 
 
@@ -112,7 +117,7 @@ def test_ctrl_c_shows_in_the_bar_before_the_run_is_heard_of_again():
     pressed = []
     file = io.StringIO()
     console = Console(file=file, force_terminal=True, width=100)
-    with Watch(console, Limits(decisions=4_000), lambda: bool(pressed)) as watch:
+    with Watch(console, RUN, lambda: bool(pressed)) as watch:
         watch(status(1, 1.0))
         pressed.append(1)
         watch._bar.refresh()

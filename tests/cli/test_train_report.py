@@ -42,7 +42,9 @@ def test_the_policy_kept_stands_beside_others_with_what_they_know():
     assert rows["policy kept"] == "22.25 ± 0.50 windows, after 10,000 decisions"
     assert rows["tdma"] == "25.00 ± 0.75 windows; robots take turns that were agreed beforehand"
     assert rows["the policy it began with"] == "48.00 windows"
-    assert rows["greedy-oracle"].startswith("12.00 windows, on the evaluations' missions; knows")
+    assert rows["greedy-oracle"].startswith(
+        "12.00 windows, on 4 of 12 missions of the evaluations; knows"
+    )
 
 
 def test_losses_are_said_and_wins_are_not_boasted_of():
@@ -56,6 +58,22 @@ def test_a_difference_within_its_error_is_no_loss():
     level = {"spatial-tdma": replace(CHOICE.others["spatial-tdma"], behind=0.75)}
     (said,) = verdicts(RUN, progress(replace(CHOICE, others=level)))
     assert said.startswith("The policy kept is no better than spatial-tdma, which is ahead by 0.75")
+
+
+def test_one_mission_is_too_few_to_lose():
+    """Without an error, nobody knows what is for chance."""
+    one = {"tdma": Cost(mean=20.0, sem=None, behind=9.0, behind_sem=None)}
+    (said,) = verdicts(RUN, progress(replace(CHOICE, others=one)))
+    assert said.startswith("The policy kept is no better than tdma, which is ahead by 9.00 windows")
+
+
+def test_an_oracle_that_has_not_flown_is_said():
+    large = replace(RUN, training=replace(RUN.training, robots=(40, 200)))
+    row = {name: x for name, x in FIRST.items() if name != "aoi_greedy_oracle"}
+    for choice in (CHOICE, None):
+        rows = report(large, Progress(decisions=20_000, curve=[row], choice=choice))
+        assert rows["greedy-oracle"].startswith("not flown: it would take long with more than 100")
+    assert "greedy-oracle" not in report(RUN, Progress(decisions=20_000, curve=[row]))
 
 
 @pytest.mark.parametrize(
@@ -72,6 +90,8 @@ def test_an_early_stop_is_said_with_the_way_on():
     said = verdicts(RUN, stalled)[0]
     assert said.startswith("Stopped early: the last 2 evaluations brought no gain.")
     assert "--patience 0 trains on" in said
+    for not_chosen in (None, replace(CHOICE, run_decisions=15_000)):
+        assert "--patience" not in verdicts(RUN, replace(stalled, choice=not_chosen))[0]
     assert not has_stopped_early(RUN, progress())
     done = replace(RUN, limits=replace(RUN.limits, decisions=20_000))
     assert not has_stopped_early(done, stalled)
@@ -82,6 +102,7 @@ def test_an_interrupted_run_says_that_its_age_flatters():
     assert rows["missions"] == "12 of each team size, which chose the policy"
     assert rows["policy kept"] == "21.50 ± 0.40 windows, after 10,000 decisions"
     assert rows["tdma"].startswith("25.00 windows; ")
+    assert rows["greedy-oracle"].startswith("12.00 windows, on 4 of 12 missions")
     assert "flatters" in verdicts(RUN, progress(None))[0]
     assert report(RUN, Progress()) == {}
     assert verdicts(RUN, Progress()) == []

@@ -57,6 +57,7 @@ def end_of(folder):
     state = torch.load(folder / CHECKPOINT, weights_only=True)
     progress = state.pop("progress")
     progress["minutes"] = progress["since_evaluation"]["seconds"] = None
+    progress["evaluation_minutes"] = None
     for row in progress["curve"]:
         row["minutes"] = row["rollout/decisions_per_s"] = None
     policy = (folder / "policy" / "model.safetensors").read_bytes()

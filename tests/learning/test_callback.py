@@ -154,6 +154,29 @@ def test_a_run_stops_when_evaluations_bring_no_gain_however_often_it_was_interru
     assert progress.curve[-1]["decisions"] == 320.0
 
 
+def test_a_stall_stops_a_run_only_when_the_last_weights_are_judged(tmp_path, monkeypatch):
+    """Asked for less patience half-way between two evaluations."""
+    evaluate = callback.evaluate
+    monkeypatch.setattr(callback, "evaluate", lambda *a: replace(evaluate(*a), objective=1.0))
+    run(TRAINING, tmp_path / "run", 640, lambda status: status.decisions <= 128)
+    asked = Run(training=TRAINING, limits=Limits(decisions=640, patience=2))
+    progress = train(asked, tmp_path / "run", listener=go_on, is_resumed=True)
+    assert progress.decisions == 160
+    assert [row["decisions"] for row in progress.curve] == [0.0, 64.0, 128.0, 160.0]
+    assert progress.choice.run_decisions == 160
+    assert progress.has_chosen
+
+
+def test_what_an_evaluation_takes_is_known_after_resuming(tmp_path):
+    """So minutes are kept back for the choice from the first rollout on."""
+    progress = run(TRAINING, tmp_path / "run", 64, StopAfter(3))
+    assert progress.evaluation_minutes > 0.0
+    limits = Limits(minutes=progress.minutes + 0.5 * progress.evaluation_minutes)
+    asked = Run(training=TRAINING, limits=limits)
+    again = train(asked, tmp_path / "run", listener=go_on, is_resumed=True)
+    assert again.decisions == progress.decisions == 32
+
+
 def test_hand_written_policies_fly_once_and_are_flat_curves(whole):
     """Their ages are those of the library's own flights."""
     folder, progress, heard = whole
@@ -214,7 +237,9 @@ def test_a_better_policy_takes_the_place_of_the_last_and_a_worse_one_does_not(
     assert config.training["decisions"] == 64
 
 
-def test_minutes_end_a_run_after_a_whole_rollout(tmp_path):
+def test_minutes_end_a_run_after_a_whole_rollout(tmp_path, monkeypatch):
+    """Where none are kept back for the choice."""
+    monkeypatch.setattr(callback, "reserved_minutes", lambda *_: 0.0)
     asked = Run(training=TRAINING, limits=Limits(minutes=1e-9))
     progress = train(asked, tmp_path / "run", listener=go_on)
     assert progress.decisions == 0
@@ -222,10 +247,10 @@ def test_minutes_end_a_run_after_a_whole_rollout(tmp_path):
 
     def slow(status):
         if status.decisions == 36:
-            time.sleep(0.02)
+            time.sleep(0.5)
         return True
 
-    limits = Limits(minutes=progress.minutes + 0.02 / 60.0)
+    limits = Limits(minutes=progress.minutes + 0.5 / 60.0)
     asked = Run(training=TRAINING, limits=limits)
     progress = train(asked, tmp_path / "run", listener=slow, is_resumed=True)
     assert progress.decisions % 32 == 0

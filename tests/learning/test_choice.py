@@ -12,6 +12,7 @@ from swarm_mj.learning.choice import (
     finalists,
     has_stalled,
     num_missions,
+    reserved_minutes,
 )
 from swarm_mj.learning.mission_batch import FIRST_TRAINING_SEED
 from swarm_mj.learning.settings import HELD_OUT_SEED
@@ -64,6 +65,16 @@ def test_missions_that_choose_are_a_share_of_the_run(decisions, size):
     training = small_training(sizes=(3, 6))
     assert num_missions(training, decisions, 5) == size
     assert num_missions(replace(training, held_out=50), decisions, 5) == 50
+
+
+def test_minutes_are_reserved_for_every_flight_of_the_end_but_never_most_of_them():
+    """The last evaluation, 4 finalists, 4 others: of 2 missions at first, as an evaluation has."""
+    training = small_training()
+    assert reserved_minutes(training, 0, 0.5, 60.0) == pytest.approx(0.5 + 8 * 0.5)
+    # Half of 3200 decisions over 8 flights of 20 windows are 10 missions, 5 times as many.
+    assert reserved_minutes(training, 3200, 0.5, 60.0) == pytest.approx(0.5 + 8 * 2.5)
+    assert reserved_minutes(training, 3200, 0.5, 2.0) == 1.0
+    assert reserved_minutes(training, 0, 0.0, 2.0) == 0.0
 
 
 @pytest.mark.parametrize(
