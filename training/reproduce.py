@@ -30,6 +30,7 @@ from swarm_mj.io import atomic
 from swarm_mj.io.provenance import code_digest, commit
 from swarm_mj.io.reading import read_file, read_json, read_plain, read_rows
 from swarm_mj.learning.run_folder import CURVE, POLICY, SETTINGS, read_run
+from swarm_mj.policies.stored import read_policy
 
 ROOT = Path(__file__).resolve().parent.parent
 FIGURES = ("fig3", "fig6", "fig5", "fig4")  # the most telling first
@@ -171,12 +172,14 @@ class Work:
         check_outputs(*(Output("results", path) for path in self.tables))
         for command in (*self.trainings.values(), *(each for _, each, _ in self.flights)):
             parse(command)
-        if self.folder.exists() and self._begun() != self._now():
-            raise ValueError(
-                f"{self.folder} was begun with another experiment or at another commit, "
-                f"{self._begun().get('commit')}, not {commit()}; go back to it, or give --force to "
-                "start over"
-            )
+        if self.folder.exists():
+            begun = self._begun()
+            if begun != self._now() and not self.settings.force:
+                raise ValueError(
+                    f"{self.folder} was begun with another experiment or at another commit, "
+                    f"{begun.get('commit')}, not {commit()}; go back to it, or give --force to "
+                    "start over"
+                )
 
     def _now(self) -> dict[str, Any]:
         return {"experiment": self.digest, "commit": commit(), "code": code_digest()}
@@ -219,13 +222,13 @@ class Work:
 
     def _training(self, name: str, rows: Sequence[dict[str, Any]]) -> dict[str, object]:
         """A row of the table of trainings."""
-        best = min(rows, key=lambda row: row["objective"])
+        _, config = read_policy(self.folder / name / POLICY)
         return {
             "training": name,
             "options": shlex.join(_typed(self.scale.train, self.experiment.trainings[name])),
             "decisions": int(rows[-1]["decisions"]),
             "minutes": rows[-1]["minutes"],
-            "best_decisions": int(best["decisions"]),
+            "best_decisions": config.training["decisions"],  # of the policy that was kept
             "commit": commit(),
             "experiment": self.digest,
             "settings": json.dumps(asdict(read_run(self.folder / name).training)),
@@ -251,12 +254,12 @@ class Work:
 def run(settings: Settings) -> int:
     """Runs the experiments; returns the exit code."""
     works = [read_work(name, settings) for name in settings.figures]
+    left = [work for work in works if settings.force or not work.is_finished]
+    for work in left:
+        work.check()
     if settings.force:
         for work in works:
             _remove(work)
-    left = [work for work in works if not work.is_finished]
-    for work in left:
-        work.check()
     for work in works:
         if work not in left:
             _say(f"{work.figure}: {work.tables[0]} is there; --force makes it anew")
@@ -280,10 +283,10 @@ def read_work(figure: str, settings: Settings) -> Work:
 
 
 def _remove(work: Work) -> None:
-    """Removes a figure's results and runs; a folder that is not its own is left alone."""
+    """Removes a figure's results and runs."""
     for path in work.tables:
         path.unlink(missing_ok=True)
-    if (work.folder / BEGUN).exists():
+    if work.folder.exists():
         shutil.rmtree(work.folder)
 
 

@@ -182,12 +182,15 @@ def test_own_options_take_the_place_of_shared_ones(program):
 
 
 def test_a_folder_of_something_else_is_left_alone(ask, folders, capsys):
-    (run, (seen, _)), (*_, runs) = ask, folders
+    (run, (seen, _)), (*_, results, runs) = ask, folders
     (runs / "mine").mkdir(parents=True)
+    (results / "fig3.csv").parent.mkdir(parents=True)
+    (results / "fig3.csv").write_text("kept\n")
     for force in ((), ("--force",)):
         assert run(*force) == 2
         assert "is there, but no runs of this; name other --runs" in capsys.readouterr().err
     assert (runs / "mine").exists()
+    assert (results / "fig3.csv").read_text() == "kept\n"
     assert seen == []
 
 
