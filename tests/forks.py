@@ -22,6 +22,8 @@ for line in sys.stdin:
         code = 0
         try:
             is_file = sys.argv[0].endswith(".py")
+            if is_file:
+                sys.path.insert(0, os.path.dirname(sys.argv[0]))  # as python does
             run = runpy.run_path if is_file else runpy.run_module
             run(sys.argv[0], run_name="__main__")
         except SystemExit as end:

@@ -14,12 +14,13 @@ import json
 import shlex
 import shutil
 import sys
-import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+
+from experiments import MOST_BYTES, Experiment, Scale, read_experiment, typed
 
 from swarm_mj.cli import DONE, parse, script
 from swarm_mj.cli import main as swarm_mj
@@ -28,7 +29,7 @@ from swarm_mj.evaluation.results import Result, read_results, write_csv
 from swarm_mj.fields import setting
 from swarm_mj.io import atomic
 from swarm_mj.io.provenance import code_digest, commit
-from swarm_mj.io.reading import read_file, read_json, read_plain, read_rows
+from swarm_mj.io.reading import read_file, read_json, read_rows
 from swarm_mj.learning.run_folder import CURVE, POLICY, SETTINGS, read_run
 from swarm_mj.policies.stored import read_policy
 
@@ -36,7 +37,6 @@ ROOT = Path(__file__).resolve().parent.parent
 FIGURES = ("fig3", "fig6", "fig5", "fig4")  # the most telling first
 SCALES = ("quick", "full")
 BEGUN = "begun.json"  # what a figure's runs were begun with
-MOST_BYTES = 10_000_000  # of a file that is read
 CURVE_COLUMNS = (
     "training", "decisions", "minutes", "aoi", "aoi_sem", "velocity_variance",
     "packets_per_window", "delivery_ratio",
@@ -77,24 +77,6 @@ class Settings:
 
 class Failed(Exception):  # noqa: N818 - as KeyboardInterrupt
     """A command has said why, and its exit code is the experiment's."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Scale:
-    """The options that all trainings share, and all flights."""
-
-    train: str  # of `swarm-mj train`
-    fly: str  # of `swarm-mj evaluate`
-
-
-@dataclass(frozen=True, kw_only=True)
-class Experiment:
-    """A figure's trainings and flights, as its file has them."""
-
-    quick: Scale
-    full: Scale
-    trainings: dict[str, str]  # their own options, by their names
-    flights: dict[str, dict[str, list[str]]]  # by missions' options: trainings and their curves
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,7 +121,7 @@ class Work:
     def trainings(self) -> dict[str, list[str]]:
         """What `swarm-mj` is called with to train each, but to go on."""
         return {
-            name: ["train", *_typed(self.scale.train, own), "--out", str(self.folder / name)]
+            name: ["train", *typed(self.scale.train, own), "--out", str(self.folder / name)]
             for name, own in self.experiment.trainings.items()
         }
 
@@ -158,7 +140,7 @@ class Work:
                 known = ", ".join(self.experiment.trainings)
                 raise ValueError(f"{self.figure} flies {name!r}, but trains only {known}")
         policies = [str(self.folder / name / POLICY) for name in flown]
-        options = _typed(self.scale.fly, missions)
+        options = typed(self.scale.fly, missions)
         jobs = ["--jobs", f"{self.settings.jobs}"]
         return ["evaluate", "--policy", *policies, *options, *jobs, "--csv", str(draft), "--resume"]
 
@@ -225,7 +207,7 @@ class Work:
         _, config = read_policy(self.folder / name / POLICY)
         return {
             "training": name,
-            "options": shlex.join(_typed(self.scale.train, self.experiment.trainings[name])),
+            "options": shlex.join(typed(self.scale.train, self.experiment.trainings[name])),
             "decisions": int(rows[-1]["decisions"]),
             "minutes": rows[-1]["minutes"],
             "best_decisions": config.training["decisions"],  # of the policy that was kept
@@ -273,12 +255,7 @@ def run(settings: Settings) -> int:
 
 def read_work(figure: str, settings: Settings) -> Work:
     """A figure's experiment; raises ValueError for a file that is no such thing."""
-    path = settings.experiments / f"{figure}.toml"
-    text = read_file(path, "experiment", MOST_BYTES)
-    try:
-        experiment = read_plain(tomllib.loads(text.decode()), Experiment)
-    except ValueError as error:
-        raise ValueError(f"experiment {path} cannot be read: {error}") from error
+    experiment = read_experiment(settings.experiments / f"{figure}.toml")
     return Work(figure=figure, settings=settings, experiment=experiment)
 
 
@@ -288,22 +265,6 @@ def _remove(work: Work) -> None:
         path.unlink(missing_ok=True)
     if work.folder.exists():
         shutil.rmtree(work.folder)
-
-
-def _typed(shared: str, own: str) -> list[str]:
-    """The words of options; a training's own, or a flight's, take the place of those shared."""
-    groups: dict[str, list[str]] = {}
-    for options in (shared, own):
-        its: dict[str, list[str]] = {}
-        for word in shlex.split(options):
-            if word.startswith("--"):
-                its[word] = []
-            elif not its:
-                raise ValueError(f"options begin with --, and not with {word!r:.60}")
-            else:
-                its[list(its)[-1]].append(word)
-        groups |= its
-    return [word for flag, values in groups.items() for word in (flag, *values)]
 
 
 def _rows(path: Path) -> list[dict[str, Any]]:

@@ -177,7 +177,7 @@ def test_runs_of_another_experiment_or_commit_are_not_gone_on_with(ask, folders,
 
 
 def test_own_options_take_the_place_of_shared_ones(program):
-    typed = program._typed("--robots 10 20 --linear --seed 1", "--seed 2 --robots 40")
+    typed = program.typed("--robots 10 20 --linear --seed 1", "--seed 2 --robots 40")
     assert typed == ["--robots", "40", "--linear", "--seed", "2"]
 
 

@@ -1,0 +1,58 @@
+"""What `reproduce.py` trains and flies for a figure: the form of the files in `reproduce/`."""
+
+import shlex
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from swarm_mj.io.reading import read_file, read_plain
+
+MOST_BYTES = 10_000_000  # of a file that is read
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scale:
+    """The options that all trainings share, and all flights."""
+
+    train: str  # of `swarm-mj train`
+    fly: str  # of `swarm-mj evaluate`
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """A figure's trainings and flights, as its file has them."""
+
+    quick: Scale
+    full: Scale
+    trainings: dict[str, str]  # their own options, by their names
+    flights: dict[str, dict[str, list[str]]]  # by missions' options: trainings and their curves
+
+
+def read_experiment(path: Path) -> Experiment:
+    """The experiment in a file.
+
+    Raises:
+        ValueError: It holds no such thing.
+        OSError: It cannot be read.
+    """
+    text = read_file(path, "experiment", MOST_BYTES)
+    try:
+        return read_plain(tomllib.loads(text.decode()), Experiment)
+    except ValueError as error:
+        raise ValueError(f"experiment {path} cannot be read: {error}") from error
+
+
+def typed(shared: str, own: str) -> list[str]:
+    """The words of options; a training's own, or a flight's, take the place of those shared."""
+    groups: dict[str, list[str]] = {}
+    for options in (shared, own):
+        its: dict[str, list[str]] = {}
+        for word in shlex.split(options):
+            if word.startswith("--"):
+                its[word] = []
+            elif not its:
+                raise ValueError(f"options begin with --, and not with {word!r:.60}")
+            else:
+                its[list(its)[-1]].append(word)
+        groups |= its
+    return [word for flag, values in groups.items() for word in (flag, *values)]
