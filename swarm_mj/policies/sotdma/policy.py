@@ -78,7 +78,9 @@ class SelfOrganisedTdma(BroadcastPolicy):
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Whoever owns the slot, or is in need where nobody does; at first, by turns."""
-        transmits, slot = self._turns.transmits(views), slot_of(views.now)
+        slot, transmits = slot_of(views.now), np.zeros(views.silence.shape, dtype=bool)
+        if any(team.takes_turns for team in self._teams):
+            transmits = self._turns.transmits(views)
         heard = views.phases[-1].heard if views.phases else views.silence
         draw = self._uniform.next()
         for b, team in enumerate(self._teams):

@@ -53,6 +53,11 @@ class Team:
         self._frames: Frames | None = None  # known from the first decision on
         self._hearsay: Hearsay | None = None  # there is none before the first frame
 
+    @property
+    def takes_turns(self) -> bool:
+        """Whether there was no frame so far."""
+        return self._hearsay is None
+
     def transmits(
         self,
         slot: int,
