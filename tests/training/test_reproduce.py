@@ -1,13 +1,12 @@
 """The paper's learned results are trained and flown as their files say, and gone on with."""
 
 import csv
-import importlib.util
 import json
 import shutil
-import sys
 from pathlib import Path
 
 import pytest
+import reproduce as program
 from synthetic import result
 
 from swarm_mj.cli import parse
@@ -53,23 +52,13 @@ def made(forks, tmp_path_factory):
     return results, runs, lambda: forks.run(folder, FILE, *options)
 
 
-@pytest.fixture(scope="module")
-def program():
-    spec = importlib.util.spec_from_file_location("reproduce", FILE)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["reproduce"] = module  # dataclasses look there
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules["reproduce"]
-
-
 @pytest.fixture
 def folders(tmp_path):
     return places(tmp_path)
 
 
 @pytest.fixture
-def ask(program, folders, made, monkeypatch):
+def ask(folders, made, monkeypatch):
     """Runs the program; commands are noted, and leave what the tiny experiment's left, or fail."""
     seen, broken = [], set()
 
@@ -176,7 +165,7 @@ def test_runs_of_another_experiment_or_commit_are_not_gone_on_with(ask, folders,
     assert not results.exists()
 
 
-def test_own_options_take_the_place_of_shared_ones(program):
+def test_own_options_take_the_place_of_shared_ones():
     typed = program.typed("--robots 10 20 --linear --seed 1", "--seed 2 --robots 40")
     assert typed == ["--robots", "40", "--linear", "--seed", "2"]
 
@@ -215,7 +204,7 @@ def test_a_wrong_experiment_is_refused_before_any_work(ask, tmp_path, capsys, ol
 
 
 @pytest.mark.parametrize("figure", ["fig3", "fig4", "fig5", "fig6"])
-def test_an_experiment_flies_all_points_of_its_figure(program, figure):
+def test_an_experiment_flies_all_points_of_its_figure(figure):
     work = program.read_work(figure, program.Settings())
     shown = RESULT_FIGURES[figure]
     flown = set()
@@ -233,7 +222,7 @@ def test_an_experiment_flies_all_points_of_its_figure(program, figure):
 
 
 @pytest.mark.parametrize("figure", ["fig3", "fig4", "fig5", "fig6"])
-def test_full_has_the_authors_budget_and_never_stops_before(program, figure):
+def test_full_has_the_authors_budget_and_never_stops_before(figure):
     work = program.read_work(figure, program.Settings(scale="full"))
     options = parse(next(iter(work.trainings.values())))[1]
     assert (options.budget, options.patience) == (2_000_000, 0)
@@ -242,7 +231,7 @@ def test_full_has_the_authors_budget_and_never_stops_before(program, figure):
 
 
 @pytest.mark.parametrize("figure", ["fig3", "fig4", "fig5", "fig6"])
-def test_committed_results_are_of_the_experiment_as_it_stands(program, figure):
+def test_committed_results_are_of_the_experiment_as_it_stands(figure):
     work = program.read_work(figure, program.Settings())
     assert work.is_finished, "make reproduce ARGS=--force makes them anew"
     commits = {row["commit"] for row in rows(work.tables[1])}

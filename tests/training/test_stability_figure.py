@@ -1,11 +1,10 @@
 """The seeds' learning curves are drawn where their table says, each kind with its spread."""
 
-import importlib.util
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+import stability_figure as program
 
 FILE = Path(__file__).parents[2] / "training" / "stability_figure.py"
 CURVES = """training,decisions,aoi,velocity_variance,more
@@ -24,16 +23,6 @@ credit,abc,"{""robots"": [40]}"
 """
 
 
-@pytest.fixture(scope="module")
-def program():
-    spec = importlib.util.spec_from_file_location("stability_figure", FILE)
-    program = importlib.util.module_from_spec(spec)
-    sys.modules["stability_figure"] = program  # dataclasses look there
-    spec.loader.exec_module(program)
-    yield program
-    del sys.modules["stability_figure"]
-
-
 @pytest.fixture
 def table(tmp_path):
     path = tmp_path / "fig6-curves.csv"
@@ -41,7 +30,7 @@ def table(tmp_path):
     return path
 
 
-def test_seeds_their_mean_and_their_band(program, table):
+def test_seeds_their_mean_and_their_band(table):
     age, variance = program.draw(program.read_curves(table), "abc").axes
     first, second, mean, alone, its_mean = age.lines
     np.testing.assert_allclose(mean.get_xdata(), [0, 100])
@@ -55,14 +44,14 @@ def test_seeds_their_mean_and_their_band(program, table):
     np.testing.assert_allclose(variance.lines[2].get_ydata(), [0.5, 0.2])
 
 
-def test_the_caption_says_how_many_seeds_and_which_commit(program, table):
+def test_the_caption_says_how_many_seeds_and_which_commit(table):
     said = [text.get_text() for text in program.draw(program.read_curves(table), "abc").texts]
     assert any("seeds: 2 of age, 1 of variance" in text for text in said)
     assert any(text.endswith("; abc") for text in said)
 
 
 @pytest.mark.usefixtures("table")
-def test_the_files_are_written_where_the_options_say(program, tmp_path):
+def test_the_files_are_written_where_the_options_say(tmp_path):
     (tmp_path / "fig6-trainings.csv").write_text(TRAININGS)
     assert program.StabilityFigure(out=tmp_path / "new" / "curves", results=tmp_path)() == 0
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == [
@@ -80,13 +69,13 @@ def test_the_files_are_written_where_the_options_say(program, tmp_path):
         (",40,", ",forty,", "is no table with"),
     ],
 )
-def test_a_table_of_something_else_is_refused(program, table, old, new, said):
+def test_a_table_of_something_else_is_refused(table, old, new, said):
     table.write_text(CURVES.replace(old, new))
     with pytest.raises(ValueError, match=said):
         program.read_curves(table)
 
 
-def test_the_origin_is_one_commit_and_one_team_size(program, tmp_path):
+def test_the_origin_is_one_commit_and_one_team_size(tmp_path):
     path = tmp_path / "fig6-trainings.csv"
     path.write_text(TRAININGS)
     assert program.read_origin(path) == "teams of 10 robots, shared reward, commit abc"
