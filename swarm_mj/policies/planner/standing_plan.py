@@ -39,8 +39,13 @@ class StandingPlan:
 
     def transmits(self, slot: int) -> Bool[np.ndarray, "N"]:
         """Who transmits in a slot, which must not lie before the first."""
+        self.last = self.ahead(slot, 1)[0]
+        return self.last
+
+    def ahead(self, slot: int, num_slots: int) -> Bool[np.ndarray, "S N"]:
+        """Who transmits in each of so many slots from this one on."""
         since = slot - self.first_slot
-        while len(self._transmits) <= since:
+        while len(self._transmits) < since + num_slots:
             transmits = np.empty((self._chunk_slots, len(self._timestamp)), dtype=bool)
             schedule(
                 self._timestamp,
@@ -52,5 +57,4 @@ class StandingPlan:
                 transmits,
             )
             self._transmits.extend(transmits)
-        self.last = self._transmits[since]
-        return self.last
+        return np.stack(self._transmits[since : since + num_slots])

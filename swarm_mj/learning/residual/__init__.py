@@ -1,0 +1,1 @@
+"""Training of residual policies: PPO on what every packet was worth."""

@@ -1,0 +1,140 @@
+"""Missions flown by a residual policy, and what its decisions were worth."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int
+
+from swarm_mj.learning.residual.worth import Course, worth
+from swarm_mj.mission.batched_rng import Started
+from swarm_mj.policies.residual.features import Seen
+from swarm_mj.policies.residual.policy import Decision, ResidualPolicy
+from swarm_mj.protocol.buffers import BROADCAST
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW, channel_at
+from swarm_mj.swarm import Swarm
+
+LIKELY = 0.02  # whoever may do otherwise than the rule with more is always learned from
+
+
+class Lesson(NamedTuple):
+    """What some decisions were, and what they were worth: R of them, with E neighbours in all."""
+
+    seen: Seen
+    logit: Float32[np.ndarray, "R"]  # of transmitting, when it was decided
+    weight: Float32[np.ndarray, "R"]  # how many decisions each stands for
+    worth: Float32[np.ndarray, "R"]  # of transmitting rather than not [slots], a mean over pairs
+
+
+class Recorder(ResidualPolicy):
+    """Keeps all that it decides, and what everyone knew before."""
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Forgets what it kept; arguments as in `Policy.start`."""
+        super().start(num_robots, rngs)
+        self.decisions: list[Decision] = []
+        self.observed: list[np.ndarray] = []  # T before each slot [ticks]
+
+    def decide(self, views: LocalViews) -> Decision:
+        """As it is decided; kept."""
+        decision = super().decide(views)
+        self.decisions.append(decision)
+        self.observed.append(ticks(views.buffers.timestamp))
+        return decision
+
+
+def ticks(timestamp: Float[np.ndarray, "..."]) -> Int[np.ndarray, "..."]:
+    """Times [windows] in slots."""
+    return np.rint(SLOTS_PER_WINDOW * timestamp).astype(np.int32)
+
+
+def lesson(
+    swarm: Swarm, policy: Recorder, rng: np.random.Generator, *, share: float, horizon: int
+) -> tuple[Lesson, float]:
+    """Flies missions to their end, and works out what decisions were worth.
+
+    Args:
+        swarm: Of missions that have just begun.
+        policy: That decides.
+        rng: Draws which decisions are learned from, and the channel's and the policy's own numbers,
+            so that the same places are never flown twice alike.
+        share: Of the decisions that are learned from, where robots hardly thought of doing
+            otherwise than the rule.
+        horizon: Slots in which a packet's worth is counted; decisions that are closer to the end
+            are left out.
+
+    Returns:
+        What there is to learn, and the mean age of information [windows].
+    """
+    num_missions, num_robots = swarm.buffers.shape
+    if isinstance(swarm.channel, Started):
+        swarm.channel.start(num_robots, rng.spawn(num_missions))
+    positions_m, heard, ages, active = [], [], [], []
+    for _ in range(swarm.mission.num_windows):
+        ages.append(np.mean(swarm.step(policy).age_windows))
+        states = swarm.states
+        positions_m.append(states.position_m.copy())
+        active.append(states.is_active)
+        heard += [phase.heard.copy() for phase in swarm.phases]
+    last = ticks(swarm.buffers.timestamp)
+    course = Course(np.stack([*policy.observed, last]), np.stack(heard))
+    num_slots = len(policy.decisions) - horizon // 2
+    parts = []
+    for s, decision in enumerate(policy.decisions[:num_slots]):
+        window = s // SLOTS_PER_WINDOW
+        chosen, weight = _learned_from(decision, rng, share)
+        rows = decision.rows[chosen]
+        otherwise = decision.transmits[rows[:, 0]]
+        place = np.arange(len(rows)), rows[:, 1]
+        did = otherwise[place]
+        otherwise[place] = ~did
+        is_active = active[window]
+        if is_active is not None:
+            otherwise &= is_active[rows[:, 0]]
+        channel = channel_at(
+            swarm.channel, np.full(len(rows), (s + 1) * SLOT_WINDOWS), rows[:, 0]
+        )
+        recipient = np.where(otherwise, BROADCAST, np.arange(num_robots))
+        decoded = channel(positions_m[window][rows[:, 0]], recipient)
+        if is_active is not None:
+            decoded = np.where(is_active[rows[:, 0]], decoded, np.arange(num_robots))
+        saved = np.empty(len(rows))
+        worth(course, np.full(len(rows), s), rows[:, 0], decoded, horizon, saved)
+        parts.append((decision, chosen, weight, np.where(did, -saved, saved) / num_robots**2))
+    return _joined(parts), float(np.mean(ages))
+
+
+def _learned_from(
+    decision: Decision, rng: np.random.Generator, share: float
+) -> tuple[Bool[np.ndarray, "R"], Float[np.ndarray, "R"]]:
+    """Which decisions are learned from, and how many each of those stands for."""
+    rows = decision.rows[:, 0], decision.rows[:, 1]
+    proposed, did = decision.proposal.transmits[rows], decision.transmits[rows]
+    is_sure = proposed | did | (decision.logit > np.log(LIKELY / (1.0 - LIKELY)))
+    chosen = is_sure | (rng.random(len(is_sure)) < share)
+    return chosen, np.where(is_sure, 1.0, 1.0 / share)[chosen]
+
+
+def _joined(
+    parts: Sequence[
+        tuple[Decision, Bool[np.ndarray, "R"], Float[np.ndarray, "R"], Float[np.ndarray, "R"]]
+    ],
+) -> Lesson:
+    """The decisions of all slots in one."""
+    robots, neighbours, owners, start = [], [], [], 0
+    for decision, chosen, _, _ in parts:
+        seen = decision.seen
+        place = np.cumsum(chosen) - 1
+        is_kept = chosen[seen.owner]
+        robots.append(seen.robots[chosen])
+        neighbours.append(seen.neighbours[is_kept])
+        owners.append(start + place[seen.owner[is_kept]])
+        start += int(np.count_nonzero(chosen))
+    single = np.float32
+    return Lesson(
+        Seen(np.concatenate(robots), np.concatenate(neighbours), np.concatenate(owners)),
+        np.concatenate([part[0].logit[part[1]] for part in parts]),
+        np.concatenate([part[2] for part in parts]).astype(single),
+        np.concatenate([part[3] for part in parts]).astype(single),
+    )

@@ -1,0 +1,253 @@
+"""The training of a residual policy: fly, learn what packets were worth, improve, again.
+
+A run's folder holds `checkpoint.pt`, from which it can go on, and `curve.csv`, one row an
+evaluation.
+"""
+
+import csv
+import io
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from swarm_mj.fields import check, setting
+from swarm_mj.io.atomic import write_bytes, write_text
+from swarm_mj.io.reading import read_file
+from swarm_mj.learning.residual.network import ResidualNetwork
+from swarm_mj.learning.residual.ppo import PpoSettings, improve
+from swarm_mj.learning.residual.recording import Lesson, Recorder, lesson
+from swarm_mj.mission import Mission
+from swarm_mj.policies.residual.network import Weights
+from swarm_mj.policies.residual.policy import ResidualPolicy
+from swarm_mj.policies.residual.resting_rule import RestingRule
+from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.rollout import rollout
+from swarm_mj.swarm import Swarm
+
+CHECKPOINT, CURVE = "checkpoint.pt", "curve.csv"
+MOST_BYTES = 100_000_000
+FIRST_PLACE = 30_000  # seeds of the places where training flies
+HELD_OUT_SEED = 500_000  # of missions that judge
+CHOICE_SEED = 510_000  # of those that choose among the best
+NUM_BEST = 3  # that are chosen among, with the untrained one
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResidualTraining:
+    """What a training depends on: the same makes the same policy on the same machine."""
+
+    missions: dict[str, Mission]  # that are flown in turn, by their names
+    width: int = setting(32, "of the network's layers", low=1, high=256)
+    trust: float = setting(
+        5.0, "what the rule's choice adds to the logit of transmitting", low=0.0, high=50.0
+    )
+    corrects_turns: bool = setting(
+        False, "let the network decide before everyone's plan is in force, too"
+    )
+    ppo: PpoSettings = PpoSettings()
+    together: int = setting(4, "missions of each kind, between two improvements", low=1, high=1000)
+    places: int = setting(40, "where robots may stand, of each kind", low=1, high=10_000)
+    share: float = setting(
+        0.1, "of the decisions that are learned from, where the rule was hardly doubted", low=1e-3, high=1.0
+    )
+    horizon: int = setting(120, "slots in which a packet's worth is counted", low=1, high=10_000)
+    seed: int = setting(0, "of all that is drawn", low=0, high=2**31)
+    held_out: int = setting(8, "missions of each kind in an evaluation", low=1, high=1000)
+    evaluate_every: int = setting(15, "improvements", low=1, high=10_000)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(kw_only=True)
+class Progress:
+    """Where a run stands."""
+
+    improvements: int = 0
+    seconds: float = 0.0
+    curve: list[dict[str, float]] = field(default_factory=list)  # an evaluation each
+    best: dict[int, dict[str, Any]] = field(default_factory=dict)  # weights by improvements
+
+
+class Run:
+    """A training under way."""
+
+    def __init__(self, training: ResidualTraining, folder: Path) -> None:
+        """Begins, or goes on from the folder's checkpoint.
+
+        Raises:
+            ValueError: The checkpoint cannot be read, or is of other settings.
+        """
+        self.training, self._folder = training, folder
+        torch.manual_seed(training.seed)
+        self._shuffle = torch.Generator().manual_seed(training.seed)
+        self._rng = np.random.default_rng(training.seed)
+        self._network = ResidualNetwork(training.width, training.trust)
+        self._optimiser = torch.optim.Adam(
+            self._network.parameters(), lr=training.ppo.learning_rate
+        )
+        self._rules = {  # each keeps the plans of its places
+            name: RestingRule(radio_of(mission)) for name, mission in training.missions.items()
+        }
+        self.progress = Progress()
+        if (folder / CHECKPOINT).exists():
+            self._load()
+        else:
+            self.evaluate()
+
+    def improve(self) -> dict[str, float]:
+        """Flies and learns once; returns the mean age of each kind of mission [windows]."""
+        start, training = time.monotonic(), self.training
+        weights = self._weights(self._network)
+        lessons: list[Lesson] = []
+        ages = {}
+        for name, mission in training.missions.items():
+            places = self._rng.choice(training.places, training.together, replace=False)
+            swarm = Swarm(mission, (FIRST_PLACE + places).tolist())
+            policy = Recorder(weights, self._rules[name], radio_of(mission))
+            rng = self._rng.spawn(1)[0]
+            learned, ages[name] = lesson(
+                swarm, policy, rng, share=training.share, horizon=training.horizon
+            )
+            lessons.append(learned)
+        improve(self._network, self._optimiser, lessons, training.ppo, self._shuffle)
+        self.progress.improvements += 1
+        self.progress.seconds += time.monotonic() - start
+        return ages
+
+    def evaluate(self) -> dict[str, float]:
+        """Flies missions that training never sees; keeps the weights if they are among the best.
+
+        Returns:
+            The mean age of each kind of mission [windows], and as `ratio` the mean of what they are
+            over those of the rule alone.
+        """
+        weights, progress = self._weights(self._network), self.progress
+        is_untrained = progress.improvements == 0  # then, without draws, it is the rule
+        ages = self.ages(
+            weights, HELD_OUT_SEED, self.training.held_out, is_deterministic=is_untrained
+        )
+        row = ages | {"ratio": self._ratio(ages)}
+        done = {"improvements": progress.improvements, "minutes": progress.seconds / 60}
+        progress.curve.append(done | row)
+        progress.best[progress.improvements] = self._network.state_dict_copy()
+        by_ratio = sorted(progress.curve, key=lambda each: each["ratio"])
+        keep = {0, *(int(each["improvements"]) for each in by_ratio[:NUM_BEST])}
+        progress.best = {at: kept for at, kept in progress.best.items() if at in keep}
+        self._save()
+        return row
+
+    def choose(self) -> tuple[int, Weights, dict[int, float]]:
+        """Which of the best is the best on missions that judged nothing so far.
+
+        Returns:
+            After how many improvements it was made, its weights, and the ratio of each of the best.
+        """
+        ratios, all_weights = {}, {}
+        for at, state in self.progress.best.items():
+            network = ResidualNetwork(self.training.width, self.training.trust)
+            network.load_state_dict(state)
+            all_weights[at] = self._weights(network)
+        num_missions = self.training.held_out
+        rule = self.ages(all_weights[0], CHOICE_SEED, num_missions, is_deterministic=True)
+        for at, weights in all_weights.items():
+            ages = self.ages(weights, CHOICE_SEED, num_missions) if at else rule
+            ratios[at] = float(np.mean([ages[name] / rule[name] for name in ages]))
+        best = min(ratios, key=lambda at: ratios[at])
+        return best, all_weights[best], ratios
+
+    def ages(
+        self,
+        weights: Weights,
+        first_seed: int,
+        num_missions: int,
+        *,
+        is_deterministic: bool = False,
+    ) -> dict[str, float]:
+        """The mean age of each kind of mission [windows]."""
+        seeds = list(range(first_seed, first_seed + num_missions))
+        return {
+            name: float(
+                np.mean(
+                    [
+                        window.costs.age_windows
+                        for window in rollout(
+                            Swarm(mission, seeds),
+                            ResidualPolicy(
+                                weights,
+                                self._rules[name],
+                                radio_of(mission),
+                                is_deterministic=is_deterministic,
+                            ),
+                        )
+                    ]
+                )
+            )
+            for name, mission in self.training.missions.items()
+        }
+
+    def _weights(self, network: ResidualNetwork) -> Weights:
+        return network.weights(corrects_turns=self.training.corrects_turns)
+
+    def _ratio(self, ages: dict[str, float]) -> float:
+        """To what the rule costs alone, as the first evaluation said."""
+        first = self.progress.curve[0] if self.progress.curve else ages
+        return float(np.mean([ages[name] / first[name] for name in ages]))
+
+    def _save(self) -> None:
+        state = {
+            "settings": repr(self.training),
+            "progress": asdict(self.progress),
+            "network": self._network.state_dict(),
+            "optimiser": self._optimiser.state_dict(),
+            "shuffle": self._shuffle.get_state(),
+            "rng": self._rng.bit_generator.state,
+            "spawned": self._rng.bit_generator.seed_seq.n_children_spawned,  # type: ignore[attr-defined]
+        }
+        content = io.BytesIO()
+        torch.save(state, content)
+        write_bytes(self._folder / CHECKPOINT, content.getbuffer())
+        text = io.StringIO()
+        table = csv.DictWriter(text, list(self.progress.curve[0]), lineterminator="\n")
+        table.writeheader()
+        table.writerows(self.progress.curve)
+        write_text(self._folder / CURVE, text.getvalue())
+
+    def _load(self) -> None:
+        path = self._folder / CHECKPOINT
+        try:
+            content = io.BytesIO(read_file(path, "checkpoint", MOST_BYTES))
+            state = torch.load(content, weights_only=True)
+            if state["settings"] != repr(self.training):
+                raise ValueError("it is of a training with other settings; name another folder")
+            self._network.load_state_dict(state["network"])
+            self._optimiser.load_state_dict(state["optimiser"])
+            self._shuffle.set_state(state["shuffle"])
+            self.progress = Progress(**state["progress"])
+            sequence = np.random.SeedSequence(
+                self.training.seed, n_children_spawned=state["spawned"]
+            )
+            self._rng = np.random.Generator(np.random.PCG64(sequence))
+            self._rng.bit_generator.state = state["rng"]
+        except (KeyError, RuntimeError, TypeError, ValueError) as error:
+            raise ValueError(f"checkpoint {path}: {error}") from error
+
+
+def train(run: Run, minutes: float, said: Callable[[str], None]) -> None:
+    """Improves for so many minutes of training in all, and says how it goes."""
+    training, progress = run.training, run.progress
+    while progress.seconds < 60.0 * minutes:
+        ages = run.improve()
+        shown = ", ".join(f"{name} {age:.1f}" for name, age in ages.items())
+        said(f"{progress.improvements:4d} improvements, {progress.seconds / 60:.1f} min: {shown}")
+        if progress.improvements % training.evaluate_every == 0:
+            row = run.evaluate()
+            held_out = ", ".join(f"{name} {value:.2f}" for name, value in row.items())
+            said(f"     held out: {held_out}")
+    if progress.curve[-1]["improvements"] < progress.improvements:
+        run.evaluate()

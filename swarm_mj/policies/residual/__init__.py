@@ -1,0 +1,1 @@
+"""A network that corrects a rule's choice of who transmits."""

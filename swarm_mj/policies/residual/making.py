@@ -1,0 +1,33 @@
+"""The residual policy of a mission."""
+
+from swarm_mj.mission import Mission
+from swarm_mj.policies.residual.network import Weights
+from swarm_mj.policies.residual.policy import ResidualPolicy
+from swarm_mj.policies.residual.resting_rule import RestingRule
+from swarm_mj.protocol.packets import fits, packet_of
+from swarm_mj.radio.mission_radio import radio_of
+
+
+def residual_policy(
+    weights: Weights, mission: Mission, *, is_deterministic: bool = False
+) -> ResidualPolicy:
+    """The policy that these weights make of a mission's rule.
+
+    Raises:
+        ValueError: The mission's team moves: there is no rule for it.
+    """
+    if mission.task != "stationary":
+        raise ValueError(
+            f"residual policies are for teams at rest, and those of {mission.task} move; fly the "
+            "task stationary, or another policy"
+        )
+    # By the authors' rule a robot may decode while it transmits, which changes its T in that slot.
+    is_whole = fits(packet_of(mission), mission)
+    radio = radio_of(mission)
+    return ResidualPolicy(
+        weights,
+        RestingRule(radio),
+        radio,
+        is_deterministic=is_deterministic,
+        reads_packets=is_whole and mission.half_duplex == "strict",
+    )

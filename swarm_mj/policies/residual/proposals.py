@@ -1,0 +1,60 @@
+"""What a rule proposes, and what it lets robots believe of each other."""
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from jaxtyping import Bool, Int, Int16
+
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.radio.link_models import Belief
+
+
+class Proposal(NamedTuple):
+    """Of one slot: `[b, i, j]` is what robot i of mission b believes of j, or says of itself."""
+
+    is_due: Bool[np.ndarray, "B N N"]  # whether j transmits in the slot
+    due_in: Int16[np.ndarray, "B N N"]  # in how many slots it does so next
+    is_agreed: Bool[np.ndarray, "B N"]  # whether the schedule is in force, or the turns of the start
+
+    @property
+    def transmits(self) -> Bool[np.ndarray, "B N"]:
+        """Who should transmit, by the rule."""
+        return np.diagonal(self.is_due, axis1=1, axis2=2)
+
+
+class Rule(Protocol):
+    """Who should transmit in each slot, robot by robot on its own view."""
+
+    uses: str  # what each robot decides by, in a few words
+
+    def inform(self, belief: Belief) -> None:
+        """Is told what robots know of the channel."""
+        ...
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Begins new missions; arguments as in `Policy.start`."""
+        ...
+
+    def propose(self, views: LocalViews) -> Proposal:
+        """What it says of the slot that begins."""
+        ...
+
+def turns(
+    order: Int[np.ndarray, "B N"], slot: Int[np.ndarray, "B"]
+) -> tuple[Bool[np.ndarray, "B N N"], Int16[np.ndarray, "B N N"]]:
+    """Whose turn it is in a common order, and when everyone's is next.
+
+    Args:
+        order: The robot at each place.
+        slot: Of each mission.
+
+    Returns:
+        As a proposal's first two parts.
+    """
+    num_robots = order.shape[1]
+    place = np.argsort(order, axis=1)
+    due_in = 1 + (place - slot[:, None] - 1) % num_robots
+    shape = (*order.shape, num_robots)
+    is_due = np.broadcast_to((due_in == num_robots)[:, None, :], shape)
+    return is_due.copy(), np.broadcast_to(due_in.astype(np.int16)[:, None, :], shape).copy()

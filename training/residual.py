@@ -1,0 +1,178 @@
+"""Trains the shipped policy `residual-gnn`: a network that corrects the plan of teams at rest.
+
+    python training/residual.py
+
+Goes on with a run that has begun. At the end the best networks, and the rule without one, fly
+missions that judged nothing so far; the best of them becomes `policy.safetensors` in the run's
+folder. `--ship` also puts it, and its card, into assets/policies.
+"""
+
+import sys
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+from swarm_mj.cli import script
+from swarm_mj.cli.outputs import Output, check_outputs
+from swarm_mj.fields import setting
+from swarm_mj.io.atomic import write_text
+from swarm_mj.io.owned import owned
+from swarm_mj.io.provenance import commit
+from swarm_mj.learning.residual.ppo import PpoSettings
+from swarm_mj.learning.residual.train import CURVE, Progress, ResidualTraining, Run, train
+from swarm_mj.mission import Mission, paper
+from swarm_mj.policies.residual.network import Weights
+from swarm_mj.policies.residual.stored import save_residual
+
+ROOT = Path(__file__).resolve().parent.parent
+POLICIES = ROOT / "assets" / "policies"
+SHIPPED = "residual-gnn"
+WINDOWS = 250  # of a mission that is learned from
+KINDS = {  # what 40 robots at rest meet; they believe in free space
+    "free space": {},
+    "30 % erased": {"erasure": 0.3},
+    "shadowing": {"shadowing_db": 6.0},
+    "Rayleigh": {"fading": "rayleigh"},
+    "bursts": {"burst_begin": 0.02},
+    "blocks": {"arena": "blocks"},
+    "10 % off": {"switched_off": 0.1},
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Residual:
+    """How long to train, and where everything goes."""
+
+    minutes: float = setting(45.0, "of training", low=0.01, high=10_000.0)
+    seed: int = setting(0, "of all that is drawn", low=0, high=2**31)
+    out: Path = setting(
+        ROOT / "runs" / "residual", "the run, to go on with", metavar="DIR", shown="runs/residual"
+    )
+    learning_rate: float = setting(5e-4, "of Adam", low=1e-9, high=1.0)
+    corrects_turns: bool = setting(
+        False, "let the network decide before everyone's plan is in force, too"
+    )
+    robots: int = setting(40, "in a team", low=2, high=200)
+    windows: int = setting(WINDOWS, "of a mission", low=100, high=10_000)
+    together: int = setting(4, "missions of each kind between two improvements", low=1, high=1000)
+    places: int = setting(40, "where robots may stand, of each kind", low=1, high=10_000)
+    held_out: int = setting(8, "missions of each kind in an evaluation", low=1, high=1000)
+    ship: bool = setting(False, "put the policy into assets/policies")
+
+    def __call__(self) -> int:
+        """Trains, chooses, writes; returns the exit code."""
+        policy = self.out / "policy.safetensors"
+        paths = [policy, *(POLICIES / f"{SHIPPED}{end}" for end in (".safetensors", ".md"))]
+        check_outputs(*(Output("policy", path) for path in (paths if self.ship else paths[:1])))
+        self.out.mkdir(parents=True, exist_ok=True)
+        with owned(self.out / CURVE):
+            run = Run(self.training(), self.out)
+            train(run, self.minutes, _said)
+            _said("choosing among the best and the rule alone, on other missions")
+            at, weights, ratios = run.choose()
+            card = self._card(run.progress, at, ratios)
+            save_residual(policy, weights, card)
+        if self.ship:
+            save_residual(paths[1], weights, card)
+            write_text(paths[2], card)
+        _said(f"{policy}: made after {at} improvements, {ratios[at]:.3f} of the rule's age")
+        return 0
+
+    def _command(self) -> str:
+        """What was typed, with all that is not as usual."""
+        usual = {each.name: each.default for each in fields(self)}
+        words = ["python training/residual.py"]
+        for name in usual.keys() - {"out", "ship"}:
+            value = getattr(self, name)
+            if value != usual[name]:
+                flag = f"--{name.replace('_', '-')}"
+                words.append(flag if value is True else f"{flag} {value:g}")
+        return " ".join([words[0], *sorted(words[1:])])
+
+    def training(self) -> ResidualTraining:
+        """What is trained, on what."""
+        return ResidualTraining(
+            missions={name: self._mission(**channel) for name, channel in KINDS.items()},
+            ppo=PpoSettings(learning_rate=self.learning_rate),
+            corrects_turns=self.corrects_turns,
+            seed=self.seed,
+            together=self.together,
+            places=self.places,
+            held_out=self.held_out,
+        )
+
+    def _mission(self, **channel: object) -> Mission:
+        return paper(
+            "stationary", num_robots=self.robots, num_windows=self.windows, **channel
+        )
+
+    def _card(self, progress: Progress, at: int, ratios: dict[int, float]) -> str:
+        """What made the policy, and how it was chosen."""
+        training = asdict(self.training())
+        training.pop("missions")
+        settings = training.pop("ppo") | training
+        listed = "\n".join(f"- {name}: {value}" for name, value in settings.items())
+        kinds = "\n".join(f"- {name}: {channel or 'as believed'}" for name, channel in KINDS.items())
+        chosen = "\n".join(
+            f"- {n} improvements: {ratio:.3f}{' (this one)' if n == at else ''}"
+            for n, ratio in sorted(ratios.items())
+        )
+        return CARD.format(
+            width=self.training().width,
+            listed=listed,
+            kinds=kinds,
+            chosen=chosen,
+            robots=self.robots,
+            windows=self.windows,
+            minutes=progress.seconds / 60,
+            held_out=self.held_out,
+            command=self._command(),
+            commit=commit(),
+        )
+
+
+CARD = """# A learned correction of a plan, of swarm_mj
+
+Teams at rest agree on one plan from positions and the clock (`planner --payload none`). In every slot, each robot
+evaluates this network on what it remembers of its neighbours, and draws from the result whether it transmits, whatever the
+plan says.
+
+- network: graph neural network of one hop, width {width}, over the neighbours that a robot believes in
+- packets: T, M and P, as the paper's, and nothing more
+- teams at rest alone; where robots move, `residual-gnn` is `sotdma`, without a network
+
+## Fly it
+
+    swarm-mj fly --policy residual-gnn --task stationary
+
+## Training
+
+PPO on what every packet was worth (`swarm_mj/learning/residual`): {minutes:.0f} minutes on one core,
+{robots} robots, {windows} windows a mission, of these kinds in turn:
+
+{kinds}
+
+{listed}
+
+    {command}
+
+Commit {commit}.
+
+## Choice
+
+Mean age over that of the rule alone, on {held_out} missions of each kind that nothing was judged on before:
+
+{chosen}
+
+## Licence
+
+Apache-2.0, as swarm_mj.
+"""
+
+
+def _said(line: str) -> None:
+    sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(script(Residual, Residual.__call__))
