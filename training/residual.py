@@ -20,7 +20,6 @@ from swarm_mj.io.provenance import commit
 from swarm_mj.learning.residual.ppo import PpoSettings
 from swarm_mj.learning.residual.train import CURVE, Progress, ResidualTraining, Run, train
 from swarm_mj.mission import Mission, paper
-from swarm_mj.policies.residual.network import Weights
 from swarm_mj.policies.residual.stored import save_residual
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -101,9 +100,7 @@ class Residual:
         )
 
     def _mission(self, **channel: object) -> Mission:
-        return paper(
-            "stationary", num_robots=self.robots, num_windows=self.windows, **channel
-        )
+        return paper("stationary", num_robots=self.robots, num_windows=self.windows, **channel)
 
     def _card(self, progress: Progress, at: int, ratios: dict[int, float]) -> str:
         """What made the policy, and how it was chosen."""
@@ -111,7 +108,9 @@ class Residual:
         training.pop("missions")
         settings = training.pop("ppo") | training
         listed = "\n".join(f"- {name}: {value}" for name, value in settings.items())
-        kinds = "\n".join(f"- {name}: {channel or 'as believed'}" for name, channel in KINDS.items())
+        kinds = "\n".join(
+            f"- {name}: {channel or 'as believed'}" for name, channel in KINDS.items()
+        )
         chosen = "\n".join(
             f"- {n} improvements: {ratio:.3f}{' (this one)' if n == at else ''}"
             for n, ratio in sorted(ratios.items())
@@ -132,11 +131,11 @@ class Residual:
 
 CARD = """# A learned correction of a plan, of swarm_mj
 
-Teams at rest agree on one plan from positions and the clock (`planner --payload none`). In every slot, each robot
-evaluates this network on what it remembers of its neighbours, and draws from the result whether it transmits, whatever the
-plan says.
+Teams at rest agree on one plan from positions and the clock (`planner --payload none`). In every
+slot, each robot evaluates this network on what it remembers of its neighbours, and draws from the
+result whether it transmits, whatever the plan says.
 
-- network: graph neural network of one hop, width {width}, over the neighbours that a robot believes in
+- network: graph neural network of one hop, width {width}, over believed neighbours
 - packets: T, M and P, as the paper's, and nothing more
 - teams at rest alone; where robots move, `residual-gnn` is `sotdma`, without a network
 
@@ -146,8 +145,8 @@ plan says.
 
 ## Training
 
-PPO on what every packet was worth (`swarm_mj/learning/residual`): {minutes:.0f} minutes on one core,
-{robots} robots, {windows} windows a mission, of these kinds in turn:
+PPO on what every packet was worth (`swarm_mj/learning/residual`): {minutes:.0f} minutes on one
+core, {robots} robots, {windows} windows a mission, of these kinds in turn:
 
 {kinds}
 
@@ -159,7 +158,8 @@ Commit {commit}.
 
 ## Choice
 
-Mean age over that of the rule alone, on {held_out} missions of each kind that nothing was judged on before:
+Mean age over that of the rule alone, on {held_out} missions of each kind that judged nothing
+before:
 
 {chosen}
 

@@ -18,7 +18,7 @@ from swarm_mj.fields import as_typed, setting
 from swarm_mj.io.packages import is_installed, missing
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
-from swarm_mj.policies.registry import POLICIES, is_learned, make_policy, normalised
+from swarm_mj.policies.registry import POLICIES, library_of, make_policy, normalised
 from swarm_mj.protocol.packets import Packet, times
 
 WINDOWS = {
@@ -59,9 +59,8 @@ class Options:
 def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
     names = POLICIES if options.name is None else (options.name,)
-    if options.name is None and not is_installed("torch"):
-        names = [name for name in names if not is_learned(name)]
-        plain_console(is_error=True).print(missing("torch", "gnn is left out: it"))
+    if options.name is None:
+        names = [name for name in names if _can_be_made(name)]
     with Console(stderr=True).status("Loading ..."):
         made = {name: make_policy(name, options.mission) for name in names}
     facts = [facts_of(name, policy, options.mission) for name, policy in made.items()]
@@ -135,6 +134,15 @@ def _packet_table(fields: list[dict[str, Any]]) -> Table:
         step = f"{each['step']:.3g} {each['unit']}" if "step" in each else ""
         table.add_row(each["name"], str(each["bits"]), f"{each['count']:,}", step)
     return table
+
+
+def _can_be_made(name: str) -> bool:
+    """Whether a policy's library is installed; says so if it is not."""
+    library = library_of(name)
+    if library is None or is_installed(library):
+        return True
+    plain_console(is_error=True).print(missing(library, f"{name} is left out: it"))
+    return False
 
 
 def _carried(payload: str) -> tuple[str, ...]:

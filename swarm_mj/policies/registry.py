@@ -97,13 +97,20 @@ RULES: dict[str, Callable[..., Policy]] = {
     "greedy-oracle": lambda mission: GreedyOracle(radio_of(mission)),
     "oracle-lookahead": lambda mission: LookaheadOracle(radio_of(mission)),
 }
-SHIPPED = "gnn"  # the learned policy that comes with the package, in assets/policies/
-POLICIES = (*RULES, SHIPPED)
+# The learned policies that come with the package, in assets/policies/.
+SHIPPED = "gnn"
+SHIPPED_RESIDUAL = "residual-gnn"
+POLICIES = (*RULES, SHIPPED, SHIPPED_RESIDUAL)
 
 
 def is_learned(name: str) -> bool:
-    """Whether a policy is a trained network: the shipped one, or one in a directory or file."""
-    return name == SHIPPED or is_stored(name)
+    """Whether a policy is a trained network: a shipped one, or one in a directory or file."""
+    return name in (SHIPPED, SHIPPED_RESIDUAL) or is_stored(name)
+
+
+def library_of(name: str) -> str | None:
+    """The library that a shipped policy needs and others do not, if any."""
+    return {SHIPPED: "torch", SHIPPED_RESIDUAL: "safetensors"}.get(name)
 
 
 def is_stored(name: str) -> bool:
@@ -190,6 +197,8 @@ def make_policy(
         return _own_policy(name, mission, probability, is_deterministic)
     if is_learned(name):
         _refuse(probability, name)
+        if name == SHIPPED_RESIDUAL:
+            return _shipped_residual(mission, is_deterministic=is_deterministic)
         return _learned(name, mission, is_deterministic=is_deterministic, features=features)
     if name not in RULES:
         raise ValueError(
@@ -223,6 +232,20 @@ def is_own_policy(name: str) -> bool:
     return is_own(name) and not is_stored(name)
 
 
+def _shipped_residual(mission: Mission, *, is_deterministic: bool) -> Policy:
+    """The shipped correction of the plan of teams at rest; teams that move go by `sotdma`."""
+    if mission.task != "stationary":
+        policy = _sotdma(mission)
+        policy.uses = f"as sotdma, for the network was trained on teams at rest: {policy.uses}"
+        return policy
+    need("safetensors", f"policy {SHIPPED_RESIDUAL}", "fly another")
+    from swarm_mj.policies.residual.making import residual_policy
+    from swarm_mj.policies.residual.stored import read_residual
+
+    weights = read_residual(asset(f"policies/{SHIPPED_RESIDUAL}.safetensors"))
+    return residual_policy(weights, mission, is_deterministic=is_deterministic)
+
+
 def _learned(name: str, mission: Mission, **options: Any) -> Policy:
     """A trained network, which takes its libraries' time to import."""
     if name != SHIPPED and is_mlp(Path(name)):
@@ -230,6 +253,16 @@ def _learned(name: str, mission: Mission, **options: Any) -> Policy:
         from swarm_mj.policies.mlp_folder import load_mlp
 
         return load_mlp(Path(name), mission, **options)
+    if name != SHIPPED and name.endswith(ONE_FILE):
+        need("safetensors", f"policy {name}", "fly another")
+        from swarm_mj.policies.residual.making import residual_policy
+        from swarm_mj.policies.residual.stored import is_residual, read_residual
+
+        if is_residual(Path(name)):
+            is_deterministic = bool(options["is_deterministic"])
+            return residual_policy(
+                read_residual(Path(name)), mission, is_deterministic=is_deterministic
+            )
     need("torch", f"policy {name}", "fly another")
     from swarm_mj.policies.stored import load_policy
 

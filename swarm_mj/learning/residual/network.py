@@ -1,4 +1,6 @@
-"""The network of residual policies where it learns; in flight it is `policies/residual/network.py`."""
+"""The network where it learns; in flight it is that of `policies/residual/network.py`."""
+
+from itertools import pairwise
 
 import torch
 from jaxtyping import Float, Int
@@ -53,6 +55,6 @@ class ResidualNetwork(nn.Module):
 
 def _layers(*widths: int) -> nn.Sequential:
     layers = []
-    for before, after in zip(widths[:-1], widths[1:], strict=True):
+    for before, after in pairwise(widths):
         layers += [nn.Linear(before, after), nn.ReLU()]
     return nn.Sequential(*layers)

@@ -92,9 +92,7 @@ def lesson(
         is_active = active[window]
         if is_active is not None:
             otherwise &= is_active[rows[:, 0]]
-        channel = channel_at(
-            swarm.channel, np.full(len(rows), (s + 1) * SLOT_WINDOWS), rows[:, 0]
-        )
+        channel = channel_at(swarm.channel, np.full(len(rows), (s + 1) * SLOT_WINDOWS), rows[:, 0])
         recipient = np.where(otherwise, BROADCAST, np.arange(num_robots))
         decoded = channel(positions_m[window][rows[:, 0]], recipient)
         if is_active is not None:

@@ -34,6 +34,7 @@ MOST_BYTES = 100_000_000
 FIRST_PLACE = 30_000  # seeds of the places where training flies
 HELD_OUT_SEED = 500_000  # of missions that judge
 CHOICE_SEED = 510_000  # of those that choose among the best
+USUAL = PpoSettings()
 NUM_BEST = 3  # that are chosen among, with the untrained one
 
 
@@ -49,11 +50,14 @@ class ResidualTraining:
     corrects_turns: bool = setting(
         False, "let the network decide before everyone's plan is in force, too"
     )
-    ppo: PpoSettings = PpoSettings()
+    ppo: PpoSettings = USUAL
     together: int = setting(4, "missions of each kind, between two improvements", low=1, high=1000)
     places: int = setting(40, "where robots may stand, of each kind", low=1, high=10_000)
     share: float = setting(
-        0.1, "of the decisions that are learned from, where the rule was hardly doubted", low=1e-3, high=1.0
+        0.1,
+        "of the decisions that are learned from, where the rule was hardly doubted",
+        low=1e-3,
+        high=1.0,
     )
     horizon: int = setting(120, "slots in which a packet's worth is counted", low=1, high=10_000)
     seed: int = setting(0, "of all that is drawn", low=0, high=2**31)

@@ -1,9 +1,9 @@
 """What a packet was worth: the age that it took from the team in the slots after it.
 
 A recorded mission says who decoded whom in every slot. With one packet more or less, one slot
-goes otherwise, and from there on news spreads by the same receptions. So the
-difference that the packet made follows exactly, for as long as one likes, under one assumption: all others
-transmit as they did. It is the difference reward of `learning/credit.py`, but it looks ahead.
+goes otherwise, and from there on news spreads by the same receptions. So the difference that the
+packet made follows exactly, for as long as one likes, under one assumption: all others transmit as
+they did. It is the difference reward of `learning/credit.py`, but it looks ahead.
 
 Index order: `[s, b, j, k]` is what robot `j` of mission `b` knows of `k` before slot `s`. Times are
 ticks: a slot's tick is its number, counted from 1.

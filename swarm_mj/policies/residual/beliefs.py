@@ -74,49 +74,59 @@ def note_slot(
     num_missions, num_robots = transmitted.shape
     reckoned, believed = room_for(num_robots), np.zeros(num_robots, dtype=np.bool_)
     for b in range(num_missions):
-        now = tick[b]
         for i in range(num_robots):
-            sender = heard[b, i] if heard[b, i] != i else NOBODY
+            sender = int(heard[b, i]) if heard[b, i] != i else NOBODY
             for o in range(num_robots):
                 believed[o] = o != i and is_due[b, i, o] and is_known[b, i, o]
             if not transmitted[b, i]:
                 reckon(believed, position_m[b, i], law, reckoned)
                 _judge(beliefs.hears[b, i], decoded_by(i, reckoned, 0.0, threshold), sender)
             if sender != NOBODY:
-                sent, told = beliefs.sent[b, i], observed[b, sender, i]
-                if 0 < sent and beliefs.decoded[b, i, sender] < sent:
-                    share = beliefs.heard_by[b, i]
-                    share[sender] += RECENT * ((1.0 if told >= sent else 0.0) - share[sender])
-                for k in range(num_robots):
-                    beliefs.held[b, i, sender, k] = observed[b, sender, k]
-                beliefs.decoded[b, i, sender], beliefs.heard[b, i] = now, now
-            believed[i] = transmitted[b, i]
-            if sender != NOBODY:
+                _read_packet(beliefs, b, i, sender, int(tick[b]), observed[b, sender])
                 believed[sender] = True
+            believed[i] = transmitted[b, i]
+            reckon(believed, position_m[b, i], law, reckoned)
+            write_powers(i, position_m[b, i], law, reckoned.power)
             _pass_on(
                 i,
                 sender,
                 beliefs.held[b, i],
                 observed[b, i],
                 is_known[b, i],
-                position_m[b, i],
                 believed,
-                law,
                 threshold,
                 reckoned,
             )
-            if sender != NOBODY:  # `reckoned.power` is that of i's packets, and links are alike
+            if sender != NOBODY:  # links are alike in both directions, as far as i knows
                 is_far = is_known[b, i, sender] and reckoned.power[sender] < threshold
-                beliefs.from_afar[b, i] += RECENT * ((1.0 if is_far else 0.0) - beliefs.from_afar[b, i])
+                _count(beliefs.from_afar[b], i, is_far)
             if transmitted[b, i]:
-                beliefs.sent[b, i] = now
+                beliefs.sent[b, i] = tick[b]
+
+
+@compiled()
+def _count(share: Float32[np.ndarray, "N"], place: int, is_so: bool) -> None:
+    """Moves a share towards what was so the last time."""
+    share[place] += RECENT * ((1.0 if is_so else 0.0) - share[place])
 
 
 @compiled()
 def _judge(share: Float32[np.ndarray, "N"], due: int, sender: int) -> None:
     """Counts whether the packet was decoded that should have been, if any."""
     if due != NOBODY:
-        share[due] += RECENT * ((1.0 if sender == due else 0.0) - share[due])
+        _count(share, due, sender == due)
+
+
+@compiled()
+def _read_packet(
+    beliefs: Beliefs, b: int, i: int, sender: int, now: int, told: Int32[np.ndarray, "N"]
+) -> None:
+    """Takes over what i decoded: all that the sender knows, and whether it knew of i's last one."""
+    last = beliefs.sent[b, i]
+    if last > 0 and beliefs.decoded[b, i, sender] < last:
+        _count(beliefs.heard_by[b, i], sender, told[i] >= last)
+    beliefs.held[b, i, sender] = told
+    beliefs.decoded[b, i, sender], beliefs.heard[b, i] = now, now
 
 
 @compiled()
@@ -126,18 +136,14 @@ def _pass_on(
     held: Int32[np.ndarray, "N N"],
     observed: Int32[np.ndarray, "N"],
     is_known: Bool[np.ndarray, "N"],
-    position_m: Float[np.ndarray, "N 2"],
     transmits: Bool[np.ndarray, "N"],
-    law: PowerLaw,
     threshold: float,
     reckoned: Reckoned,
 ) -> None:
     """Neighbours that should have decoded a packet now know what its sender does."""
-    reckon(transmits, position_m, law, reckoned)
-    write_powers(i, position_m, law, reckoned.power)
     for j in range(held.shape[0]):
         is_near = is_known[j] and reckoned.power[j] >= threshold
-        if j == i or j == sender or transmits[j] or not is_near:
+        if transmits[j] or not is_near or j in (i, sender):
             continue
         o = decoded_by(j, reckoned, 0.0, threshold)
         if o == NOBODY:

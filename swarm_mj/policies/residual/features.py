@@ -7,12 +7,18 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int, Int32
+from jaxtyping import Bool, Float, Float32, Int, Int16, Int32
 
 from swarm_mj.compiled import compiled
 from swarm_mj.policies.residual.beliefs import Beliefs
 from swarm_mj.policies.residual.proposals import Proposal
-from swarm_mj.policies.residual.reckoning import NOBODY, decoded_by, reckon, room_for
+from swarm_mj.policies.residual.reckoning import (
+    NOBODY,
+    Reckoned,
+    decoded_by,
+    reckon,
+    room_for,
+)
 from swarm_mj.radio.kernels import is_received, sinr
 from swarm_mj.radio.power_law import PowerLaw, write_powers
 
@@ -73,6 +79,23 @@ def room_to_see(num_rows: int, num_robots: int) -> Seen:
     )
 
 
+class _Own(NamedTuple):
+    """What one robot decides by, before a slot."""
+
+    identity: int
+    now: int  # the slot's tick
+    place_m: Float[np.ndarray, "N 2"]  # where it believes everyone to be
+    knows: Bool[np.ndarray, "N"]  # whom it has heard of
+    known: Int32[np.ndarray, "N"]  # its T
+    held: Int32[np.ndarray, "N N"]  # and its teammates', as it believes
+    decoded: Int32[np.ndarray, "N"]  # when it last decoded a packet of each
+    hears: Float32[np.ndarray, "N"]
+    heard_by: Float32[np.ndarray, "N"]
+    is_due: Bool[np.ndarray, "N"]
+    due_in: Int16[np.ndarray, "N"]
+    draw: Float[np.ndarray, "N"]
+
+
 @compiled()
 def see(
     rows: Int[np.ndarray, "R 2"],
@@ -110,70 +133,109 @@ def see(
     count = 0
     for r in range(rows.shape[0]):
         b, i = rows[r, 0], rows[r, 1]
-        now, place_m, knows = tick[b], position_m[b, i], is_known[b, i]
-        is_due, due_in = proposal.is_due[b, i], proposal.due_in[b, i]
-        known, held, own = observed[b, i], beliefs.held[b, i], seen.robots[r]
+        own = _Own(
+            int(i),
+            int(tick[b]),
+            position_m[b, i],
+            is_known[b, i],
+            observed[b, i],
+            beliefs.held[b, i],
+            beliefs.decoded[b, i],
+            beliefs.hears[b, i],
+            beliefs.heard_by[b, i],
+            proposal.is_due[b, i],
+            proposal.due_in[b, i],
+            draw[b],
+        )
         for o in range(num_robots):
-            others[o] = o != i and is_due[o] and knows[o]
-        reckon(others, place_m, law, reckoned)
-        write_powers(i, place_m, law, reckoned.power)
-        degree, above, hears, heard_by = 0, 0, 0.0, 0.0
+            others[o] = o != i and own.is_due[o] and own.knows[o]
+        reckon(others, own.place_m, law, reckoned)
+        write_powers(i, own.place_m, law, reckoned.power)
+        first = count
         for j in range(num_robots):
-            power = reckoned.power[j]
-            if j == i or not knows[j] or not is_received(power, threshold):
-                continue
-            seen.owner[count] = r
-            edge = seen.neighbours[count]
-            count += 1
-            degree += 1
-            above += draw[b, j] > draw[b, i]
-            hears += beliefs.hears[b, i, j]
-            heard_by += beliefs.heard_by[b, i, j]
-            beside = sinr(power, reckoned.total[j], 1.0)
-            other = decoded_by(j, reckoned, 0.0, threshold)
-            news, news_of_other = 0.0, 0.0
-            if not others[j]:
-                news = _news(i, known, j, held[j], now)
-                if other != NOBODY:
-                    news_of_other = _news(other, held[other], j, held[j], now)
-            is_jammed = other != NOBODY and decoded_by(j, reckoned, power, threshold) == NOBODY
-            balance = news if is_received(beside, threshold) else 0.0
-            if is_jammed:
-                balance -= news_of_other
-            strongest = reckoned.strongest[j]
-            edge[0] = _margin(power, threshold)
-            edge[1] = _margin(beside, threshold)
-            edge[2] = 1.0 if others[j] else 0.0
-            edge[3] = min(due_in[j], FARTHEST) / FARTHEST
-            edge[4] = _margin(sinr(strongest, reckoned.total[j] - strongest, 1.0), threshold)
-            edge[5] = 1.0 if is_jammed else 0.0
-            edge[6] = 0.5 * math.log1p(news)
-            edge[7] = 0.5 * math.log1p(news_of_other)
-            edge[8] = 0.05 * balance
-            edge[9] = _age(now - beliefs.decoded[b, i, j])
-            edge[10] = _age(now - held[j, i])
-            edge[11] = beliefs.hears[b, i, j]
-            edge[12] = beliefs.heard_by[b, i, j]
-            edge[13] = 1.0 if draw[b, j] > draw[b, i] else -1.0
-        sender = decoded_by(i, reckoned, 0.0, threshold)
-        gain = 0.0 if sender == NOBODY else _news(sender, held[sender], i, known, now)
-        strongest = reckoned.strongest[i]
-        own[0] = 1.0 if is_due[i] else -1.0
-        own[1] = min(due_in[i], FARTHEST) / FARTHEST
-        own[2] = 1.0 if proposal.is_agreed[b, i] else 0.0
-        own[3] = _margin(sinr(strongest, reckoned.total[i] - strongest, 1.0), threshold)
-        own[4] = 0.5 * math.log1p(gain)
-        own[5] = _age(now - beliefs.sent[b, i])
-        own[6] = _age(now - beliefs.heard[b, i])
-        own[7] = 0.3 * math.log1p(_mean_age(known, now))
-        own[8] = 0.1 * degree
-        own[9] = above / max(degree, 1)
-        own[10] = hears / max(degree, 1)
-        own[11] = heard_by / max(degree, 1)
-        own[12] = num_robots / 40.0
-        own[13] = 0.15 * math.log1p(now)
-        own[14] = beliefs.from_afar[b, i]
+            is_near = own.knows[j] and is_received(float(reckoned.power[j]), threshold)
+            if j != i and is_near:
+                seen.owner[count] = r
+                _see_neighbour(j, own, others, reckoned, threshold, seen.neighbours[count])
+                count += 1
+        robot = seen.robots[r]
+        _see_oneself(own, reckoned, threshold, seen.neighbours[first:count], robot)
+        robot[2] = 1.0 if proposal.is_agreed[b, i] else 0.0
+        robot[5] = _age(own.now - int(beliefs.sent[b, i]))
+        robot[6] = _age(own.now - int(beliefs.heard[b, i]))
+        robot[14] = beliefs.from_afar[b, i]
     return count
+
+
+@compiled()
+def _see_neighbour(
+    j: int,
+    own: _Own,
+    others: Bool[np.ndarray, "N"],
+    reckoned: Reckoned,
+    threshold: float,
+    edge: Float32[np.ndarray, "G"],
+) -> None:
+    """Fills in what a robot sees of neighbour j, in the order of `NEIGHBOUR_FEATURES`."""
+    i, now, held = own.identity, own.now, own.held
+    power, total = float(reckoned.power[j]), float(reckoned.total[j])
+    strongest = float(reckoned.strongest[j])
+    beside = sinr(power, total, 1.0)
+    other = decoded_by(j, reckoned, 0.0, threshold)
+    news, news_of_other = 0.0, 0.0
+    if not others[j]:
+        news = _news(i, own.known, j, held[j], now)
+        if other != NOBODY:
+            news_of_other = _news(other, held[other], j, held[j], now)
+    is_jammed = other != NOBODY and decoded_by(j, reckoned, power, threshold) == NOBODY
+    balance = news if is_received(beside, threshold) else 0.0
+    if is_jammed:
+        balance -= news_of_other
+    edge[0] = _margin(power, threshold)
+    edge[1] = _margin(beside, threshold)
+    edge[2] = 1.0 if others[j] else 0.0
+    edge[3] = min(own.due_in[j], FARTHEST) / FARTHEST
+    edge[4] = _margin(sinr(strongest, total - strongest, 1.0), threshold)
+    edge[5] = 1.0 if is_jammed else 0.0
+    edge[6] = 0.5 * math.log1p(news)
+    edge[7] = 0.5 * math.log1p(news_of_other)
+    edge[8] = 0.05 * balance
+    edge[9] = _age(now - int(own.decoded[j]))
+    edge[10] = _age(now - int(held[j, i]))
+    edge[11] = own.hears[j]
+    edge[12] = own.heard_by[j]
+    edge[13] = 1.0 if own.draw[j] > own.draw[i] else -1.0
+
+
+@compiled()
+def _see_oneself(
+    own: _Own,
+    reckoned: Reckoned,
+    threshold: float,
+    neighbours: Float32[np.ndarray, "D G"],
+    robot: Float32[np.ndarray, "F"],
+) -> None:
+    """Fills in what a robot sees of itself, as far as it follows from these."""
+    i, now, degree = own.identity, own.now, neighbours.shape[0]
+    sender = decoded_by(i, reckoned, 0.0, threshold)
+    gain = 0.0 if sender == NOBODY else _news(sender, own.held[sender], i, own.known, now)
+    strongest = float(reckoned.strongest[i])
+    above, hears, heard_by = 0, 0.0, 0.0
+    for n in range(degree):
+        above += neighbours[n, 13] > 0.0
+        hears += neighbours[n, 11]
+        heard_by += neighbours[n, 12]
+    robot[0] = 1.0 if own.is_due[i] else -1.0
+    robot[1] = min(own.due_in[i], FARTHEST) / FARTHEST
+    robot[3] = _margin(sinr(strongest, float(reckoned.total[i]) - strongest, 1.0), threshold)
+    robot[4] = 0.5 * math.log1p(gain)
+    robot[7] = 0.3 * math.log1p(_mean_age(own.known, now))
+    robot[8] = 0.1 * degree
+    robot[9] = above / max(degree, 1)
+    robot[10] = hears / max(degree, 1)
+    robot[11] = heard_by / max(degree, 1)
+    robot[12] = len(own.known) / 40.0
+    robot[13] = 0.15 * math.log1p(now)
 
 
 @compiled()

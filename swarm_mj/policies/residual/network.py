@@ -1,7 +1,7 @@
 """The network: a graph neural network of one hop, over the neighbours that a robot believes in.
 
-Each neighbour passes through two layers, together with the robot itself. Their sum and their maximum
-pass through three more, with the robot again. What comes out is added to the rule's own choice.
+Each neighbour passes through two layers, together with the robot itself. Their sum and their
+maximum pass through three more, with the robot again. What comes out is added to the rule's choice.
 """
 
 from collections.abc import Mapping

@@ -1,9 +1,9 @@
 """Residual policies: a rule proposes who transmits, and a network corrects it.
 
-Residual reinforcement learning (Silver et al. 2018, Johannink et al. 2019) for the slots of a shared
-channel. The rule is one that robots agree on without a word. It cannot know what the channel did to
-their packets. The network sees what its robot remembers of every neighbour, and may transmit where
-the rule would not, or keep silent where it would.
+Residual reinforcement learning (Silver et al. 2018, Johannink et al. 2019) for the slots of a
+shared channel. The rule is one that robots agree on without a word. It cannot know what the channel
+did to their packets. The network sees what its robot remembers of every neighbour, and may transmit
+where the rule would not, or keep silent where it would.
 """
 
 import hashlib
@@ -18,7 +18,8 @@ from swarm_mj.policies.policy import BroadcastPolicy, Parameters
 from swarm_mj.policies.residual.beliefs import no_beliefs, note_slot
 from swarm_mj.policies.residual.features import Seen, room_to_see, see
 from swarm_mj.policies.residual.network import Weights
-from swarm_mj.policies.residual.proposals import Proposal, Rule
+from swarm_mj.policies.residual.proposals import Proposal
+from swarm_mj.policies.residual.resting_rule import RestingRule
 from swarm_mj.policies.tdma import slot_of
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
@@ -50,7 +51,7 @@ class ResidualPolicy(BroadcastPolicy):
     def __init__(
         self,
         weights: Weights,
-        rule: Rule,
+        rule: RestingRule,
         radio: FreeSpaceRadio,
         *,
         is_deterministic: bool = False,

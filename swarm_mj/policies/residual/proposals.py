@@ -1,13 +1,9 @@
 """What a rule proposes, and what it lets robots believe of each other."""
 
-from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Int, Int16
-
-from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.radio.link_models import Belief
 
 
 class Proposal(NamedTuple):
@@ -15,30 +11,15 @@ class Proposal(NamedTuple):
 
     is_due: Bool[np.ndarray, "B N N"]  # whether j transmits in the slot
     due_in: Int16[np.ndarray, "B N N"]  # in how many slots it does so next
-    is_agreed: Bool[np.ndarray, "B N"]  # whether the schedule is in force, or the turns of the start
+    is_agreed: Bool[
+        np.ndarray, "B N"
+    ]  # whether the schedule is in force, or the turns of the start
 
     @property
     def transmits(self) -> Bool[np.ndarray, "B N"]:
         """Who should transmit, by the rule."""
         return np.diagonal(self.is_due, axis1=1, axis2=2)
 
-
-class Rule(Protocol):
-    """Who should transmit in each slot, robot by robot on its own view."""
-
-    uses: str  # what each robot decides by, in a few words
-
-    def inform(self, belief: Belief) -> None:
-        """Is told what robots know of the channel."""
-        ...
-
-    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Begins new missions; arguments as in `Policy.start`."""
-        ...
-
-    def propose(self, views: LocalViews) -> Proposal:
-        """What it says of the slot that begins."""
-        ...
 
 def turns(
     order: Int[np.ndarray, "B N"], slot: Int[np.ndarray, "B"]

@@ -23,10 +23,12 @@ class RestingRule:
     It is `planner --payload none` in a team at rest. Plans are kept for positions that come again.
     """
 
-    uses = "its buffer, T in packets, a common order, the clock and the radio: a plan from positions"
+    uses = (
+        "its buffer, T in packets, a common order, the clock and the radio: a plan from positions"
+    )
 
     def __init__(self, radio: FreeSpaceRadio, settings: PlannerSettings | None = None) -> None:
-        """Prepares the rule; the radio is what robots believe in unless it is informed otherwise."""
+        """Prepares the rule; robots believe in the radio unless it is informed otherwise."""
         self._belief = Belief(radio=radio)
         self._settings = PlannerSettings() if settings is None else settings
         self._plans: dict[bytes, StandingPlan] = {}
@@ -61,9 +63,7 @@ class RestingRule:
         return Proposal(is_due, due_in, knows_all)
 
 
-def _told(
-    plan: StandingPlan, slot: int
-) -> tuple[Bool[np.ndarray, "N"], Int16[np.ndarray, "N"]]:
+def _told(plan: StandingPlan, slot: int) -> tuple[Bool[np.ndarray, "N"], Int16[np.ndarray, "N"]]:
     """Who transmits by the plan, and in how many slots next."""
     ahead = plan.ahead(slot, 1 + FARTHEST)
     later = ahead[1:]
