@@ -95,9 +95,8 @@ class Run:
         self._optimiser = torch.optim.Adam(
             self._network.parameters(), lr=training.ppo.learning_rate
         )
-        self._rules = {  # each keeps the plans of its places
-            name: RestingRule(radio_of(mission)) for name, mission in training.missions.items()
-        }
+        radios = {radio_of(mission) for mission in training.missions.values()}
+        self._rules = {radio: RestingRule(radio) for radio in radios}  # each keeps its plans
         self.progress = Progress()
         if (folder / CHECKPOINT).exists():
             self._load()
@@ -113,7 +112,7 @@ class Run:
         for name, mission in training.missions.items():
             places = self._rng.choice(training.places, training.together, replace=False)
             swarm = Swarm(mission, (FIRST_PLACE + places).tolist())
-            policy = Recorder(weights, self._rules[name], radio_of(mission))
+            policy = Recorder(weights, self._rules[radio_of(mission)], radio_of(mission))
             rng = self._rng.spawn(1)[0]
             learned, ages[name] = lesson(
                 swarm, policy, rng, share=training.share, horizon=training.horizon
@@ -184,7 +183,7 @@ class Run:
                             Swarm(mission, seeds),
                             ResidualPolicy(
                                 weights,
-                                self._rules[name],
+                                self._rules[radio_of(mission)],
                                 radio_of(mission),
                                 is_deterministic=is_deterministic,
                             ),
