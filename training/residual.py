@@ -50,6 +50,7 @@ class Residual:
     corrects_turns: bool = setting(
         False, "let the network decide before everyone's plan is in force, too"
     )
+    epochs: int = setting(2, "passes over the decisions of an improvement", low=1, high=100)
     robots: int = setting(40, "in a team", low=2, high=200)
     windows: int = setting(WINDOWS, "of a mission", low=100, high=10_000)
     together: int = setting(4, "missions of each kind between two improvements", low=1, high=1000)
@@ -91,7 +92,7 @@ class Residual:
         """What is trained, on what."""
         return ResidualTraining(
             missions={name: self._mission(**channel) for name, channel in KINDS.items()},
-            ppo=PpoSettings(learning_rate=self.learning_rate),
+            ppo=PpoSettings(learning_rate=self.learning_rate, epochs=self.epochs),
             corrects_turns=self.corrects_turns,
             seed=self.seed,
             together=self.together,
