@@ -6,7 +6,6 @@ or not there.
 
 import io
 import json
-import zipfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -18,13 +17,14 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.io.atomic import write_bytes
-from swarm_mj.io.reading import read_file, read_json
+from swarm_mj.io.reading import read_json
 from swarm_mj.learning.actor_critic import GnnActorCritic
 from swarm_mj.learning.checkpoint_state import check_state
 from swarm_mj.learning.choice import NUM_BEST
 from swarm_mj.learning.mission_batch import ActionHistory
 from swarm_mj.learning.run_folder import Progress
 from swarm_mj.learning.settings import Training
+from swarm_mj.learning.torch_file import read_torch
 from swarm_mj.learning.vec_env import missions_of
 
 CHECKPOINT_VERSION = 3
@@ -126,18 +126,7 @@ def _most_bytes(model: PPO) -> int:
 
 def _read(path: Path, most_bytes: int) -> dict[str, Any]:
     """Raises ValueError for what is no whole checkpoint of this version."""
-    content = io.BytesIO(read_file(path, "checkpoint", most_bytes, folder=path.parent))
-    try:
-        with zipfile.ZipFile(content) as archive:
-            is_plain = all(entry.compress_type == zipfile.ZIP_STORED for entry in archive.filelist)
-            if not is_plain or archive.testzip() is not None:
-                raise zipfile.BadZipFile
-        content.seek(0)
-        state = torch.load(content, map_location="cpu", weights_only=True)
-    except Exception as error:  # torch names no exception of its own for damaged files
-        raise ValueError(
-            f"checkpoint {path} is damaged, or none; begin a new run with another --out"
-        ) from error
+    state: Any = read_torch(path, most_bytes)
     version = state.get("version") if isinstance(state, dict) else None
     if not isinstance(version, int):
         raise ValueError(f"{path} is no checkpoint of swarm-mj train")
