@@ -22,6 +22,7 @@ from swarm_mj.learning.residual.recording import Lesson
 from swarm_mj.policies.residual.features import Seen
 
 CHUNK = 16  # decisions that stay together when they are shuffled
+SCALE = 20.0  # of the loss, against which gradients are clipped
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,9 +78,6 @@ def improve(
             optimiser.step()
 
 
-SCALE = 20.0  # of the loss, against which gradients are clipped
-
-
 def surrogate(
     now: Float[Tensor, "R"],
     before: Float[Tensor, "R"],
@@ -118,7 +116,8 @@ def _batch(
     scaled = [lesson.worth / max(float(np.std(lesson.worth)), 1e-9) for lesson in lessons]
     worth = np.clip(np.concatenate(scaled), -settings.most_worth, settings.most_worth)
     tensors = [torch.from_numpy(each) for each in seen]
-    logit, weight = (np.concatenate([lesson[n] for lesson in lessons]) for n in (1, 2))
+    logit = np.concatenate([lesson.logit for lesson in lessons])
+    weight = np.concatenate([lesson.weight for lesson in lessons])
     return (
         (tensors[0], tensors[1], tensors[2]),
         torch.from_numpy(logit),

@@ -27,6 +27,15 @@ class Lesson(NamedTuple):
     worth: Float32[np.ndarray, "R"]  # of transmitting rather than not [slots], a mean over pairs
 
 
+class _Part(NamedTuple):
+    """Of a lesson: one slot's, with R decisions, of which C are learned from."""
+
+    decision: Decision
+    chosen: Bool[np.ndarray, "R"]
+    weight: Float[np.ndarray, "C"]
+    worth: Float[np.ndarray, "C"]  # as `Lesson.worth`
+
+
 class Recorder(ResidualPolicy):
     """Keeps all that it decides, and what everyone knew before."""
 
@@ -57,12 +66,13 @@ def lesson(
     Args:
         swarm: Of missions that have just begun.
         policy: That decides.
-        rng: Draws which decisions are learned from, and the channel's and the policy's own numbers,
-            so that the same places are never flown twice alike.
+        rng: Draws which decisions are learned from, and the channel's own numbers if it has any, so
+            that the same places are not flown twice alike there. The policy's numbers are the
+            mission's.
         share: Of the decisions that are learned from, where robots hardly thought of doing
             otherwise than the rule.
         horizon: Slots in which a packet's worth is counted; decisions that are closer to the end
-            are left out.
+            than half of it are left out.
 
     Returns:
         What there is to learn, and the mean age of information [windows].
@@ -99,13 +109,14 @@ def lesson(
             decoded = np.where(is_active[rows[:, 0]], decoded, np.arange(num_robots))
         saved = np.empty(len(rows))
         worth(course, np.full(len(rows), s), rows[:, 0], decoded, horizon, saved)
-        parts.append((decision, chosen, weight, np.where(did, -saved, saved) / num_robots**2))
+        saved = np.where(did, -saved, saved) / num_robots**2
+        parts.append(_Part(decision, chosen, weight, saved))
     return _joined(parts), float(np.mean(ages))
 
 
 def _learned_from(
     decision: Decision, rng: np.random.Generator, share: float
-) -> tuple[Bool[np.ndarray, "R"], Float[np.ndarray, "R"]]:
+) -> tuple[Bool[np.ndarray, "R"], Float[np.ndarray, "C"]]:
     """Which decisions are learned from, and how many each of those stands for."""
     rows = decision.rows[:, 0], decision.rows[:, 1]
     proposed, did = decision.proposal.transmits[rows], decision.transmits[rows]
@@ -114,15 +125,11 @@ def _learned_from(
     return chosen, np.where(is_sure, 1.0, 1.0 / share)[chosen]
 
 
-def _joined(
-    parts: Sequence[
-        tuple[Decision, Bool[np.ndarray, "R"], Float[np.ndarray, "R"], Float[np.ndarray, "R"]]
-    ],
-) -> Lesson:
+def _joined(parts: Sequence[_Part]) -> Lesson:
     """The decisions of all slots in one."""
     robots, neighbours, owners, start = [], [], [], 0
-    for decision, chosen, _, _ in parts:
-        seen = decision.seen
+    for part in parts:
+        seen, chosen = part.decision.seen, part.chosen
         place = np.cumsum(chosen) - 1
         is_kept = chosen[seen.owner]
         robots.append(seen.robots[chosen])
@@ -132,7 +139,7 @@ def _joined(
     single = np.float32
     return Lesson(
         Seen(np.concatenate(robots), np.concatenate(neighbours), np.concatenate(owners)),
-        np.concatenate([part[0].logit[part[1]] for part in parts]),
-        np.concatenate([part[2] for part in parts]).astype(single),
-        np.concatenate([part[3] for part in parts]).astype(single),
+        np.concatenate([part.decision.logit[part.chosen] for part in parts]),
+        np.concatenate([part.weight for part in parts]).astype(single),
+        np.concatenate([part.worth for part in parts]).astype(single),
     )
