@@ -1,10 +1,9 @@
 """The training of a residual policy: fly, learn what packets were worth, improve, again.
 
-A run's folder holds `checkpoint.pt`, from which it can go on, and `curve.csv`, one row an
-evaluation.
+A run's folder holds `checkpoint.pt`, written after each improvement and each evaluation, from which
+it goes on as if it had never stopped, and `curve.csv`, one row an evaluation.
 """
 
-import csv
 import io
 import time
 from collections.abc import Callable
@@ -16,15 +15,16 @@ import numpy as np
 import torch
 
 from swarm_mj.fields import check, setting
-from swarm_mj.io.atomic import write_bytes, write_text
-from swarm_mj.io.reading import read_file
+from swarm_mj.io.atomic import write_bytes, write_csv
 from swarm_mj.learning.residual.network import ResidualNetwork
 from swarm_mj.learning.residual.ppo import PpoSettings, improve
 from swarm_mj.learning.residual.recording import Lesson, Recorder, lesson
+from swarm_mj.learning.torch_file import read_torch
 from swarm_mj.mission import Mission
 from swarm_mj.policies.residual.network import Weights
 from swarm_mj.policies.residual.policy import ResidualPolicy
 from swarm_mj.policies.residual.resting_rule import RestingRule
+from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.rollout import rollout
 from swarm_mj.swarm import Swarm
@@ -66,6 +66,17 @@ class ResidualTraining:
 
     def __post_init__(self) -> None:
         check(self)
+        if self.together > self.places:
+            raise ValueError(
+                f"together must be up to places, {self.places}, not {self.together}: missions that "
+                "fly together begin in different places"
+            )
+        shortest = SLOTS_PER_WINDOW * min(each.num_windows for each in self.missions.values())
+        if self.horizon // 2 >= shortest:
+            raise ValueError(
+                f"horizon must be below twice the slots of a mission, {2 * shortest}, not "
+                f"{self.horizon}"
+            )
 
 
 @dataclass(kw_only=True)
@@ -74,7 +85,7 @@ class Progress:
 
     improvements: int = 0
     seconds: float = 0.0
-    curve: list[dict[str, float]] = field(default_factory=list)  # an evaluation each
+    curve: list[dict[str, int | float]] = field(default_factory=list)  # an evaluation each
     best: dict[int, dict[str, Any]] = field(default_factory=dict)  # weights by improvements
 
 
@@ -82,10 +93,15 @@ class Run:
     """A training under way."""
 
     def __init__(self, training: ResidualTraining, folder: Path) -> None:
-        """Begins, or goes on from the folder's checkpoint.
+        """Begins with an evaluation of the rule alone, or goes on from the folder's checkpoint.
+
+        Args:
+            training: What is trained.
+            folder: The run's; made if it is missing.
 
         Raises:
-            ValueError: The checkpoint cannot be read, or is of other settings.
+            ValueError: The checkpoint is damaged, or of other settings.
+            OSError: The folder cannot be read or written.
         """
         self.training, self._folder = training, folder
         torch.manual_seed(training.seed)
@@ -104,7 +120,15 @@ class Run:
             self.evaluate()
 
     def improve(self) -> dict[str, float]:
-        """Flies and learns once; returns the mean age of each kind of mission [windows]."""
+        """Flies and learns once, and writes the checkpoint.
+
+        Returns:
+            The mean age of each kind of mission [windows].
+
+        Raises:
+            ValueError: There was no decision to learn from.
+            OSError: The checkpoint cannot be written.
+        """
         start, training = time.monotonic(), self.training
         weights = self._weights(self._network)
         lessons: list[Lesson] = []
@@ -117,10 +141,17 @@ class Run:
             learned, ages[name] = lesson(
                 swarm, policy, rng, share=training.share, horizon=training.horizon
             )
-            lessons.append(learned)
+            if len(learned.logit):
+                lessons.append(learned)
+        if not lessons:
+            raise ValueError(
+                "no robot had a plan to correct: missions are too short for teams to agree on one; "
+                "fly longer ones, or smaller teams"
+            )
         improve(self._network, self._optimiser, lessons, training.ppo, self._shuffle)
         self.progress.improvements += 1
         self.progress.seconds += time.monotonic() - start
+        self._save()
         return ages
 
     def evaluate(self) -> dict[str, float]:
@@ -173,26 +204,15 @@ class Run:
         is_deterministic: bool = False,
     ) -> dict[str, float]:
         """The mean age of each kind of mission [windows]."""
-        seeds = list(range(first_seed, first_seed + num_missions))
-        return {
-            name: float(
-                np.mean(
-                    [
-                        window.costs.age_windows
-                        for window in rollout(
-                            Swarm(mission, seeds),
-                            ResidualPolicy(
-                                weights,
-                                self._rules[radio_of(mission)],
-                                radio_of(mission),
-                                is_deterministic=is_deterministic,
-                            ),
-                        )
-                    ]
-                )
+        seeds, ages = range(first_seed, first_seed + num_missions), {}
+        for name, mission in self.training.missions.items():
+            radio = radio_of(mission)
+            policy = ResidualPolicy(
+                weights, self._rules[radio], radio, is_deterministic=is_deterministic
             )
-            for name, mission in self.training.missions.items()
-        }
+            windows = rollout(Swarm(mission, seeds), policy)
+            ages[name] = float(np.mean([window.costs.age_windows for window in windows]))
+        return ages
 
     def _weights(self, network: ResidualNetwork) -> Weights:
         return network.weights(corrects_turns=self.training.corrects_turns)
@@ -215,19 +235,15 @@ class Run:
         content = io.BytesIO()
         torch.save(state, content)
         write_bytes(self._folder / CHECKPOINT, content.getbuffer())
-        text = io.StringIO()
-        table = csv.DictWriter(text, list(self.progress.curve[0]), lineterminator="\n")
-        table.writeheader()
-        table.writerows(self.progress.curve)
-        write_text(self._folder / CURVE, text.getvalue())
+        curve = self.progress.curve
+        write_csv(self._folder / CURVE, list(curve[0]), curve)
 
     def _load(self) -> None:
         path = self._folder / CHECKPOINT
+        state: Any = read_torch(path, MOST_BYTES)
         try:
-            content = io.BytesIO(read_file(path, "checkpoint", MOST_BYTES))
-            state = torch.load(content, weights_only=True)
             if state["settings"] != repr(self.training):
-                raise ValueError("it is of a training with other settings; name another folder")
+                raise ValueError("it was made with other settings")
             self._network.load_state_dict(state["network"])
             self._optimiser.load_state_dict(state["optimiser"])
             self._shuffle.set_state(state["shuffle"])
@@ -237,20 +253,35 @@ class Run:
             )
             self._rng = np.random.Generator(np.random.PCG64(sequence))
             self._rng.bit_generator.state = state["rng"]
-        except (KeyError, RuntimeError, TypeError, ValueError) as error:
-            raise ValueError(f"checkpoint {path}: {error}") from error
+        except Exception as error:  # torch and generators of random numbers take what they please
+            reason = str(error).partition("\n")[0]
+            raise ValueError(
+                f"checkpoint {path} is not this run's ({reason:.200}); begin a new run with "
+                "another --out"
+            ) from error
 
 
 def train(run: Run, minutes: float, said: Callable[[str], None]) -> None:
-    """Improves for so many minutes of training in all, and says how it goes."""
-    training, progress = run.training, run.progress
-    while progress.seconds < 60.0 * minutes:
-        ages = run.improve()
-        shown = ", ".join(f"{name} {age:.1f}" for name, age in ages.items())
-        said(f"{progress.improvements:4d} improvements, {progress.seconds / 60:.1f} min: {shown}")
-        if progress.improvements % training.evaluate_every == 0:
+    """Improves for so many minutes of training in all, and says how it goes.
+
+    Args:
+        run: That begins or goes on; minutes that it has trained already count, evaluations do not.
+        minutes: After which it stops, once the improvement under way is done and evaluated.
+        said: Is given each line.
+    """
+    progress = run.progress
+    while True:
+        is_over = progress.seconds >= 60.0 * minutes
+        is_due = is_over or progress.improvements % run.training.evaluate_every == 0
+        if is_due and progress.curve[-1]["improvements"] < progress.improvements:
             row = run.evaluate()
-            held_out = ", ".join(f"{name} {value:.2f}" for name, value in row.items())
-            said(f"     held out: {held_out}")
-    if progress.curve[-1]["improvements"] < progress.improvements:
-        run.evaluate()
+            ages = _listed({name: row[name] for name in run.training.missions})
+            said(f"      held out: {row['ratio']:.3f} of the rule's age; {ages}")
+        if is_over:
+            return
+        ages = _listed(run.improve())
+        said(f"{progress.improvements:5d} improvements, {progress.seconds / 60:.1f} min: {ages}")
+
+
+def _listed(ages: dict[str, float]) -> str:
+    return ", ".join(f"{name} {age:.2f}" for name, age in ages.items()) + " windows"
