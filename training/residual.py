@@ -2,9 +2,10 @@
 
     python training/residual.py
 
-Goes on with a run that has begun. At the end the best networks, and the rule without one, fly
-missions that judged nothing so far; the best of them becomes `policy.safetensors` in the run's
-folder. `--ship` also puts it, and its card, into assets/policies.
+A run that has begun goes on where it was, with the same options but for the minutes; stopped by
+Ctrl-C or killed, it loses the improvement under way and nothing else. At the end the best networks,
+and the rule without one, fly missions that judged nothing so far; the best of them becomes
+`policy.safetensors` in the run's folder. `--ship` also puts it, and its card, into assets/policies.
 """
 
 import sys
@@ -13,7 +14,7 @@ from pathlib import Path
 
 from swarm_mj.cli import script
 from swarm_mj.cli.outputs import Output, check_outputs
-from swarm_mj.fields import setting
+from swarm_mj.fields import as_typed, setting
 from swarm_mj.io.atomic import write_text
 from swarm_mj.io.owned import owned
 from swarm_mj.io.provenance import commit
@@ -41,10 +42,18 @@ KINDS = {  # what 40 robots at rest meet; they believe in free space
 class Residual:
     """How long to train, and where everything goes."""
 
-    minutes: float = setting(45.0, "of training", low=0.01, high=10_000.0)
+    minutes: float = setting(
+        45.0,
+        "of training in all; those of a run that goes on count",
+        low=0.01,
+        high=10_000.0,
+    )
     seed: int = setting(0, "of all that is drawn", low=0, high=2**31)
     out: Path = setting(
-        ROOT / "runs" / "residual", "the run, to go on with", metavar="DIR", shown="runs/residual"
+        ROOT / "runs" / "residual",
+        "the run; one that has begun goes on, with the same options but for the minutes",
+        metavar="DIR",
+        shown="runs/residual",
     )
     learning_rate: float = setting(5e-4, "of Adam", low=1e-9, high=1.0)
     corrects_turns: bool = setting(
@@ -59,34 +68,42 @@ class Residual:
     ship: bool = setting(False, "put the policy into assets/policies")
 
     def __call__(self) -> int:
-        """Trains, chooses, writes; returns the exit code."""
+        """Trains, chooses, writes; returns the exit code.
+
+        Raises:
+            ValueError: The run's folder is another run's or damaged, or no network that could be
+                shipped is better than the rule.
+            OSError: Something cannot be read or written.
+        """
         policy = self.out / "policy.safetensors"
         paths = [policy, *(POLICIES / f"{SHIPPED}{end}" for end in (".safetensors", ".md"))]
         check_outputs(*(Output("policy", path) for path in (paths if self.ship else paths[:1])))
-        self.out.mkdir(parents=True, exist_ok=True)
         with owned(self.out / CURVE):
+            _said("flying the rule alone, or reading how far the run is")
             run = Run(self.training(), self.out)
+            _said(f"{self.out} stands at {run.progress.improvements} improvements")
             train(run, self.minutes, _said)
             _said("choosing among the best and the rule alone, on other missions")
             at, weights, ratios = run.choose()
             card = self._card(run.progress, at, ratios)
             save_residual(policy, weights, card)
+        _said(f"{policy}: made after {at} improvements, {ratios[at]:.3f} of the rule's age")
         if self.ship:
+            if not at:
+                raise ValueError("the rule alone is best, so nothing is shipped; train for longer")
             save_residual(paths[1], weights, card)
             write_text(paths[2], card)
-        _said(f"{policy}: made after {at} improvements, {ratios[at]:.3f} of the rule's age")
         return 0
 
     def _command(self) -> str:
         """What was typed, with all that is not as usual."""
-        usual = {each.name: each.default for each in fields(self)}
         words = ["python training/residual.py"]
-        for name in usual.keys() - {"out", "ship"}:
-            value = getattr(self, name)
-            if value != usual[name]:
-                flag = f"--{name.replace('_', '-')}"
-                words.append(flag if value is True else f"{flag} {value:g}")
-        return " ".join([words[0], *sorted(words[1:])])
+        for spec in fields(self):
+            value = getattr(self, spec.name)
+            if spec.name not in ("out", "ship") and value != spec.default:
+                flag = f"--{spec.name.replace('_', '-')}"
+                words.append(flag if value is True else f"{flag} {as_typed(value)}")
+        return " ".join(words)
 
     def training(self) -> ResidualTraining:
         """What is trained, on what."""

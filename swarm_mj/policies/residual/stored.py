@@ -80,7 +80,8 @@ def _metadata(data: bytes) -> dict[str, str]:
     """Of a safetensors file; raises ValueError if it is none."""
     size = int.from_bytes(data[:HEADER_BYTES], "little")
     header = read_json(data[HEADER_BYTES : HEADER_BYTES + size], dict)
-    return read_plain(header.get("__metadata__", {}), dict[str, str])
+    about = read_plain(header.get("__metadata__", {}), dict)
+    return {name: read_plain(text, str) for name, text in about.items()}
 
 
 def _weights(data: bytes, about: _About) -> Weights:
