@@ -25,8 +25,8 @@ POLICY = "policy.safetensors"
 
 @pytest.fixture(autouse=True)
 def _small(monkeypatch, tmp_path):
-    """Two kinds of missions; each improvement takes half a minute; nothing is really shipped."""
-    monkeypatch.setattr(residual, "KINDS", {"free space": {}, "30 % erased": {"erasure": 0.3}})
+    """One kind of missions; each improvement takes half a minute; nothing is really shipped."""
+    monkeypatch.setattr(residual, "KINDS", {"30 % erased": {"erasure": 0.3}})
     ticks = iter(range(0, 10**6, 30))
     monkeypatch.setattr(training_module, "time", SimpleNamespace(monotonic=lambda: next(ticks)))
     monkeypatch.setattr(residual, "POLICIES", tmp_path / "policies")
@@ -48,7 +48,7 @@ def test_a_run_leaves_a_policy_that_flies_and_goes_on_when_it_is_called_again(tm
     assert names == {CHECKPOINT, CURVE, POLICY}
     said = capfd.readouterr().err
     assert "run stands at 0 improvements" in said
-    assert "    1 improvements, 0.5 min: free space " in said
+    assert "    1 improvements, 0.5 min: 30 % erased " in said
     mission = paper("stationary", num_robots=6, num_windows=10)
     policy = make_policy(str(tmp_path / "run" / POLICY), mission)
     assert isinstance(policy, ResidualPolicy)
@@ -84,7 +84,7 @@ def test_its_card_names_the_command_the_commit_and_the_choice(tmp_path):
 
 def test_the_command_of_a_card_makes_the_same_training():
     made = Residual(
-        minutes=12.5, seed=2**31, learning_rate=1.23456789e-3, corrects_turns=True, held_out=3
+        minutes=12.5, seed=2**31, learning_rate=1.23456789e-3, corrects_turns=True, epochs=3
     )
     typed = made._command().split()[2:]
     seen = []

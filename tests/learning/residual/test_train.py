@@ -44,11 +44,21 @@ TRAINING = ResidualTraining(
 )
 
 
-@pytest.fixture(autouse=True)
-def _half_minutes(monkeypatch):
+@pytest.fixture(autouse=True, scope="module")
+def _half_minutes():
     """Each improvement takes half a minute."""
     ticks = iter(range(0, 10**6, 30))
-    monkeypatch.setattr(training_module, "time", SimpleNamespace(monotonic=lambda: next(ticks)))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(training_module, "time", SimpleNamespace(monotonic=lambda: next(ticks)))
+        yield
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory, _half_minutes):
+    """A run of four improvements that never stopped."""
+    run = Run(TRAINING, tmp_path_factory.mktemp("whole"))
+    train(run, 2.0, nobody)
+    return run
 
 
 def nobody(_line):
@@ -124,20 +134,22 @@ def test_the_curve_has_a_row_an_evaluation_and_says_what_it_was(tmp_path):
     assert not torch.equal(networks[2]["logit.weight"], networks[3]["logit.weight"])
 
 
-@pytest.mark.parametrize("improvements", [1, 2, 3])
-def test_a_run_that_goes_on_ends_as_one_that_never_stopped(tmp_path, improvements):
-    """It stops before an evaluation that is due, or between two."""
-    whole, parts = Run(TRAINING, tmp_path / "whole"), Run(TRAINING, tmp_path / "parts")
-    train(whole, 2.0, nobody)
-    for _ in range(improvements):
-        parts.improve()
-    parts = Run(TRAINING, tmp_path / "parts")
-    assert parts.progress.improvements == improvements
+@pytest.mark.parametrize("num_lines", [1, 2, 3, 4])
+def test_a_run_that_goes_on_ends_as_one_that_never_stopped(tmp_path, whole, num_lines):
+    """It is interrupted after an improvement, before an evaluation that is due, and after it."""
+    said = []
+
+    def interrupted(line):
+        said.append(line)
+        if len(said) == num_lines:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(Run(TRAINING, tmp_path), 2.0, interrupted)
+    parts = Run(TRAINING, tmp_path)
+    assert parts.progress.improvements == sum("improvements" in line for line in said)
     train(parts, 2.0, nobody)
-    if improvements < 3:
-        assert_same(parts, whole)
-    for name, weight in arrays(whole)[4].items():
-        assert torch.equal(weight, arrays(parts)[4][name])
+    assert_same(parts, whole)
 
 
 def test_a_run_that_is_over_goes_on_for_more_minutes_only(tmp_path):
@@ -151,9 +163,10 @@ def test_a_run_that_is_over_goes_on_for_more_minutes_only(tmp_path):
     assert [row["improvements"] for row in rows_of(tmp_path)] == [0, 2, 4]
 
 
-def test_a_run_that_is_broken_off_loses_the_improvement_under_way_alone(tmp_path, monkeypatch):
-    whole, broken = Run(TRAINING, tmp_path / "whole"), Run(TRAINING, tmp_path / "broken")
-    train(whole, 2.0, nobody)
+def test_a_run_that_is_broken_off_loses_the_improvement_under_way_alone(
+    tmp_path, whole, monkeypatch
+):
+    broken = Run(TRAINING, tmp_path)
     broken.improve()
 
     def interrupted(*_):
@@ -163,9 +176,9 @@ def test_a_run_that_is_broken_off_loses_the_improvement_under_way_alone(tmp_path
         patched.setattr(training_module, "improve", interrupted)
         with pytest.raises(KeyboardInterrupt):
             broken.improve()
-    names = {path.name for path in (tmp_path / "broken").iterdir()}
+    names = {path.name for path in tmp_path.iterdir()}
     assert names == {CHECKPOINT, CURVE}
-    again = Run(TRAINING, tmp_path / "broken")
+    again = Run(TRAINING, tmp_path)
     assert again.progress.improvements == 1
     train(again, 2.0, nobody)
     assert_same(again, whole)
@@ -178,15 +191,13 @@ def choice_if(run, monkeypatch, ratios):
     return run.choose()
 
 
-def test_the_choice_is_the_best_and_keeps_the_rule_if_all_networks_are_worse(tmp_path, monkeypatch):
-    run = Run(TRAINING, tmp_path)
-    train(run, 2.0, nobody)
-    assert list(run.progress.best) == [0, 2, 4]
-    at, weights, ratios = choice_if(run, monkeypatch, [0.9, 0.8])
+def test_the_choice_is_the_best_and_keeps_the_rule_if_all_networks_are_worse(whole, monkeypatch):
+    assert list(whole.progress.best) == [0, 2, 4]
+    at, weights, ratios = choice_if(whole, monkeypatch, [0.9, 0.8])
     assert (at, ratios) == (4, {0: 1.0, 2: pytest.approx(0.9), 4: pytest.approx(0.8)})
-    for name, weight in arrays(run)[4].items():
+    for name, weight in arrays(whole)[4].items():
         np.testing.assert_array_equal(weights.arrays[name], weight)
-    at, weights, _ = choice_if(run, monkeypatch, [1.01, 1.2])
+    at, weights, _ = choice_if(whole, monkeypatch, [1.01, 1.2])
     assert at == 0
     assert np.all(weights.arrays["logit.weight"] == 0.0)
 
