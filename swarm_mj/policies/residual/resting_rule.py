@@ -35,7 +35,8 @@ class RestingRule:
 
     def inform(self, belief: Belief) -> None:
         """Plans by this belief from now on."""
-        if not (_is_free_space(belief) and belief.radio == self._belief.radio):
+        are_plain = _is_free_space(belief) and _is_free_space(self._belief)
+        if not (are_plain and belief.radio == self._belief.radio):
             self._plans = {}
         self._belief = belief
 
