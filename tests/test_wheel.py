@@ -64,7 +64,8 @@ def test_both_bring_what_they_need(built):
     assert {"LICENSE", "README.md", "CITATION.cff", "tests/conftest.py", "docs/code.md"} <= sources
     with zipfile.ZipFile(wheel) as archive:
         names = {name.removeprefix("swarm_mj/") for name in archive.namelist()}
-    assets = {f"assets/{name}" for name in ("arena.xml", "robot.xml", "policies/gnn.safetensors")}
+    networks = (f"policies/{name}.safetensors" for name in ("gnn", "residual-gnn"))
+    assets = {f"assets/{name}" for name in ("arena.xml", "robot.xml", *networks)}
     assert {"py.typed", "policies/tuned.csv", "evaluation/published.csv"} | assets <= names
     assert not any(name.startswith(("tests/", "tools/", "training/")) for name in names)
 

@@ -17,7 +17,7 @@ DECENTRALISED = [name for name in POLICIES if name not in CENTRALISED]
 # What robots learn from payload, or from others' T in packets, is in no view: the tests of these
 # policies hold them to Eq. 9.
 PAYLOAD = {"planner": "snapshots"}  # what packets carry beyond T, M and P
-VIEWED = [name for name in DECENTRALISED if name not in (*PAYLOAD, "sotdma")]
+VIEWED = [name for name in DECENTRALISED if name not in (*PAYLOAD, "sotdma", "residual-gnn")]
 ROW = 3  # the robot whose knowledge the law keeps
 
 
