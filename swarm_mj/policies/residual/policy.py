@@ -74,9 +74,10 @@ class ResidualPolicy(BroadcastPolicy):
 
     @property
     def parameters(self) -> Parameters:
-        """Whether it draws, and a digest that changes with its weights."""
-        digest = hashlib.sha256(repr(self._weights.trust).encode())
-        for name, array in sorted(self._weights.arrays.items()):
+        """Whether it draws, and a digest that changes with its network."""
+        weights = self._weights
+        digest = hashlib.sha256(repr((weights.trust, weights.corrects_turns)).encode())
+        for name, array in sorted(weights.arrays.items()):
             digest.update(name.encode() + b"\0" + np.ascontiguousarray(array).tobytes())
         hexadecimal = digest.hexdigest()[:DIGITS]
         return {"is_deterministic": self._is_deterministic, "digest": hexadecimal}

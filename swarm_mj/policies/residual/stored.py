@@ -47,6 +47,7 @@ def save_residual(path: Path, weights: Weights, card: str) -> None:
     arrays = {name: np.ascontiguousarray(each) for name, each in weights.arrays.items()}
     data = save(arrays, {METADATA: json.dumps(document, allow_nan=False)})
     check_size(path.name, len(data), MOST_BYTES)
+    _weights(data, about)
     write_bytes(path, data, check=read_residual)
 
 
