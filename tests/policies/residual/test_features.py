@@ -23,7 +23,7 @@ from swarm_mj.radio.power_law import power_law
 THRESHOLD, NOW = 2.0, 100
 LINE = [[0.0, 0.0], [0.6, 0.0], [1.2, 0.0], [1.8, 0.0]]
 ONE, TWO = 2 / 0.6**2, 2 / 1.2**2  # power over one gap, and over two [noise]
-KNOWN = [90, 99, 97, 80]  # T of robot 1
+KNOWN = [97, 99, 97, 80]  # T of robot 1
 HELD = [[95, 92, 60, 50], [0, 0, 0, 0], [70, 90, 98, 96], [40, 85, 91, 94]]  # and of its teammates
 
 
@@ -123,12 +123,12 @@ def test_a_neighbour_is_jammed_that_would_decode_another_if_this_robot_kept_sile
 
 
 def test_news_is_what_a_packet_would_make_younger():
-    """Robot 1 says of itself that it is as old as the slot."""
+    """What robot 1 knows of itself is as new as the slot; of the listener it tells nothing new."""
     _, (before, behind) = eyes()
-    said = [90, 100, 97, 80]
+    said = [97, 100, 97, 80]
     assert younger(said, HELD[0], 0) == (8 + 37 + 30) / 4
     assert before["news"] == approx(0.5 * log1p((8 + 37 + 30) / 4))
-    assert behind["news"] == approx(0.5 * log1p((20 + 10) / 4))
+    assert behind["news"] == approx(0.5 * log1p((27 + 10) / 4))
     assert before["balance"] == approx(0.05 * (8 + 37 + 30) / 4)
     assert before["news_of_other"] == behind["news_of_other"] == 0.0
 
@@ -138,7 +138,7 @@ def test_news_is_held_against_what_is_lost():
     _, (before, behind) = eyes(due=[3])
     lost = younger([*HELD[3][:3], 100], HELD[2], 2)
     assert lost == 4 / 4
-    assert behind["news"] == approx(0.5 * log1p((20 + 10) / 4))
+    assert behind["news"] == approx(0.5 * log1p((27 + 10) / 4))
     assert behind["news_of_other"] == approx(0.5 * log1p(lost))
     assert behind["balance"] == approx(-0.05 * lost)
     assert before["balance"] == approx(0.05 * (8 + 37 + 30) / 4)
@@ -169,7 +169,7 @@ def test_ages_are_logarithms():
     assert behind["age_of_us"] == approx(0.3 * log1p(10))
     assert own["since_sent"] == approx(0.3 * log1p(7))
     assert own["since_heard"] == approx(0.3 * log1p(1))
-    assert own["age"] == approx(0.3 * log1p((10 + 1 + 3 + 20) / 4))
+    assert own["age"] == approx(0.3 * log1p((3 + 1 + 3 + 20) / 4))
     own, (before, _) = eyes(tick=1000, known=[700, 999, 0, 0], sent=599)
     assert before["since_decoded"] == own["since_sent"] == approx(0.3 * log1p(400))
     assert own["age"] == approx(0.3 * log1p((300 + 1 + 400 + 400) / 4))

@@ -160,6 +160,42 @@ def test_the_digest_changes_with_anything_that_a_file_holds_but_its_card():
     assert len(digests - {first["digest"]}) == len(arrays) + 2
 
 
+def test_robots_remember_the_slots_in_which_they_sent_and_decoded():
+    """Slots are counted from 1; of the last slot of the flight they have not been told."""
+    swarm, policy = Swarm(LOSSY, [1, 2]), residual_policy(some_weights(), LOSSY)
+    swarm.start(policy)
+    sent, decoded = np.zeros((2, 8)), np.zeros((2, 8, 8))
+    phases = [phase for _ in range(20) if swarm.step(policy) for phase in swarm.phases]
+    for slot, phase in enumerate(phases[:-1], start=1):
+        for b in range(2):
+            for i in range(8):
+                if phase.recipient[b, i] != i:
+                    sent[b, i] = slot
+                if phase.heard[b, i] != i:
+                    decoded[b, i, phase.heard[b, i]] = slot
+    np.testing.assert_array_equal(policy._beliefs.sent, sent)
+    np.testing.assert_array_equal(policy._beliefs.decoded, decoded)
+    np.testing.assert_array_equal(policy._beliefs.heard, np.max(decoded, axis=2))
+
+
+def test_the_network_sees_those_in_range_that_a_robot_has_heard_of():
+    swarm, talk = Swarm(LOSSY, [1]), make_policy("tdma", LOSSY)
+    policy = residual_policy(constant(0.0), LOSSY)
+    swarm.start(talk)
+    place_m = swarm.states.position_m[0]
+    apart_m = np.linalg.norm(place_m[:, None] - place_m, axis=2)
+    num_seen = []
+    for _ in range(12):
+        is_near = (apart_m <= LOSSY.range_m) & swarm.buffers.is_known[0] & ~np.eye(8, dtype=bool)
+        policy.start(8, [np.random.default_rng(1)])
+        seen = policy.decide(swarm.views).seen
+        assert np.bincount(seen.owner, minlength=8).tolist() == np.sum(is_near, axis=1).tolist()
+        num_seen.append(len(seen.owner))
+        swarm.step(talk)
+    assert num_seen[0] == 0
+    assert num_seen[-1] > 10
+
+
 def test_packets_that_hold_a_part_of_t_tell_nothing_of_what_their_senders_know():
     slow = paper("stationary", num_robots=8, range_ratio=0.3, bit_rate=5_000.0)
     strange = reference("stationary", num_robots=8, range_ratio=0.3)

@@ -118,9 +118,10 @@ def test_plans_are_made_once_for_positions_that_come_again():
     first = propose(rule, standing(1))
     assert len(rule._plans) == 1
     propose(rule, standing(2))
-    assert len(rule._plans) == 2
+    plans = list(rule._plans.values())
+    assert len(plans) == 2
     assert_same(propose(rule, standing(1)), first)
-    assert len(rule._plans) == 2
+    assert all(kept is plan for kept, plan in zip(rule._plans.values(), plans, strict=True))
 
 
 def test_who_is_never_due_is_due_beyond_the_last_slot():
