@@ -19,7 +19,14 @@ from swarm_mj.io.atomic import write_text
 from swarm_mj.io.owned import owned
 from swarm_mj.io.provenance import commit
 from swarm_mj.learning.residual.ppo import PpoSettings
-from swarm_mj.learning.residual.train import CURVE, Progress, ResidualTraining, Run, train
+from swarm_mj.learning.residual.train import (
+    CURVE,
+    USUAL,
+    Progress,
+    ResidualTraining,
+    Run,
+    train,
+)
 from swarm_mj.mission import Mission, paper
 from swarm_mj.policies.residual.stored import save_residual
 
@@ -43,7 +50,7 @@ class Residual:
     """How long to train, and where everything goes."""
 
     minutes: float = setting(
-        45.0,
+        30.0,
         "of training in all; those of a run that goes on count",
         low=0.01,
         high=10_000.0,
@@ -55,11 +62,13 @@ class Residual:
         metavar="DIR",
         shown="runs/residual",
     )
-    learning_rate: float = setting(5e-4, "of Adam", low=1e-9, high=1.0)
+    learning_rate: float = setting(USUAL.learning_rate, "of Adam", low=1e-9, high=1.0)
     corrects_turns: bool = setting(
         False, "let the network decide before everyone's plan is in force, too"
     )
-    epochs: int = setting(2, "passes over the decisions of an improvement", low=1, high=100)
+    epochs: int = setting(
+        USUAL.epochs, "passes over the decisions of an improvement", low=1, high=100
+    )
     robots: int = setting(40, "in a team", low=2, high=200)
     windows: int = setting(WINDOWS, "of a mission", low=100, high=10_000)
     together: int = setting(4, "missions of each kind between two improvements", low=1, high=1000)

@@ -76,7 +76,7 @@ def test_its_card_names_the_command_the_commit_and_the_choice(tmp_path):
     )
     assert command in said
     assert f"Commit {commit()}." in said
-    assert "- learning_rate: 0.0005\n" in said
+    assert "- learning_rate: 0.0007\n" in said
     assert "- 30 % erased: {'erasure': 0.3}\n" in said
     assert "- 0 improvements: 1.000" in said
     assert said.count("(this one)") == 1

@@ -39,7 +39,8 @@ class ResidualNetwork(nn.Module):
         messages = self.message(torch.cat([neighbours, robots[owner]], dim=1))
         none = robots.new_zeros(len(robots), messages.shape[1])
         total = OF_MESSAGES * none.index_add(0, owner, messages)
-        most = none.index_reduce(0, owner, messages, "amax")
+        rows = owner[:, None].expand_as(messages)
+        most = none.scatter_reduce(0, rows, messages, "amax")
         said = self.logit(self.decision(torch.cat([total, most, robots], dim=1))).squeeze(1)
         return said + self.trust * robots[:, 0]
 

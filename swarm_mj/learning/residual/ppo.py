@@ -29,8 +29,8 @@ SCALE = 20.0  # of the loss, against which gradients are clipped
 class PpoSettings:
     """Of one improvement."""
 
-    learning_rate: float = setting(1e-3, "of Adam", low=1e-9, high=1.0)
-    epochs: int = setting(2, "passes over the decisions", low=1, high=100)
+    learning_rate: float = setting(7e-4, "of Adam", low=1e-9, high=1.0)
+    epochs: int = setting(5, "passes over the decisions", low=1, high=100)
     minibatch: int = setting(6000, "decisions in a minibatch, about", low=CHUNK, high=10**7)
     least_ratio: float = setting(0.7, "of probabilities", low=0.0, high=1.0)
     most_ratio: float = setting(1.5, "of probabilities", low=1.0, high=100.0)
