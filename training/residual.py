@@ -94,12 +94,12 @@ class Residual:
             train(run, self.minutes, _said)
             _said("choosing among the best and the rule alone, on other missions")
             at, weights, ratios = run.choose()
+            if not at:
+                raise ValueError("the rule alone is best, so no policy is kept; train for longer")
             card = self._card(run.progress, at, ratios)
             save_residual(policy, weights, card)
         _said(f"{policy}: made after {at} improvements, {ratios[at]:.3f} of the rule's age")
         if self.ship:
-            if not at:
-                raise ValueError("the rule alone is best, so nothing is shipped; train for longer")
             save_residual(paths[1], weights, card)
             write_text(paths[2], card)
         return 0
@@ -135,9 +135,7 @@ class Residual:
         training.pop("missions")
         settings = training.pop("ppo") | training
         listed = "\n".join(f"- {name}: {value}" for name, value in settings.items())
-        kinds = "\n".join(
-            f"- {name}: {channel or 'as believed'}" for name, channel in KINDS.items()
-        )
+        kinds = "\n".join(f"- {name}{_options(channel)}" for name, channel in KINDS.items())
         chosen = "\n".join(
             f"- {n} improvements: {ratio:.3f}{' (this one)' if n == at else ''}"
             for n, ratio in sorted(ratios.items())
@@ -145,6 +143,9 @@ class Residual:
         return CARD.format(
             width=self.training().width,
             listed=listed,
+            turns=", and those that still take turns, too"
+            if self.corrects_turns
+            else ", and no others",
             kinds=kinds,
             chosen=chosen,
             robots=self.robots,
@@ -159,8 +160,9 @@ class Residual:
 CARD = """# A learned correction of a plan, of swarm_mj
 
 Teams at rest agree on one plan from positions and the clock (`planner --payload none`). In every
-slot, each robot evaluates this network on what it remembers of its neighbours, and draws from the
-result whether it transmits, whatever the plan says.
+slot, each robot that decides evaluates this network on what it remembers of its neighbours, and
+draws from the result whether it transmits, whatever the plan says. Those that follow the plan
+decide{turns}.
 
 - network: graph neural network of one hop, width {width}, over believed neighbours
 - packets: T, M and P, as the paper's, and nothing more
@@ -186,7 +188,7 @@ Commit {commit}.
 ## Choice
 
 Mean age over that of the rule alone, on {held_out} missions of each kind that judged nothing
-before:
+before. The least of several flatters; docs/channels.md has missions that chose nothing:
 
 {chosen}
 
@@ -194,6 +196,12 @@ before:
 
 Apache-2.0, as swarm_mj.
 """
+
+
+def _options(channel: dict[str, object]) -> str:
+    """A kind's options, as they are typed."""
+    typed = (f"`--{name.replace('_', '-')} {value}`" for name, value in channel.items())
+    return ": " + " ".join(typed) if channel else ""
 
 
 def _said(line: str) -> None:

@@ -235,11 +235,6 @@ def is_own_policy(name: str) -> bool:
 def _shipped_residual(mission: Mission, *, is_deterministic: bool) -> Policy:
     """The shipped correction of the plan of teams at rest; teams that move go by `sotdma`."""
     if mission.task != "stationary":
-        if is_deterministic:
-            raise ValueError(
-                f"{SHIPPED_RESIDUAL} draws from no network's distribution where robots move; leave "
-                "--deterministic out"
-            )
         policy = _sotdma(mission)
         policy.uses = f"as sotdma, for the network was trained on teams at rest: {policy.uses}"
         return policy

@@ -24,7 +24,7 @@ class Lesson(NamedTuple):
     seen: Seen
     logit: Float32[np.ndarray, "R"]  # of transmitting, when it was decided
     weight: Float32[np.ndarray, "R"]  # how many decisions each stands for
-    worth: Float32[np.ndarray, "R"]  # of transmitting rather than not [slots], a mean over pairs
+    worth: Float32[np.ndarray, "R"]  # of transmitting rather than not [slots²], a mean over pairs
 
 
 class _Part(NamedTuple):
@@ -48,6 +48,8 @@ class Recorder(ResidualPolicy):
     def decide(self, views: LocalViews) -> Decision:
         """As it is decided; kept."""
         decision = super().decide(views)
+        seen = decision.seen  # of a room for many more neighbours
+        decision = decision._replace(seen=seen._replace(neighbours=seen.neighbours.copy()))
         self.decisions.append(decision)
         self.observed.append(ticks(views.buffers.timestamp))
         return decision

@@ -21,6 +21,7 @@ from swarm_mj.learning.residual.ppo import PpoSettings, improve
 from swarm_mj.learning.residual.recording import Lesson, Recorder, lesson
 from swarm_mj.learning.torch_file import read_torch
 from swarm_mj.mission import Mission
+from swarm_mj.policies.residual.making import check_rests, reads_packets
 from swarm_mj.policies.residual.network import Weights
 from swarm_mj.policies.residual.policy import ResidualPolicy
 from swarm_mj.policies.residual.resting_rule import RestingRule
@@ -66,6 +67,13 @@ class ResidualTraining:
 
     def __post_init__(self) -> None:
         check(self)
+        for name, mission in self.missions.items():
+            check_rests(mission)
+            if not reads_packets(mission):
+                raise ValueError(
+                    f"a packet of {name} does not say all that its sender knew before, so "
+                    "there is too little to learn from; take the preset paper and no bit rate"
+                )
         if self.together > self.places:
             raise ValueError(
                 f"together must be up to places, {self.places}, not {self.together}: missions that "
@@ -180,7 +188,8 @@ class Run:
         """Which of the best is the best on missions that judged nothing so far.
 
         Returns:
-            After how many improvements it was made, its weights, and the ratio of each of the best.
+            After how many improvements it was made, its weights, and the ratio of each of the best;
+            0 is the rule alone, whose weights, still untrained, must not be flown by draws.
         """
         ratios, all_weights = {}, {}
         for at, state in self.progress.best.items():

@@ -140,7 +140,11 @@ def _pass_on(
     threshold: float,
     reckoned: Reckoned,
 ) -> None:
-    """Neighbours that should have decoded a packet now know what its sender does."""
+    """Neighbours that should have decoded a packet now know what its sender is believed to know.
+
+    Of a sender that i did not decode itself, that is what i last believed: not that it has just
+    observed itself.
+    """
     for j in range(held.shape[0]):
         is_near = is_known[j] and reckoned.power[j] >= threshold
         if transmits[j] or not is_near or j in (i, sender):

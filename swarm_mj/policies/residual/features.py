@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Float32, Int, Int16, Int32
 
 from swarm_mj.compiled import compiled
 from swarm_mj.policies.residual.beliefs import Beliefs
-from swarm_mj.policies.residual.proposals import Proposal
+from swarm_mj.policies.residual.proposals import FARTHEST, Proposal
 from swarm_mj.policies.residual.reckoning import (
     NOBODY,
     Reckoned,
@@ -23,7 +23,6 @@ from swarm_mj.radio.kernels import is_received, sinr
 from swarm_mj.radio.power_law import PowerLaw, write_powers
 
 OLDEST = 400  # ages count no further [slots]
-FARTHEST = 40  # nor do times until somebody is due [slots]
 WORST, BEST = -2.0, 2.0  # margins, in decades of SINR
 
 ROBOT_FEATURES = (
@@ -40,7 +39,7 @@ ROBOT_FEATURES = (
     "hears",  # mean share of due packets that it decodes of them
     "heard_by",  # and they of its own
     "team",  # N, in forties
-    "clock",  # how long the mission lasts
+    "clock",  # how long the mission has lasted
     "from_afar",  # share of the packets it decoded from out of range
 )
 NEIGHBOUR_FEATURES = (

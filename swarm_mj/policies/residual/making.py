@@ -16,18 +16,27 @@ def residual_policy(
     Raises:
         ValueError: The mission's team moves: there is no rule for it.
     """
-    if mission.task != "stationary":
-        raise ValueError(
-            f"residual policies are for teams at rest, and those of {mission.task} move; fly the "
-            "task stationary, or another policy"
-        )
-    # By the authors' rule a robot may decode while it transmits, which changes its T in that slot.
-    is_whole = fits(packet_of(mission), mission)
+    check_rests(mission)
     radio = radio_of(mission)
     return ResidualPolicy(
         weights,
         RestingRule(radio),
         radio,
         is_deterministic=is_deterministic,
-        reads_packets=is_whole and mission.half_duplex == "strict",
+        reads_packets=reads_packets(mission),
     )
+
+
+def check_rests(mission: Mission) -> None:
+    """Raises ValueError if the mission's team moves: there is no rule for it."""
+    if mission.task != "stationary":
+        raise ValueError(
+            f"residual policies are for teams at rest, and those of {mission.task} move; fly the "
+            "task stationary, or another policy"
+        )
+
+
+def reads_packets(mission: Mission) -> bool:
+    """Whether a packet holds all of its sender's T as it was before the slot."""
+    # By the authors' rule a robot may decode while it transmits, which changes its T in that slot.
+    return fits(packet_of(mission), mission) and mission.half_duplex == "strict"

@@ -67,7 +67,10 @@ class ResidualPolicy(BroadcastPolicy):
             reads_packets: Whether packets hold all of T as it was before the slot, so that they
                 tell what their senders know.
         """
-        self.uses = f"{rule.uses}; and what its neighbours know, by a trained network"
+        self.uses = (
+            f"{rule.uses}, which a trained graph neural network corrects by what the robot "
+            "remembers of its neighbours and of its own packets"
+        )
         self._weights, self._rule, self._radio = weights, rule, radio
         self._is_deterministic, self._reads_packets = is_deterministic, reads_packets
         self._belief = Belief(radio=radio)

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Int, Int16
 
+FARTHEST = 40  # nobody is told of a transmission that is later [slots]
+
 
 class Proposal(NamedTuple):
     """Of one slot: `[b, i, j]` is what robot i of mission b believes of j, or says of itself."""

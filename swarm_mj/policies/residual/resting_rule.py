@@ -7,13 +7,12 @@ from jaxtyping import Bool, Int16
 
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.standing_plan import StandingPlan
-from swarm_mj.policies.residual.proposals import Proposal, turns
+from swarm_mj.policies.residual.proposals import FARTHEST, Proposal, turns
 from swarm_mj.policies.tdma import draw_order, slot_of
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.link_models import Belief
 
-FARTHEST = 40  # slots that robots look ahead
 MOST_PLANS = 512  # that are kept for positions that come again
 
 
@@ -24,13 +23,13 @@ class RestingRule:
     """
 
     uses = (
-        "its buffer, T in packets, a common order, the clock and the radio: a plan from positions"
+        "its buffer, T in packets, a common order, the clock and the radio: it follows the plan of "
+        "planner --payload none"
     )
 
-    def __init__(self, radio: FreeSpaceRadio, settings: PlannerSettings | None = None) -> None:
+    def __init__(self, radio: FreeSpaceRadio) -> None:
         """Prepares the rule; robots believe in the radio unless it is informed otherwise."""
         self._belief = Belief(radio=radio)
-        self._settings = PlannerSettings() if settings is None else settings
         self._plans: dict[bytes, StandingPlan] = {}
 
     def inform(self, belief: Belief) -> None:
@@ -49,7 +48,8 @@ class RestingRule:
     def propose(self, views: LocalViews) -> Proposal:
         """The plan's choice, or the turns'."""
         buffers, slot = views.buffers, slot_of(views.now)
-        knows_all = np.all(buffers.is_known, axis=2)
+        knows_motion = np.any(buffers.velocity_mps, axis=(2, 3))
+        knows_all = np.all(buffers.is_known, axis=2) & ~knows_motion
         is_due, due_in = turns(self._order, slot)
         for b in np.flatnonzero(np.any(knows_all, axis=1)).tolist():
             # Robots at rest believe the same positions as soon as they know them all.
@@ -59,7 +59,7 @@ class RestingRule:
             for key, robots in members.items():
                 if key not in self._plans:
                     links = self._belief.links(buffers.position_m[b, robots[0]])
-                    self._plans[key] = StandingPlan(links, self._settings)
+                    self._plans[key] = StandingPlan(links, PlannerSettings())
                 is_due[b, robots], due_in[b, robots] = _told(self._plans[key], int(slot[b]))
         return Proposal(is_due, due_in, knows_all)
 

@@ -16,7 +16,7 @@ from swarm_mj.policies.residual.network import Weights, shapes
 FORMAT, VERSION = "swarm_mj residual policy", 1
 METADATA = FORMAT  # the entry of the file's metadata that says what the weights are of
 MOST_BYTES = 5_000_000
-MOST_WIDTH = 256
+MOST_WIDTH, MOST_TRUST = 256, 50
 HEADER_BYTES = 8  # of a safetensors file: how long the JSON behind them is, little-endian
 
 
@@ -89,6 +89,8 @@ def _weights(data: bytes, about: _About) -> Weights:
     """The arrays, each checked."""
     if not 1 <= about.width <= MOST_WIDTH:
         raise ValueError(f"its width must be from 1 to {MOST_WIDTH}, not {about.width}")
+    if not 0.0 <= about.trust <= MOST_TRUST:
+        raise ValueError(f"its trust must be from 0 to {MOST_TRUST}, not {about.trust:g}")
     try:
         arrays = load(data)
     except (SafetensorError, KeyError, ValueError) as error:
