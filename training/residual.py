@@ -80,8 +80,7 @@ class Residual:
         """Trains, chooses, writes; returns the exit code.
 
         Raises:
-            ValueError: The run's folder is another run's or damaged, or no network that could be
-                shipped is better than the rule.
+            ValueError: The run's folder is another run's or damaged.
             OSError: Something cannot be read or written.
         """
         policy = self.out / "policy.safetensors"
@@ -95,7 +94,8 @@ class Residual:
             _said("choosing among the best and the rule alone, on other missions")
             at, weights, ratios = run.choose()
             if not at:
-                raise ValueError("the rule alone is best, so no policy is kept; train for longer")
+                _said("the rule alone is best, so no policy is kept; train for longer")
+                return 0
             card = self._card(run.progress, at, ratios)
             save_residual(policy, weights, card)
         _said(f"{policy}: made after {at} improvements, {ratios[at]:.3f} of the rule's age")

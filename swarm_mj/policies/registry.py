@@ -1,7 +1,7 @@
 """The one table of policies by their names on the command line.
 
 A learned policy has no name but that of the directory or file that holds it, except the shipped
-one, `gnn`.
+ones, `gnn` and `residual-gnn`.
 """
 
 import os

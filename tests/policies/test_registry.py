@@ -115,11 +115,15 @@ def test_only_a_learned_policy_is_made_deterministic():
         policy = make_policy(name, MISSION, is_deterministic=True)
         assert policy.parameters["is_deterministic"] is True
     for name in POLICIES:
-        if name != "gnn":
+        if name not in ("gnn", "residual-gnn"):
             with pytest.raises(ValueError, match=f"{name} draws from no network"):
                 make_policy(name, MISSION, is_deterministic=True)
     policy = make_policy("residual-gnn", REST, is_deterministic=True)
     assert policy.parameters["is_deterministic"] is True
+    # Where robots move it has no network, and is flown beside learned policies all the same.
+    assert isinstance(
+        make_policy("residual-gnn", MISSION, is_deterministic=True), SelfOrganisedTdma
+    )
 
 
 @here
