@@ -12,7 +12,7 @@ def test_a_team_at_rest_has_one(preset):
     assert type(policy) is ResidualPolicy
     assert policy.parameters["is_deterministic"] is False
     assert policy.payload == "none"
-    assert policy.uses.endswith("and what its neighbours know, by a trained network")
+    assert policy.uses.endswith("what the robot remembers of its neighbours and of its own packets")
 
 
 @pytest.mark.parametrize("task", ["random-walk", "flocking"])
