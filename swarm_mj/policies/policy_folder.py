@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.io.atomic import present_folder, write_folder
-from swarm_mj.io.reading import check_size, format_of, read_file
+from swarm_mj.io.reading import check_size, format_of, read_file, read_json, read_plain
 
 WEIGHTS, CONFIG, CARD = "model.safetensors", "config.json", "README.md"
 MAX_BYTES = {WEIGHTS: 64_000_000, CONFIG: 1_000_000}
 ONE_FILE = ".safetensors"
+HEADER_BYTES = 8  # of such a file: how long the JSON behind them is, little-endian
 MLP_FORMAT = "swarm_mj mlp policy"  # of a plain network's config; a GNN's is another
 MOST_SHOWN = 8  # policies in a message
 WAY_OUT = "copy it again, or make one with `swarm-mj train`"
@@ -92,6 +93,18 @@ def is_mlp(folder: Path) -> bool:
     with suppress(ValueError):  # what is wrong is said when all of it is read
         return format_of(read_part(present, CONFIG)) == MLP_FORMAT
     return False
+
+
+def metadata_of(data: bytes) -> dict[str, str]:
+    """The metadata in the JSON at the head of a safetensors file; none is empty.
+
+    Raises:
+        ValueError: It is no such file.
+    """
+    size = int.from_bytes(data[:HEADER_BYTES], "little")
+    header = read_json(data[HEADER_BYTES : HEADER_BYTES + size], dict)
+    about = read_plain(header.get("__metadata__", {}), dict)
+    return {name: read_plain(text, str) for name, text in about.items()}
 
 
 def check_tensors(

@@ -26,13 +26,13 @@ from swarm_mj.policies.policy_folder import (
     WEIGHTS,
     check_tensors,
     kind_of_tensor,
+    metadata_of,
     present_policy,
     read_part,
     write_policy,
 )
 
 METADATA = "swarm_mj policy"  # the entry of a one-file policy's metadata that has config and card
-HEADER_BYTES = 8  # of a safetensors file: how long the JSON behind them is, little-endian
 
 
 def save_policy(
@@ -118,10 +118,9 @@ def read_policy(path: Path) -> tuple[AggregationGnn, PolicyConfig]:
 def _read_file(path: Path) -> tuple[AggregationGnn, PolicyConfig]:
     """As `read_policy`, of one file, whose metadata is in the JSON at its head."""
     data = read_file(path, "policy", MAX_BYTES[WEIGHTS])
-    size = int.from_bytes(data[:HEADER_BYTES], "little")
-    header = read_json(data[HEADER_BYTES : HEADER_BYTES + size], dict)
+    about = metadata_of(data)
     try:
-        config = from_json(read_json(header["__metadata__"][METADATA], dict)[CONFIG])
+        config = from_json(read_json(about[METADATA], dict)[CONFIG])
     except (KeyError, TypeError) as error:
         raise ValueError(
             "it has weights, but does not say of which policy; if a policy's folder holds it, "

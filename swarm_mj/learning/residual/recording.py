@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
+from jaxtyping import Bool, Float, Float32
 
 from swarm_mj.learning.residual.worth import Course, worth
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.policies.residual.features import Seen
-from swarm_mj.policies.residual.policy import Decision, ResidualPolicy
+from swarm_mj.policies.residual.policy import Decision, ResidualPolicy, ticks
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW, channel_at
@@ -53,11 +53,6 @@ class Recorder(ResidualPolicy):
         self.decisions.append(decision)
         self.observed.append(ticks(views.buffers.timestamp))
         return decision
-
-
-def ticks(timestamp: Float[np.ndarray, "..."]) -> Int[np.ndarray, "..."]:
-    """Times [windows] in slots."""
-    return np.rint(SLOTS_PER_WINDOW * timestamp).astype(np.int32)
 
 
 def lesson(

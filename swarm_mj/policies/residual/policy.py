@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float32, Int
+from jaxtyping import Bool, Float, Float32, Int, Int32
 
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.policy import BroadcastPolicy, Parameters
@@ -109,7 +109,7 @@ class ResidualPolicy(BroadcastPolicy):
     def decide(self, views: LocalViews) -> Decision:
         """What is decided of the slot that begins, and on what."""
         buffers, tick = views.buffers, 1 + slot_of(views.now)
-        observed = np.rint(SLOTS_PER_WINDOW * buffers.timestamp).astype(np.int32)
+        observed = ticks(buffers.timestamp)
         is_known, threshold = buffers.is_known, self._radio.threshold
         if self._last is not None:
             note_slot(
@@ -148,3 +148,8 @@ class ResidualPolicy(BroadcastPolicy):
         transmits[place] = 1.0 / (1.0 + np.exp(-logit.astype(np.float64))) > likely
         self._last = Decision(rows, seen, logit, proposal, transmits)
         return self._last
+
+
+def ticks(timestamp: Float[np.ndarray, "..."]) -> Int32[np.ndarray, "..."]:
+    """Times [windows] in slots."""
+    return np.rint(SLOTS_PER_WINDOW * timestamp).astype(np.int32)

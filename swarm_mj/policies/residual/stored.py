@@ -9,15 +9,14 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from swarm_mj.io.atomic import write_bytes
-from swarm_mj.io.reading import check_size, read_document, read_file, read_json, read_plain
-from swarm_mj.policies.policy_folder import check_tensors, kind_of_tensor
+from swarm_mj.io.reading import check_size, read_document, read_file
+from swarm_mj.policies.policy_folder import check_tensors, kind_of_tensor, metadata_of
 from swarm_mj.policies.residual.network import Weights, shapes
 
 FORMAT, VERSION = "swarm_mj residual policy", 1
 METADATA = FORMAT  # the entry of the file's metadata that says what the weights are of
 MOST_BYTES = 5_000_000
 MOST_WIDTH, MOST_TRUST = 256, 50
-HEADER_BYTES = 8  # of a safetensors file: how long the JSON behind them is, little-endian
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +53,7 @@ def save_residual(path: Path, weights: Weights, card: str) -> None:
 def is_residual(path: Path) -> bool:
     """Whether a file says that it holds such weights."""
     try:
-        return METADATA in _metadata(read_file(path, "policy", MOST_BYTES))
+        return METADATA in metadata_of(read_file(path, "policy", MOST_BYTES))
     except ValueError:  # it is a folder, or no such file; whoever reads it as another says more
         return False
 
@@ -69,20 +68,12 @@ def read_residual(path: Path) -> Weights:
     """
     data = read_file(path, "policy", MOST_BYTES)
     try:
-        about = read_document(_metadata(data)[METADATA], FORMAT, VERSION, _About)
+        about = read_document(metadata_of(data)[METADATA], FORMAT, VERSION, _About)
         return _weights(data, about)
     except KeyError as error:
         raise ValueError(f"policy {path} is no residual policy; name another file") from error
     except ValueError as error:
         raise ValueError(f"policy {path}: {error}; copy it again") from error
-
-
-def _metadata(data: bytes) -> dict[str, str]:
-    """Of a safetensors file; raises ValueError if it is none."""
-    size = int.from_bytes(data[:HEADER_BYTES], "little")
-    header = read_json(data[HEADER_BYTES : HEADER_BYTES + size], dict)
-    about = read_plain(header.get("__metadata__", {}), dict)
-    return {name: read_plain(text, str) for name, text in about.items()}
 
 
 def _weights(data: bytes, about: _About) -> Weights:
