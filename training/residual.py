@@ -51,7 +51,7 @@ class Residual:
 
     minutes: float = setting(
         30.0,
-        "of training in all; those of a run that goes on count",
+        "of training in all, without evaluations; those of a run that goes on count",
         low=0.01,
         high=10_000.0,
     )
@@ -94,7 +94,7 @@ class Residual:
             _said("choosing among the best and the rule alone, on other missions")
             at, weights, ratios = run.choose()
             if not at:
-                _said("the rule alone is best, so no policy is kept; train for longer")
+                _said("the rule alone is best, so nothing is written or shipped; train for longer")
                 return 0
             card = self._card(run.progress, at, ratios)
             save_residual(policy, weights, card)

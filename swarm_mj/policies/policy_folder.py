@@ -45,7 +45,7 @@ def present_policy(folder: Path) -> Path:
     if not present.exists():
         raise ValueError(
             f"policy {folder} does not exist; name a directory that `swarm-mj train` wrote, such "
-            "as runs/NAME/policy"
+            f"as runs/NAME/policy, or a {ONE_FILE} file"
         )
     if present.suffix == ONE_FILE and present.is_file():
         return present

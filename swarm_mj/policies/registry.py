@@ -236,7 +236,10 @@ def _shipped_residual(mission: Mission, *, is_deterministic: bool) -> Policy:
     """The shipped correction of the plan of teams at rest; teams that move go by `sotdma`."""
     if mission.task != "stationary":
         policy = _sotdma(mission)
-        policy.uses = f"as sotdma, for the network was trained on teams at rest: {policy.uses}"
+        policy.uses = (
+            "where robots move, what sotdma uses; at rest (--task stationary) a trained graph "
+            "neural network corrects the plan of planner --payload none"
+        )
         return policy
     need("safetensors", f"policy {SHIPPED_RESIDUAL}", "fly another")
     from swarm_mj.policies.residual.making import residual_policy

@@ -163,7 +163,7 @@ def test_where_robots_move_the_shipped_correction_is_sotdma(task):
             swarm.step(policy)
         sent.append(swarm.buffers.timestamp.copy())
     np.testing.assert_array_equal(*sent)
-    assert policy.uses.startswith("as sotdma, for the network was trained on teams at rest: its b")
+    assert policy.uses.startswith("where robots move, what sotdma uses; at rest (--task stationary)")
 
 
 @here
@@ -172,7 +172,7 @@ def test_a_correction_of_ones_own_is_a_file_and_corrects_no_team_that_moves(tmp_
     policy = make_policy("mine.safetensors", REST, is_deterministic=True)
     assert type(policy) is ResidualPolicy
     assert policy.parameters["is_deterministic"] is True
-    with pytest.raises(ValueError, match="are for teams at rest, and those of flocking move; fly"):
+    with pytest.raises(ValueError, match="are for teams at rest, and those of flocking move; add"):
         make_policy("mine.safetensors", MISSION)
 
 

@@ -31,8 +31,8 @@ def check_rests(mission: Mission) -> None:
     """Raises ValueError if the mission's team moves: there is no rule for it."""
     if mission.task != "stationary":
         raise ValueError(
-            f"residual policies are for teams at rest, and those of {mission.task} move; fly the "
-            "task stationary, or another policy"
+            f"residual policies are for teams at rest, and those of {mission.task} move; add "
+            "--task stationary, or fly another policy"
         )
 
 

@@ -41,11 +41,11 @@ class Decision(NamedTuple):
 
 
 class ResidualPolicy(BroadcastPolicy):
-    """Transmits if a draw by the network says so, which sees what the rule says.
+    """Draws whether to transmit from the network's probability, given what the plan says.
 
     Uses the robot's own buffer, T in packets that it decoded, its identity, the team's size, the
     order, the clock, common random numbers and the radio's range and threshold. Of what the mission
-    grants of the channel it uses what its rule does.
+    grants of the channel it uses what `planner --payload none` uses.
     """
 
     def __init__(

@@ -17,6 +17,6 @@ def test_a_team_at_rest_has_one(preset):
 
 @pytest.mark.parametrize("task", ["random-walk", "flocking"])
 def test_a_team_that_moves_has_none(task):
-    said = f"are for teams at rest, and those of {task} move; fly the task stationary, or another"
+    said = f"are for teams at rest, and those of {task} move; add --task stationary, or fly another"
     with pytest.raises(ValueError, match=said):
         residual_policy(some_weights(), paper(task, num_robots=5))
