@@ -163,7 +163,7 @@ def test_where_robots_move_the_shipped_correction_is_sotdma(task):
             swarm.step(policy)
         sent.append(swarm.buffers.timestamp.copy())
     np.testing.assert_array_equal(*sent)
-    assert policy.uses.startswith("where robots move, what sotdma uses; at rest (--task stationary)")
+    assert policy.uses.startswith("where robots move, what sotdma uses; at rest (--task ")
 
 
 @here
