@@ -15,7 +15,7 @@ from swarm_mj.radio.fading import NO_FADING
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.links import Links, doubtful, links_between
 from swarm_mj.radio.path_loss import FREE_SPACE_EXPONENT
-from swarm_mj.radio.power_law import PowerLaw, powers_between
+from swarm_mj.radio.power_law import PowerLaw, power_law, powers_between
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -26,6 +26,12 @@ class Belief:
     law: PowerLaw | None = None  # of mean powers [mW]; None is that of free space
     reception: Reception | None = None  # the statistics of fades and losses; None: there are none
     shadowing_db: float = 0.0  # standard deviation of what nobody knows of the powers [dB]
+
+    def law_over_noise(self, num_robots: int) -> PowerLaw:
+        """The law of a team's mean powers, free space's too, in units of the noise."""
+        at_1_m = np.full(num_robots, self.radio.received_at_1_m_mw)
+        law = power_law(at_1_m) if self.law is None else self.law
+        return law._replace(at_1_m=law.at_1_m / self.radio.noise_mw)
 
     def links(
         self,

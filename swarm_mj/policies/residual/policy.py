@@ -25,7 +25,6 @@ from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.link_models import Belief
-from swarm_mj.radio.power_law import power_law
 
 DIGITS = 12  # of a digest: enough to tell policies apart
 
@@ -96,10 +95,7 @@ class ResidualPolicy(BroadcastPolicy):
         self._own = Stream(rngs, uniform, (num_robots,))
         self._common = Stream(rngs, uniform, (num_robots,))
         self._beliefs = no_beliefs(len(rngs), num_robots)
-        radio = self._belief.radio
-        at_1_m = np.full(num_robots, radio.received_at_1_m_mw)
-        law = power_law(at_1_m) if self._belief.law is None else self._belief.law
-        self._law = law._replace(at_1_m=law.at_1_m / radio.noise_mw)
+        self._law = self._belief.law_over_noise(num_robots)
         self._last: Decision | None = None
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:

@@ -19,7 +19,7 @@ from swarm_mj.policies.sotdma.settings import SotdmaSettings
 from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 from swarm_mj.radio.link_models import Belief
-from swarm_mj.radio.power_law import power_law, powers_between, write_powers
+from swarm_mj.radio.power_law import powers_between, write_powers
 
 
 class Team:
@@ -38,9 +38,7 @@ class Team:
         radio = belief.radio
         self._order = order
         self._settings = settings
-        at_1_m = np.full(len(order), radio.received_at_1_m_mw)
-        law = power_law(at_1_m) if belief.law is None else belief.law
-        self._law = law._replace(at_1_m=law.at_1_m / radio.noise_mw)
+        self._law = belief.law_over_noise(len(order))
         num_slots = settings.frame_slots(len(order))
         self._rule = Rule(
             threshold=radio.threshold,
