@@ -16,12 +16,12 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     II-C    Eq. 10  age of information       protocol.costs.age_of_information
     III-B   Alg. 1  the protocol's window    protocol.window.window
     IV-C            two broadcasts instead   protocol.window.DoubleBroadcast
-    III-A           a buffer as a graph      gnn.graphs.Graphs
-    III-A   Eq. 11  GN block                 gnn.network.gn_block
-    III-A   Eq. 12  mean aggregation         gnn.network.mean_aggregation
-    III-A   Eq. 13  non-linear updates       gnn.network.Core
-    III-A   Eq. 14  Aggregation GNN          gnn.network.AggregationGnn
-    III-C           decisions                gnn.action_distribution.recipient_logits
+    III-A           a buffer as a graph      policies.gnn.graphs.Graphs
+    III-A   Eq. 11  GN block                 policies.gnn.network.gn_block
+    III-A   Eq. 12  mean aggregation         policies.gnn.network.mean_aggregation
+    III-A   Eq. 13  non-linear updates       policies.gnn.network.Core
+    III-A   Eq. 14  Aggregation GNN          policies.gnn.network.AggregationGnn
+    III-C           decisions                policies.gnn.action_distribution.recipient_logits
     III-C           PPO                      learning.train.make_model
     IV-A    Eq. 15  dynamics                 physics.worlds.Physics.step
     IV-A    Eq. 16  flocking control         control.motion.flocking
@@ -32,12 +32,11 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     IV-C            round robin              policies.round_robin.RoundRobin
     IV-C            minimum spanning tree    policies.minimum_spanning_tree.MinimumSpanningTree
 
-Around the paper: `compiled` and `fields` (how functions are compiled, how options are declared),
-`io` (files that appear whole, processes that end), `parts` (users' own, by name), `swarm` (B
-missions side by side), `rollout` (a policy from the first window to the last), more `policies` than
-the paper's, `evaluation` (V: policies on the same missions, and Figs. 2 to 6), `replay` and
-`rendering` (what is seen), `envs` (other libraries' faces), `benchmark` (speed), `cli` (the command
-line), `api` (Python in five lines; its names stand here as well).
+Around the paper: `system` (compiling, declared fields, files that appear whole, processes),
+`simulation` (B missions side by side; a policy from the first window to the last), more `policies`
+than the paper's, `evaluation` (V: policies on the same missions, and Figs. 2 to 6), `replay` (what
+is seen), `envs` (interfaces of other libraries), `api` (Python in five lines; its names stand here
+as well), `cli` (the command line).
 """
 
 from importlib import import_module
@@ -58,8 +57,8 @@ if TYPE_CHECKING:
         Policy,
         make_policy,
     )
-    from swarm_mj.rollout import summarise
-    from swarm_mj.swarm import Swarm
+    from swarm_mj.simulation.rollout import summarise
+    from swarm_mj.simulation.swarm import Swarm
 
     __version__: str
 
@@ -92,15 +91,15 @@ _HOMES = {
         *("POLICIES", "BroadcastPolicy", "CentralisedPolicy", "DecentralisedPolicy"),
         *("LocalViews", "Policy", "make_policy"),
     ),
-    "rollout": ("summarise",),
-    "swarm": ("Swarm",),
+    "simulation.rollout": ("summarise",),
+    "simulation.swarm": ("Swarm",),
 }
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - any of the names
     """A name of `__all__`, or the version, when it is first asked for."""
     if name == "__version__":
-        return import_module("swarm_mj.io.provenance").version()
+        return import_module("swarm_mj.system.provenance").version()
     for home, names in _HOMES.items():
         if name in names:
             return getattr(import_module(f"swarm_mj.{home}"), name)

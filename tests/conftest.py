@@ -53,7 +53,9 @@ def forks(tmp_path_factory):
 @pytest.fixture(scope="session")
 def opengl():
     """Skips the test where there is no OpenGL to draw pictures with."""
-    from swarm_mj.rendering.opengl import make_context  # types are checked in what is loaded later
+    from swarm_mj.replay.rendering.opengl import (
+        make_context,  # types are checked in what is loaded later
+    )
 
     try:
         make_context(8, 8).free()

@@ -6,8 +6,8 @@ from channels import to_nobody
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.rollout import rollout, summarise
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
 
 NUM_WINDOWS = 100  # in which a spread of 3 m/s shrinks to 0.1 mm/s, far above rounding errors
 BASELINES = ["random-flooding", "round-robin", "mst"]

@@ -12,8 +12,8 @@ from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.protocol.buffers import empty_buffers, merge, record_attempt
 from swarm_mj.protocol.costs import mean_hops
-from swarm_mj.rollout import rollout, summarise
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
 
 NOW = np.ones(2)
 
@@ -192,8 +192,8 @@ import swarm_mj
 from swarm_mj.mission import Mission, paper, reference
 from swarm_mj.policies import make_policy
 from swarm_mj.policies.tdma import Tdma
-from swarm_mj.rollout import rollout, summarise
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
 mission = paper("stationary", num_robots=5, num_windows=5)
 for mistake, complaint in {OF_ANOTHER_KIND!r}.items():
     try:

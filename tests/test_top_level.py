@@ -33,8 +33,8 @@ def test_type_checkers_are_told_of_the_same_names():
 
 def test_rollout_is_a_module_that_has_a_function_of_its_name():
     """One meaning each, whatever was imported before."""
-    from swarm_mj.rollout import rollout
+    from swarm_mj.simulation.rollout import rollout
 
-    assert swarm_mj.rollout.rollout is rollout
+    assert swarm_mj.simulation.rollout.rollout is rollout
     assert "rollout" not in swarm_mj.__all__
-    assert not callable(swarm_mj.rollout)
+    assert not callable(swarm_mj.simulation.rollout)

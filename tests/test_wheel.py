@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from swarm_mj.io.packages import CORE
+from swarm_mj.system.packages import CORE
 
 ROOT = Path(__file__).parent.parent
 
@@ -64,8 +64,7 @@ def test_both_bring_what_they_need(built):
     assert {"LICENSE", "README.md", "CITATION.cff", "tests/conftest.py", "docs/code.md"} <= sources
     with zipfile.ZipFile(wheel) as archive:
         names = {name.removeprefix("swarm_mj/") for name in archive.namelist()}
-    networks = (f"policies/{name}.safetensors" for name in ("gnn", "residual-gnn"))
-    assets = {f"assets/{name}" for name in ("arena.xml", "robot.xml", *networks)}
+    assets = {f"assets/{name}" for name in ("arena.xml", "robot.xml", "policies/gnn.safetensors")}
     assert {"py.typed", "policies/tuned.csv", "evaluation/published.csv"} | assets <= names
     assert not any(name.startswith(("tests/", "tools/", "training/")) for name in names)
 
@@ -75,7 +74,7 @@ def test_assets_come_from_the_wheel(installed, tmp_path):
         installed,
         tmp_path,
         "-c",
-        "from swarm_mj.io.assets import asset; print(asset('arena.xml'))",
+        "from swarm_mj.system.assets import asset; print(asset('arena.xml'))",
     )
     assert done.stdout.strip() == str(installed / "swarm_mj" / "assets" / "arena.xml")
 

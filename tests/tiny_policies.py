@@ -2,10 +2,10 @@
 
 import torch
 
-from swarm_mj.gnn.fast import FastAggregationGnn
-from swarm_mj.gnn.feature_sets import make_extractor
-from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.mission import Mission
+from swarm_mj.policies.gnn.fast import FastAggregationGnn
+from swarm_mj.policies.gnn.feature_sets import make_extractor
+from swarm_mj.policies.gnn.shape import GnnShape
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.policies.stored import save_policy
 

@@ -21,13 +21,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch
 
 from swarm_mj.cli import script
-from swarm_mj.fields import setting
-from swarm_mj.io.atomic import write_text
 from swarm_mj.mission import paper
 from swarm_mj.policies import make_policy
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.rollout import rollout
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.atomic import write_text
+from swarm_mj.system.fields import setting
 
 # What a colour is for: as matplotlib draws it, on a light page, on a dark page.
 COLOURS = {

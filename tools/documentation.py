@@ -15,8 +15,8 @@ from mkdocs.structure.files import File, Files
 from notebook_page import page_of
 
 import swarm_mj
-from swarm_mj.fields import as_typed, range_of
 from swarm_mj.mission import Mission
+from swarm_mj.system.fields import as_typed, range_of
 
 ROOT = Path(__file__).parent.parent
 PAGES = {  # where they are on the site, and in the repository

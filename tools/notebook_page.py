@@ -9,7 +9,7 @@ from typing import Any
 import nbformat
 from nbclient import NotebookClient
 
-from swarm_mj.rendering.opengl import make_context
+from swarm_mj.replay.rendering.opengl import make_context
 
 TIMEOUT_S = 110  # of a cell
 RENDERS = "renders"  # the tag of cells that need OpenGL

@@ -22,13 +22,13 @@ from PIL import Image
 from rerun.experimental import ViewerClient
 
 from swarm_mj.cli import script
-from swarm_mj.cli.outputs import Output, check_outputs
-from swarm_mj.fields import setting
-from swarm_mj.io.atomic import write_bytes
-from swarm_mj.io.owned import owned
-from swarm_mj.io.processes import running
 from swarm_mj.replay.read import check_replay, windows
 from swarm_mj.replay.view import LOOPBACK, VIEWER, free_ports, quiet_environment
+from swarm_mj.system.atomic import write_bytes
+from swarm_mj.system.fields import setting
+from swarm_mj.system.outputs import Output, check_outputs
+from swarm_mj.system.owned import owned
+from swarm_mj.system.processes import running
 
 START_TIMEOUT_S = 60.0
 LOAD_TIMEOUT_S = 120.0

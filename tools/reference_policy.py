@@ -19,18 +19,18 @@ import numpy as np
 import torch
 
 from swarm_mj.cli import script
-from swarm_mj.cli.terminal import tell_cores
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.evaluation.jobs import run_jobs
 from swarm_mj.evaluation.study import Study
-from swarm_mj.fields import setting
-from swarm_mj.gnn.network import AggregationGnn
-from swarm_mj.gnn.shape import GnnShape
-from swarm_mj.io.provenance import version
-from swarm_mj.io.reading import read_file
 from swarm_mj.mission import reference
+from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.policies.gnn.shape import GnnShape
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.policies.stored import save_policy
+from swarm_mj.system.fields import setting
+from swarm_mj.system.provenance import version
+from swarm_mj.system.reading import read_file
+from swarm_mj.system.terminal import tell_cores
 
 TOO_FAR = 1
 MOST_BYTES = 10_000_000  # of the weights

@@ -17,8 +17,8 @@ from statistics import mean
 from swarm_mj.cli import script
 from swarm_mj.evaluation.published import SWEEPS
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, read_results
-from swarm_mj.fields import setting
 from swarm_mj.protocol.packets import bits_per_second
+from swarm_mj.system.fields import setting
 
 COSTS = {
     "aoi": ("age of information [windows]", 1),

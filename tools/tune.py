@@ -18,18 +18,18 @@ import numpy as np
 from rich.console import Console
 
 from swarm_mj.cli import script
-from swarm_mj.cli.outputs import Output, check_outputs
-from swarm_mj.cli.progress import WorkBar
-from swarm_mj.cli.terminal import plain_console
-from swarm_mj.fields import same_as, setting
-from swarm_mj.io.atomic import write_csv
-from swarm_mj.io.interrupt import heard_interrupt
-from swarm_mj.io.owned import owned
-from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import PAPERS, Mission
 from swarm_mj.policies.registry import HAVE_PROBABILITY, make_policy
 from swarm_mj.policies.tuning import TABLE, Tuned, read_table
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.atomic import write_csv
+from swarm_mj.system.fields import same_as, setting
+from swarm_mj.system.interrupt import heard_interrupt
+from swarm_mj.system.outputs import Output, check_outputs
+from swarm_mj.system.owned import owned
+from swarm_mj.system.progress import WorkBar
+from swarm_mj.system.provenance import commit, version
+from swarm_mj.system.terminal import plain_console
 
 AUTHORS_GRID = (0.04, 0.06, 0.08, 0.1, 0.12, 0.15)  # of flooding and MST, in the authors' code
 WIDE_GRID = (0.01, 0.02, 0.03, *AUTHORS_GRID, 0.2, 0.25, 0.3, 0.4)

@@ -5,7 +5,7 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from swarm_mj.io.reading import read_file, read_plain
+from swarm_mj.system.reading import read_file, read_plain
 
 MOST_BYTES = 10_000_000  # of a file that is read
 

@@ -13,16 +13,16 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from swarm_mj.api.flight_table import AGREED
 from swarm_mj.cli import script
-from swarm_mj.cli.flight_table import AGREED
-from swarm_mj.cli.progress import WorkBar
 from swarm_mj.evaluation.published import BASELINES
-from swarm_mj.fields import setting
-from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import Mission, paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.rollout import rollout, summarise
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.fields import setting
+from swarm_mj.system.progress import WorkBar
+from swarm_mj.system.provenance import commit, version
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,11 +16,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from swarm_mj.cli import script
-from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.evaluation.figures.style import CAPTION, FAINT, INK, WIDTH_IN, look_of, save, styled
 from swarm_mj.evaluation.results import read_results
-from swarm_mj.fields import setting
-from swarm_mj.io.reading import read_rows
+from swarm_mj.system.fields import setting
+from swarm_mj.system.outputs import Output, check_outputs
+from swarm_mj.system.reading import read_rows
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "training" / "results" / "learning"

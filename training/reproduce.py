@@ -22,16 +22,17 @@ from typing import Any
 
 from experiments import MOST_BYTES, Experiment, Scale, read_experiment, typed
 
-from swarm_mj.cli import DONE, parse, script
 from swarm_mj.cli import main as swarm_mj
-from swarm_mj.cli.outputs import Output, check_outputs
+from swarm_mj.cli import parse, script
 from swarm_mj.evaluation.results import Result, read_results, write_csv
-from swarm_mj.fields import setting
-from swarm_mj.io import atomic
-from swarm_mj.io.provenance import code_digest, commit
-from swarm_mj.io.reading import read_file, read_json, read_rows
 from swarm_mj.learning.run_folder import CURVE, POLICY, SETTINGS, read_run
 from swarm_mj.policies.stored import read_policy
+from swarm_mj.system import atomic
+from swarm_mj.system.exit_codes import DONE
+from swarm_mj.system.fields import setting
+from swarm_mj.system.outputs import Output, check_outputs
+from swarm_mj.system.provenance import code_digest, commit
+from swarm_mj.system.reading import read_file, read_json, read_rows
 
 ROOT = Path(__file__).resolve().parent.parent
 FIGURES = ("fig3", "fig6", "fig5", "fig4")  # the most telling first

@@ -5,7 +5,7 @@ from typing import Any
 
 from rich.console import Console
 
-from swarm_mj.cli.progress import WorkBar
+from swarm_mj.system.progress import WorkBar
 
 AFTER_S = 2.0  # shorter work shows no bar
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.figures.style import FAINT, as_it_is, look_of, styled
 from swarm_mj.evaluation.results import Result
-from swarm_mj.parts import OwnParts
+from swarm_mj.mission.components import OwnParts
 
 if TYPE_CHECKING:
     from swarm_mj.api.run import Run

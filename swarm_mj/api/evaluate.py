@@ -6,28 +6,28 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarm_mj.api.bars import AFTER_S, quiet_console
+from swarm_mj.api.estimates import check_fits, study_needs
 from swarm_mj.api.fly import SHARED, mission_of, names_of
 from swarm_mj.api.numbers import Numbers
-from swarm_mj.cli.estimates import check_fits, study_needs
-from swarm_mj.cli.evaluate import (
+from swarm_mj.evaluation.batch import BatchCosts
+from swarm_mj.evaluation.results import COLUMNS, write_csv
+from swarm_mj.evaluation.run_study import (
     DEFAULT_POLICIES,
-    Options,
+    Processes,
     fly_study,
     study_bar,
     write_evaluated,
 )
-from swarm_mj.cli.evaluation_table import results_text
-from swarm_mj.cli.machine import memory_errors
-from swarm_mj.cli.outputs import Output, check_outputs
-from swarm_mj.evaluation.batch import BatchCosts
-from swarm_mj.evaluation.results import COLUMNS, write_csv
 from swarm_mj.evaluation.study import Study
 from swarm_mj.evaluation.summary import Evaluated, summarise
-from swarm_mj.fields import check_value, name_of
-from swarm_mj.io.packages import need
+from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission
-from swarm_mj.parts import OwnParts
+from swarm_mj.mission.components import OwnParts
 from swarm_mj.policies.registry import listed, normalised
+from swarm_mj.system.fields import check_value, name_of
+from swarm_mj.system.machine import memory_errors
+from swarm_mj.system.outputs import Output, check_outputs
+from swarm_mj.system.packages import need
 
 if TYPE_CHECKING:  # each takes its time to import
     from matplotlib.figure import Figure
@@ -187,7 +187,7 @@ def evaluate(
     for kind, name in parts.items():
         if name is not None:
             _check_named(kind, name)
-    check_value(Options.__dataclass_fields__["jobs"], num_jobs, "num_jobs")
+    check_value(Processes.__dataclass_fields__["jobs"], num_jobs, "num_jobs")
     check_value(Study.__dataclass_fields__["episodes"], num_missions, "num_missions")
     study = Study(
         policies=_names(policies),

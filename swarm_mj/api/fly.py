@@ -7,28 +7,27 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.api.bars import quiet_bar
-from swarm_mj.api.numbers import Numbers
-from swarm_mj.api.run import PARTS, Run
-from swarm_mj.cli import DONE
-from swarm_mj.cli.estimates import check_fits, flight_needs
-from swarm_mj.cli.flight import (
+from swarm_mj.api.estimates import check_fits, flight_needs
+from swarm_mj.api.flight import (
     COMPILING_WINDOWS,
     compile_ahead,
     flight_config,
     flight_summary,
     fly_swarm,
 )
-from swarm_mj.cli.mission_options import make_mission
+from swarm_mj.api.numbers import Numbers
+from swarm_mj.api.run import PARTS, Run
 from swarm_mj.control.controller import Controller
-from swarm_mj.fields import check_kind, check_names
-from swarm_mj.mission import Mission
-from swarm_mj.parts import OwnParts
+from swarm_mj.mission import Mission, make_mission
+from swarm_mj.mission.components import OwnParts
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import check_used, make_policy, normalised
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.replay.recorder import Recorder
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.exit_codes import DONE
+from swarm_mj.system.fields import check_kind, check_names
 
 MISSION_FIELDS = tuple(spec.name for spec in fields(Mission) if spec.name != "task")
 SHARED = ("seed", "probability", "is_deterministic", "features", *PARTS)  # with `evaluate`

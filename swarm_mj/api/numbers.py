@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from swarm_mj.fields import did_you_mean
+from swarm_mj.system.fields import did_you_mean
 
 
 class Numbers(Mapping[str, Any]):

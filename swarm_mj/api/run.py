@@ -11,17 +11,17 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.api.bars import is_notebook
+from swarm_mj.api.flight_table import flight_rows, flight_title
 from swarm_mj.api.numbers import Numbers
-from swarm_mj.cli.flight_table import flight_rows, flight_title
-from swarm_mj.cli.outputs import Output, check_outputs
-from swarm_mj.fields import as_typed
-from swarm_mj.io.atomic import write_bytes, write_csv, write_json
-from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
-from swarm_mj.parts import OwnParts
+from swarm_mj.mission.components import OwnParts
 from swarm_mj.protocol.costs import PACKETS
 from swarm_mj.replay.recorder import Log
-from swarm_mj.rollout import WindowRecord
+from swarm_mj.simulation.rollout import WindowRecord
+from swarm_mj.system.atomic import write_bytes, write_csv, write_json
+from swarm_mj.system.fields import as_typed
+from swarm_mj.system.outputs import Output, check_outputs
+from swarm_mj.system.packages import need
 
 if TYPE_CHECKING:  # each takes its time to import, and flights do without
     from matplotlib.figure import Figure

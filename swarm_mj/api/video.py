@@ -4,9 +4,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from swarm_mj.api.bars import quiet_bar
-from swarm_mj.cli.terminal import plain_console
-from swarm_mj.io.packages import need
-from swarm_mj.rendering.style import USUAL, fitted, usual_seconds
+from swarm_mj.replay.rendering.style import USUAL, fitted, usual_seconds
+from swarm_mj.system.packages import need
+from swarm_mj.system.terminal import plain_console
 
 if TYPE_CHECKING:  # they load what draws
     from swarm_mj.replay.footage import Footage
@@ -30,7 +30,7 @@ def film(footage: "Footage", suffix: str) -> bytes:
     """
     for module in ("av", "PIL"):
         need(module, "a video")
-    from swarm_mj.rendering.video import make_video
+    from swarm_mj.replay.rendering.video import make_video
 
     style = fitted(replace(USUAL[suffix], seconds=usual_seconds([footage])), suffix)
     with quiet_bar("Drawing", style.num_frames, "pictures") as bar:

@@ -14,13 +14,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
-from swarm_mj.io.interrupt import interruptible
-from swarm_mj.io.streams import lasting_streams
-from swarm_mj.parts import one_line_each
+from swarm_mj.mission.components import one_line_each
+from swarm_mj.system.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
+from swarm_mj.system.interrupt import interruptible
+from swarm_mj.system.streams import lasting_streams
 
 Options = TypeVar("Options")
 
-DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 WRONG_NAMES = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
 COMMANDS = {  # each a module here, with its options, `Options`, and what it does, `run`
     "fly": "Fly one mission and record its replay.",
@@ -48,7 +48,7 @@ def parse(arguments: Sequence[str]) -> tuple[Any, Any]:
         from rich.console import Console
 
         from swarm_mj.cli import options
-        from swarm_mj.rendering.opengl import check_choice
+        from swarm_mj.replay.rendering.opengl import check_choice
 
         check_choice()  # before something imports MuJoCo
         with Console(stderr=True).status("Loading ..."):
@@ -144,7 +144,7 @@ def _told(name: str, work: Callable[[], int], was_interrupted: Callable[[], bool
 
 def _missing(error: ModuleNotFoundError) -> str:
     """What to say of a package that is not installed; raises the error again if it is our own."""
-    from swarm_mj.io.packages import missing
+    from swarm_mj.system.packages import missing
 
     module = (error.name or "").partition(".")[0]
     if module == "swarm_mj":

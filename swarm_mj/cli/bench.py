@@ -7,7 +7,7 @@ from typing import NamedTuple
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.benchmark.simulation import (
+from swarm_mj.cli.benchmark.simulation import (
     PLAIN_STEP,
     Row,
     evaluation_rows,
@@ -15,8 +15,8 @@ from swarm_mj.benchmark.simulation import (
     simulation_rows,
     world_rows,
 )
-from swarm_mj.cli.terminal import plain_console, tell_cores
-from swarm_mj.fields import setting
+from swarm_mj.system.fields import setting
+from swarm_mj.system.terminal import plain_console, tell_cores
 
 WORLD_MISSIONS = 32  # side by side, among obstacles and under fading
 BUSY = 0.3  # the spread from which on numbers say little
@@ -110,7 +110,7 @@ def _measure(options: Options, say: Callable[[str], None]) -> Iterator[_Measured
         yield _Measured(title, [list(rows)])
     if not options.no_learning:
         say("Measuring networks and training (a minute or two) ...")
-        from swarm_mj.benchmark import learning  # torch takes its time to import
+        from swarm_mj.cli.benchmark import learning  # torch takes its time to import
 
         rows = learning.learning_rows(threads=options.threads, seconds=options.seconds)
         yield _Measured("Learning: 40 robots at rest", [list(rows)])

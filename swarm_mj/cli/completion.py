@@ -12,7 +12,7 @@ import shtab
 from swarm_mj.cli import COMMANDS
 from swarm_mj.cli.options import declare
 from swarm_mj.cli.overview import overview_parser
-from swarm_mj.fields import kind_of
+from swarm_mj.system.fields import kind_of
 
 # Names that a folder may stand for: zsh and bash each have their way to offer both.
 OR_FOLDER = {

@@ -9,13 +9,13 @@ from typing import ClassVar
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.cli import DONE, FAILED
 from swarm_mj.cli.health.finding import Finding
 from swarm_mj.cli.health.machine import machine
 from swarm_mj.cli.health.packages import about, packages
 from swarm_mj.cli.health.trials import tried
-from swarm_mj.cli.terminal import plain_console
-from swarm_mj.fields import setting
+from swarm_mj.system.exit_codes import DONE, FAILED
+from swarm_mj.system.fields import setting
+from swarm_mj.system.terminal import plain_console
 
 MARKS = {"ok": "ok", "absent": "-", "broken": "BROKEN"}
 VERDICTS = {

@@ -1,7 +1,7 @@
 """`swarm-mj evaluate`: policies over the same missions, with error bars."""
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, closing
+from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -9,31 +9,35 @@ from typing import ClassVar
 
 from rich.console import Console
 
-from swarm_mj.cli import DONE, FAILED, INTERRUPTED
-from swarm_mj.cli.estimates import check_fits, study_needs
-from swarm_mj.cli.evaluation_table import print_results
-from swarm_mj.cli.machine import YES, memory_errors
+from swarm_mj.api.estimates import check_fits, study_needs
 from swarm_mj.cli.mission_options import several_missions
-from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.policy_options import NAMED, NAMES, OTHERS, PolicyOptions
-from swarm_mj.cli.progress import WorkBar
-from swarm_mj.cli.terminal import tell_cores
 from swarm_mj.evaluation import progress
-from swarm_mj.evaluation.batch import BatchCosts, fly_batch
-from swarm_mj.evaluation.jobs import run_jobs
-from swarm_mj.evaluation.published import BASELINES
-from swarm_mj.evaluation.results import write_csv, write_json
+from swarm_mj.evaluation.batch import BatchCosts
+from swarm_mj.evaluation.results import write_csv
+from swarm_mj.evaluation.run_study import (
+    DEFAULT_POLICIES,
+    Processes,
+    fly_study,
+    num_flown,
+    study_bar,
+    write_evaluated,
+)
 from swarm_mj.evaluation.study import Study
 from swarm_mj.evaluation.summary import Evaluated, summarise
-from swarm_mj.fields import same_as, setting
-from swarm_mj.io.interrupt import deferred_interrupt, heard_interrupt
-from swarm_mj.io.owned import owned
-from swarm_mj.io.packages import need
+from swarm_mj.evaluation.table import print_results
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import listed, normalised, stored_policies, with_payload
+from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
+from swarm_mj.system.fields import same_as, setting
+from swarm_mj.system.interrupt import deferred_interrupt
+from swarm_mj.system.machine import YES, memory_errors
+from swarm_mj.system.outputs import Output, check_outputs
+from swarm_mj.system.owned import owned
+from swarm_mj.system.packages import need
+from swarm_mj.system.terminal import tell_cores
 
 OUTPUT = "output"  # a heading of the help
-DEFAULT_POLICIES = ("planner", *BASELINES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +57,7 @@ class Options(PolicyOptions):
     episodes: int = same_as(Study, "episodes")
     seed: int = same_as(Study, "seed")
     baseline: str | None = same_as(Study, "baseline")
-    jobs: int = setting(1, "processes", low=1, high=256)
+    jobs: int = same_as(Processes, "jobs")
     missions: tuple[Mission, ...] = several_missions()
     json: Path | None = setting(
         None, "write all figures and each mission's costs", group=OUTPUT, metavar="FILE.json"
@@ -120,7 +124,7 @@ def _evaluate(options: Options, study: Study) -> int:
     except (KeyboardInterrupt, MemoryError) as error:
         is_memory = isinstance(error, MemoryError)
         hint = "the same command with --resume continues" if kept else "nothing was kept"
-        flown, total = _num_flown(study, costs), study.episodes * len(study.pairs)
+        flown, total = num_flown(study, costs), study.episodes * len(study.pairs)
         ending = "Out of memory" if is_memory else "Interrupted"
         console.print(f"{ending} after {flown} of {total} missions; {hint}.")
         return FAILED if is_memory else INTERRUPTED
@@ -151,56 +155,8 @@ def _progress_file(options: Options) -> Path | None:
     return kept
 
 
-def _num_flown(study: Study, costs: Mapping[int, BatchCosts]) -> int:
-    return sum(len(study.batches[index].seeds) for index in costs)
-
-
-def study_bar(
-    study: Study, costs: Mapping[int, BatchCosts], console: Console, *, after_s: float = 0.0
-) -> WorkBar:
-    """A bar of the missions of a study, as far as they are flown; arguments as of `WorkBar`."""
-    total, done = study.episodes * len(study.pairs), _num_flown(study, costs)
-    return WorkBar("Flying", total, "missions", completed=done, console=console, after_s=after_s)
-
-
-def fly_study(
-    study: Study,
-    costs: dict[int, BatchCosts],
-    num_jobs: int,
-    keep: Callable[[int, BatchCosts], None] | None,
-    bar: WorkBar,
-) -> None:
-    """Flies the batches that `costs` lacks, into `costs` and where they are kept.
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C was pressed; `costs` has all batches that were flown.
-    """
-    left = [index for index in range(len(study.batches)) if index not in costs]
-    flown = run_jobs(fly_batch, [study.batches[index] for index in left], num_jobs)
-    with bar, closing(flown), heard_interrupt() as was_pressed:
-        for which, batch_costs in flown:
-            index = left[which]
-            with deferred_interrupt() as is_interrupted:
-                costs[index] = batch_costs
-                if keep:
-                    keep(index, batch_costs)
-            if is_interrupted() or was_pressed():
-                raise KeyboardInterrupt
-            bar.move_to(_num_flown(study, costs))
-
-
 def _write(options: Options, evaluated: Sequence[Evaluated]) -> None:
     if options.json:
         write_evaluated(options.json, evaluated)
     if options.csv:
         write_csv(options.csv, [each.result for each in evaluated])
-
-
-def write_evaluated(path: Path, evaluated: Sequence[Evaluated]) -> None:
-    """Writes results and what each mission cost, as JSON."""
-    missions = [
-        {"episode_aoi": each.aoi, "episode_velocity_variance": each.velocity_variance}
-        | ({} if each.task_cost is None else {"episode_task_cost": each.task_cost})
-        for each in evaluated
-    ]
-    write_json(path, [each.result for each in evaluated], missions)

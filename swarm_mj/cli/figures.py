@@ -6,17 +6,17 @@ from pathlib import Path
 
 from rich.console import Console
 
-from swarm_mj.cli.estimates import check_fits, figures_needs
-from swarm_mj.cli.machine import YES
-from swarm_mj.cli.outputs import Output, check_outputs
+from swarm_mj.api.estimates import check_fits, figures_needs
 from swarm_mj.cli.policy_options import NAMED
-from swarm_mj.cli.terminal import plain_console
 from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS
 from swarm_mj.evaluation.results import Result, read_results
-from swarm_mj.fields import setting
+from swarm_mj.mission.components import OwnParts
 from swarm_mj.mission.specification import NOTHING, OPEN
-from swarm_mj.parts import OwnParts
 from swarm_mj.policies.registry import stored_policies
+from swarm_mj.system.fields import setting
+from swarm_mj.system.machine import YES
+from swarm_mj.system.outputs import Output, check_outputs
+from swarm_mj.system.terminal import plain_console
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,20 +10,11 @@ from typing import Any, ClassVar
 
 from rich.console import Console
 
-from swarm_mj.cli import DONE
-from swarm_mj.cli.estimates import check_fits, flight_needs
-from swarm_mj.cli.flight import compile_ahead, flight_config, flight_summary, fly_swarm
-from swarm_mj.cli.flight_table import flight_table, flight_title
-from swarm_mj.cli.machine import YES
+from swarm_mj.api.estimates import check_fits, flight_needs
+from swarm_mj.api.flight import compile_ahead, flight_config, flight_summary, fly_swarm
+from swarm_mj.api.flight_table import flight_table, flight_title
 from swarm_mj.cli.mission_options import mission_flags, one_mission
-from swarm_mj.cli.outputs import Output, check_outputs
 from swarm_mj.cli.policy_options import NAMED, NAMES, PolicyOptions
-from swarm_mj.cli.progress import WorkBar
-from swarm_mj.cli.terminal import plain_console, this_command
-from swarm_mj.fields import setting
-from swarm_mj.io.atomic import write_json
-from swarm_mj.io.interrupt import deferred_interrupt, heard_interrupt
-from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import notes_on
 from swarm_mj.policies.policy import Policy
@@ -39,7 +30,16 @@ from swarm_mj.policies.registry import (
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.view import has_display, view_command
 from swarm_mj.replay.view import run as run_viewer
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.atomic import write_json
+from swarm_mj.system.exit_codes import DONE
+from swarm_mj.system.fields import setting
+from swarm_mj.system.interrupt import deferred_interrupt, heard_interrupt
+from swarm_mj.system.machine import YES
+from swarm_mj.system.outputs import Output, check_outputs
+from swarm_mj.system.packages import need
+from swarm_mj.system.progress import WorkBar
+from swarm_mj.system.terminal import plain_console, this_command
 
 REPLAYS = Path("replays")
 OTHERWISE = "name another place with --record, or leave it out with --no-record"

@@ -8,8 +8,8 @@ from itertools import product
 from typing import Any
 
 from swarm_mj.cli.options import add_option, flag_of, nested
-from swarm_mj.fields import FieldOf, as_typed, kind_of
-from swarm_mj.mission import PRESETS, WORLDS, Mission, paper
+from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper
+from swarm_mj.system.fields import FieldOf, as_typed, kind_of
 
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]
 # Fields that count only where another has this value, or for None any above 0.
@@ -62,13 +62,6 @@ def check_in_use(given: Collection[str], missions: Sequence[Mission]) -> None:
                 f"{flags[name]} counts only with {flags[switch]} {shown}; give that too, or leave "
                 f"{flags[name]} out"
             )
-
-
-def make_mission(**given: Any) -> Mission:
-    """A mission of the preset and task that are given, or usual, changed by the other fields."""
-    preset = given.pop("preset", Mission().preset)
-    replace(Mission(), preset=preset, task=given.get("task", Mission().task))  # refuses the unknown
-    return PRESETS[preset](**given)
 
 
 def mission_flags(mission: Mission) -> str:

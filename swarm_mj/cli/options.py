@@ -12,8 +12,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar, get_origin
 
-from swarm_mj.cli import BAD_INPUT
-from swarm_mj.fields import FieldOf, as_typed, check, did_you_mean, kind_of, range_of
+from swarm_mj.system.exit_codes import BAD_INPUT
+from swarm_mj.system.fields import FieldOf, as_typed, check, did_you_mean, kind_of, range_of
 
 Options = TypeVar("Options")
 MANY = 10**9  # from here on, the end of a range is only there to catch slips

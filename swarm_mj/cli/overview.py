@@ -5,10 +5,11 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import NoReturn
 
-from swarm_mj.cli import BAD_INPUT, COMMANDS, DONE
+from swarm_mj.cli import COMMANDS
 from swarm_mj.cli.options import Parser
-from swarm_mj.fields import did_you_mean
-from swarm_mj.io.provenance import version
+from swarm_mj.system.exit_codes import BAD_INPUT, DONE
+from swarm_mj.system.fields import did_you_mean
+from swarm_mj.system.provenance import version
 
 SHELLS = ("bash", "zsh")
 NAME = "swarm-mj"

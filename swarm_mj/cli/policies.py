@@ -10,16 +10,16 @@ from typing import Any, ClassVar
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.cli import DONE
 from swarm_mj.cli.mission_options import mission_flags, one_mission
 from swarm_mj.cli.policy_options import NAMED
-from swarm_mj.cli.terminal import named_values, plain_console, this_command
-from swarm_mj.fields import as_typed, setting
-from swarm_mj.io.packages import is_installed, missing
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
 from swarm_mj.policies.registry import POLICIES, library_of, make_policy, normalised
 from swarm_mj.protocol.packets import Packet, times
+from swarm_mj.system.exit_codes import DONE
+from swarm_mj.system.fields import as_typed, setting
+from swarm_mj.system.packages import is_installed, missing
+from swarm_mj.system.terminal import named_values, plain_console, this_command
 
 WINDOWS = {
     "broadcasts": "two broadcasts, which nobody answers",

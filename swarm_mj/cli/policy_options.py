@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Any
 
-from swarm_mj.fields import setting
-from swarm_mj.parts import GROUP, SHOWN_AS, OwnParts
+from swarm_mj.mission.components import GROUP, SHOWN_AS, OwnParts
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
+from swarm_mj.system.fields import setting
 
 NAMED = tuple(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes the other
 NAMES = f"who talks when (`swarm-mj policies` says more): {', '.join(NAMED)}"

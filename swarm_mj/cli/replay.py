@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from swarm_mj.cli.machine import YES
-from swarm_mj.cli.outputs import Output, check_outputs
-from swarm_mj.cli.progress import WorkBar
-from swarm_mj.cli.terminal import plain_console
-from swarm_mj.fields import setting
-from swarm_mj.io.atomic import write_bytes
-from swarm_mj.io.interrupt import heard_interrupt
-from swarm_mj.io.packages import need
-from swarm_mj.parts import SHOWN_AS, OwnParts, is_own
-from swarm_mj.rendering.style import LONGEST_S, USUAL, Style, fitted, usual_seconds
+from swarm_mj.mission.components import SHOWN_AS, OwnParts, is_own
+from swarm_mj.replay.rendering.style import LONGEST_S, USUAL, Style, fitted, usual_seconds
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
+from swarm_mj.system.atomic import write_bytes
+from swarm_mj.system.fields import setting
+from swarm_mj.system.interrupt import heard_interrupt
+from swarm_mj.system.machine import YES
+from swarm_mj.system.outputs import Output, check_outputs
+from swarm_mj.system.packages import need
+from swarm_mj.system.progress import WorkBar
+from swarm_mj.system.terminal import plain_console
 
 if TYPE_CHECKING:
     from swarm_mj.replay.footage import Footage
@@ -95,7 +95,7 @@ def run(options: Options) -> int:
 
 
 def _make_video(options: Options, video: Path) -> int:
-    from swarm_mj.cli.estimates import check_fits, video_needs  # with all that flies
+    from swarm_mj.api.estimates import check_fits, video_needs  # with all that flies
 
     if options.web:
         raise ValueError("--web is not allowed with --video; leave one out")
@@ -108,7 +108,10 @@ def _make_video(options: Options, video: Path) -> int:
     check_fits(needs, video, "choose a smaller --size or fewer --seconds", is_forced=options.yes)
     for module in ("av", "PIL", "rerun"):
         need(module, "a video")
-    from swarm_mj.rendering.video import check_video, make_video  # MuJoCo takes its time to import
+    from swarm_mj.replay.rendering.video import (  # MuJoCo takes its time to import
+        check_video,
+        make_video,
+    )
 
     with heard_interrupt() as was_pressed:
         with Console(stderr=True, highlight=False).status("Reading ..."):
@@ -137,8 +140,8 @@ def _style(options: Options, suffix: str) -> Style:
 
 def _read(options: Options) -> list["Footage"]:
     """What is to be seen."""
-    from swarm_mj.rendering.movie import MOST_MISSIONS
     from swarm_mj.replay.read import read_footage
+    from swarm_mj.replay.rendering.movie import MOST_MISSIONS
 
     if len(options.file) > MOST_MISSIONS:
         raise ValueError(f"a video shows 1 or {MOST_MISSIONS} replays, not {len(options.file)}")

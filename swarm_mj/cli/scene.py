@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from swarm_mj.cli.mission_options import one_mission
-from swarm_mj.cli.outputs import Output, check_outputs
-from swarm_mj.cli.terminal import plain_console, this_command
-from swarm_mj.fields import same_as, setting
-from swarm_mj.io.atomic import write_text
 from swarm_mj.mission import Mission
-from swarm_mj.parts import OwnParts
+from swarm_mj.mission.components import OwnParts
+from swarm_mj.system.atomic import write_text
+from swarm_mj.system.fields import same_as, setting
+from swarm_mj.system.outputs import Output, check_outputs
+from swarm_mj.system.terminal import plain_console, this_command
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +27,7 @@ class Options:
 def run(options: Options) -> int:
     """Runs the command; returns its exit code."""
     from swarm_mj.physics.scene import compose  # MuJoCo takes its time to import
-    from swarm_mj.swarm import Swarm
+    from swarm_mj.simulation.swarm import Swarm
 
     mission = options.mission
     check_outputs(Output("scene", options.out, ".xml|.mjcf"), must_be_new=not options.force)

@@ -7,13 +7,9 @@ from typing import Any, ClassVar
 
 from rich.console import Console
 
-from swarm_mj.cli import DONE, FAILED, INTERRUPTED
-from swarm_mj.cli.estimates import check_fits, training_needs
-from swarm_mj.cli.machine import YES, memory_errors
+from swarm_mj.api.estimates import check_fits, training_needs
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
-from swarm_mj.cli.outputs import Output, check_outputs
-from swarm_mj.cli.terminal import named_values, plain_console, tell_cores, this_command
 from swarm_mj.cli.train_progress import Watch
 from swarm_mj.cli.train_report import has_stopped_early, report, verdicts
 from swarm_mj.cli.train_settings import (
@@ -24,8 +20,6 @@ from swarm_mj.cli.train_settings import (
     own_names,
     refuse_others,
 )
-from swarm_mj.fields import same_as, setting
-from swarm_mj.io.interrupt import deferred_interrupt
 from swarm_mj.learning.run_folder import (
     BUDGETS,
     CHECKPOINT,
@@ -40,6 +34,12 @@ from swarm_mj.learning.run_folder import (
 )
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.stored import read_policy
+from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
+from swarm_mj.system.fields import same_as, setting
+from swarm_mj.system.interrupt import deferred_interrupt
+from swarm_mj.system.machine import YES, memory_errors
+from swarm_mj.system.outputs import Output, check_outputs
+from swarm_mj.system.terminal import named_values, plain_console, tell_cores, this_command
 
 
 @dataclass(frozen=True, kw_only=True)

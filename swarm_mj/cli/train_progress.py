@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.progress import Task
 
-from swarm_mj.cli.progress import WorkBar
 from swarm_mj.learning.choice import ORACLE, REFERENCES, column, reference_missions
+from swarm_mj.system.progress import WorkBar
 
 if TYPE_CHECKING:
     from swarm_mj.learning.callback import Status

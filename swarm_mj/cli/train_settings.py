@@ -10,16 +10,16 @@ from functools import reduce
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.cli.mission_options import check_in_use, make_mission
+from swarm_mj.cli.mission_options import check_in_use
 from swarm_mj.cli.options import add_option, flag_of
-from swarm_mj.fields import as_typed
-from swarm_mj.gnn.feature_sets import check_named, is_own_set, load_features, num_features
-from swarm_mj.gnn.shape import GnnShape
 from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
-from swarm_mj.mission import PRESETS, Mission
-from swarm_mj.parts import GROUP, OwnParts, is_own
+from swarm_mj.mission import PRESETS, Mission, make_mission
+from swarm_mj.mission.components import GROUP, OwnParts, is_own
+from swarm_mj.policies.gnn.feature_sets import check_named, is_own_set, load_features, num_features
+from swarm_mj.policies.gnn.shape import GnnShape
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.protocol.packets import check_whole
+from swarm_mj.system.fields import as_typed
 
 PARTS = {
     "": Training,

@@ -13,12 +13,12 @@ so cells of different robots may overlap, or leave ground to nobody.
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.compiled import compiled
 from swarm_mj.control.controller import steer
 from swarm_mj.control.voronoi import cell, moments
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import NEVER, Buffers
+from swarm_mj.system.compiled import compiled
 
 
 class Coverage:

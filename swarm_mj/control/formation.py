@@ -15,11 +15,11 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.compiled import compiled
 from swarm_mj.control.controller import steer
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import NEVER, Buffers
+from swarm_mj.system.compiled import compiled
 
 BLOCK_SHARE = 0.5  # of the area's side: so wide is the formation
 

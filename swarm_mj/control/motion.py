@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from swarm_mj.compiled import compiled
 from swarm_mj.control.controller import Controller
 from swarm_mj.control.coverage import Coverage
 from swarm_mj.control.formation import Formation
@@ -17,6 +16,7 @@ from swarm_mj.mission.batched_rng import Stream, normal
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import NEVER, Buffers
 from swarm_mj.protocol.costs import velocity_variance
+from swarm_mj.system.compiled import compiled
 
 
 def controller_of(mission: Mission) -> Controller:

@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.compiled import compiled
 from swarm_mj.mission.geometry import squared_distance
+from swarm_mj.system.compiled import compiled
 
 
 @compiled()

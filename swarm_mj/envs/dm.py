@@ -21,7 +21,7 @@ from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.protocol.buffers import check_robots
 from swarm_mj.protocol.costs import age_of_information
 from swarm_mj.radio.free_space import Channel
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 _Task: Any = control.Task  # untyped: pyright reads its abstract methods as returning None
 

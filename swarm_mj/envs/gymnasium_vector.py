@@ -19,8 +19,8 @@ from swarm_mj.envs.options import check_reset
 from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.envs.spaces import team_spaces
 from swarm_mj.envs.team import Info, Observation, Team, check_count, next_seed
-from swarm_mj.fields import did_you_mean
 from swarm_mj.mission import Mission
+from swarm_mj.system.fields import did_you_mean
 
 METADATA: dict[str, Any] = {**RENDERING, "render_modes": ["rgb_array"]}
 Step = tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Info]

@@ -5,8 +5,8 @@ from collections.abc import Collection, Mapping
 from typing import Any, get_args
 
 from swarm_mj.envs.registration import NAMESPACE, environment_id
-from swarm_mj.fields import did_you_mean
 from swarm_mj.mission import Mission, Task
+from swarm_mj.system.fields import did_you_mean
 
 
 def check_task(mission: Mission | str) -> None:

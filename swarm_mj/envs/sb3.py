@@ -21,10 +21,10 @@ from torch import nn
 from swarm_mj.envs.gymnasium import check_paid_together
 from swarm_mj.envs.spaces import robot_spaces, team_spaces
 from swarm_mj.envs.team import Observation, Team, next_seed
-from swarm_mj.io.provenance import version
 from swarm_mj.mission import Mission
 from swarm_mj.policies.mlp import MlpShape
 from swarm_mj.policies.mlp_folder import MlpConfig, save_mlp
+from swarm_mj.system.provenance import version
 
 AGENTS = ("robot", "team")  # what an environment is
 ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}  # of networks that can be stored as policies

@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import UInt8
 
 from swarm_mj.envs.team import Team
-from swarm_mj.rendering.contents import contents_of
-from swarm_mj.rendering.scene import SceneRenderer
+from swarm_mj.replay.rendering.contents import contents_of
+from swarm_mj.replay.rendering.scene import SceneRenderer
 
 if TYPE_CHECKING:
-    from swarm_mj.rendering.viewer import SceneViewer
+    from swarm_mj.replay.rendering.viewer import SceneViewer
 
 MODES = ("rgb_array", "human")
 RENDERING: dict[str, Any] = {"render_modes": list(MODES), "render_fps": 10}  # 100 ms a window
@@ -48,7 +48,9 @@ class Screen:
         if self._mode != "human":
             return
         if self._viewer is None:
-            from swarm_mj.rendering.viewer import SceneViewer  # looks for a display when imported
+            from swarm_mj.replay.rendering.viewer import (
+                SceneViewer,  # looks for a display when imported
+            )
 
             self._viewer = SceneViewer(team.mission, scene=team.flown.scene)
         self._viewer.show(contents_of(team.flown))

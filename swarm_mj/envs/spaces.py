@@ -7,8 +7,8 @@ from gymnasium import spaces
 from gymnasium.vector.utils import batch_space
 
 from swarm_mj.envs.team import Team
-from swarm_mj.gnn.feature_sets import is_own_set
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
+from swarm_mj.policies.gnn.feature_sets import is_own_set
 from swarm_mj.protocol.buffers import NO_PARENT
 
 

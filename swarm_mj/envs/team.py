@@ -15,19 +15,19 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.control.controller import Controller, Costed
 from swarm_mj.control.motion import controller_of
+from swarm_mj.envs.credit import as_it_is, credits_of
+from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED, LAST_TRAINING_SEED
 from swarm_mj.envs.options import check_features_named, check_fields, check_task
-from swarm_mj.fields import check_callable
-from swarm_mj.gnn.feature_sets import is_own_set, load_features, make_extractor
-from swarm_mj.gnn.graphs import check_width
-from swarm_mj.learning.credit import as_it_is, credits_of
-from swarm_mj.learning.mission_batch import FIRST_TRAINING_SEED, LAST_TRAINING_SEED
 from swarm_mj.mission import PRESETS, Mission
-from swarm_mj.parts import OwnParts
+from swarm_mj.mission.components import OwnParts
 from swarm_mj.physics.scene import Scene
+from swarm_mj.policies.gnn.feature_sets import is_own_set, load_features, make_extractor
+from swarm_mj.policies.gnn.graphs import check_width
 from swarm_mj.protocol.costs import WindowCosts, age_of_information, velocity_variance
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.radio.free_space import Channel
-from swarm_mj.swarm import CALLED_WITH, Swarm
+from swarm_mj.simulation.swarm import CALLED_WITH, Swarm
+from swarm_mj.system.fields import check_callable
 
 REWARDS = ("aoi", "velocity-variance", "task-cost", "credit")
 Observation = dict[str, np.ndarray]

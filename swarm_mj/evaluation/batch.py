@@ -7,17 +7,17 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from msgspec import Meta
 
-from swarm_mj.compiled import compiled
 from swarm_mj.evaluation.lower_bound import ConnectivityFloor
 from swarm_mj.mission import Mission
-from swarm_mj.parts import OwnParts, one_line_each
+from swarm_mj.mission.components import OwnParts, one_line_each
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.window import SLOT_WINDOWS
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.rollout import WindowRecord, rollout
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import WindowRecord, rollout
+from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.compiled import compiled
 
 MEANS = ("aoi", "velocity_variance", "hops")  # over windows
 TOTALS = {  # totals, and what `protocol.costs.Packets` calls them

@@ -10,8 +10,8 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnContext
 from typing import Any, TypeVar
 
-from swarm_mj.io.interrupt import INTERRUPTS, deferred_interrupt
-from swarm_mj.io.processes import guard
+from swarm_mj.system.interrupt import INTERRUPTS, deferred_interrupt
+from swarm_mj.system.processes import guard
 
 Piece = TypeVar("Piece")
 Product = TypeVar("Product")

@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.compiled import compiled
 from swarm_mj.mission.geometry import gather_connected
 from swarm_mj.protocol.buffers import NEVER
+from swarm_mj.system.compiled import compiled
 
 
 class ConnectivityFloor:

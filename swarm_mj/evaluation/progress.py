@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.evaluation.batch import Batch, BatchCosts, Count, num_ages
-from swarm_mj.io.atomic import append_bytes, write_bytes
-from swarm_mj.io.reading import read_file, read_json
+from swarm_mj.system.atomic import append_bytes, write_bytes
+from swarm_mj.system.reading import read_file, read_json
 
 DIGEST_DIGITS = 16
 NUMBER_BYTES = 32  # that a number takes, at most

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import msgspec
 
-from swarm_mj.io.reading import read_rows
 from swarm_mj.mission import PAPERS, Mission
+from swarm_mj.system.reading import read_rows
 
 MOST_BYTES = 1_000_000  # of the table
 METHODS = {

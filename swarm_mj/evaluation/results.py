@@ -6,11 +6,11 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, get_args
 
-from swarm_mj.fields import check_value, kind_of
-from swarm_mj.io import atomic
-from swarm_mj.io.reading import read_rows
 from swarm_mj.mission import Mission
 from swarm_mj.mission.specification import NOTHING
+from swarm_mj.system import atomic
+from swarm_mj.system.fields import check_value, kind_of
+from swarm_mj.system.reading import read_rows
 
 
 @dataclass(frozen=True, kw_only=True)

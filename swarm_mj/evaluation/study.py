@@ -9,10 +9,8 @@ from typing import Any
 from swarm_mj.control.controller import Costed
 from swarm_mj.control.motion import controller_of
 from swarm_mj.evaluation.batch import Batch
-from swarm_mj.fields import check, setting
-from swarm_mj.io.provenance import code_digest, commit, version
 from swarm_mj.mission import Mission
-from swarm_mj.parts import OwnParts, digest
+from swarm_mj.mission.components import OwnParts, digest
 from swarm_mj.policies.policy import Parameters, Policy
 from swarm_mj.policies.registry import (
     check_used,
@@ -21,7 +19,9 @@ from swarm_mj.policies.registry import (
     make_policy,
     normalised,
 )
-from swarm_mj.swarm import MAX_SEED
+from swarm_mj.simulation.swarm import MAX_SEED
+from swarm_mj.system.fields import check, setting
+from swarm_mj.system.provenance import code_digest, commit, version
 
 MAX_EPISODES = 100_000
 BATCH_SIZE = 25  # missions side by side: as fast as many, and little lost by an interruption

@@ -12,7 +12,7 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
-from swarm_mj.io.provenance import commit, version
+from swarm_mj.envs.vec_env import missions_of
 from swarm_mj.learning import checkpoint
 from swarm_mj.learning.choice import Row, candidates, has_stalled, reserved_minutes
 from swarm_mj.learning.held_out import HeldOut, evaluate, record_replay
@@ -33,9 +33,9 @@ from swarm_mj.learning.selection import (
     told_of_choice,
     told_of_evaluation,
 )
-from swarm_mj.learning.vec_env import missions_of
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.policies.stored import save_policy
+from swarm_mj.system.provenance import commit, version
 
 OPTIMISER = tuple(
     f"train/{name}"

@@ -15,17 +15,17 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
-from swarm_mj.gnn.network import AggregationGnn
-from swarm_mj.io.atomic import write_bytes
-from swarm_mj.io.reading import read_json
+from swarm_mj.envs.mission_batch import ActionHistory
+from swarm_mj.envs.vec_env import missions_of
 from swarm_mj.learning.actor_critic import GnnActorCritic
 from swarm_mj.learning.checkpoint_state import check_state
 from swarm_mj.learning.choice import NUM_BEST
-from swarm_mj.learning.mission_batch import ActionHistory
 from swarm_mj.learning.run_folder import Progress
 from swarm_mj.learning.settings import Training
 from swarm_mj.learning.torch_file import read_torch
-from swarm_mj.learning.vec_env import missions_of
+from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.system.atomic import write_bytes
+from swarm_mj.system.reading import read_json
 
 CHECKPOINT_VERSION = 3
 SPARE_BYTES = 100_000_000  # the curve's, and what else does not depend on the settings

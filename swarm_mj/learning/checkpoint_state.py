@@ -14,13 +14,13 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import Tensor
 
-from swarm_mj.io.reading import read_plain
+from swarm_mj.envs.mission_batch import MissionBatch
+from swarm_mj.envs.vec_env import missions_of
 from swarm_mj.learning.actor_critic import GnnActorCritic
 from swarm_mj.learning.choice import Amount, Count, candidates
 from swarm_mj.learning.held_out import HeldOut
-from swarm_mj.learning.mission_batch import MissionBatch
 from swarm_mj.learning.run_folder import Progress
-from swarm_mj.learning.vec_env import missions_of
+from swarm_mj.system.reading import read_plain
 
 OPTIONAL = ("aoi_sem",)  # of what a held-out evaluation has
 IN_A_ROW = {"decisions", "minutes", *(spec.name for spec in fields(HeldOut))}.difference(OPTIONAL)

@@ -10,16 +10,16 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.evaluation.statistics import standard_error
-from swarm_mj.gnn.feature_sets import make_extractor
-from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.learning.settings import HELD_OUT_SEED, Training
 from swarm_mj.mission import Mission
-from swarm_mj.policies.gnn import LearnedPolicy
+from swarm_mj.policies.gnn.feature_sets import make_extractor
+from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.policies.gnn.policy import LearnedPolicy
 from swarm_mj.policies.policy import Policy
 from swarm_mj.protocol.costs import WindowCosts
 from swarm_mj.replay.recorder import Recorder
-from swarm_mj.rollout import rollout
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.swarm import Swarm
 
 Flown = list[list[WindowCosts]]  # by team size, window by window
 MakePolicy = Callable[[Mission], Policy]

@@ -9,12 +9,12 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from swarm_mj.fields import check, setting
-from swarm_mj.io.atomic import write_csv, write_json
-from swarm_mj.io.reading import read_document, read_file
 from swarm_mj.learning.choice import MANY_DECISIONS, Amount, Choice, Count
 from swarm_mj.learning.settings import Training
 from swarm_mj.protocol.costs import WindowCosts
+from swarm_mj.system.atomic import write_csv, write_json
+from swarm_mj.system.fields import check, setting
+from swarm_mj.system.reading import read_document, read_file
 
 SETTINGS, CHECKPOINT, CURVE = "settings.json", "checkpoint.pt", "curve.csv"
 INIT, POLICY, REPLAYS, TENSORBOARD = "init", "policy", "replays", "tensorboard"

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from swarm_mj.gnn.network import AggregationGnn
 from swarm_mj.learning.choice import (
     CHOICE_SEED,
     COMPARED,
@@ -39,6 +38,7 @@ from swarm_mj.learning.held_out import (
     seeds_from,
 )
 from swarm_mj.learning.settings import HELD_OUT_SEED, Training
+from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.registry import make_policy
 
 REFERENCE_COLUMNS = [column(cost, name) for cost in JUDGED for name in REFERENCES]

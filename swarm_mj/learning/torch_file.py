@@ -6,7 +6,7 @@ from pathlib import Path
 
 import torch
 
-from swarm_mj.io.reading import read_file
+from swarm_mj.system.reading import read_file
 
 
 def read_torch(path: Path, most_bytes: int) -> object:

@@ -17,13 +17,12 @@ from stable_baselines3.common.buffers import DictRolloutBuffer
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from swarm_mj.gnn.network import AggregationGnn
-from swarm_mj.io.owned import owned
+from swarm_mj.envs.mission_batch import make_batches
+from swarm_mj.envs.vec_env import RobotEnv, TeamEnv, missions_of
 from swarm_mj.learning import checkpoint
 from swarm_mj.learning.active_rollout_buffer import ActiveRolloutBuffer
 from swarm_mj.learning.actor_critic import GnnActorCritic, TeamActorCritic
 from swarm_mj.learning.callback import Listener, Stopped, TrainingCallback
-from swarm_mj.learning.mission_batch import make_batches
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
     CURVE,
@@ -40,10 +39,11 @@ from swarm_mj.learning.run_folder import (
     write_run,
 )
 from swarm_mj.learning.settings import PpoSettings, Training
-from swarm_mj.learning.vec_env import RobotEnv, TeamEnv, missions_of
+from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.policies.policy_folder import check_replaceable
 from swarm_mj.policies.stored import read_policy, save_policy
+from swarm_mj.system.owned import owned
 
 NO_BUDGET = 10**15  # team decisions
 

@@ -1,6 +1,6 @@
 """The mission (IV-B): its numbers, its presets, and what is drawn before it begins."""
 
-from swarm_mj.mission.presets import PAPERS, PRESETS, WORLDS, paper, reference
+from swarm_mj.mission.presets import PAPERS, PRESETS, WORLDS, make_mission, paper, reference
 from swarm_mj.mission.specification import (
     MISSION_DISTANCE_M,
     Boundary,
@@ -24,6 +24,7 @@ __all__ = [
     "PhysicsMode",
     "Task",
     "WallHit",
+    "make_mission",
     "paper",
     "reference",
 ]

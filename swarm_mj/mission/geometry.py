@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.compiled import compiled
+from swarm_mj.system.compiled import compiled
 
 ROOT = -1  # the parent of the root
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.compiled import compiled
 from swarm_mj.mission.geometry import gather_connected
+from swarm_mj.system.compiled import compiled
 
 MAX_DRAWS = 20_000  # the sparsest of the paper's teams (range ratio 0.2) connects in a few hundred
 MAX_FREE_DRAWS = 1000  # of a robot; of an area that is half free, a robot needs two

@@ -129,3 +129,10 @@ def where_flown(mission: Mission) -> list[str]:
     if radio != usual.beyond_free_space:
         changed.append(radio or "free space")
     return [f"preset {mission.preset}", *changed]
+
+
+def make_mission(**given: Any) -> Mission:
+    """A mission of the preset and task that are given, or usual, changed by the other fields."""
+    preset = given.pop("preset", Mission().preset)
+    replace(Mission(), preset=preset, task=given.get("task", Mission().task))  # refuses the unknown
+    return PRESETS[preset](**given)

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from swarm_mj.fields import FieldOf, as_typed, check, check_names, setting
+from swarm_mj.system.fields import FieldOf, as_typed, check, check_names, setting
 
 Preset = Literal["paper", "reference", "indoor", "urban", "open-field"]
 Task = Literal["stationary", "random-walk", "flocking", "formation", "coverage"]

@@ -13,10 +13,10 @@ from xml.etree import ElementTree
 from mujoco._enums import mjtGeom
 from mujoco._specs import MjSpec
 
-from swarm_mj.fields import did_you_mean
 from swarm_mj.mission import Mission
 from swarm_mj.mission.specification import OPEN
 from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP, idle_obstacles, obstacles_of
+from swarm_mj.system.fields import did_you_mean
 
 Arena = Callable[[MjSpec, Mission], None]  # adds what stands in the area
 

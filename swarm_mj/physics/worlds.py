@@ -14,13 +14,13 @@ import numpy as np
 from jaxtyping import Bool, Float
 from mujoco import batch
 
-from swarm_mj.compiled import compiled
 from swarm_mj.mission import Mission
 from swarm_mj.mission.geometry import overlaps_earlier
 from swarm_mj.physics.obstacles import Obstacles
 from swarm_mj.physics.scene import ROBOT_MASS_KG, Scene, compose, num_substeps, timestep_s
 from swarm_mj.physics.solid_geoms import obstacles_of
 from swarm_mj.physics.state import ROBOT_RADIUS_M, RobotStates
+from swarm_mj.system.compiled import compiled
 
 OPEN, MIRROR, CLIP = 0, 1, 2  # what happens at the boundary
 

@@ -3,10 +3,10 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.compiled import compiled
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.policies.policy import BroadcastPolicy, RandomTransmission
 from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.system.compiled import compiled
 
 
 class Aloha(RandomTransmission, BroadcastPolicy):

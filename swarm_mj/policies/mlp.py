@@ -12,13 +12,13 @@ from typing import Literal, get_args
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from swarm_mj.fields import check, setting
-from swarm_mj.gnn.feature_sets import check_num_features, is_own_set
-from swarm_mj.gnn.graphs import FeatureExtractor
-from swarm_mj.gnn.sampling import IMPOSSIBLE, sample
 from swarm_mj.mission.batched_rng import Stream, uniform
+from swarm_mj.policies.gnn.feature_sets import check_num_features, is_own_set
+from swarm_mj.policies.gnn.graphs import FeatureExtractor
+from swarm_mj.policies.gnn.sampling import IMPOSSIBLE, sample
 from swarm_mj.policies.policy import DecentralisedPolicy, Parameters
 from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.system.fields import check, setting
 
 Activation = Literal["tanh", "relu"]
 Weights = dict[str, np.ndarray]  # by name; `0.weight` [Out, In] and `0.bias` [Out] come first

@@ -10,9 +10,8 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from swarm_mj.gnn.feature_sets import trained_extractor
-from swarm_mj.io.reading import read_document
 from swarm_mj.mission import Mission
+from swarm_mj.policies.gnn.feature_sets import trained_extractor
 from swarm_mj.policies.mlp import MlpPolicy, MlpShape, Weights
 from swarm_mj.policies.model_card import mlp_card
 from swarm_mj.policies.policy_folder import (
@@ -27,6 +26,7 @@ from swarm_mj.policies.policy_folder import (
     read_part,
     write_policy,
 )
+from swarm_mj.system.reading import read_document
 
 VERSION = 1
 

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from swarm_mj.gnn.feature_sets import is_own_set
+from swarm_mj.policies.gnn.feature_sets import is_own_set
 from swarm_mj.policies.mlp import MlpShape
 from swarm_mj.policies.policy_config import PolicyConfig
 

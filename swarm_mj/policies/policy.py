@@ -7,7 +7,6 @@ from numbers import Real
 import numpy as np
 from jaxtyping import Bool, Int
 
-from swarm_mj.fields import name_of
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.physics.state import RobotStates
@@ -16,6 +15,7 @@ from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.packets import Packet, PacketField, fitting, packet_of
 from swarm_mj.protocol.window import DoubleBroadcast, RequestResponse, WindowProtocol
 from swarm_mj.radio.link_models import Belief, TrueLinks
+from swarm_mj.system.fields import name_of
 
 Parameters = Mapping[str, bool | int | float | str]  # what a policy was made with, by name
 

@@ -4,10 +4,10 @@ import json
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from swarm_mj.fields import check, setting
-from swarm_mj.gnn.feature_sets import check_fit
-from swarm_mj.gnn.shape import GnnShape
-from swarm_mj.io.reading import read_document
+from swarm_mj.policies.gnn.feature_sets import check_fit
+from swarm_mj.policies.gnn.shape import GnnShape
+from swarm_mj.system.fields import check, setting
+from swarm_mj.system.reading import read_document
 
 FORMAT = "swarm_mj policy"
 FORMAT_VERSION = 1

@@ -8,8 +8,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.io.atomic import present_folder, write_folder
-from swarm_mj.io.reading import check_size, format_of, read_file, read_json, read_plain
+from swarm_mj.system.atomic import present_folder, write_folder
+from swarm_mj.system.reading import check_size, format_of, read_file, read_json, read_plain
 
 WEIGHTS, CONFIG, CARD = "model.safetensors", "config.json", "README.md"
 MAX_BYTES = {WEIGHTS: 64_000_000, CONFIG: 1_000_000}

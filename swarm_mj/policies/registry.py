@@ -1,7 +1,7 @@
 """The one table of policies by their names on the command line.
 
 A learned policy has no name but that of the directory or file that holds it, except the shipped
-ones, `gnn` and `residual-gnn`.
+one, `gnn`.
 """
 
 import os
@@ -9,11 +9,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.fields import check_kind, did_you_mean
-from swarm_mj.io.assets import asset
-from swarm_mj.io.packages import need
 from swarm_mj.mission import Mission
-from swarm_mj.parts import is_own, make
+from swarm_mj.mission.components import is_own, make
 from swarm_mj.policies.aloha import Aloha
 from swarm_mj.policies.gossip import InnovationGossip
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle, LookaheadOracle
@@ -33,6 +30,9 @@ from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.protocol.packets import fits, packet_of
 from swarm_mj.radio.free_space import from_db
 from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.system.assets import asset
+from swarm_mj.system.fields import check_kind, did_you_mean
+from swarm_mj.system.packages import need
 
 WITHOUT_PAYLOAD = "planner --payload none"  # packets carry T, M and P alone
 PAYLOADS = ("snapshots", "none")
@@ -97,20 +97,18 @@ RULES: dict[str, Callable[..., Policy]] = {
     "greedy-oracle": lambda mission: GreedyOracle(radio_of(mission)),
     "oracle-lookahead": lambda mission: LookaheadOracle(radio_of(mission)),
 }
-# The learned policies that come with the package, in assets/policies/.
-SHIPPED = "gnn"
-SHIPPED_RESIDUAL = "residual-gnn"
-POLICIES = (*RULES, SHIPPED, SHIPPED_RESIDUAL)
+SHIPPED = "gnn"  # the learned policy that comes with the package, in assets/policies/
+POLICIES = (*RULES, SHIPPED)
 
 
 def is_learned(name: str) -> bool:
-    """Whether a policy is a trained network: a shipped one, or one in a directory or file."""
-    return name in (SHIPPED, SHIPPED_RESIDUAL) or is_stored(name)
+    """Whether a policy is a trained network: the shipped one, or one in a directory or file."""
+    return name == SHIPPED or is_stored(name)
 
 
 def library_of(name: str) -> str | None:
-    """The library that a shipped policy needs and others do not, if any."""
-    return {SHIPPED: "torch", SHIPPED_RESIDUAL: "safetensors"}.get(name)
+    """The library that the shipped policy needs and others do not, if any."""
+    return "torch" if name == SHIPPED else None
 
 
 def is_stored(name: str) -> bool:
@@ -197,8 +195,6 @@ def make_policy(
         return _own_policy(name, mission, probability, is_deterministic)
     if is_learned(name):
         _refuse(probability, name)
-        if name == SHIPPED_RESIDUAL:
-            return _shipped_residual(mission, is_deterministic=is_deterministic)
         return _learned(name, mission, is_deterministic=is_deterministic, features=features)
     if name not in RULES:
         raise ValueError(
@@ -232,23 +228,6 @@ def is_own_policy(name: str) -> bool:
     return is_own(name) and not is_stored(name)
 
 
-def _shipped_residual(mission: Mission, *, is_deterministic: bool) -> Policy:
-    """The shipped correction of the plan of teams at rest; teams that move go by `sotdma`."""
-    if mission.task != "stationary":
-        policy = _sotdma(mission)
-        policy.uses = (
-            "where robots move, what sotdma uses; at rest (--task stationary) a trained graph "
-            "neural network corrects the plan of planner --payload none"
-        )
-        return policy
-    need("safetensors", f"policy {SHIPPED_RESIDUAL}", "fly another")
-    from swarm_mj.policies.residual.making import residual_policy
-    from swarm_mj.policies.residual.stored import read_residual
-
-    weights = read_residual(asset(f"policies/{SHIPPED_RESIDUAL}.safetensors"))
-    return residual_policy(weights, mission, is_deterministic=is_deterministic)
-
-
 def _learned(name: str, mission: Mission, **options: Any) -> Policy:
     """A trained network, which takes its libraries' time to import."""
     if name != SHIPPED and is_mlp(Path(name)):
@@ -256,16 +235,6 @@ def _learned(name: str, mission: Mission, **options: Any) -> Policy:
         from swarm_mj.policies.mlp_folder import load_mlp
 
         return load_mlp(Path(name), mission, **options)
-    if name != SHIPPED and name.endswith(ONE_FILE):
-        need("safetensors", f"policy {name}", "fly another")
-        from swarm_mj.policies.residual.making import residual_policy
-        from swarm_mj.policies.residual.stored import is_residual, read_residual
-
-        if is_residual(Path(name)):
-            is_deterministic = bool(options["is_deterministic"])
-            return residual_policy(
-                read_residual(Path(name)), mission, is_deterministic=is_deterministic
-            )
     need("torch", f"policy {name}", "fly another")
     from swarm_mj.policies.stored import load_policy
 

@@ -8,13 +8,11 @@ import torch
 from safetensors import SafetensorError
 from safetensors.torch import load, save
 
-from swarm_mj.gnn.fast import FastAggregationGnn
-from swarm_mj.gnn.feature_sets import is_own_set, trained_extractor
-from swarm_mj.gnn.network import AggregationGnn
-from swarm_mj.io.atomic import write_bytes
-from swarm_mj.io.reading import check_size, read_file, read_json
 from swarm_mj.mission import Mission
-from swarm_mj.policies.gnn import LearnedPolicy
+from swarm_mj.policies.gnn.fast import FastAggregationGnn
+from swarm_mj.policies.gnn.feature_sets import is_own_set, trained_extractor
+from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.policies.gnn.policy import LearnedPolicy
 from swarm_mj.policies.model_card import model_card
 from swarm_mj.policies.policy_config import PolicyConfig, from_json, to_json
 from swarm_mj.policies.policy_folder import (
@@ -31,6 +29,8 @@ from swarm_mj.policies.policy_folder import (
     read_part,
     write_policy,
 )
+from swarm_mj.system.atomic import write_bytes
+from swarm_mj.system.reading import check_size, read_file, read_json
 
 METADATA = "swarm_mj policy"  # the entry of a one-file policy's metadata that has config and card
 

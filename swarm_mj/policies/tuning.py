@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from swarm_mj.fields import check, check_value, setting
-from swarm_mj.io.reading import read_rows
 from swarm_mj.mission import WORLDS, Mission
+from swarm_mj.system.fields import check, check_value, setting
+from swarm_mj.system.reading import read_rows
 
 TABLE = Path(__file__).with_name("tuned.csv")
 MOST_BYTES = 10_000_000

@@ -9,9 +9,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.compiled import compiled
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.timestamps import is_newer
+from swarm_mj.system.compiled import compiled
 
 NO_PARENT = -1  # of oneself, and of a teammate never heard of over the radio
 BROADCAST = -1  # the recipient of a packet for everyone who hears it

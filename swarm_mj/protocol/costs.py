@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.compiled import compiled
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import AT_START, NEVER, Buffers
 from swarm_mj.protocol.window import Phase
+from swarm_mj.system.compiled import compiled
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,10 +6,10 @@ Index order: `[b, i]` is robot `i` of mission `b`.
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.fields import name_of
 from swarm_mj.protocol.buffers import check_robots
 from swarm_mj.radio.composed import SlotChannel
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio
+from swarm_mj.system.fields import name_of
 
 
 def decoded(

@@ -11,8 +11,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.compiled import compiled
 from swarm_mj.protocol.buffers import NEVER, Buffers
+from swarm_mj.system.compiled import compiled
 
 TIE_BREAK = 1e-9
 

@@ -6,7 +6,7 @@ Index order: `[i, k]` is when robot `k` observed what robot `i` knows of it.
 import numpy as np
 from jaxtyping import Float, Int
 
-from swarm_mj.compiled import compiled
+from swarm_mj.system.compiled import compiled
 
 
 @compiled()

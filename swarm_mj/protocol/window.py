@@ -11,12 +11,12 @@ from typing import ClassVar, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.compiled import compiled
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST, Buffers, merge, observe_self, record_attempt
 from swarm_mj.protocol.own_channel import decoded
 from swarm_mj.protocol.partial_packets import entries_sent
 from swarm_mj.radio.free_space import Channel, VaryingChannel
+from swarm_mj.system.compiled import compiled
 
 SLOTS_PER_WINDOW = 2  # a transmission takes one, and so do its responses
 SLOT_WINDOWS = 1.0 / SLOTS_PER_WINDOW  # Delta t: what a slot lasts [windows]

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt64
 
-from swarm_mj.compiled import compiled
 from swarm_mj.radio.counters import keyed_uniform, link_key, mixed
 from swarm_mj.radio.fading import NO_BURSTS, NO_FADING, Bursts, fade, is_in_burst
 from swarm_mj.radio.kernels import is_received, sinr
 from swarm_mj.radio.link_gains import LinkGains
+from swarm_mj.system.compiled import compiled
 
 _FADES, _ERASURES, _BURSTS = np.uint64(1), np.uint64(2), np.uint64(3)  # what a key is used for
 

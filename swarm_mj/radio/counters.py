@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from swarm_mj.compiled import compiled
+from swarm_mj.system.compiled import compiled
 
 _WEYL = np.uint64(0x9E3779B97F4A7C15)  # SplitMix64's increment: 2^64 over the golden ratio
 _MIX_1, _MIX_2 = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)

@@ -9,8 +9,8 @@ import math
 import numpy as np
 from jaxtyping import Float, Int
 
-from swarm_mj.compiled import compiled
 from swarm_mj.radio.fading import NO_FADING
+from swarm_mj.system.compiled import compiled
 
 NUM_RATIOS = 1024  # steps of x = r / (1 + r), where r is the SINR over the threshold
 MAX_MARGIN_DB = 80.0  # up to which a fade's own distribution is worked out

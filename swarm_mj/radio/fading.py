@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarm_mj.compiled import compiled
-from swarm_mj.fields import check, setting
 from swarm_mj.radio.counters import keyed_normals, keyed_uniform, mixed
+from swarm_mj.system.compiled import compiled
+from swarm_mj.system.fields import check, setting
 
 NO_LINE_OF_SIGHT = 0.0  # K of Rayleigh fading, linear
 NO_FADING = math.inf  # K without scattered waves, linear

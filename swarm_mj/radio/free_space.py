@@ -12,9 +12,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float, Int
 
-from swarm_mj.compiled import compiled
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.radio.kernels import is_received, received_power, sinr
+from swarm_mj.system.compiled import compiled
 
 
 @runtime_checkable

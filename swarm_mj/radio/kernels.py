@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from swarm_mj.compiled import compiled
+from swarm_mj.system.compiled import compiled
 
 MIN_DISTANCE_M = 1e-3  # robots closer than this count as this far apart, which keeps gains finite
 LOGISTIC = 1.702  # 1 / (1 + exp(-1.702 z)) is within 0.01 of the normal distribution function

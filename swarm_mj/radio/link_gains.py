@@ -9,7 +9,6 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from swarm_mj.compiled import compiled
 from swarm_mj.physics.obstacles import Obstacles
 from swarm_mj.physics.state import ROBOT_HEIGHT_M
 from swarm_mj.radio.obstruction import obstruct
@@ -23,6 +22,7 @@ from swarm_mj.radio.shadowing import (
     set_ends,
     shadowing_neper,
 )
+from swarm_mj.system.compiled import compiled
 
 
 class LinkGains:

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.compiled import compiled
 from swarm_mj.radio.decode_curves import (
     DB_PER_NEPER,
     KNOWN,
@@ -18,6 +17,7 @@ from swarm_mj.radio.decode_curves import (
 )
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.kernels import MIN_DISTANCE_M, decode_probability, received_power, sinr
+from swarm_mj.system.compiled import compiled
 
 NOBODY = -1
 

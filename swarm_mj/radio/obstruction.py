@@ -10,8 +10,8 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.compiled import compiled
 from swarm_mj.physics.obstacles import BOX, CYLINDER, ELLIPSOID, SPHERE, Obstacles
+from swarm_mj.system.compiled import compiled
 
 
 @compiled()

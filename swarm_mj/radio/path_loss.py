@@ -7,9 +7,9 @@ breakpoint, so a mission's transmit power means the same under each of them.
 import math
 from dataclasses import dataclass
 
-from swarm_mj.compiled import compiled
 from swarm_mj.radio.free_space import path_loss_db
 from swarm_mj.radio.kernels import received_power
+from swarm_mj.system.compiled import compiled
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 FREE_SPACE_EXPONENT = 2.0

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Float32
 
-from swarm_mj.compiled import compiled
+from swarm_mj.system.compiled import compiled
 
 NUM_WAVES = 64
 STEPS_PER_CORRELATION = 10.0  # places within that share of d_corr count as one

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from swarm_mj.compiled import compiled
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.radio.kernels import is_received, received_power, sinr
 from swarm_mj.radio.power_law import PowerLaw, write_powers
+from swarm_mj.system.compiled import compiled
 
 NOISE = 1.0
 

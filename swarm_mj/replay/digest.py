@@ -11,7 +11,7 @@ import os
 from pathlib import Path
 from typing import BinaryIO
 
-from swarm_mj.io.reading import open_file
+from swarm_mj.system.reading import open_file
 
 HEADER_BYTES = 12  # what a stream begins with
 FOOTER_BYTES, FOOTER = 32, b"RRF2FOOT\x01\x00\x00\x00"  # what it ends with, and how that ends

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, Int16, UInt8
 
 from swarm_mj.mission import Mission
-from swarm_mj.parts import OwnParts
+from swarm_mj.mission.components import OwnParts
 from swarm_mj.physics.scene import Scene
 from swarm_mj.replay import palette
 from swarm_mj.replay.frame import Frame, frame

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int, Int16
 
 from swarm_mj.radio.composed import ComposedChannel, reached_from
 from swarm_mj.radio.mission_radio import by_robot, radio_of
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 EVERY = 5  # windows between looks; in between, the last one is shown
 WAY_SHARE = 0.005  # of the area's side, that robots may fly from look to look

@@ -8,7 +8,6 @@ import pyarrow as pa
 from jaxtyping import Bool, Float, Int
 from rerun.chunk import RrdReader
 
-from swarm_mj.io.reading import read_json
 from swarm_mj.replay.arcs import SEGMENTS
 from swarm_mj.replay.digest import has_digest
 from swarm_mj.replay.footage import Facts, Footage
@@ -16,6 +15,7 @@ from swarm_mj.replay.looks import Looks, Surprises, in_turn
 from swarm_mj.replay.sheet import TIMELINE
 from swarm_mj.replay.shots import LOOKS, Shots, in_order
 from swarm_mj.replay.strokes import STROKES
+from swarm_mj.system.reading import read_json
 
 FACTS = "footage"  # the recording's property that holds them
 

@@ -10,8 +10,8 @@ from swarm_mj.physics.scene import Scene
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay.looks import Looks, Surprises, joined, look, stride_of
-from swarm_mj.rollout import WindowRecord
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import WindowRecord
+from swarm_mj.simulation.swarm import Swarm
 
 # Longer or larger flights keep the age matrix of every k-th window only.
 MAX_AGE_MATRIX_BYTES = 64e6

@@ -6,7 +6,7 @@ import sys
 from contextlib import ExitStack
 from pathlib import Path
 
-from swarm_mj.io.processes import PYTHON, running
+from swarm_mj.system.processes import PYTHON, running
 
 LOOPBACK = "127.0.0.1"
 # Light, unlike `python -m rerun`; and unlike `python -m rerun_cli` it tells the exit code.

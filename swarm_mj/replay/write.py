@@ -8,9 +8,8 @@ import numpy as np
 import rerun as rr
 import rerun_bindings as bindings
 
-from swarm_mj.io.atomic import write_bytes
 from swarm_mj.mission import Mission
-from swarm_mj.parts import OwnParts
+from swarm_mj.mission.components import OwnParts
 from swarm_mj.physics.solid_geoms import obstacles_of
 from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 from swarm_mj.replay import arena, charts, palette
@@ -25,6 +24,7 @@ from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.sheet import Sheet
 from swarm_mj.replay.space import draw_space, stage
 from swarm_mj.replay.world import draw_looks, draw_obstacles
+from swarm_mj.system.atomic import write_bytes
 
 APPLICATION = "swarm_mj"
 

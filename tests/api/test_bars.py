@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from swarm_mj.api.bars import quiet_console
-from swarm_mj.cli.progress import WorkBar
+from swarm_mj.system.progress import WorkBar
 
 
 @pytest.mark.parametrize(("after_s", "is_shown"), [(0.01, True), (100.0, False)])

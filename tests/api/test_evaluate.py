@@ -106,7 +106,7 @@ def test_other_endings_are_refused(found, tmp_path):
 
 
 def test_what_is_not_installed_is_told_before_the_work(monkeypatch):
-    monkeypatch.setattr("swarm_mj.io.packages.find_spec", lambda _module: None)
+    monkeypatch.setattr("swarm_mj.system.packages.find_spec", lambda _module: None)
     with pytest.raises(
         ModuleNotFoundError, match=r"an evaluation needs scipy, .* pip install 'scipy"
     ):

@@ -7,8 +7,8 @@ import pytest
 
 import swarm_mj
 from swarm_mj.api import video
-from swarm_mj.rendering.style import Style
-from swarm_mj.rendering.video import check_video
+from swarm_mj.replay.rendering.style import Style
+from swarm_mj.replay.rendering.video import check_video
 
 TINY = {"num_robots": 4, "num_windows": 3, "range_ratio": 2.0}
 

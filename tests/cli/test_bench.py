@@ -4,9 +4,9 @@ from functools import partial
 
 import pytest
 
-from swarm_mj.benchmark import learning
 from swarm_mj.cli import main
 from swarm_mj.cli.bench import noise
+from swarm_mj.cli.benchmark import learning
 
 
 def test_bench_prints_the_whole_and_its_parts(swarm_mj):

@@ -4,7 +4,8 @@ import os
 import signal
 import time
 
-from swarm_mj.cli import INTERRUPTED, _exit_code
+from swarm_mj.cli import _exit_code
+from swarm_mj.system.exit_codes import INTERRUPTED
 
 
 def test_no_command_and_version(swarm_mj):

@@ -11,8 +11,8 @@ from swarm_mj.cli import main, parse
 from swarm_mj.evaluation.results import COLUMNS, read_results
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import POLICIES, make_policy
-from swarm_mj.rollout import rollout, summarise
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
 
 SMALL = ("--robots", "5", "--windows", "12", "--range-ratio", "0.5")
 # Four batches: 30 missions are flown as 25 and 5, under each policy.

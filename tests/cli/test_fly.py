@@ -19,8 +19,8 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.replay import write
 from swarm_mj.replay.read import check_replay, windows
-from swarm_mj.rollout import rollout, summarise
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
 
 SHORT = ("--windows", "20", "--robots", "6", "--range-ratio", "0.5")
 

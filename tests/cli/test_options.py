@@ -9,7 +9,7 @@ import pytest
 
 from swarm_mj.cli import COMMANDS, main
 from swarm_mj.cli.options import parse
-from swarm_mj.fields import setting
+from swarm_mj.system.fields import setting
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -129,9 +129,9 @@ def test_what_is_wrong_with_a_part_is_one_line(swarm_mj, options, complaint):
 
 def test_a_channel_of_ones_own_gives_a_mission_the_same_course_beside_any_other(here):
     from swarm_mj.mission import paper
-    from swarm_mj.parts import OwnParts
+    from swarm_mj.mission.components import OwnParts
     from swarm_mj.policies.registry import make_policy
-    from swarm_mj.swarm import Swarm
+    from swarm_mj.simulation.swarm import Swarm
 
     (here / "my_parts_too.py").write_text(PARTS)
     mission = paper("random-walk", num_robots=5, range_ratio=0.5)

@@ -10,7 +10,7 @@ PARTS = """
 from pathlib import Path
 
 import numpy as np
-from swarm_mj.gnn.graphs import FeatureExtractor, Graphs
+from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.radio.mission_radio import radio_of
 

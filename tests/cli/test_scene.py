@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from swarm_mj.mission import paper
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 
 def test_scene_writes_a_model_that_mujoco_opens(swarm_mj, tmp_path):

@@ -8,7 +8,7 @@ from swarm_mj.control.coverage import Coverage, locational_cost
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 
 def standing(position_m, **more):

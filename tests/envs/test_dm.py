@@ -12,7 +12,7 @@ from dm_env import StepType, test_utils
 from swarm_mj.envs.dm import make_environment
 from swarm_mj.mission import paper
 from swarm_mj.protocol.buffers import NEVER, NO_PARENT
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 TASKS = ["stationary", "random-walk", "flocking"]
 MODES = ["exact", "contact"]

@@ -9,7 +9,7 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.registration import register_environments
 from swarm_mj.mission import paper
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 SMALL = {"num_robots": 5, "num_windows": 8, "range_ratio": 0.4}
 

@@ -15,7 +15,7 @@ from swarm_mj.envs.pettingzoo import parallel_env
 from swarm_mj.envs.registration import register_environments
 from swarm_mj.envs.sb3 import make_vec_env
 from swarm_mj.mission import paper
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 SEEDS = (11, 12)
 NUM_WINDOWS, NUM_ROBOTS = 40, 6

@@ -10,8 +10,8 @@ from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
 from swarm_mj.envs.options import check_features_named
 from swarm_mj.envs.team import Team
-from swarm_mj.gnn.graphs import PaperFeatures
 from swarm_mj.mission import paper
+from swarm_mj.policies.gnn.graphs import PaperFeatures
 
 SMALL = {"num_robots": 3, "num_windows": 5}
 
@@ -35,7 +35,7 @@ def test_seeds_are_given_to_reset():
 
 OWN = """
 from dataclasses import replace
-from swarm_mj.gnn.graphs import PaperFeatures
+from swarm_mj.policies.gnn.graphs import PaperFeatures
 
 class Three(PaperFeatures):
     names = ("one", "two", "three")
@@ -57,7 +57,7 @@ def test_own_features_name_all_their_numbers(here, monkeypatch):
 def test_features_are_no_class():
     with pytest.raises(TypeError, match=r'features="swarm_mj\.gnn\.graphs:PaperFeatures"'):
         check_features_named(PaperFeatures)
-    check_features_named("swarm_mj.gnn.graphs:PaperFeatures")
+    check_features_named("swarm_mj.policies.gnn.graphs:PaperFeatures")
 
 
 def test_options_of_reset():

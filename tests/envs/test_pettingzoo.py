@@ -13,7 +13,7 @@ from stable_baselines3 import PPO
 
 from swarm_mj.envs.pettingzoo import parallel_env
 from swarm_mj.mission import paper
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 SMALL = {"num_robots": 6, "num_windows": 12, "range_ratio": 0.4}
 FAILING = {**SMALL, "switched_off": 0.3}  # 2 of 6, at the start of the 7th window

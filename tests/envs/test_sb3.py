@@ -209,7 +209,7 @@ def test_a_stored_actor_flies_from_the_command_line(here, forks):
 
 
 def test_an_actor_that_sees_by_ones_own_features_flies_if_they_are_named(here, forks):
-    own = "swarm_mj.gnn.graphs:PaperFeatures"
+    own = "swarm_mj.policies.gnn.graphs:PaperFeatures"
     save_policy(trained(env=make_vec_env("stationary", 2, seed=1, features=own, **SMALL)), "own")
     fly = ("fly", "--policy", "own/", "--task", "stationary", "--robots", 4, "--windows", 5)
     done = forks.run(here, "swarm_mj", *fly, "--no-record")

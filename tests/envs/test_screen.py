@@ -13,9 +13,9 @@ from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
 from swarm_mj.envs.pettingzoo import parallel_env
 from swarm_mj.envs.screen import HEIGHT, WIDTH, Screen
 from swarm_mj.mission import paper
-from swarm_mj.rendering.contents import contents_of
-from swarm_mj.rendering.scene import SceneRenderer
-from swarm_mj.swarm import Swarm
+from swarm_mj.replay.rendering.contents import contents_of
+from swarm_mj.replay.rendering.scene import SceneRenderer
+from swarm_mj.simulation.swarm import Swarm
 
 MISSION = paper("random-walk", num_robots=6, range_ratio=0.4, num_windows=9)
 pytestmark = pytest.mark.usefixtures("opengl")

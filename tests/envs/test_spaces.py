@@ -6,7 +6,7 @@ from gymnasium import spaces
 
 from swarm_mj.envs.spaces import robot_spaces, team_spaces
 from swarm_mj.envs.team import Team
-from swarm_mj.gnn.extended_features import ExtendedFeatures, LocalFeatures
+from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 
 
 def test_a_robot_sees_a_row_of_what_the_team_sees():
@@ -37,7 +37,7 @@ def test_parents_are_seen_on_request_only():
 
 OWN = """
 import numpy as np
-from swarm_mj.gnn.graphs import PaperFeatures
+from swarm_mj.policies.gnn.graphs import PaperFeatures
 
 class Mine(PaperFeatures):
     names = ("T", "huge")

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from channels import Lossy, to_nobody, to_the_addressee
 
+from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.envs.spaces import robot_spaces
 from swarm_mj.envs.team import Team, next_seed
-from swarm_mj.gnn.feature_sets import FEATURE_SETS, make_extractor
-from swarm_mj.learning.mission_batch import MissionBatch
 from swarm_mj.mission import paper, reference
-from swarm_mj.parts import OwnParts
-from swarm_mj.swarm import Swarm
+from swarm_mj.mission.components import OwnParts
+from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, make_extractor
+from swarm_mj.simulation.swarm import Swarm
 
 SMALL = {"num_robots": 5, "num_windows": 10, "range_ratio": 0.4}
 

@@ -12,8 +12,8 @@ from swarm_mj.mission import paper
 from swarm_mj.mission.placement import is_connected
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.rollout import rollout, summarise
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
 
 SEEDS = (5, 6, 7)
 

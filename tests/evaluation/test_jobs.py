@@ -8,7 +8,7 @@ import time
 import pytest
 
 from swarm_mj.evaluation.jobs import SURROUNDINGS, run_jobs
-from swarm_mj.io.interrupt import INTERRUPTS
+from swarm_mj.system.interrupt import INTERRUPTS
 
 
 def square(piece):

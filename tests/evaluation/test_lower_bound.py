@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from swarm_mj.evaluation.lower_bound import ConnectivityFloor
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import POLICIES, make_policy
-from swarm_mj.rollout import rollout
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.swarm import Swarm
 
 
 def on_a_line(*x_m):

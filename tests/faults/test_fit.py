@@ -11,7 +11,7 @@ from swarm_mj.cli import estimates, evaluate, flight, main
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.replay.read import check_replay
 from swarm_mj.replay.recorder import Recorder
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 FACTOR = 2.0  # by which estimates and peaks may differ
 SMALL = ("--robots", "4", "--windows", "120")
@@ -154,7 +154,7 @@ def test_a_memory_error_keeps_what_was_flown(monkeypatch, tmp_path, capsys, erro
 LIMITED = """
 import resource, sys
 from swarm_mj.cli import main
-from swarm_mj.cli.machine import psutil
+from swarm_mj.system.machine import psutil
 most = psutil.Process().memory_info().vms + int(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_AS, (most, most))
 sys.exit(main(sys.argv[2:]))

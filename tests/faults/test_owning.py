@@ -14,8 +14,8 @@ import pytest
 from left_over import left_after_limit, needs_proc, signalled, taken_after_limit
 from tries import tries
 
-from swarm_mj.io.processes import running
 from swarm_mj.replay.view import quiet_environment, serve_command
+from swarm_mj.system.processes import running
 
 ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL)
 ROOT = Path(__file__).parent.parent.parent

@@ -5,8 +5,8 @@ from tries import tries
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.rollout import rollout, summarise
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
 
 MISSION = paper("random-walk", num_robots=8, num_windows=150)
 MEANS = ("aoi_mean", "velocity_variance_mean", "hops_mean")

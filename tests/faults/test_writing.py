@@ -18,8 +18,8 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay.read import check_replay
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.write import write_replay
-from swarm_mj.rollout import rollout
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.swarm import Swarm
 
 ROOT = Path(__file__).parent.parent.parent
 SMALL = ("--robots", "5", "--windows", "12", "--range-ratio", "0.5")
@@ -187,7 +187,7 @@ def test_replays_leave_no_threads_and_no_memory(flown, tmp_path, record_property
 WRITE_AND_DIE = """
 import os, signal, sys
 from pathlib import Path
-from swarm_mj.io.atomic import append_bytes, write_bytes, write_folder
+from swarm_mj.system.atomic import append_bytes, write_bytes, write_folder
 last, folder = int(sys.argv[1]), sys.argv[2]
 steps = 0
 def die(event, arguments):
@@ -208,7 +208,7 @@ sys.exit(0)
 @pytest.mark.fault("kills at each step")
 def test_a_kill_at_any_step_leaves_what_was_or_what_is_new(forks, tmp_path, record_property):
     """Fault 24: and the next to write there sweeps what is left."""
-    from swarm_mj.io.atomic import present_folder
+    from swarm_mj.system.atomic import present_folder
 
     program = tmp_path / "program.py"
     program.write_text(WRITE_AND_DIE)
@@ -238,7 +238,7 @@ def test_a_signal_while_writing_leaves_no_part(forks, tmp_path, end, record_prop
     """Fault 24: sent by the writer to itself in the middle of each kind of file."""
     program = tmp_path / "program.py"
     program.write_text(
-        "import os, runpy, sys, swarm_mj.io.atomic as atomic\n"
+        "import os, runpy, sys, swarm_mj.system.atomic as atomic\n"
         "fsync = os.fsync\n"
         "def told(number):\n"
         f"    os.kill(os.getpid(), {int(end)})\n"

@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarm_mj.policies.policy import BroadcastPolicy
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 
 class Scripted(BroadcastPolicy):

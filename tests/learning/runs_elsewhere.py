@@ -18,13 +18,13 @@ import torch._dynamo  # noqa: F401 - optimisers import it late, so every child w
 from small_runs import StopAfter, difference, end_of, go_on, run, small_training
 
 from swarm_mj.cli import main
-from swarm_mj.gnn.sampling import sample
+from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.learning import callback
-from swarm_mj.learning.mission_batch import MissionBatch
 from swarm_mj.learning.run_folder import Limits, Progress, Run
 from swarm_mj.learning.selection import reference_columns
 from swarm_mj.learning.train import train
 from swarm_mj.mission import paper
+from swarm_mj.policies.gnn.sampling import sample
 
 RESUMED = {
     "robot": {},

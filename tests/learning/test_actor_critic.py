@@ -8,10 +8,10 @@ import torch
 from small_runs import small_training
 from torch.distributions import Categorical
 
+from swarm_mj.envs.vec_env import missions_of
 from swarm_mj.learning.actor_critic import boltzmann_sample, entropy, log_probability
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import make_model
-from swarm_mj.learning.vec_env import missions_of
 from swarm_mj.mission import PRESETS
 
 RUNS = [

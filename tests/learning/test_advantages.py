@@ -8,8 +8,8 @@ import torch
 from small_runs import small_training
 from stable_baselines3.common.callbacks import BaseCallback
 
+from swarm_mj.envs.vec_env import missions_of
 from swarm_mj.learning.train import make_model
-from swarm_mj.learning.vec_env import missions_of
 
 DISCOUNT, GAE_LAMBDA, STEPS = 0.9, 0.7, 26  # missions are of 20 windows, cut at 5, 10 and 15
 

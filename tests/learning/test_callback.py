@@ -17,8 +17,8 @@ from swarm_mj.learning.train import train
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.stored import read_policy
 from swarm_mj.replay.read import windows
-from swarm_mj.rollout import rollout, summarise
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
 
 TRAINING = small_training()
 PROMISED = {

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from small_runs import small_training
 
+from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED
 from swarm_mj.learning.choice import (
     CHOICE_SEED,
     TEST_SEED,
@@ -14,7 +15,6 @@ from swarm_mj.learning.choice import (
     num_missions,
     reserved_minutes,
 )
-from swarm_mj.learning.mission_batch import FIRST_TRAINING_SEED
 from swarm_mj.learning.settings import HELD_OUT_SEED
 
 

@@ -8,11 +8,11 @@ import torch
 from small_runs import small_training
 from tiny_policies import tiny_network
 
+from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED
 from swarm_mj.learning.held_out import evaluate, held_out_policy
-from swarm_mj.learning.mission_batch import FIRST_TRAINING_SEED
 from swarm_mj.learning.settings import HELD_OUT_SEED
-from swarm_mj.rollout import rollout, summarise
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
 
 NETWORK = tiny_network("extended")
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from small_runs import small_training
 
-from swarm_mj.learning.mission_batch import make_batches
+from swarm_mj.envs.mission_batch import make_batches
+from swarm_mj.envs.vec_env import TeamEnv
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
     CURVE,
@@ -25,9 +26,8 @@ from swarm_mj.learning.run_folder import (
     write_curve,
     write_run,
 )
-from swarm_mj.learning.vec_env import TeamEnv
 from swarm_mj.mission import paper
-from swarm_mj.parts import OwnParts
+from swarm_mj.mission.components import OwnParts
 
 LIMITS = Limits(decisions=5, minutes=0.5, replay_every=3)
 ROW = {"decisions": 10.0, "aoi": 1 / 3, "objective": 0.2}

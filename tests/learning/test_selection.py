@@ -13,8 +13,8 @@ from swarm_mj.learning.held_out import fly, held_out_policy
 from swarm_mj.learning.selection import choose, reference_columns, told_of_choice
 from swarm_mj.learning.settings import HELD_OUT_SEED
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.rollout import rollout, summarise
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
 
 TRAINING = replace(small_training(held_out=3), silence_logit=1.0)
 

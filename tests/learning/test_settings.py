@@ -7,11 +7,11 @@ import pytest
 import torch
 from small_runs import small_training
 
-from swarm_mj.gnn.feature_sets import make_extractor
-from swarm_mj.gnn.network import AggregationGnn
-from swarm_mj.io.reading import read_json
 from swarm_mj.learning.settings import Training, usual_settings
 from swarm_mj.mission import PRESETS, paper, reference
+from swarm_mj.policies.gnn.feature_sets import make_extractor
+from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.system.reading import read_json
 
 ARMS = [(arm, preset) for arm in ("robot", "team") for preset in PRESETS]
 

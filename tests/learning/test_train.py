@@ -10,15 +10,15 @@ from stable_baselines3.common.buffers import DictRolloutBuffer
 from stable_baselines3.common.vec_env import VecNormalize
 from tiny_policies import save_tiny
 
-from swarm_mj.io.owned import owned
+from swarm_mj.envs.vec_env import missions_of
 from swarm_mj.learning import train
 from swarm_mj.learning.active_rollout_buffer import ActiveRolloutBuffer
 from swarm_mj.learning.run_folder import CHECKPOINT, INIT, SETTINGS
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import make_model
-from swarm_mj.learning.vec_env import missions_of
 from swarm_mj.mission import PRESETS
 from swarm_mj.policies.stored import read_policy
+from swarm_mj.system.owned import owned
 
 # III-C, and the authors' code for what the text leaves open. Their minibatches are of 32, which
 # takes a misspelt key to, and their value loss has an extra 1/2.

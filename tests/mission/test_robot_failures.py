@@ -15,8 +15,8 @@ from swarm_mj.protocol.buffers import Buffers, empty_buffers
 from swarm_mj.protocol.costs import mean_hops
 from swarm_mj.protocol.window import transmit, window
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.rollout import rollout
-from swarm_mj.swarm import Swarm, _streams
+from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.swarm import Swarm, _streams
 
 NUM_WINDOWS, HALF = 21, 10  # of an odd number of windows the first half is the shorter one
 SEEDS = [1, 2, 3]

@@ -7,9 +7,9 @@ from dataclasses import FrozenInstanceError, fields
 import numpy as np
 import pytest
 
-from swarm_mj.fields import kind_of
 from swarm_mj.mission import Mission, paper, reference
 from swarm_mj.mission import specification as mission_module
+from swarm_mj.system.fields import kind_of
 
 # As users load it: without the type checks that these tests run under, which would answer first.
 Unchecked = runpy.run_path(mission_module.__file__)["Mission"]

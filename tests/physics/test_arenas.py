@@ -14,7 +14,7 @@ from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP, obstacles_of
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M
 from swarm_mj.policies import make_policy
 from swarm_mj.radio.obstruction import blocked
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 WITH_OBSTACLES = [name for name in ARENAS if name != "open"]
 PILLAR = f"""<mujoco><worldbody>

@@ -8,7 +8,7 @@ from swarm_mj.mission import paper, reference
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.tdma import Tdma
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 NUM_MISSIONS, NUM_ROBOTS = 6, 10
 BODY_RADIUS_M = 0.5  # assets/robot.xml

@@ -20,7 +20,7 @@ from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 SETTINGS = PlannerSettings()
 

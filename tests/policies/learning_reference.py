@@ -23,7 +23,7 @@ from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 NUM_SLOTS = 120  # of a mission, at most
 

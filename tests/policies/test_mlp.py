@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from swarm_mj.gnn.feature_sets import make_extractor, num_features
 from swarm_mj.mission import paper
+from swarm_mj.policies.gnn.feature_sets import make_extractor, num_features
 from swarm_mj.policies.mlp import MlpPolicy, MlpShape
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 MISSION = paper("random-walk", num_robots=4, range_ratio=0.2, num_windows=30)
 

@@ -9,7 +9,7 @@ from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Pol
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.packets import PacketField
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 MISSION = paper("flocking", num_robots=8)
 CENTRALISED = ["round-robin", "mst", "greedy-oracle", "oracle-lookahead"]
@@ -17,7 +17,7 @@ DECENTRALISED = [name for name in POLICIES if name not in CENTRALISED]
 # What robots learn from payload, or from others' T in packets, is in no view: the tests of these
 # policies hold them to Eq. 9.
 PAYLOAD = {"planner": "snapshots"}  # what packets carry beyond T, M and P
-VIEWED = [name for name in DECENTRALISED if name not in (*PAYLOAD, "sotdma", "residual-gnn")]
+VIEWED = [name for name in DECENTRALISED if name not in (*PAYLOAD, "sotdma")]
 ROW = 3  # the robot whose knowledge the law keeps
 
 

@@ -10,7 +10,7 @@ from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import BROADCAST, empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 NUM_ROBOTS = 6
 

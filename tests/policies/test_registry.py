@@ -5,13 +5,11 @@ import os
 
 import numpy as np
 import pytest
-from residual_networks import some_weights
 from tiny_policies import save_tiny
 
-from swarm_mj.io.assets import asset
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.aloha import Aloha
-from swarm_mj.policies.gnn import LearnedPolicy
+from swarm_mj.policies.gnn.policy import LearnedPolicy
 from swarm_mj.policies.gossip import InnovationGossip
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle, LookaheadOracle
 from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
@@ -26,14 +24,13 @@ from swarm_mj.policies.registry import (
     normalised,
     with_payload,
 )
-from swarm_mj.policies.residual.policy import ResidualPolicy
-from swarm_mj.policies.residual.stored import save_residual
 from swarm_mj.policies.round_robin import RoundRobin
 from swarm_mj.policies.sotdma.policy import SelfOrganisedTdma
 from swarm_mj.policies.spatial_tdma import SpatialTdma
 from swarm_mj.policies.tdma import Tdma
 from swarm_mj.policies.tuning import tuned_probability
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.assets import asset
 
 MISSION = paper("flocking", num_robots=8)
 REST = paper("stationary", num_robots=8)
@@ -115,15 +112,9 @@ def test_only_a_learned_policy_is_made_deterministic():
         policy = make_policy(name, MISSION, is_deterministic=True)
         assert policy.parameters["is_deterministic"] is True
     for name in POLICIES:
-        if name not in ("gnn", "residual-gnn"):
+        if name != "gnn":
             with pytest.raises(ValueError, match=f"{name} draws from no network"):
                 make_policy(name, MISSION, is_deterministic=True)
-    policy = make_policy("residual-gnn", REST, is_deterministic=True)
-    assert policy.parameters["is_deterministic"] is True
-    # Where robots move it has no network, and is flown beside learned policies all the same.
-    assert isinstance(
-        make_policy("residual-gnn", MISSION, is_deterministic=True), SelfOrganisedTdma
-    )
 
 
 @here
@@ -137,43 +128,6 @@ def test_the_shipped_policy_is_the_network_in_assets(tmp_path):
     assert shipped.payload == "none"
     with pytest.raises(ValueError, match="gnn takes no transmission probability; leave out"):
         make_policy("gnn", MISSION, 0.1)
-
-
-@here
-def test_the_shipped_correction_is_the_network_in_assets():
-    shipped = make_policy("residual-gnn", REST)
-    assert type(shipped) is ResidualPolicy
-    assert is_learned("residual-gnn")
-    stored = make_policy(str(asset("policies/residual-gnn.safetensors")), REST)
-    assert shipped.parameters == stored.parameters
-    assert shipped.parameters["is_deterministic"] is False
-    with pytest.raises(ValueError, match="residual-gnn takes no transmission probability; leave"):
-        make_policy("residual-gnn", REST, 0.1)
-
-
-@pytest.mark.parametrize("task", ["random-walk", "flocking"])
-def test_where_robots_move_the_shipped_correction_is_sotdma(task):
-    mission = paper(task, num_robots=8)
-    sent = []
-    for name in ("sotdma", "residual-gnn"):
-        swarm, policy = Swarm(mission, [1, 2]), make_policy(name, mission)
-        assert type(policy) is SelfOrganisedTdma
-        swarm.start(policy)
-        for _ in range(20):
-            swarm.step(policy)
-        sent.append(swarm.buffers.timestamp.copy())
-    np.testing.assert_array_equal(*sent)
-    assert policy.uses.startswith("where robots move, what sotdma uses; at rest (--task ")
-
-
-@here
-def test_a_correction_of_ones_own_is_a_file_and_corrects_no_team_that_moves(tmp_path):
-    save_residual(tmp_path / "mine.safetensors", some_weights(), "# Mine")
-    policy = make_policy("mine.safetensors", REST, is_deterministic=True)
-    assert type(policy) is ResidualPolicy
-    assert policy.parameters["is_deterministic"] is True
-    with pytest.raises(ValueError, match="are for teams at rest, and those of flocking move; add"):
-        make_policy("mine.safetensors", MISSION)
 
 
 def test_ii_b_the_planner_can_go_without_payload():

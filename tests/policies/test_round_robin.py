@@ -6,7 +6,7 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.round_robin import RoundRobin
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 # Four robots in the plane [m]; the third is nearest the centre.
 SQUARE_M = np.array([[-90.0, 0.0], [0.0, 80.0], [10.0, -10.0], [70.0, 70.0]])

@@ -13,7 +13,7 @@ from swarm_mj.policies.tdma import Tdma
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.window import SLOT_WINDOWS
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 MISSION = paper("stationary", num_robots=20)
 

@@ -6,7 +6,7 @@ import pytest
 from swarm_mj.mission import paper
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 
 def views_of(num_missions, num_robots):

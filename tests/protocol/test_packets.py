@@ -15,7 +15,7 @@ from swarm_mj.protocol.packets import (
     packet_of,
     slot_bytes,
 )
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 
 def test_the_bytes_of_a_buffer_by_hand():

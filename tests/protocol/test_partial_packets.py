@@ -9,7 +9,7 @@ from swarm_mj.protocol.buffers import NEVER, NO_PARENT, empty_buffers, merge
 from swarm_mj.protocol.costs import mean_hops
 from swarm_mj.protocol.packets import packet_of
 from swarm_mj.protocol.partial_packets import entries_sent, with_room
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 ALL = [-1, -1, -1, -1, -1]  # everyone broadcasts
 

@@ -10,8 +10,8 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import Packets
 from swarm_mj.replay.recorder import Log, Recorder
 from swarm_mj.replay.write import write_replay
-from swarm_mj.rollout import rollout
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.swarm import Swarm
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarm_mj.parts import OwnParts
+from swarm_mj.mission.components import OwnParts
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import footage_of
 from swarm_mj.replay.read import read_footage

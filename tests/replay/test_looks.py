@@ -11,7 +11,7 @@ from swarm_mj.mission import paper
 from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP
 from swarm_mj.replay import looks
 from swarm_mj.replay.looks import EVERY, NO_SURPRISES, in_turn, joined, look, stride_of
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 CITY = {"arena": "blocks", "shadowing_db": 6.0, "num_robots": 14, "strong_share": 0.3}
 WALL_DB = 3.0

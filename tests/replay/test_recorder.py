@@ -8,8 +8,8 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay import recorder
 from swarm_mj.replay.looks import look
 from swarm_mj.replay.recorder import Recorder
-from swarm_mj.rollout import rollout
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.swarm import Swarm
 
 
 def flown_log(num_windows=12, ego=2, num_robots=8):

@@ -7,8 +7,8 @@ import numpy as np
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.rollout import rollout
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.swarm import Swarm
 
 FILE = Path(__file__).parent.parent.parent / "training" / "flocking_converges.py"
 

@@ -7,17 +7,17 @@ from types import SimpleNamespace
 import pytest
 import residual
 from residual import Residual
+from residual_gnn.policy import ResidualPolicy
+from residual_gnn.stored import read_residual
+from residual_gnn.training import train as training_module
+from residual_gnn.training.train import CHECKPOINT, CURVE
 
 from swarm_mj.cli import script
-from swarm_mj.io.provenance import commit
-from swarm_mj.learning.residual import train as training_module
-from swarm_mj.learning.residual.train import CHECKPOINT, CURVE
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.policies.residual.policy import ResidualPolicy
-from swarm_mj.policies.residual.stored import read_residual
-from swarm_mj.rollout import rollout
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.provenance import commit
 
 TINY = ["--robots", "6", "--windows", "100", "--held-out", "1", "--places", "2", "--together", "1"]
 POLICY = "policy.safetensors"

@@ -7,8 +7,8 @@ from importlib import metadata
 from packaging.requirements import Requirement
 
 from swarm_mj.cli.health.finding import Finding
-from swarm_mj.io.packages import CORE
-from swarm_mj.io.provenance import commit, version
+from swarm_mj.system.packages import CORE
+from swarm_mj.system.provenance import commit, version
 
 PACKAGE = "swarm_mj"
 PURPOSES = {  # of what flying itself does without

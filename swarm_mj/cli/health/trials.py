@@ -12,7 +12,7 @@ from textwrap import shorten
 from typing import IO, NamedTuple
 
 from swarm_mj.cli.health.finding import Finding
-from swarm_mj.io.processes import PYTHON, running
+from swarm_mj.system.processes import PYTHON, running
 
 LONGEST_S = 120.0  # of a trial; the first flight of an installation compiles for half a minute
 MOST_LETTERS = 400  # of what a trial complains, cut between words

@@ -12,8 +12,8 @@ from jaxtyping import Float
 from swarm_mj.evaluation.figures.contents import OPTIONS, ResultFigure
 from swarm_mj.evaluation.published import points
 from swarm_mj.evaluation.results import Result, carries_more
-from swarm_mj.io.reading import read_json
 from swarm_mj.mission import PAPERS
+from swarm_mj.system.reading import read_json
 
 # A figure compares policies, so all else is the same.
 AGREED = ("episodes", "seed", "version")  # the commits stand in the caption

@@ -13,12 +13,12 @@ from matplotlib.ticker import MultipleLocator
 
 from swarm_mj.evaluation.figures.style import FAINT, RAMP, WIDTH_IN, styled, write_caption
 from swarm_mj.evaluation.results import CARRIES_MORE
-from swarm_mj.io.provenance import commit, version
 from swarm_mj.mission import PAPERS, Mission
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import velocity_variance
-from swarm_mj.rollout import rollout
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.provenance import commit, version
 
 HEIGHT_IN = 4.2
 ARROW_SHARE = 0.13  # of a panel's width: the length of its longest arrow

@@ -15,8 +15,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from swarm_mj.io.atomic import write_bytes
 from swarm_mj.policies.registry import WITHOUT_PAYLOAD
+from swarm_mj.system.atomic import write_bytes
 
 WIDTH_IN = 7.5  # shown at 900 pixels, a point of type is 1.7 pixels
 DPI = 240

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from swarm_mj.compiled import compiled
 from swarm_mj.protocol.timestamps import merge_expected, observe_own, rise
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 from swarm_mj.radio.links import NOBODY, Links, air_of, listen
+from swarm_mj.system.compiled import compiled
 
 NO_PAIR = (NOBODY, NOBODY)
 NOT_A_PAIR = -1.0  # in place of a gain, which is never negative

@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 
-from swarm_mj.compiled import compiled
 from swarm_mj.protocol.timestamps import merge_expected, observe_own, rise
 from swarm_mj.radio.kernels import sinr
 from swarm_mj.radio.links import (
@@ -32,6 +31,7 @@ from swarm_mj.radio.links import (
     stronger,
     transmit,
 )
+from swarm_mj.system.compiled import compiled
 
 
 class Weights(NamedTuple):

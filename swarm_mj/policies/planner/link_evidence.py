@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.compiled import compiled
 from swarm_mj.radio.kernels import sinr
 from swarm_mj.radio.links import NOBODY
+from swarm_mj.system.compiled import compiled
 
 BIN_DB = 2.0
 LEAST_MARGIN_DB = -15.0  # of the lowest bin; packets that are expected to be weaker are not missed

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.compiled import compiled
 from swarm_mj.policies.planner.settings import WeightSettings
 from swarm_mj.radio.links import Links, lone_probabilities
+from swarm_mj.system.compiled import compiled
 
 OUT_OF_REACH = np.inf  # instead of a number of hops
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.compiled import compiled
 from swarm_mj.policies.sotdma.periodic import NOWHERE, Periodic, best_slot, empty_frame, move
+from swarm_mj.system.compiled import compiled
 
 
 class Rule(NamedTuple):

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int, Int8, Int32
 
-from swarm_mj.compiled import compiled
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
+from swarm_mj.system.compiled import compiled
 
 LONG_AGO = -1_000_000
 OF_NO_FRAME = -1  # the place of a slot that is left to whoever is in need

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from swarm_mj.compiled import compiled
 from swarm_mj.radio.kernels import is_received, sinr
+from swarm_mj.system.compiled import compiled
 
 NOWHERE = -1  # no slot of the frame
 

@@ -10,7 +10,7 @@ from packaging.requirements import Requirement
 
 from swarm_mj.cli.health import packages as looked_at
 from swarm_mj.cli.health.packages import EXTRAS, PURPOSES, about, packages
-from swarm_mj.io.packages import CORE
+from swarm_mj.system.packages import CORE
 
 PROJECT = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
 INSTALLED = {"numba": "0.68.1", "mujoco": "3.2", "torch": "2.7", "pettingzoo": "1.27"}

@@ -8,8 +8,8 @@ from swarm_mj.evaluation.figures import flock
 from swarm_mj.evaluation.figures.flock import Snapshot, draw_flock, fly_flock
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.rollout import rollout
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.swarm import Swarm
 
 MISSION = paper("flocking", num_robots=6, num_windows=20, range_ratio=1.0)
 

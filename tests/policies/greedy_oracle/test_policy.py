@@ -18,8 +18,8 @@ from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.link_models import TrueLinks
 from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import channel_of, radio_of
-from swarm_mj.rollout import rollout, summarise
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -17,8 +17,8 @@ from swarm_mj.policies.planner.settings import SnapshotSettings
 from swarm_mj.policies.planner.snapshots import take_snapshots
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.packets import packet_of
-from swarm_mj.rollout import rollout, summarise
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
 
 WALK = paper("random-walk")
 

@@ -8,8 +8,8 @@ from swarm_mj.policies.planner.policy import epoch_starts, regular_length
 from swarm_mj.policies.planner.settings import EpochSettings, PlannerSettings, ScheduleSettings
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.rollout import rollout
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.swarm import Swarm
 
 TASKS = ["stationary", "random-walk", "flocking"]
 

@@ -9,7 +9,7 @@ from swarm_mj.policies.tdma import Tdma
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 NAME = "planner --payload none"
 REST = paper("stationary", num_robots=10)

@@ -8,7 +8,7 @@ from swarm_mj.mission import paper
 from swarm_mj.policies.planner.resting_team import CommonTimes
 from swarm_mj.policies.planner.settings import LearningSettings
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 CHANNELS = {
     "free space": {},

@@ -7,7 +7,7 @@ from swarm_mj.mission import paper, reference
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.sotdma.hearsay import LONG_AGO, OF_NO_FRAME, place_of
-from swarm_mj.swarm import Swarm
+from swarm_mj.simulation.swarm import Swarm
 
 REST = paper("stationary", num_robots=12, range_ratio=0.2)
 FIRST = 36  # the first slot of a frame, of 11 slots

@@ -1,0 +1,144 @@
+"""The flight itself, of `swarm-mj fly` and of `swarm_mj.fly` alike: it ends early without loss.
+
+Ctrl-C ends it after a whole window, and so does a lack of memory while there is enough to write
+what was flown.
+"""
+
+import gc
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, replace
+from typing import Any, NamedTuple
+
+from swarm_mj.api.estimates import in_gb, replay_memory
+from swarm_mj.api.flight_table import flight_numbers
+from swarm_mj.mission import Mission
+from swarm_mj.physics.arenas import ARENAS
+from swarm_mj.policies.policy import Policy
+from swarm_mj.policies.registry import is_own_policy, is_stored, make_policy
+from swarm_mj.replay.recorder import Recorder
+from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
+from swarm_mj.system.interrupt import deferred_interrupt
+from swarm_mj.system.machine import free_memory, memory_errors
+from swarm_mj.system.progress import WorkBar
+from swarm_mj.system.provenance import commit, version
+
+WINDOWS_BETWEEN_LOOKS = 50  # at the memory that is left
+COMPILING_WINDOWS = 10  # in which three robots do all that a flight does, schedules included
+SECOND_LOOK_S = 0.5  # later, as what others have just freed may still be counted
+
+
+class Flown(NamedTuple):
+    """What was flown, and how it ended."""
+
+    windows: list[WindowRecord]
+    code: int  # an exit code
+    ending: str  # why it ended early; empty if it did not
+    wall_s: float  # that it took
+
+
+def fly_swarm(
+    swarm: Swarm, policy: Policy, recorder: Recorder | None, bar: WorkBar, *, way_on: str | None
+) -> Flown:
+    """Flies a swarm's missions.
+
+    Args:
+        swarm: At the start of its missions.
+        policy: Who addresses whom.
+        recorder: Takes each window, if there is one.
+        bar: Shows how far it is.
+        way_on: Said to who would fly on when memory runs short; None does so without a look.
+
+    Raises:
+        ValueError: As `rollout` does.
+        MemoryError: Memory did not suffice for one window.
+    """
+    flown: list[WindowRecord] = []
+    start_s = time.perf_counter()
+
+    def ended(code: int, ending: str = "") -> Flown:
+        return Flown(flown, code, ending, time.perf_counter() - start_s)
+
+    with suppress(MemoryError), memory_errors(), deferred_interrupt() as is_interrupted, bar:
+        for window in rollout(swarm, policy):
+            if recorder:
+                recorder.add(window)
+            flown.append(window)
+            bar.text = f"age {float(window.costs.age_windows[0]):.1f}"
+            bar.advance()
+            if is_interrupted():
+                return ended(INTERRUPTED, "Interrupted")
+            is_time = way_on is not None and len(flown) % WINDOWS_BETWEEN_LOOKS == 0
+            if recorder and is_time and (short := _shortage(swarm.mission, len(flown), recorder)):
+                return ended(FAILED, f"Memory ran short ({short}{way_on})")
+        return ended(DONE)
+    if not flown:
+        raise MemoryError
+    return ended(FAILED, "Out of memory")
+
+
+def compile_ahead(
+    mission: Mission,
+    policy_name: str,
+    on_window: Callable[[], object] = lambda: None,
+    **how: Any,
+) -> None:
+    """Flies a small mission of this kind, beyond half-way, so that compiling is not timed.
+
+    Parts of users' own are spared: they may be made for this mission only.
+
+    Args:
+        mission: The one that is to be flown.
+        policy_name: As it is given to `make_policy`.
+        on_window: Called after each window.
+        **how: The other arguments of `make_policy`.
+    """
+    # A stored policy may be for teams of one size, and a file's arena does not shrink.
+    is_bound = is_stored(policy_name) or mission.arena not in ARENAS
+    smallest = replace(
+        mission,
+        num_robots=mission.num_robots if is_bound else 3,
+        range_ratio=10.0,
+        num_windows=COMPILING_WINDOWS,
+    )
+    if is_own_policy(policy_name):
+        policy_name, how = "tdma", {}
+    for _ in rollout(Swarm(smallest, [0]), make_policy(policy_name, smallest, **how)):
+        on_window()
+
+
+def flight_summary(mission: Mission, policy: Policy, flown: Flown) -> dict[str, Any]:
+    """What a flight cost, how long it took, and whether it ended early for whatever reason."""
+    took = {"wall_seconds": flown.wall_s, "interrupted": flown.code != DONE}
+    return flight_numbers(mission, policy, summarise(flown.windows)) | took
+
+
+def flight_config(
+    mission: Mission, policy_name: str, policy: Policy, *, seed: int, observer: int
+) -> dict[str, Any]:
+    """Everything that makes a flight again."""
+    return {
+        **asdict(mission),
+        "policy": policy_name,
+        **policy.parameters,
+        "packet_bytes": policy.packet(mission).num_bytes,
+        "seed": seed,
+        "observer": observer,
+        "version": version(),
+        "commit": commit(),
+    }
+
+
+def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | None:
+    """What to say if memory does not suffice to write what was flown, at a second look either."""
+    needed = replay_memory(mission, num_windows) - recorder.num_bytes
+    if free_memory() >= needed:
+        return None
+    gc.collect()
+    time.sleep(SECOND_LOOK_S)
+    if (free := free_memory()) >= needed:
+        return None
+    return f"{in_gb(free)} are free, writing the replay takes {in_gb(needed)}"

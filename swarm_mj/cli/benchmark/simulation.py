@@ -1,0 +1,231 @@
+"""How fast the simulation is: windows per second, whole and in parts, beside plain MuJoCo steps.
+
+And how long an evaluation takes, the oracle, and a robot that plans. A loop of plain mj_steps in
+the same run is the yardstick.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import product
+from timeit import repeat, timeit
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Int
+from mujoco._enums import mjtGeom
+from mujoco._functions import mj_step
+from mujoco._specs import MjSpec
+from mujoco._structs import MjData
+
+from swarm_mj.evaluation.batch import fly_batch
+from swarm_mj.evaluation.jobs import run_jobs
+from swarm_mj.evaluation.published import BASELINES
+from swarm_mj.evaluation.study import Study
+from swarm_mj.mission import Mission, paper
+from swarm_mj.physics.arenas import BLOCK_M, HALF_HEIGHT_M
+from swarm_mj.physics.scene import Scene, compose
+from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP
+from swarm_mj.policies.planner.plan import Plan
+from swarm_mj.policies.planner.policy import regular_length
+from swarm_mj.policies.planner.settings import PlannerSettings
+from swarm_mj.policies.planner.snapshots import take_snapshots
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.policies.round_robin import RoundRobin
+from swarm_mj.protocol.costs import mean_hops, window_costs
+from swarm_mj.protocol.window import channel_at, window
+from swarm_mj.radio.link_models import Belief
+from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.simulation.swarm import Swarm
+
+ORACLE_EPISODES = 4  # it takes its time
+REPETITIONS = 7  # of each measurement; their median counts, for machines are shared
+MISSION = paper("random-walk")
+DENSE = replace(MISSION, range_ratio=1.0)
+PLAN_SIZES = (40, 80, 200)  # robots
+
+
+PLAIN_STEP = "one plain MuJoCo step of 40 robots"  # measured again and again
+IN_STEPS = "  that is so many plain MuJoCo steps"
+
+
+class Row(NamedTuple):
+    """A line of a table."""
+
+    name: str
+    value: float
+    form: str = "{:.2f} µs"  # of the value, with its unit
+    ends_section: bool = False
+
+
+def simulation_rows(
+    num_missions: int, *, num_threads: int = 1, seconds: float = 2.0
+) -> Iterator[Row]:
+    """Times random walks of 40 robots with round robin, B side by side, per window of one mission.
+
+    The threads are MuJoCo's own; each measurement takes about so many seconds.
+    """
+    swarm = Swarm(MISSION, range(num_missions), num_threads=num_threads)
+    policy = RoundRobin()
+    swarm.start(policy)
+    recipient = swarm.decide(policy)
+    swarm.exchange(recipient)
+    request, response = swarm.phases
+    phases, channel = (request, response), channel_at(swarm.channel, swarm.now)
+    parts = {
+        "  the policy decides": lambda: swarm.decide(policy),
+        "  MuJoCo moves the robots": swarm.move,
+        "  the radio delivers, buffers merge": talking(swarm, recipient),
+        "  costs are measured": lambda: window_costs(
+            swarm.buffers, swarm.states, phases, swarm.now, is_broadcast=False
+        ),
+        "the radio alone": lambda: channel(swarm.states.position_m, recipient),
+        "hops of news are counted (fly only)": lambda: mean_hops(swarm.buffers),
+    }
+    window_us = microseconds(lambda: swarm.step(policy), seconds) / num_missions
+    step_us = plain_step_us(seconds / 4)
+    yield Row("windows simulated per second", 1e6 / window_us, "{:,.0f}")
+    yield Row("time of one window of one mission", window_us)
+    yield Row(IN_STEPS, window_us / step_us, "{:.2f}")
+    yield Row(PLAIN_STEP, step_us, ends_section=True)
+    for name, part in parts.items():
+        yield Row(name, microseconds(part, seconds / 4) / num_missions)
+
+
+def world_rows(num_missions: int, *, seconds: float = 2.0) -> Iterator[Row]:
+    """Times the same walks where there is more than free space, per window of one mission.
+
+    The two sides of a ratio are measured in turn, so that a machine's moods reach both; each
+    measurement takes about so many seconds.
+    """
+
+    def window_us(scene: Scene | None = None, **world: Any) -> tuple[float, float]:
+        """A window, and of it what MuJoCo takes."""
+        swarm = Swarm(replace(MISSION, **world), range(num_missions), scene=scene)
+        policy = RoundRobin()
+        whole_us = microseconds(lambda: swarm.step(policy), seconds / 2)
+        return whole_us / num_missions, microseconds(swarm.move, seconds / 4) / num_missions
+
+    (exact_us, _), (faded_us, _) = window_us(), window_us(fading="rayleigh")
+    yield Row("free space", exact_us)
+    yield Row("Rayleigh fading", faded_us)
+    yield Row("  times free space", faded_us / exact_us, "{:.2f}", ends_section=True)
+    (plain_us, plain_move_us) = window_us(physics="contact")
+    (among_us, among_move_us) = window_us(twenty_blocks, physics="contact")
+    yield Row("free space, contact physics", plain_us)
+    yield Row("  of these, MuJoCo moves the robots", plain_move_us)
+    yield Row("20 obstacles, contact physics", among_us)
+    yield Row("  of these, MuJoCo moves the robots", among_move_us)
+    yield Row("  times none", among_us / plain_us, "{:.2f}")
+
+
+def twenty_blocks(spec: MjSpec, mission: Mission) -> None:
+    """A scene: five rows of four city blocks, as in arena `blocks`."""
+    for x, y in product(np.linspace(-0.4, 0.4, 5), np.linspace(-0.375, 0.375, 4)):
+        spec.worldbody.add_geom(
+            type=mjtGeom.mjGEOM_BOX,
+            pos=[x * mission.side_m, y * mission.side_m, HALF_HEIGHT_M],
+            size=[BLOCK_M / 2.0, BLOCK_M / 2.0, HALF_HEIGHT_M],
+            group=OBSTACLE_GROUP,
+        )
+
+
+def evaluation_rows(num_episodes: int, *, num_jobs: int = 2, seconds: float = 2.0) -> Iterator[Row]:
+    """Times an evaluation of the paper's baselines, the oracle, and a robot's plans of an epoch.
+
+    The jobs share the baselines' missions, and starting them counts; the oracle flies at most
+    `ORACLE_EPISODES`. The other measurements take about so many seconds, four times over.
+    """
+    for policy in (*BASELINES, "greedy-oracle"):  # compiles, if it never has
+        _flying_s(policy, num_episodes=1, mission=replace(MISSION, num_windows=1))
+    baselines_s = _flying_s(*BASELINES, num_episodes=num_episodes, num_jobs=num_jobs)
+    step_us = plain_step_us(seconds / 4)
+    num_windows = len(BASELINES) * num_episodes * MISSION.num_windows
+    yield Row(f"{', '.join(BASELINES)}, --jobs {num_jobs}", baselines_s, "{:.1f} s")
+    window_us = 1e6 * baselines_s / num_windows
+    yield Row("  one window of one mission, with start-up", window_us)
+    yield Row(IN_STEPS, window_us / step_us, "{:.2f}")
+    num_oracles = min(num_episodes, ORACLE_EPISODES)
+    oracle_s = _flying_s("greedy-oracle", num_episodes=num_oracles)
+    yield Row("greedy-oracle, one mission", oracle_s / num_oracles, "{:.2f} s")
+    for size in PLAN_SIZES:
+        plan_ms = microseconds(_planning(replace(MISSION, num_robots=size)), seconds / 4) / 1000.0
+        num_halves = 2 * regular_length(size, PlannerSettings().epochs)
+        yield Row(f"planner, {size} robots: one robot's plan", plan_ms, "{:.1f} ms")
+        yield Row("  for each of its slots of 50 ms", plan_ms / num_halves, "{:.2f} ms")
+    dense_ms = microseconds(_planning(DENSE), seconds / 4) / 1000.0
+    yield Row("planner, 40 robots that hear 1 km far", dense_ms, "{:.1f} ms")
+    yield Row(PLAIN_STEP, step_us)
+
+
+def _flying_s(
+    *policies: str, num_episodes: int, num_jobs: int = 1, mission: Mission = MISSION
+) -> float:
+    """Wall time of an evaluation's missions [s]."""
+    study = Study(policies=policies, regimes=(mission,), episodes=num_episodes)
+    start_s = time.perf_counter()
+    for _ in run_jobs(fly_batch, study.batches, num_jobs):
+        pass
+    return time.perf_counter() - start_s
+
+
+def _planning(mission: Mission) -> Callable[[], object]:
+    """One robot's plan for an epoch, from what it knows after four rounds of TDMA."""
+    swarm = Swarm(mission, [0])
+    tdma = make_policy("tdma", mission)
+    num_windows = regular_length(mission.num_robots, PlannerSettings().epochs)
+    for _ in range(2 * mission.num_robots):
+        swarm.step(tdma)
+    buffers, now = swarm.buffers, float(swarm.now[0])
+    belief, settings = Belief(radio=radio_of(mission)), PlannerSettings()
+
+    def plan() -> object:
+        snapshots = take_snapshots(
+            buffers.position_m[0],
+            buffers.velocity_mps[0],
+            buffers.timestamp[0],
+            buffers.is_known[0],
+            now,
+            mission.window_s,
+            num_windows / 2.0,
+            replace(settings.snapshots, fresh_rounds=10.0),
+        )
+        is_free = np.ones(2 * num_windows, dtype=bool)
+        timestamp = buffers.timestamp[0]
+        return Plan(belief, settings, snapshots, 0, timestamp, now, is_free).outcome()
+
+    return plan
+
+
+def talking(swarm: Swarm, recipient: Int[np.ndarray, "B N"]) -> Callable[[], object]:
+    """Repeats the radio's part of a window, on the swarm's own clock.
+
+    The clock must run on: packets would hold nothing new otherwise. It must also be the swarm's,
+    because a buffer that holds entries from the future takes none that is older, so that parents
+    of different windows mix and no longer lead back to the buffer's owner.
+    """
+
+    def talk() -> None:
+        window(swarm.buffers, swarm.states, recipient, swarm.channel, swarm.now)
+        swarm.now = swarm.now + 1.0
+
+    return talk
+
+
+def plain_step_us(seconds: float) -> float:
+    """One mj_step of the scene of 40 robots, in about so many seconds [µs]."""
+    return microseconds(_plain_steps(MISSION), seconds)
+
+
+def _plain_steps(mission: Mission) -> Callable[[], None]:
+    """One mj_step of the mission's scene."""
+    model = compose(mission).compile()
+    data = MjData(model)
+    return lambda: mj_step(model, data)
+
+
+def microseconds(call: Callable[[], object], seconds: float) -> float:
+    """Median time of a call, after one that is not timed, in about so many seconds [µs]."""
+    call()
+    num_calls = max(1, int(seconds / REPETITIONS / max(timeit(call, number=1), 1e-7)))
+    return 1e6 * float(np.median(repeat(call, number=num_calls, repeat=REPETITIONS))) / num_calls

@@ -1,0 +1,237 @@
+"""The extended features: all that one robot can tell of each teammate.
+
+From its own buffer, the packets it sent and decoded, its identity, the team's size and the clock.
+"""
+
+import math
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Shaped
+
+from swarm_mj.mission.geometry import squared_distance
+from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
+from swarm_mj.policies.gnn.packet_memory import Memory, empty_memory, remember
+from swarm_mj.policies.gnn.turns import write_turns
+from swarm_mj.protocol.buffers import NEVER
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.radio.free_space import from_db
+from swarm_mj.radio.spatial_reuse import believes_as_the_last, write_joined
+from swarm_mj.system.compiled import compiled
+
+ADDRESS_RANGES = 1.2  # a teammate believed farther away is not worth addressing [ranges]
+LONG_WINDOWS = 500.0  # ages count by their logarithm, up to 1 at this one [windows]
+FAR_RANGES = 4.0  # distances count up to here [ranges]
+CROWD = 10.0  # neighbours that count as 1
+TEAM = 40.0  # robots that count as 1
+
+
+# What a node tells, by its field in `NODE`, in the network's order. A node of the robot itself
+# carries what concerns all of its neighbours.
+FEATURES = {
+    "is_oneself": "is oneself",
+    "is_known": "is known",
+    "timestamp_age": "age of T",
+    "distance": "distance",
+    "is_near": "is in range",
+    "heard_age": "age of last packet heard",  # of oneself: since it last spoke first
+    "attempt_age": "age of last attempt",
+    "addressed_age": "age of last being addressed",
+    "news": "news to it, by its last packet",  # of oneself: to all in range together
+    "unsaid_news": "news to it, if it heard what was said last",  # as above
+    "turn_rank": "rank of its turn",
+    "has_turn_1_5": "has a turn, 1.5 ranges apart",
+    "has_turn_2": "has a turn, 2 ranges apart",
+    "has_turn_3": "has a turn, 3 ranges apart",
+    "has_joined": "has a turn, by interference",
+    "neighbours": "neighbours",
+    "known_share": "share of the team known",
+    "team_size": "size of the team",
+}
+TURN_RANGES = {"has_turn_1_5": 1.5, "has_turn_2": 2.0, "has_turn_3": 3.0}  # [ranges]
+NODE = np.dtype([(field, np.float32) for field in FEATURES])
+
+
+class ExtendedFeatures(FeatureExtractor):
+    """Features for learning in minutes; see `FEATURES`."""
+
+    names: ClassVar[tuple[str, ...]] = tuple(FEATURES.values())
+    uses: ClassVar[str] = (
+        "its buffer, the packets it sent and received, and whose turn it is by the rule of "
+        "spatial-tdma, in the order of identities"
+    )
+
+    def start(self, num_missions: int, num_robots: int) -> None:
+        """Forgets the packets of earlier missions."""
+        self._memory = empty_memory(num_missions, num_robots)
+
+    def graphs(self, views: LocalViews) -> Graphs:
+        """What every robot's network sees now; must see every window."""
+        remember(self._memory, views)
+        buffers = views.buffers
+        num_missions, num_robots = buffers.shape
+        believed_m, range_m = buffers.position_m, self._mission.range_m
+        node = np.empty((num_missions, num_robots, num_robots), dtype=NODE)
+        may_address = np.empty(node.shape, dtype=np.bool_)
+        _fill(
+            buffers.timestamp,
+            believed_m,
+            buffers.last_attempt,
+            views.now,
+            self._memory,
+            range_m,
+            node,
+            may_address,
+        )
+        is_known = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
+        _write_neighbours(believed_m, is_known, range_m, node["neighbours"])
+        for field, ranges in TURN_RANGES.items():
+            write_turns(believed_m, is_known, views.now, ranges * range_m, node[field])
+        now, threshold = views.now.astype(np.int64), from_db(self._mission.sinr_threshold_db)
+        write_joined(believed_m, is_known, now, range_m, threshold, node["has_joined"])
+        rows = (num_missions * num_robots, num_robots)
+        return Graphs(
+            node=node.view(np.float32).reshape(*rows, len(FEATURES)),
+            parent=buffers.parent.reshape(rows),
+            may_address=may_address.reshape(rows),
+            has_turn=np.diagonal(node["has_joined"], axis1=1, axis2=2).reshape(-1) > 0.0,
+        )
+
+
+class LocalFeatures(ExtendedFeatures):
+    """The extended features without whose turn it is: nothing that a common order grants."""
+
+    names: ClassVar[tuple[str, ...]] = tuple(
+        name for name in ExtendedFeatures.names if "turn" not in name
+    )
+    uses: ClassVar[str] = "its buffer, and the packets it sent and received"
+
+    def graphs(self, views: LocalViews) -> Graphs:
+        """What every robot's network sees now; must see every window."""
+        seen = super().graphs(views)
+        is_kept = np.array([name in self.names for name in ExtendedFeatures.names])
+        return replace(seen, node=seen.node[:, :, is_kept], has_turn=np.zeros_like(seen.has_turn))
+
+
+@compiled()
+def _logarithm(windows: float) -> float:
+    """Times on a logarithmic scale, up to 1 at `LONG_WINDOWS`."""
+    return math.log1p(windows) / math.log1p(LONG_WINDOWS)
+
+
+# Ages are of whole and half windows, so almost all of them are looked up.
+LOG_AGES = np.array([math.log1p(n / 2) / math.log1p(LONG_WINDOWS) for n in range(1000)])
+
+
+@compiled()
+def _log_age(now: float, then: float) -> float:
+    """The age on this scale: 0 is now, 1 is long ago or never."""
+    age = now - then
+    if then <= NEVER or age >= LONG_WINDOWS:
+        return 1.0
+    place = int(2.0 * age)
+    return LOG_AGES[place] if place == 2.0 * age and place >= 0 else _logarithm(age)
+
+
+@compiled(fastmath=True)
+def _news(
+    own: Float32[np.ndarray, "N"],
+    neighbour: Float32[np.ndarray, "N"],
+    said: Float32[np.ndarray, "N"],
+) -> tuple[float, float]:
+    """Mean rise of a neighbour's T if it heard all: by its packet, or also by one's own."""
+    by_packet, by_both = np.float32(0.0), np.float32(0.0)
+    zero = np.float32(0.0)
+    for j in range(own.shape[0]):
+        by_packet += max(own[j] - neighbour[j], zero)
+        by_both += max(own[j] - max(neighbour[j], said[j]), zero)
+    return by_packet / own.shape[0], by_both / own.shape[0]
+
+
+@compiled()
+def _fill(
+    timestamp: Float[np.ndarray, "B N N"],
+    position_m: Float[np.ndarray, "B N N 2"],
+    last_attempt: Float[np.ndarray, "B N N"],
+    now: Float[np.ndarray, "B"],
+    memory: Memory,
+    range_m: float,
+    node: Shaped[np.ndarray, "B N N"],
+    may_address: Bool[np.ndarray, "B N N"],
+) -> None:
+    """All features but neighbours and turns by distance or interference."""
+    num_missions, num_robots = timestamp.shape[:2]
+    rank, own = np.empty(num_robots), np.empty(num_robots, dtype=np.float32)
+    for b in range(num_missions):
+        for k in range(num_robots):
+            rank[k] = ((k - int(now[b])) % num_robots) / num_robots
+        for i in range(num_robots):
+            num_known = 0
+            for k in range(num_robots):
+                own[k] = timestamp[b, i, k]
+                num_known += k == i or timestamp[b, i, k] > NEVER
+            for k in range(num_robots):
+                ranges = math.sqrt(squared_distance(position_m[b, i], k, i)) / range_m
+                is_known = k == i or timestamp[b, i, k] > NEVER
+                is_near = is_known and k != i and ranges <= 1.0
+                of_k = node[b, i, k]
+                of_k.is_oneself = k == i
+                of_k.is_known = is_known
+                of_k.timestamp_age = _log_age(now[b], timestamp[b, i, k])
+                of_k.distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known else 0.0
+                of_k.is_near = is_near
+                of_k.heard_age = _log_age(now[b], memory.heard[b, i, k])
+                of_k.attempt_age = _log_age(now[b], last_attempt[b, i, k])
+                of_k.addressed_age = _log_age(now[b], memory.addressed_by[b, i, k])
+                of_k.news, of_k.unsaid_news = 0.0, 0.0
+                if is_near:
+                    news = _news(own, memory.neighbour[b, i, k], memory.said[b, i])
+                    of_k.news, of_k.unsaid_news = news
+                of_k.turn_rank = rank[k]
+                of_k.known_share = num_known / num_robots
+                of_k.team_size = num_robots / TEAM
+                may_address[b, i, k] = k == i or not is_known or ranges <= ADDRESS_RANGES
+            _fill_oneself(i, _log_age(now[b], memory.sent[b, i]), node[b, i])
+
+
+@compiled()
+def _fill_oneself(i: int, spoken_log_age: float, node: Shaped[np.ndarray, "N"]) -> None:
+    """What concerns all neighbours together; the news of each then goes to its logarithm."""
+    news, unsaid_news = 0.0, 0.0
+    for k in range(node.shape[0]):
+        news += node[k].news
+        unsaid_news += node[k].unsaid_news
+        if node[k].is_near > 0.0:  # nobody else has news, and its logarithm is 0, too
+            node[k].news = _logarithm(node[k].news)
+            node[k].unsaid_news = _logarithm(node[k].unsaid_news)
+    node[i].heard_age = spoken_log_age
+    node[i].news, node[i].unsaid_news = _logarithm(news), _logarithm(unsaid_news)
+
+
+@compiled()
+def _write_neighbours(
+    believed_m: Float[np.ndarray, "B N N 2"],
+    is_known: Bool[np.ndarray, "B N N"],
+    range_m: float,
+    neighbours: Float32[np.ndarray, "B N N"],
+) -> None:
+    """How many known robots are within range of each, by belief; unknown robots have none."""
+    num_missions, num_robots = is_known.shape[:2]
+    # Columns of their own, with which the inner loop is compiled to vectors.
+    x_m, y_m, known = np.empty(num_robots), np.empty(num_robots), np.empty(num_robots, np.int64)
+    for b in range(num_missions):
+        for i in range(num_robots):
+            if believes_as_the_last(believed_m[b], is_known[b], i):
+                for k in range(num_robots):
+                    neighbours[b, i, k] = neighbours[b, i - 1, k]
+                continue
+            for k in range(num_robots):
+                x_m[k], y_m[k] = believed_m[b, i, k, 0], believed_m[b, i, k, 1]
+                known[k] = is_known[b, i, k]
+            for k in range(num_robots):
+                count = -1  # for it finds itself
+                for j in range(num_robots):
+                    dx, dy = x_m[j] - x_m[k], y_m[j] - y_m[k]
+                    count += known[j] * (dx * dx + dy * dy <= range_m * range_m)
+                neighbours[b, i, k] = count * known[k] / CROWD

@@ -1,0 +1,183 @@
+"""A robot's buffer as a graph (III-A): nodes, and over the parent references, edges.
+
+Index order: `[r, k]` is what the robot of row `r` knows about robot `k`; row `b N + i` is robot `i`
+of mission `b`.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int, Shaped
+
+from swarm_mj.mission import MISSION_DISTANCE_M, Mission
+from swarm_mj.protocol.buffers import NEVER, Buffers
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.system.compiled import compiled
+
+REFERENCE_WINDOWS = 500.0  # what the authors' code divides times by, whatever the mission [windows]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Graphs:
+    """The graphs of R robots, each with a node for every robot of its team (III-A)."""
+
+    node: Float32[np.ndarray, "R N F"]  # V: features, normalised
+    parent: Int[np.ndarray, "R N"]  # P: the node that k's state came over first, or NO_PARENT
+    may_address: Bool[np.ndarray, "R N"]  # recipients worth a thought; oneself, silence, always is
+    has_turn: Bool[np.ndarray, "R"]  # whether a common order lets the robot speak now
+
+
+class FeatureExtractor(ABC):
+    """Makes graphs of local views; one that remembers packets must see every window."""
+
+    names: ClassVar[tuple[str, ...]]  # of the features, in order; there are F
+    uses: ClassVar[str] = "its buffer"  # what they are made of, in a few words
+
+    def __init__(self, mission: Mission) -> None:
+        """Takes the mission whose area, duration and range normalise the features."""
+        self._mission = mission
+
+    def start(self, num_missions: int, num_robots: int) -> None:  # noqa: B027 - most remember none
+        """Forgets earlier missions, if it remembers any; now there are B of N robots."""
+
+    @abstractmethod
+    def graphs(self, views: LocalViews) -> Graphs:
+        """What every robot's network sees now, row [b N + i] from view [b, i] only."""
+
+
+def check_width(features: str, extractor: FeatureExtractor, graphs: Graphs) -> None:
+    """Passes if an extractor, of the feature set of this name, names all numbers of its nodes.
+
+    Raises:
+        ValueError: It does not, as a user's own may.
+    """
+    named, found = len(extractor.names), graphs.node.shape[-1]
+    if named != found:
+        raise ValueError(f"{features} names {named} features, but its node has {found}")
+
+
+class PaperFeatures(FeatureExtractor):
+    """The paper's features: T, M and L, by the mission's area and duration.
+
+    There is one difference: an explicit flag tells what was never heard of from what was observed
+    at the start, and another the robot itself.
+    """
+
+    names: ClassVar[tuple[str, ...]] = (
+        "is oneself", "is known", "T", "p_x", "p_y", "v_x", "v_y", "L",
+    )  # fmt: skip
+
+    def graphs(self, views: LocalViews) -> Graphs:
+        """The buffers as they are; positions from the area's middle, velocities per mission."""
+        buffers, mission = views.buffers, self._mission
+        duration_s = mission.num_windows * mission.window_s
+        node = np.empty((*buffers.shape, views.num_robots), dtype=PAPER_NODE)
+        _fill_paper(
+            buffers.timestamp,
+            buffers.position_m,
+            buffers.velocity_mps,
+            buffers.last_attempt,
+            1.0 / mission.num_windows,
+            1.0 / mission.side_m,
+            duration_s / mission.side_m,
+            node,
+        )
+        return _everyone_addressable(buffers, node)
+
+
+class ReferenceFeatures(FeatureExtractor):
+    """The seven features of the authors' code, constants included.
+
+    Ages are negative; positions and velocities are relative to the robot's own, also of robots
+    never heard of, which count as if at rest in the middle of the area at the start.
+    """
+
+    names: ClassVar[tuple[str, ...]] = (
+        "T - t", "zero", "p_x relative", "p_y relative", "v_x relative", "v_y relative", "L - t",
+    )  # fmt: skip
+
+    def graphs(self, views: LocalViews) -> Graphs:
+        """The buffers as the authors' code shows them to its network."""
+        buffers = views.buffers
+        node = np.empty((*buffers.shape, views.num_robots), dtype=REFERENCE_NODE)
+        _fill_reference(
+            buffers.timestamp,
+            buffers.position_m,
+            buffers.velocity_mps,
+            buffers.last_attempt,
+            views.now,
+            node,
+        )
+        return _everyone_addressable(buffers, node)
+
+
+# The numbers of a node, in the order of the names.
+STATE = ("timestamp", "x", "y", "velocity_x", "velocity_y", "last_attempt")
+PAPER_NODE = np.dtype([(field, np.float32) for field in ("is_oneself", "is_known", *STATE)])
+REFERENCE_NODE = np.dtype([(field, np.float32) for field in (STATE[0], "zero", *STATE[1:])])
+
+
+@compiled()
+def _fill_paper(
+    timestamp: Float[np.ndarray, "B N N"],
+    position_m: Float[np.ndarray, "B N N 2"],
+    velocity_mps: Float[np.ndarray, "B N N 2"],
+    last_attempt: Float[np.ndarray, "B N N"],
+    per_window: float,
+    per_m: float,
+    per_mps: float,
+    node: Shaped[np.ndarray, "B N N"],
+) -> None:
+    num_missions, num_robots = timestamp.shape[:2]
+    for b in range(num_missions):
+        for i in range(num_robots):
+            for k in range(num_robots):
+                of_k = node[b, i, k]
+                of_k.is_oneself = k == i
+                of_k.is_known = k == i or timestamp[b, i, k] > NEVER
+                of_k.timestamp = timestamp[b, i, k] * per_window
+                of_k.x = position_m[b, i, k, 0] * per_m
+                of_k.y = position_m[b, i, k, 1] * per_m
+                of_k.velocity_x = velocity_mps[b, i, k, 0] * per_mps
+                of_k.velocity_y = velocity_mps[b, i, k, 1] * per_mps
+                of_k.last_attempt = last_attempt[b, i, k] * per_window
+
+
+@compiled()
+def _fill_reference(
+    timestamp: Float[np.ndarray, "B N N"],
+    position_m: Float[np.ndarray, "B N N 2"],
+    velocity_mps: Float[np.ndarray, "B N N 2"],
+    last_attempt: Float[np.ndarray, "B N N"],
+    now: Float[np.ndarray, "B"],
+    node: Shaped[np.ndarray, "B N N"],
+) -> None:
+    per_window, per_m = 1.0 / REFERENCE_WINDOWS, 1.0 / MISSION_DISTANCE_M
+    num_missions, num_robots = timestamp.shape[:2]
+    for b in range(num_missions):
+        for i in range(num_robots):
+            own_x_m, own_y_m = position_m[b, i, i, 0], position_m[b, i, i, 1]
+            own_x_mps, own_y_mps = velocity_mps[b, i, i, 0], velocity_mps[b, i, i, 1]
+            for k in range(num_robots):
+                of_k = node[b, i, k]
+                of_k.timestamp = (timestamp[b, i, k] - now[b]) * per_window
+                of_k.zero = 0.0
+                of_k.x = (position_m[b, i, k, 0] - own_x_m) * per_m
+                of_k.y = (position_m[b, i, k, 1] - own_y_m) * per_m
+                of_k.velocity_x = (velocity_mps[b, i, k, 0] - own_x_mps) * per_m
+                of_k.velocity_y = (velocity_mps[b, i, k, 1] - own_y_mps) * per_m
+                of_k.last_attempt = (last_attempt[b, i, k] - now[b]) * per_window
+
+
+def _everyone_addressable(buffers: Buffers, node: Shaped[np.ndarray, "B N N"]) -> Graphs:
+    """Graphs with these nodes, in which every robot may be addressed."""
+    num_missions, num_robots = buffers.shape
+    rows = (num_missions * num_robots, num_robots)
+    return Graphs(
+        node=node.view(np.float32).reshape(*rows, -1),
+        parent=buffers.parent.reshape(rows),
+        may_address=np.ones(rows, dtype=np.bool_),
+        has_turn=np.zeros(rows[0], dtype=np.bool_),
+    )

@@ -1,0 +1,168 @@
+"""The Aggregation GNN (III-A, Eqs. 11-14): nodes and their parents in, numbers for each node out.
+
+This is the definition. `gnn.fast` computes the same numbers in fewer steps.
+"""
+
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor, nn
+
+from swarm_mj.policies.gnn.shape import Edges, GnnShape
+
+
+class EdgeSet(NamedTuple):
+    """All edges of R graphs of N nodes each; node k of graph r is row r N + k."""
+
+    receiver: Int[Tensor, "e"]
+    sender: Int[Tensor, "e"]
+    feature: Float[Tensor, "e 1"]  # their direction where there are two: 1 from parent to child
+
+
+def edges_of(parent: Int[Tensor, "R N"], edges: Edges, dtype: torch.dtype) -> EdgeSet:
+    """The edges between children and parents; a node whose parent is -1 has none."""
+    graph, child = (parent >= 0).nonzero(as_tuple=True)
+    first = graph * parent.shape[1]
+    below, above = first + child, first + parent[graph, child]
+    zero = torch.zeros(len(child), 1, dtype=dtype, device=parent.device)
+    if edges == "both":
+        ends = torch.cat([above, below]), torch.cat([below, above])
+        return EdgeSet(*ends, torch.cat([zero, zero + 1]))
+    return EdgeSet(above, below, zero) if edges == "paper" else EdgeSet(below, above, zero)
+
+
+class Perceptron(nn.ModuleList):
+    """Linear layers of equal width, with a ReLU after all but the last."""
+
+    def __init__(self, num_inputs: int, shape: GnnShape) -> None:
+        widths = [num_inputs, *[shape.latent] * shape.depth]
+        super().__init__(map(nn.Linear, widths[:-1], widths[1:]))
+
+    @property
+    def layers(self) -> list[nn.Linear]:
+        """First to last."""
+        return [layer for layer in self if isinstance(layer, nn.Linear)]
+
+    def forward(self, x: Float[Tensor, "n In"]) -> Float[Tensor, "n C"]:
+        """Applies the layers."""
+        *hidden, last = self.layers
+        for layer in hidden:
+            x = torch.relu(layer(x))
+        return last(x)
+
+
+class Perceptrons(nn.Module):
+    """A perceptron for nodes and, where edges take part, one for edges."""
+
+    def __init__(self, node: Perceptron, edge: Perceptron | None = None) -> None:
+        super().__init__()
+        self.node = node
+        if edge is not None:
+            self.edge = edge
+
+
+class Core(Perceptrons):
+    """The non-linear updates, NN_e and NN_v (Eq. 13)."""
+
+    def update_edge(self, edge: Tensor, receiver: Tensor, sender: Tensor) -> Tensor:
+        """NN_e([e, v_r, v_s]), one row per edge."""
+        return self.edge(torch.cat([edge, receiver, sender], dim=1))
+
+    def update_node(self, mean: Tensor, node: Tensor) -> Tensor:
+        """NN_v([mean of e', v]), one row per node."""
+        return self.node(torch.cat([mean, node], dim=1))
+
+
+class LinearCore(nn.Module):
+    """The linear updates: edges copy their senders, nodes keep the mean, so GN(v) = A v."""
+
+    def update_edge(self, _edge: Tensor, _receiver: Tensor, sender: Tensor) -> Tensor:
+        """The sender."""
+        return sender
+
+    def update_node(self, mean: Tensor, _node: Tensor) -> Tensor:
+        """The mean."""
+        return mean
+
+
+def mean_aggregation(
+    edge: Float[Tensor, "e C"], receiver: Int[Tensor, "e"], num_nodes: int
+) -> Float[Tensor, "n C"]:
+    """For each node, the mean over the edges it receives, 0 without any (Eq. 12)."""
+    count = edge.new_zeros(num_nodes).index_add(0, receiver, edge.new_ones(len(edge)))
+    total = edge.new_zeros(num_nodes, edge.shape[1]).index_add(0, receiver, edge)
+    return total / count.clamp(min=1)[:, None]
+
+
+def gn_block(
+    core: Core | LinearCore, node: Float[Tensor, "n C"], edge: Float[Tensor, "e _"], edges: EdgeSet
+) -> tuple[Float[Tensor, "n C"], Float[Tensor, "e C"]]:
+    """Updates all edges by their ends, and all nodes by the mean of their edges (Eq. 11)."""
+    edge = core.update_edge(edge, node[edges.receiver], node[edges.sender])
+    mean = mean_aggregation(edge, edges.receiver, len(node))
+    return core.update_node(mean, node), edge
+
+
+class AggregationGnn(nn.Module):
+    """Encodes, applies the GN block K times, decodes each stage, maps all linearly (Eq. 14)."""
+
+    def __init__(self, shape: GnnShape) -> None:
+        """Draws the parameters from PyTorch's own generator."""
+        super().__init__()
+        self.shape = shape
+        width = shape.latent
+        self.encoder = Perceptrons(Perceptron(shape.num_features, shape))
+        self.core: Core | LinearCore = LinearCore()
+        if shape.has_core:
+            self.encoder.edge = Perceptron(1, shape)
+            self.core = Core(Perceptron(2 * width, shape), Perceptron(3 * width, shape))
+        self.decoder = Perceptrons(Perceptron(width, shape))
+        self.output = nn.Linear((shape.receptive_field + 1) * width, shape.num_outputs)
+
+    def forward(
+        self,
+        node: Float[Tensor, "R N F"],
+        parent: Int[Tensor, "R N"],
+        is_wanted: Bool[Tensor, "R N"] | None = None,
+    ) -> Float[Tensor, "R N O"]:
+        """Maps the features of the nodes of R graphs to numbers for each node.
+
+        Graphs do not hear of each other, nor nodes of those that no edges lead to: a smaller graph
+        may be padded with nodes that have no parent.
+
+        Args:
+            node: Features.
+            parent: Index of each node's parent in the same graph, or -1: no edge.
+            is_wanted: Whose numbers are asked for; None is everyone's.
+
+        Returns:
+            The numbers; 0 where nobody asked for them.
+
+        Raises:
+            ValueError: Features of another number than the network's, or a parent that is no node.
+        """
+        self.check(node, parent)
+        edges = edges_of(parent, self.shape.edges, node.dtype)
+        v = self.encoder.node(node.flatten(0, 1))
+        e = self.encoder.edge(edges.feature) if self.shape.has_core else edges.feature
+        stages = [self.decoder.node(v)]
+        for _ in range(self.shape.receptive_field):
+            v, e = gn_block(self.core, v, e, edges)
+            stages.append(self.decoder.node(v))
+        output = self.output(torch.cat(stages, dim=1)).view(*parent.shape, self.shape.num_outputs)
+        return output if is_wanted is None else output.masked_fill(~is_wanted[:, :, None], 0.0)
+
+    def check(self, node: Tensor, parent: Tensor) -> None:
+        """Raises ValueError on graphs that would give numbers without a meaning."""
+        num_features, num_nodes = node.shape[-1], parent.shape[-1]
+        if num_features != self.shape.num_features:
+            raise ValueError(
+                f"nodes must have the {self.shape.num_features} features that the network was made "
+                f"for, not {num_features}"
+            )
+        if parent.numel() and (highest := int(parent.max())) >= num_nodes:
+            raise ValueError(
+                f"a parent must be one of its graph's nodes, 0 to {num_nodes - 1}, or -1 for "
+                f"none, not {highest}"
+            )

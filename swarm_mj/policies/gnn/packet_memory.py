@@ -1,0 +1,72 @@
+"""What a robot remembers of the packets that it sent and decoded, beside its buffer.
+
+Every robot's memory is its own: row `[b, i]` is written from what robot `i` sent and decoded only.
+A packet's timestamps are its sender's at that time. They are followed from window to window here,
+by Alg. 1: who decoded a packet saw them.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Float32, Int
+
+from swarm_mj.protocol.buffers import NEVER
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.timestamps import merge_timestamps, observe_own
+from swarm_mj.protocol.window import SLOT_WINDOWS
+from swarm_mj.system.compiled import compiled
+
+
+class Memory(NamedTuple):
+    """When each robot last heard, addressed and was addressed by whom, and what packets said."""
+
+    heard: Float32[np.ndarray, "B N N"]  # when i last decoded a packet of k itself [windows]
+    addressed_by: Float32[np.ndarray, "B N N"]  # when such a packet was last meant for i [windows]
+    sent: Float32[np.ndarray, "B N"]  # when i last spoke first [windows]
+    neighbour: Float32[np.ndarray, "B N N N"]  # T^{k,j} in the last packet of k that i decoded
+    said: Float32[np.ndarray, "B N N"]  # T^{i,j} when i last spoke first [windows]
+    timestamp: Float32[np.ndarray, "B N N"]  # T^{i,j} when the last window ended [windows]
+
+
+def empty_memory(num_missions: int, num_robots: int) -> Memory:
+    """Nothing was ever heard or said."""
+    robots = (num_missions, num_robots)
+    pairs = (*robots, num_robots)
+    shapes = (pairs, pairs, robots, (*pairs, num_robots), pairs, pairs)
+    return Memory(*(np.full(shape, NEVER, dtype=np.float32) for shape in shapes))
+
+
+def remember(memory: Memory, views: LocalViews) -> None:
+    """Takes in the window of transmission and response that has just ended; must see every one."""
+    if views.phases:
+        transmission, response = views.phases
+        half_way = views.now - SLOT_WINDOWS
+        _take_in(memory, transmission.recipient, transmission.heard, half_way, True)
+        _take_in(memory, response.recipient, response.heard, views.now, False)
+    memory.timestamp[...] = views.buffers.timestamp
+
+
+@compiled()
+def _take_in(
+    memory: Memory,
+    recipient: Int[np.ndarray, "B N"],
+    heard: Int[np.ndarray, "B N"],
+    time: Float[np.ndarray, "B"],
+    is_transmission: bool,
+) -> None:
+    """One phase: what was said, who decoded it, and timestamps merged as the buffers were."""
+    num_missions, num_robots = recipient.shape
+    for b in range(num_missions):
+        observe_own(memory.timestamp[b], time[b])
+        packet = memory.timestamp[b].copy()
+        for i in range(num_robots):
+            if is_transmission and recipient[b, i] != i:
+                memory.sent[b, i] = time[b]
+                memory.said[b, i] = packet[i]
+            k = heard[b, i]
+            if k != i:
+                memory.heard[b, i, k] = time[b]
+                memory.neighbour[b, i, k] = packet[k]
+                if recipient[b, k] == i:
+                    memory.addressed_by[b, i, k] = time[b]
+        merge_timestamps(packet, heard[b], memory.timestamp[b])

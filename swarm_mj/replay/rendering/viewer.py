@@ -1,0 +1,85 @@
+"""A window on a mission: MuJoCo's own viewer, with robots and packets as pictures have them."""
+
+import threading
+import warnings
+
+import glfw
+from mujoco import viewer
+from mujoco._functions import mj_forward
+from mujoco._structs import MjData
+
+from swarm_mj.mission import Mission
+from swarm_mj.physics.scene import Scene, compose
+from swarm_mj.replay.rendering.camera import look_at
+from swarm_mj.replay.rendering.contents import Contents
+from swarm_mj.replay.rendering.markers import Markers
+from swarm_mj.replay.rendering.scene import BEACONS, aim, light, prepare
+
+SIZE = 1280, 720  # that sizes on the window are meant for [pixels]
+WAY_OUT = 'the window needs a display; without one, render_mode="rgb_array" draws pictures'
+CLOSING_S = 5.0  # what the window may take to close
+
+
+class SceneViewer:
+    """MuJoCo's passive viewer; who closes the window sees no more, and nothing else ends."""
+
+    def __init__(self, mission: Mission, *, scene: Scene | None = None) -> None:
+        """Opens the window.
+
+        Args:
+            mission: Whose scene it is.
+            scene: What changes the arena, if anything does: `swarm.scene`.
+
+        Raises:
+            OSError: There is no display, or the window is closed already.
+        """
+        _check_display()
+        spec = compose(mission, scene=scene)
+        prepare(spec, mission)
+        self._model = spec.compile()
+        light(self._model, *SIZE)
+        self._data = MjData(self._model)
+        others = set(threading.enumerate())
+        try:
+            self._window = viewer.launch_passive(
+                self._model, self._data, show_left_ui=False, show_right_ui=False
+            )
+        except RuntimeError as error:  # macOS opens windows for `mjpython` only
+            raise OSError(f"{error}; {WAY_OUT}") from error
+        self._threads = set(threading.enumerate()) - others
+        markers = self._window.user_scn
+        if markers is None:
+            raise OSError("the window was closed before the mission began; open it again")
+        self._markers = markers
+        self._is_aimed = False
+
+    def show(self, contents: Contents) -> None:
+        """Shows this from now on."""
+        if not self._window.is_running():
+            return
+        camera = look_at(contents.centre_m, contents.reach_m, *SIZE)
+        with self._window.lock():
+            if not self._is_aimed:  # from then on it is the user's
+                aim(self._window.cam, camera)
+                self._window.opt.geomgroup[BEACONS] = 0
+                self._is_aimed = True
+            self._data.qpos[:] = contents.position_m.ravel()
+            mj_forward(self._model, self._data)
+            self._markers.ngeom = 0
+            Markers(self._markers, SIZE[1]).draw(contents, camera)
+        self._window.sync()
+
+    def close(self) -> None:
+        """Closes the window, and waits until it is: a process that ends earlier may crash."""
+        self._window.close()
+        for thread in self._threads:
+            thread.join(CLOSING_S)
+
+
+def _check_display() -> None:
+    """Raises OSError if no window can be opened: MuJoCo's viewer would wait forever."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        has_display = glfw.init()
+    if not has_display:
+        raise OSError(WAY_OUT)

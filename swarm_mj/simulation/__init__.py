@@ -1,0 +1,1 @@
+"""Missions side by side, window by window, and whole rollouts."""

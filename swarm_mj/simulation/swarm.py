@@ -1,0 +1,300 @@
+"""The swarm: B missions side by side, window by window: motion, physics, radio, buffers, costs."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from numbers import Integral
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from swarm_mj.control.controller import Controller, costed
+from swarm_mj.control.motion import controller_of, initial_velocity
+from swarm_mj.mission import Mission
+from swarm_mj.mission.batched_rng import Started
+from swarm_mj.mission.components import is_ours
+from swarm_mj.mission.geometry import overlaps_earlier
+from swarm_mj.mission.placement import connected_positions
+from swarm_mj.mission.robot_failures import draw_survivors, failure_window
+from swarm_mj.physics.scene import Scene
+from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
+from swarm_mj.physics.worlds import Physics
+from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
+from swarm_mj.protocol.buffers import (
+    Buffers,
+    check_robots,
+    empty_buffers,
+    grant_start,
+    observe_self,
+)
+from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.packets import fitting, packet_of
+from swarm_mj.protocol.partial_packets import with_room
+from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, RequestResponse, WindowProtocol
+from swarm_mj.radio.composed import ComposedChannel
+from swarm_mj.radio.free_space import Channel, VaryingChannel
+from swarm_mj.radio.mission_radio import belief_of, channel_of, truth_of
+from swarm_mj.radio.obstruction import blocked
+from swarm_mj.system.fields import check_callable, check_kind
+
+CALLED_WITH = {  # what own parts are given
+    "channel": ("position_m", "recipient"),
+    "controller": ("buffers", "states"),
+    "scene": ("spec", "mission"),
+}
+MAX_THREADS = 1024
+MAX_SEED = 2**63 - 1  # the largest that a replay's properties keep
+
+
+class Swarm:
+    """B missions that differ in their seed only.
+
+    A mission's course depends on its own seed, not on the missions beside it.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        seeds: Sequence[int],
+        *,
+        channel: Channel | VaryingChannel | None = None,
+        controller: Controller | None = None,
+        scene: Scene | None = None,
+        num_threads: int = 1,
+    ) -> None:
+        """Places the robots and starts all missions.
+
+        Args:
+            mission: The numbers of every mission.
+            seeds: One per mission; its length is B.
+            channel: Who decodes whom; the mission's own unless given.
+            controller: What drives the robots; that of the mission's task unless given.
+            scene: What changes the arena before it is compiled; nothing unless given. All missions
+                stand in the same arena.
+            num_threads: MuJoCo's own.
+
+        Raises:
+            ValueError: No seed, a negative one, no connected team could be drawn, or the scene
+                changed the robots.
+            TypeError: The mission is none, or a part of one's own cannot be called.
+        """
+        check_kind("mission", mission, Mission, 'paper("flocking")')
+        parts = {"channel": channel, "controller": controller, "scene": scene}
+        for what, part in parts.items():
+            if not isinstance(part, VaryingChannel):
+                check_callable(what, part, CALLED_WITH[what])
+        _check_seeds(seeds)
+        if not isinstance(num_threads, Integral) or not 1 <= num_threads <= MAX_THREADS:
+            limits = f"from 1 to {MAX_THREADS}"
+            raise ValueError(f"num_threads must be a whole number {limits}, not {num_threads!r}")
+        self.mission = mission
+        self.controller = controller_of(mission) if controller is None else controller
+        self._costed = costed(self.controller)
+        self.scene = scene
+        self._physics = Physics(mission, len(seeds), scene=scene, num_threads=num_threads)
+        self._obstacles = self._physics.obstacles
+        self.channel = channel_of(mission, self._obstacles) if channel is None else channel
+        self.belief = belief_of(mission, self._obstacles)
+        self._truth = truth_of(mission, self.channel)
+        self._num_missions = len(seeds)
+        self.restart(seeds)
+
+    def restart(self, seeds: Sequence[int]) -> None:
+        """Starts all missions anew.
+
+        Args:
+            seeds: One per mission, as many as before.
+
+        Raises:
+            ValueError: Not as many seeds, a negative one, or no connected team could be drawn.
+        """
+        _check_seeds(seeds, self._num_missions)
+        streams = zip(*(_streams(seed) for seed in seeds), strict=True)
+        placement, motion, policy, outage, channel = streams
+        mission = self.mission
+        for part, rngs in ((self.controller, motion), (self.channel, channel)):
+            if isinstance(part, Started):
+                part.start(mission.num_robots, rngs)
+        position_m = [self._place(b, rng) for b, rng in enumerate(placement)]
+        velocity_mps = [initial_velocity(mission, rng) for rng in placement]
+        self._physics.place(np.stack(position_m), np.stack(velocity_mps))
+        self._policy_rngs = policy
+        self._survivors = draw_survivors(mission, outage)
+        self.now = np.zeros(len(seeds))  # t [windows]
+        room = fitting(packet_of(mission), mission, "T, M and P").num_entries
+        self.buffers: Buffers = with_room(empty_buffers(len(seeds), mission.num_robots), room)
+        observe_self(self.buffers, self.states, self.now)
+        if mission.grants("start"):
+            grant_start(self.buffers, self.states)
+        self.phases: tuple[Phase, ...] = ()
+        self._read_only = self.buffers.read_only()
+        self._started: Policy | None = None
+
+    def _place(self, b: int, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
+        """Where mission b's robots begin: connected in its own channel, if that can be asked."""
+        mission, channel = self.mission, self.channel
+        asks = isinstance(channel, ComposedChannel)
+        stands = len(self._obstacles.kind) > 0
+        return connected_positions(
+            mission.num_robots,
+            mission.half_side_m,
+            mission.range_m,
+            rng,
+            partial(channel.largest_part, mission=b) if asks else None,
+            self._is_blocked if stands or mission.collide else None,
+            keeps_largest=stands,
+        )
+
+    def _is_blocked(self, position_m: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
+        """Which robots would touch an obstacle there, or another robot if they collide."""
+        is_blocked = blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, self._obstacles)
+        if self.mission.collide:
+            is_blocked |= overlaps_earlier(position_m, 2.0 * ROBOT_RADIUS_M)
+        return is_blocked
+
+    @property
+    def states(self) -> RobotStates:
+        """Where the robots truly are, and who is active."""
+        return self._physics.states
+
+    @property
+    def views(self) -> LocalViews:
+        """What every robot knows."""
+        return LocalViews(buffers=self._read_only, now=self.now, phases=self.phases)
+
+    def start(self, policy: Policy) -> None:
+        """Tells a policy what it may know, gives it random streams and lets it forget all else.
+
+        Raises:
+            TypeError: It is no policy.
+        """
+        check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
+        room = policy.packet(self.mission).num_entries
+        if isinstance(policy, CentralisedPolicy):
+            policy.inform(self._truth)
+        elif isinstance(policy, DecentralisedPolicy):
+            policy.inform(self.belief)
+        policy.start(self.mission.num_robots, self._policy_rngs)
+        self.buffers = with_room(self.buffers, room)
+        self._started = policy
+
+    def decide(self, policy: Policy) -> Int[np.ndarray, "B N"]:
+        """Whom each robot addresses next, from no more than the policy's type allows it to know.
+
+        A policy that is new to these missions is started first.
+
+        Raises:
+            TypeError: The policy is neither decentralised nor centralised.
+        """
+        if policy is not self._started:
+            self.start(policy)
+        views = self.views if is_ours(policy) else self.views.copy()
+        if isinstance(policy, CentralisedPolicy):
+            return policy.recipients(views, self._states_for(policy))
+        if isinstance(policy, DecentralisedPolicy):
+            return policy.recipients(views)
+        raise TypeError("a policy must be a DecentralisedPolicy or a CentralisedPolicy")
+
+    def move(self) -> RobotStates:
+        """Moves the robots through one window, by their controller and the physics."""
+        wanted_mps2 = self.controller(self._read_only, self._states_for(self.controller))
+        return self._physics.step(np.asarray(wanted_mps2, dtype=np.float64))
+
+    def step(self, policy: Policy) -> WindowCosts:
+        """One window: the policy decides, the robots move, then they talk.
+
+        Raises:
+            TypeError: It is no policy.
+        """
+        check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
+        if policy is not self._started:
+            self.start(policy)
+        return self._play(policy.window(self.mission), lambda: self.decide(policy))
+
+    def exchange(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
+        """One window of Alg. 1 with these recipients, after the robots have moved.
+
+        Args:
+            recipient: Whom each robot addresses; itself is silence.
+
+        Returns:
+            What the window cost.
+
+        Raises:
+            ValueError: A recipient is no robot, or there is not one per robot; nothing has moved.
+        """
+        request_response = RequestResponse(silence_is_attempt=self.mission.silence_is_attempt)
+        return self._play(request_response, lambda: recipient)
+
+    def _states_for(self, part: object) -> RobotStates:
+        """Where the robots truly are; a user's own part gets copies, so it can move nothing."""
+        return self.states if is_ours(part) else self.states.copy()
+
+    def _play(
+        self, window: WindowProtocol, decide: Callable[[], Int[np.ndarray, "B N"]]
+    ) -> WindowCosts:
+        """One window of this protocol."""
+        start = self.now
+        decide_after = partial(self._decide_after, start, decide, window.is_broadcast)
+        self._fail()
+        self.phases = window(self.buffers, decide_after, self.move, self.channel, start)
+        self.now = start + 1.0
+        return window_costs(
+            self.buffers,
+            self.states,
+            self.phases,
+            self.now,
+            is_broadcast=window.is_broadcast,
+            task_cost=self._task_cost(),
+        )
+
+    def _task_cost(self) -> TaskCost | None:
+        """What the task costs now, if the controller says so."""
+        controller = self._costed
+        if controller is None:
+            return None
+        value = np.asarray(controller.cost(self._states_for(controller)), dtype=np.float64)
+        if value.shape != self.now.shape or not np.all(value >= 0.0):
+            raise ValueError(
+                f"a controller's cost must have shape {self.now.shape}, one number of 0 or more "
+                f"for each mission, not {np.array2string(value, threshold=8)}"
+            )
+        return TaskCost(name=controller.cost_name, unit=controller.cost_unit, value=value)
+
+    def _decide_after(
+        self,
+        start: Float[np.ndarray, "B"],
+        decide: Callable[[], Int[np.ndarray, "B N"]],
+        may_broadcast: bool,
+        phases: tuple[Phase, ...],
+    ) -> Int[np.ndarray, "B N"]:
+        """Whom each robot addresses, after these phases of the window that began at `start`."""
+        if phases:
+            self.phases, self.now = phases, start + len(phases) * SLOT_WINDOWS
+        recipient = np.asarray(decide())
+        check_robots("recipient", recipient, self.buffers.shape, may_broadcast=may_broadcast)
+        return recipient
+
+    def _fail(self) -> None:
+        """Half-way through the mission, the robots that are to fail do."""
+        is_half_way = self.now[0] >= failure_window(self.mission)
+        if is_half_way and self._survivors is not None and self.states.is_active is None:
+            self._physics.deactivate(self._survivors)
+
+
+def _check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
+    """Raises ValueError unless there are seeds, as many as expected, and none is negative."""
+    if not hasattr(seeds, "__len__") or isinstance(seeds, str | bytes):
+        raise ValueError(f"seeds must be a list, one per mission, such as [1], not {seeds!r}")
+    is_whole = all(isinstance(seed, Integral) and 0 <= seed <= MAX_SEED for seed in seeds)
+    if not is_whole or len(seeds) != (expected or max(1, len(seeds))):
+        count = "one or more" if expected is None else str(expected)
+        raise ValueError(f"seeds must be {count} integers from 0 to {MAX_SEED}, not {list(seeds)}")
+
+
+def _streams(seed: int) -> list[np.random.Generator]:
+    """Placement, motion, policy, outages and channel draw apart, so policies meet equal missions.
+
+    Only add to the end: a stream's place is what it draws from.
+    """
+    return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(5)]

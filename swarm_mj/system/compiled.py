@@ -1,0 +1,109 @@
+"""Compiled loops: numba's `njit`, cached on disk until any code they are made of changes.
+
+numba's own cache watches a function's file alone, and would keep what it compiled of a function or
+a constant that stands elsewhere. Here the cache watches all files of the package that a function's
+file imports, one after the other, so that physics can stand once and loops anywhere may call it.
+
+The cache lies in `NUMBA_CACHE_DIR` if that is set, else in the `__pycache__` beside the file, else,
+in an installation that cannot be written, in the user's cache folder. Where none of them can be
+written, every process compiles anew. What is out of date is overwritten, so no folder grows.
+"""
+
+import functools
+import hashlib
+import inspect
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from numba import config, njit
+from numba.core import caching
+
+PACKAGE = Path(__file__).parents[1]
+IMPORT = re.compile(rf"^from ({PACKAGE.name}(?:\.\w+)*) import ", re.MULTILINE)
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def compiled(*, fastmath: bool | set[str] = False) -> Callable[[Function], Function]:
+    """Compiles a function when it is first called with arguments of new types.
+
+    Args:
+        fastmath: What LLVM may assume of floats. numba compiles a function with its first caller's
+            assumptions unless they are said, so here they always are.
+
+    Returns:
+        The decorator; type checkers see the function as it was.
+    """
+    # Checks for divisions by zero would keep loops that divide from being as fast as they can be.
+    options: Any = {"fastmath": fastmath, "error_model": "numpy"}
+
+    def decorate(function: Function) -> Function:
+        plain = inspect.unwrap(function)  # of the checks that tests put around all functions
+        numba: Any = config
+        before, numba.CACHE_LOCATOR_CLASSES = numba.CACHE_LOCATOR_CLASSES, LOCATORS
+        try:
+            return cast(Function, njit(cache=True, **options)(plain))
+        except RuntimeError:  # no place for a cache
+            return cast(Function, njit(**options)(plain))
+        finally:
+            numba.CACHE_LOCATOR_CLASSES = before
+
+    return decorate
+
+
+def digest(file: Path) -> bytes:
+    """A hash of a file and of the package's files that it imports, directly or by way of others."""
+    found, waiting = set(), [file]
+    while waiting:
+        path = waiting.pop()
+        if path not in found:
+            found.add(path)
+            waiting += _read(path)[1]
+    hashes = [_read(path)[0] for path in sorted(found)]
+    return hashlib.sha256(b"".join(hashes)).digest()
+
+
+@functools.cache
+def _read(path: Path) -> tuple[bytes, list[Path]]:
+    """A file's hash, and the package's files that it imports."""
+    source = path.read_bytes()
+    modules = [
+        PACKAGE.parent.joinpath(*name.split(".")) for name in IMPORT.findall(source.decode())
+    ]
+    files = [path / "__init__.py" if path.is_dir() else path.with_suffix(".py") for path in modules]
+    return hashlib.sha256(source).digest(), files
+
+
+class _WatchesImports:
+    """What a place for caches compares to tell whether a cached function is out of date."""
+
+    _py_file: str
+
+    def get_source_stamp(self) -> bytes:
+        """The digest of the function's file; numba asks by this name."""
+        return digest(Path(self._py_file))
+
+
+class InFolderGiven(_WatchesImports, caching.UserProvidedCacheLocator):
+    """In `NUMBA_CACHE_DIR`, if it is set."""
+
+
+class BesideFile(_WatchesImports, caching.InTreeCacheLocator):
+    """In the `__pycache__` of the function's file, if it can be written."""
+
+
+class InUsersFolder(_WatchesImports, caching.UserWideCacheLocator):
+    """In the user's cache folder, if there is one that can be written."""
+
+    def ensure_cache_path(self) -> None:
+        """The name is numba's. A user without a home has `~/.cache`, in whatever folder this is."""
+        if not Path(self.get_cache_path()).is_absolute():
+            raise FileNotFoundError(self.get_cache_path())
+        super().ensure_cache_path()
+
+
+LOCATORS = ",".join(
+    f"{place.__module__}.{place.__name__}" for place in (InFolderGiven, BesideFile, InUsersFolder)
+)

@@ -1,0 +1,187 @@
+"""Tables of results: whole at 100 columns, the freshest first, one per regime."""
+
+from dataclasses import fields
+from typing import get_args
+
+import pytest
+
+from swarm_mj.evaluation.results import Result
+from swarm_mj.evaluation.table import print_results
+
+
+def some_result(policy, aoi_mean, **overrides):
+    """A result whose other numbers are 1; its task has no cost of its own."""
+    values = {
+        spec.name: {str: "paper", int: 1, float: 1.0}[(get_args(spec.type) or (spec.type,))[0]]
+        for spec in fields(Result)
+    }
+    values["task_cost_name"] = None
+    return Result(**values | {"policy": policy, "aoi_mean": aoi_mean} | overrides)
+
+
+NOTHING = {spec.name: None for spec in fields(Result) if type(None) in get_args(spec.type)}
+LARGEST = {
+    "aoi_sem": 12.345,
+    "aoi_ci_low": 100.001,
+    "aoi_ci_high": 222.222,
+    "aoi_median": 123.456,
+    "aoi_p95": 234.567,
+    "aoi_difference_mean": -123.456,
+    "aoi_difference_ci_low": -222.222,
+    "aoi_difference_ci_high": -111.111,
+    "velocity_variance_mean": 12.3456,
+    "packets_per_window": 79.987,
+    "packet_bytes": 164_283,
+    "bytes_per_second": 11_111_111.1,
+    "heard_ratio": 1.0,
+    "hearers_per_packet": 39.125,
+    "payload": "snapshots",
+    "published_aoi_mean": 115.7268,
+    "published_aoi_sem": 12.964,
+}
+
+
+@pytest.fixture
+def printed(capsys, monkeypatch):
+    """What is printed on a console of so many columns."""
+
+    def lines(results, columns):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        print_results(results)
+        return capsys.readouterr().out.splitlines()
+
+    return lines
+
+
+@pytest.mark.parametrize("columns", [60, 100])
+def test_the_largest_numbers_are_whole_at_100_columns(printed, columns):
+    names = ("random-flooding", "oracle-lookahead", "planner --payload none")
+    moving = {"task": "flocking"} | LARGEST
+    results = [some_result(name, 123.456, **moving) for name in names]
+    lines = printed(results, columns)
+    assert max(map(len, lines)) <= 100
+    text = "\n".join(lines)
+    assert "…" not in text
+    for number in ("123.46 ± 12.35", "100.00, 222.22", "-222.22, -111.11", "115.73 ± 12.96"):
+        assert number in text
+
+
+def test_the_freshest_comes_first_in_each_regime(printed):
+    results = [
+        some_result("a", 3.0),
+        some_result("b", 1.0),
+        some_result("c", 2.0),
+        some_result("d", 9.0, task="flocking"),
+        some_result("e", 8.0, task="flocking"),
+    ]
+    lines = printed(results, 100)
+    order = [line[0] for line in lines if line[:2] in {f"{name} " for name in "abcde"}]
+    assert order == ["b", "c", "a", "e", "d"]
+    assert sum("preset paper: 1 robots" in line for line in lines) == 2
+
+
+def test_regimes_in_which_robots_fail_are_apart_and_say_so(printed):
+    results = [some_result("a", 3.0, switched_off=0.0), some_result("a", 4.0, switched_off=0.2)]
+    lines = printed(results, 100)
+    assert sum("preset paper: 1 robots" in line for line in lines) == 2
+    assert sum(" 1 windows of paper physics" in line for line in lines) == 2
+    assert sum(" 20% of the robots off half-way" in line for line in lines) == 1
+
+
+def rows(lines, policy):
+    """The words of both lines of a policy's row."""
+    first = next(index for index, line in enumerate(lines) if line.startswith(policy))
+    return lines[first].split(), lines[first + 1].split()
+
+
+def test_what_does_not_exist_is_a_dash(printed):
+    nothing = NOTHING | {"task": "flocking"}
+    above, below = rows(printed([some_result("mst", 2.0, **nothing)], 100), "mst")
+    assert above == ["mst", "2.00", "1.00", "-", "1.00", "-", "1.0000", "-"]
+    assert below == ["1.00", "-", "-"]  # p95; no packet was sent, so no share of them arrived
+
+
+def test_broadcasts_have_hearers_and_addressed_packets_arrive(printed):
+    broadcast = {"delivery_ratio": None, "heard_ratio": 0.97, "hearers_per_packet": 4.111}
+    addressed = {"delivery_ratio": 0.77, "heard_ratio": None, "hearers_per_packet": None}
+    results = [some_result("tdma", 1.0, **broadcast), some_result("mst", 2.0, **addressed)]
+    lines = printed(results, 100)
+    (above, below), (above_mst, below_mst) = rows(lines, "tdma"), rows(lines, "mst")
+    assert "97%" in below
+    assert "4.11" in above
+    assert "77%" in below_mst
+    assert "-" in above_mst
+
+
+@pytest.mark.parametrize(
+    ("payload", "mark"), [("snapshots", ["+", "snapshots"]), ("none", []), (None, [])]
+)
+def test_who_carries_more_than_the_paper_s_packets_is_marked_and_explained(printed, payload, mark):
+    lines = printed([some_result("planner", 1.0, payload=payload)], 100)
+    _, below = rows(lines, "planner")
+    assert below[: len(mark)] == mark
+    assert ("+: packets carry more than T, M, P" in " ".join(lines)) == bool(mark)
+
+
+def test_what_packets_weigh_and_what_teams_send(printed):
+    """1000 bytes a second are 8 kbit/s; files made before it was counted say nothing of it."""
+    known = some_result("mst", 1.0, packet_bytes=7263, bytes_per_second=1000.0)
+    older = some_result("tdma", 2.0, packet_bytes=None, bytes_per_second=None)
+    lines = printed([known, older], 100)
+    assert "7,263" in rows(lines, "mst")[1]
+    assert "sent by the team [kbit/s]: mst 8.0" in lines
+
+
+def test_regimes_of_other_bit_rates_are_tables_of_their_own(printed):
+    lines = printed([some_result("mst", 1.0, bit_rate=rate) for rate in (250e3, 1e6)], 100)
+    assert [line for line in lines if line.startswith("bit rate")] == [
+        "bit rate 250 kbit/s,",
+        "bit rate 1 Mbit/s,",
+    ]
+
+
+def test_an_option_stands_below_its_policy(printed):
+    lines = printed([some_result("planner --payload none", 1.0, payload="none")], 100)
+    above, below = rows(lines, "planner")
+    assert above[:2] == ["planner", "1.00"]
+    assert below[:2] == ["--payload", "none"]
+
+
+def test_velocities_are_those_of_flocks(printed):
+    for task in ("stationary", "random-walk"):  # whose velocities depend on no policy
+        assert "variance" not in "\n".join(printed([some_result("a", 1.0, task=task)], 100))
+    flocking = "\n".join(printed([some_result("a", 1.0, task="flocking")], 100))
+    assert "Velocity variance (var.): of the robots' velocities [m²/s²]" in flocking
+
+
+def test_the_lower_bound_stands_below(printed):
+    lines = printed([some_result("a", 1.0), some_result("b", 2.0, aoi_floor_mean=1.75)], 100)
+    assert "lower bound (connectivity): 1.00 to 1.75, by policy" in lines
+    assert "lower bound (connectivity): 1.00" in printed([some_result("a", 1.0)], 100)
+    unknown = "\n".join(printed([some_result("a", 1.0, aoi_floor_mean=None)], 100))
+    assert "ower bound" not in unknown
+
+
+def test_regimes_of_other_channels_and_arenas_are_tables_of_their_own(printed):
+    plain = {"arena": "open", "known": "nothing"}
+    others = ({}, {"arena": "blocks"}, {"radio": "fading rayleigh"}, {"known": "map,start"})
+    lines = printed([some_result("a", 1.0, **plain | other) for other in others], 100)
+    text = "\n".join(lines)
+    assert text.count("lower bound (connectivity)") == 4
+    assert text.count("known ") == 1
+    assert ",\nknown map,start\n" in text
+    assert ",\narena blocks\n" in text
+    assert ",\nradio fading rayleigh" in text
+
+
+def test_a_tasks_own_cost_has_a_column_and_a_sentence(printed):
+    cost = {"task_cost_name": "formation error", "task_cost_unit": "m", "task_cost_mean": 321.5}
+    cost |= {"task_cost_sem": 1.25, "task_cost_difference_mean": -4.5}
+    interval = {"task_cost_difference_ci_low": -7.0, "task_cost_difference_ci_high": -2.0}
+    found = some_result("mst", 1.0, task="formation", task_cost_last_mean=12.25, **cost, **interval)
+    text = "\n".join(printed([found], 100))
+    assert "± 1.25" in text
+    assert "-7.00, -2.00" in text
+    assert "321.50" in text
+    assert "12.25" in text
+    assert "Task cost: formation error [m], mean over windows ± standard error" in text

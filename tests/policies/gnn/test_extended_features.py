@@ -1,0 +1,325 @@
+"""Every extended feature by hand, on teams of a few robots, and laws; times are in windows."""
+
+import copy
+import math
+
+import mixed_missions
+import numpy as np
+import pytest
+
+from swarm_mj.mission import paper
+from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures, _log_age
+from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import Phase
+
+MISSION = paper("stationary", num_robots=4)
+OBSERVER = 1  # the robot whose row is looked at
+TEACHER = 3  # a robot that it knows, out of range
+# Where robot 1 believes the others to be: 200 m, itself, unknown, 350 m.
+BELIEVED_M = [[200.0, 0.0], [0.0, 0.0], [0.0, 0.0], [-210.0, -280.0]]
+IS_KNOWN = [True, True, False, True]
+
+
+def log_age(windows):
+    return math.log(1 + windows) / math.log(501)
+
+
+def buffers_of_robot_1(now):
+    """It heard of robot 0 at 4, never of robot 2, of robot 3 at 6; it addressed robot 0 at 8."""
+    buffers = empty_buffers(1, 4)
+    buffers.timestamp[0, OBSERVER] = [4.0, now, 0.0, 6.0]
+    buffers.position_m[0, OBSERVER] = BELIEVED_M
+    buffers.parent[0, OBSERVER] = [1, -1, -1, 0]
+    buffers.last_attempt[0, OBSERVER] = [8.0, 0.0, 0.0, 0.0]
+    return buffers
+
+
+def seen(views, mission=MISSION, robot=OBSERVER):
+    """The features of each teammate by name, and whom it may address, after these views."""
+    extractor = ExtendedFeatures(mission)
+    extractor.start(1, views[0].num_robots)
+    for view in views:
+        graphs = extractor.graphs(view)
+    values = graphs.node[robot].T
+    return dict(zip(extractor.names, values, strict=True)), graphs.may_address[robot]
+
+
+def silent_views(now=10.0):
+    return [LocalViews(buffers=buffers_of_robot_1(now), now=np.array([now]), phases=())]
+
+
+def check(found, **expected):
+    for name, values in expected.items():
+        np.testing.assert_allclose(found[name.replace("_", " ")], values, rtol=1e-6, err_msg=name)
+
+
+def test_identity_knowledge_and_ages():
+    found, _ = seen(silent_views())
+    check(
+        found,
+        is_oneself=[0, 1, 0, 0],
+        is_known=IS_KNOWN,
+        age_of_T=[log_age(6), 0.0, 1.0, log_age(4)],
+        age_of_last_attempt=[log_age(2), 1.0, 1.0, 1.0],
+        age_of_last_packet_heard=[1.0] * 4,
+        age_of_last_being_addressed=[1.0] * 4,
+        share_of_the_team_known=[0.75] * 4,
+        size_of_the_team=[0.1] * 4,
+    )
+
+
+def test_ages_count_up_to_500_windows():
+    found, _ = seen(silent_views(now=504.0))
+    check(found, age_of_T=[1.0, 0.0, 1.0, log_age(498)])
+    found, _ = seen(silent_views(now=900.0))
+    check(found, age_of_T=[1.0, 0.0, 1.0, 1.0])
+
+
+def test_distances_by_belief():
+    """200 and 350 m are 0.8 and 1.4 ranges; up to 4 count, and 1.2 are worth addressing."""
+    found, may_address = seen(silent_views())
+    check(found, distance=[0.2, 0.0, 0.0, 0.35], is_in_range=[1, 0, 0, 0])
+    assert may_address.tolist() == [True, True, True, False]
+    views = silent_views()
+    for at_0, at_3 in ((251.0, 299.0), (249.0, 301.0), (3000.0, 200.0)):
+        views[0].buffers.position_m[0, OBSERVER, 0] = [at_0, 0.0]
+        views[0].buffers.position_m[0, OBSERVER, 3] = [0.0, at_3]
+        found, may_address = seen(views)
+        check(found, distance=[min(at_0 / 1000, 1.0), 0.0, 0.0, at_3 / 1000])
+        check(found, is_in_range=[at_0 < 250, 0, 0, at_3 < 250])
+        assert may_address.tolist() == [at_0 < 300, True, True, at_3 < 300]
+
+
+def test_the_range_is_the_missions():
+    found, may_address = seen(silent_views(), paper("stationary", num_robots=4, range_ratio=0.5))
+    check(found, distance=[0.1, 0.0, 0.0, 0.175], is_in_range=[1, 0, 0, 1])
+    assert np.all(may_address)
+
+
+def test_neighbours_of_each_by_belief():
+    """0 and 1 are 200 m apart; 3 is 350 m from 1 and farther from 0; nobody knows 2."""
+    check(seen(silent_views())[0], neighbours=[0.1, 0.1, 0.0, 0.0])
+    closer = silent_views()
+    closer[0].buffers.position_m[0, OBSERVER, 3] = [-100.0, 0.0]
+    check(seen(closer)[0], neighbours=[0.1, 0.2, 0.0, 0.1])
+
+
+def check_turns(found, *apart_1_5_2_3, by_interference):
+    names = [f"has a turn, {ranges} ranges apart" for ranges in ("1.5", "2", "3")]
+    check(found, **dict(zip(names, apart_1_5_2_3, strict=True)))
+    check(found, **{"has a turn, by interference": by_interference})
+
+
+def has_turn(view):
+    """Whether each robot has a turn by its own beliefs."""
+    extractor = ExtendedFeatures(MISSION)
+    extractor.start(1, 4)
+    return extractor.graphs(view).has_turn.tolist()
+
+
+@pytest.mark.parametrize(
+    ("now", "rank", "turns"),
+    [
+        (8.0, [0, 1, 2, 3], [1, 0, 0, 0]),  # 0 leads; 2 is next, who may be anywhere
+        (9.0, [3, 0, 1, 2], [0, 1, 0, 0]),  # 1 leads; 3 is 1.4 ranges off, and 0 nearer
+        (10.0, [2, 3, 0, 1], [0, 0, 0, 0]),  # 2 leads, who may be anywhere
+    ],
+)
+def test_turns_go_by_the_clock_up_to_the_first_unknown_robot(now, rank, turns):
+    found, _ = seen(silent_views(now))
+    check(found, rank_of_its_turn=[r / 4 for r in rank])
+    check_turns(found, turns, turns, turns, by_interference=turns)
+
+
+def test_turns_by_distance_and_by_interference():
+    """Robot 1 leads at the origin and is heard by 0; then 3, 0 and 2 are asked, in this order.
+
+    Robot 3, 300 m off, is too near by distance, 2 at 400 m (1.6 ranges) is not. By interference 3
+    may speak: in units of noise, 0 hears robot 1 with 1.259 (250/100)^2 = 7.9 over 1 + 0.5 from 3,
+    and 2 hears 3 likewise. So neither 0 nor 2 may.
+    """
+    views = silent_views(9.0)
+    views[0].buffers.timestamp[0, OBSERVER] = [4.0, 9.0, 5.0, 6.0]
+    views[0].buffers.position_m[0, OBSERVER, :, 0] = [-100.0, 0.0, 400.0, 300.0]
+    views[0].buffers.position_m[0, OBSERVER, :, 1] = 0.0
+    alone = [0, 1, 0, 0]
+    check_turns(seen(views)[0], [0, 1, 1, 0], alone, alone, by_interference=[0, 1, 0, 1])
+    assert has_turn(views[0]) == [False, True, False, False]
+
+
+def test_a_robot_has_the_turn_that_it_believes_it_has():
+    """Robot 1 believes what robot 3 believed above, and so it, not the leader, is robot 3."""
+    buffers = empty_buffers(1, 4)
+    buffers.timestamp[0, 3] = [4.0, 5.0, 5.0, 9.0]
+    buffers.position_m[0, 3, :, 0] = [-100.0, 0.0, 400.0, 300.0]
+    view = LocalViews(buffers=buffers, now=np.array([9.0]), phases=())
+    assert has_turn(view) == [False, True, False, True]
+    buffers.position_m[0, 3, 0, 0] = 50.0  # robot 0 would lose what the leader tells it
+    buffers.position_m[0, 3, 3, 0] = 120.0
+    assert has_turn(view) == [False, True, False, False]
+
+
+def phase(recipient, heard):
+    return Phase(recipient=np.array([recipient]), heard=np.array([heard]))
+
+
+def views_of_a_talk():
+    """In window 10 robot 3 addresses robot 1, which answers; in window 11 robot 1 addresses 0.
+
+    Robot 3 knows of itself and, from 9, of robot 2. Nobody decodes what robot 1 says in window 11.
+    """
+    before = buffers_of_robot_1(10.0)
+    before.timestamp[0, TEACHER] = [3.0, 2.0, 9.0, 10.0]
+    asked, answered = phase([0, 1, 2, 1], [0, 3, 2, 3]), phase([0, 3, 2, 3], [0, 1, 2, 1])
+    after = buffers_of_robot_1(11.0)
+    after.timestamp[0, OBSERVER] = [4.0, 11.0, 9.0, 10.5]
+    after.position_m[0, OBSERVER, 2:] = [[0.0, 900.0], [-60.0, 80.0]]  # 3 is nearer, at 100 m
+    last = copy.deepcopy(after)
+    last.timestamp[0, OBSERVER, OBSERVER] = 12.0
+    last.last_attempt[0, OBSERVER, 0] = 11.5
+    spoke, nothing = phase([0, 0, 2, 3], [0, 1, 2, 3]), phase([0, 1, 2, 3], [0, 1, 2, 3])
+    return [
+        LocalViews(buffers=buffers, now=np.array([now]), phases=phases)
+        for buffers, now, phases in [
+            (before, 10.0, ()),
+            (after, 11.0, (asked, answered)),
+            (last, 12.0, (spoke, nothing)),
+        ]
+    ]
+
+
+def test_ages_of_packets_heard_and_meant_for_oneself():
+    """Robot 3's packet came at 10.5 and was meant for robot 1, whose own first word is at 11.5."""
+    found, _ = seen(views_of_a_talk()[:2])
+    check(
+        found,
+        age_of_last_packet_heard=[1.0, 1.0, 1.0, log_age(0.5)],
+        age_of_last_being_addressed=[1.0, 1.0, 1.0, log_age(0.5)],
+    )
+    found, _ = seen(views_of_a_talk())
+    check(
+        found,
+        age_of_last_packet_heard=[1.0, log_age(0.5), 1.0, log_age(1.5)],
+        age_of_last_being_addressed=[1.0, 1.0, 1.0, log_age(1.5)],
+        age_of_last_attempt=[log_age(0.5), 1.0, 1.0, 1.0],
+    )
+
+
+def test_being_overheard_is_not_being_addressed():
+    views = views_of_a_talk()[:2]
+    views[1].phases[0].recipient[0, TEACHER] = 2
+    found, _ = seen(views)
+    check(
+        found,
+        age_of_last_packet_heard=[1.0, 1.0, 1.0, log_age(0.5)],
+        age_of_last_being_addressed=[1.0] * 4,
+    )
+
+
+def test_news_to_those_in_range():
+    """Means of rises over 4 subjects; robot 0 was never heard, robot 3's T were [3, 2, 9, 10.5].
+
+    Robot 1 spoke first at 11.5, with T = [4, 11.5, 9, 10.5]: all that is new since is 0.5 of its
+    own clock.
+    """
+    heard_only, _ = seen(views_of_a_talk()[:2])
+    to_0, to_3 = (4 + 11 + 9 + 10.5) / 4, (1 + 9 + 0 + 0) / 4
+    by_packet = "news to it, by its last packet"
+    by_both = "news to it, if it heard what was said last"
+    expected = [log_age(to_0), log_age(to_0 + to_3), 0.0, log_age(to_3)]
+    for name in (by_packet, by_both):
+        np.testing.assert_allclose(heard_only[name], expected, rtol=1e-6)
+    after_speech, _ = seen(views_of_a_talk())
+    to_0, to_3 = (4 + 12 + 9 + 10.5) / 4, (1 + 10 + 0 + 0) / 4
+    expected = [log_age(to_0), log_age(to_0 + to_3), 0.0, log_age(to_3)]
+    np.testing.assert_allclose(after_speech[by_packet], expected, rtol=1e-6)
+    expected = [log_age(0.125), log_age(0.25), 0.0, log_age(0.125)]
+    np.testing.assert_allclose(after_speech[by_both], expected, rtol=1e-6)
+
+
+def test_a_start_forgets_what_was_heard():
+    extractor = ExtendedFeatures(MISSION)
+    extractor.start(1, 4)
+    for view in views_of_a_talk():
+        extractor.graphs(view)
+    extractor.start(1, 4)
+    node = extractor.graphs(silent_views()[0]).node
+    fresh = ExtendedFeatures(MISSION)
+    fresh.start(1, 4)
+    np.testing.assert_array_equal(node, fresh.graphs(silent_views()[0]).node)
+
+
+def test_every_feature_is_in_range_and_all_named_here_are_all():
+    swarm_views = mixed_missions.flown(5)
+    extractor = ExtendedFeatures(mixed_missions.MISSION)
+    extractor.start(len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS)
+    for view in swarm_views:
+        node = extractor.graphs(view).node
+        assert node.shape == (
+            len(mixed_missions.SEEDS) * mixed_missions.NUM_ROBOTS,
+            mixed_missions.NUM_ROBOTS,
+            len(extractor.names),
+        )
+        assert np.all((node >= 0.0) & (node <= 2.0))
+    assert len(extractor.names) == 18
+
+
+@pytest.mark.parametrize("robot", [0, 4])
+def test_eq9_a_graph_rests_on_what_its_robot_can_know(robot):
+    """All but its own buffer and the packets it decodes is another team's."""
+    extractors = [ExtendedFeatures(mixed_missions.MISSION) for _ in range(2)]
+    for extractor in extractors:
+        extractor.start(len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS)
+    rows = [b * mixed_missions.NUM_ROBOTS + robot for b in range(len(mixed_missions.SEEDS))]
+    num_others = 0
+    for pair in zip(*mixed_missions.mixed_views(robot), strict=True):
+        graphs, same = (o.graphs(view) for o, view in zip(extractors, pair, strict=True))
+        for name in ("node", "parent", "may_address", "has_turn"):
+            np.testing.assert_array_equal(getattr(graphs, name)[rows], getattr(same, name)[rows])
+        num_others += np.any(graphs.node != same.node)
+    assert num_others > 50
+
+
+def test_the_local_features_are_the_extended_ones_without_turns():
+    extended, local = (
+        ExtendedFeatures(mixed_missions.MISSION),
+        LocalFeatures(mixed_missions.MISSION),
+    )
+    kept = [k for k, name in enumerate(extended.names) if "turn" not in name]
+    assert local.names == tuple(extended.names[k] for k in kept)
+    assert len(local.names) == 13
+    for extractor in (extended, local):
+        extractor.start(len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS)
+    for view in mixed_missions.flown(6):
+        graphs, fewer = extended.graphs(view), local.graphs(view)
+        np.testing.assert_array_equal(fewer.node, graphs.node[:, :, kept])
+        np.testing.assert_array_equal(fewer.may_address, graphs.may_address)
+        np.testing.assert_array_equal(fewer.parent, graphs.parent)
+        assert not np.any(fewer.has_turn)
+
+
+def test_names_matter_for_turns_only():
+    """A team under other names sees the same, each under its new name, but for whose turn it is."""
+    name = np.random.default_rng(1).permutation(mixed_missions.NUM_ROBOTS)
+    new_name = np.argsort(name)
+    one, other = ExtendedFeatures(mixed_missions.MISSION), ExtendedFeatures(mixed_missions.MISSION)
+    for extractor in (one, other):
+        extractor.start(len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS)
+    is_turn = np.array(["turn" in called for called in one.names])
+    assert is_turn.sum() == 5
+    for view in mixed_missions.flown(6):
+        node = one.graphs(view).node.reshape(
+            len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS, mixed_missions.NUM_ROBOTS, -1
+        )
+        same = other.graphs(mixed_missions.renamed(view, name, new_name)).node.reshape(node.shape)
+        expected = node[:, name][:, :, name]
+        np.testing.assert_allclose(same[..., ~is_turn], expected[..., ~is_turn], atol=1e-6)
+
+
+@pytest.mark.parametrize("age", [0.0, 0.5, 1.0, 17.5, 499.5, 0.3, 499.9, 500.0, 2_000.5])
+def test_ages_count_by_their_logarithm_whether_they_are_looked_up_or_not(age):
+    assert _log_age(3_000.0, 3_000.0 - age) == pytest.approx(
+        min(1.0, math.log(1 + age) / math.log(501))
+    )
+    assert _log_age(age, 0.0) == 1.0  # never

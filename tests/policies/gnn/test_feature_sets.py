@@ -1,0 +1,50 @@
+"""The table of feature sets: their names, their sizes, the mission that normalises them."""
+
+import numpy as np
+import pytest
+
+from swarm_mj.mission import paper
+from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
+from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, make_extractor, num_features
+from swarm_mj.policies.gnn.graphs import PaperFeatures, ReferenceFeatures
+from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.protocol.local_views import LocalViews
+
+
+@pytest.mark.parametrize(
+    ("features", "kind", "count"),
+    [
+        ("paper", PaperFeatures, 1 + 1 + 1 + 2 + 2 + 1),  # two flags, T, p, v, L (III-A)
+        ("reference", ReferenceFeatures, 7),
+        ("local", LocalFeatures, 18 - 5),  # without the turns agreed beforehand
+        ("extended", ExtendedFeatures, 18),
+    ],
+)
+def test_a_set_is_found_by_its_name_and_has_so_many_features(features, kind, count):
+    extractor = make_extractor(features, paper())
+    assert type(extractor) is kind
+    assert num_features(features) == count
+    swarm_of_two = LocalViews(buffers=empty_buffers(1, 2), now=np.zeros(1), phases=())
+    extractor.start(1, 2)
+    assert extractor.graphs(swarm_of_two).node.shape == (2, 2, count)
+
+
+def test_the_mission_given_is_the_one_that_normalises():
+    """At constant density, four times the robots have twice the side: positions count half."""
+    buffers = empty_buffers(1, 4)
+    buffers.position_m[...] = 50.0
+    views = LocalViews(buffers=buffers, now=np.zeros(1), phases=())
+    place = PaperFeatures.names.index("p_x")
+    small, large = (
+        make_extractor("paper", paper(num_robots=num_robots)).graphs(views).node[..., place]
+        for num_robots in (10, 40)
+    )
+    np.testing.assert_allclose(large, 50.0 / 1000.0)  # 40 robots at 40 per km²: 1 km
+    np.testing.assert_allclose(small, 50.0 / 500.0)
+
+
+@pytest.mark.parametrize("refuse", [lambda name: make_extractor(name, paper()), num_features])
+def test_unknown_features_are_a_clear_error(refuse):
+    assert set(FEATURE_SETS) == {"paper", "reference", "local", "extended"}
+    with pytest.raises(ValueError, match="extended, or module:Name of your own, not 'all'"):
+        refuse("all")

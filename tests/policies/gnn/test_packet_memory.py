@@ -1,0 +1,108 @@
+"""What robots remember of packets, against loops over the packets that the simulator sent."""
+
+import numpy as np
+import pytest
+from mixed_missions import NUM_ROBOTS, NUM_WINDOWS, SEEDS, mixed_views, random_recipients
+
+from swarm_mj.mission import paper, reference
+from swarm_mj.policies.gnn.packet_memory import empty_memory, remember
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.simulation.swarm import Swarm
+
+ARRAYS = ("heard", "addressed_by", "sent", "neighbour", "said")
+
+
+class Wire:
+    """The mission's radio, which keeps every packet: the buffers at the moment of sending."""
+
+    def __init__(self, mission):
+        self._radio = radio_of(mission)
+        self.packets = []  # (T of every sender, recipients, whom everyone decoded), phase by phase
+
+    def __call__(self, position_m, recipient):
+        heard = self._radio(position_m, recipient)
+        self.packets.append((self.swarm.buffers.timestamp.copy(), recipient.copy(), heard.copy()))
+        return heard
+
+
+def wired(mission):
+    """The mission's swarm and its wire."""
+    wire = Wire(mission)
+    wire.swarm = Swarm(mission, SEEDS, channel=wire)
+    return wire
+
+
+class Diary:
+    """One robot's memory: it is handed what it sent and what it decoded, and nothing else."""
+
+    def __init__(self, num_robots):
+        self.heard, self.addressed_by, self.said = ([0.0] * num_robots for _ in range(3))
+        self.neighbour = [[0.0] * num_robots for _ in range(num_robots)]
+        self.sent = 0.0
+
+    def send(self, packet, now):
+        self.sent, self.said = now, packet
+
+    def hear(self, sender, packet, now, *, is_for_me):
+        self.heard[sender], self.neighbour[sender] = now, packet
+        if is_for_me:
+            self.addressed_by[sender] = now
+
+
+def read_packets(diaries, packets, now):
+    """A window's two phases, half a window each: who spoke first, then who answered."""
+    for phase, (timestamp, recipient, heard) in enumerate(packets):
+        time = now + 0.5 * (phase + 1)
+        for b, team in enumerate(diaries):
+            for i, diary in enumerate(team):
+                if phase == 0 and recipient[b, i] != i:
+                    diary.send(timestamp[b, i].tolist(), time)
+                k = int(heard[b, i])
+                if k != i:
+                    packet = timestamp[b, k].tolist()
+                    diary.hear(k, packet, time, is_for_me=bool(recipient[b, k] == i))
+
+
+@pytest.mark.parametrize("make", [paper, reference])
+@pytest.mark.parametrize("task", ["stationary", "random-walk"])
+def test_alg1_memory_is_what_was_sent_and_decoded(make, task):
+    mission = make(task, num_robots=NUM_ROBOTS)
+    wire = wired(mission)
+    memory = empty_memory(len(SEEDS), NUM_ROBOTS)
+    diaries = [[Diary(NUM_ROBOTS) for _ in range(NUM_ROBOTS)] for _ in SEEDS]
+    remember(memory, wire.swarm.views)
+    for now, recipient in enumerate(random_recipients(seed=0)):
+        wire.swarm.exchange(recipient)
+        remember(memory, wire.swarm.views)
+        read_packets(diaries, wire.packets[-2:], float(now))
+        for name in ARRAYS:
+            expected = [[getattr(diary, name) for diary in team] for team in diaries]
+            np.testing.assert_array_equal(getattr(memory, name), expected, err_msg=f"{now} {name}")
+    for name in ("heard", "addressed_by"):
+        assert np.mean(getattr(memory, name) > 0.0) > 0.2
+
+
+def remembered(views: list[LocalViews]):
+    """All of a memory, copied window by window."""
+    memory = empty_memory(len(SEEDS), NUM_ROBOTS)
+    for view in views:
+        remember(memory, view)
+        yield {name: getattr(memory, name).copy() for name in ARRAYS}
+
+
+@pytest.mark.parametrize("robot", [0, 4])
+def test_eq9_a_memory_rests_on_packets_sent_and_decoded_only(robot):
+    num_others = 0
+    for memory, same in zip(*map(remembered, mixed_views(robot)), strict=True):
+        for name in ARRAYS:
+            np.testing.assert_array_equal(memory[name][:, robot], same[name][:, robot])
+        num_others += np.any(memory["neighbour"] != same["neighbour"])
+    assert num_others > NUM_WINDOWS / 2
+
+
+def test_a_memory_begins_empty():
+    memory = empty_memory(2, 3)
+    remember(memory, Swarm(paper("stationary", num_robots=3), [1, 2]).views)
+    for name in ARRAYS:
+        assert not np.any(getattr(memory, name))

@@ -1,0 +1,221 @@
+"""A learned policy flies: reproducibly, locally, in teams of any size."""
+
+import numpy as np
+import pytest
+import torch
+from mixed_missions import MISSION as WALK
+from mixed_missions import NUM_ROBOTS, SEEDS, mixed_views
+from tiny_policies import FEATURES, save_tiny, tiny_network
+
+from swarm_mj.mission import paper, reference
+from swarm_mj.policies.gnn.action_distribution import recipient_logits
+from swarm_mj.policies.gnn.feature_sets import make_extractor
+from swarm_mj.policies.gnn.policy import LearnedPolicy
+from swarm_mj.policies.gnn.sampling import sample
+from swarm_mj.policies.policy import DecentralisedPolicy
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.replay.recorder import Recorder
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
+
+MISSION = paper("random-walk", num_robots=7, num_windows=40)
+
+
+def learned(
+    features="extended",
+    mission=MISSION,
+    *,
+    seed=1,
+    outputs=1,
+    sharpness=2.0,
+    silence_logit=2.5,
+    is_deterministic=False,
+):
+    """A policy whose robots are silent most of the time, so that packets arrive.
+
+    The sharper it is, the more of what it does follows from what it sees, not from the dice.
+    """
+    network = tiny_network(features, seed, num_outputs=outputs)
+    with torch.no_grad():
+        for layer in network.modules():
+            if isinstance(layer, torch.nn.Linear):
+                layer.weight *= sharpness
+    extractor = make_extractor(features, mission)
+    return LearnedPolicy(
+        network, extractor, silence_logit=silence_logit, is_deterministic=is_deterministic
+    )
+
+
+def decisions(policy, seeds, mission=MISSION):
+    """Whom everyone addresses in every window of these missions [window, mission, robot]."""
+    swarm, decided, num_heard = Swarm(mission, seeds), [], 0
+    swarm.start(policy)
+    for _ in range(mission.num_windows):
+        decided.append(swarm.decide(policy))
+        num_heard += np.sum(swarm.exchange(decided[-1]).packets.delivered)
+    assert num_heard > 0
+    return np.array(decided)
+
+
+def logits_of(policy, graphs, silence_logit):
+    """The logits of two missions of seven robots, from the network itself."""
+    output = policy._network(torch.tensor(graphs.node), torch.tensor(graphs.parent).long())
+    owner, may_address = torch.tensor([*range(7), *range(7)]), torch.tensor(graphs.may_address)
+    has_turn = torch.tensor(graphs.has_turn)
+    logits = recipient_logits(output, owner, may_address, silence_logit, has_turn)
+    return logits.detach().numpy()
+
+
+@pytest.mark.parametrize("outputs", [1, 2])
+@pytest.mark.parametrize("features", FEATURES)
+def test_robots_draw_from_the_networks_logits(features, outputs):
+    """The first windows again, put together from the network, the draw and the mission's dice."""
+    policy = learned(features, outputs=outputs, silence_logit=0.7)
+    extractor, rngs = make_extractor(features, MISSION), [np.random.default_rng(b) for b in (5, 6)]
+    extractor.start(2, 7)
+    policy.start(7, [np.random.default_rng(b) for b in (5, 6)])
+    dice = np.stack([rng.random((64, 7)) for rng in rngs])  # [mission, window, robot]
+    swarm = Swarm(MISSION, [1, 2])
+    for window in range(5):
+        logits = logits_of(policy, extractor.graphs(swarm.views), 0.7)
+        expected = sample(logits, dice[:, window].ravel()).reshape(2, 7)
+        recipient = policy.recipients(swarm.views)
+        np.testing.assert_array_equal(recipient, expected)
+        swarm.exchange(recipient)
+
+
+@pytest.mark.parametrize("features", FEATURES)
+def test_the_mode_is_taken_on_request(features):
+    """Of two robots that look alike, as those never heard of do, it may be either."""
+    policy = learned(features, silence_logit=0.7, is_deterministic=True)
+    extractor = make_extractor(features, MISSION)
+    policy.start(7, [np.random.default_rng(b) for b in (5, 6)])
+    extractor.start(2, 7)
+    swarm, rng = Swarm(MISSION, [1, 2]), np.random.default_rng(1)
+    for _ in range(30):
+        logits = logits_of(policy, extractor.graphs(swarm.views), 0.7)
+        recipient = policy.recipients(swarm.views)
+        chosen = logits[np.arange(14), recipient.ravel()]
+        np.testing.assert_allclose(chosen, logits.max(axis=1), atol=1e-5)
+        swarm.exchange(np.where(rng.random((2, 7)) < 0.2, rng.integers(0, 7, (2, 7)), range(7)))
+
+
+@pytest.mark.parametrize("features", FEATURES)
+def test_the_same_seed_is_the_same_flight(features):
+    first, second = (decisions(learned(features), [3]) for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+    assert np.any(first != decisions(learned(features), [4]))
+    assert np.any(first != decisions(learned(features, seed=2), [3]))
+
+
+@pytest.mark.parametrize("features", FEATURES)
+def test_a_mission_does_not_depend_on_those_beside_it(features):
+    """One policy flies them in turn, so it must forget the last ones too."""
+    policy = learned(features)
+    together = decisions(policy, [3, 4, 5])
+    for b, seed in enumerate((3, 4, 5)):
+        np.testing.assert_array_equal(decisions(policy, [seed])[:, 0], together[:, b])
+
+
+@pytest.mark.parametrize("robot", [0, 4])
+@pytest.mark.parametrize("features", FEATURES)
+def test_eq9_a_robot_decides_on_what_it_can_know(features, robot):
+    """Its own buffer, and for the extended features the packets that it sent and decoded."""
+    decided = []
+    for views in mixed_views(robot):
+        policy = learned(features, WALK, sharpness=4.0)
+        policy.start(NUM_ROBOTS, [np.random.default_rng(b) for b in range(len(SEEDS))])
+        decided.append(np.array([policy.recipients(view) for view in views]))
+    np.testing.assert_array_equal(decided[0][:, :, robot], decided[1][:, :, robot])
+    assert np.mean(decided[0] != decided[1]) > 0.2
+
+
+@pytest.mark.parametrize("features", FEATURES)
+@pytest.mark.parametrize("preset", [paper, reference])
+def test_one_directory_flies_teams_of_any_size(tmp_path, features, preset):
+    save_tiny(tmp_path / "policy", features)
+    for num_robots in (2, 10, 40, 80):
+        mission = preset("random-walk", num_robots=num_robots, num_windows=12, range_ratio=0.5)
+        swarm = Swarm(mission, [1])
+        summary = summarise(list(rollout(swarm, make_policy(str(tmp_path / "policy"), mission))))
+        assert summary.packets_attempted[0] > 0
+        assert np.all(swarm.buffers.timestamp <= 12.0)
+
+
+def test_what_is_seen_is_normalised_by_the_mission_flown(tmp_path):
+    """Twice the range and side, twice the distances: nothing tells the missions apart."""
+    save_tiny(tmp_path / "policy", "extended")
+    decided = []
+    for scale in (1.0, 2.0):
+        mission = paper(
+            "stationary", num_robots=7, num_windows=20, range_ratio=0.25 * scale,
+            density_per_km2=40.0 / scale**2,
+        )  # fmt: skip
+        decided.append(decisions(make_policy(str(tmp_path / "policy"), mission), [3], mission))
+    np.testing.assert_array_equal(*decided)
+
+
+def test_it_is_decentralised_and_says_what_it_is():
+    policy = learned()
+    assert isinstance(policy, DecentralisedPolicy)
+    assert policy.payload == "none"
+    assert not policy.window(paper()).is_broadcast
+    assert policy.parameters["receptive_field"] == 1
+    assert policy.parameters["is_deterministic"] is False
+    assert learned(is_deterministic=True).parameters["is_deterministic"] is True
+
+
+def test_the_digest_tells_whatever_changes_decisions():
+    def digest(**options):
+        return learned(**options).parameters["digest"]
+
+    changed = [
+        digest(),
+        digest(seed=2),
+        digest(silence_logit=0.5),
+        digest(features="paper"),
+        digest(outputs=2),
+    ]
+    assert len(set(changed)) == len(changed)
+    assert digest() == digest(is_deterministic=True)
+    policy = learned()
+    before = policy.parameters["digest"]
+    with torch.no_grad():
+        policy._network.output.bias[0] += 1e-6
+    assert policy.parameters["digest"] != before
+    edges = [
+        LearnedPolicy(tiny_network(edges=edges), make_extractor("extended", MISSION))
+        for edges in ("paper", "reference")
+    ]
+    assert edges[0].parameters["digest"] != edges[1].parameters["digest"]
+
+
+def test_the_network_is_live():
+    """Training goes on with it: once silence is certain, nobody speaks."""
+    policy = learned("paper")
+    swarm = Swarm(MISSION, [1])
+    swarm.start(policy)
+    assert np.any(swarm.decide(policy) != swarm.views.silence)
+    with torch.no_grad():
+        policy._network.output.weight.zero_()
+    policy._silence_logit = 100.0
+    np.testing.assert_array_equal(swarm.decide(policy), swarm.views.silence)
+
+
+def test_threads_and_gradients_are_left_as_they_were():
+    before = torch.get_num_threads()
+    torch.set_num_threads(3)
+    try:
+        decisions(learned("paper"), [1])
+        assert torch.get_num_threads() == 3
+        assert torch.is_grad_enabled()
+    finally:
+        torch.set_num_threads(before)
+
+
+def test_a_flight_is_recorded():
+    swarm, policy = Swarm(MISSION, [1]), learned()
+    recorder = Recorder(swarm, ego=2, is_broadcast=policy.window(swarm.mission).is_broadcast)
+    for window in rollout(swarm, policy):
+        recorder.add(window)
+    assert len(recorder.log().recipient) == MISSION.num_windows

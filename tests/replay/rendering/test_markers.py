@@ -1,0 +1,55 @@
+"""What is added to a scene for robots and packets."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+from moments import moment
+
+from swarm_mj.replay import palette
+from swarm_mj.replay.arcs import SEGMENTS
+from swarm_mj.replay.rendering.camera import look_at
+from swarm_mj.replay.rendering.markers import Markers
+
+
+def drawn(contents):
+    scene = mujoco.MjvScene(mujoco.MjModel.from_xml_string("<mujoco/>"), 100)
+    scene.ngeom = 0
+    camera = look_at(contents.centre_m, contents.reach_m, 640, 480)
+    Markers(scene, 480).draw(contents, camera)
+    return [scene.geoms[k] for k in range(scene.ngeom)]
+
+
+def test_the_observer_is_the_largest_and_white():
+    discs = drawn(moment([(0.0, 0.0), (100.0, 0.0), (0.0, 100.0)], observer=1))
+    assert np.argmax([disc.size[0] for disc in discs]) == 1
+    assert discs[0].size[0] == discs[2].size[0]
+    np.testing.assert_array_equal(discs[1].rgba, 1.0)
+    np.testing.assert_allclose([disc.pos[:2] for disc in discs], [(0, 0), (100, 0), (0, 100)])
+
+
+def test_a_robot_that_is_cut_off_has_a_flat_red_halo():
+    contents = moment([(0.0, 0.0), (100.0, 0.0)])
+    contents.is_cut_off[1] = True
+    _, robot, halo = drawn(contents)
+    np.testing.assert_allclose(halo.pos[:2], (100, 0))
+    np.testing.assert_allclose(halo.rgba[:3] * 255.0, palette.CUT_OFF)
+    assert halo.size[0] > robot.size[0]
+    assert halo.size[2] < 0.3 * robot.size[2]
+
+
+def test_links_that_surprise_are_drawn_until_there_is_no_room():
+    contents = moment([(0.0, 0.0), (100.0, 0.0)])
+    for num in (3, 500):
+        lines = np.tile([[(0.0, 0.0), (100.0, 0.0)]], (num, 1, 1))
+        colour = np.tile(np.array([[255, 0, 0]], np.uint8), (num, 1))
+        geoms = drawn(replace(contents, strokes_m=lines, stroke_colour=colour))
+        assert len(geoms) == min(2 + num, 100)
+        np.testing.assert_array_equal(geoms[-1].rgba, (1, 0, 0, 1))
+
+
+def test_a_packet_is_an_arc_of_lines_and_a_heading_one_more():
+    contents = moment([(0.0, 0.0), (100.0, 0.0)], [(0, 1)])
+    assert len(drawn(contents)) == 2 + SEGMENTS
+    contents.velocity_mps[0] = (3.0, 0.0)
+    assert len(drawn(contents)) == 3 + SEGMENTS

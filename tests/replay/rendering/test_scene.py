@@ -1,0 +1,163 @@
+"""Pictures of the scene, by what is where in them."""
+
+import numpy as np
+import pytest
+from moments import GREEN, moment
+from mujoco import FatalError
+from mujoco import mjtGeom as MjtGeom
+from scipy import ndimage
+
+from swarm_mj.mission import paper
+from swarm_mj.replay.rendering.opengl import make_context
+from swarm_mj.replay.rendering.scene import SceneRenderer
+
+SIZE = 640, 480
+pytestmark = pytest.mark.usefixtures("opengl")
+
+
+def places(num_robots, half_m, rng):
+    """Robots on a grid, jittered, some of them at the walls: none hides another."""
+    across = int(np.ceil(np.sqrt(num_robots)))
+    grid = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, across)] * 2), axis=-1).reshape(-1, 2)
+    return half_m * grid[rng.permutation(len(grid))[:num_robots]]
+
+
+def is_of(picture, colour):
+    """Pixels of a vivid colour, in light or shade, or behind glass."""
+    high, low = np.argmax(colour), np.argmin(colour)
+    return picture[..., high].astype(int) - picture[..., low] > 45
+
+
+def num_blobs(is_set):
+    """Connected regions; the edge of a glass wall in front divides none."""
+    return ndimage.label(ndimage.binary_dilation(is_set, iterations=2))[1]
+
+
+@pytest.mark.parametrize("num_robots", [2, 10, 40, 100])
+@pytest.mark.parametrize("boundary", ["none", "reflect"])
+def test_a_picture_shows_every_robot_once(num_robots, boundary):
+    mission = paper("random-walk", num_robots=num_robots, boundary=boundary)
+    where = places(num_robots, mission.half_side_m, np.random.default_rng(num_robots))
+    contents = moment(where, reach_m=mission.half_side_m)
+    with SceneRenderer(mission, 960, 720) as renderer:
+        picture = renderer.frame(contents)
+    assert picture.shape == (720, 960, 3)
+    assert num_blobs(is_of(picture, GREEN)) == num_robots - 1
+    assert num_blobs(picture.min(axis=2) > 110) == 1
+
+
+def test_robots_stand_where_the_camera_says():
+    where = [(-480.0, -480.0), (0.0, 0.0), (480.0, 480.0), (300.0, -200.0)]
+    contents = moment(where, observer=3)
+    with SceneRenderer(paper("random-walk", num_robots=4, density_per_km2=4.0), *SIZE) as renderer:
+        picture, camera = renderer.frame(contents), renderer.camera(contents)
+    expected = camera.pixels(np.pad(np.array(where), ((0, 0), (0, 1)), constant_values=6.0))
+    blobs, count = ndimage.label(is_of(picture, GREEN))
+    found = ndimage.center_of_mass(blobs > 0, blobs, range(1, count + 1))
+    seen = sorted((x, y) for y, x in found)
+    np.testing.assert_allclose(seen, sorted(map(tuple, expected[:3])), atol=3.0)
+    y, x = ndimage.center_of_mass(picture.min(axis=2) > 240)
+    np.testing.assert_allclose((x, y), expected[3], atol=5.0)
+
+
+def test_a_link_joins_the_robots_it_leads_from_and_to():
+    """With it, two blobs are one; the third robot stays alone."""
+    where = [(0.0, 400.0), (-300.0, -100.0), (200.0, -250.0), (400.0, 200.0)]
+    mission = paper("random-walk", num_robots=4, density_per_km2=4.0)
+    with SceneRenderer(mission, *SIZE) as renderer:
+        apart = is_of(renderer.frame(moment(where)), GREEN)
+        joined = is_of(renderer.frame(moment(where, [(1, 2)])), GREEN)
+        camera = renderer.camera(moment(where))
+    assert ndimage.label(apart)[1] == 3
+    blobs, count = ndimage.label(joined, structure=np.ones((3, 3)))
+    assert count == 2
+    (x1, y1), (x2, y2), (x3, y3) = camera.pixels(np.pad(np.array(where[1:]), ((0, 0), (0, 1))))
+    at = {blobs[round(y) - 2, round(x)] for x, y in ((x1, y1), (x2, y2))}
+    assert len(at - {0}) == 1
+    assert blobs[round(y3) - 2, round(x3)] not in at | {0}
+
+
+def test_a_heading_points_along_the_velocity():
+    contents = moment([(0.0, -400.0), (0.0, 0.0)])
+    east = np.array([[0.0, 0.0], [2.0, 0.0]])
+    with SceneRenderer(paper(num_robots=2, density_per_km2=2.0), *SIZE) as renderer:
+        still = renderer.frame(contents).astype(int)
+        object.__setattr__(contents, "velocity_mps", east)
+        moving = renderer.frame(contents).astype(int)
+        x, y = renderer.camera(contents).pixels(np.zeros((1, 3)))[0]
+    rows, columns = np.nonzero(np.abs(moving - still).max(axis=2) > 60)
+    assert columns.min() >= x
+    assert columns.max() - x > 3 * np.abs(rows - y).max()
+
+
+def test_the_floor_of_an_open_area_follows_its_team():
+    """Where the team is, the squares are the same after whole pairs of them."""
+    mission = paper(num_robots=2, density_per_km2=2.0)
+    near = moment([(-200.0, 0.0), (200.0, 0.0)])
+    away = np.array([8000.0, -4000.0])
+    far = moment(near.position_m + away)
+    object.__setattr__(far, "centre_m", away)
+    with SceneRenderer(mission, *SIZE) as renderer:
+        pictures = [renderer.frame(contents).astype(int) for contents in (near, far)]
+    assert np.abs(pictures[0] - pictures[1]).mean() < 1.0
+    assert pictures[0][:20].std() > 1.0  # there is floor as far as one sees
+
+
+def test_what_a_scene_of_one_s_own_adds_is_drawn():
+    def with_tower(spec, _mission):
+        spec.worldbody.add_geom(
+            type=MjtGeom.mjGEOM_BOX, pos=[0, 0, 30], size=[60, 60, 30], rgba=[1, 0, 0, 1]
+        )
+
+    def without_floor(spec, _mission):
+        spec.delete(spec.geom("floor"))
+
+    mission = paper(num_robots=2, density_per_km2=2.0)
+    contents = moment([(-300.0, 0.0), (300.0, 0.0)])
+    with SceneRenderer(mission, *SIZE, scene=with_tower) as renderer:
+        is_red = is_of(renderer.frame(contents), (255, 0, 0))
+        x, y = renderer.camera(contents).pixels(np.array([[0.0, 0.0, 30.0]]))[0]
+    assert ndimage.label(is_red)[1] == 1
+    assert is_red[round(y), round(x)]
+    with SceneRenderer(mission, *SIZE, scene=without_floor) as renderer:
+        assert renderer.frame(contents)[:20].std(axis=(0, 1)).max() == 0.0
+
+
+def test_two_renderers_do_not_disturb_each_other():
+    mission = paper("stationary", num_robots=3)
+    contents = moment([(0.0, 0.0), (100.0, 0.0), (0.0, 100.0)], reach_m=mission.half_side_m)
+    with SceneRenderer(mission, 320, 240) as first:
+        alone = first.frame(contents)
+        with SceneRenderer(mission, 64, 64) as second:
+            assert second.frame(contents).shape == (64, 64, 3)
+        np.testing.assert_array_equal(first.frame(contents), alone)
+
+
+def test_wrong_sizes_and_teams_are_named():
+    mission = paper(num_robots=3)
+    with pytest.raises(ValueError, match="height must be from 16 to 4096 pixels, not 5"):
+        SceneRenderer(mission, 640, 5)
+    with (
+        SceneRenderer(mission, 64, 64) as renderer,
+        pytest.raises(ValueError, match="contents must have 3 robots, not 2"),
+    ):
+        renderer.frame(moment([(0.0, 0.0), (1.0, 1.0)]))
+
+
+def test_a_back_end_that_turns_out_not_to_work_is_one_line(monkeypatch):
+    def refuse(*_):
+        raise FatalError("no context")
+
+    made = []
+
+    def noted(width, height):
+        made.append(make_context(width, height))
+        freed = made[-1].free
+        monkeypatch.setattr(made[-1], "free", lambda: (freed(), made.clear()))
+        return made[-1]
+
+    monkeypatch.setattr("swarm_mj.replay.rendering.scene.MjrContext", refuse)
+    monkeypatch.setattr("swarm_mj.replay.rendering.scene.make_context", noted)
+    with pytest.raises(OSError, match=r"does not work here \(FatalError\); rendering needs OpenGL"):
+        SceneRenderer(paper(num_robots=3), 64, 64)
+    assert made == []

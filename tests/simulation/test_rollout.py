@@ -1,0 +1,144 @@
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swarm_mj.mission import paper
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.protocol.costs import Packets, WindowCosts, mean_hops
+from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
+
+ADDRESSED = ("attempted", "delivered", "overheard", "answered")
+BROADCAST = ("sent", "heard", "receptions")
+TRANSMITTED = {"transmitted": [4.0, 2.0]}  # in each window
+
+
+def packets_of(**counts):
+    """Counts of one kind of packets in two missions; those of the other kind are nan."""
+    nothing = {name: [np.nan, np.nan] for name in (*ADDRESSED, *BROADCAST)} | TRANSMITTED
+    return Packets(**{name: np.array(count) for name, count in (nothing | counts).items()})
+
+
+def flown_by_hand(age, variance, is_complete, hops, packets):
+    """One window of two missions; packets: attempted, delivered, overheard, answered."""
+    counts = {name: np.array(count, float) for name, count in zip(ADDRESSED, packets, strict=True)}
+    costs = WindowCosts(
+        age_windows=np.array(age),
+        is_complete=np.array(is_complete),
+        velocity_variance_m2ps2=np.array(variance),
+        packets=packets_of(sent=counts["attempted"], **counts),
+    )
+    return WindowRecord(costs=costs, hops=np.array(hops))
+
+
+THREE_WINDOWS = [
+    flown_by_hand(
+        [1.0, 0.5], [9.0, 4.0], [False, False], [0.0, 1.0], ([3, 1], [1, 0], [2, 0], [1, 0])
+    ),
+    flown_by_hand(
+        [2.0, 1.0], [6.0, 5.0], [True, False], [1.5, 1.0], ([2, 2], [2, 1], [0, 4], [0, 1])
+    ),
+    flown_by_hand(
+        [6.0, 3.0], [0.0, 6.0], [True, False], [3.0, 1.0], ([0, 1], [0, 1], [0, 0], [0, 1])
+    ),
+]
+
+
+def test_summary_by_hand():
+    """Two missions over three windows: means of the costs, totals of the packets."""
+    summary = summarise(THREE_WINDOWS)
+    assert summary.num_windows == 3
+    np.testing.assert_allclose(summary.aoi_mean, [3.0, 1.5])
+    np.testing.assert_allclose(summary.velocity_variance_mean, [5.0, 5.0])
+    np.testing.assert_allclose(summary.velocity_variance_first, [9.0, 4.0])
+    np.testing.assert_allclose(summary.velocity_variance_last, [0.0, 6.0])
+    np.testing.assert_allclose(summary.hops_mean, [1.5, 1.0])
+    np.testing.assert_allclose(summary.packets_sent, [5.0, 4.0])
+    np.testing.assert_allclose(summary.packets_transmitted, [12.0, 6.0])
+    np.testing.assert_allclose(summary.packets_attempted, [5.0, 4.0])
+    np.testing.assert_allclose(summary.packets_delivered, [3.0, 2.0])
+    np.testing.assert_allclose(summary.packets_lost, [2.0, 2.0])
+    np.testing.assert_allclose(summary.packets_overheard, [2.0, 4.0])
+    np.testing.assert_allclose(summary.packets_answered, [1.0, 2.0])
+    assert np.isnan([summary.packets_heard, summary.hearers_per_packet]).all()
+
+
+def test_broadcasts_are_summed_up_by_hand():
+    """7 of 10 packets are heard, by 15 robots; in the second mission none is sent."""
+    counts = [([6.0, 0.0], [4.0, 0.0], [12.0, 0.0]), ([4.0, 0.0], [3.0, 0.0], [3.0, 0.0])]
+    flown = [
+        replace(
+            window,
+            costs=replace(
+                window.costs, packets=packets_of(**dict(zip(BROADCAST, count, strict=True)))
+            ),
+        )
+        for window, count in zip(THREE_WINDOWS[:2], counts, strict=True)
+    ]
+    summary = summarise(flown)
+    np.testing.assert_array_equal(summary.packets_sent, [10.0, 0.0])
+    np.testing.assert_array_equal(summary.packets_heard, [7.0, 0.0])
+    np.testing.assert_array_equal(summary.hearers_per_packet, [1.5, np.nan])
+    for name in (*ADDRESSED, "lost"):
+        assert np.isnan(getattr(summary, f"packets_{name}")).all()
+
+
+@pytest.mark.parametrize(
+    ("first", "expected"), [(0, [2.0, np.nan]), (1, [1.0, np.nan]), (2, [1.0, np.nan])]
+)
+def test_complete_window_is_the_first_or_none(first, expected):
+    """Counted from 1 at the first window given; the second mission never completes."""
+    summary = summarise(THREE_WINDOWS[first:])
+    np.testing.assert_array_equal(summary.complete_window, expected)
+
+
+def test_summary_of_one_window_is_that_window():
+    summary = summarise(THREE_WINDOWS[1:2])
+    assert summary.num_windows == 1
+    np.testing.assert_allclose(summary.aoi_mean, [2.0, 1.0])
+    np.testing.assert_allclose(summary.velocity_variance_first, summary.velocity_variance_last)
+
+
+def test_summary_of_no_windows_is_a_clear_error():
+    with pytest.raises(ValueError, match="at least 1 window"):
+        summarise([])
+
+
+def small_flight(num_windows=12):
+    mission = paper("flocking", num_robots=8, num_windows=num_windows)
+    return Swarm(mission, [3, 4]), make_policy("mst", mission, 0.3)
+
+
+def test_flight_is_the_missions_windows_step_by_step():
+    """The costs are those of the swarm stepped by hand, and the hops those of its buffers."""
+    swarm, policy = small_flight()
+    by_hand = Swarm(swarm.mission, [3, 4])
+    rival = make_policy("mst", swarm.mission, 0.3)
+    by_hand.start(rival)
+    num_flown = 0
+    for window in rollout(swarm, policy):
+        costs = by_hand.step(rival)
+        num_flown += 1
+        np.testing.assert_array_equal(swarm.now, num_flown)
+        np.testing.assert_array_equal(window.costs.age_windows, costs.age_windows)
+        np.testing.assert_array_equal(window.hops, mean_hops(by_hand.buffers))
+    assert num_flown == 12
+
+
+def test_flight_can_be_broken_off():
+    swarm, policy = small_flight()
+    assert len(list(itertools.islice(rollout(swarm, policy), 5))) == 5
+    np.testing.assert_array_equal(swarm.now, 5.0)
+
+
+def test_windows_of_a_flight_keep_their_costs():
+    """What a window cost does not change while the flight goes on."""
+    swarm, policy = small_flight()
+    ages, flown = [], []
+    for window in rollout(swarm, policy):
+        ages.append(window.costs.age_windows.copy())
+        flown.append(window)
+    np.testing.assert_array_equal([window.costs.age_windows for window in flown], ages)
+    np.testing.assert_allclose(summarise(flown).aoi_mean, np.mean(ages, axis=0))

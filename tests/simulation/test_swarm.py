@@ -1,0 +1,631 @@
+import itertools
+from functools import partial
+
+import mujoco
+import numpy as np
+import pytest
+from channels import to_nobody
+
+from swarm_mj.control.motion import initial_velocity
+from swarm_mj.mission import paper, reference
+from swarm_mj.mission.placement import is_connected
+from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy, DecentralisedPolicy
+from swarm_mj.policies.random_flooding import RandomFlooding
+from swarm_mj.policies.registry import POLICIES, make_policy
+from swarm_mj.policies.round_robin import RoundRobin
+from swarm_mj.simulation.swarm import Swarm
+
+TASKS = ["stationary", "random-walk", "flocking"]
+PRESETS = [paper, reference]
+MODES = ["exact", "contact"]
+NUM_WINDOWS = 8
+
+# Every policy under both presets and physics and in all tasks; every kind of mission with several.
+everything = pytest.mark.parametrize(
+    ("name", "task", "preset", "physics"),
+    [
+        (name, TASKS[(place + kind) % 3], preset, physics)
+        for place, name in enumerate(POLICIES)
+        for kind, (preset, physics) in enumerate(itertools.product(PRESETS, MODES))
+    ],
+)
+
+
+def small(task="flocking", preset=paper, **numbers):
+    return preset(task, num_robots=8, velocity_ratio=1.0, **numbers)
+
+
+def course(swarm, policy, num_windows=NUM_WINDOWS):
+    """Everything that can be seen of a mission: arrays with the missions as leading axis."""
+    swarm.start(policy)
+    seen = []
+    for _ in range(num_windows):
+        costs = swarm.step(policy)
+        seen += [swarm.states.position_m, swarm.states.velocity_mps, swarm.now]
+        seen += [array.copy() for array in vars(swarm.buffers).values()]
+        seen += [array for phase in swarm.phases for array in vars(phase).values()]
+        seen += [costs.age_windows, costs.is_complete, costs.velocity_variance_m2ps2]
+        seen += list(vars(costs.packets).values())
+    return seen
+
+
+def assert_same(one, other):
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@everything
+def test_a_seed_is_a_mission(name, task, preset, physics):
+    """The same seeds give the same missions bit by bit, other seeds others, and so do restarts."""
+    mission = small(task, preset, physics=physics)
+    swarm = Swarm(mission, [1, 2])
+    first = course(swarm, make_policy(name, mission))
+    assert_same(first, course(Swarm(mission, [1, 2]), make_policy(name, mission)))
+    others = course(Swarm(mission, [3, 4]), make_policy(name, mission))
+    assert not np.array_equal(first[0], others[0])
+    swarm.restart([3, 4])
+    assert_same(others, course(swarm, make_policy(name, mission)))
+
+
+@everything
+def test_missions_side_by_side_are_the_missions_one_by_one(name, task, preset, physics):
+    mission = small(task, preset, physics=physics)
+    together = course(Swarm(mission, [5, 6, 7]), make_policy(name, mission))
+    for b, seed in enumerate([5, 6, 7]):
+        alone = course(Swarm(mission, [seed]), make_policy(name, mission))
+        assert_same([array[b : b + 1] for array in together], alone)
+
+
+def test_missions_side_by_side_differ():
+    swarm = Swarm(small(), [1, 2, 1])
+    np.testing.assert_array_equal(swarm.states.position_m[0], swarm.states.position_m[2])
+    assert not np.any(swarm.states.position_m[0] == swarm.states.position_m[1])
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("physics", MODES)
+def test_every_policy_meets_the_same_missions(preset, physics):
+    """Common random numbers: equal seeds are equal placements, and equal walks.
+
+    Under flooding the reference preset's robots move twice per window, so every second of its
+    states stands beside the others'.
+    """
+    mission = small("random-walk", preset, physics=physics)
+    paths = []
+    for name in POLICIES:
+        swarm, policy = Swarm(mission, [1, 2]), make_policy(name, mission)
+        moves = 2 if mission.moves_each_transmission and name == "random-flooding" else 1
+        swarm.start(policy)
+        path = [swarm.states.position_m]
+        for _ in range(12 // moves):
+            swarm.step(policy)
+            path.append(swarm.states.position_m)
+        paths.append({k * moves: position_m for k, position_m in enumerate(path)})
+    for path in paths[1:]:
+        for window in path.keys() & paths[0].keys():
+            np.testing.assert_array_equal(path[window], paths[0][window])
+
+
+class Silent(DecentralisedPolicy):
+    """Nobody ever transmits."""
+
+    def start(self, num_robots, rngs):  # noqa: ARG002 - a Policy
+        self.rngs = rngs
+
+    def recipients(self, views):
+        return views.silence.copy()
+
+
+def test_policy_draws_apart_from_placement_and_motion():
+    """Over 400 seeds, their first numbers have nothing to do with each other.
+
+    From one state they would be equal: so the policy's generator is asked for what placement draws
+    first, a uniform number, and for what the walk draws first, a normal one.
+    """
+    num_missions = 400
+    mission = paper(
+        "random-walk", num_robots=2, range_ratio=10.0, velocity_ratio=5.0, boundary="none"
+    )
+    swarm, policy = Swarm(mission, list(range(num_missions))), Silent()
+    placed, start_mps = swarm.states.position_m[:, 0, 0], swarm.states.velocity_mps
+    swarm.start(policy)
+    by_policy = [rng.random() for rng in policy.rngs]
+    swarm.move()
+    walked = (swarm.states.velocity_mps - start_mps)[:, 0, 0]
+    swarm.restart(list(range(num_missions)))
+    swarm.start(policy)
+    by_policy_normal = [rng.standard_normal() for rng in policy.rngs]
+    correlation = np.corrcoef([placed, walked, by_policy, by_policy_normal])
+    assert np.abs(correlation[:2, 2:]).max() < 4 / num_missions**0.5
+
+
+def test_iv_b_start_is_connected_inside_and_known_to_nobody_else():
+    mission = small("random-walk")
+    swarm = Swarm(mission, list(range(10)))
+    for position_m in swarm.states.position_m:
+        assert is_connected(position_m, 250.0)
+        assert np.abs(position_m).max() <= 500.0 * (8 / 40) ** 0.5
+    buffers, own = swarm.buffers, np.arange(8)
+    np.testing.assert_array_equal(buffers.position_m[:, own, own], swarm.states.position_m)
+    np.testing.assert_array_equal(buffers.velocity_mps[:, own, own], swarm.states.velocity_mps)
+    is_other = ~np.eye(8, dtype=bool)
+    assert not np.any(buffers.position_m[:, is_other])
+    assert not np.any(buffers.is_known[:, is_other])
+    np.testing.assert_array_equal(swarm.now, 0.0)
+    assert swarm.phases == ()
+
+
+def test_start_is_known_to_everyone_where_the_mission_grants_it():
+    mission = small("random-walk", known="start")
+    swarm = Swarm(mission, [3, 4])
+    assert np.all(swarm.buffers.is_known)
+    for i in range(8):
+        np.testing.assert_array_equal(swarm.buffers.position_m[:, i], swarm.states.position_m)
+        np.testing.assert_array_equal(swarm.buffers.velocity_mps[:, i], swarm.states.velocity_mps)
+    costs = swarm.step(Silent())
+    assert costs.is_complete.all()
+    assert costs.age_windows.tolist() == [1.0 - 1.0 / 8.0] * 2  # all but oneself is from t = 0
+
+
+class Witness(CentralisedPolicy):
+    """Notes what it is shown, and what the robots know of themselves by then; stays silent."""
+
+    def __init__(self):
+        self.shown = []
+
+    def recipients(self, views, states):
+        own = np.arange(views.num_robots)
+        self.shown.append((states.position_m, views.buffers.position_m[:, own, own], views.now))
+        return views.silence.copy()
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_policy_decides_before_the_robots_move(preset):
+    """In window w it sees the states at the end of window w - 1, and so do the robots."""
+    swarm, witness = Swarm(small("random-walk", preset), [1, 2]), Witness()
+    swarm.start(witness)
+    ends_m = [swarm.states.position_m]
+    for window in range(5):
+        swarm.step(witness)
+        shown_m, believed_m, now = witness.shown[window]
+        np.testing.assert_array_equal(shown_m, ends_m[window])
+        np.testing.assert_array_equal(believed_m, ends_m[window])
+        np.testing.assert_array_equal(now, window)
+        ends_m.append(swarm.states.position_m)
+        assert np.all(ends_m[window] != ends_m[window + 1])
+    own = np.arange(8)
+    np.testing.assert_array_equal(swarm.buffers.position_m[:, own, own], ends_m[-1])
+
+
+SilentTwice = partial(RandomFlooding, 0.0)  # nobody ever transmits, twice per window
+
+
+@pytest.mark.parametrize("physics", MODES)
+@pytest.mark.parametrize(
+    ("preset", "policy", "moves"),
+    [
+        (paper, Silent, 1),
+        (paper, SilentTwice, 1),
+        (reference, Silent, 1),
+        (reference, SilentTwice, 2),
+    ],
+)
+def test_iv_b_flooding_moves_twice_in_the_reference_preset_only(physics, preset, policy, moves):
+    """A flock that hears nothing coasts: 10 windows of 0.1 s at v, or 20 of them."""
+    swarm = Swarm(small(preset=preset, physics=physics), [1, 2])
+    start = swarm.states
+    for _ in range(10):
+        swarm.step(policy())
+    travelled_m = swarm.states.position_m - start.position_m
+    np.testing.assert_allclose(travelled_m, moves * 1.0 * start.velocity_mps, rtol=1e-9)
+    np.testing.assert_array_equal(swarm.now, 10.0)
+
+
+class Script(DecentralisedPolicy):
+    """Reads its decisions off a list."""
+
+    def __init__(self, recipients):
+        self._recipients = iter(recipients)
+
+    def recipients(self, views):  # noqa: ARG002 - a DecentralisedPolicy
+        return next(self._recipients)
+
+
+class ScriptTwice(BroadcastPolicy):
+    """Reads off a list who transmits, twice per window."""
+
+    def __init__(self, transmitters):
+        self._transmitters = iter(transmitters)
+
+    def transmits(self, views):
+        return views.silence == next(self._transmitters)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_exchange_is_a_window_of_a_policy_that_chose_these_recipients(preset):
+    mission = small("random-walk", preset)
+    rng = np.random.default_rng(0)
+    recipients = [rng.integers(0, 8, size=(2, 8)) for _ in range(6)]
+    given, chosen = Swarm(mission, [1, 2]), Swarm(mission, [1, 2])
+    script = Script(recipients)
+    for recipient in recipients:
+        by_hand, by_policy = given.exchange(recipient), chosen.step(script)
+        np.testing.assert_array_equal(by_hand.age_windows, by_policy.age_windows)
+        np.testing.assert_array_equal(given.phases[0].recipient, recipient)
+        assert_same(vars(given.buffers).values(), vars(chosen.buffers).values())
+        np.testing.assert_array_equal(given.states.position_m, chosen.states.position_m)
+
+
+@pytest.mark.parametrize("physics", MODES)
+def test_iv_a_a_flock_can_be_walled_in(physics):
+    """At 20 m/s for 30 s a flock of 450 m by 450 m leaves its area, unless given a boundary."""
+    farthest_m = {}
+    for boundary in ("reflect", "none"):
+        mission = small(physics=physics, boundary=boundary)
+        swarm, policy = Swarm(mission, [1, 2]), make_policy("round-robin", mission)
+        reached_m = [0.0]
+        for _ in range(300):
+            swarm.step(policy)
+            reached_m.append(np.abs(swarm.states.position_m).max())
+        farthest_m[boundary] = max(reached_m)
+    half_side_m = 500.0 * (8 / 40) ** 0.5
+    assert farthest_m["reflect"] <= half_side_m + 0.5  # the radius of a body
+    assert farthest_m["none"] > half_side_m + 50.0
+
+
+def silence_of(num_missions, num_robots):
+    return np.tile(np.arange(num_robots), (num_missions, 1))
+
+
+def test_alg1_exchange_by_hand():
+    """Robot 0 addresses robot 1, alone on the air and within range: both learn of each other.
+
+    The packet leaves at half a window, the answer at a whole one, after the robots moved.
+    """
+    mission = small("random-walk", range_ratio=10.0)
+    swarm = Swarm(mission, [1])
+    recipient = silence_of(1, 8)
+    recipient[0, 0] = 1
+    costs = swarm.exchange(recipient)
+    timestamp = np.diag(np.full(8, 1.0))
+    timestamp[1:, 0] = 0.5  # everyone decoded robot 0's packet,
+    timestamp[[0, *range(2, 8)], 1] = 1.0  # and robot 1's answer
+    np.testing.assert_array_equal(swarm.buffers.timestamp[0], timestamp)
+    np.testing.assert_array_equal(swarm.buffers.position_m[0, 0, 1], swarm.states.position_m[0, 1])
+    assert swarm.buffers.last_attempt[0, 0, 1] == 0.5
+    assert np.count_nonzero(swarm.buffers.last_attempt) == 1
+    assert costs.packets.attempted == costs.packets.delivered == costs.packets.answered == 1
+    assert costs.packets.overheard == 6 + 6
+    assert costs.age_windows[0] == pytest.approx(1.0 - timestamp.mean())
+
+
+def test_iv_c_flooding_by_hand():
+    """Robot 0 sends, then robot 1: the second packet passes the first one's news on, unanswered."""
+    mission = small("random-walk", range_ratio=10.0)
+    swarm = Swarm(mission, [1])
+    costs = swarm.step(ScriptTwice([0, 1]))
+    timestamp = np.diag(np.full(8, 1.0))
+    timestamp[1:, 0] = 0.5
+    timestamp[[0, *range(2, 8)], 1] = 1.0
+    np.testing.assert_array_equal(swarm.buffers.timestamp[0], timestamp)
+    assert not np.any(swarm.buffers.last_attempt)  # a broadcast has no addressee
+    assert costs.packets.sent == costs.packets.heard == 2
+    assert costs.packets.receptions == 7 + 7
+
+
+@pytest.mark.parametrize(("preset", "own_attempt"), [(paper, 0.0), (reference, 0.5)])
+def test_eq7_silence_is_an_attempt_in_the_reference_preset_only(preset, own_attempt):
+    swarm = Swarm(small(preset=preset), [1])
+    swarm.exchange(silence_of(1, 8))
+    np.testing.assert_array_equal(swarm.buffers.last_attempt[0], np.eye(8) * own_attempt)
+    swarm.step(SilentTwice())
+    expected = np.eye(8) * (2.0 if own_attempt else 0.0)
+    np.testing.assert_array_equal(swarm.buffers.last_attempt[0], expected)
+
+
+def test_eq6_channel_is_exchangeable():
+    """Everyone decodes robot 5 and nobody else, wherever they are: the swarm believes it."""
+
+    def only_robot_5(position_m, recipient):
+        assert position_m.shape == (*recipient.shape, 2)
+        return np.where(recipient[:, 5:6] != 5, 5, np.arange(8))
+
+    swarm = Swarm(small(), [1, 2], channel=only_robot_5)
+    swarm.exchange(np.roll(silence_of(2, 8), 1, axis=1))
+    assert np.all(swarm.buffers.timestamp[:, np.arange(8) != 5, 5] == 0.5)
+    is_own_or_5 = np.eye(8, dtype=bool) | (np.arange(8) == 5)
+    np.testing.assert_array_equal(swarm.buffers.is_known, np.stack([is_own_or_5] * 2))
+
+
+@pytest.mark.parametrize("seeds", [[], [-1], [3, -1]])
+def test_bad_seeds_are_a_clear_error(seeds):
+    with pytest.raises(ValueError, match="seeds must be one or more integers from 0"):
+        Swarm(small(), seeds)
+
+
+def test_more_seeds_than_missions_are_an_error():
+    swarm = Swarm(small(), [1, 2])
+    with pytest.raises(ValueError, match="3"):
+        swarm.restart([1, 2, 3])
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_eq16_a_robot_does_not_react_to_one_it_has_not_heard(preset, monkeypatch):
+    """Two flocks that differ in robot 7's velocity alone, and nobody hears robot 7."""
+
+    def all_but_7_hear_0(position_m, recipient):
+        heard = to_nobody(position_m, recipient)
+        heard[:, 1:7] = np.where(recipient[:, :1] != 0, 0, heard[:, 1:7])
+        return heard
+
+    def with_a_slower_robot_7(mission, rng):
+        velocity_mps = initial_velocity(mission, rng)
+        velocity_mps[7] /= 2.0
+        return velocity_mps
+
+    ends = []
+    for start_of in (initial_velocity, with_a_slower_robot_7):
+        monkeypatch.setattr("swarm_mj.simulation.swarm.initial_velocity", start_of)
+        swarm = Swarm(small(preset=preset), [1, 2], channel=all_but_7_hear_0)
+        start_mps = swarm.states.velocity_mps
+        for _ in range(NUM_WINDOWS):
+            recipient = silence_of(2, 8).copy()
+            recipient[:, 0] = 1
+            swarm.exchange(recipient)
+        ends.append(swarm.states.velocity_mps)
+    assert np.all(start_mps[:, 1:7] != ends[0][:, 1:7])  # they did react to robot 0
+    np.testing.assert_array_equal(ends[0][:, :7], ends[1][:, :7])
+    assert np.all(ends[0][:, 7] != ends[1][:, 7])
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("name", POLICIES)
+def test_ages_never_shrink_without_a_packet(name, preset):
+    """Laws along a mission: no age is negative, and old news stays old until a packet decodes."""
+    mission = small("random-walk", preset)
+    swarm, policy = Swarm(mission, [1, 2]), make_policy(name, mission)
+    swarm.start(policy)
+    is_other = ~np.eye(8, dtype=bool)
+    num_learnt = num_deaf = 0
+    for _ in range(60):
+        before = swarm.buffers.timestamp.copy()
+        swarm.step(policy)
+        timestamp = swarm.buffers.timestamp
+        assert np.all(timestamp <= swarm.now[:, None, None])
+        assert np.all(timestamp >= before)
+        np.testing.assert_array_equal(timestamp[:, ~is_other], swarm.now[:, None].repeat(8, axis=1))
+        has_decoded = np.any([p.heard != silence_of(2, 8) for p in swarm.phases], axis=0)
+        has_news = np.any((timestamp > before) & is_other, axis=2)
+        assert not np.any(has_news & ~has_decoded)
+        num_learnt += np.sum(has_news)
+        num_deaf += np.sum(~has_decoded)
+    assert num_learnt > 10
+    assert num_deaf > 0
+
+
+@pytest.mark.parametrize(
+    ("name", "task"), [*((name, "random-walk") for name in POLICIES), ("mst", "flocking")]
+)
+def test_eq5_eq8_what_a_robot_knows_was_true_when_observed(name, task):
+    """However many hops it took: M^{i,j} is j's true state in the window of its timestamp."""
+    mission = small(task)
+    swarm, policy = Swarm(mission, [1, 2]), make_policy(name, mission)
+    swarm.start(policy)
+    path_m, path_mps = [swarm.states.position_m], [swarm.states.velocity_mps]
+    for _ in range(60):
+        swarm.step(policy)
+        path_m.append(swarm.states.position_m)
+        path_mps.append(swarm.states.velocity_mps)
+    observed_in = np.ceil(swarm.buffers.timestamp).astype(int)  # both phases of window w end it
+    checked = 0
+    for b, i, j in zip(*np.nonzero(swarm.buffers.is_known), strict=True):
+        w = observed_in[b, i, j]
+        np.testing.assert_array_equal(swarm.buffers.position_m[b, i, j], path_m[w][b, j])
+        np.testing.assert_array_equal(swarm.buffers.velocity_mps[b, i, j], path_mps[w][b, j])
+        checked += i != j
+    assert checked > 20
+
+
+@pytest.mark.parametrize("policy", [RandomFlooding(0.2), RoundRobin()])
+def test_costs_are_of_the_end_of_the_window(policy):
+    """Eq. 10 and Eq. 17 from the swarm's own arrays, in plain loops."""
+    swarm = Swarm(small("random-walk"), [1, 2])
+    swarm.start(policy)
+    for _ in range(10):
+        costs = swarm.step(policy)
+    for b in range(2):
+        ages = [swarm.now[b] - t for row in swarm.buffers.timestamp[b] for t in row]
+        assert costs.age_windows[b] == pytest.approx(sum(ages) / 64)
+        velocity_mps = swarm.states.velocity_mps[b]
+        spread = [np.sum((v - velocity_mps.mean(axis=0)) ** 2) for v in velocity_mps]
+        assert costs.velocity_variance_m2ps2[b] == pytest.approx(sum(spread) / 8)
+
+
+class Watchful(BroadcastPolicy):
+    """Everyone transmits, and keeps what it saw of its own age and of the last phases."""
+
+    def __init__(self):
+        self.own_age, self.num_phases = [], []
+
+    def transmits(self, views):
+        robots = np.arange(views.num_robots)
+        self.own_age.append(views.now[:, None] - views.buffers.timestamp[:, robots, robots])
+        self.num_phases.append(len(views.phases))
+        return np.ones_like(views.silence, dtype=bool)
+
+
+def test_the_clock_and_the_last_phase_are_current_at_each_half_of_flooding():
+    policy = Watchful()
+    swarm = Swarm(paper("random-walk", num_robots=5, range_ratio=1.0), [1])
+    for _ in range(3):
+        swarm.step(policy)
+    np.testing.assert_array_equal(policy.own_age, 0.0)
+    assert policy.num_phases == [0, 1, 2, 1, 2, 1]
+
+
+class Meddles(CentralisedPolicy):
+    """Writes into everything that it gets; so do the two below."""
+
+    def recipients(self, views, states):
+        views.now[:] = 1000.0
+        for phase in views.phases:
+            phase.heard[:] = 0
+        spoil(states)
+        return np.roll(views.silence, 1, axis=1)
+
+
+def spoil(states):
+    states.position_m[:] = states.velocity_mps[:] = 7.0
+    if states.is_active is not None:
+        states.is_active[:] = True
+
+
+class Pulls:
+    cost_name, cost_unit = "nothing", "m"
+
+    def __init__(self, *, meddles):
+        self.meddles = meddles
+
+    def __call__(self, _buffers, states):
+        wanted = -states.position_m
+        self.spoil(states)
+        return wanted
+
+    def cost(self, states):
+        self.spoil(states)
+        return np.zeros(len(states.position_m))
+
+    def spoil(self, states):
+        if self.meddles:
+            spoil(states)
+
+
+class Asks(CentralisedPolicy):
+    """Chooses as `Meddles` does."""
+
+    def recipients(self, views, _states):
+        return np.roll(views.silence, 1, axis=1)
+
+
+def hears_nothing_and_writes(position_m, recipient):
+    position_m[:] = 0.0
+    return to_nobody(position_m, recipient)
+
+
+def test_parts_of_ones_own_cannot_move_what_they_are_shown():
+    mission = small(switched_off=0.3, num_windows=NUM_WINDOWS)
+    honest = Swarm(mission, [1, 2], channel=to_nobody, controller=Pulls(meddles=False))
+    channel, controller = hears_nothing_and_writes, Pulls(meddles=True)
+    meddled = Swarm(mission, [1, 2], channel=channel, controller=controller)
+    assert_same(course(honest, Asks()), course(meddled, Meddles()))
+
+
+@pytest.mark.parametrize(
+    ("answer", "complaint"),
+    [
+        (np.ones((1, 8)), r"transmits of Says must be True or False .* \(1, 8\), .* not float64"),
+        (np.ones(8, dtype=bool), r"transmits of Says must .* not bool of shape \(8,\)"),
+        (-1, r"transmits of Says must .* not int64 of shape \(\)"),
+    ],
+)
+def test_who_transmits_is_told_by_one_truth_value_a_robot(answer, complaint):
+    class Says(BroadcastPolicy):
+        def transmits(self, _views):
+            return answer
+
+    with pytest.raises(ValueError, match=complaint):
+        Swarm(small(), [1]).step(Says())
+
+
+def test_a_cost_needs_a_name_and_a_unit():
+    class Nameless:
+        def __call__(self, _buffers, states):
+            return np.zeros_like(states.velocity_mps)
+
+        def cost(self, states):
+            return np.zeros(len(states.position_m))
+
+    with pytest.raises(TypeError, match="set its cost_name and cost_unit"):
+        Swarm(paper(num_robots=3), [1], controller=Nameless())
+
+
+@pytest.mark.parametrize(
+    ("part", "said"),
+    [
+        ({"controller": lambda states: states}, r"a controller is called with \(buffers, states\)"),
+        (
+            {"channel": lambda: 0},
+            r"a channel is called with \(position_m, recipient\), but .* \(\)",
+        ),
+        ({"scene": lambda _spec: None}, r"a scene is called with \(spec, mission\)"),
+    ],
+)
+def test_parts_that_take_other_arguments_are_refused_before_the_flight(part, said):
+    with pytest.raises(TypeError, match=said):
+        Swarm(paper(num_robots=3), [1], **part)
+
+
+def test_a_scene_that_mujoco_does_not_take_is_told_in_one_line():
+    def flat(spec, _mission):
+        spec.worldbody.add_geom(name="wall", type=mujoco.mjtGeom.mjGEOM_BOX, size=[1, 1, 0])
+
+    with pytest.raises(ValueError, match=r"the scene does not compile: .*size 2 .*wall") as told:
+        Swarm(paper(num_robots=3), [1], scene=flat)
+    assert "\n" not in str(told.value)
+
+
+def test_robots_that_collide_start_apart():
+    """40 robots on 63 m by 63 m: of teams drawn at random, nearly half have two that overlap."""
+    mission = paper("random-walk", collide=True, density_per_km2=10_000.0)
+    for position_m in Swarm(mission, range(20)).states.position_m:
+        apart_m = np.linalg.norm(position_m[:, None] - position_m, axis=-1)
+        assert np.min(apart_m[np.triu_indices(40, 1)]) >= 1.0
+
+
+class Told(Silent):
+    """Notes what it is told of the channel, and whether it had begun."""
+
+    def __init__(self):
+        self.told = []
+
+    def inform(self, belief):
+        self.told.append((belief, hasattr(self, "rngs")))
+
+
+class ToldTheTruth(Witness):
+    def __init__(self):
+        super().__init__()
+        self.told = []
+
+    def inform(self, truth):
+        self.told.append(truth)
+
+
+def wall_across(spec, mission):
+    """An obstacle of the user's own."""
+    half_m = mission.half_side_m
+    spec.worldbody.add_geom(type=6, pos=[0, 0, 5], size=[1, half_m / 2, 5], group=1)
+
+
+@pytest.mark.parametrize(("known", "has_law"), [("nothing", False), ("map", True)])
+def test_policies_are_told_of_the_channel_by_their_kind_before_they_start(known, has_law):
+    """The scene's own wall is on the map."""
+    swarm = Swarm(small("stationary", known=known, physics="contact"), [1], scene=wall_across)
+    policy, centre = Told(), ToldTheTruth()
+    swarm.step(policy)
+    ((belief, has_begun),) = policy.told
+    assert belief is swarm.belief
+    assert (belief.law is not None) == has_law
+    assert not has_begun
+    swarm.step(centre)
+    (truth,) = centre.told
+    assert truth.channel is swarm.channel
+
+
+def test_of_a_channel_of_ones_own_nobody_is_told():
+    channel, centre = to_nobody, ToldTheTruth()
+    swarm = Swarm(small("stationary"), [1], channel=channel)
+    swarm.step(centre)
+    (truth,) = centre.told
+    assert truth.channel is None
+    assert swarm.belief.law is None

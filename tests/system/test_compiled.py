@@ -1,0 +1,125 @@
+"""The cache of compiled functions, in a small package of its own."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import swarm_mj.system.compiled
+
+PHYSICS = """
+from swarm_mj.system.compiled import compiled
+
+HALF = 0.5
+
+
+@compiled()
+def scaled(x: float) -> float:
+    return {factor} * x
+"""
+LOOP = """
+from swarm_mj.system.compiled import compiled
+from swarm_mj.physics import HALF, scaled
+
+
+@compiled(fastmath=True)
+def total(n: int) -> float:
+    return HALF * n + scaled(1.0)
+"""
+RUN = """
+from swarm_mj.loop import total
+print(total(4), sum(total.stats.cache_hits.values()), total.stats.cache_path)
+"""
+ASSUME = """
+from swarm_mj.loop import total
+from swarm_mj.physics import scaled
+total(4)
+print(*(" fast " in str(function.inspect_llvm()) for function in (total, scaled)))
+"""
+
+
+class Checkout:
+    """A package of two modules, of which one calls the other."""
+
+    def __init__(self, root):
+        self.root = root
+        self.package = root / "swarm_mj"
+        self.package.mkdir()
+        shutil.copy(swarm_mj.system.compiled.__file__, self.package)
+        (self.package / "__init__.py").touch()
+        (self.package / "loop.py").write_text(LOOP)
+        self.write(factor=2.0)
+
+    def write(self, factor, half=0.5):
+        """New physics."""
+        source = PHYSICS.format(factor=factor).replace("HALF = 0.5", f"HALF = {half}")
+        (self.package / "physics.py").write_text(source)
+
+    def python(self, code, **environment):
+        """What a new process prints."""
+        plain = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            cwd=self.root,
+            env={**plain, "PYTHONPATH": str(self.root), **environment},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return done.stdout.strip()
+
+    def run(self, **environment):
+        """What a new process makes of it, whether from the cache, and where that lies."""
+        value, num_hits, path = self.python(RUN, **environment).split()
+        return float(value), num_hits == "1", path
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    return Checkout(tmp_path)
+
+
+def files_of(folder):
+    return sorted(path.name for path in Path(folder).glob("*.nb*"))
+
+
+def test_functions_are_compiled_anew_when_what_they_call_changes(checkout):
+    """In another file: a function, and a constant. The old cache is overwritten."""
+    beside = str(checkout.package / "__pycache__")
+    assert checkout.run() == (4.0, False, beside)
+    before = files_of(beside)
+    (checkout.package / "unrelated.py").write_text("NAME = 'fly'\n")
+    assert checkout.run() == (4.0, True, beside)
+    checkout.write(factor=3.0)
+    assert checkout.run() == (5.0, False, beside)
+    checkout.write(factor=3.0, half=1.5)
+    assert checkout.run() == (9.0, False, beside)
+    assert files_of(beside) == before
+
+
+def test_a_folder_given_holds_the_cache(checkout, tmp_path):
+    value, _, path = checkout.run(NUMBA_CACHE_DIR=str(tmp_path / "given"))
+    assert value == 4.0
+    assert Path(path).parent == tmp_path / "given"
+    assert files_of(path)
+    assert not files_of(checkout.package / "__pycache__")
+
+
+def test_an_installation_that_cannot_be_written_uses_the_user_s_folder_or_none(checkout, tmp_path):
+    """A file where the folder should be cannot be written to by anyone."""
+    shutil.rmtree(checkout.package / "__pycache__", ignore_errors=True)
+    (checkout.package / "__pycache__").touch()
+    home = str(tmp_path / "home")
+    value, _, path = checkout.run(XDG_CACHE_HOME=home, HOME=home)
+    assert value == 4.0
+    assert path.startswith(home)
+    nowhere = str(checkout.package / "__init__.py")
+    assert checkout.run(XDG_CACHE_HOME=nowhere, HOME=nowhere) == (4.0, False, "None")
+
+
+def test_assumptions_on_floats_are_never_those_of_the_caller(checkout):
+    """The loop lets its sums be reordered; nobody said so of the function that it calls."""
+    assert checkout.python(ASSUME) == "True False"

@@ -1,0 +1,157 @@
+"""What every robot remembers of the others: what they know, and how well it hears them.
+
+Whoever decodes a packet knows all that its sender knew. What the sender learns from then on can be
+reckoned from who is believed to transmit. Index order: `[b, i, j]` is what robot `i` of mission `b`
+believes of robot `j`. Times are ticks: a slot's tick is its number, counted from 1.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int, Int32
+
+from residual_gnn.reckoning import NOBODY, Reckoned, decoded_by, reckon, room_for
+from swarm_mj.radio.power_law import PowerLaw, write_powers
+from swarm_mj.system.compiled import compiled
+
+RECENT = 0.15  # the weight of the last packet in a share of packets
+FIRST_SHARE = 0.8  # before there was one
+
+
+class Beliefs(NamedTuple):
+    """Of all robots of B missions."""
+
+    held: Int32[np.ndarray, "B N N N"]  # [b, i, j, k]: when k observed what j knows of k, or 0
+    decoded: Int32[np.ndarray, "B N N"]  # when i last decoded a packet of j, or 0
+    sent: Int32[np.ndarray, "B N"]  # when i last transmitted, or 0
+    heard: Int32[np.ndarray, "B N"]  # when i last decoded anything, or 0
+    hears: Float32[np.ndarray, "B N N"]  # share of j's packets, lately, that i decoded when due
+    heard_by: Float32[np.ndarray, "B N N"]  # and of i's that j knew of when i heard it next
+    from_afar: Float32[np.ndarray, "B N"]  # share of packets it decoded, lately, from out of range
+
+
+def no_beliefs(num_missions: int, num_robots: int) -> Beliefs:
+    """Of robots that have heard nothing."""
+    pairs = (num_missions, num_robots, num_robots)
+    return Beliefs(
+        held=np.zeros((*pairs, num_robots), dtype=np.int32),
+        decoded=np.zeros(pairs, dtype=np.int32),
+        sent=np.zeros(pairs[:2], dtype=np.int32),
+        heard=np.zeros(pairs[:2], dtype=np.int32),
+        hears=np.full(pairs, FIRST_SHARE, dtype=np.float32),
+        heard_by=np.full(pairs, FIRST_SHARE, dtype=np.float32),
+        from_afar=np.zeros(pairs[:2], dtype=np.float32),
+    )
+
+
+@compiled()
+def note_slot(
+    beliefs: Beliefs,
+    tick: Int[np.ndarray, "B"],
+    observed: Int32[np.ndarray, "B N N"],
+    is_known: Bool[np.ndarray, "B N N"],
+    position_m: Float[np.ndarray, "B N N 2"],
+    is_due: Bool[np.ndarray, "B N N"],
+    transmitted: Bool[np.ndarray, "B N"],
+    heard: Int[np.ndarray, "B N"],
+    law: PowerLaw,
+    threshold: float,
+) -> None:
+    """Takes note of a slot that has passed.
+
+    Args:
+        beliefs: Written in place.
+        tick: The slot's.
+        observed: T of everyone after it, in ticks; of a sender, what its packet said.
+        is_known: Whom each robot has heard of.
+        position_m: Where each robot believes the others to be [m].
+        is_due: Who each robot believed would transmit in it, by the rule.
+        transmitted: Who did.
+        heard: Whom each robot decoded; itself is nobody.
+        law: Of the powers that are believed in [noise].
+        threshold: Least SINR that decodes, linear [1].
+    """
+    num_missions, num_robots = transmitted.shape
+    reckoned, believed = room_for(num_robots), np.zeros(num_robots, dtype=np.bool_)
+    for b in range(num_missions):
+        for i in range(num_robots):
+            sender = int(heard[b, i]) if heard[b, i] != i else NOBODY
+            for o in range(num_robots):
+                believed[o] = o != i and is_due[b, i, o] and is_known[b, i, o]
+            if not transmitted[b, i]:
+                reckon(believed, position_m[b, i], law, reckoned)
+                _judge(beliefs.hears[b, i], decoded_by(i, reckoned, 0.0, threshold), sender)
+            if sender != NOBODY:
+                _read_packet(beliefs, b, i, sender, int(tick[b]), observed[b, sender])
+                believed[sender] = True
+            believed[i] = transmitted[b, i]
+            reckon(believed, position_m[b, i], law, reckoned)
+            write_powers(i, position_m[b, i], law, reckoned.power)
+            _pass_on(
+                i,
+                sender,
+                beliefs.held[b, i],
+                observed[b, i],
+                is_known[b, i],
+                believed,
+                threshold,
+                reckoned,
+            )
+            if sender != NOBODY:  # links are alike in both directions, as far as i knows
+                is_far = is_known[b, i, sender] and reckoned.power[sender] < threshold
+                _count(beliefs.from_afar[b], i, is_far)
+            if transmitted[b, i]:
+                beliefs.sent[b, i] = tick[b]
+
+
+@compiled()
+def _count(share: Float32[np.ndarray, "N"], place: int, is_so: bool) -> None:
+    """Moves a share towards what was so the last time."""
+    share[place] += RECENT * ((1.0 if is_so else 0.0) - share[place])
+
+
+@compiled()
+def _judge(share: Float32[np.ndarray, "N"], due: int, sender: int) -> None:
+    """Counts whether the packet was decoded that should have been, if any."""
+    if due != NOBODY:
+        _count(share, due, sender == due)
+
+
+@compiled()
+def _read_packet(
+    beliefs: Beliefs, b: int, i: int, sender: int, now: int, told: Int32[np.ndarray, "N"]
+) -> None:
+    """Takes over what i decoded: all that the sender knows, and whether it knew of i's last one."""
+    last = beliefs.sent[b, i]
+    if last > 0 and beliefs.decoded[b, i, sender] < last:
+        _count(beliefs.heard_by[b, i], sender, told[i] >= last)
+    beliefs.held[b, i, sender] = told
+    beliefs.decoded[b, i, sender], beliefs.heard[b, i] = now, now
+
+
+@compiled()
+def _pass_on(
+    i: int,
+    sender: int,
+    held: Int32[np.ndarray, "N N"],
+    observed: Int32[np.ndarray, "N"],
+    is_known: Bool[np.ndarray, "N"],
+    transmits: Bool[np.ndarray, "N"],
+    threshold: float,
+    reckoned: Reckoned,
+) -> None:
+    """Neighbours that should have decoded a packet now know what its sender is believed to know.
+
+    Of a sender that i did not decode itself, that is what i last believed: not that it has just
+    observed itself.
+    """
+    for j in range(held.shape[0]):
+        is_near = is_known[j] and reckoned.power[j] >= threshold
+        if transmits[j] or not is_near or j in (i, sender):
+            continue
+        o = decoded_by(j, reckoned, 0.0, threshold)
+        if o == NOBODY:
+            continue
+        told = observed if o == i else held[o]
+        for k in range(held.shape[1]):
+            held[j, k] = max(held[j, k], told[k])

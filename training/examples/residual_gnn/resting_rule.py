@@ -1,0 +1,77 @@
+"""The rule of teams at rest: one plan from positions and the clock (`planner/standing_plan.py`)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Int16
+
+from residual_gnn.proposals import FARTHEST, Proposal, turns
+from swarm_mj.policies.planner.settings import PlannerSettings
+from swarm_mj.policies.planner.standing_plan import StandingPlan
+from swarm_mj.policies.tdma import draw_order, slot_of
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.radio.free_space import FreeSpaceRadio
+from swarm_mj.radio.link_models import Belief
+
+MOST_PLANS = 512  # that are kept for positions that come again
+
+
+class RestingRule:
+    """Whoever has heard of everyone follows the plan that all such robots share; others take turns.
+
+    It is `planner --payload none` in a team at rest. Plans are kept for positions that come again.
+    """
+
+    uses = (
+        "its buffer, T in packets, a common order, the clock and the radio: it follows the plan of "
+        "planner --payload none"
+    )
+
+    def __init__(self, radio: FreeSpaceRadio) -> None:
+        """Prepares the rule; robots believe in the radio unless it is informed otherwise."""
+        self._belief = Belief(radio=radio)
+        self._plans: dict[bytes, StandingPlan] = {}
+
+    def inform(self, belief: Belief) -> None:
+        """Plans by this belief from now on."""
+        are_plain = _is_free_space(belief) and _is_free_space(self._belief)
+        if not (are_plain and belief.radio == self._belief.radio):
+            self._plans = {}
+        self._belief = belief
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Draws each mission's order of turns; arguments as in `Policy.start`."""
+        self._order = draw_order(num_robots, rngs)
+        if len(self._plans) > MOST_PLANS:
+            self._plans = {}
+
+    def propose(self, views: LocalViews) -> Proposal:
+        """The plan's choice, or the turns'."""
+        buffers, slot = views.buffers, slot_of(views.now)
+        knows_motion = np.any(buffers.velocity_mps, axis=(2, 3))
+        knows_all = np.all(buffers.is_known, axis=2) & ~knows_motion
+        is_due, due_in = turns(self._order, slot)
+        for b in np.flatnonzero(np.any(knows_all, axis=1)).tolist():
+            # Robots at rest believe the same positions as soon as they know them all.
+            members: dict[bytes, list[int]] = {}
+            for i in np.flatnonzero(knows_all[b]).tolist():
+                members.setdefault(buffers.position_m[b, i].tobytes(), []).append(i)
+            for key, robots in members.items():
+                if key not in self._plans:
+                    links = self._belief.links(buffers.position_m[b, robots[0]])
+                    self._plans[key] = StandingPlan(links, PlannerSettings())
+                is_due[b, robots], due_in[b, robots] = _told(self._plans[key], int(slot[b]))
+        return Proposal(is_due, due_in, knows_all)
+
+
+def _told(plan: StandingPlan, slot: int) -> tuple[Bool[np.ndarray, "N"], Int16[np.ndarray, "N"]]:
+    """Who transmits by the plan, and in how many slots next."""
+    ahead = plan.ahead(slot, 1 + FARTHEST)
+    later = ahead[1:]
+    due_in = np.where(np.any(later, axis=0), 1 + np.argmax(later, axis=0), len(ahead))
+    return ahead[0], due_in.astype(np.int16)
+
+
+def _is_free_space(belief: Belief) -> bool:
+    """Whether nothing is believed of the channel but its radio."""
+    return belief.law is None and belief.reception is None and belief.shadowing_db == 0.0
