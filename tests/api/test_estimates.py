@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from swarm_mj.api import estimates
 from swarm_mj.api.estimates import (
     Needs,
     check_fits,
@@ -14,7 +15,6 @@ from swarm_mj.api.estimates import (
     training_needs,
     video_needs,
 )
-from swarm_mj.cli import estimates
 from swarm_mj.evaluation.study import Study
 from swarm_mj.learning.run_folder import Limits
 from swarm_mj.learning.settings import usual_settings

@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import pytest
 
 import swarm_mj
+from swarm_mj.api import flight
 from swarm_mj.api import fly as module
-from swarm_mj.cli import flight, main
+from swarm_mj.cli import main
 from swarm_mj.mission import paper
 from swarm_mj.policies.policy import DecentralisedPolicy
 

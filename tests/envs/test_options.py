@@ -55,7 +55,9 @@ def test_own_features_name_all_their_numbers(here, monkeypatch):
 
 
 def test_features_are_no_class():
-    with pytest.raises(TypeError, match=r'features="swarm_mj\.gnn\.graphs:PaperFeatures"'):
+    with pytest.raises(
+        TypeError, match=r'features="swarm_mj\.policies\.gnn\.graphs:PaperFeatures"'
+    ):
         check_features_named(PaperFeatures)
     check_features_named("swarm_mj.policies.gnn.graphs:PaperFeatures")
 

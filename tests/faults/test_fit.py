@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 from tries import tries
 
-from swarm_mj.cli import estimates, evaluate, flight, main
+from swarm_mj.api import estimates, flight
+from swarm_mj.cli import evaluate, main
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.replay.read import check_replay
 from swarm_mj.replay.recorder import Recorder

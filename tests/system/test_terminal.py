@@ -6,7 +6,7 @@ import sys
 import pytest
 from rich.console import Console
 
-from swarm_mj.cli import terminal
+from swarm_mj.system import terminal
 from swarm_mj.system.terminal import named_values, plain_console, this_command
 
 
