@@ -97,7 +97,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - any of the names
-    """A name of `__all__`, or the version, when it is first asked for."""
+    """Return a name of `__all__`, or the version, when it is first asked for."""
     if name == "__version__":
         return import_module("swarm_mj.system.provenance").version()
     for home, names in _HOMES.items():

@@ -76,7 +76,7 @@ def run(options: Options) -> int:
 
 
 def themed(figure: Figure) -> str:
-    """A figure as SVG whose colours follow the page's theme."""
+    """Return a figure as SVG whose colours follow the page's theme."""
     drawn = io.StringIO()
     figure.savefig(drawn, format="svg", metadata={"Date": None})
     plt.close(figure)
@@ -118,7 +118,7 @@ def _arrow(
 
 
 def _canvas(width: float, height: float) -> tuple[Figure, Axes]:
-    """An empty drawing, one unit to the inch."""
+    """Return an empty drawing, one unit to the inch."""
     figure = plt.figure(figsize=(width, height))
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, width), ylim=(0, height), aspect="equal")
@@ -147,7 +147,7 @@ def draw_loop() -> Figure:
 
 
 def draw_window() -> Figure:
-    """The two protocols, slot by slot."""
+    """Return the two protocols, slot by slot."""
     figure, axes = _canvas(8.0, 3.5)
     for left, title in ((0.2, "Request and response"), (4.2, "Two broadcasts")):
         axes.text(left + 0.55, 3.25, title, weight="bold", va="center")
@@ -248,7 +248,7 @@ def _ages() -> tuple[Float[np.ndarray, "W N"], Int[np.ndarray, "N"]]:
 
 
 def draw_buffer() -> Figure:
-    """A team of four, and what r0's buffer says about it."""
+    """Return a team of four, and what r0's buffer says about it."""
     figure, axes = _canvas(8.0, 3.0)
     places = {"r0": (0.6, 1.0), "r1": (1.6, 1.9), "r2": (2.7, 1.3), "r3": (1.85, 0.5)}
     for start, end, colour in (("r2", "r1", ORANGE), ("r1", "r0", BLUE), ("r3", "r0", BLUE)):

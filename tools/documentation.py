@@ -31,7 +31,7 @@ MAP_LINE = re.compile(r"^    (I\S+)\s+(Eq\. \d+|Alg\. \d+)?\s+(\S.*?)\s{2,}(\S+)
 
 
 def on_files(files: Files, *, config: MkDocsConfig) -> Files:
-    """Adds what stands elsewhere, and turns links between files into links of the site.
+    """Add what stands elsewhere, and turns links between files into links of the site.
 
     Args:
         files: Those of `docs/`.
@@ -65,7 +65,7 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
 
 
 def mission_fields() -> str:
-    """The fields of `Mission` as a table."""
+    """Return the fields of `Mission` as a table."""
     rows = ["| field | default | what it is | allowed | source |", "|---|---|---|---|---|"]
     for spec in fields(Mission):
         known = spec.metadata
@@ -81,7 +81,7 @@ def mission_fields() -> str:
 
 
 def _put(files: Files, file: File) -> None:
-    """Adds a file in the place of its namesake."""
+    """Add a file in the place of its namesake."""
     present = files.get_file_from_path(file.src_uri)
     if present is not None:
         files.remove(present)
@@ -98,7 +98,7 @@ def place_of(path: str) -> str:
 
 
 def site_links(text: str, source: str, page: str) -> tuple[str, set[str]]:
-    """A page with links of the site, and the files outside `docs/` that it links to.
+    """Return a page with links of the site, and the files outside `docs/` that it links to.
 
     Args:
         text: The page, in Markdown.
@@ -142,12 +142,12 @@ def paper_map() -> str:
 
 
 def names_of(page: str) -> list[str]:
-    """The names that a page explains from their docstrings."""
+    """Return the names that a page explains from their docstrings."""
     return re.findall(r"^::: (\S+)$", page, re.MULTILINE)
 
 
 def home_of(name: str) -> str:
-    """A name by the module in which it is defined, where `swarm_mj` itself has it, too."""
+    """Return a name by the module in which it is defined, where `swarm_mj` itself has it, too."""
     found = getattr(swarm_mj, name.removeprefix("swarm_mj."), None)
     return f"{found.__module__}.{found.__qualname__}" if found is not None else name
 

@@ -17,7 +17,7 @@ RENDERS = "renders"  # the tag of cells that need OpenGL
 
 @cache
 def page_of(path: Path) -> str:
-    """A notebook in Markdown; it is run once a process.
+    """Return a notebook in Markdown; it is run once a process.
 
     Where no OpenGL works, cells that render are shown without being run.
 
@@ -64,7 +64,7 @@ def _parts(cell: Any) -> list[str]:  # noqa: ANN401 - a notebook's node
 
 
 def _shown(output: Any) -> str:  # noqa: ANN401 - a notebook's node
-    """An output in the richest form that a page can have."""
+    """Return an output in the richest form that a page can have."""
     if output.output_type == "stream":
         return FORMS["text/plain"](output.text)
     best = next(form for form in FORMS if form in output.data)

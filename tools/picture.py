@@ -51,7 +51,7 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """Takes the picture; returns the exit code."""
+    """Take the picture; returns the exit code."""
     check_outputs(Output("picture", options.out, ".png"), must_be_new=not options.force)
     with owned(options.out):
         take_picture(options.replay, options.window, options.out, options.size, options.zoom)
@@ -60,7 +60,7 @@ def run(options: Options) -> int:
 
 
 def take_picture(replay: Path, window: int | None, out: Path, size: str, zoom: int) -> None:
-    """Writes a PNG of the replay's first tab at one window.
+    """Write a PNG of the replay's first tab at one window.
 
     Args:
         replay: The recording.
@@ -105,7 +105,7 @@ def _without_title_bar(png: bytes, zoom: int) -> bytes:
 
 @contextmanager
 def _viewer(size: str) -> Iterator[ViewerClient]:
-    """A headless viewer on a free port of this machine, gone afterwards."""
+    """Return a headless viewer on a free port of this machine, gone afterwards."""
     (port,) = free_ports(1)
     command = [
         *(*VIEWER, "--headless", "--hide-welcome-screen", "--bind", LOOPBACK),

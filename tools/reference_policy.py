@@ -53,7 +53,7 @@ OUTPUT = "policy_model/output/node_model/node_output"
 
 
 def network_of(path: Path) -> AggregationGnn:
-    """The acting network of the authors' weights.
+    """Return the acting network of the authors' weights.
 
     Raises:
         ValueError: The file cannot be read, is damaged, or holds other arrays.
@@ -82,7 +82,7 @@ def network_of(path: Path) -> AggregationGnn:
 
 
 def store(path: Path, folder: Path) -> None:
-    """Writes the authors' weights as a policy directory."""
+    """Write the authors' weights as a policy directory."""
     config = PolicyConfig(
         network=SHAPE,
         features="reference",

@@ -70,14 +70,14 @@ def _place(x: float | None) -> float:
 
 
 def _shown(swept: str, x: float | None) -> str:
-    """A column's head."""
+    """Return a column's head."""
     if x is None:
         return "no limit"
     return bits_per_second(x) if swept == "bit_rate" else f"{x:g}"
 
 
 def _name(policy: str, results: Sequence[Result]) -> str:
-    """A policy's name, and whether its packets carry more than the paper's."""
+    """Return a policy's name, and whether its packets carry more than the paper's."""
     more = any(carries_more(result) for result in results if result.policy == policy)
     return f"{policy} (packets {CARRIES_MORE})" if more else policy
 
@@ -114,7 +114,7 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """Prints the tables; returns the exit code."""
+    """Print the tables; returns the exit code."""
     for path in options.files:
         results = read_results(path)
         kinds = [_kind(result, is_by_rate=_is_by_rate(results)) for result in results]
@@ -126,7 +126,7 @@ def run(options: Options) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the tool; returns its exit code."""
+    """Run the tool; returns its exit code."""
     return script(Options, run, arguments)
 
 

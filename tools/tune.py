@@ -64,14 +64,14 @@ class Search:
 
 
 def grid_of(policy: str, preset: str) -> tuple[float, ...]:
-    """The probabilities to try: under `reference` the authors' own, for their baselines."""
+    """Return the probabilities to try: under `reference` the authors' own, for their baselines."""
     if policy in ("random-flooding", "mst"):
         return AUTHORS_GRID if preset == "reference" else WIDE_GRID
     return {"aloha": ALOHA_GRID, "gossip": GOSSIP_GRID}[policy]
 
 
 def regimes(preset: str, num_windows: int) -> Iterator[Mission]:
-    """The regimes of the paper's four result figures; those of Fig. 3 are among Fig. 4's."""
+    """Return the regimes of the paper's four result figures; those of Fig. 3 are among Fig. 4's."""
     make = PAPERS[preset]
     for range_ratio in (0.2, 0.25, 0.5, 0.75, 1.0):
         yield make("stationary", range_ratio=range_ratio, num_windows=num_windows)
@@ -100,7 +100,7 @@ def ages(search: Search, probability: float, seeds: Sequence[int]) -> np.ndarray
 
 
 def tune(search: Search, seeds: Sequence[int], guess: float) -> Tuned:
-    """Finds the probability of the grid whose mean age is less than its neighbours'.
+    """Find the probability of the grid whose mean age is less than its neighbours'.
 
     Args:
         search: Policy, regime and grid.
@@ -142,7 +142,7 @@ def _row(search: Search, probability: float, aoi: np.ndarray, seeds: Sequence[in
 
 
 def write_table(rows: Sequence[Tuned], path: Path) -> None:
-    """Writes the table whole, or not at all."""
+    """Write the table whole, or not at all."""
     names = [field.name for field in fields(Tuned)]
     write_csv(path, names, (asdict(row) for row in rows))
 

@@ -29,7 +29,7 @@ class Experiment:
 
 
 def read_experiment(path: Path) -> Experiment:
-    """The experiment in a file.
+    """Return the experiment in a file.
 
     Raises:
         ValueError: It holds no such thing.

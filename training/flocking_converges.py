@@ -38,7 +38,7 @@ class Settings:
 
 
 def left_over(settings: Settings, policy_name: str) -> np.ndarray:
-    """The share of the first window's velocity variance left after the last, per mission."""
+    """Return the share of the first window's velocity variance left after the last, per mission."""
     seeds = range(settings.first_seed, settings.first_seed + settings.num_missions)
     swarm = Swarm(settings.mission, seeds)
     policy = make_policy(policy_name, settings.mission)
@@ -52,7 +52,7 @@ def left_over(settings: Settings, policy_name: str) -> np.ndarray:
 
 
 def run(open_area: Settings) -> int:
-    """Runs the experiment; returns its exit code."""
+    """Run the experiment; returns its exit code."""
     walled = replace(open_area, mission=replace(open_area.mission, boundary="reflect"))
     table = Table(title=f"Velocity variance left, {open_area.num_missions} missions")
     for heading in ("boundary", "policy"):

@@ -72,7 +72,7 @@ class LearningFigure:
 
 
 def read_curve(path: Path) -> dict[str, np.ndarray]:
-    """The columns of a learning curve that are drawn, by their names.
+    """Return the columns of a learning curve that are drawn, by their names.
 
     Raises:
         ValueError: It cannot be read, or is no learning curve.
@@ -110,7 +110,7 @@ def draw(curve: Mapping[str, np.ndarray], levels: Mapping[str, float]) -> Figure
 
 
 def _draw_level(axes: Axes, policy: str, level: float) -> None:
-    """A dotted line, named with its cost beside the axes."""
+    """Return a dotted line, named with its cost beside the axes."""
     look = look_of(policy)
     axes.axhline(level, color=look.colour, linewidth=0.9, linestyle=(0, (1, 1.5)))
     axes.annotate(

@@ -76,7 +76,7 @@ class Part:
 
 
 def evaluate(settings: Settings, jobs: int, *, force: bool) -> int:
-    """Makes the results that are missing, or all by force; returns the exit code."""
+    """Make the results that are missing, or all by force; returns the exit code."""
     parts = [
         Part(figure=RESULT_FIGURES[name], preset=preset)
         for preset in settings.presets
@@ -100,7 +100,7 @@ def evaluate(settings: Settings, jobs: int, *, force: bool) -> int:
 
 
 def _remove(settings: Settings, parts: Sequence[Part]) -> None:
-    """Removes all results and drafts."""
+    """Remove all results and drafts."""
     for part in parts:
         draft = settings.drafts / part.name
         for path in (settings.results / part.name, draft, progress_path(draft)):
@@ -115,7 +115,7 @@ def _is_current(draft: Path) -> bool:
 
 
 def run(settings: Settings) -> int:
-    """Runs the experiment; returns its exit code."""
+    """Run the experiment; returns its exit code."""
     return evaluate(settings, settings.jobs, force=settings.force)
 
 

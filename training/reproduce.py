@@ -146,7 +146,7 @@ class Work:
         return ["evaluate", "--policy", *policies, *options, *jobs, "--csv", str(draft), "--resume"]
 
     def check(self) -> None:
-        """Passes if all commands can be read, and all tables written.
+        """Pass if all commands can be read, and all tables written.
 
         Raises:
             ValueError: Not so, or runs have begun otherwise.
@@ -191,7 +191,7 @@ class Work:
             atomic.write_text(ended, "")
 
     def _hand_over(self) -> None:
-        """Writes the tables, that of the flights last: it is drawn."""
+        """Write the tables, that of the flights last: it is drawn."""
         results, trainings, curves = self.tables
         rows = {name: _rows(self.folder / name / CURVE) for name in self.trainings}
         table = [{"training": name} | row for name, its in rows.items() for row in its]
@@ -204,7 +204,7 @@ class Work:
         write_csv(results, list(self._results(rows)))
 
     def _training(self, name: str, rows: Sequence[dict[str, Any]]) -> dict[str, object]:
-        """A row of the table of trainings."""
+        """Return a row of the table of trainings."""
         _, config = read_policy(self.folder / name / POLICY)
         return {
             "training": name,
@@ -218,7 +218,7 @@ class Work:
         }
 
     def _results(self, rows: dict[str, list[dict[str, Any]]]) -> Iterator[Result]:
-        """The flights' results under their curves' names, with what was trained."""
+        """Return the flights' results under their curves' names, with what was trained."""
         for draft, _, curves in self.flights:
             paths = {str(self.folder / name / POLICY): name for name in curves}
             for result in read_results(draft):
@@ -235,7 +235,7 @@ class Work:
 
 
 def run(settings: Settings) -> int:
-    """Runs the experiments; returns the exit code."""
+    """Run the experiments; returns the exit code."""
     works = [read_work(name, settings) for name in settings.figures]
     left = [work for work in works if settings.force or not work.is_finished]
     for work in left:
@@ -255,13 +255,13 @@ def run(settings: Settings) -> int:
 
 
 def read_work(figure: str, settings: Settings) -> Work:
-    """A figure's experiment; raises ValueError for a file that is no such thing."""
+    """Return a figure's experiment; raises ValueError for a file that is no such thing."""
     experiment = read_experiment(settings.experiments / f"{figure}.toml")
     return Work(figure=figure, settings=settings, experiment=experiment)
 
 
 def _remove(work: Work) -> None:
-    """Removes a figure's results and runs."""
+    """Remove a figure's results and runs."""
     for path in work.tables:
         path.unlink(missing_ok=True)
     if work.folder.exists():
@@ -269,7 +269,7 @@ def _remove(work: Work) -> None:
 
 
 def _rows(path: Path) -> list[dict[str, Any]]:
-    """A run's learning curve."""
+    """Return a run's learning curve."""
     _, rows = read_rows(path, "learning curve", MOST_BYTES)
     return [{name: float(cell) if cell else None for name, cell in row.items()} for _, row in rows]
 

@@ -24,5 +24,5 @@ def quiet_console() -> Console:
 
 
 def quiet_bar(what: str, total: int, unit: str) -> WorkBar:
-    """A bar of this much work."""
+    """Return a bar of this much work."""
     return WorkBar(what, total, unit, console=quiet_console(), after_s=AFTER_S)

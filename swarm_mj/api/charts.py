@@ -29,7 +29,7 @@ LABELS = {
 
 
 def draw_run(run: "Run") -> Figure:
-    """A mission's costs over its windows, one above the other."""
+    """Return a mission's costs over its windows, one above the other."""
     columns, colour = run.columns(), look_of(run.config["policy"]).colour
     has_own_cost = run.task_cost is not None and run.task_cost[0] != Flocking.cost_name
     moves = bool(np.any(columns["velocity_variance"]))
@@ -99,7 +99,7 @@ def _draw_task(
 
 
 def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:
-    """A policy's mean with its 95 % interval, if there is one."""
+    """Return a policy's mean with its 95 % interval, if there is one."""
     look, mean = look_of(result.policy), getattr(result, f"{cost}_mean")
     ends = [getattr(result, f"{cost}_ci_{end}") for end in ("low", "high")]
     if None not in ends:
@@ -108,7 +108,7 @@ def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:
 
 
 def _panels(number: int) -> tuple[Figure, list[Axes]]:
-    """A figure of so many panels above each other."""
+    """Return a figure of so many panels above each other."""
     figure, axes = plt.subplots(
         *(number, 1),
         sharex=True,
@@ -122,7 +122,7 @@ def _panels(number: int) -> tuple[Figure, list[Axes]]:
 
 
 def _kept(figure: Figure) -> Figure:
-    """The figure, which notebooks would else show twice: as open, and as a cell's result."""
+    """Return the figure, which notebooks would else show twice: as open, and as a cell's result."""
     if "inline" in str(plt.get_backend()):
         plt.close(figure)
     return figure

@@ -43,7 +43,7 @@ def check_fits(
     is_forced: bool,
     way_on: str = ", or try it with --yes",
 ) -> None:
-    """Passes if a command's needs will be met, or nobody minds.
+    """Pass if a command's needs will be met, or nobody minds.
 
     Args:
         needs: The command's.
@@ -157,7 +157,7 @@ def replay_memory(mission: Mission, num_windows: int) -> float:
 
 
 def replay_file(mission: Mission) -> float:
-    """A replay's size, of teams that move; others' are smaller."""
+    """Return a replay's size, of teams that move; others' are smaller."""
     matrices = min(MAX_AGE_MATRIX_BYTES, AGE_BYTES * mission.num_windows * mission.num_robots**2)
     return 0.5e6 + (500.0 + 150.0 * mission.num_robots) * mission.num_windows + 0.25 * matrices
 
@@ -183,5 +183,5 @@ def passes_bytes(training: "Training") -> float:
 
 
 def in_gb(size: int | float) -> str:
-    """A size as messages name it."""
+    """Return a size as messages name it."""
     return f"{float(f'{size / GB:.3g}'):,g} GB"

@@ -52,11 +52,11 @@ class Evaluation:
     results: Sequence[Evaluated]
 
     def __repr__(self) -> str:
-        """The table that `swarm-mj evaluate` prints."""
+        """Return the table that `swarm-mj evaluate` prints."""
         return results_text([each.result for each in self.results])
 
     def _repr_html_(self) -> str:
-        """The main columns of `to_dataframe`, for notebooks."""
+        """Return the main columns of `to_dataframe`, for notebooks."""
         shown = ["aoi_mean", "aoi_sem", "aoi_ci_low", "aoi_ci_high", "packets_per_window"]
         return self.to_dataframe().set_index("policy")[shown].to_html()
 
@@ -112,7 +112,7 @@ class Evaluation:
         return draw_evaluation([each.result for each in self.results])
 
     def save(self, path: str | Path) -> Path:
-        """Writes what `swarm-mj evaluate` does, replacing the file if it exists.
+        """Write what `swarm-mj evaluate` does, replacing the file if it exists.
 
         Args:
             path: Ends in .csv, one row per policy, or .json, with what each mission cost.
@@ -210,7 +210,7 @@ def evaluate(
 
 
 def _check_named(kind: str, part: object) -> None:
-    """Passes for a name; raises TypeError for anything else, with a name that leads to it."""
+    """Pass for a name; raises TypeError for anything else, with a name that leads to it."""
     if isinstance(part, str) or (kind == "policy" and isinstance(part, Path)):
         return
     home = getattr(part, "__module__", "builtins")

@@ -60,7 +60,7 @@ def flight_table(title: str, mission: Mission, numbers: dict[str, Any], wall_s: 
 
 
 def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> dict[str, str]:
-    """The rows of `flight_table`: names and values, as they are shown."""
+    """Return the rows of `flight_table`: names and values, as they are shown."""
     decider = "a centre that is told where all are"
     hops, num_off = numbers["hops_mean"], num_failures(mission)
     rows = {
@@ -80,7 +80,7 @@ def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> 
 
 
 def _windows(value: float | int | None, mission: Mission, digits: int, word: str = "") -> str:
-    """A time in windows and in seconds, or that it never came."""
+    """Return a time in windows and in seconds, or that it never came."""
     if value is None:
         return "never"
     number = f"{value:.{digits}f}"

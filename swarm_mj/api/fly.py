@@ -119,7 +119,7 @@ def mission_of(
     mission_fields: Mapping[str, Any],
     known: tuple[str, ...],
 ) -> Mission:
-    """The mission that a function's arguments name.
+    """Return the mission that a function's arguments name.
 
     Args:
         function: Its name, for messages.
@@ -146,7 +146,7 @@ def mission_of(
 def _policy_of(
     policy: str | Path | Policy, mission: Mission, how: Mapping[str, Any]
 ) -> tuple[Policy, str]:
-    """A policy and its name: what was given, or its class's."""
+    """Return a policy and its name: what was given, or its class's."""
     if not isinstance(policy, Policy):
         check_kind("policy", policy, (str, Path), '"planner"')
         name = normalised(str(policy))

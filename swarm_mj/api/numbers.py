@@ -10,7 +10,7 @@ class Numbers(Mapping[str, Any]):
     """A mapping that cannot be changed, whose keys are attributes as well."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
-        """Takes the values by their names."""
+        """Take the values by their names."""
         self._values = dict(values)
 
     def __getitem__(self, name: str) -> Any:  # noqa: ANN401 - any value
@@ -32,7 +32,7 @@ class Numbers(Mapping[str, Any]):
         return [*super().__dir__(), *self._values]
 
     def __repr__(self) -> str:
-        """A line for each name; numbers within numbers are set in."""
+        """Return a line for each name; numbers within numbers are set in."""
         width = max((len(name) for name in self), default=0)
         lines = []
         for name, value in self.items():

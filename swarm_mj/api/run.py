@@ -59,7 +59,7 @@ class Run:
         )
 
     def _repr_html_(self) -> str:
-        """The numbers as a table, for notebooks."""
+        """Return the numbers as a table, for notebooks."""
         rows = flight_rows(self.mission, self.summary, self.summary.wall_seconds)
         lines = "".join(
             f"<tr><th style='text-align:left'>{escape(name)}</th>"
@@ -82,7 +82,7 @@ class Run:
         return None if cost is None else (cost.name, cost.unit)
 
     def columns(self) -> dict[str, Float[np.ndarray, "T"]]:
-        """The flight window by window, column by column: all that `to_dataframe` has."""
+        """Return the flight window by window, column by column: all that `to_dataframe` has."""
         window = np.arange(1.0, len(self.windows) + 1.0)
         worst = {"aoi_worst": self.log.age_max} if self.log else {}
         task = {} if self.task_cost is None else {"task_cost": self._course(_task_cost)}
@@ -168,7 +168,7 @@ class Run:
         return footage_of(self._recorded(), self.mission, policy, seed, own)
 
     def save(self, path: str | Path) -> Path:
-        """Writes the flight, replacing the file if it exists.
+        """Write the flight, replacing the file if it exists.
 
         Args:
             path: By its ending, a replay for `swarm-mj replay` (.rrd), a video (.mp4, .gif), the
@@ -195,7 +195,7 @@ class Run:
     def _course(
         self, of: Callable[[WindowRecord], Float[np.ndarray, "B"]]
     ) -> Float[np.ndarray, "T"]:
-        """A cost of the mission, window by window."""
+        """Return a cost of the mission, window by window."""
         return np.array([float(of(window)[0]) for window in self.windows])
 
 

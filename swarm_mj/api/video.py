@@ -18,7 +18,7 @@ ELSEWHERE = (
 
 
 def film(footage: "Footage", suffix: str) -> bytes:
-    """The content of a video file, as `swarm-mj replay --video` makes it.
+    """Return the content of a video file, as `swarm-mj replay --video` makes it.
 
     Args:
         footage: What was flown.
@@ -38,7 +38,7 @@ def film(footage: "Footage", suffix: str) -> bytes:
 
 
 def play(content: bytes) -> None:
-    """Shows a video in the notebook."""
+    """Show a video in the notebook."""
     from IPython.display import Video, display
 
     display(Video(data=content, embed=True, mimetype="video/mp4", html_attributes="controls loop"))

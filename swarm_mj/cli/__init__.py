@@ -61,7 +61,7 @@ def parse(arguments: Sequence[str]) -> tuple[Any, Any]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs a command line, or this process's if none is given; returns the exit code."""
+    """Run a command line, or this process's if none is given; returns the exit code."""
 
     def work() -> int:
         run, options = parse(sys.argv[1:] if arguments is None else list(arguments))
@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def end_process() -> NoReturn:
-    """Runs this process's command line as `main` does, and ends the process with its exit code.
+    """Run this process's command line as `main` does, and ends the process with its exit code.
 
     It ends at once when it was interrupted: compiled code that was broken off while it loaded may
     crash if Python then takes its libraries down one by one.
@@ -88,7 +88,7 @@ def end_process() -> NoReturn:
 def script(
     kind: type[Options], run: Callable[[Options], int], arguments: Sequence[str] | None = None
 ) -> int:
-    """Runs a program of its own, such as those of `tools/`, as `main` does a command.
+    """Run a program of its own, such as those of `tools/`, as `main` does a command.
 
     Args:
         kind: The dataclass of its options; its module's docstring says what it does.
@@ -105,7 +105,7 @@ def script(
 
 
 def _exit_code(name: str, work: Callable[[], int]) -> int:
-    """Does the work; says in one line what is wrong, or that it was interrupted."""
+    """Do the work; says in one line what is wrong, or that it was interrupted."""
     with lasting_streams() as failure, interruptible() as was_interrupted:
         code = _told(name, work, was_interrupted)
         if lost := failure():

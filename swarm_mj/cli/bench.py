@@ -46,7 +46,7 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """Runs the command; returns its exit code."""
+    """Run the command; returns its exit code."""
     tell_cores(options.jobs if options.episodes else 1)
     tell_cores(options.threads, "threads")
     with Console(stderr=True).status("Measuring ...") as status:

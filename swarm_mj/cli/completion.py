@@ -29,7 +29,7 @@ OF_KIND = {
 
 
 def completion(shell: str) -> str:
-    """A script that completes commands, options, choices, policies and files in a shell."""
+    """Return a script that completes commands, options, choices, policies and files in a shell."""
     parser = overview_parser()
     commands = parser.add_subparsers()
     for name, summary in COMMANDS.items():

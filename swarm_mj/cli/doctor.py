@@ -33,7 +33,7 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """Runs the command; returns its exit code."""
+    """Run the command; returns its exit code."""
     with Console(stderr=True).status("Trying things out ..."):
         found = [*about(), *packages(), *tried(), *machine()]
     is_sound = all(each.state != "broken" for each in found)
@@ -47,7 +47,7 @@ def run(options: Options) -> int:
 
 
 def _print(found: list[Finding], verdict: str) -> None:
-    """A table by groups, then what to do, then whether it works."""
+    """Return a table by groups, then what to do, then whether it works."""
     groups = list(dict.fromkeys(each.group for each in found))
     in_groups = sorted(found, key=lambda each: groups.index(each.group))
     table = Table(show_header=False)

@@ -88,7 +88,7 @@ class Options(PolicyOptions):
 
 
 def run(options: Options) -> int:
-    """Runs the command; returns its exit code."""
+    """Run the command; returns its exit code."""
     need("scipy", "an evaluation")
     study = options.study
     check_outputs(

@@ -47,7 +47,7 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """Runs the command; returns its exit code."""
+    """Run the command; returns its exit code."""
     paths = _paths(options)
     needs = figures_needs(options.results, sum(map(len, paths.values())))
     check_fits(needs, options.out, "draw fewer results at once", is_forced=options.yes)
@@ -98,7 +98,7 @@ def _papers(path: Path) -> list[Result]:
 
 
 def _paths(options: Options) -> dict[str, list[Path]]:
-    """The files of each figure; raises ValueError for those that cannot be written."""
+    """Return the files of each figure; raises ValueError for those that cannot be written."""
     endings = dict.fromkeys(options.format)
     paths = {
         name: [options.out / f"{name}.{ending}" for ending in endings] for name in options.figure

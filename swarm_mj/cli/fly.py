@@ -75,7 +75,7 @@ class Options(PolicyOptions):
 
 
 def run(options: Options) -> int:
-    """Runs the command; returns its exit code."""
+    """Run the command; returns its exit code."""
     options = replace(options, policy=with_payload([options.policy], options.payload)[0])
     mission = options.mission
     path = _replay_path(options)
@@ -136,7 +136,7 @@ def _next_commands(options: Options, path: Path | None) -> Iterator[tuple[str, s
 
 
 def _replay_path(options: Options) -> Path | None:
-    """The replay's path, or None; raises ValueError for what could not be written later."""
+    """Return the replay's path, or None; raises ValueError for what could not be written later."""
     if options.no_record and options.record:
         raise ValueError("--no-record is not allowed with --record; leave one out")
     if options.no_record and options.view:
@@ -155,14 +155,14 @@ def _replay_path(options: Options) -> Path | None:
 
 
 def _fresh_name(options: Options) -> Path:
-    """A name of this process's own, for flights that start in the same second."""
+    """Return a name of this process's own, for flights that start in the same second."""
     when = f"{datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}"
     task, policy = options.mission.task, _short(options.policy)
     return REPLAYS / f"{task}-{policy}-seed{options.seed}-{when}.rrd"
 
 
 def _short(policy: str) -> str:
-    """A policy's name without the path: `x` of runs/x/policy and of x.safetensors."""
+    """Return a policy's name without the path: `x` of runs/x/policy and of x.safetensors."""
     if not is_stored(policy):
         return policy.replace(" --", "-").replace(" ", "-").replace(":", "-")
     path = Path(policy.removesuffix(ONE_FILE)).resolve()
@@ -177,7 +177,7 @@ def _recorder(options: Options, swarm: Swarm, policy: Policy) -> Recorder:
 def _write(
     options: Options, summary: dict[str, Any], path: Path | None, recorder: Recorder | None
 ) -> None:
-    """Writes both files, the replay even if the summary fails."""
+    """Write both files, the replay even if the summary fails."""
     try:
         if options.json:
             write_json(options.json, summary)

@@ -25,17 +25,17 @@ NEEDED: dict[str, tuple[str, str | None]] = {
 
 
 def one_mission() -> FieldOf:
-    """A field that is a mission."""
+    """Return a field that is a mission."""
     return nested(_add, lambda given: missions_of(given)[0])
 
 
 def several_missions() -> FieldOf:
-    """A field that is missions: options take several values, and those multiply."""
+    """Return a field that is missions: options take several values, and those multiply."""
     return nested(partial(_add, is_many=True), missions_of)
 
 
 def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
-    """The missions that options name, by `mission.` and the field's name; a list sweeps.
+    """Return the missions that options name, by `mission.` and the field's name; a list sweeps.
 
     The last field's values vary fastest; raises ValueError if one is unknown or out of range.
     """
@@ -48,7 +48,7 @@ def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
 
 
 def check_in_use(given: Collection[str], missions: Sequence[Mission]) -> None:
-    """Passes if every field of the channel that was given counts in some mission.
+    """Pass if every field of the channel that was given counts in some mission.
 
     Raises:
         ValueError: One does not, for lack of another that switches it on.

@@ -28,7 +28,7 @@ def _path(text: str) -> Path:
 
 
 def _bit_rate(text: str) -> float | None:
-    """A rate such as 250000, 250k or 6M, or `none`."""
+    """Return a rate such as 250000, 250k or 6M, or `none`."""
     if text.lower() == "none":
         return None
     unit = BIT_RATES.get(text[-1:].lower(), 1.0)
@@ -57,7 +57,7 @@ class Parser(argparse.ArgumentParser):
         return parsed
 
     def error(self, message: str) -> NoReturn:
-        """Prints the complaint and where to read on; exits with 2."""
+        """Print the complaint and where to read on; exits with 2."""
         self.exit(BAD_INPUT, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
 
 
@@ -74,12 +74,12 @@ class _Formatter(argparse.HelpFormatter):
 def nested(
     add: Callable[[argparse.ArgumentParser], None], build: Callable[[dict[str, Any]], Any]
 ) -> FieldOf:
-    """A field of several options, which `add` declares; `build` makes it of those given."""
+    """Return a field of several options, which `add` declares; `build` makes it of those given."""
     return field(metadata={"add": add, "build": build})
 
 
 def parse(kind: type[Options], arguments: Sequence[str], prog: str, summary: str) -> Options:
-    """The command line as an instance of its dataclass.
+    """Return the command line as an instance of its dataclass.
 
     Args:
         kind: The dataclass; its `EPILOG`, if it has one, ends the help, and a field called `typed`,
@@ -108,7 +108,7 @@ def parse(kind: type[Options], arguments: Sequence[str], prog: str, summary: str
 
 
 def _check_names(arguments: Sequence[str]) -> None:
-    """Raises ValueError for a name that not all libraries could open, or none could find."""
+    """Raise ValueError for a name that not all libraries could open, or none could find."""
     try:
         names = (*arguments, str(Path.cwd()))
     except FileNotFoundError:
@@ -136,7 +136,7 @@ def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
 
 
 def declare(parser: argparse.ArgumentParser, kind: type[Any]) -> None:
-    """Declares the fields of a command's dataclass as options of a parser."""
+    """Declare the fields of a command's dataclass as options of a parser."""
     groups: dict[str, Any] = {"": parser}
     for spec in fields(kind):
         if "add" in spec.metadata:
@@ -158,7 +158,7 @@ def add_option(
     is_many: bool = False,
     is_required: bool = False,
 ) -> None:
-    """Declares a field as an option of a parser, or of a group of it.
+    """Declare a field as an option of a parser, or of a group of it.
 
     Args:
         group: The parser, or the group.
@@ -189,13 +189,13 @@ def add_option(
 
 
 def flag_of(spec: Field[Any]) -> str:
-    """The flag of a field: `--windows` of `num_windows`."""
+    """Return the flag of a field: `--windows` of `num_windows`."""
     name = spec.name.removeprefix("num_").removeprefix("is_")
     return "--" + name.replace("_", "-")
 
 
 def _shown_default(spec: Field[Any]) -> str:
-    """A default as text; empty if there is none to show."""
+    """Return a default as text; empty if there is none to show."""
     if "shown" in spec.metadata:
         return spec.metadata["shown"]
     has_none = any(spec.default is nothing for nothing in (MISSING, None, False, ()))

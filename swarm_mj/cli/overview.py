@@ -22,7 +22,7 @@ BEGINNING = {
 
 
 def overview_parser() -> Parser:
-    """The parser of a line without a command; its help lists the commands."""
+    """Return the parser of a line without a command; its help lists the commands."""
     begin_with = {f"{NAME} {command}": what for command, what in BEGINNING.items()}
     parser = Parser(
         prog=NAME,
@@ -49,7 +49,7 @@ def _listed(title: str, meanings: Mapping[str, str]) -> str:
 
 
 def show_or_refuse(arguments: Sequence[str]) -> NoReturn:
-    """Shows what was asked for: help, version, completion; or says what is wrong with the line."""
+    """Show what was asked for: help, version, completion; or says what is wrong with the line."""
     parser = overview_parser()
     if not arguments:
         parser.print_help(sys.stderr)

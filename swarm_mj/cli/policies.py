@@ -57,7 +57,7 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """Runs the command; returns its exit code."""
+    """Run the command; returns its exit code."""
     names = POLICIES if options.name is None else (options.name,)
     if options.name is None:
         names = [name for name in names if _can_be_made(name)]
@@ -116,7 +116,7 @@ def _cells(each: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _fields(packet: Packet) -> list[dict[str, Any]]:
-    """A packet's table of fields: how wide, how many, and how far apart two numbers are."""
+    """Return a packet's table of fields: how wide, how many, and how far apart two numbers are."""
     entries = [times(field, packet.num_entries) for field in packet.entry]
     return [
         {"name": field.name, "bits": field.bits, "count": field.count}

@@ -76,7 +76,7 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """Runs the command; returns its exit code."""
+    """Run the command; returns its exit code."""
     if options.video is not None:
         return _make_video(options, options.video)
     if options.size or options.seconds or options.fps or options.force or options.scene:

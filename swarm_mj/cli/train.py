@@ -65,7 +65,7 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """Runs the command; returns its exit code."""
+    """Run the command; returns its exit code."""
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     with console.status("Preparing ..."):
         asked = _asked_run(options)
@@ -136,7 +136,7 @@ def asked_limits(limits: Limits, options: Options) -> Limits:
 
 
 def _print(out: Path, asked: Run, progress: Progress, *, is_over: bool) -> None:
-    """Prints what the run came to, and what to do with it."""
+    """Print what the run came to, and what to do with it."""
     training, console = asked.training, plain_console()
     sizes = ", ".join(map(str, training.robots))
     title = f"{out}: arm {training.arm}, {training.mission.task}, {sizes} robots"

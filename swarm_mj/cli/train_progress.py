@@ -24,7 +24,7 @@ class Watch(WorkBar):
     """The listener of a run, and its bar: shows where it stands, and passes Ctrl-C on."""
 
     def __init__(self, console: Console, run: "Run", is_interrupted: Callable[[], bool]) -> None:
-        """Prepares the bar; `is_interrupted` says whether Ctrl-C was pressed."""
+        """Prepare the bar; `is_interrupted` says whether Ctrl-C was pressed."""
         super().__init__("Training", WHOLE, console=console, shows_time_left=False)
         self._console, self._limits, self._is_interrupted = console, run.limits, is_interrupted
         self._notes = {ORACLE: f" ({oracle_missions(run.training)})"}
@@ -38,7 +38,7 @@ class Watch(WorkBar):
         return self._start is not None
 
     def __call__(self, status: "Status") -> bool:
-        """Shows a status; returns whether to go on."""
+        """Show a status; returns whether to go on."""
         if self._start is None:
             self._start = status
             self._num_rows = len(status.progress.curve)
@@ -93,7 +93,7 @@ def minutes_left(status: "Status", start: "Status", limits: "Limits") -> float |
 
 
 def age_of(row: dict[str, float]) -> str:
-    """A held-out age of information, with its standard error if it has one [windows]."""
+    """Return a held-out age of information, with its standard error if it has one [windows]."""
     error = f" ± {row['aoi_sem']:.2f}" if "aoi_sem" in row else ""
     return f"{row['aoi']:.2f}{error}"
 

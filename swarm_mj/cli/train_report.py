@@ -74,7 +74,7 @@ def _of_evaluations(run: Run, progress: Progress) -> dict[str, str]:
 
 
 def _oracle(run: Run, progress: Progress) -> dict[str, str]:
-    """The oracle flies missions of the evaluations only, and few of them."""
+    """Return the oracle flies missions of the evaluations only, and few of them."""
     age, its_missions = reference_ages(progress.curve[0]).get(ORACLE), oracle_missions(run.training)
     if age is not None:
         told = f"{age:.2f} windows, on {its_missions} of the evaluations; {REFERENCES[ORACLE]}"

@@ -45,14 +45,14 @@ SPECS: dict[str, Field[Any]] = {
 
 
 def add_setting_options(parser: argparse.ArgumentParser) -> None:
-    """Declares them, under a heading for each part of the settings."""
+    """Declare them, under a heading for each part of the settings."""
     groups = {part: parser.add_argument_group(title) for part, title in HEADINGS.items()}
     for place, spec in SPECS.items():
         add_option(groups[place.removesuffix(spec.name)], spec, place, _usual(place))
 
 
 def given_settings(given: dict[str, Any]) -> dict[str, Any]:
-    """The settings that were given, by their places."""
+    """Return the settings that were given, by their places."""
     values = {place: given[place] for place in SPECS if place in given}
     return {
         place: tuple(dict.fromkeys(value)) if isinstance(value, list) else value
@@ -112,7 +112,7 @@ def own_names(given: dict[str, Any]) -> list[str]:
 
 
 def load_own(features: str, training: Training) -> None:
-    """Loads features, and the parts of a run, that are the user's own and were all named here.
+    """Load features, and the parts of a run, that are the user's own and were all named here.
 
     Raises:
         ValueError: One cannot be made.
@@ -123,7 +123,7 @@ def load_own(features: str, training: Training) -> None:
 
 
 def refuse_others(given: dict[str, Any], training: Training, whose: str) -> None:
-    """Passes if given settings are those of a run, or of the policy that it begins with.
+    """Pass if given settings are those of a run, or of the policy that it begins with.
 
     Raises:
         ValueError: One contradicts.
@@ -169,7 +169,7 @@ def _groups(missions: int, num_sizes: int) -> int:
 
 
 def _check(training: Training) -> None:
-    """Raises ValueError for settings that are sound one by one, but not together."""
+    """Raise ValueError for settings that are sound one by one, but not together."""
     for size in training.robots:
         check_whole("training", replace(training.mission, num_robots=size))
     if training.reward == "velocity-variance" and training.mission.task != "flocking":
@@ -180,7 +180,7 @@ def _check(training: Training) -> None:
 
 
 def _usual(place: str) -> str:
-    """The default as text: per robot and, where it differs, per team."""
+    """Return the default as text: per robot and, where it differs, per team."""
     if "shown" in SPECS[place].metadata:
         return SPECS[place].metadata["shown"]
     robot, team = (_usual_of(arm, place) for arm in ("robot", "team"))
@@ -190,7 +190,7 @@ def _usual(place: str) -> str:
 
 
 def _usual_of(arm: str, place: str) -> str:
-    """The default as text, if it does not depend on preset or task."""
+    """Return the default as text, if it does not depend on preset or task."""
     missions = (PRESETS["paper"]("stationary"), PRESETS["reference"]("flocking"))
     usual, other = (
         _stored(usual_settings(arm, each, (each.num_robots,)), place) for each in missions

@@ -20,7 +20,7 @@ class Controller(Protocol):
     """
 
     def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N 2"]:
-        """The accelerations u [m/s²]; row [b, i] may use buffer and body [b, i] only.
+        """Return the accelerations u [m/s²]; row [b, i] may use buffer and body [b, i] only.
 
         Args:
             buffers: What each robot has heard; they cannot be written.
@@ -45,7 +45,7 @@ class Costed(Protocol):
 
 
 def costed(controller: Controller) -> Costed | None:
-    """A controller that says what its task costs, or None.
+    """Return a controller that says what its task costs, or None.
 
     Raises:
         TypeError: It has a cost without a name or a unit.

@@ -28,7 +28,7 @@ class Coverage:
     cost_unit = "m"
 
     def __init__(self, mission: Mission) -> None:
-        """Takes the mission whose area is to be covered."""
+        """Take the mission whose area is to be covered."""
         self._half_side_m = mission.half_side_m
 
     def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N 2"]:
@@ -84,7 +84,7 @@ def _centroids(
     half_side_m: float,
     target_m: Float[np.ndarray, "B N 2"],
 ) -> None:
-    """Fills `target_m`; whose cell has no ground goes to the nearest point of the area."""
+    """Fill `target_m`; whose cell has no ground goes to the nearest point of the area."""
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):

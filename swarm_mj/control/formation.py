@@ -31,7 +31,7 @@ class Formation:
     cost_unit = "m"
 
     def __init__(self, mission: Mission) -> None:
-        """Takes the mission whose team and area size the formation."""
+        """Take the mission whose team and area size the formation."""
         self._place_m = block(mission.num_robots, BLOCK_SHARE * mission.side_m)
 
     def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N 2"]:
@@ -88,7 +88,7 @@ def _mean_places(
     place_m: Float[np.ndarray, "N 2"],
     target_m: Float[np.ndarray, "B N 2"],
 ) -> None:
-    """Fills `target_m`; who knows nobody stays where it is."""
+    """Fill `target_m`; who knows nobody stays where it is."""
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):

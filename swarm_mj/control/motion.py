@@ -20,7 +20,7 @@ from swarm_mj.system.compiled import compiled
 
 
 def controller_of(mission: Mission) -> Controller:
-    """The controller of a mission's task, to be started if it is `Started`."""
+    """Return the controller of a mission's task, to be started if it is `Started`."""
     return CONTROLLERS[mission.task](mission)
 
 
@@ -47,11 +47,11 @@ class RandomWalk:
         self._limit_mps2 = mission.max_acceleration_mps2
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Gives every robot its own stream of numbers; arguments as in `Started.start`."""
+        """Give every robot its own stream of numbers; arguments as in `Started.start`."""
         self._stream = Stream(rngs, normal, (num_robots, 2))
 
     def __call__(self, _buffers: Buffers, _states: RobotStates) -> Float[np.ndarray, "B N 2"]:
-        """The next accelerations [m/s²]."""
+        """Return the next accelerations [m/s²]."""
         acceleration = self._stream.next() * (self._limit_mps2 / 3.0)
         return np.clip(acceleration, -self._limit_mps2, self._limit_mps2)
 
@@ -67,12 +67,12 @@ class Flocking:
         self._flocking_set: FlockingSet = mission.flocking_set
 
     def __call__(self, buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N 2"]:
-        """The next accelerations [m/s²]."""
+        """Return the next accelerations [m/s²]."""
         acceleration = flocking(buffers, states.velocity_mps, self._flocking_set)
         return np.clip(acceleration, -self._limit_mps2, self._limit_mps2)
 
     def cost(self, states: RobotStates, /) -> Float[np.ndarray, "B"]:
-        """The velocity variance of the active robots [m²/s²]."""
+        """Return the velocity variance of the active robots [m²/s²]."""
         return velocity_variance(states.velocity_mps, states.is_active)
 
 

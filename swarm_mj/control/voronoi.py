@@ -14,7 +14,7 @@ def cell(
     i: int,
     half_side_m: float,
 ) -> Float[np.ndarray, "corners 2"]:
-    """The points of the area that are nearer to robot i than to any other.
+    """Return the points of the area that are nearer to robot i than to any other.
 
     Args:
         position_m: Where the robots are [m].
@@ -43,7 +43,7 @@ def cell(
 
 @compiled()
 def _reach(polygon: Float[np.ndarray, "corners 2"], from_m: Float[np.ndarray, "2"]) -> float:
-    """The squared distance to a polygon's farthest corner [m²]."""
+    """Return the squared distance to a polygon's farthest corner [m²]."""
     farthest = 0.0
     for x, y in polygon:
         farthest = max(farthest, (x - from_m[0]) ** 2 + (y - from_m[1]) ** 2)
@@ -58,7 +58,7 @@ def _nearer(
     j: int,
     kept: Float[np.ndarray, "room 2"],
 ) -> int:
-    """Fills `kept` with the part of a polygon that is nearer to i than to j; returns its corners.
+    """Fill `kept` with the part of a polygon that is nearer to i than to j; returns its corners.
 
     The clipping of Sutherland and Hodgman (1974), along the bisector.
     """

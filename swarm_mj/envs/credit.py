@@ -29,7 +29,7 @@ def credits_of(
     now: Float[np.ndarray, "B"],
     is_active: Bool[np.ndarray, "B N"] | None = None,
 ) -> Float[np.ndarray, "B N"]:
-    """The age that the team would not have lost in a window without each robot.
+    """Return the age that the team would not have lost in a window without each robot.
 
     A channel that is not the package's meets B missions at a time, as it does in flight.
 
@@ -64,7 +64,7 @@ def credits_of(
 
 
 def as_it_is(channel: Kind) -> Kind:
-    """A channel that later draws of this one do not change, to replay a window with."""
+    """Return a channel that later draws of this one do not change, to replay a window with."""
     draws = isinstance(channel, Started) and not isinstance(channel, VaryingChannel)
     return copy.deepcopy(channel) if draws else channel
 
@@ -76,7 +76,7 @@ class _Rows:
     """
 
     def __init__(self, channel: Channel, mission: Int[np.ndarray, "W"]) -> None:
-        """Takes the channel as it was before the window, and each row's mission."""
+        """Take the channel as it was before the window, and each row's mission."""
         self._mission = mission
         self._turn = np.array([np.sum(mission[:w] == b) for w, b in enumerate(mission)])
         self._channels = [as_it_is(channel) for _ in range(int(np.max(self._turn)) + 1)]

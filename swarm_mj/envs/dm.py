@@ -60,14 +60,14 @@ class SwarmPhysics(mujoco.Physics):
         self.restart(seed)
 
     def restart(self, seed: int) -> None:
-        """Starts a mission with this seed; until told otherwise, everyone is silent."""
+        """Start a mission with this seed; until told otherwise, everyone is silent."""
         self._seed = seed
         self.swarm.restart([seed])
         self.recipient: Int[np.ndarray, "B N"] = self.swarm.views.silence.copy()
         self._show()
 
     def reset(self, keyframe_id: int | None = None) -> None:
-        """Starts the same mission anew, as dm_control asks before every episode."""
+        """Start the same mission anew, as dm_control asks before every episode."""
         super().reset(keyframe_id)
         self.restart(self._seed)
 
@@ -82,7 +82,7 @@ class SwarmPhysics(mujoco.Physics):
         return self.swarm.mission.window_s
 
     def _show(self) -> None:
-        """Copies the robots' states and the time to where dm_control looks for them."""
+        """Copy the robots' states and the time to where dm_control looks for them."""
         mission, states = self.swarm.mission, self.swarm.states
         self.data.time = self.swarm.now[0] * mission.window_s
         self.data.qpos[:] = states.position_m.ravel()
@@ -95,16 +95,16 @@ class SwarmTask(_Task):
     """Choose whom every robot addresses, so that what they know of each other is young."""
 
     def __init__(self, seed: int) -> None:
-        """Takes the seed of the first episode's mission."""
+        """Take the seed of the first episode's mission."""
         self._next_seed = seed
 
     def initialize_episode(self, physics: SwarmPhysics) -> None:
-        """Starts a fresh mission with the next seed."""
+        """Start a fresh mission with the next seed."""
         physics.restart(self._next_seed)
         self._next_seed += 1
 
     def before_step(self, action: np.ndarray | Sequence[int], physics: SwarmPhysics) -> None:
-        """Sets whom each robot addresses; itself is silence.
+        """Set whom each robot addresses; itself is silence.
 
         Raises:
             ValueError: The action is not one integer from 0 to N - 1 per robot.
@@ -131,5 +131,5 @@ class SwarmTask(_Task):
         return -float(age[0])
 
     def get_termination(self, physics: SwarmPhysics) -> float | None:
-        """A discount of 1 after the last window: a mission is cut off, it reaches no end."""
+        """Return a discount of 1 after the last window: a mission is cut off, it reaches no end."""
         return 1.0 if physics.swarm.now[0] >= physics.swarm.mission.num_windows else None

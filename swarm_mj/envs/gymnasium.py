@@ -30,7 +30,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        """Takes a mission or its task, and options as `Team` does: any field of `Mission`, too.
+        """Take a mission or its task, and options as `Team` does: any field of `Mission`, too.
 
         Raises:
             ValueError: A value is unknown or out of range.
@@ -79,7 +79,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         return self.team.observation["action_mask"].ravel().astype(np.bool_)
 
     def render(self) -> UInt8[np.ndarray, "H W 3"] | None:
-        """The mission as it is now, in the render mode "rgb_array".
+        """Return the mission as it is now, in the render mode "rgb_array".
 
         Raises:
             OSError: No OpenGL works here; it says what to install.
@@ -87,7 +87,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         return self._screen.picture(self.team) if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
-        """Gives back what pictures took."""
+        """Give back what pictures took."""
         self._screen.close()
 
     def _info(self) -> Info:
@@ -98,7 +98,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
 
 
 def check_paid_together(team: Team) -> None:
-    """Raises ValueError if a reward is each robot's own where a team has one."""
+    """Raise ValueError if a reward is each robot's own where a team has one."""
     if team.reward == "credit":
         raise ValueError(
             "reward credit is each robot's own, and this environment pays the team; choose reward "

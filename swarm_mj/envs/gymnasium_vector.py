@@ -53,7 +53,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        """Takes how many missions, and which; options as `Team` does.
+        """Take how many missions, and which; options as `Team` does.
 
         Raises:
             ValueError: A value is unknown or out of range.
@@ -153,7 +153,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         return tuple(self._screen.picture(*places[env]) for env in range(self.num_envs))
 
     def close_extras(self, **_: Any) -> None:
-        """Gives back what pictures took."""
+        """Give back what pictures took."""
         self._screen.close()
 
     def _make_team(self, num_missions: int) -> Team:
@@ -170,7 +170,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         return mask
 
     def _seeds_of(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
-        """A seed for each environment, or None."""
+        """Return a seed for each environment, or None."""
         if seed is None or isinstance(seed, int):
             return [seed if seed is None else seed + env for env in range(self.num_envs)]
         if len(seed) != self.num_envs:
@@ -197,14 +197,14 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         self._note(infos, envs, team.infos())
 
     def _spare_team(self, envs: Int[np.ndarray, "E"]) -> Team:
-        """A team of so many missions that no other environment is part of."""
+        """Return a team of so many missions that no other environment is part of."""
         for group in self._groups:
             if group.team.num_missions == len(envs) and np.isin(group.envs, envs).all():
                 return group.team
         return self._make_team(len(envs))
 
     def _without(self, envs: Int[np.ndarray, "E"]) -> Iterator[_Group]:
-        """The groups, without environments that begin anew."""
+        """Return the groups, without environments that begin anew."""
         for group in self._groups:
             stays = ~np.isin(group.envs, envs)
             if stays.any():
@@ -242,12 +242,12 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         return {**left, "final_obs": seen, "final_info": final, **mask}
 
     def _show(self, group: _Group) -> None:
-        """Takes over what a group sees."""
+        """Take over what a group sees."""
         for name, each in group.team.observation.items():
             self._seen[name][group.envs] = each[group.rows]
 
     def _note(self, infos: Info, envs: Int[np.ndarray, "E"], values: dict[str, np.ndarray]) -> None:
-        """Writes what these environments say into `infos`, beside masks of who said it."""
+        """Write what these environments say into `infos`, beside masks of who said it."""
         for name, each in values.items():
             if name not in infos:
                 infos[name] = np.zeros(self.num_envs, dtype=each.dtype)

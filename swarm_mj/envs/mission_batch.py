@@ -58,7 +58,7 @@ class MissionBatch:
         first_windows: int,
         parts: OwnParts = OwnParts(),
     ) -> None:
-        """Starts the first missions, of so many windows; `rng` draws the missions' seeds."""
+        """Start the first missions, of so many windows; `rng` draws the missions' seeds."""
         self.mission = mission
         self.num_missions = num_missions
         self._rng = rng

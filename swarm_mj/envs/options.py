@@ -10,7 +10,7 @@ from swarm_mj.system.fields import did_you_mean
 
 
 def check_task(mission: Mission | str) -> None:
-    """Passes for a mission, or a task.
+    """Pass for a mission, or a task.
 
     Raises:
         ValueError: There is no such task; what looks like an environment's name may mean one.
@@ -26,7 +26,7 @@ def check_task(mission: Mission | str) -> None:
 
 
 def check_fields(mission: Mission | str, fields: Mapping[str, Any]) -> None:
-    """Passes unless an option has its place elsewhere; names unknown to all are left to `Mission`.
+    """Pass unless an option has its place elsewhere; names unknown to all are left to `Mission`.
 
     Raises:
         TypeError: It has.
@@ -42,7 +42,7 @@ def check_fields(mission: Mission | str, fields: Mapping[str, Any]) -> None:
 
 
 def check_features_named(features: object) -> None:
-    """Passes for a name, which stored policies keep.
+    """Pass for a name, which stored policies keep.
 
     Raises:
         TypeError: The features are a class, or something else.
@@ -56,7 +56,7 @@ def check_features_named(features: object) -> None:
 
 
 def check_reset(options: Collection[str], known: Collection[str] = ()) -> None:
-    """Passes if these are options of `reset`.
+    """Pass if these are options of `reset`.
 
     Raises:
         ValueError: One is not.

@@ -40,7 +40,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        """Takes a mission or its task, and options as `Team` does: any field of `Mission`, too.
+        """Take a mission or its task, and options as `Team` does: any field of `Mission`, too.
 
         Raises:
             ValueError: A value is unknown or out of range.
@@ -121,7 +121,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         return seen, rewards, ended, cut, infos
 
     def render(self) -> UInt8[np.ndarray, "H W 3"] | None:
-        """The mission as it is now, in the render mode "rgb_array".
+        """Return the mission as it is now, in the render mode "rgb_array".
 
         Raises:
             OSError: No OpenGL works here; it says what to install.
@@ -129,11 +129,11 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         return self._screen.picture(self.team) if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
-        """Gives back what pictures took."""
+        """Give back what pictures took."""
         self._screen.close()
 
     def _check_action(self, agent: str, action: object) -> None:
-        """Raises ValueError for who is no agent, and for what is no action."""
+        """Raise ValueError for who is no agent, and for what is no action."""
         names = self.possible_agents
         if agent not in names:
             raise ValueError(

@@ -26,5 +26,5 @@ def register_environments() -> None:
 
 
 def environment_id(task: str) -> str:
-    """A task's environment: `swarm_mj/RandomWalk-v0` is that of `random-walk`."""
+    """Return a task's environment: `swarm_mj/RandomWalk-v0` is that of `random-walk`."""
     return f"{NAMESPACE}/{task.title().replace('-', '')}-v0"

@@ -67,7 +67,7 @@ class SwarmVecEnv(VecEnv):
     """See `make_vec_env`; environments run mission by mission and, if a robot is one, by robot."""
 
     def __init__(self, team: Team, agent: str) -> None:
-        """Takes missions that have not begun."""
+        """Take missions that have not begun."""
         self.team = team
         self.agent = agent
         self.render_mode = None
@@ -97,7 +97,7 @@ class SwarmVecEnv(VecEnv):
         return self._observations()
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Takes the actions; `step_wait` plays them."""
+        """Take the actions; `step_wait` plays them."""
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
@@ -136,7 +136,7 @@ class SwarmVecEnv(VecEnv):
         return [masks[env] for env in self._get_indices(indices)]
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """The attribute of this object, once per environment."""
+        """Return the attribute of this object, once per environment."""
         return [getattr(self, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, *_: object, **__: object) -> None:
@@ -168,7 +168,7 @@ class SwarmVecEnv(VecEnv):
 
 
 def save_policy(model: BaseAlgorithm, folder: Path | str) -> None:
-    """Stores a trained actor as a policy that `swarm-mj fly --policy FOLDER` flies.
+    """Store a trained actor as a policy that `swarm-mj fly --policy FOLDER` flies.
 
     The folder holds the network's weights, no code and no pickle; the model itself is not kept.
 
@@ -245,7 +245,7 @@ def _trained_on(model: BaseAlgorithm) -> Team:
 
 
 def _actor(model: BaseAlgorithm) -> list[nn.Module]:
-    """The layers that lead to a decision; raises ValueError if they are not plain ones."""
+    """Return the layers that lead to a decision; raises ValueError if they are not plain ones."""
     policy: Any = model.policy
     own = ("mlp_extractor.policy_net.", "action_net.", "mlp_extractor.value_net.", "value_net.")
     is_plain = type(getattr(policy, "features_extractor", None)) is CombinedExtractor
@@ -259,7 +259,7 @@ def _actor(model: BaseAlgorithm) -> list[nn.Module]:
 
 
 def _shape_of(layers: list[nn.Module]) -> tuple[Any, tuple[int, ...]]:
-    """The activation between layers, and the widths of all but the last."""
+    """Return the activation between layers, and the widths of all but the last."""
     *hidden, _ = [each.out_features for each in layers if isinstance(each, nn.Linear)]
     between = {type(each) for each in layers} - {nn.Linear}
     names = {kind: name for name, kind in ACTIVATIONS.items()}

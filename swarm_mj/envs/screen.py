@@ -27,7 +27,7 @@ class Screen:
     """
 
     def __init__(self, mode: str | None, modes: Sequence[str] = MODES) -> None:
-        """Takes a render mode, one of these, or None, in which nothing is seen.
+        """Take a render mode, one of these, or None, in which nothing is seen.
 
         Raises:
             ValueError: There is no such mode.
@@ -40,7 +40,7 @@ class Screen:
         self._shown_s = 0.0
 
     def update(self, team: Team) -> None:
-        """Shows the team's first mission to a human, if one looks on.
+        """Show the team's first mission to a human, if one looks on.
 
         Raises:
             OSError: There is no display.
@@ -70,7 +70,7 @@ class Screen:
         return self._renderer.frame(contents)
 
     def close(self) -> None:
-        """Gives back what pictures took."""
+        """Give back what pictures took."""
         for shown in (self._renderer, self._viewer):
             if shown is not None:
                 shown.close()

@@ -39,7 +39,7 @@ def team_spaces(team: Team) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
 
 
 def _largest_feature(mission: Mission) -> float:
-    """A bound on every number that a feature set makes of a mission.
+    """Return a bound on every number that a feature set makes of a mission.
 
     Ages are shares of the mission or of 500 windows; positions and distances are those of robots
     that fly straight on all the time, by the area or by 1 km; counts are by 10 at least.

@@ -61,7 +61,7 @@ class Team:
         scene: Scene | str | None = None,
         **fields: Any,
     ) -> None:
-        """Takes what to play; `restart` begins.
+        """Take what to play; `restart` begins.
 
         Args:
             mission: The mission, or its task.
@@ -162,7 +162,7 @@ class Team:
         return np.ones(shape, dtype=np.bool_) if is_active is None else is_active
 
     def infos(self) -> Info:
-        """The missions' seeds, and what the last window cost, by name, [B] each.
+        """Return the missions' seeds, and what the last window cost, by name, [B] each.
 
         Names and numbers are those of `swarm-mj fly --json`. Before the first window, when nothing
         is known and nothing was sent, ages and packets are 0.
@@ -170,7 +170,7 @@ class Team:
         return {"seed": np.array(self.seeds), **self._costs}
 
     def _keep_start(self) -> None:
-        """Keeps what a window that has not been flown would cost."""
+        """Keep what a window that has not been flown would cost."""
         swarm = self.flown
         controller = swarm.controller
         task = (
@@ -195,7 +195,7 @@ class Team:
         }
 
     def _see(self) -> None:
-        """Keeps what the robots see now in `observation`, new arrays of shape [B, N, ...].
+        """Keep what the robots see now in `observation`, new arrays of shape [B, N, ...].
 
         A robot that was switched off may only be silent.
         """
@@ -218,13 +218,13 @@ def next_seed(rng: np.random.Generator) -> int:
 
 
 def check_count(what: str, number: object) -> None:
-    """Raises ValueError unless a number of missions, or of environments, is one."""
+    """Raise ValueError unless a number of missions, or of environments, is one."""
     if not isinstance(number, Integral) or number < 1:
         raise ValueError(f"{what} must be 1 or more, not {number!r}")
 
 
 def _mission_of(mission: Mission | str, preset: str | None, fields: dict[str, Any]) -> Mission:
-    """A mission as it is, or a task's, with other values of some fields."""
+    """Return a mission as it is, or a task's, with other values of some fields."""
     check_task(mission)
     check_fields(mission, fields)
     if isinstance(mission, Mission):
@@ -249,7 +249,7 @@ def _made(parts: dict[str, Any], mission: Mission) -> dict[str, Any]:
 
 
 def _checked(reward: str, mission: Mission, controller: Controller | None) -> str:
-    """The reward, if there is such a one for these missions; raises ValueError otherwise."""
+    """Return the reward, if there is such a one for these missions; raises ValueError otherwise."""
     if reward not in REWARDS:
         raise ValueError(f"reward must be one of {', '.join(REWARDS)}, not {reward!r}")
     if reward == "task-cost" and not isinstance(controller or controller_of(mission), Costed):

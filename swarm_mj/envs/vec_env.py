@@ -42,12 +42,12 @@ class MissionsEnv(VecEnv):
         super().__init__(sum(sizes), observation, action)
 
     def observe(self, graphs: Sequence[Graphs]) -> Observation:
-        """The graphs of all batches, one each, as the observation of all environments."""
+        """Return the graphs of all batches, one each, as the observation of all environments."""
         return self._observe(graphs, slice(0, self.num_envs))
 
     @abstractmethod
     def _observe(self, graphs: Sequence[Graphs], envs: slice) -> Observation:
-        """The graphs of neighbouring batches, which are these environments."""
+        """Return the graphs of neighbouring batches, which are these environments."""
 
     @abstractmethod
     def _step_batch(
@@ -65,7 +65,7 @@ class MissionsEnv(VecEnv):
         return self.observe([batch.restart() for batch in self.batches])
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Takes the actions; `step_wait` plays them."""
+        """Take the actions; `step_wait` plays them."""
         self._actions = actions
 
     def step_wait(self) -> Step:
@@ -93,7 +93,7 @@ class MissionsEnv(VecEnv):
         """There is nothing to release."""
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """The attribute of this object, once per environment."""
+        """Return the attribute of this object, once per environment."""
         return [getattr(self, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, *_: object, **__: object) -> None:
@@ -131,7 +131,7 @@ class RobotEnv(MissionsEnv):
         )
 
     def _observe(self, graphs: Sequence[Graphs], envs: slice) -> Observation:
-        """The robots' graphs, stacked and padded."""
+        """Return the robots' graphs, stacked and padded."""
         return {**padded(graphs, self.num_nodes), "owner": self._owner[envs]}
 
     def _step_batch(
@@ -183,7 +183,7 @@ class TeamEnv(MissionsEnv):
 
 
 def missions_of(model: PPO) -> MissionsEnv:
-    """A model's environment, inside what may be wrapped around it."""
+    """Return a model's environment, inside what may be wrapped around it."""
     env = model.get_env()
     inner = env.unwrapped if env is not None else None
     assert isinstance(inner, MissionsEnv)
@@ -221,7 +221,7 @@ def _largest_team(batches: Sequence[MissionBatch]) -> int:
 
 
 def _graph_spaces(nodes: tuple[int, ...], num_features: int) -> dict[str, spaces.Space]:
-    """The spaces of one environment's graphs, of so many nodes, as `padded` orders them."""
+    """Return the spaces of one environment's graphs, of so many nodes, as `padded` orders them."""
     return {
         "node": spaces.Box(-np.inf, np.inf, (*nodes, num_features), np.float32),
         "parent": spaces.Box(-1, nodes[-1] - 1, nodes, np.int32),

@@ -111,7 +111,7 @@ class Tally:
     """
 
     def __init__(self, swarm: Swarm) -> None:
-        """Starts at nothing; the swarm is at the start of its missions."""
+        """Start at nothing; the swarm is at the start of its missions."""
         mission, num_missions = swarm.mission, len(swarm.now)
         self._swarm = swarm
         self._floor: ConnectivityFloor | None = None  # it reckons with the mission's own range
@@ -125,7 +125,7 @@ class Tally:
         self._ages = np.zeros(num_ages(mission), dtype=np.int64)
 
     def add(self, flown: WindowRecord) -> None:
-        """Adds a window; the swarm stands at its end."""
+        """Add a window; the swarm stands at its end."""
         swarm, costs, is_active = self._swarm, flown.costs, self._swarm.states.is_active
         is_steady = swarm.now[0] > swarm.mission.num_windows - self._num_steady
         packets = {name: getattr(costs.packets, count) for name, count in TOTALS.items()}
@@ -180,7 +180,7 @@ def count_ages(
     counts: Int[np.ndarray, "bins"],
     is_active: Bool[np.ndarray, "B N"] | None = None,
 ) -> None:
-    """Counts how old what each robot knows of each other robot is.
+    """Count how old what each robot knows of each other robot is.
 
     Args:
         timestamp: T [windows].

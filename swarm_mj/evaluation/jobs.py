@@ -26,7 +26,7 @@ SURROUNDINGS |= {"MUJOCO_GL": "disable", "PYTHONSAFEPATH": "1"}
 def run_jobs(
     work: Callable[[Piece], Product], pieces: Sequence[Piece], num_jobs: int
 ) -> Generator[tuple[int, Product]]:
-    """Does all pieces of work.
+    """Do all pieces of work.
 
     Ctrl-C reaches this process only; the others end with it, however it ends.
 
@@ -72,19 +72,19 @@ def run_jobs(
 def _hand_out(
     waiting: Iterator[tuple[int, Any]], worker: Connection, under_way: dict[Connection, int]
 ) -> None:
-    """Gives a worker the next piece, if there is one."""
+    """Give a worker the next piece, if there is one."""
     for index, piece in islice(waiting, 1):
         worker.send(piece)
         under_way[worker] = index
 
 
 def _ready(under_way: dict[Connection, int]) -> list[Connection]:
-    """The workers that have something to say, waiting for the first."""
+    """Return the workers that have something to say, waiting for the first."""
     return [worker for worker in wait(list(under_way)) if isinstance(worker, Connection)]
 
 
 def _receive(worker: Connection) -> Any:  # noqa: ANN401 - any product
-    """A worker's product; raises what its work raised."""
+    """Return a worker's product; raises what its work raised."""
     try:
         product, error = worker.recv()
     except (EOFError, ConnectionError):
@@ -98,7 +98,7 @@ def _receive(worker: Connection) -> Any:  # noqa: ANN401 - any product
 def _worker(
     work: Callable[[Any], Any], context: SpawnContext, watch: Callable[[int], None]
 ) -> Iterator[Any]:
-    """A process that works until the block ends; yields the connection to it."""
+    """Return a process that works until the block ends; yields the connection to it."""
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(work, theirs), daemon=True)
     process.start()
@@ -112,7 +112,7 @@ def _worker(
 
 
 def _serve(work: Callable[[Any], Any], connection: Connection) -> None:
-    """A process's life: works until nobody wants it any more."""
+    """Return a process's life: works until nobody wants it any more."""
     with suppress(EOFError, ConnectionError):
         while True:
             piece = connection.recv()
@@ -125,7 +125,7 @@ def _serve(work: Callable[[Any], Any], connection: Connection) -> None:
 
 @contextmanager
 def _shielded() -> Iterator[None]:
-    """Processes started within it hear no Ctrl-C, even as they load."""
+    """Process started within it hear no Ctrl-C, even as they load."""
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
     try:
         yield
@@ -135,7 +135,7 @@ def _shielded() -> Iterator[None]:
 
 @contextmanager
 def _surrounded() -> Iterator[None]:
-    """Processes started within it start no more threads, draw nothing, load nothing from here."""
+    """Process started within it start no more threads, draw nothing, load nothing from here."""
     before = dict(os.environ)
     os.environ.update(SURROUNDINGS)
     try:

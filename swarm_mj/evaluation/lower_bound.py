@@ -17,7 +17,7 @@ class ConnectivityFloor:
     """
 
     def __init__(self, num_missions: int, num_robots: int, range_m: float) -> None:
-        """Starts before the first window: nobody knows anyone; neighbours are within `range_m`."""
+        """Start before the first window: nobody knows anyone; neighbours are within `range_m`."""
         self._timestamp = np.full((num_missions, num_robots, num_robots), NEVER)
         self._range_m = range_m
 
@@ -75,7 +75,7 @@ def _pool(
     now: float,
     newest: Float[np.ndarray, "N"],
 ) -> None:
-    """Gives every member the newest that any of them knows, and `now` of the members."""
+    """Give every member the newest that any of them knows, and `now` of the members."""
     newest[:] = timestamp[members[0]]
     for i in members[1:]:
         for j in range(newest.shape[0]):

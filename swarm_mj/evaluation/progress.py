@@ -33,7 +33,7 @@ def start(path: Path, header: dict[str, Any]) -> None:
 
 
 def append(path: Path, header: dict[str, Any], index: int, costs: BatchCosts) -> None:
-    """Adds what a batch cost, by its index among the study's; raises OSError if that cannot be."""
+    """Add what a batch cost, by its index among the study's; raises OSError if that cannot be."""
     append_bytes(path, _line(_json(header), {"batch": index, "costs": asdict(costs)}))
 
 
@@ -92,13 +92,13 @@ class _Flown:
 
 
 def _line(first: bytes, content: dict[str, Any]) -> bytes:
-    """A line; `first` is the JSON of the file's first."""
+    """Return a line; `first` is the JSON of the file's first."""
     text = _json(content)
     return _digest(first + text) + b" " + text + b"\n"
 
 
 def _checked(first: bytes, line: bytes) -> bytes:
-    """The JSON of a line; raises ValueError if its digest does not say so."""
+    """Return the JSON of a line; raises ValueError if its digest does not say so."""
     digest, _, text = line.partition(b" ")
     if digest != _digest(first + text):
         raise ValueError("a line does not have its digest")

@@ -146,7 +146,7 @@ def read_results(path: Path) -> list[Result]:
 
 
 def write_csv(path: Path, results: Sequence[Result]) -> None:
-    """Writes results as the rows of a CSV file, replaced if it exists; None is an empty cell.
+    """Write results as the rows of a CSV file, replaced if it exists; None is an empty cell.
 
     Raises:
         OSError: The file cannot be written.
@@ -157,7 +157,7 @@ def write_csv(path: Path, results: Sequence[Result]) -> None:
 def write_json(
     path: Path, results: Sequence[Result], missions: Sequence[Mapping[str, Sequence[float]]]
 ) -> None:
-    """Writes `{"results": [...]}`; what does not exist is null.
+    """Write `{"results": [...]}`; what does not exist is null.
 
     Args:
         path: The file, replaced if it exists.
@@ -182,7 +182,7 @@ def _result(place: str, row: dict[str, str]) -> Result:
 
 
 def _value(spec: Field[Any], text: str) -> Any:  # noqa: ANN401 - any field's value
-    """A cell as its field's type; raises ValueError if it is not, or out of its range."""
+    """Return a cell as its field's type; raises ValueError if it is not, or out of its range."""
     if text == "" and NoneType in get_args(spec.type):
         return None
     kind = kind_of(spec)
@@ -209,5 +209,5 @@ def _number(spec: Field[Any], kind: type, text: str) -> int | float | None:
 
 
 def _least(spec: Field[Any]) -> float:
-    """A difference may be less than nothing."""
+    """Return a difference may be less than nothing."""
     return -MOST if "difference" in spec.name else LEAST

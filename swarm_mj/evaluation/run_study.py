@@ -67,7 +67,7 @@ def fly_study(
 
 
 def write_evaluated(path: Path, evaluated: Sequence[Evaluated]) -> None:
-    """Writes results and what each mission cost, as JSON."""
+    """Write results and what each mission cost, as JSON."""
     missions = [
         {"episode_aoi": each.aoi, "episode_velocity_variance": each.velocity_variance}
         | ({} if each.task_cost is None else {"episode_task_cost": each.task_cost})

@@ -50,7 +50,7 @@ def standard_deviation(samples: Float[np.ndarray, "n"]) -> float | None:
 
 
 def standard_error(samples: Float[np.ndarray, "n"]) -> float | None:
-    """The mean's standard error, std / sqrt(n); None of fewer than two samples."""
+    """Return the mean's standard error, std / sqrt(n); None of fewer than two samples."""
     std = standard_deviation(samples)
     return None if std is None else std / math.sqrt(samples.size)
 

@@ -159,6 +159,6 @@ class Study:
         return json.loads(json.dumps(header))
 
     def _own_names(self) -> list[str]:
-        """The names of all parts that are the user's own."""
+        """Return the names of all parts that are the user's own."""
         own = [name for name in self.policies if is_own_policy(name)]
         return [*own, *self.features, *self.parts.named.values()]

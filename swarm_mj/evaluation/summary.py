@@ -37,7 +37,7 @@ class Evaluated:
 def summarise(
     study: Study, costs: Mapping[int, BatchCosts], made_by: Mapping[str, Any]
 ) -> list[Evaluated]:
-    """The results of a study, one per policy and regime: regime by regime, policy by policy.
+    """Return the results of a study, one per policy and regime: regime by regime, policy by policy.
 
     Args:
         study: What was asked for.
@@ -164,7 +164,7 @@ def _bytes(costs: BatchCosts, regime: Mission, policy: Policy) -> dict[str, Any]
 
 
 def _per_packet(counts: Sequence[int | None], sent: int) -> float | None:
-    """A count over the packets sent; None if it does not apply to them, or none was sent."""
+    """Return a count over the packets sent; None if it does not apply to them, or none was sent."""
     applicable = [count for count in counts if count is not None]
     return sum(applicable) / sent if applicable and sent else None
 
@@ -196,7 +196,7 @@ def _differences(costs: BatchCosts, baseline: BatchCosts) -> dict[str, Any]:
 
 
 def _published(policy: str, regime: Mission | None) -> dict[str, Any]:
-    """The paper's values; none for missions with parts of the user's own."""
+    """Return the paper's values; none for missions with parts of the user's own."""
     points = {} if regime is None else published(policy, regime)
     return {
         f"published_{cost}_{figure}": getattr(points[cost], figure) if cost in points else None

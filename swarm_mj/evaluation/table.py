@@ -27,7 +27,7 @@ def results_text(results: Sequence[Result]) -> str:
 
 
 def print_results(results: Sequence[Result], **where: Any) -> None:
-    """Prints a table per regime; results of a regime stand together.
+    """Print a table per regime; results of a regime stand together.
 
     Args:
         results: One or more.
@@ -49,7 +49,7 @@ def print_results(results: Sequence[Result], **where: Any) -> None:
 
 
 def _regime(result: Result) -> str:
-    """A table's title."""
+    """Return a table's title."""
     parts = {name: getattr(result, name) for name in ("radio", "channel", "controller", "scene")}
     rate = result.bit_rate
     parts |= {"bit rate": bits_per_second(rate)} if rate is not None else {}
@@ -91,7 +91,7 @@ COLUMNS: dict[str, Callable[[Result], str]] = {
 
 
 def _columns_of(result: Result) -> dict[str, Callable[[Result], str]]:
-    """A task's own columns: what it costs, if anything, or else what the paper says."""
+    """Return a task's own columns: what it costs, if anything, or else what the paper says."""
     if _has_own_cost(result):
         return {
             "task cost\nat the end": lambda r: (
@@ -117,13 +117,13 @@ def _has_own_cost(result: Result) -> bool:
 
 
 def _name(result: Result) -> str:
-    """A policy's name; below it its option, or what its packets carry beyond T, M and P."""
+    """Return a policy's name; below it its option, or what its packets carry beyond T, M and P."""
     name = result.policy.replace(" --", "\n  --")
     return f"{name}\n  + {result.payload}" if carries_more(result) else name
 
 
 def _reached(result: Result) -> float | None:
-    """The share of packets that reached whom they were meant for; of broadcasts, anyone."""
+    """Return the share of packets that reached whom they were meant for; of broadcasts, anyone."""
     return result.heard_ratio if result.delivery_ratio is None else result.delivery_ratio
 
 
@@ -138,7 +138,7 @@ def _sent(results: Sequence[Result]) -> list[str]:
 
 
 def _published(result: Result) -> str:
-    """The paper's age and, of flocks, its velocity variance below."""
+    """Return the paper's age and, of flocks, its velocity variance below."""
     age = _with_error(result.published_aoi_mean, result.published_aoi_sem)
     if result.published_velocity_variance_mean is None:
         return age

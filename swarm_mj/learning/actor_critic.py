@@ -50,7 +50,7 @@ class GnnActorCritic(ActorCriticPolicy):
         )
 
     def acting_network(self) -> AggregationGnn:
-        """A copy of the network that acts, without what values."""
+        """Return a copy of the network that acts, without what values."""
         with torch.device("meta"):  # draws no random numbers
             network = FastAggregationGnn(self._shape)
         weights = {name: t.detach().cpu().clone() for name, t in self.network.state_dict().items()}
@@ -112,7 +112,7 @@ class GnnActorCritic(ActorCriticPolicy):
         return self(observation, deterministic)[0]
 
     def predict_values(self, obs: PyTorchObs) -> Float[Tensor, "E"]:
-        """The environments' values."""
+        """Return the environments' values."""
         return self.logits_and_value(obs)[1]
 
 
@@ -144,7 +144,7 @@ class TeamActorCritic(GnnActorCritic):
 
 
 def boltzmann_sample(logits: Float[Tensor, "*rows N"]) -> Int[Tensor, "*rows"]:
-    """A draw from each row's Boltzmann distribution, by its cumulated probabilities."""
+    """Return a draw from each row's Boltzmann distribution, by its cumulated probabilities."""
     cumulated = logits.double().softmax(-1).cumsum(-1)
     uniform = torch.rand(*logits.shape[:-1], 1, device=logits.device)  # below 1 by more than ...
     return (cumulated <= uniform * cumulated[..., -1:]).sum(-1)  # ... a double's rounding
@@ -153,7 +153,7 @@ def boltzmann_sample(logits: Float[Tensor, "*rows N"]) -> Int[Tensor, "*rows"]:
 def log_probability(
     logits: Float[Tensor, "E *robots N"], actions: Int[Tensor, "E *robots"]
 ) -> Float[Tensor, "E"]:
-    """The log-probability of each environment's actions, summed over its robots."""
+    """Return the log-probability of each environment's actions, summed over its robots."""
     chosen = logits.log_softmax(-1).gather(-1, actions[..., None]).squeeze(-1)
     return chosen.flatten(1).sum(1) if chosen.dim() > 1 else chosen
 

@@ -147,7 +147,7 @@ class TrainingCallback(BaseCallback):
         self._goes_on = self._listener(status) and self._goes_on
 
     def between_rollouts(self, *, is_last: bool) -> None:
-        """Evaluates, records a replay and keeps a checkpoint, each if it is due."""
+        """Evaluate, records a replay and keeps a checkpoint, each if it is due."""
         progress, decisions, logged = self._progress, self.decisions, self.logger.name_to_value
         _check_finite(self._ppo, decisions)
         progress.decisions = decisions
@@ -176,7 +176,7 @@ class TrainingCallback(BaseCallback):
         self._saved_s = time.monotonic()
 
     def _count_time(self) -> None:
-        """Moves the time since the last call into the progress."""
+        """Move the time since the last call into the progress."""
         now_s = time.monotonic()
         self._progress.minutes += (now_s - self._counted_s) / 60.0
         self._progress.since_evaluation.seconds += now_s - self._counted_s
@@ -242,7 +242,7 @@ class TrainingCallback(BaseCallback):
             raise Stopped
 
     def _keep(self, row: Row, costs: HeldOut, how: dict[str, Any]) -> None:
-        """Stores the policy of an evaluation, with what it costs, and where."""
+        """Store the policy of an evaluation, with what it costs, and where."""
         training, decisions = self._training, int(row["decisions"])
         config = PolicyConfig(
             network=training.network,
@@ -262,7 +262,7 @@ class TrainingCallback(BaseCallback):
 
 
 def _check_finite(model: PPO, decisions: int) -> None:
-    """Raises ValueError if training has diverged; the last checkpoint is from before that."""
+    """Raise ValueError if training has diverged; the last checkpoint is from before that."""
     if not all(torch.isfinite(weight).all() for weight in model.policy.parameters()):
         raise ValueError(
             f"the network's weights are no longer finite after {decisions} decisions; begin a new "

@@ -42,7 +42,7 @@ def save(
     progress: Progress,
     networks: Networks,
 ) -> None:
-    """Writes a checkpoint; call it between rollouts. `rng` draws the missions' seeds.
+    """Write a checkpoint; call it between rollouts. `rng` draws the missions' seeds.
 
     Raises:
         OSError: The file cannot be written.
@@ -76,7 +76,7 @@ def save(
 def load(
     path: Path, training: Training, model: PPO, rng: np.random.Generator
 ) -> tuple[Progress, Networks]:
-    """Puts a model and its missions, made of these settings, back to where a checkpoint was made.
+    """Put a model and its missions, made of these settings, back to where a checkpoint was made.
 
     Returns where the run stands, and the networks of its candidates.
 
@@ -101,13 +101,13 @@ def load(
 
 
 def acting_network(model: PPO) -> AggregationGnn:
-    """A copy of the network that acts."""
+    """Return a copy of the network that acts."""
     assert isinstance(model.policy, GnnActorCritic)
     return model.policy.acting_network()
 
 
 def _networks(state: dict[str, Any], model: PPO) -> Networks:
-    """The candidates'."""
+    """Return the candidates'."""
     networks = {}
     for at, weights in state["candidates"].items():
         networks[at] = acting_network(model)
@@ -125,7 +125,7 @@ def _most_bytes(model: PPO) -> int:
 
 
 def _read(path: Path, most_bytes: int) -> dict[str, Any]:
-    """Raises ValueError for what is no whole checkpoint of this version."""
+    """Raise ValueError for what is no whole checkpoint of this version."""
     state: Any = read_torch(path, most_bytes)
     version = state.get("version") if isinstance(state, dict) else None
     if not isinstance(version, int):
@@ -158,7 +158,7 @@ def _restore(state: dict[str, Any], model: PPO, rng: np.random.Generator) -> Non
 
 
 def _normaliser_state(model: PPO) -> dict[str, Any] | None:
-    """The running variance of returns, if rewards are normalised."""
+    """Return the running variance of returns, if rewards are normalised."""
     env = model.get_env()
     if not isinstance(env, VecNormalize):
         return None

@@ -54,7 +54,7 @@ class _Running:
 
 
 def check_state(state: Mapping[str, Any], model: PPO) -> Progress:
-    """Passes for the state of a model's run; returns where that run stands.
+    """Pass for the state of a model's run; returns where that run stands.
 
     Raises:
         ValueError: It is not.
@@ -133,7 +133,7 @@ def _check_normaliser(state: Mapping[str, Any] | None, model: PPO) -> None:
 
 
 def _check_tensors(given: Mapping[str, Any], expected: Mapping[str, Tensor]) -> None:
-    """Passes for plain and finite tensors of the same names, shapes and kinds, else ValueError."""
+    """Pass for plain and finite tensors of the same names, shapes and kinds, else ValueError."""
     if given.keys() != expected.keys():
         raise ValueError(f"it must have {', '.join(expected)}")
     for name, wanted in expected.items():

@@ -39,7 +39,7 @@ class HeldOut:
 
 
 def held_out_policy(training: Training, network: AggregationGnn, mission: Mission) -> LearnedPolicy:
-    """The policy under training, as it flies."""
+    """Return the policy under training, as it flies."""
     extractor = make_extractor(training.features, mission)
     return LearnedPolicy(network, extractor, silence_logit=training.silence_logit)
 
@@ -91,7 +91,7 @@ def means(training: Training, costs: Flown) -> HeldOut:
 def record_replay(
     training: Training, network: AggregationGnn, decisions: int, folder: Path
 ) -> None:
-    """Records the first held-out mission, as the network flies it after so many team decisions."""
+    """Record the first held-out mission, as the network flies it after so many team decisions."""
     from swarm_mj.replay.write import write_replay  # rerun takes its time to import
 
     mission = held_out_missions(training)[0]
@@ -142,7 +142,7 @@ def _mean(by_size: Sequence[Float[np.ndarray, "windows B"]]) -> float:
 
 
 def _standard_error(by_size: Sequence[Float[np.ndarray, "B"]]) -> float | None:
-    """The standard error of the mean over sizes; sizes differ, but they are not drawn."""
+    """Return the standard error of the mean over sizes; sizes differ, but they are not drawn."""
     errors = [standard_error(each) for each in by_size]
     known = [error for error in errors if error is not None]
     return math.hypot(*known) / len(known) if len(known) == len(errors) else None

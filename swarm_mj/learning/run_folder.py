@@ -88,7 +88,7 @@ class Accumulator:
     delivered: Count = 0
 
     def add(self, batches: Iterable[WindowCosts]) -> None:
-        """Adds a window of all missions, but no time."""
+        """Add a window of all missions, but no time."""
         for costs in batches:
             self.decisions += len(costs.age_windows)
             self.age_windows += float(costs.age_windows.sum())
@@ -134,7 +134,7 @@ class Progress:
 
 
 def write_run(folder: Path, run: Run) -> None:
-    """Writes a run's `settings.json`.
+    """Write a run's `settings.json`.
 
     Raises:
         OSError: The folder cannot be written.
@@ -179,7 +179,7 @@ def read_run(folder: Path, named: Collection[str] = ()) -> Run:
 
 
 def check_new(folder: Path) -> None:
-    """Passes if a run can begin in a folder.
+    """Pass if a run can begin in a folder.
 
     Raises:
         ValueError: It holds a run, or anything else.
@@ -197,7 +197,7 @@ def check_new(folder: Path) -> None:
 
 
 def check_begun(folder: Path) -> None:
-    """Passes if a run that has begun can go on in a folder.
+    """Pass if a run that has begun can go on in a folder.
 
     Raises:
         ValueError: Its checkpoint is lost, or it has links that lead out of the folder, through
@@ -217,7 +217,7 @@ def check_begun(folder: Path) -> None:
 
 
 def write_curve(path: Path, curve: list[dict[str, float]]) -> None:
-    """Writes a learning curve, one row an evaluation; later rows may have more columns.
+    """Write a learning curve, one row an evaluation; later rows may have more columns.
 
     Raises:
         OSError: The file cannot be written.

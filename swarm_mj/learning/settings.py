@@ -173,7 +173,7 @@ class Training:
 
 
 def usual_settings(arm: str, mission: Mission, robots: Sequence[int], seed: int = 0) -> Training:
-    """The usual settings of credit per `robot` or per `team`, the paper's way (III-C).
+    """Return the usual settings of credit per `robot` or per `team`, the paper's way (III-C).
 
     The mission's preset says whose way, where they differ; `dataclasses.replace` changes some.
 

@@ -125,7 +125,7 @@ def _policy_settings(training: Training) -> dict[str, Any]:
 
 
 def decayed_rate(ppo: PpoSettings, num_epochs: int) -> float:
-    """The learning rate after so many passes: it falls in steps of the optimiser (III-C)."""
+    """Return the learning rate after so many passes: it falls in steps of the optimiser (III-C)."""
     share = ppo.decay ** (num_epochs * ppo.num_minibatches // ppo.decay_steps)
     return ppo.learning_rate * max(share, ppo.least_share)
 
@@ -179,7 +179,7 @@ def _learn(model: PPO, limits: Limits, callback: TrainingCallback) -> None:
 def _begun(
     folder: Path, run: Run, model: PPO, rng: np.random.Generator
 ) -> tuple[Progress, checkpoint.Networks]:
-    """Takes a run to its last checkpoint, or else to its beginning; then it can be resumed.
+    """Take a run to its last checkpoint, or else to its beginning; then it can be resumed.
 
     Nothing is written before all that is read has been checked.
     """

@@ -38,7 +38,7 @@ class Stream:
     def __init__(
         self, rngs: Sequence[np.random.Generator], draw: Draw, shape: tuple[int, ...]
     ) -> None:
-        """Prepares the stream.
+        """Prepare the stream.
 
         Args:
             rngs: One generator per mission.

@@ -64,7 +64,7 @@ def load(kind: str, name: str) -> Any:  # noqa: ANN401 - whatever has that name
 
 
 def make(kind: str, name: str, mission: Mission) -> Any:  # noqa: ANN401 - any kind of part
-    """A user's own part for a mission.
+    """Return a user's own part for a mission.
 
     What `name` names is called with the mission, or with nothing if it needs no argument. A
     function of two arguments, or an object like one, is the part itself. Either may be a
@@ -86,7 +86,7 @@ def make(kind: str, name: str, mission: Mission) -> Any:  # noqa: ANN401 - any k
 
 
 def digest(name: str) -> str:
-    """A hash of the file that holds a part which was loaded; empty if there is none."""
+    """Return a hash of the file that holds a part which was loaded; empty if there is none."""
     file = getattr(sys.modules.get(name.partition(":")[0]), "__file__", None)
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()[:12] if file else ""
 
@@ -117,7 +117,7 @@ class OwnParts:
         return "".join(f", {kind} {name}" for kind, name in self.named.items())
 
     def made(self, mission: Mission) -> dict[str, Any]:
-        """The parts themselves, as `Swarm` takes them.
+        """Return the parts themselves, as `Swarm` takes them.
 
         Raises:
             ValueError: As for `make`, or a channel would take the place of what the mission asks.
@@ -152,7 +152,7 @@ def one_line_each() -> Iterator[None]:
 
 
 def _check_form(kind: str, name: str) -> None:
-    """Raises ValueError, with what it should be, unless a name has the form of one."""
+    """Raise ValueError, with what it should be, unless a name has the form of one."""
     module, _, attribute = name.partition(":")
     if module.endswith(".py"):
         dotted = module.removesuffix(".py").removeprefix("./").replace("/", ".")
@@ -169,7 +169,7 @@ def _check_form(kind: str, name: str) -> None:
 
 
 def _import(kind: str, name: str, module_name: str) -> ModuleType:
-    """Imports a part's module; the current folder comes first from now on, as for `python -m`."""
+    """Import a part's module; the current folder comes first from now on, as for `python -m`."""
     here = os.getcwd()
     if here not in sys.path:
         sys.path.insert(0, here)
@@ -208,7 +208,7 @@ def _said(error: BaseException, modules: list[str]) -> str:
 
 
 def _modules_within(error: BaseException) -> list[str]:
-    """The modules of parts that an exception came through, the innermost first."""
+    """Return the modules of parts that an exception came through, the innermost first."""
     names = [f.f_globals.get("__name__") for f, _ in traceback.walk_tb(error.__traceback__)]
     return [name for name in reversed(names) if name in _loaded]
 
@@ -248,7 +248,7 @@ def _num_needed(found: Callable[..., Any]) -> int:
 
 
 def _whole(found: object) -> object:
-    """The function or class that a partial one is made of."""
+    """Return the function or class that a partial one is made of."""
     while isinstance(found, partial):
         found = found.func
     return found

@@ -10,7 +10,7 @@ ROOT = -1  # the parent of the root
 
 @compiled()
 def squared_distance(position_m: Float[np.ndarray, "N 2"], i: int, j: int) -> float:
-    """The square of how far two robots are apart [m²]."""
+    """Return the square of how far two robots are apart [m²]."""
     dx = position_m[i, 0] - position_m[j, 0]
     dy = position_m[i, 1] - position_m[j, 1]
     return dx * dx + dy * dy

@@ -13,7 +13,7 @@ from swarm_mj.mission.specification import OPEN, Boundary, Mission, PhysicsMode,
 
 
 def paper(task: Task = "flocking", **overrides: Any) -> Mission:
-    """The paper's text, taken literally.
+    """Return the paper's text, taken literally.
 
     Args:
         task: What the robots do; a flock has no boundary unless `overrides` give it one.
@@ -65,7 +65,7 @@ def reference(task: Task = "flocking", **overrides: Any) -> Mission:
 
 
 def world(preset: str, task: Task = "random-walk", **overrides: Any) -> Mission:
-    """A mission of the paper's text in an arena, with the channel that goes with it.
+    """Return a mission of the paper's text in an arena, with the channel that goes with it.
 
     Args:
         preset: One of `WORLDS`.

@@ -23,7 +23,7 @@ def num_failures(mission: Mission) -> int:
 
 
 def failure_window(mission: Mission) -> int:
-    """The window at whose start they fail, counted from 0 [windows]."""
+    """Return the window at whose start they fail, counted from 0 [windows]."""
     return mission.num_windows // 2
 
 

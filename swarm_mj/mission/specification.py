@@ -42,7 +42,7 @@ def _quantity(
     high: float,
     help: str = "",
 ) -> FieldOf:
-    """A number of the mission: name in words, unit, source, range; with help, an option."""
+    """Return a number of the mission: name in words, unit, source, range; with help, an option."""
     return setting(default, help, label=label, unit=unit, source=source, low=low, high=high)
 
 
@@ -52,7 +52,7 @@ def _choice(default: str, label: str, source: str, choices: object, help: str = 
 
 
 def _radio(default: float, label: str, unit: str, low: float, high: float, help: str) -> FieldOf:
-    """A number of the channel beyond free space, an option under its own heading."""
+    """Return a number of the channel beyond free space, an option under its own heading."""
     spec = {"label": label, "unit": unit, "source": "not the paper's", "low": low, "high": high}
     return setting(default, help, group=CHANNEL, **spec)
 

@@ -69,7 +69,7 @@ def notes_on(mission: Mission) -> list[str]:
 
 
 def blocks(spec: MjSpec, mission: Mission) -> None:
-    """A city: square blocks with streets between them and around them."""
+    """Return a city: square blocks with streets between them and around them."""
     num = max(1, round(mission.side_m / BLOCK_PITCH_M))
     pitch_m = mission.side_m / num
     for x, y in _grid(num, pitch_m):
@@ -77,7 +77,7 @@ def blocks(spec: MjSpec, mission: Mission) -> None:
 
 
 def rooms(spec: MjSpec, mission: Mission) -> None:
-    """An office floor: square rooms, with a door in the middle of every wall between two."""
+    """Return an office floor: square rooms, with a door in the middle of every wall between two."""
     num = max(1, round(mission.side_m / ROOM_M))
     side_m = mission.side_m / num
     half_m = (side_m - DOOR_M) / 4.0  # of the wall on either side of a door
@@ -172,7 +172,7 @@ def _why_none(theirs: MjSpec) -> str:
 
 
 def _grid(num: int, pitch_m: float) -> Iterator[tuple[float, float]]:
-    """The middles of num by num squares around the origin [m]."""
+    """Return the middles of num by num squares around the origin [m]."""
     middles = [(n - (num - 1) / 2.0) * pitch_m for n in range(num)]
     yield from ((x, y) for x in middles for y in middles)
 
@@ -184,7 +184,7 @@ def _add(
     centre_m: tuple[float, float],
     size_m: tuple[float, float],
 ) -> None:
-    """Adds an upright obstacle."""
+    """Add an upright obstacle."""
     if spec.material(material) is None:
         spec.add_material(name=material, rgba=COLOURS[material])
     spec.worldbody.add_geom(
@@ -199,7 +199,7 @@ def _add(
 
 
 def _halton(n: int, base: int) -> float:
-    """The n-th point of the van der Corput sequence, in (0, 1)."""
+    """Return the n-th point of the van der Corput sequence, in (0, 1)."""
     share, point = 1.0 / base, 0.0
     while n > 0:
         n, digit = divmod(n, base)

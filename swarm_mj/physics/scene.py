@@ -49,7 +49,7 @@ def num_substeps(mission: Mission) -> int:
 def compose(
     mission: Mission, start: RobotStates | None = None, *, scene: Scene | None = None
 ) -> MjSpec:
-    """The arena at the mission's size with its N robots, ready to compile.
+    """Return the arena at the mission's size with its N robots, ready to compile.
 
     Args:
         mission: Number of robots, area, bounds and physics.
@@ -120,7 +120,7 @@ def _movable(spec: MjSpec) -> list[str]:
 
 
 def _place_robots(spec: MjSpec, mission: Mission, start: RobotStates) -> None:
-    """Puts the robots at their start: as the model's own pose, and with velocities as a keyframe.
+    """Put the robots at their start: as the model's own pose, and with velocities as a keyframe.
 
     A viewer opens a model in its own pose and loads a keyframe only when told to.
     """
@@ -157,7 +157,7 @@ def _scale_arena(spec: MjSpec, mission: Mission) -> None:
 
 
 def _fit_robot(robot: MjSpec, mission: Mission) -> None:
-    """Sets the robot's beacon, the mission's bounds on it, and in `contact` its elastic walls."""
+    """Set the robot's beacon, the mission's bounds on it, and in `contact` its elastic walls."""
     step_s = timestep_s(mission)
     robot.option.timestep = step_s
     beacon_m = BEACON_RADIUS_M * max(1.0, mission.side_m / MISSION_DISTANCE_M)

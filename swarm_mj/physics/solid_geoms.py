@@ -99,7 +99,7 @@ def _half_sides_m(kind: int, size_m: Float[np.ndarray, "3"]) -> Float[np.ndarray
 
 
 def loss_db_of(model: MjModel, g: int) -> float:
-    """An obstacle's penetration loss [dB].
+    """Return an obstacle's penetration loss [dB].
 
     Raises:
         ValueError: It is negative or not finite.

@@ -18,7 +18,7 @@ class RobotStates:
     is_active: Bool[np.ndarray, "B N"] | None = None  # who observes and talks; None: everyone
 
     def copy(self) -> "RobotStates":
-        """The same in arrays of its own."""
+        """Return the same in arrays of its own."""
         return RobotStates(
             position_m=self.position_m.copy(),
             velocity_mps=self.velocity_mps.copy(),

@@ -80,7 +80,7 @@ class Physics:
     def place(
         self, position_m: Float[np.ndarray, "B N 2"], velocity_mps: Float[np.ndarray, "B N 2"]
     ) -> None:
-        """Starts all worlds anew from these states.
+        """Start all worlds anew from these states.
 
         Args:
             position_m: p_0 [m].
@@ -105,7 +105,7 @@ class Physics:
         self._states = replace(self._states, is_active=is_active)
 
     def step(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> RobotStates:
-        """Moves all robots through one window (Eq. 15).
+        """Move all robots through one window (Eq. 15).
 
         Args:
             acceleration_mps2: u, clipped to plus or minus A_max [m/s²].
@@ -124,7 +124,7 @@ class Physics:
         return self._states
 
     def _check_vectors(self, what: str, given: np.ndarray) -> None:
-        """Raises ValueError unless there is one finite vector per robot."""
+        """Raise ValueError unless there is one finite vector per robot."""
         expected = self._states.position_m.shape
         if np.shape(given) != expected:
             raise ValueError(
@@ -177,7 +177,7 @@ class Physics:
 
 
 def _check_apart(position_m: Float[np.ndarray, "B N 2"]) -> None:
-    """Raises ValueError if bodies overlap: such a start would fling them apart."""
+    """Raise ValueError if bodies overlap: such a start would fling them apart."""
     for b, team_m in enumerate(position_m):
         overlaps = np.flatnonzero(overlaps_earlier(team_m, 2.0 * ROBOT_RADIUS_M))
         if len(overlaps) > 0:

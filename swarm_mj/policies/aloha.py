@@ -25,7 +25,7 @@ class Aloha(RandomTransmission, BroadcastPolicy):
     uses = "how many neighbours its buffer shows"
 
     def __init__(self, probability: float, *, range_m: float) -> None:
-        """Prepares the policy.
+        """Prepare the policy.
 
         Args:
             probability: That anyone of a neighbourhood broadcasts in a slot.

@@ -23,7 +23,7 @@ class InnovationGossip(RandomTransmission, BroadcastPolicy):
     uses = "how much it has learned since it last transmitted"
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Gives every robot its own numbers, and all to tell; arguments as in `Policy.start`."""
+        """Give every robot its own numbers, and all to tell; arguments as in `Policy.start`."""
         super().start(num_robots, rngs)
         self._told = np.zeros((len(rngs), num_robots))  # mean T at the last broadcast [windows]
 

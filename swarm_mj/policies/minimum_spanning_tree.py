@@ -22,7 +22,7 @@ class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
     def __init__(
         self, probability: float, *, is_recomputed: bool = False, root_transmits: bool = False
     ) -> None:
-        """Prepares the policy.
+        """Prepare the policy.
 
         Args:
             probability: Of a robot's transmission, in each window.
@@ -44,7 +44,7 @@ class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
         self._parent = None
 
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
-        """The parent, for each robot that draws a transmission."""
+        """Return the parent, for each robot that draws a transmission."""
         if self._parent is None or self._is_recomputed:
             self._parent = spanning_tree(states.position_m)
         rootless = np.int64(views.num_robots - 1) if self._root_transmits else views.silence

@@ -45,7 +45,7 @@ class MlpShape:
         check_num_features(self.num_features, self.features)
 
     def tensors(self) -> dict[str, tuple[int, ...]]:
-        """The weights' names and shapes."""
+        """Return the weights' names and shapes."""
         inputs = self.num_robots * (1 + self.num_features)
         widths = [inputs, *self.hidden, self.num_robots]
         shapes: dict[str, tuple[int, ...]] = {}
@@ -65,7 +65,7 @@ class MlpPolicy(DecentralisedPolicy):
         *,
         is_deterministic: bool = False,
     ) -> None:
-        """Takes weights of that shape, and what makes the features that they were trained on."""
+        """Take weights of that shape, and what makes the features that they were trained on."""
         self._shape = shape
         self._weights = weights
         self._extractor = extractor

@@ -41,7 +41,7 @@ class MlpConfig:
 
 
 def save_mlp(folder: Path, weights: Weights, config: MlpConfig) -> None:
-    """Writes a plain network as a policy, whole or not at all; a policy there is replaced.
+    """Write a plain network as a policy, whole or not at all; a policy there is replaced.
 
     Raises:
         ValueError: `load_mlp` would not take it, or the folder holds other files than a policy's.
@@ -58,7 +58,7 @@ def save_mlp(folder: Path, weights: Weights, config: MlpConfig) -> None:
 
 
 def read_mlp(folder: Path) -> tuple[Weights, MlpConfig]:
-    """A plain network's weights and config.
+    """Return a plain network's weights and config.
 
     Raises:
         ValueError: There is none, or it is damaged, foreign, oversized or of a newer version.
@@ -82,7 +82,7 @@ def load_mlp(
     is_deterministic: bool = False,
     features: Sequence[str] = (),
 ) -> MlpPolicy:
-    """A plain network, ready to fly a mission with as many robots as it was trained on.
+    """Return a plain network, ready to fly a mission with as many robots as it was trained on.
 
     Feature sets of one's own are imported only if their names are among `features`.
 
@@ -112,6 +112,6 @@ def _weights(data: bytes) -> Weights:
 
 
 def _check(weights: Weights, shape: MlpShape) -> None:
-    """Raises ValueError unless these are the weights of a network of that shape, all finite."""
+    """Raise ValueError unless these are the weights of a network of that shape, all finite."""
     expected = {name: kind_of_tensor(size, "float32") for name, size in shape.tensors().items()}
     check_tensors(expected, weights, lambda values: np.all(np.isfinite(values)))

@@ -16,7 +16,7 @@ EDGES = {
 
 
 def model_card(config: PolicyConfig) -> str:
-    """A README in Markdown that says what the config holds, and nothing else.
+    """Return a README in Markdown that says what the config holds, and nothing else.
 
     Of `training` and `evaluation` it lists every value, under dotted names; a text named `command`
     becomes a block.
@@ -84,7 +84,7 @@ def _card(
 
 
 def _task(training: Mapping[str, Any]) -> str:
-    """The task that a network was trained on, if that is known."""
+    """Return the task that a network was trained on, if that is known."""
     return next((v for k, v in training.items() if v and _is_text(k, v, "task")), "TASK")
 
 

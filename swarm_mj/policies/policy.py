@@ -60,7 +60,7 @@ class Policy:
         return {}
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Prepares for new missions; policies that draw or remember say more.
+        """Prepare for new missions; policies that draw or remember say more.
 
         Args:
             num_robots: N.
@@ -155,7 +155,7 @@ class RandomTransmission(Policy):
     """What policies share whose robots draw whether they transmit."""
 
     def __init__(self, probability: float) -> None:
-        """Takes the probability, whose meaning is each policy's own.
+        """Take the probability, whose meaning is each policy's own.
 
         Raises:
             ValueError: The probability is not in [0, 1].
@@ -170,5 +170,5 @@ class RandomTransmission(Policy):
         return {"probability": self._probability}
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Gives every robot its own stream of numbers; arguments as in `Policy.start`."""
+        """Give every robot its own stream of numbers; arguments as in `Policy.start`."""
         self._stream = Stream(rngs, uniform, (num_robots,))

@@ -35,7 +35,7 @@ class PolicyConfig:
 
 
 def to_json(config: PolicyConfig) -> str:
-    """The text of a `config.json`.
+    """Return the text of a `config.json`.
 
     Raises:
         ValueError: `from_json` would not take it: something in it is no JSON, or no finite number.

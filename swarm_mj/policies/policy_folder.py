@@ -23,7 +23,7 @@ WAY_OUT = "copy it again, or make one with `swarm-mj train`"
 def write_policy(
     folder: Path, contents: Mapping[str, bytes], check: Callable[[Path], object]
 ) -> None:
-    """Writes a policy's files, whole or not at all; a policy there is replaced.
+    """Write a policy's files, whole or not at all; a policy there is replaced.
 
     Raises:
         ValueError: One is too large, or the folder holds other files than a policy's.
@@ -60,7 +60,7 @@ def present_policy(folder: Path) -> Path:
 
 
 def _check_none_below(folder: Path) -> None:
-    """Raises ValueError if a folder that is no policy holds some, by themselves or in runs."""
+    """Raise ValueError if a folder that is no policy holds some, by themselves or in runs."""
     found = sorted(
         path.parent
         for pattern in (f"*/{CONFIG}", f"*/policy/{CONFIG}")
@@ -96,7 +96,7 @@ def is_mlp(folder: Path) -> bool:
 
 
 def metadata_of(data: bytes) -> dict[str, str]:
-    """The metadata in the JSON at the head of a safetensors file; none is empty.
+    """Return the metadata in the JSON at the head of a safetensors file; none is empty.
 
     Raises:
         ValueError: It is no such file.
@@ -110,7 +110,7 @@ def metadata_of(data: bytes) -> dict[str, str]:
 def check_tensors(
     expected: Mapping[str, str], tensors: Mapping[str, Any], is_finite: Callable[[Any], object]
 ) -> None:
-    """Passes if these are a network's tensors, all of them finite.
+    """Pass if these are a network's tensors, all of them finite.
 
     Args:
         expected: Each one's shape and type as `kind_of_tensor` says them, by name.
@@ -132,12 +132,12 @@ def check_tensors(
 
 
 def kind_of_tensor(shape: Iterable[int], dtype: object) -> str:
-    """A tensor's shape and type, in words."""
+    """Return a tensor's shape and type, in words."""
     return f"{list(shape)} of {dtype}"
 
 
 def check_replaceable(folder: Path) -> None:
-    """Passes if a policy may take a folder's place; what file browsers hide in it may be lost.
+    """Pass if a policy may take a folder's place; what file browsers hide in it may be lost.
 
     Raises:
         ValueError: Something else would be lost.

@@ -24,7 +24,7 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
     uses = "nothing: it transmits with probability p"
 
     def __init__(self, probability: float, *, names_addressee: bool = False) -> None:
-        """Prepares the policy.
+        """Prepare the policy.
 
         Args:
             probability: Of a draw, in each slot.
@@ -44,7 +44,7 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
         )
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Gives every robot its own stream of numbers; arguments as in `Policy.start`."""
+        """Give every robot its own stream of numbers; arguments as in `Policy.start`."""
         self._stream = Stream(rngs, uniform, (2, num_robots))
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:

@@ -107,7 +107,7 @@ def is_learned(name: str) -> bool:
 
 
 def library_of(name: str) -> str | None:
-    """The library that the shipped policy needs and others do not, if any."""
+    """Return the library that the shipped policy needs and others do not, if any."""
     return "torch" if name == SHIPPED else None
 
 
@@ -121,12 +121,12 @@ def is_stored(name: str) -> bool:
 
 
 def stored_policies(names: Iterable[str]) -> list[Path]:
-    """The directories and files among policies' names."""
+    """Return the directories and files among policies' names."""
     return [Path(name) for name in names if is_stored(name)]
 
 
 def normalised(name: str) -> str:
-    """A policy's name as typed, but a path without what does not change where it leads."""
+    """Return a policy's name as typed, but a path without what does not change where it leads."""
     if not is_stored(name):
         return name
     plain = os.path.normpath(name)
@@ -166,7 +166,7 @@ def make_policy(
     is_deterministic: bool = False,
     features: Sequence[str] = (),
 ) -> Policy:
-    """A policy by its name on the command line.
+    """Return a policy by its name on the command line.
 
     Args:
         name: One of `POLICIES`, a directory or a file with a learned policy, or the `module:Name`
@@ -212,7 +212,7 @@ def make_policy(
 
 
 def check_used(features: Sequence[str], policies: Iterable[Policy]) -> None:
-    """Passes if own feature sets that were named are those of some policy.
+    """Pass if own feature sets that were named are those of some policy.
 
     Raises:
         ValueError: Nobody was trained on one.
@@ -229,7 +229,7 @@ def is_own_policy(name: str) -> bool:
 
 
 def _learned(name: str, mission: Mission, **options: Any) -> Policy:
-    """A trained network, which takes its libraries' time to import."""
+    """Return a trained network, which takes its libraries' time to import."""
     if name != SHIPPED and is_mlp(Path(name)):
         need("safetensors", f"policy {name}", "fly another")
         from swarm_mj.policies.mlp_folder import load_mlp
@@ -245,7 +245,7 @@ def _learned(name: str, mission: Mission, **options: Any) -> Policy:
 def _own_policy(
     name: str, mission: Mission, probability: float | None, is_deterministic: bool
 ) -> Policy:
-    """A user's own; raises ValueError as `make_policy`."""
+    """Return a user's own; raises ValueError as `make_policy`."""
     if probability is not None:
         raise ValueError(
             f"{name} takes no transmission probability; leave out {probability}, and name one "
@@ -267,6 +267,6 @@ def _is_path(name: str) -> bool:
 
 
 def _refuse(probability: float | None, name: str) -> None:
-    """Raises ValueError if a policy that has no probability is given one."""
+    """Raise ValueError if a policy that has no probability is given one."""
     if probability is not None:
         raise ValueError(f"{name} takes no transmission probability; leave out {probability}")

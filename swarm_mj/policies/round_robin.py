@@ -17,7 +17,7 @@ class RoundRobin(CentralisedPolicy):
     uses = "the true positions: a base near the middle talks to each robot in turn"
 
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
-        """The base, for the one robot whose turn it is."""
+        """Return the base, for the one robot whose turn it is."""
         missions = np.arange(len(views.now))
         base = np.argmin(np.sum(states.position_m**2, axis=2), axis=1)
         turn = views.now.astype(np.int64) % (views.num_robots - 1)

@@ -30,7 +30,7 @@ class SpatialTdma(BroadcastPolicy):
     uses = "as tdma, and the positions in its buffer: robots far enough apart share a slot"
 
     def __init__(self, *, range_m: float, threshold: float) -> None:
-        """Prepares the policy.
+        """Prepare the policy.
 
         Args:
             range_m: Distance at which a lone transmission just decodes [m].
@@ -41,7 +41,7 @@ class SpatialTdma(BroadcastPolicy):
         self._law: PowerLaw | None = None
 
     def inform(self, belief: Belief) -> None:
-        """Takes the powers that robots believe in; they are reckoned in units of the noise."""
+        """Take the powers that robots believe in; they are reckoned in units of the noise."""
         law, noise_mw = belief.law, belief.radio.noise_mw
         self._law = None if law is None else law._replace(at_1_m=law.at_1_m / noise_mw)
 

@@ -38,7 +38,7 @@ METADATA = "swarm_mj policy"  # the entry of a one-file policy's metadata that h
 def save_policy(
     path: Path, network: AggregationGnn, config: PolicyConfig, card: str | None = None
 ) -> None:
-    """Writes a policy, whole or not at all; whoever is killed leaves the old one or the new one.
+    """Write a policy, whole or not at all; whoever is killed leaves the old one or the new one.
 
     A policy there is replaced; the card is `model_card` of the config unless given. A path that
     ends in `.safetensors` becomes one file, any other a folder.
@@ -70,7 +70,7 @@ def load_policy(
     is_deterministic: bool = False,
     features: Sequence[str] = (),
 ) -> LearnedPolicy:
-    """A policy, ready to fly a mission, which may be of another kind than it was trained on.
+    """Return a policy, ready to fly a mission, which may be of another kind than it was trained on.
 
     The mission's area, duration and range normalise what the robots see. A deterministic policy
     takes the most probable recipient instead of a draw. Feature sets of one's own are imported only
@@ -99,7 +99,7 @@ def load_policy(
 
 
 def read_policy(path: Path) -> tuple[AggregationGnn, PolicyConfig]:
-    """A policy's network, with its weights, and its config; errors as of `load_policy`."""
+    """Return a policy's network, with its weights, and its config; errors as of `load_policy`."""
     present = present_policy(path)
     if present.is_file():
         try:
@@ -130,7 +130,7 @@ def _read_file(path: Path) -> tuple[AggregationGnn, PolicyConfig]:
 
 
 def _network(config: PolicyConfig, data: bytes) -> AggregationGnn:
-    """The network with the weights of a safetensors file."""
+    """Return the network with the weights of a safetensors file."""
     try:
         tensors = {name: tensor.clone() for name, tensor in load(data).items()}
     except (SafetensorError, AssertionError, KeyError, RuntimeError, ValueError) as error:
@@ -142,12 +142,12 @@ def _network(config: PolicyConfig, data: bytes) -> AggregationGnn:
 
 
 def _empty(config: PolicyConfig) -> AggregationGnn:
-    """The network without weights: it takes no memory, and draws no random numbers."""
+    """Return the network without weights: it takes no memory, and draws no random numbers."""
     with torch.device("meta"):
         return FastAggregationGnn(config.network)
 
 
 def _check(tensors: Mapping[str, torch.Tensor], network: AggregationGnn) -> None:
-    """Raises ValueError unless these are a network's tensors, all of them finite."""
+    """Raise ValueError unless these are a network's tensors, all of them finite."""
     expected = {n: kind_of_tensor(t.shape, t.dtype) for n, t in network.state_dict().items()}
     check_tensors(expected, tensors, lambda tensor: torch.isfinite(tensor).all())

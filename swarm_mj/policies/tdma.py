@@ -26,14 +26,14 @@ class Tdma(BroadcastPolicy):
         self._order = draw_order(num_robots, rngs)
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
-        """The one robot whose slot it is."""
+        """Return the one robot whose slot it is."""
         place = slot_of(views.now) % views.num_robots
         owner = self._order[np.arange(len(place)), place]
         return views.silence == owner[:, None]
 
 
 def draw_order(num_robots: int, rngs: Sequence[np.random.Generator]) -> Int[np.ndarray, "B N"]:
-    """A random order of identities for each mission.
+    """Return a random order of identities for each mission.
 
     Args:
         num_robots: N.
@@ -46,5 +46,5 @@ def draw_order(num_robots: int, rngs: Sequence[np.random.Generator]) -> Int[np.n
 
 
 def slot_of(now: Float[np.ndarray, "B"]) -> Int[np.ndarray, "B"]:
-    """The slot that begins now, counted from 0 at the mission's start."""
+    """Return the slot that begins now, counted from 0 at the mission's start."""
     return np.rint(now / SLOT_WINDOWS).astype(np.int64)

@@ -48,7 +48,7 @@ class Tuned:
 
 
 def tuned_probability(policy_name: str, mission: Mission) -> float:
-    """A policy's tuned probability in the regime that is nearest to a mission's.
+    """Return a policy's tuned probability in the regime that is nearest to a mission's.
 
     Nearest by the ratios of team size, range and velocity, among the regimes of the same preset
     and task: the mission's own where the table has it. Tasks and presets that nobody tuned for take
@@ -69,7 +69,7 @@ def tuned_probability(policy_name: str, mission: Mission) -> float:
 
 
 def read_table(path: Path) -> list[Tuned]:
-    """The rows of a table.
+    """Return the rows of a table.
 
     Raises:
         ValueError: The file cannot be read, a column is missing or unknown, or a value is none.

@@ -41,7 +41,7 @@ class Buffers:
         return num_missions, num_robots
 
     def read_only(self) -> "Buffers":
-        """The same arrays, seen through views that cannot be written."""
+        """Return the same arrays, seen through views that cannot be written."""
         views = {spec.name: getattr(self, spec.name).view() for spec in fields(Buffers)}
         for view in views.values():
             view.flags.writeable = False
@@ -73,7 +73,7 @@ def grant_start(buffers: Buffers, states: RobotStates) -> None:
 
 
 def observe_self(buffers: Buffers, states: RobotStates, now: Float[np.ndarray, "B"]) -> None:
-    """Writes every active robot's own state and the time into its own buffer (Eq. 5).
+    """Write every active robot's own state and the time into its own buffer (Eq. 5).
 
     Args:
         buffers: Written in place.
@@ -99,7 +99,7 @@ def record_attempt(
     *,
     silence_is_attempt: bool = False,
 ) -> None:
-    """Notes when each robot last addressed its recipient (Eq. 7).
+    """Note when each robot last addressed its recipient (Eq. 7).
 
     Args:
         buffers: Written in place.
@@ -120,7 +120,7 @@ def merge(
     heard: Int[np.ndarray, "B N"],
     is_sent: Bool[np.ndarray, "B N N"] | None = None,
 ) -> None:
-    """Takes over whatever is strictly newer in the packet each robot decoded (Eq. 8).
+    """Take over whatever is strictly newer in the packet each robot decoded (Eq. 8).
 
     A packet holds its sender's buffer as it was before the phase. Information that comes straight
     from its subject gets the receiver as parent (II-B: P^{i,k} = i).
@@ -142,7 +142,7 @@ def merge(
 def check_robots(
     what: str, robots: np.ndarray, shape: tuple[int, int], *, may_broadcast: bool = False
 ) -> None:
-    """Passes if there is one robot chosen per robot: the compiled loops here trust that.
+    """Pass if there is one robot chosen per robot: the compiled loops here trust that.
 
     Args:
         what: What was chosen, for the message.

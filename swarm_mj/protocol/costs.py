@@ -92,7 +92,7 @@ def velocity_variance(
 
 
 def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets:
-    """Counts what became of one window's packets.
+    """Count what became of one window's packets.
 
     Args:
         phases: The window's two phases.
@@ -226,7 +226,7 @@ class _Counts(NamedTuple):
 
 
 def _count(recipient: Int[np.ndarray, "B N"], heard: Int[np.ndarray, "B N"]) -> _Counts:
-    """Counts one phase's packets; whoever addresses itself sends nothing."""
+    """Count one phase's packets; whoever addresses itself sends nothing."""
     counts = _Counts(*np.zeros((5, len(recipient))))
     _add_counts(recipient, heard, counts)
     return counts
@@ -259,7 +259,7 @@ def _mean_depth(
     is_active: Bool[np.ndarray, "B N"],
     hops: Float[np.ndarray, "B"],
 ) -> bool:
-    """Fills `hops`; returns whether all parents form trees."""
+    """Fill `hops`; returns whether all parents form trees."""
     num_missions, num_robots = parent.shape[:2]
     depth = np.empty(num_robots, dtype=np.int64)
     path = np.empty(num_robots, dtype=np.int64)

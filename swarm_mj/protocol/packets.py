@@ -83,7 +83,7 @@ class Packet:
 
 
 def packet_of(mission: Mission, payload: tuple[PacketField, ...] = ()) -> Packet:
-    """The packet that holds a whole buffer of a mission's robots, and a payload."""
+    """Return the packet that holds a whole buffer of a mission's robots, and a payload."""
     header = (
         identity("sender", mission),
         identity("addressee", mission),
@@ -99,7 +99,7 @@ def packet_of(mission: Mission, payload: tuple[PacketField, ...] = ()) -> Packet
 
 
 def identity(name: str, mission: Mission) -> PacketField:
-    """A robot, or none: one byte for up to 255 robots, two for more."""
+    """Return a robot, or none: one byte for up to 255 robots, two for more."""
     bits = BITS_PER_BYTE * (1 if mission.num_robots < 2**BITS_PER_BYTE else 2)
     return PacketField(name=name, bits=bits, low=float(NO_PARENT))
 
@@ -125,7 +125,7 @@ def bits_for(count: int) -> int:
 
 
 def times(field: PacketField, count: int) -> PacketField:
-    """A field, so many times."""
+    """Return a field, so many times."""
     return replace(field, count=field.count * count)
 
 
@@ -150,7 +150,7 @@ def least_bit_rate(num_bytes: int, mission: Mission) -> float:
 
 
 def bits_per_second(rate: float) -> str:
-    """A bit rate in words, by the usual prefix."""
+    """Return a bit rate in words, by the usual prefix."""
     for prefix, unit in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
         if rate >= unit:
             return f"{rate / unit:.4g} {prefix}bit/s"
@@ -164,7 +164,7 @@ def fits(packet: Packet, mission: Mission) -> bool:
 
 
 def fitting(packet: Packet, mission: Mission, policy: str) -> Packet:
-    """A packet with as many entries as a slot of the mission holds.
+    """Return a packet with as many entries as a slot of the mission holds.
 
     Args:
         packet: Whole.
@@ -190,7 +190,7 @@ def fitting(packet: Packet, mission: Mission, policy: str) -> Packet:
 
 
 def check_whole(what: str, mission: Mission) -> None:
-    """Raises ValueError, naming what needs it, unless a slot holds a whole buffer."""
+    """Raise ValueError, naming what needs it, unless a slot holds a whole buffer."""
     packet = packet_of(mission)
     if fitting(packet, mission, "T, M and P").num_entries < mission.num_robots:
         raise ValueError(

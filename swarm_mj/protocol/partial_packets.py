@@ -26,7 +26,7 @@ class PartialBuffers(Buffers):
 
 
 def with_room(buffers: Buffers, num_entries: int) -> Buffers:
-    """The same buffers, of which so many entries fit into a packet."""
+    """Return the same buffers, of which so many entries fit into a packet."""
     if isinstance(buffers, PartialBuffers):
         return replace(buffers, num_entries=min(num_entries, buffers.shape[1]))
     if num_entries >= buffers.shape[1]:

@@ -34,7 +34,7 @@ def merge_timestamps(
     heard: Int[np.ndarray, "N"],
     timestamp: Float[np.ndarray, "N N"],
 ) -> float:
-    """Merges what everyone decoded, as Eq. 8 has it; returns by how much T rises in sum.
+    """Merge what everyone decoded, as Eq. 8 has it; returns by how much T rises in sum.
 
     Args:
         packet: T of every sender before the slot.
@@ -59,7 +59,7 @@ def merge_expected(
     probability: Float[np.ndarray, "N"],
     merged: Float[np.ndarray, "N N"],
 ) -> None:
-    """Fills `merged`: T as Eq. 8 leaves it on average.
+    """Fill `merged`: T as Eq. 8 leaves it on average.
 
     Args:
         timestamp: T before the slot.

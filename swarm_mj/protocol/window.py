@@ -30,7 +30,7 @@ class Phase:
     heard: Int[np.ndarray, "B N"]  # i with j in R^i: whom robot j decoded; itself: nobody
 
     def copy(self) -> "Phase":
-        """The same in arrays of its own."""
+        """Return the same in arrays of its own."""
         return Phase(recipient=self.recipient.copy(), heard=self.heard.copy())
 
 
@@ -221,7 +221,7 @@ def channel_at(
     now: Float[np.ndarray, "B"],
     mission: Int[np.ndarray, "B"] | None = None,
 ) -> Channel:
-    """The channel of the slot that ends at t.
+    """Return the channel of the slot that ends at t.
 
     Args:
         channel: One that stays as it is, or one that is another in every slot.
@@ -244,7 +244,7 @@ def _send(
     channel: Channel | VaryingChannel,
     now: Float[np.ndarray, "B"],
 ) -> Phase:
-    """Sends everyone's packet through the channel (Eq. 6) and merges what was decoded."""
+    """Send everyone's packet through the channel (Eq. 6) and merges what was decoded."""
     sent_to = of_active(states.is_active, recipient)
     at_once = channel_at(channel, now)
     heard = of_active(states.is_active, decoded(at_once, states.position_m, sent_to))

@@ -52,7 +52,7 @@ class ComposedChannel:
         self.reception = reception
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:  # noqa: ARG002 - as a policy's
-        """Starts new missions; one generator each."""
+        """Start new missions; one generator each."""
         self._key = np.array([rng.integers(2**64, dtype=np.uint64) for rng in rngs])
         self.gains.start(rngs)
 
@@ -71,7 +71,7 @@ class ComposedChannel:
     def largest_part(
         self, position_m: Float[np.ndarray, "N 2"], mission: int
     ) -> Bool[np.ndarray, "N"]:
-        """The largest group in which everyone reaches everyone.
+        """Return the largest group in which everyone reaches everyone.
 
         Links are those whose packets decode in silence and without fades.
 
@@ -89,7 +89,7 @@ class ComposedChannel:
     def mean_powers_mw(
         self, position_m: Float[np.ndarray, "N 2"], mission: int
     ) -> Float[np.ndarray, "N N"]:
-        """The power of each robot at each other before fades; arguments as above [mW]."""
+        """Return the power of each robot at each other before fades; arguments as above [mW]."""
         everyone = np.ones((1, len(position_m)), dtype=np.bool_)
         row = np.array([mission])
         return self.gains.received_mw(position_m[None], row, everyone)[mission].copy()
@@ -101,7 +101,7 @@ class ComposedChannel:
         slot: Int[np.ndarray, "W"],
         mission: Int[np.ndarray, "W"],
     ) -> Int[np.ndarray, "W N"]:
-        """The sender that each robot decodes; itself is nobody."""
+        """Return the sender that each robot decodes; itself is nobody."""
         is_sender = recipient != np.arange(recipient.shape[1])
         received_mw = self.gains.received_mw(position_m, mission, is_sender)
         heard = np.empty_like(recipient)
@@ -151,7 +151,7 @@ def _decode(
     rule: _Rule,
     heard: Int[np.ndarray, "W N"],
 ) -> None:
-    """Fills `heard`: the strongest packet at each receiver, if it clears the threshold."""
+    """Fill `heard`: the strongest packet at each receiver, if it clears the threshold."""
     num_rows, num_robots = recipient.shape
     sender = np.empty(num_robots, dtype=np.int64)
     for w in range(num_rows):
@@ -208,7 +208,7 @@ def _is_lost(i: int, j: int, key: np.uint64, slot: int, rule: _Rule) -> bool:
 
 @compiled()
 def _largest_part(is_linked: Bool[np.ndarray, "N N"]) -> Bool[np.ndarray, "N"]:
-    """The largest group in which everyone reaches everyone over links from row to column."""
+    """Return the largest group in which everyone reaches everyone over links from row to column."""
     num_robots = is_linked.shape[0]
     largest = np.zeros(num_robots, dtype=np.bool_)
     is_placed = np.zeros(num_robots, dtype=np.bool_)

@@ -19,7 +19,7 @@ _UNIT = 2.0**-53
 
 @compiled()
 def mixed(key: np.uint64, number: np.uint64) -> np.uint64:
-    """A key that also depends on a number."""
+    """Return a key that also depends on a number."""
     z = (key ^ number) + _WEYL
     z = (z ^ (z >> _S30)) * _MIX_1
     z = (z ^ (z >> _S27)) * _MIX_2
@@ -28,13 +28,13 @@ def mixed(key: np.uint64, number: np.uint64) -> np.uint64:
 
 @compiled()
 def keyed_uniform(key: np.uint64) -> float:
-    """A uniform number in (0, 1), the same for the same key."""
+    """Return a uniform number in (0, 1), the same for the same key."""
     return (float(key >> _S11) + 0.5) * _UNIT
 
 
 @compiled()
 def link_key(key: np.uint64, i: int, j: int) -> np.uint64:
-    """A key of the link between two robots, the same in both directions."""
+    """Return a key of the link between two robots, the same in both directions."""
     low, high = (i, j) if i < j else (j, i)
     return mixed(mixed(key, np.uint64(low)), np.uint64(high))
 

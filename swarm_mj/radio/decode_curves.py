@@ -28,7 +28,7 @@ KNOWN = np.zeros((0, 0))  # instead of curves: powers are known but for the posi
 
 
 def decode_curves(rician_k: float = NO_FADING, success: float = 1.0) -> Curves:
-    """The probability that a packet decodes.
+    """Return the probability that a packet decodes.
 
     Args:
         rician_k: Of the fades, linear; 0 is Rayleigh [1].
@@ -57,7 +57,7 @@ def decode_curves(rician_k: float = NO_FADING, success: float = 1.0) -> Curves:
 
 
 def row_of(std_db: Float[np.ndarray, "N N"]) -> Int[np.ndarray, "N N"]:
-    """The row of `decode_curves` that is nearest to a standard deviation [dB]."""
+    """Return the row of `decode_curves` that is nearest to a standard deviation [dB]."""
     return np.rint(np.minimum(std_db, MAX_STD_DB) / STD_STEP_DB).astype(np.int64)
 
 
@@ -68,7 +68,7 @@ def probability_at(curves: Curves, row: int, ratio: float) -> float:
 
 
 def _fade_exceeds(margin_db: Float[np.ndarray, "M"], rician_k: float) -> Float[np.ndarray, "M"]:
-    """The probability that a fade leaves more than what a margin can spare."""
+    """Return the probability that a fade leaves more than what a margin can spare."""
     least = 10.0 ** (-margin_db / 10.0)  # of the mean power
     if rician_k == NO_FADING:
         return (least <= 1.0).astype(np.float64)
@@ -79,7 +79,7 @@ def _fade_exceeds(margin_db: Float[np.ndarray, "M"], rician_k: float) -> Float[n
 
 
 def _rician_exceeds(least: Float[np.ndarray, "M"], rician_k: float) -> Float[np.ndarray, "M"]:
-    """The Marcum Q function Q_1, as a mixture of Poisson's distributions."""
+    """Return the Marcum Q function Q_1, as a mixture of Poisson's distributions."""
     count = np.arange(int(rician_k + 12.0 * math.sqrt(rician_k) + 30.0))
     log_factorial = np.array([math.lgamma(n + 1.0) for n in count.tolist()])
     of_sight = np.exp(-rician_k + _times_log(count, rician_k) - log_factorial)
@@ -89,7 +89,7 @@ def _rician_exceeds(least: Float[np.ndarray, "M"], rician_k: float) -> Float[np.
 
 
 def _times_log(count: np.ndarray, value: float) -> np.ndarray:
-    """The logarithms of the powers of a value that may be 0, whose power 0 is 1."""
+    """Return the logarithms of the powers of a value that may be 0, whose power 0 is 1."""
     if value == 0.0:
         return np.where(count == 0, 0.0, -np.inf)
     return count * math.log(value)

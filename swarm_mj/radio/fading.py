@@ -55,7 +55,7 @@ NO_BURSTS = Bursts(begin=0.0, end=1.0)
 
 @compiled()
 def fade(key: np.uint64, rician_k: float) -> float:
-    """The power of a fade over its mean, linear [1].
+    """Return the power of a fade over its mean, linear [1].
 
     Args:
         key: Of the link in its slot.

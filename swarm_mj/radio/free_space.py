@@ -42,7 +42,7 @@ class VaryingChannel(Protocol):
     """A channel that is another one in every slot, and the same again when a slot is replayed."""
 
     def at(self, slot: Int[np.ndarray, "B"], mission: Int[np.ndarray, "B"], /) -> Channel:
-        """The channel of one slot.
+        """Return the channel of one slot.
 
         Args:
             slot: Of each row, counted from 0, the mission's first; a window has two.
@@ -65,7 +65,7 @@ def channel_gain(loss_db: float) -> float:
 
 
 def from_db(ratio_db: float) -> float:
-    """A ratio in dB as a linear one; a power in dBm as mW."""
+    """Return a ratio in dB as a linear one; a power in dBm as mW."""
     return 10.0 ** (ratio_db / 10.0)
 
 
@@ -131,7 +131,7 @@ def _decode_strongest(
     hears_while_sending: bool,
     heard: Int[np.ndarray, "B N"],
 ) -> None:
-    """Fills `heard`: the strongest packet at each receiver, if it clears the threshold."""
+    """Fill `heard`: the strongest packet at each receiver, if it clears the threshold."""
     num_missions, num_robots = recipient.shape
     sender = np.empty(num_robots, dtype=np.int64)
     for b in range(num_missions):

@@ -29,7 +29,7 @@ class LinkGains:
     """Received powers in B missions of N robots, for one place of the robots at a time."""
 
     def __init__(self, law: PowerLaw, shadowing: Shadowing | None) -> None:
-        """Takes what the powers follow from.
+        """Take what the powers follow from.
 
         Args:
             law: Powers after one metre [mW], path loss and obstacles.
@@ -39,7 +39,7 @@ class LinkGains:
         self._shadowing = shadowing
 
     def start(self, rngs: Sequence[np.random.Generator]) -> None:
-        """Starts new missions, each with its own shadowing and its own generator."""
+        """Start new missions, each with its own shadowing and its own generator."""
         num_missions, num_robots = len(rngs), len(self._law.at_1_m)
         self._position_m = np.full((num_missions, num_robots, 2), np.nan)
         self._is_done = np.zeros((num_missions, num_robots), dtype=np.bool_)
@@ -93,7 +93,7 @@ def _ask(
     is_done: Bool[np.ndarray, "B N"],
     is_asked: Bool[np.ndarray, "B N"],
 ) -> bool:
-    """Marks whose powers are to be worked out: senders that are new where the robots now are."""
+    """Mark whose powers are to be worked out: senders that are new where the robots now are."""
     is_any = False
     num_robots = position_m.shape[1]
     for w in range(mission.shape[0]):

@@ -28,7 +28,7 @@ class Belief:
     shadowing_db: float = 0.0  # standard deviation of what nobody knows of the powers [dB]
 
     def law_over_noise(self, num_robots: int) -> PowerLaw:
-        """The law of a team's mean powers, free space's too, in units of the noise."""
+        """Return the law of a team's mean powers, free space's too, in units of the noise."""
         at_1_m = np.full(num_robots, self.radio.received_at_1_m_mw)
         law = power_law(at_1_m) if self.law is None else self.law
         return law._replace(at_1_m=law.at_1_m / self.radio.noise_mw)
@@ -54,7 +54,7 @@ class TrueLinks:
     channel: ComposedChannel | None = None  # None is the radio in free space
 
     def links(self, position_m: Float[np.ndarray, "N 2"], mission: int) -> Links:
-        """The links between robots at true positions.
+        """Return the links between robots at true positions.
 
         Args:
             position_m: Where the robots of one mission are [m].
@@ -90,7 +90,7 @@ def _by_law(
 
 
 def _with_chances(links: Links, reception: Reception | None, std_db: float) -> Links:
-    """The same links with the chances of their packets, where they are not certain."""
+    """Return the same links with the chances of their packets, where they are not certain."""
     curves = KNOWN if reception is None else _curves(reception, is_certain=std_db == 0.0)
     if curves is KNOWN:
         return links

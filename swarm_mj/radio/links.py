@@ -53,7 +53,7 @@ def links_between(
     spread_m: Float[np.ndarray, "N"] | None = None,
     is_known: Bool[np.ndarray, "N"] | None = None,
 ) -> Links:
-    """The links between robots at believed positions.
+    """Return the links between robots at believed positions.
 
     Args:
         radio: The mission's.
@@ -81,7 +81,7 @@ def links_between(
 
 
 def doubtful(links: Links, curves: Curves, std_db: Float[np.ndarray, "N N"]) -> Links:
-    """The same links over a channel that fades, or whose powers are known up to an error.
+    """Return the same links over a channel that fades, or whose powers are known up to an error.
 
     Args:
         links: Between robots whose positions are true, or only believed.
@@ -116,13 +116,13 @@ def _received_powers(
 
 @compiled()
 def silent_air(num_robots: int) -> Air:
-    """The air when nobody transmits."""
+    """Return the air when nobody transmits."""
     return Air(np.zeros(num_robots), np.zeros(num_robots), np.zeros(num_robots, dtype=np.int64))
 
 
 @compiled()
 def transmit(links: Links, air: Air, i: int) -> None:
-    """Adds i's packet to the air."""
+    """Add i's packet to the air."""
     received_mw, interference_mw = links.received_mw, links.interference_mw
     total_mw, strongest_mw, strongest = air.total_mw, air.strongest_mw, air.strongest
     for j in range(received_mw.shape[0]):
@@ -133,7 +133,7 @@ def transmit(links: Links, air: Air, i: int) -> None:
 
 @compiled()
 def air_of(links: Links, transmits: Bool[np.ndarray, "N"]) -> Air:
-    """The air when these robots transmit."""
+    """Return the air when these robots transmit."""
     air = silent_air(transmits.shape[0])
     for i in range(transmits.shape[0]):
         if transmits[i]:

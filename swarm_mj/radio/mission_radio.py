@@ -22,7 +22,7 @@ from swarm_mj.radio.shadowing import Shadowing
 
 
 def radio_of(mission: Mission) -> FreeSpaceRadio:
-    """The mission's radio in free space: its power makes the range exact in silence (IV-B).
+    """Return the mission's radio in free space: its power makes the range exact in silence (IV-B).
 
     It is the true channel of the paper's missions, and what robots believe in all others, unless
     they are told more (`belief_of`).
@@ -92,7 +92,7 @@ def truth_of(mission: Mission, channel: Channel | VaryingChannel) -> TrueLinks:
 
 
 def by_robot(mission: Mission, usual_mw: float) -> Float[np.ndarray, "N"]:
-    """A power of each robot's packets where a usual radio has this one [mW]."""
+    """Return a power of each robot's packets where a usual radio has this one [mW]."""
     power_mw = np.full(mission.num_robots, usual_mw)
     power_mw[: mission.num_strong] *= from_db(mission.strong_db)
     return power_mw

@@ -85,7 +85,7 @@ def num_crossed(
 def power_through(
     start_m: Float[np.ndarray, "3"], along_m: Float[np.ndarray, "3"], obstacles: Obstacles
 ) -> float:
-    """The share of the power that reaches the end of a line, linear [1]."""
+    """Return the share of the power that reaches the end of a line, linear [1]."""
     left = 1.0
     o = _next_crossed(start_m, along_m, 0, obstacles)
     while o < obstacles.kind.shape[0]:
@@ -101,7 +101,7 @@ def _next_crossed(
     first: int,
     obstacles: Obstacles,
 ) -> int:
-    """The next obstacle that a line crosses, from this one on; as many as there are if none.
+    """Return the next obstacle that a line crosses, from this one on; as many as there are if none.
 
     Most are too far off, which is seen in plain numbers: a view of an array would cost as much as
     all of the arithmetic.
@@ -165,7 +165,7 @@ def _crosses(
 def _turned(
     a: float, b: float, c: float, o: int, obstacles: Obstacles
 ) -> tuple[float, float, float]:
-    """A vector of the scene as an obstacle sees it."""
+    """Return a vector of the scene as an obstacle sees it."""
     frame = obstacles.rotation
     return (
         frame[o, 0, 0] * a + frame[o, 1, 0] * b + frame[o, 2, 0] * c,
@@ -176,7 +176,7 @@ def _turned(
 
 @compiled()
 def _within(p: float, v: float, half: float, low: float, high: float) -> tuple[float, float]:
-    """The part of [low, high] in which p + s v lies within plus or minus half."""
+    """Return the part of [low, high] in which p + s v lies within plus or minus half."""
     if v == 0.0:
         return (low, high) if abs(p) <= half else (1.0, 0.0)
     near, far = (-half - p) / v, (half - p) / v

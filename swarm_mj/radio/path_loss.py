@@ -23,7 +23,7 @@ class PathLoss:
     exponent: float = FREE_SPACE_EXPONENT  # n, beyond the breakpoint
 
     def loss_db(self, distance_m: float, frequency_hz: float) -> float:
-        """The loss [dB]."""
+        """Return the loss [dB]."""
         near_m = min(distance_m, self.breakpoint_m)
         beyond_db = 10.0 * self.exponent * math.log10(distance_m / near_m)
         return path_loss_db(near_m, frequency_hz) + beyond_db

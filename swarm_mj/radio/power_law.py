@@ -39,7 +39,7 @@ def power_law(
     path_loss: PathLoss = FREE_SPACE,
     obstacles: Obstacles | None = None,
 ) -> PowerLaw:
-    """The law of these parts; free space unless they are given."""
+    """Return the law of these parts; free space unless they are given."""
     known = NO_OBSTACLES if obstacles is None else obstacles
     return PowerLaw(at_1_m, path_loss.breakpoint_m, path_loss.exponent, known)
 
@@ -48,7 +48,7 @@ def power_law(
 def write_powers(
     i: int, position_m: Float[np.ndarray, "N 2"], law: PowerLaw, power: Float[np.ndarray, "N"]
 ) -> None:
-    """Fills `power`: the mean power of i's packets at every robot; nobody receives itself."""
+    """Fill `power`: the mean power of i's packets at every robot; nobody receives itself."""
     write_path_loss(i, position_m, law, power)
     obstruct(i, position_m, ROBOT_HEIGHT_M, law.obstacles, power)
 
@@ -57,7 +57,7 @@ def write_powers(
 def write_path_loss(
     i: int, position_m: Float[np.ndarray, "N 2"], law: PowerLaw, power: Float[np.ndarray, "N"]
 ) -> None:
-    """Fills `power` as in an area where nothing stands."""
+    """Fill `power` as in an area where nothing stands."""
     for j in range(position_m.shape[0]):
         apart_m2 = squared_distance(position_m, i, j)
         power[j] = power_after(law.at_1_m[i], apart_m2, law.breakpoint_m, law.exponent)
@@ -66,7 +66,7 @@ def write_path_loss(
 
 @compiled()
 def powers_between(position_m: Float[np.ndarray, "N 2"], law: PowerLaw) -> Float[np.ndarray, "N N"]:
-    """The mean power of every i at every j."""
+    """Return the mean power of every i at every j."""
     num_robots = position_m.shape[0]
     power = np.empty((num_robots, num_robots))
     for i in range(num_robots):

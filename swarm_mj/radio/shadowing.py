@@ -73,7 +73,7 @@ def set_ends(
     phase: Float[np.ndarray, "W"],
     ends: Float32[np.ndarray, "4 W"],
 ) -> None:
-    """Fills `ends` with the cosines and sines of the waves where a robot is.
+    """Fill `ends` with the cosines and sines of the waves where a robot is.
 
     Args:
         position_m: Where it is [m].
@@ -96,7 +96,7 @@ def set_ends(
 def shadowing_neper(
     a: Float32[np.ndarray, "4 W"], b: Float32[np.ndarray, "4 W"], std_db: float
 ) -> float:
-    """The loss between two ends as an exponent of e of the power [1]; its sign is either."""
+    """Return the loss between two ends as an exponent of e of the power [1]; its sign is either."""
     total = np.float32(0.0)
     for w in range(a.shape[1]):
         total += a[0, w] * b[2, w] - a[1, w] * b[3, w] + b[0, w] * a[2, w] - b[1, w] * a[3, w]

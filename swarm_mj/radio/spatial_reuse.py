@@ -56,7 +56,7 @@ def write_joined(
     threshold: float,
     has_joined: Float32[np.ndarray, "B N N"],
 ) -> None:
-    """Writes who sends in free space by the rule, in the order of identities, as each believes.
+    """Write who sends in free space by the rule, in the order of identities, as each believes.
 
     Args:
         believed_m: Where robot i believes the others to be [m].
@@ -88,7 +88,7 @@ def _join_in_turn(
     threshold: float,
     has_joined: Float32[np.ndarray, "N"],
 ) -> None:
-    """Marks who sends by one robot's beliefs."""
+    """Mark who sends by one robot's beliefs."""
     num_robots = is_known.shape[0]
     owner, half_round = turn % num_robots, (turn + num_robots // 2) % num_robots
     if not is_known[owner]:
@@ -201,7 +201,7 @@ def _forget_unless_equal(believed_m: Float[np.ndarray, "N 2"], told: Told, b: in
 
 @compiled()
 def _work_out(k: int, told: Told, b: int) -> None:
-    """Makes sure of the powers of k's packets in mission b."""
+    """Make sure of the powers of k's packets in mission b."""
     if not told.is_done[b, k]:
         write_powers(k, told.believed_m[b], told.law, told.power[b, k])
         told.is_done[b, k] = True
@@ -249,7 +249,7 @@ def _join(
     threshold: float,
     slot: _Slot,
 ) -> None:
-    """Makes k a sender: whom everyone decodes, and what is in the air."""
+    """Make k a sender: whom everyone decodes, and what is in the air."""
     is_sender, signal, total = slot
     is_sender[k] = True
     for j in range(signal.shape[0]):
@@ -269,7 +269,7 @@ def _power(
     at_1_m: float,
     power: Float[np.ndarray, "N N"] | None,
 ) -> float:
-    """The power of k's packets at j: that of free space, or as it was worked out."""
+    """Return the power of k's packets at j: that of free space, or as it was worked out."""
     if power is None:
         return received_power(at_1_m, squared_distance(believed_m, k, j))
     return power[k, j]

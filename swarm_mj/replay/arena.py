@@ -37,7 +37,7 @@ def draw_area(sheet: Sheet, mission: Mission) -> None:
 
 
 def square_m(frame: Frame) -> float:
-    """The side of the grid's squares: 100 m, or a power of ten more for a large ground."""
+    """Return the side of the grid's squares: 100 m, or a power of ten more for a large ground."""
     across_m = 2.0 * frame.reach_m + float(np.max(np.ptp(frame.centre_m, axis=0)))
     return SQUARE_M * 10.0 ** max(0, int(np.ceil(np.log10(across_m / SQUARE_M / MAX_SQUARES))))
 
@@ -75,7 +75,7 @@ def draw_beliefs(sheet: Sheet) -> None:
 
 
 def draw_tree_on_map(sheet: Sheet) -> None:
-    """The ego robot's parent tree between the robots' true positions."""
+    """Return the ego robot's parent tree between the robots' true positions."""
     log = sheet.log
     row, child = np.nonzero(log.has_parent)
     parent = log.parent[row, child]

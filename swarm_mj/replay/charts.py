@@ -19,7 +19,7 @@ RATE_WINDOWS = 10  # that packets are counted over
 
 
 def draw_tree(sheet: Sheet, colours: UInt8[np.ndarray, "T N 3"]) -> None:
-    """The ego robot's parent tree as a dendrogram, nodes in their robots' colours."""
+    """Return the ego robot's parent tree as a dendrogram, nodes in their robots' colours."""
     log = sheet.log
     place = dendrogram(log.parent, log.is_known, log.ego)
     max_hops = max(4.0, float(np.nanmax(place[..., 0])))

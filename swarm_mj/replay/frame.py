@@ -22,7 +22,7 @@ class Frame:
 
 
 def frame(position_m: Float[np.ndarray, "T N 2"], half_side_m: float) -> Frame:
-    """The smallest square that holds the area and all ways, or else all robots at any time.
+    """Return the smallest square that holds the area and all ways, or else all robots at any time.
 
     It follows the team if robots go far beyond the area, which is centred on the origin.
     """

@@ -79,7 +79,7 @@ def _drawing(
     y_range: tuple[float, float],
     **options: Any,
 ) -> rrb.Spatial2DView:
-    """A part of the plane; the look does not depend on the viewer's theme."""
+    """Return a part of the plane; the look does not depend on the viewer's theme."""
     bounds = rrb.VisualBounds2D(x_range=x_range, y_range=y_range)
     return rrb.Spatial2DView(
         origin=origin, name=name, background=palette.BACKGROUND, visual_bounds=bounds, **options
@@ -105,7 +105,7 @@ def _space(frame: Frame) -> rrb.Spatial3DView:
 
 
 def _charts(log: Log, packets: dict[str, Links]) -> list[rrb.View | rrb.Container]:
-    """The ego robot's tree and the ages of all pairs; below them the plots."""
+    """Return the ego robot's tree and the ages of all pairs; below them the plots."""
     ego = f"r{log.ego}"
     ages = [log.age_mean + log.age_std, np.mean(log.ego_age, axis=1)]
     radio = f"Packets in {RATE_WINDOWS} windows: " + (
@@ -138,7 +138,7 @@ def _charts(log: Log, packets: dict[str, Links]) -> list[rrb.View | rrb.Containe
 
 
 def _plot(entity: str, name: str, shown: Sequence[np.ndarray]) -> rrb.TimeSeriesView:
-    """A plot without a legend, which would cover curves: its name says what they are."""
+    """Return a plot without a legend, which would cover curves: its name says what they are."""
     hidden: dict[Any, Any] = {}
     if entity in HIDDEN:
         hidden[f"/plots/{entity}/{HIDDEN[entity]}"] = rrb.EntityBehavior(visible=False)

@@ -65,7 +65,7 @@ def _samples(log: Log) -> list[dict[str, str]]:
 
 
 def _samples_of_world(log: Log) -> list[dict[str, str]]:
-    """A row, if there is anything to name in it."""
+    """Return a row, if there is anything to name in it."""
     if log.looks is None:
         return []
     texts = {"too_weak": "believed,\ntoo weak", "unbelieved": "works,\nunbelieved"}
@@ -77,7 +77,7 @@ def _samples_of_world(log: Log) -> list[dict[str, str]]:
 
 
 def _draw_sample(sheet: Sheet, path: str, name: str, x: float, y: float) -> None:
-    """A layer's line, arrow, ring or point around a place."""
+    """Return a layer's line, arrow, ring or point around a place."""
     layer = LAYERS[f"arena/{name}"]
     start, radius = (x - SAMPLE / 2, y), RADII.get(name, 0.0)
     share = LOST_SHARE if name == "radio/lost" else 1.0

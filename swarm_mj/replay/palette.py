@@ -51,7 +51,7 @@ _STALEST = 0.10  # the darkest end of viridis would vanish on the background
 
 
 def dim(colour: Colour, share: float) -> Colour:
-    """A darker shade: alpha on 2D lines only darkens, so darken plainly."""
+    """Return a darker shade: alpha on 2D lines only darkens, so darken plainly."""
     return (int(colour[0] * share), int(colour[1] * share), int(colour[2] * share))
 
 
@@ -83,12 +83,12 @@ def robot_colours(
 def with_switched_off(
     colours: UInt8[np.ndarray, "*T N 3"], is_on: Bool[np.ndarray, "*T N"]
 ) -> UInt8[np.ndarray, "*T N 3"]:
-    """The same colours, but dark for robots that are off."""
+    """Return the same colours, but dark for robots that are off."""
     return np.where(is_on[..., None], colours, np.array(SWITCHED_OFF, np.uint8))
 
 
 def nice_scale(age_windows: Float[np.ndarray, "..."]) -> float:
-    """A round number of windows that 19 ages in 20 lie below."""
+    """Return a round number of windows that 19 ages in 20 lie below."""
     return nice_top(max(1.0, float(np.percentile(age_windows, 95))))
 
 

@@ -21,7 +21,7 @@ FACTS = "footage"  # the recording's property that holds them
 
 
 def check_replay(path: Path) -> None:
-    """Passes for a whole replay; rerun may crash over others, so they are kept from it.
+    """Pass for a whole replay; rerun may crash over others, so they are kept from it.
 
     Raises:
         ValueError: There is no such file, or it is not as `write_replay` left it.
@@ -37,7 +37,7 @@ def check_replay(path: Path) -> None:
 
 
 def windows(path: Path) -> Int[np.ndarray, "T"]:
-    """The numbers of a whole replay's windows, in order; 1 is a mission's first."""
+    """Return the numbers of a whole replay's windows, in order; 1 is a mission's first."""
     return _timed(path, "/arena/robots", TIMELINE).to_numpy(zero_copy_only=False).astype(np.int64)
 
 
@@ -152,7 +152,7 @@ def _flat(column: pa.Array) -> pa.Array:
 
 
 def _timed(path: Path, entity: str, component: str) -> pa.Array:
-    """A component's values in all windows, in order."""
+    """Return a component's values in all windows, in order."""
     batches = [
         chunk.to_record_batch()
         for chunk in RrdReader(path).stream().filter(content=entity)

@@ -85,7 +85,7 @@ class Recorder:
     """Copies what a replay shows from the swarm's first mission, window by window."""
 
     def __init__(self, swarm: Swarm, *, ego: int = 0, is_broadcast: bool = False) -> None:
-        """Prepares the record.
+        """Prepare the record.
 
         Args:
             swarm: Whose mission 0 is recorded.
@@ -111,7 +111,7 @@ class Recorder:
         self._latest: dict[str, object] = {}  # of looks, what stands until the next one
 
     def add(self, flown: WindowRecord) -> None:
-        """Records the window that was just flown."""
+        """Record the window that was just flown."""
         buffers, states, phases = self._swarm.buffers, self._swarm.states, self._swarm.phases
         age = self._swarm.now[0] - buffers.timestamp[0]
         num_robots = len(age)
@@ -172,7 +172,7 @@ class Recorder:
         )
 
     def _seen(self, window: Int[np.ndarray, "C"]) -> Looks | None:
-        """The looks at the channel, if it can be looked at."""
+        """Return the looks at the channel, if it can be looked at."""
         return joined(self._looks[: len(window)], window) if self._looks else None
 
     def _task_cost(self, num_windows: int) -> TaskCost | None:

@@ -31,12 +31,12 @@ def fixed_solids(model: MjModel) -> dict[str, rr.AsComponents]:
 
 
 def name_of(model: MjModel, g: int) -> str:
-    """A geom's name, made up if it has none."""
+    """Return a geom's name, made up if it has none."""
     return model.geom(g).name or f"geom{g}"
 
 
 def _solid(model: MjModel, data: MjData, g: int) -> rr.AsComponents:
-    """A geom in its place."""
+    """Return a geom in its place."""
     quaternion = np.empty(4)
     mju_mat2Quat(quaternion, data.geom_xmat[g])
     turn = data.geom_xmat[g].reshape(3, 3)
@@ -54,7 +54,7 @@ def _solid(model: MjModel, data: MjData, g: int) -> rr.AsComponents:
 
 
 def _colour(model: MjModel, g: int) -> UInt8[np.ndarray, "3"]:
-    """A geom's colour, or its material's, or the mean of its texture."""
+    """Return a geom's colour, or its material's, or the mean of its texture."""
     material = int(model.geom_matid[g])
     if material < 0:
         return (255.0 * model.geom_rgba[g, :3]).astype(np.uint8)
@@ -83,7 +83,7 @@ def _box_around(
 def _plane(
     size: np.ndarray, _: np.ndarray, at: np.ndarray, turn: np.ndarray, **look: Any
 ) -> rr.Boxes3D:
-    """A plate whose upper face is the plane; sizes of 0 are without end."""
+    """Return a plate whose upper face is the plane; sizes of 0 are without end."""
     half = [*np.where(size[:2] > 0.0, size[:2], FAR_M), FLOOR_M]
     return rr.Boxes3D(half_sizes=[half], centers=[at - FLOOR_M * turn[:, 2]], **look)
 

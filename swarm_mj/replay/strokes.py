@@ -41,7 +41,7 @@ def strokes(
 
 
 def shades(kind: str, links: Surprises) -> UInt8[np.ndarray, "L 3"]:
-    """The colours of links of this kind: the more is missing, the darker."""
+    """Return the colours of links of this kind: the more is missing, the darker."""
     colour = np.tile(np.array(STROKES[kind], dtype=np.uint8), (len(links.row), 1))
     if kind != "too_weak":
         return colour

@@ -24,7 +24,7 @@ def quiet_environment() -> dict[str, str]:
 
 
 def view_command(*paths: Path) -> list[str]:
-    """The command that opens replays in a window.
+    """Return the command that opens replays in a window.
 
     Raises:
         ValueError: There is no display to open a window on.
@@ -56,7 +56,7 @@ def serve_command(*paths: Path) -> tuple[list[str], str]:
 
 
 def run(command: list[str]) -> int:
-    """Runs a viewer until it is closed; returns 1 if it failed, 0 after Ctrl-C."""
+    """Run a viewer until it is closed; returns 1 if it failed, 0 after Ctrl-C."""
     try:
         with running(command, environment=quiet_environment()) as viewer:
             return int(viewer.wait() != 0)  # its own codes, or a signal's, mean nothing here

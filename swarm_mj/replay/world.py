@@ -23,7 +23,7 @@ HALO, HALO_M = 1.7, 2.0  # of a robot that is cut off, by the robot's radius; it
 
 
 def draw_obstacles(sheet: Sheet, obstacles: Obstacles) -> None:
-    """The obstacles on the map."""
+    """Return the obstacles on the map."""
     outlines = footprints(obstacles, ROBOT_HEIGHT_M)
     if outlines:
         apart_m = FILL_SHARE * sheet.frame.reach_m
@@ -67,7 +67,7 @@ def _draw_links(
     links: Surprises,
     window: Int[np.ndarray, "C"],
 ) -> None:
-    """A strip for each of these links; who clicks on one reads its numbers."""
+    """Return a strip for each of these links; who clicks on one reads its numbers."""
     numbers = {name: getattr(links, name) for name in NUMBERS}
     per_look = np.bincount(links.row, minlength=len(window))
     known = rr.AnyValues.columns(**numbers).partition(per_look)
@@ -75,7 +75,7 @@ def _draw_links(
 
 
 def _draw_cut_off(sheet: Sheet, radius_m: float) -> None:
-    """A halo around each robot that is cut off from the ego robot."""
+    """Return a halo around each robot that is cut off from the ego robot."""
     log = sheet.log
     row, robot = np.nonzero(log.is_cut_off)
     where_m = log.position_m[row, robot]

@@ -30,7 +30,7 @@ APPLICATION = "swarm_mj"
 
 
 def write_replay(log: Log, mission: Mission, config: dict[str, object], path: Path) -> None:
-    """Writes a replay; the file appears under its name only when it is whole.
+    """Write a replay; the file appears under its name only when it is whole.
 
     Args:
         log: What was flown.
@@ -48,7 +48,7 @@ def write_replay(log: Log, mission: Mission, config: dict[str, object], path: Pa
 
 
 def _recorded(log: Log, mission: Mission, config: dict[str, object], name: str) -> bytes:
-    """The bytes of a replay."""
+    """Return the bytes of a replay."""
     rr.set_strict_mode(True)  # bad data raises; otherwise a column is silently missing
     packets = fates(log)
     shown = frame(log.position_m, mission.half_side_m)

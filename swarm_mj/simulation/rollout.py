@@ -76,7 +76,7 @@ def rollout(swarm: Swarm, policy: Policy) -> Iterator[WindowRecord]:
 
 
 def summarise(flown: Iterable[WindowRecord]) -> Summary:
-    """The costs of the windows flown.
+    """Return the costs of the windows flown.
 
     Args:
         flown: One or more windows, in order; `rollout` itself will do.

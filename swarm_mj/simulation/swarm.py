@@ -100,7 +100,7 @@ class Swarm:
         self.restart(seeds)
 
     def restart(self, seeds: Sequence[int]) -> None:
-        """Starts all missions anew.
+        """Start all missions anew.
 
         Args:
             seeds: One per mission, as many as before.
@@ -196,7 +196,7 @@ class Swarm:
         raise TypeError("a policy must be a DecentralisedPolicy or a CentralisedPolicy")
 
     def move(self) -> RobotStates:
-        """Moves the robots through one window, by their controller and the physics."""
+        """Move the robots through one window, by their controller and the physics."""
         wanted_mps2 = self.controller(self._read_only, self._states_for(self.controller))
         return self._physics.step(np.asarray(wanted_mps2, dtype=np.float64))
 
@@ -283,7 +283,7 @@ class Swarm:
 
 
 def _check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
-    """Raises ValueError unless there are seeds, as many as expected, and none is negative."""
+    """Raise ValueError unless there are seeds, as many as expected, and none is negative."""
     if not hasattr(seeds, "__len__") or isinstance(seeds, str | bytes):
         raise ValueError(f"seeds must be a list, one per mission, such as [1], not {seeds!r}")
     is_whole = all(isinstance(seed, Integral) and 0 <= seed <= MAX_SEED for seed in seeds)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 
 def asset(name: str) -> Path:
-    """The path of a file or folder in `assets/`, in a checkout or in an installed wheel.
+    """Return the path of a file or folder in `assets/`, in a checkout or in an installed wheel.
 
     Raises:
         FileNotFoundError: It is in neither place.

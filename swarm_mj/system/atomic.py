@@ -23,7 +23,7 @@ PAGE = bytes(4096)  # a full disk takes an empty file, but not this
 
 
 def write_bytes(path: Path, content: bytes | memoryview, check: Check | None = None) -> None:
-    """Writes a file: the old one stays until the new one is on the disk and passes the check.
+    """Write a file: the old one stays until the new one is on the disk and passes the check.
 
     Missing folders are made; of a link, the file that it leads to is replaced.
 
@@ -56,17 +56,17 @@ def write_folder(path: Path, contents: Mapping[str, bytes], check: Check | None 
 
 
 def write_text(path: Path, text: str) -> None:
-    """Writes a text file, as `write_bytes` does."""
+    """Write a text file, as `write_bytes` does."""
     write_bytes(path, text.encode())
 
 
 def write_json(path: Path, document: dict[str, Any]) -> None:
-    """Writes a JSON file, as `write_bytes` does; raises ValueError for what is not finite."""
+    """Write a JSON file, as `write_bytes` does; raises ValueError for what is not finite."""
     write_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n")
 
 
 def write_csv(path: Path, names: Sequence[str], rows: Iterable[Mapping[str, object]]) -> None:
-    """Writes a CSV file of these columns, as `write_bytes` does; None is an empty cell."""
+    """Write a CSV file of these columns, as `write_bytes` does; None is an empty cell."""
     text = io.StringIO()
     writer = csv.DictWriter(text, names, lineterminator="\n")
     writer.writeheader()
@@ -75,7 +75,7 @@ def write_csv(path: Path, names: Sequence[str], rows: Iterable[Mapping[str, obje
 
 
 def append_bytes(path: Path, content: bytes) -> None:
-    """Adds to a file; if that fails, it is as it was.
+    """Add to a file; if that fails, it is as it was.
 
     Raises:
         OSError: The file could not be written; the message names it.
@@ -91,7 +91,7 @@ def append_bytes(path: Path, content: bytes) -> None:
 
 
 def check_writable(path: Path) -> None:
-    """Passes if there is place for a file, a small one at least; leaves nothing.
+    """Pass if there is place for a file, a small one at least; leaves nothing.
 
     Raises:
         OSError: There is not.
@@ -132,7 +132,7 @@ def _part(path: Path) -> Iterator[tuple[Path, Path]]:
 
 
 def _sweep(target: Path) -> None:
-    """Removes what processes of this machine that were killed had not finished writing."""
+    """Remove what processes of this machine that were killed had not finished writing."""
     for part in target.parent.glob(f".{glob.escape(target.name)}.{_machine()}.*.part"):
         pid = part.name.split(".")[-2]
         if pid.isdecimal() and (int(pid) == os.getpid() or not _is_alive(int(pid))):
@@ -167,7 +167,7 @@ def _fill(path: Path, content: bytes | memoryview) -> None:
 
 
 def _write(file: BinaryIO, content: bytes | memoryview) -> None:
-    """Writes as far as the disk; raises OSError if that cannot be, or something else is there."""
+    """Write as far as the disk; raises OSError if that cannot be, or something else is there."""
     start = file.tell()
     file.write(content)
     file.flush()

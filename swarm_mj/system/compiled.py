@@ -67,7 +67,7 @@ def digest(file: Path) -> bytes:
 
 @functools.cache
 def _read(path: Path) -> tuple[bytes, list[Path]]:
-    """A file's hash, and the package's files that it imports."""
+    """Return a file's hash, and the package's files that it imports."""
     source = path.read_bytes()
     modules = [
         PACKAGE.parent.joinpath(*name.split(".")) for name in IMPORT.findall(source.decode())
@@ -82,7 +82,7 @@ class _WatchesImports:
     _py_file: str
 
     def get_source_stamp(self) -> bytes:
-        """The digest of the function's file; numba asks by this name."""
+        """Return the digest of the function's file; numba asks by this name."""
         return digest(Path(self._py_file))
 
 

@@ -23,7 +23,7 @@ FieldOf = Any  # what a field's maker returns: type checkers take it for the att
 
 
 def setting(default: object = MISSING, help: str = "", **metadata: Any) -> FieldOf:
-    """A field that says what it means.
+    """Return a field that says what it means.
 
     Args:
         default: The value unless given; without one, it must be given.
@@ -38,13 +38,13 @@ def setting(default: object = MISSING, help: str = "", **metadata: Any) -> Field
 
 
 def same_as(owner: type[Any], name: str) -> FieldOf:
-    """A field like another dataclass's: its default, meaning and range."""
+    """Return a field like another dataclass's: its default, meaning and range."""
     spec = owner.__dataclass_fields__[name]
     return field(default=spec.default, metadata=spec.metadata)
 
 
 def check(settings: Any) -> None:  # noqa: ANN401 - any dataclass
-    """Passes if every field's value is of its kind and in its range, or among its choices.
+    """Pass if every field's value is of its kind and in its range, or among its choices.
 
     Raises:
         ValueError: One is not; the message names it, what is allowed, and the value.
@@ -66,13 +66,13 @@ def kind_of(spec: Field[Any]) -> Any:  # noqa: ANN401 - a type
 
 
 def range_of(spec: Field[Any]) -> str:
-    """A field's allowed numbers and their unit, in words."""
+    """Return a field's allowed numbers and their unit, in words."""
     ends = " to ".join(as_typed(spec.metadata[end]) for end in ("low", "high"))
     return f"{ends} [{spec.metadata['unit']}]" if "unit" in spec.metadata else ends
 
 
 def as_typed(value: object) -> str:
-    """A setting's value as it is typed."""
+    """Return a setting's value as it is typed."""
     if isinstance(value, tuple):
         return " ".join(map(as_typed, value))
     if value is None:
@@ -90,7 +90,7 @@ def did_you_mean(typed: object, known: Iterable[str]) -> str:
 
 
 def check_names(what: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Passes if all keywords given are known; raises TypeError, as Python does, if one is not."""
+    """Pass if all keywords given are known; raises TypeError, as Python does, if one is not."""
     known = list(known)
     for name in given:
         if name not in known:
@@ -101,7 +101,7 @@ def check_names(what: str, given: Iterable[str], known: Iterable[str]) -> None:
 def check_kind(
     what: str, value: object, kinds: type[Any] | tuple[type[Any], ...], such_as: str
 ) -> None:
-    """Passes if an argument is of a kind; raises TypeError, naming one that is, if not."""
+    """Pass if an argument is of a kind; raises TypeError, naming one that is, if not."""
     if not isinstance(value, kinds):
         allowed = kinds if isinstance(kinds, tuple) else (kinds,)
         names = " or ".join(kind.__name__ for kind in allowed)
@@ -118,7 +118,7 @@ def name_of(part: Any) -> str:  # noqa: ANN401 - any function or object
 
 
 def check_callable(what: str, value: object, takes: tuple[str, ...]) -> None:
-    """Passes if an argument is None, or can be called with so many others.
+    """Pass if an argument is None, or can be called with so many others.
 
     Raises:
         TypeError: It cannot, or it is a class.
@@ -140,7 +140,7 @@ def check_callable(what: str, value: object, takes: tuple[str, ...]) -> None:
 
 
 def _shown(value: object) -> str:
-    """A wrong argument, and what to do about a class in place of its object."""
+    """Return a wrong argument, and what to do about a class in place of its object."""
     if isinstance(value, type):
         return f"the class {value.__name__}; make an object of it, {value.__name__}(...)"
     return f"{value!r:.80}"
@@ -165,7 +165,7 @@ def check_value(spec: Field[Any], value: Any, called: str = "") -> None:  # noqa
 
 
 def _check_choice(label: str, value: Any, choices: Sequence[str], *, is_joined: bool) -> None:  # noqa: ANN401 - any field's value
-    """Passes if a value is one of the choices, or several of them joined by commas."""
+    """Pass if a value is one of the choices, or several of them joined by commas."""
     several = is_joined and isinstance(value, str)
     for each in map(str.strip, value.split(",")) if several else [value]:
         if each not in choices:

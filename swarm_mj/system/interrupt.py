@@ -54,7 +54,7 @@ def heard_interrupt() -> AbstractContextManager[Callable[[], bool]]:
 
 @contextmanager
 def _noted(*, is_deferred: bool) -> Iterator[Callable[[], bool]]:
-    """Notes Ctrl-C; interrupts, too, unless it is the first and deferred.
+    """Note Ctrl-C; interrupts, too, unless it is the first and deferred.
 
     A terminal that is closed hangs up more than once, so a hang-up is never the second.
     """

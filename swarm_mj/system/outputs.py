@@ -22,7 +22,7 @@ class Output(NamedTuple):
 
 
 def check_outputs(*outputs: Output, inputs: Iterable[Path] = (), must_be_new: bool = False) -> None:
-    """Passes if a command can write all its files; missing folders will be made.
+    """Pass if a command can write all its files; missing folders will be made.
 
     Args:
         *outputs: The files.

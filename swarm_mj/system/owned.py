@@ -41,7 +41,7 @@ def owned(path: Path) -> Iterator[None]:
 
 
 def _locked(lock: Path, path: Path) -> int:
-    """The open file under its name, locked if the disk knows locks."""
+    """Return the open file under its name, locked if the disk knows locks."""
     while True:
         number = _opened(lock, path)
         try:
@@ -65,7 +65,7 @@ def _locked(lock: Path, path: Path) -> int:
 
 
 def _opened(lock: Path, path: Path) -> int:
-    """Opens or makes the file; raises ValueError if that would touch a file of another name."""
+    """Open or makes the file; raises ValueError if that would touch a file of another name."""
     flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     way_out = f"unless it is being written, remove {lock}"
     try:

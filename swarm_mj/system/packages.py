@@ -13,7 +13,7 @@ BROUGHT_BY = {"PIL": "pillow", "dm_control": "dm-control", "rerun": "rerun-sdk"}
 
 
 def need(module: str, what: str, way_out: str = "") -> None:
-    """Passes if a module can be imported.
+    """Pass if a module can be imported.
 
     Args:
         module: Its name, as it is imported.
@@ -42,7 +42,7 @@ def is_installed(module: str) -> bool:
 
 
 def _wanted(package: str) -> str:
-    """A package with the versions that fit, as pip takes it; without, if none are known."""
+    """Return a package with the versions that fit, as pip takes it; without, if none are known."""
     from packaging.requirements import Requirement
 
     try:

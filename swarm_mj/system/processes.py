@@ -25,7 +25,7 @@ GATE = 'read -r go && exec "$@"'
 
 @contextmanager
 def guard() -> Iterator[Callable[[int], None]]:
-    """A process that kills others, computing or not, if this one ends within the block.
+    """Return a process that kills others, computing or not, if this one ends within the block.
 
     Yields:
         Takes the number of a process to be guarded, or minus that of a group. Processes that the
@@ -54,7 +54,7 @@ def running(
     environment: Mapping[str, str] | None = None,
     output: IO[str] | None = None,
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """A program that ends, with all that it started, when the block or this process does.
+    """Return a program that ends, with all that it started, when the block or this process does.
 
     Args:
         command: The program and its arguments.

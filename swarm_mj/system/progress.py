@@ -29,7 +29,7 @@ class WorkBar:
         shows_time_left: bool = True,
         after_s: float = 0.0,
     ) -> None:
-        """Prepares the bar, on standard error unless told otherwise.
+        """Prepare the bar, on standard error unless told otherwise.
 
         Without a unit, it shows no numbers; the time left is by the speed so far. Work that is done
         in less than `after_s` shows no bar [s].

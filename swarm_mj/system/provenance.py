@@ -10,12 +10,12 @@ PACKAGE = ("swarm_mj", "assets", ":!assets/figures", ":!assets/pictures", "pypro
 
 
 def version() -> str:
-    """The installed package's version."""
+    """Return the installed package's version."""
     return metadata.version("swarm_mj")
 
 
 def code_digest() -> str:
-    """A hash of the package's code and data, which tells changes that no commit tells."""
+    """Return a hash of the package's code and data, which tells changes that no commit tells."""
     package = Path(__file__).resolve().parents[1]
     digest = hashlib.sha256()
     for path in sorted([*package.rglob("*.py"), *package.rglob("*.csv")]):

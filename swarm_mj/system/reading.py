@@ -26,7 +26,7 @@ MOST_WORDS = 160  # characters of what msgspec says
 
 
 def open_file(path: Path, what: str, *, folder: Path | None = None) -> BinaryIO:
-    """Opens a regular file, at once: pipes and devices would be waited for, or have no end.
+    """Open a regular file, at once: pipes and devices would be waited for, or have no end.
 
     Args:
         path: The file; it may be a link.
@@ -66,13 +66,13 @@ def read_file(path: Path, what: str, most_bytes: int, *, folder: Path | None = N
 
 
 def check_size(what: str, size: int, most_bytes: int) -> None:
-    """Raises ValueError for a file that is too large to be read, or to be written."""
+    """Raise ValueError for a file that is too large to be read, or to be written."""
     if size > most_bytes:
         raise ValueError(f"{what} may have up to {most_bytes} bytes, not {size}")
 
 
 def read_rows(path: Path, what: str, most_bytes: int) -> tuple[list[str], list[Row]]:
-    """A CSV file: the names of its columns, and its rows with the lines that they end on.
+    """Return a CSV file: the names of its columns, and its rows with the lines that they end on.
 
     Raises:
         ValueError: It cannot be read or is too large, is no CSV, or a row has more cells, or fewer,
@@ -118,7 +118,7 @@ def read_document(text: bytes | str, name: str, version: int, kind: type[Kind]) 
 
 
 def format_of(text: bytes | str) -> str:
-    """The `format` that a JSON object begins with; raises ValueError if it has none."""
+    """Return the `format` that a JSON object begins with; raises ValueError if it has none."""
     return read_plain(_plain(text), _Header).format
 
 
@@ -185,7 +185,7 @@ def _strict(kind: Any, bases: tuple[type, ...] = ()) -> Any:  # noqa: ANN401 - a
 
 
 def _check_levels(values: Iterable[Any], num_levels: int = 0) -> None:
-    """Raises RecursionError if lists and objects are nested too deep."""
+    """Raise RecursionError if lists and objects are nested too deep."""
     if num_levels > MOST_LEVELS:
         raise RecursionError
     for value in values:

@@ -29,7 +29,7 @@ def tell_cores(number: int, what: str = "jobs") -> None:
 
 
 def named_values(title: str, rows: dict[str, str], caption: str | None = None) -> Table:
-    """A table of values beside their names."""
+    """Return a table of values beside their names."""
     table = Table(title=title, title_justify="left", show_header=False)
     table.caption, table.caption_justify = caption, "left"
     for name, value in rows.items():

@@ -63,12 +63,12 @@ class SwarmClass(PettingZooClass):
         return False
 
     def max_steps(self, env: EnvBase) -> int:  # noqa: ARG002
-        """A mission's windows."""
+        """Return a mission's windows."""
         return self.config["num_windows"]
 
     @staticmethod
     def env_name() -> str:
-        """The name under which BenchMARL logs."""
+        """Return the name under which BenchMARL logs."""
         return "swarm_mj"
 
 
@@ -76,7 +76,7 @@ class Ages(Callback):
     """Prints what evaluations cost."""
 
     def on_evaluation_end(self, rollouts: list[Any]) -> None:
-        """The age of information of the missions flown [windows]."""
+        """Return the age of information of the missions flown [windows]."""
         ages = [each["next", "robots", "info", "age_windows"].mean().item() for each in rollouts]
         print(f"{sum(ages) / len(ages):.1f} windows old")
 

@@ -33,7 +33,7 @@ class FlatEnv(ParallelPettingZooEnv):
     """What robots know as one row, without masks: RLlib's own networks take that."""
 
     def __init__(self, _config: dict[str, Any]) -> None:
-        """Makes the missions that are trained on."""
+        """Make the missions that are trained on."""
         super().__init__(make_mission("credit"))
         seen = {agent: flat_space(self.par_env, agent) for agent in self.par_env.possible_agents}
         self.observation_space = spaces.Dict(seen)
@@ -60,7 +60,7 @@ def flat(seen: dict[str, Any]) -> dict[str, np.ndarray]:
 
 
 def mean_age(module: RLModule, num_missions: int = 5) -> float:
-    """The age of information, which is minus the reward `aoi` [windows]."""
+    """Return the age of information, which is minus the reward `aoi` [windows]."""
     mission, ages = make_mission("aoi"), []
     for seed in range(num_missions):
         seen, _ = mission.reset(seed=seed)

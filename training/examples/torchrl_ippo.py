@@ -59,7 +59,7 @@ def make_actor(env: EnvBase) -> ProbabilisticActor:
 
 
 def mean_age(actor: ProbabilisticActor, num_missions: int = 5) -> float:
-    """The age of information, which is minus the reward `aoi` [windows]."""
+    """Return the age of information, which is minus the reward `aoi` [windows]."""
     env = make_env("aoi")
     env.set_seed(0)
     with torch.no_grad(), set_exploration_type(ExplorationType.RANDOM):

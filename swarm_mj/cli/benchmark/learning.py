@@ -27,7 +27,7 @@ SHAPE = GnnShape(num_features=len(PaperFeatures.names))  # the paper's
 def learning_rows(
     *, num_robots: int = NUM_ROBOTS, threads: int = 1, seconds: float = 2.0
 ) -> Iterator[Row]:
-    """Times networks and training, in team decisions per second; no weights are kept.
+    """Time networks and training, in team decisions per second; no weights are kept.
 
     The threads are torch's; each measurement takes about so many seconds.
     """
@@ -47,7 +47,7 @@ def learning_rows(
 
 
 def _network_rows(mission: Mission, num_missions: int, seconds: float) -> Iterator[Row]:
-    """The paper's network (K = 5, width 64) on the CPU.
+    """Return the paper's network (K = 5, width 64) on the CPU.
 
     The yardstick is a plain product of the same numbers: as many rows as the network has nodes,
     through one 64 by 64 layer, in the same run.

@@ -61,7 +61,7 @@ class Row(NamedTuple):
 def simulation_rows(
     num_missions: int, *, num_threads: int = 1, seconds: float = 2.0
 ) -> Iterator[Row]:
-    """Times random walks of 40 robots with round robin, B side by side, per window of one mission.
+    """Time random walks of 40 robots with round robin, B side by side, per window of one mission.
 
     The threads are MuJoCo's own; each measurement takes about so many seconds.
     """
@@ -93,14 +93,14 @@ def simulation_rows(
 
 
 def world_rows(num_missions: int, *, seconds: float = 2.0) -> Iterator[Row]:
-    """Times the same walks where there is more than free space, per window of one mission.
+    """Time the same walks where there is more than free space, per window of one mission.
 
     The two sides of a ratio are measured in turn, so that a machine's moods reach both; each
     measurement takes about so many seconds.
     """
 
     def window_us(scene: Scene | None = None, **world: Any) -> tuple[float, float]:
-        """A window, and of it what MuJoCo takes."""
+        """Return a window, and of it what MuJoCo takes."""
         swarm = Swarm(replace(MISSION, **world), range(num_missions), scene=scene)
         policy = RoundRobin()
         whole_us = microseconds(lambda: swarm.step(policy), seconds / 2)
@@ -120,7 +120,7 @@ def world_rows(num_missions: int, *, seconds: float = 2.0) -> Iterator[Row]:
 
 
 def twenty_blocks(spec: MjSpec, mission: Mission) -> None:
-    """A scene: five rows of four city blocks, as in arena `blocks`."""
+    """Return a scene: five rows of four city blocks, as in arena `blocks`."""
     for x, y in product(np.linspace(-0.4, 0.4, 5), np.linspace(-0.375, 0.375, 4)):
         spec.worldbody.add_geom(
             type=mjtGeom.mjGEOM_BOX,
@@ -131,7 +131,7 @@ def twenty_blocks(spec: MjSpec, mission: Mission) -> None:
 
 
 def evaluation_rows(num_episodes: int, *, num_jobs: int = 2, seconds: float = 2.0) -> Iterator[Row]:
-    """Times an evaluation of the paper's baselines, the oracle, and a robot's plans of an epoch.
+    """Time an evaluation of the paper's baselines, the oracle, and a robot's plans of an epoch.
 
     The jobs share the baselines' missions, and starting them counts; the oracle flies at most
     `ORACLE_EPISODES`. The other measurements take about so many seconds, four times over.

@@ -81,11 +81,11 @@ class ResultFigure:
         )
 
     def mission(self, preset: str) -> Mission:
-        """The missions' numbers as a preset has them; x is any."""
+        """Return the missions' numbers as a preset has them; x is any."""
         return PAPERS[preset](self.task)
 
     def command(self, preset: str) -> str:
-        """The command that makes the figure's results."""
+        """Return the command that makes the figure's results."""
         return shlex.join(["swarm-mj", *self.arguments(preset), "--csv", "FILE"])
 
     def arguments(self, preset: str) -> Sequence[str]:

@@ -39,7 +39,7 @@ class Curve:
 
 
 def preset_of(results: Sequence[Result]) -> str:
-    """The one preset of all results, one of the paper's; raises ValueError if it is not."""
+    """Return the one preset of all results, one of the paper's; raises ValueError if it is not."""
     presets = list(dict.fromkeys(result.preset for result in results))
     if len(presets) > 1:
         raise ValueError(
@@ -55,7 +55,7 @@ def preset_of(results: Sequence[Result]) -> str:
 
 
 def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
-    """The results that belong into a figure, one per policy and x, in their order.
+    """Return the results that belong into a figure, one per policy and x, in their order.
 
     Args:
         figure: Whose missions count; other regimes are passed over.
@@ -83,7 +83,7 @@ def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
 
 
 def curves(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[Curve]:
-    """The published curves of a cost, then ours, each in the order of their rows.
+    """Return the published curves of a cost, then ours, each in the order of their rows.
 
     Args:
         figure: Which figure.
@@ -127,7 +127,7 @@ def _ours(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[Cu
 
 
 def _mean_and_sem(figure: ResultFigure, cost: str, result: Result) -> tuple[float, float]:
-    """A cost and its standard error, nan where a single episode has none."""
+    """Return a cost and its standard error, nan where a single episode has none."""
     mean, sem = getattr(result, f"{cost}_mean"), getattr(result, f"{cost}_sem")
     if mean <= 0.0:
         raise ValueError(
@@ -148,7 +148,7 @@ def _published(figure: ResultFigure, cost: str) -> list[Curve]:
 
 
 def _curve(method: str, rows: Sequence[tuple[float, float, float]], **traits: bool) -> Curve:
-    """A curve through rows of x, mean and standard error."""
+    """Return a curve through rows of x, mean and standard error."""
     x, mean, sem = np.array(sorted(rows), dtype=float).T
     return Curve(method=method, x=x, mean=mean, sem=sem, **traits)
 
@@ -178,7 +178,7 @@ def _config(result: Result) -> dict[str, Any]:
 
 
 def _check_agreed(figure: ResultFigure, results: Sequence[Result]) -> None:
-    """Raises ValueError, naming two that differ, unless all were evaluated in the same way."""
+    """Raise ValueError, naming two that differ, unless all were evaluated in the same way."""
     first = results[0]
     for result in results:
         for name in AGREED:
@@ -192,7 +192,7 @@ def _check_agreed(figure: ResultFigure, results: Sequence[Result]) -> None:
 
 
 def _check_papers(figure: ResultFigure, result: Result) -> None:
-    """Raises ValueError unless the missions are the paper's but for x."""
+    """Raise ValueError unless the missions are the paper's but for x."""
     swept = set(OPTIONS) - set(figure.fixed)
     said = _config(result) | asdict(result)
     for name, expected in asdict(figure.mission(result.preset)).items():
@@ -205,7 +205,7 @@ def _check_papers(figure: ResultFigure, result: Result) -> None:
 
 
 def _check_unique(figure: ResultFigure, results: Sequence[Result]) -> None:
-    """Raises ValueError if a policy has two values at one x."""
+    """Raise ValueError if a policy has two values at one x."""
     places = [(result.policy, _x(figure, result)) for result in results]
     for index, place in enumerate(places):
         if place in places[:index]:
@@ -215,6 +215,6 @@ def _check_unique(figure: ResultFigure, results: Sequence[Result]) -> None:
 
 
 def _where(figure: ResultFigure, result: Result) -> str:
-    """A result's policy and x, for messages."""
+    """Return a result's policy and x, for messages."""
     x = _x(figure, result)
     return result.policy if x is None else f"{result.policy} at {figure.x_name} {x:g}"

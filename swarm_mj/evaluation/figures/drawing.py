@@ -149,7 +149,7 @@ def _widened(values: Float[np.ndarray, "V"], share: float, scale: Scale) -> tupl
 def _head(
     drawing: Figure, figure: ResultFigure, results: Sequence[Result], height_in: float
 ) -> None:
-    """The title, what is the same all over the figure, and what lines and marks mean."""
+    """Return the title, what is the same all over the figure, and what lines and marks mean."""
     fixed = [FIXED[name].format(getattr(results[0], name)) for name in figure.fixed]
     regime = ", ".join([figure.task.replace("-", " "), *fixed])
     line = 1.0 - 0.28 / height_in

@@ -116,13 +116,13 @@ def _draw(axes: Axes, mission: Mission, team: Snapshot, colours: ScalarMappable)
 
 
 def _power(value: float) -> str:
-    """A number with two digits, and its power of ten as it is written by hand."""
+    """Return a number with two digits, and its power of ten as it is written by hand."""
     digits, _, exponent = f"{value:.2g}".partition("e")
     return rf"{digits}$\times$10$^{{{int(exponent)}}}$" if exponent else digits
 
 
 def _frame(panels: tuple[Axes, Axes], position_m: Float[np.ndarray, "P 2"]) -> None:
-    """The same square in both panels, around all robots."""
+    """Return the same square in both panels, around all robots."""
     low = (np.min(position_m, axis=0) - MARGIN_M) / KM
     high = (np.max(position_m, axis=0) + MARGIN_M) / KM
     centre, half = (low + high) / 2.0, float(np.max(high - low)) / 2.0

@@ -16,7 +16,7 @@ PLACE = 1.045  # of the axes' width
 
 
 def name_ends(axes: Axes, curves: Sequence[Curve]) -> None:
-    """Writes each method's name beside the axes, as near the end of its curve as others allow.
+    """Write each method's name beside the axes, as near the end of its curve as others allow.
 
     Args:
         axes: With their limits set.
@@ -51,13 +51,13 @@ def name_ends(axes: Axes, curves: Sequence[Curve]) -> None:
 
 
 def name_of(curve: Curve) -> str:
-    """A method's name, marked where its packets carry more than T, M and P."""
+    """Return a method's name, marked where its packets carry more than T, M and P."""
     label = look_of(curve.method).label
     return f"{label} {MORE}" if curve.carries_more else label
 
 
 def spread(wanted: Float[np.ndarray, "L"], gap: float) -> Float[np.ndarray, "L"]:
-    """The places nearest to those wanted, in least squares, that keep their order and a gap.
+    """Return the places nearest to those wanted, in least squares, that keep their order and a gap.
 
     They stand from 0 to 1, if there is room for all.
     """

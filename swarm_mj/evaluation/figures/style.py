@@ -107,7 +107,7 @@ def look_of(method: str) -> Look:
 
 
 def as_it_is(text: str) -> str:
-    """A text of others as matplotlib draws it as it is: dollars do not begin a formula."""
+    """Return a text of others as matplotlib draws it as it is: dollars do not begin a formula."""
     return text.replace("$", r"\$")
 
 
@@ -117,12 +117,12 @@ def styled() -> AbstractContextManager[None]:
 
 
 def write_caption(figure: Figure, x: float, y: float, text: str) -> None:
-    """Writes where a figure's numbers come from, small, from a place on the figure on."""
+    """Write where a figure's numbers come from, small, from a place on the figure on."""
     figure.text(x, y, as_it_is(text), fontsize=7, color=FAINT, gid=CAPTION)
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Writes a figure, its caption among the file's own data; the same figure gives the same bytes.
+    """Write a figure, its caption among the file's own data; the same figure gives the same bytes.
 
     Args:
         figure: Drawn in this style, with a caption.

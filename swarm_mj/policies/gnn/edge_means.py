@@ -28,7 +28,7 @@ class EdgeMeans(torch.autograd.Function):
         is_upward: Bool[Tensor, "D"],
         is_wanted: Bool[Tensor, "R N"],
     ) -> tuple[Float[Tensor, "w C"], Float[Tensor, "w"]]:
-        """The means; all tensors are on a CPU.
+        """Return the means; all tensors are on a CPU.
 
         Args:
             ctx: What the way back needs.
@@ -76,7 +76,7 @@ def _average(
     mean: Float[np.ndarray, "w C"],
     share: Float[np.ndarray, "w"],
 ) -> None:
-    """Fills `mean` and `share`."""
+    """Fill `mean` and `share`."""
     first, place = 0, np.empty(parent.shape[1], dtype=np.int64)
     for r in range(parent.shape[0]):
         last = _place_wanted(is_wanted[r], first, place)
@@ -110,7 +110,7 @@ def _spread(
     of_sender: Float[np.ndarray, "R N C"],
     of_direction: Float[np.ndarray, "D C"],
 ) -> None:
-    """Fills the last three with the gradients of what `_average` was given."""
+    """Fill the last three with the gradients of what `_average` was given."""
     back, of_direction[...] = np.empty_like(direction[0]), 0
     first, place = 0, np.empty(parent.shape[1], dtype=np.int64)
     for r in range(parent.shape[0]):
@@ -132,7 +132,7 @@ def _spread(
 
 @compiled()
 def _place_wanted(is_wanted: Bool[np.ndarray, "N"], first: int, place: Int[np.ndarray, "N"]) -> int:
-    """Fills `place`: each wanted node's row, counted from `first`, else -1; returns the next."""
+    """Fill `place`: each wanted node's row, counted from `first`, else -1; returns the next."""
     for k in range(len(place)):
         place[k] = first if is_wanted[k] else -1
         first += is_wanted[k]
@@ -141,6 +141,6 @@ def _place_wanted(is_wanted: Bool[np.ndarray, "N"], first: int, place: Int[np.nd
 
 @compiled()
 def _add_to_row(rows: Float[np.ndarray, "n C"], k: int, row: Float[np.ndarray, "C"]) -> None:
-    """Adds to one row; loops over few arrays are compiled to vectors."""
+    """Add to one row; loops over few arrays are compiled to vectors."""
     for c in range(len(row)):
         rows[k, c] += row[c]

@@ -116,7 +116,7 @@ class LocalFeatures(ExtendedFeatures):
 
 @compiled()
 def _logarithm(windows: float) -> float:
-    """Times on a logarithmic scale, up to 1 at `LONG_WINDOWS`."""
+    """Time on a logarithmic scale, up to 1 at `LONG_WINDOWS`."""
     return math.log1p(windows) / math.log1p(LONG_WINDOWS)
 
 
@@ -126,7 +126,7 @@ LOG_AGES = np.array([math.log1p(n / 2) / math.log1p(LONG_WINDOWS) for n in range
 
 @compiled()
 def _log_age(now: float, then: float) -> float:
-    """The age on this scale: 0 is now, 1 is long ago or never."""
+    """Return the age on this scale: 0 is now, 1 is long ago or never."""
     age = now - then
     if then <= NEVER or age >= LONG_WINDOWS:
         return 1.0

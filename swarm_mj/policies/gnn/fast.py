@@ -47,17 +47,17 @@ class Layer(NamedTuple):
     bias: Float[Tensor, "Out"]
 
     def __call__(self, x: Float[Tensor, "n In"]) -> Float[Tensor, "n Out"]:
-        """Applies it."""
+        """Apply it."""
         return nn.functional.linear(x, self.weight, self.bias)
 
     def after(self, before: nn.Linear) -> "Layer":
-        """The one layer that does what `before` and then this one do."""
+        """Return the one layer that does what `before` and then this one do."""
         bias = torch.addmv(self.bias, self.weight, before.bias)
         return Layer(self.weight @ before.weight, bias)
 
 
 def hidden(x: Float[Tensor, "n C"], layers: list[nn.Linear]) -> Float[Tensor, "n C"]:
-    """A perceptron behind its first layer and before its last; overwrites its argument."""
+    """Return a perceptron behind its first layer and before its last; overwrites its argument."""
     x = x.relu_()
     for layer in layers:
         x = layer(x).relu_()
@@ -114,7 +114,7 @@ class Composed:
         parent: Int[Tensor, "R N"],
         is_wanted: Bool[Tensor, "R N"] | None = None,
     ) -> Float[Tensor, "R N O"]:
-        """Evaluates the network; arguments as in `AggregationGnn.forward`."""
+        """Evaluate the network; arguments as in `AggregationGnn.forward`."""
         wanted = None if is_wanted is None else is_wanted.flatten().nonzero().squeeze(1)
         v = hidden(self._encoder[0](node.flatten(0, 1)), self._encoder[1:-1])
         own = picked(v, wanted)
@@ -131,7 +131,7 @@ class Composed:
         return output.view(*parent.shape, output.shape[1])
 
     def _decode(self, stage: int, node: Float[Tensor, "n C"]) -> Float[Tensor, "n O"]:
-        """A stage's part of the network's numbers."""
+        """Return a stage's part of the network's numbers."""
         decoded = hidden(self._stages[stage].decoder(node), self._decoder[1:-1])
         return self._outputs[stage](decoded)
 
@@ -192,7 +192,7 @@ class Links:
     """
 
     def __init__(self, parent: Int[Tensor, "R N"], edges: Edges, like: Tensor) -> None:
-        """Finds the ends; means have the type of `like` and are on its device."""
+        """Find the ends; means have the type of `like` and are on its device."""
         self._is_upward = IS_UPWARD[edges]
         own = torch.arange(parent.numel(), device=parent.device).view(parent.shape)
         has_parent = parent >= 0

@@ -21,7 +21,7 @@ _own: dict[str, type[FeatureExtractor]] = {}  # those that the user of this proc
 
 
 def make_extractor(features: str, mission: Mission) -> FeatureExtractor:
-    """An extractor by the name of its feature set; it is to be started.
+    """Return an extractor by the name of its feature set; it is to be started.
 
     The mission's area, duration and range normalise the features.
 
@@ -45,7 +45,7 @@ def _feature_set(features: str) -> type[FeatureExtractor]:
 
 
 def load_features(features: str) -> None:
-    """Imports a user's own feature set, `module:Name`, which from then on has that name.
+    """Import a user's own feature set, `module:Name`, which from then on has that name.
 
     That runs its code, so the name must be one that the user gave, and none from a file.
 
@@ -66,7 +66,7 @@ def is_own_set(features: str) -> bool:
 
 
 def check_features(features: str) -> None:
-    """Passes if a name is that of a feature set, or could be that of a user's own.
+    """Pass if a name is that of a feature set, or could be that of a user's own.
 
     It imports nothing, so the name may stand in a file.
 
@@ -81,7 +81,7 @@ def check_features(features: str) -> None:
 
 
 def check_named(features: str, named: Collection[str], where: str) -> None:
-    """Passes unless a file names a user's own feature set that its user has not named, too.
+    """Pass unless a file names a user's own feature set that its user has not named, too.
 
     Raises:
         ValueError: It does: to load it would run code that a file chose.
@@ -96,7 +96,7 @@ def check_named(features: str, named: Collection[str], where: str) -> None:
 def trained_extractor(
     features: str, num_features: int, mission: Mission, *, named: Collection[str], where: str
 ) -> FeatureExtractor:
-    """An extractor of what a stored network, which `where` calls, was trained on.
+    """Return an extractor of what a stored network, which `where` calls, was trained on.
 
     A user's own set is imported, but only if it is among those that the user named.
 
@@ -116,7 +116,7 @@ def trained_extractor(
 
 
 def check_num_features(given: int, features: str) -> None:
-    """Passes if a feature set has so many numbers for each node, or is a user's own.
+    """Pass if a feature set has so many numbers for each node, or is a user's own.
 
     That is not imported, as the name may stand in a file: it may have any number.
 
@@ -132,7 +132,7 @@ def check_num_features(given: int, features: str) -> None:
 
 
 def check_fit(network: GnnShape, features: str) -> None:
-    """Passes for a network that takes a feature set, and gives what decisions are made of.
+    """Pass for a network that takes a feature set, and gives what decisions are made of.
 
     Raises:
         ValueError: It does not; as `check_num_features`.

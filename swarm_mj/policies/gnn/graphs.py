@@ -36,7 +36,7 @@ class FeatureExtractor(ABC):
     uses: ClassVar[str] = "its buffer"  # what they are made of, in a few words
 
     def __init__(self, mission: Mission) -> None:
-        """Takes the mission whose area, duration and range normalise the features."""
+        """Take the mission whose area, duration and range normalise the features."""
         self._mission = mission
 
     def start(self, num_missions: int, num_robots: int) -> None:  # noqa: B027 - most remember none
@@ -48,7 +48,7 @@ class FeatureExtractor(ABC):
 
 
 def check_width(features: str, extractor: FeatureExtractor, graphs: Graphs) -> None:
-    """Passes if an extractor, of the feature set of this name, names all numbers of its nodes.
+    """Pass if an extractor, of the feature set of this name, names all numbers of its nodes.
 
     Raises:
         ValueError: It does not, as a user's own may.
@@ -99,7 +99,7 @@ class ReferenceFeatures(FeatureExtractor):
     )  # fmt: skip
 
     def graphs(self, views: LocalViews) -> Graphs:
-        """The buffers as the authors' code shows them to its network."""
+        """Return the buffers as the authors' code shows them to its network."""
         buffers = views.buffers
         node = np.empty((*buffers.shape, views.num_robots), dtype=REFERENCE_NODE)
         _fill_reference(

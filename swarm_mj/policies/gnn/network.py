@@ -21,7 +21,7 @@ class EdgeSet(NamedTuple):
 
 
 def edges_of(parent: Int[Tensor, "R N"], edges: Edges, dtype: torch.dtype) -> EdgeSet:
-    """The edges between children and parents; a node whose parent is -1 has none."""
+    """Return the edges between children and parents; a node whose parent is -1 has none."""
     graph, child = (parent >= 0).nonzero(as_tuple=True)
     first = graph * parent.shape[1]
     below, above = first + child, first + parent[graph, child]
@@ -45,7 +45,7 @@ class Perceptron(nn.ModuleList):
         return [layer for layer in self if isinstance(layer, nn.Linear)]
 
     def forward(self, x: Float[Tensor, "n In"]) -> Float[Tensor, "n C"]:
-        """Applies the layers."""
+        """Apply the layers."""
         *hidden, last = self.layers
         for layer in hidden:
             x = torch.relu(layer(x))
@@ -78,11 +78,11 @@ class LinearCore(nn.Module):
     """The linear updates: edges copy their senders, nodes keep the mean, so GN(v) = A v."""
 
     def update_edge(self, _edge: Tensor, _receiver: Tensor, sender: Tensor) -> Tensor:
-        """The sender."""
+        """Return the sender."""
         return sender
 
     def update_node(self, mean: Tensor, _node: Tensor) -> Tensor:
-        """The mean."""
+        """Return the mean."""
         return mean
 
 
@@ -98,7 +98,7 @@ def mean_aggregation(
 def gn_block(
     core: Core | LinearCore, node: Float[Tensor, "n C"], edge: Float[Tensor, "e _"], edges: EdgeSet
 ) -> tuple[Float[Tensor, "n C"], Float[Tensor, "e C"]]:
-    """Updates all edges by their ends, and all nodes by the mean of their edges (Eq. 11)."""
+    """Update all edges by their ends, and all nodes by the mean of their edges (Eq. 11)."""
     edge = core.update_edge(edge, node[edges.receiver], node[edges.sender])
     mean = mean_aggregation(edge, edges.receiver, len(node))
     return core.update_node(mean, node), edge
@@ -126,7 +126,7 @@ class AggregationGnn(nn.Module):
         parent: Int[Tensor, "R N"],
         is_wanted: Bool[Tensor, "R N"] | None = None,
     ) -> Float[Tensor, "R N O"]:
-        """Maps the features of the nodes of R graphs to numbers for each node.
+        """Map the features of the nodes of R graphs to numbers for each node.
 
         Graphs do not hear of each other, nor nodes of those that no edges lead to: a smaller graph
         may be padded with nodes that have no parent.
@@ -154,7 +154,7 @@ class AggregationGnn(nn.Module):
         return output if is_wanted is None else output.masked_fill(~is_wanted[:, :, None], 0.0)
 
     def check(self, node: Tensor, parent: Tensor) -> None:
-        """Raises ValueError on graphs that would give numbers without a meaning."""
+        """Raise ValueError on graphs that would give numbers without a meaning."""
         num_features, num_nodes = node.shape[-1], parent.shape[-1]
         if num_features != self.shape.num_features:
             raise ValueError(

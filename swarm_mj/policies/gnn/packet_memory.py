@@ -37,7 +37,7 @@ def empty_memory(num_missions: int, num_robots: int) -> Memory:
 
 
 def remember(memory: Memory, views: LocalViews) -> None:
-    """Takes in the window of transmission and response that has just ended; must see every one."""
+    """Take in the window of transmission and response that has just ended; must see every one."""
     if views.phases:
         transmission, response = views.phases
         half_way = views.now - SLOT_WINDOWS

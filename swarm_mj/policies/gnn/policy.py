@@ -35,7 +35,7 @@ class LearnedPolicy(DecentralisedPolicy):
         is_deterministic: bool = False,
         own_features: str | None = None,
     ) -> None:
-        """Takes the network as it is, live, on any device: later changes of its weights count.
+        """Take the network as it is, live, on any device: later changes of its weights count.
 
         The extractor makes the graphs that it was trained on, and `own_features` is its name if it
         is a user's own; the logit is added to silence, but in a robot's own turn.
@@ -86,7 +86,7 @@ class LearnedPolicy(DecentralisedPolicy):
             ).numpy()
 
     def _digest(self) -> str:
-        """A hash of all that its decisions follow from."""
+        """Return a hash of all that its decisions follow from."""
         said = (self._network.shape, self._extractor.names, self._silence_logit)
         digest = hashlib.sha256(repr(said).encode())
         for name, tensor in sorted(self._network.state_dict().items()):

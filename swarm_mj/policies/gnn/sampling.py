@@ -12,7 +12,7 @@ IMPOSSIBLE = -1e9  # the logit of a recipient that may not be addressed; finite,
 def sample(
     logits: Float[np.ndarray, "R N"], uniform: Float[np.ndarray, "R"]
 ) -> Int[np.ndarray, "R"]:
-    """A recipient from each row's Boltzmann distribution, by its cumulated probabilities.
+    """Return a recipient from each row's Boltzmann distribution, by its cumulated probabilities.
 
     `uniform` is one number in [0, 1) a row; the same number is the same decision.
     """

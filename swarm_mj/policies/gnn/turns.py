@@ -22,7 +22,7 @@ def write_turns(
     radius_m: float,
     has_turn: Float32[np.ndarray, "B N N"],
 ) -> None:
-    """Writes which of the robots that each robot knows have a turn.
+    """Write which of the robots that each robot knows have a turn.
 
     Args:
         believed_m: Where robot i believes the others to be [m].
@@ -56,7 +56,7 @@ def _join(
     is_close: Float[np.ndarray, "N"],
     has_turn: Float32[np.ndarray, "N"],
 ) -> None:
-    """Marks the robots that have a turn, and all that are too close to one of them."""
+    """Mark the robots that have a turn, and all that are too close to one of them."""
     num_robots = is_known.shape[0]
     half_round = (now + num_robots // 2) % num_robots
     for place in range(num_robots + 1):

@@ -41,7 +41,7 @@ def schedule(
     first_gain: float,
     recipient: Int[np.ndarray, "W N"],
 ) -> float:
-    """Fills `recipient` window by window, and brings `timestamp` to the end of the last.
+    """Fill `recipient` window by window, and brings `timestamp` to the end of the last.
 
     Args:
         timestamp: T, written in place [slots].
@@ -88,7 +88,7 @@ def _complete(
     first_gain: float,
     recipient: Int[np.ndarray, "N"],
 ) -> None:
-    """Fills `recipient`: a first pair, if there is one, and then pairs while the gain rises."""
+    """Fill `recipient`: a first pair, if there is one, and then pairs while the gain rises."""
     num_robots = timestamp.shape[0]
     for j in range(num_robots):
         recipient[j] = j
@@ -154,7 +154,7 @@ def _value_responses(
     gain: float,
     value: Float[np.ndarray, "N"],
 ) -> None:
-    """Fills `value[r]`: the gain of the first slot and of the responses if r is i's recipient."""
+    """Fill `value[r]`: the gain of the first slot and of the responses if r is i's recipient."""
     answers = _answers(slot, recipient)
     air, listens = air_of(links, answers), ~answers
     response = _deaf_slot(recipient.shape[0])
@@ -220,7 +220,7 @@ def _with_own_time(timestamp: Float32[np.ndarray, "N N"], now: float) -> Float32
 def _advance_slot(
     sent: Float32[np.ndarray, "N N"], slot: _Slot, now: float, after: Float32[np.ndarray, "N N"]
 ) -> None:
-    """Fills `after`: T as expected after a slot, own timestamps those of the window's end."""
+    """Fill `after`: T as expected after a slot, own timestamps those of the window's end."""
     merge_expected(sent, slot.heard, slot.probability, after)
     observe_own(after, now + SLOTS_PER_WINDOW)
 
@@ -250,7 +250,7 @@ def _pair_gains(
 def _gain(
     newer: Float32[np.ndarray, "N"], older: Float32[np.ndarray, "N"], is_squared: bool
 ) -> float:
-    """The rise of T from one row to another, summed over subjects."""
+    """Return the rise of T from one row to another, summed over subjects."""
     total = np.float32(0.0)
     if is_squared:
         for k in range(older.shape[0]):

@@ -24,7 +24,7 @@ class _Oracle(CentralisedPolicy):
     """Plans each window of each mission from all true buffers and positions."""
 
     def __init__(self, radio: FreeSpaceRadio) -> None:
-        """Prepares the policy.
+        """Prepare the policy.
 
         Args:
             radio: What is true unless the policy is informed otherwise.
@@ -36,7 +36,7 @@ class _Oracle(CentralisedPolicy):
         self._truth = truth
 
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
-        """The window's schedule; robots move before they talk, which it does not foresee."""
+        """Return the window's schedule; robots move before they talk, which it does not foresee."""
         windows = [
             self._window(timestamp, float(now), self._truth.links(position_m, b))
             for b, (timestamp, now, position_m) in enumerate(

@@ -58,7 +58,7 @@ def schedule(
     is_free: Bool[np.ndarray, "P"],
     transmits: Bool[np.ndarray, "P N"],
 ) -> None:
-    """Fills `transmits`, slot by slot, and brings `timestamp` to the end of the last.
+    """Fill `transmits`, slot by slot, and brings `timestamp` to the end of the last.
 
     Args:
         timestamp: T, written in place [slots].
@@ -116,7 +116,7 @@ def _follow(
     first: int,
     is_free: Bool[np.ndarray, "P"],
 ) -> float:
-    """The sum of all timestamps after each of the slots that begin with this transmitter."""
+    """Return the sum of all timestamps after each of the slots that begin with this transmitter."""
     known = 0.0
     before, after = timestamp.copy(), np.empty_like(timestamp)
     transmits = np.zeros(timestamp.shape[0], dtype=np.bool_)
@@ -141,7 +141,7 @@ def _choose(
     first: int,
     transmits: Bool[np.ndarray, "N"],
 ) -> None:
-    """Fills `transmits` with a slot's transmitters, a given first one before all others."""
+    """Fill `transmits` with a slot's transmitters, a given first one before all others."""
     num_robots = timestamp.shape[0]
     gain = _gains(timestamp, reach, weights)
     has_news = _has_news(gain)
@@ -225,7 +225,7 @@ def _advance(
     transmits: Bool[np.ndarray, "N"],
     after: Float32[np.ndarray, "N N"],
 ) -> None:
-    """Fills `after`: T as expected after a slot with these transmitters."""
+    """Fill `after`: T as expected after a slot with these transmitters."""
     num_robots = timestamp.shape[0]
     air = air_of(links, transmits)
     heard, probability = np.arange(num_robots), np.zeros(num_robots)
@@ -255,7 +255,7 @@ def _gain(
     older: Float32[np.ndarray, "N"],
     weight: Float32[np.ndarray, "N"],
 ) -> float:
-    """The worth of raising T from one row to another, summed over subjects."""
+    """Return the worth of raising T from one row to another, summed over subjects."""
     total = np.float32(0.0)
     for k in range(older.shape[0]):
         total += _weighed(rise(newer[k], older[k]), weight[k])

@@ -132,5 +132,5 @@ def _group_sizes(num_robots: int, num_reaches: float, settings: DiscoverySetting
 
 
 def _groups(order: Int[np.ndarray, "N"], count: int) -> list[Int[np.ndarray, "K"]]:
-    """An order cut into groups that transmit at the same time."""
+    """Return an order cut into groups that transmit at the same time."""
     return [order[begin : begin + count] for begin in range(0, len(order), count)]

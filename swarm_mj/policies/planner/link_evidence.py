@@ -42,7 +42,7 @@ def no_observation(num_robots: int) -> Observation:
 
 
 def bin_centres_db() -> Float[np.ndarray, "K"]:
-    """The margin in the middle of every bin [dB]."""
+    """Return the margin in the middle of every bin [dB]."""
     return LEAST_MARGIN_DB + BIN_DB * np.arange(NUM_BINS)
 
 
@@ -58,7 +58,7 @@ def observe(
     threshold: float,
     observation: Observation,
 ) -> None:
-    """Fills in what these robots learn from a slot in which they followed one plan.
+    """Fill in what these robots learn from a slot in which they followed one plan.
 
     Args:
         listens: Which robots followed the plan and did not transmit.
@@ -115,7 +115,7 @@ class Evidence:
         self._num_kinds = np.zeros(num_robots, dtype=np.int64)
 
     def add(self, observation: Observation) -> None:
-        """Takes down what the next slot taught; full notes count on only what they have."""
+        """Take down what the next slot taught; full notes count on only what they have."""
         sender, margin, is_decoded = observation
         j = np.flatnonzero(sender != NOBODY)
         kind = is_decoded[j].astype(np.int64), j, sender[j], margin[j]

@@ -38,7 +38,7 @@ class LinkGraph:
 
 
 def link_graph(links: Links, settings: WeightSettings) -> LinkGraph:
-    """The graph of these links; a link of probability p is a way of 1 / p hops."""
+    """Return the graph of these links; a link of probability p is a way of 1 / p hops."""
     probability = lone_probabilities(links)
     is_linked = probability >= settings.min_probability
     hops = _hops(np.where(is_linked, probability, 0.0))

@@ -57,7 +57,7 @@ class Tables:
         known_until: Int[np.ndarray, "N N"],
         settings: LearningSettings,
     ) -> None:
-        """Keeps what every robot knew.
+        """Keep what every robot knew.
 
         Args:
             evidence: What all robots observed, of which later slots do not count.
@@ -77,7 +77,7 @@ class Tables:
         return np.where(self._rank[theirs] < self._rank[mine], theirs, mine)
 
     def table(self, owner: int) -> LinkTable:
-        """The table of one robot."""
+        """Return the table of one robot."""
         if owner not in self._tables:
             known_until = self._known_until[owner]
             self._tables[owner] = fit(*self._evidence.counts(known_until), self._settings)
@@ -89,7 +89,7 @@ def fit(
     missed: Counts,
     settings: LearningSettings,
 ) -> LinkTable:
-    """The table that follows from what was observed, rounded as packets carry it.
+    """Return the table that follows from what was observed, rounded as packets carry it.
 
     Args:
         decoded: Packets that were.
@@ -119,7 +119,7 @@ def fit(
 
 
 def expected(links: Links, table: LinkTable) -> Float[np.ndarray, "N N"]:
-    """The power of i at j, by a table [mW]."""
+    """Return the power of i at j, by a table [mW]."""
     return links.received_mw * 10.0 ** (table.mean_db / 10.0)
 
 

@@ -81,7 +81,7 @@ class SnapshotForm:
 
 
 def snapshot_form(mission: Mission) -> SnapshotForm:
-    """The richest form of which packets fit into the mission's slots.
+    """Return the richest form of which packets fit into the mission's slots.
 
     Raises:
         ValueError: None does.

@@ -36,7 +36,7 @@ class Plan:
         now: float,
         is_free: Bool[np.ndarray, "P"],
     ) -> None:
-        """Prepares the plan.
+        """Prepare the plan.
 
         Args:
             belief: What the robots take the channel for.

@@ -73,7 +73,7 @@ class Planner(BroadcastPolicy):
         range_m: float,
         side_m: float,
     ) -> None:
-        """Prepares the policy.
+        """Prepare the policy.
 
         Args:
             radio: What robots believe in unless the policy is informed otherwise.
@@ -121,7 +121,7 @@ class Planner(BroadcastPolicy):
         return np.stack([self.transmits_in(views, b) for b in range(len(self._teams))])
 
     def transmits_in(self, views: LocalViews, b: int) -> Bool[np.ndarray, "N"]:
-        """The same in one mission alone."""
+        """Return the same in one mission alone."""
         return self._teams[b].transmits(views, b)
 
 
@@ -231,7 +231,7 @@ class _Team:
         return self._form.arrived(taken, now, windows_ahead)
 
     def _plan(self, owner: int) -> Plan:
-        """The plan that follows from someone's snapshot."""
+        """Return the plan that follows from someone's snapshot."""
         if owner not in self._plans and self._current is not None:
             before = self._ended.get(int(self._ended_continues[owner]))
             is_at_rest = not np.any(self._current.position_std_m[owner])

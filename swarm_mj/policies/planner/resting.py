@@ -50,7 +50,7 @@ class RestingPlanner(BroadcastPolicy):
         learns: bool,
         moving: Planner | None = None,
     ) -> None:
-        """Prepares the policy.
+        """Prepare the policy.
 
         Args:
             radio: What robots believe in unless the policy is informed otherwise.

@@ -40,7 +40,7 @@ class RestingTeam:
     def __init__(
         self, num_robots: int, belief: Belief, settings: PlannerSettings, *, learns: bool
     ) -> None:
-        """Prepares the team.
+        """Prepare the team.
 
         Args:
             num_robots: N.
@@ -136,7 +136,7 @@ class RestingTeam:
     def _keep_time(
         self, times: "CommonTimes", slot: int, known_until: Int[np.ndarray, "N N"]
     ) -> None:
-        """Makes tables and flies by them when it is time."""
+        """Make tables and flies by them when it is time."""
         if times.are_made(slot):
             self._next = Tables(self._evidence, known_until, self._settings.learning)
             self._will_hold = self._everyone

@@ -75,5 +75,5 @@ def take_snapshots(
 
 
 def _fresh_windows(num_robots: int, settings: SnapshotSettings) -> float:
-    """The age up to which a robot counts as fresh [windows]."""
+    """Return the age up to which a robot counts as fresh [windows]."""
     return max(settings.fresh_rounds * num_robots, settings.min_fresh_windows)

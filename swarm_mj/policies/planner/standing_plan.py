@@ -18,7 +18,7 @@ class StandingPlan:
     """
 
     def __init__(self, links: Links, settings: PlannerSettings, first_slot: int = 0) -> None:
-        """Prepares the plan.
+        """Prepare the plan.
 
         Args:
             links: Between the robots, where they stand.

@@ -65,7 +65,7 @@ def chosen(
     power: Float[np.ndarray, "N N"],
     rule: Rule,
 ) -> int:
-    """The slot that robot i chooses.
+    """Return the slot that robot i chooses.
 
     Whoever chose lately and was not heard of since may have moved: i first predicts what it chose.
 

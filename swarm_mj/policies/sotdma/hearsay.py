@@ -73,13 +73,13 @@ def nothing_heard(slots: Int[np.ndarray, "N N"], num_slots: int) -> Hearsay:
 
 @compiled()
 def _slot_of(timestamp: float) -> int:
-    """The slot in which a robot transmitted that was observed at that time [windows]."""
+    """Return the slot in which a robot transmitted that was observed at that time [windows]."""
     return round(SLOTS_PER_WINDOW * timestamp) - 1
 
 
 @compiled()
 def read_slots(hearsay: Hearsay, timestamp: Float[np.ndarray, "N N"], frames: Frames) -> None:
-    """Takes over the slots that teammates announced by transmitting in them."""
+    """Take over the slots that teammates announced by transmitting in them."""
     num_robots = timestamp.shape[0]
     for i in range(num_robots):
         for k in range(num_robots):
@@ -99,7 +99,7 @@ def read_packets(
     slot: int,
     frames: Frames,
 ) -> None:
-    """Takes note of what the packets decoded in the last slot say of one's own.
+    """Take note of what the packets decoded in the last slot say of one's own.
 
     Args:
         hearsay: Written in place.
@@ -138,7 +138,7 @@ def write_marks(
     since: int,
     is_marked: Bool[np.ndarray, "F N"],
 ) -> None:
-    """Marks who does not decode a robot in which slot: who missed too many packets for chance.
+    """Mark who does not decode a robot in which slot: who missed too many packets for chance.
 
     Args:
         missed: In a row, there.

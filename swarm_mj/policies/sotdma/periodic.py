@@ -36,7 +36,7 @@ def empty_frame(
     frames: int,
     start_age: float,
 ) -> Periodic:
-    """A frame in which nobody transmits."""
+    """Return a frame in which nobody transmits."""
     num_robots = power.shape[0]
     heard = np.empty((num_slots, num_robots), dtype=np.int64)
     for s in range(num_slots):

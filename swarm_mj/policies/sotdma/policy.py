@@ -50,7 +50,7 @@ class SelfOrganisedTdma(BroadcastPolicy):
         *,
         reads_packets: bool = True,
     ) -> None:
-        """Prepares the policy.
+        """Prepare the policy.
 
         Args:
             radio: What robots believe in unless the policy is informed otherwise.
@@ -65,7 +65,7 @@ class SelfOrganisedTdma(BroadcastPolicy):
         self._belief = Belief(radio=radio)
 
     def inform(self, belief: Belief) -> None:
-        """Takes the powers that robots believe in."""
+        """Take the powers that robots believe in."""
         self._belief = belief
         self._turns.inform(belief)
 

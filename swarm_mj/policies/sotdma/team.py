@@ -28,7 +28,7 @@ class Team:
     def __init__(
         self, order: Int[np.ndarray, "N"], belief: Belief, settings: SotdmaSettings
     ) -> None:
-        """Prepares the team.
+        """Prepare the team.
 
         Args:
             order: In which robots choose.
@@ -139,7 +139,7 @@ class Team:
         chose_lately: Int[np.ndarray, "predicted 2"],
         power: Float[np.ndarray, "N N"],
     ) -> int:
-        """The slot that robot i chooses."""
+        """Return the slot that robot i chooses."""
         is_marked = np.empty(hearsay.missed.shape[1:], dtype=bool)
         write_marks(
             hearsay.missed[i],

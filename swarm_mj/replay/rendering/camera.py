@@ -37,7 +37,7 @@ SIN, COS = np.sin(np.deg2rad(ELEVATION_DEG)), np.cos(np.deg2rad(ELEVATION_DEG))
 
 
 def look_at(centre_m: Float[np.ndarray, "2"], reach_m: float, width: int, height: int) -> Camera:
-    """The camera that sees a square of ground, as large as its picture holds it.
+    """Return the camera that sees a square of ground, as large as its picture holds it.
 
     Args:
         centre_m: The square's centre [m].

@@ -77,7 +77,7 @@ def draw_title(
 def draw_legend(
     draw: ImageDraw.ImageDraw, footages: Sequence[Footage], full_scale: float, box: Box, size: int
 ) -> None:
-    """The ramp of ages, and what the colours of packets mean."""
+    """Return the ramp of ages, and what the colours of packets mean."""
     small = font(round(0.8 * size))
     who = f"colour: age of what {_observers(footages)} (white) knows"
     draw.text((box.left, box.top), who, palette.TEXT, small)
@@ -101,7 +101,7 @@ def draw_legend(
 def _draw_samples(
     draw: ImageDraw.ImageDraw, samples: dict[str, Colour], box: Box, size: int
 ) -> None:
-    """Samples in two columns; the more there are, the closer."""
+    """Sample in two columns; the more there are, the closer."""
     step = min(STEP, ROOM / ((len(samples) + 1) // 2)) * size
     small = font(round(min(0.8 * size, 0.9 * step)))
     for k, (text, colour) in enumerate(samples.items()):
@@ -177,7 +177,7 @@ def _draw_tag(
     y: float,
     small: ImageFont.FreeTypeFont | ImageFont.ImageFont,
 ) -> None:
-    """A text on a dark ground, so that it is read before anything."""
+    """Return a text on a dark ground, so that it is read before anything."""
     left, top, right, bottom = draw.textbbox((x, y), text, small)
     draw.rectangle((left - TAG, top - TAG, right + TAG, bottom + TAG), palette.BACKGROUND)
     draw.text((x, y), text, palette.TOO_WEAK, small)
@@ -218,7 +218,7 @@ class AgePlot:
     """The mean age over the mission, of one flight or two, on a common axis."""
 
     def __init__(self, footages: Sequence[Footage], box: Box, size: int) -> None:
-        """Prepares the curves."""
+        """Prepare the curves."""
         self._box, self._size = box, size
         self._inner = Box(
             box.left + 2 * size, round(box.top + 1.4 * size), box.right, box.bottom - size
@@ -246,7 +246,7 @@ class AgePlot:
             draw.line([tuple(point) for point in curve.tolist()], dim(colour, FAINT), 1)
 
     def draw_until(self, draw: ImageDraw.ImageDraw, rows: Sequence[int]) -> None:
-        """The curves so far, and where they are now."""
+        """Return the curves so far, and where they are now."""
         radius, width = max(2.0, self._size / 5), max(2, self._size // 8)
         for curve, colour, row in zip(self._curves, CURVES, rows, strict=False):
             points = [tuple(point) for point in curve[: row + 1].tolist()]
@@ -266,12 +266,12 @@ class AgePlot:
                 draw.rectangle((left, top, right, inner.bottom), dim(palette.CUT_OFF, SHADE))
 
     def _curve(self, footage: Footage) -> Float[np.ndarray, "T 2"]:
-        """A flight's ages as points of the picture."""
+        """Return a flight's ages as points of the picture."""
         inner, seconds = self._inner, footage.window * footage.facts.mission.window_s
         x = inner.left + inner.width * seconds / self._end_s
         return np.stack([x, inner.bottom - inner.height * footage.age_mean / self._top], axis=1)
 
 
 def blank(width: int, height: int) -> Image.Image:
-    """An empty picture."""
+    """Return an empty picture."""
     return Image.new("RGB", (width, height), palette.BACKGROUND)

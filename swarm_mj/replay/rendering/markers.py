@@ -28,13 +28,13 @@ class Markers:
     """Draws robots as discs with their heading, and packets as arcs."""
 
     def __init__(self, scene: MjvScene, height: int) -> None:
-        """Takes the scene, with room for `GEOMS_PER_ROBOT`, and the picture's height [pixels]."""
+        """Take the scene, with room for `GEOMS_PER_ROBOT`, and the picture's height [pixels]."""
         self._scene = scene
         self._enlarged = max(1.0, SMALLEST / height)
         self._line_pixels = self._enlarged * LINE * height
 
     def draw(self, contents: Contents, camera: Camera) -> None:
-        """Adds what is there, in sizes that this camera's picture asks for."""
+        """Add what is there, in sizes that this camera's picture asks for."""
         picture_m = self._enlarged * camera.pixel_m * camera.height
         self._draw_robots(contents, picture_m)
         self._draw_links(contents, picture_m)
@@ -74,7 +74,7 @@ class Markers:
     def _add_disc(
         self, where: Float[np.ndarray, "3"], radius_m: float, half_m: float, colour: np.ndarray
     ) -> None:
-        """A disc that reaches so far above and below its middle."""
+        """Return a disc that reaches so far above and below its middle."""
         size = np.array([radius_m, half_m, 0.0])
         kind = mjtGeom.mjGEOM_CYLINDER.value
         mjv_initGeom(self._next_geom(), kind, size, where, NO_TURN, _rgba(colour))
@@ -85,7 +85,7 @@ class Markers:
         mjv_connector(geom, kind, self._line_pixels, start, end)
 
     def _next_geom(self) -> MjvGeom:
-        """A geom more in the scene."""
+        """Return a geom more in the scene."""
         self._scene.ngeom += 1
         return self._scene.geoms[self._scene.ngeom - 1]
 

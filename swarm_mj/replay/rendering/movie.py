@@ -35,7 +35,7 @@ class Movie:
     """The pictures of a video."""
 
     def __init__(self, footages: Sequence[Footage], style: Style) -> None:
-        """Prepares everything that does not move.
+        """Prepare everything that does not move.
 
         Args:
             footages: One mission, or two that are shown side by side.
@@ -94,7 +94,7 @@ class Movie:
             yield self.picture([int(each[number]) for each in rows])
 
     def picture(self, rows: Sequence[int]) -> UInt8[np.ndarray, "H W 3"]:
-        """The picture of these windows, one of each mission, from 0."""
+        """Return the picture of these windows, one of each mission, from 0."""
         picture = self._empty.copy()
         draw = ImageDraw.Draw(picture)
         for k, (footage, row, box) in enumerate(
@@ -114,7 +114,7 @@ class Movie:
         return np.asarray(picture)
 
     def _rows(self, footage: Footage) -> Int[np.ndarray, "F"]:
-        """The window of each picture; a mission that is over stands still."""
+        """Return the window of each picture; a mission that is over stands still."""
         longest = max(len(each.window) for each in self._footages)
         rows = np.linspace(0, longest - 1, len(self)).round().astype(int)
         return np.minimum(rows, len(footage.window) - 1)

@@ -36,12 +36,12 @@ class Context(Protocol):
         ...
 
     def free(self) -> None:
-        """Gives its memory back."""
+        """Give its memory back."""
         ...
 
 
 def make_context(width: int, height: int) -> Context:
-    """A context to draw pictures of this size in.
+    """Return a context to draw pictures of this size in.
 
     Raises:
         OSError: No OpenGL works here, or not the one that MUJOCO_GL names.
@@ -88,7 +88,7 @@ def check_choice() -> str:
 
 
 def backend() -> str:
-    """The back end in use: the one that MUJOCO_GL names, or else the first that works here.
+    """Return the back end in use: the one that MUJOCO_GL names, or else the first that works here.
 
     Raises:
         OSError: MUJOCO_GL says that there is to be none, or somebody else has settled on one that

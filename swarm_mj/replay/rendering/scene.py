@@ -91,11 +91,11 @@ class SceneRenderer:
         return context
 
     def camera(self, contents: Contents) -> Camera:
-        """The camera by which a picture of these contents is seen."""
+        """Return the camera by which a picture of these contents is seen."""
         return look_at(contents.centre_m, contents.reach_m, self._width, self._height)
 
     def frame(self, contents: Contents) -> UInt8[np.ndarray, "H W 3"]:
-        """The picture of these contents, RGB, its first row on top.
+        """Return the picture of these contents, RGB, its first row on top.
 
         Raises:
             ValueError: There is not one position per robot of the mission.
@@ -122,7 +122,7 @@ class SceneRenderer:
         return self._pixels()
 
     def close(self) -> None:
-        """Gives OpenGL's memory back; nothing can be drawn any more."""
+        """Give OpenGL's memory back; nothing can be drawn any more."""
         if not self._is_open:
             return
         self._is_open = False
@@ -137,7 +137,7 @@ class SceneRenderer:
         self.close()
 
     def _place(self, contents: Contents) -> None:
-        """Puts the robots' bodies, and an open area's floor, where they are seen."""
+        """Put the robots' bodies, and an open area's floor, where they are seen."""
         self._data.qpos[:] = contents.position_m.ravel()
         mj_kinematics(self._model, self._data)
         mj_comPos(self._model, self._data)
@@ -156,7 +156,7 @@ class SceneRenderer:
 
 
 def _close(renderer: "ref[SceneRenderer]") -> None:
-    """Closes a renderer that is still there when Python ends: by then, OpenGL would fail."""
+    """Close a renderer that is still there when Python ends: by then, OpenGL would fail."""
     if (left := renderer()) is not None:
         left.close()
 
@@ -177,7 +177,7 @@ def light(model: MjModel, width: int, height: int) -> None:
 
 
 def prepare(spec: MjSpec, mission: Mission) -> None:
-    """Makes walls translucent, and an open area's floor as wide as a camera sees.
+    """Make walls translucent, and an open area's floor as wide as a camera sees.
 
     A scene of one's own may have neither.
     """

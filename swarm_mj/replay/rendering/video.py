@@ -27,7 +27,7 @@ def make_video(
     style: Style | None = None,
     on_picture: Callable[[], object] = lambda: None,
 ) -> bytes:
-    """A video of one mission, or of two side by side.
+    """Return a video of one mission, or of two side by side.
 
     Args:
         footages: What is shown, from `footage_of` or `read_footage`.
@@ -58,7 +58,7 @@ def make_video(
 
 
 def check_video(path: Path, suffix: str, style: Style) -> None:
-    """Passes for a video that is whole.
+    """Pass for a video that is whole.
 
     Raises:
         ValueError: It does not have the pictures that it should, not in this size, or does not
@@ -96,7 +96,7 @@ def _samples(footages: Sequence[Footage]) -> Iterator[list[int]]:
 
 
 def encode_mp4(pictures: Iterable[Picture], style: Style, _: Sequence[Picture] = ()) -> bytes:
-    """An H.264 video in the pixel format that every browser plays."""
+    """Return an H.264 video in the pixel format that every browser plays."""
     content = io.BytesIO()
     with av.open(content, "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(style.fps).limit_denominator())
@@ -110,7 +110,7 @@ def encode_mp4(pictures: Iterable[Picture], style: Style, _: Sequence[Picture] =
 
 
 def encode_gif(pictures: Iterable[Picture], style: Style, samples: Sequence[Picture]) -> bytes:
-    """A GIF that starts over and over; its colours are those of the samples."""
+    """Return a GIF that starts over and over; its colours are those of the samples."""
     colours = _colours(samples)
     images = (
         Image.fromarray(picture).quantize(palette=colours, dither=Image.Dither.NONE)

@@ -24,7 +24,7 @@ class SceneViewer:
     """MuJoCo's passive viewer; who closes the window sees no more, and nothing else ends."""
 
     def __init__(self, mission: Mission, *, scene: Scene | None = None) -> None:
-        """Opens the window.
+        """Open the window.
 
         Args:
             mission: Whose scene it is.
@@ -54,7 +54,7 @@ class SceneViewer:
         self._is_aimed = False
 
     def show(self, contents: Contents) -> None:
-        """Shows this from now on."""
+        """Show this from now on."""
         if not self._window.is_running():
             return
         camera = look_at(contents.centre_m, contents.reach_m, *SIZE)
@@ -70,14 +70,14 @@ class SceneViewer:
         self._window.sync()
 
     def close(self) -> None:
-        """Closes the window, and waits until it is: a process that ends earlier may crash."""
+        """Close the window, and waits until it is: a process that ends earlier may crash."""
         self._window.close()
         for thread in self._threads:
             thread.join(CLOSING_S)
 
 
 def _check_display() -> None:
-    """Raises OSError if no window can be opened: MuJoCo's viewer would wait forever."""
+    """Raise OSError if no window can be opened: MuJoCo's viewer would wait forever."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         has_display = glfw.init()

@@ -57,7 +57,7 @@ def note_slot(
     law: PowerLaw,
     threshold: float,
 ) -> None:
-    """Takes note of a slot that has passed.
+    """Take note of a slot that has passed.
 
     Args:
         beliefs: Written in place.
@@ -106,13 +106,13 @@ def note_slot(
 
 @compiled()
 def _count(share: Float32[np.ndarray, "N"], place: int, is_so: bool) -> None:
-    """Moves a share towards what was so the last time."""
+    """Move a share towards what was so the last time."""
     share[place] += RECENT * ((1.0 if is_so else 0.0) - share[place])
 
 
 @compiled()
 def _judge(share: Float32[np.ndarray, "N"], due: int, sender: int) -> None:
-    """Counts whether the packet was decoded that should have been, if any."""
+    """Count whether the packet was decoded that should have been, if any."""
     if due != NOBODY:
         _count(share, due, sender == due)
 
@@ -121,7 +121,7 @@ def _judge(share: Float32[np.ndarray, "N"], due: int, sender: int) -> None:
 def _read_packet(
     beliefs: Beliefs, b: int, i: int, sender: int, now: int, told: Int32[np.ndarray, "N"]
 ) -> None:
-    """Takes over what i decoded: all that the sender knows, and whether it knew of i's last one."""
+    """Take over what i decoded: all that the sender knows, and whether it knew of i's last one."""
     last = beliefs.sent[b, i]
     if last > 0 and beliefs.decoded[b, i, sender] < last:
         _count(beliefs.heard_by[b, i], sender, told[i] >= last)

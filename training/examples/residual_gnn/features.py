@@ -109,7 +109,7 @@ def see(
     threshold: float,
     seen: Seen,
 ) -> int:
-    """Fills in what robots see before a slot.
+    """Fill in what robots see before a slot.
 
     Args:
         rows: Mission and identity of each robot that decides.
@@ -175,7 +175,7 @@ def _see_neighbour(
     threshold: float,
     edge: Float32[np.ndarray, "G"],
 ) -> None:
-    """Fills in what a robot sees of neighbour j, in the order of `NEIGHBOUR_FEATURES`."""
+    """Fill in what a robot sees of neighbour j, in the order of `NEIGHBOUR_FEATURES`."""
     i, now, held = own.identity, own.now, own.held
     power, total = float(reckoned.power[j]), float(reckoned.total[j])
     strongest = float(reckoned.strongest[j])
@@ -214,7 +214,7 @@ def _see_oneself(
     neighbours: Float32[np.ndarray, "D G"],
     robot: Float32[np.ndarray, "F"],
 ) -> None:
-    """Fills in what a robot sees of itself, as far as it follows from these."""
+    """Fill in what a robot sees of itself, as far as it follows from these."""
     i, now, degree = own.identity, own.now, neighbours.shape[0]
     sender = decoded_by(i, reckoned, 0.0, threshold)
     gain = 0.0 if sender == NOBODY else _news(sender, own.held[sender], i, own.known, now)
@@ -245,7 +245,7 @@ def _margin(ratio: float, threshold: float) -> float:
 
 @compiled()
 def _age(slots: int) -> float:
-    """An age as the network gets it."""
+    """Return an age as the network gets it."""
     return 0.3 * math.log1p(min(slots, OLDEST))
 
 

@@ -199,7 +199,7 @@ Apache-2.0, as swarm_mj.
 
 
 def _options(channel: dict[str, object]) -> str:
-    """A kind's options, as they are typed."""
+    """Return a kind's options, as they are typed."""
     typed = (f"`--{name.replace('_', '-')} {value}`" for name, value in channel.items())
     return ": " + " ".join(typed) if channel else ""
 

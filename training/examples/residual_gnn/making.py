@@ -11,7 +11,7 @@ from swarm_mj.radio.mission_radio import radio_of
 def residual_policy(
     weights: Weights, mission: Mission, *, is_deterministic: bool = False
 ) -> ResidualPolicy:
-    """The policy that these weights make of a mission's rule.
+    """Return the policy that these weights make of a mission's rule.
 
     Raises:
         ValueError: The mission's team moves: there is no rule for it.
@@ -28,7 +28,7 @@ def residual_policy(
 
 
 def check_rests(mission: Mission) -> None:
-    """Raises ValueError if the mission's team moves: there is no rule for it."""
+    """Raise ValueError if the mission's team moves: there is no rule for it."""
     if mission.task != "stationary":
         raise ValueError(
             f"residual policies are for teams at rest, and those of {mission.task} move; add "

@@ -32,7 +32,7 @@ class Weights:
         return len(self.arrays[f"{MESSAGE[0]}.bias"])
 
     def logits(self, seen: Seen) -> Float[np.ndarray, "R"]:
-        """The logit of transmitting, for every robot that decides."""
+        """Return the logit of transmitting, for every robot that decides."""
         robots, owner = seen.robots, seen.owner
         if not len(robots):
             return np.zeros(0, dtype=np.float32)
@@ -56,7 +56,7 @@ class Weights:
 
 
 def shapes(width: int) -> dict[str, tuple[int, ...]]:
-    """The shapes of a network's arrays, by name."""
+    """Return the shapes of a network's arrays, by name."""
     own, other = len(ROBOT_FEATURES), len(NEIGHBOUR_FEATURES)
     layers = {
         MESSAGE[0]: (own + other, width),

@@ -56,7 +56,7 @@ class ResidualPolicy(BroadcastPolicy):
         is_deterministic: bool = False,
         reads_packets: bool = True,
     ) -> None:
-        """Prepares the policy.
+        """Prepare the policy.
 
         Args:
             weights: The network's.
@@ -85,7 +85,7 @@ class ResidualPolicy(BroadcastPolicy):
         return {"is_deterministic": self._is_deterministic, "digest": hexadecimal}
 
     def inform(self, belief: Belief) -> None:
-        """Takes the powers that robots believe in."""
+        """Take the powers that robots believe in."""
         self._belief = belief
         self._rule.inform(belief)
 
@@ -147,5 +147,5 @@ class ResidualPolicy(BroadcastPolicy):
 
 
 def ticks(timestamp: Float[np.ndarray, "..."]) -> Int32[np.ndarray, "..."]:
-    """Times [windows] in slots."""
+    """Time [windows] in slots."""
     return np.rint(SLOTS_PER_WINDOW * timestamp).astype(np.int32)

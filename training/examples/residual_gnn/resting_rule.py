@@ -28,7 +28,7 @@ class RestingRule:
     )
 
     def __init__(self, radio: FreeSpaceRadio) -> None:
-        """Prepares the rule; robots believe in the radio unless it is informed otherwise."""
+        """Prepare the rule; robots believe in the radio unless it is informed otherwise."""
         self._belief = Belief(radio=radio)
         self._plans: dict[bytes, StandingPlan] = {}
 
@@ -46,7 +46,7 @@ class RestingRule:
             self._plans = {}
 
     def propose(self, views: LocalViews) -> Proposal:
-        """The plan's choice, or the turns'."""
+        """Return the plan's choice, or the turns'."""
         buffers, slot = views.buffers, slot_of(views.now)
         knows_motion = np.any(buffers.velocity_mps, axis=(2, 3))
         knows_all = np.all(buffers.is_known, axis=2) & ~knows_motion

@@ -30,7 +30,7 @@ class _About:
 
 
 def save_residual(path: Path, weights: Weights, card: str) -> None:
-    """Writes weights and a card as one file, whole or not at all; a file there is replaced.
+    """Write weights and a card as one file, whole or not at all; a file there is replaced.
 
     Raises:
         ValueError: `read_residual` would not take it.
@@ -59,7 +59,7 @@ def is_residual(path: Path) -> bool:
 
 
 def read_residual(path: Path) -> Weights:
-    """The weights in a file.
+    """Return the weights in a file.
 
     Raises:
         ValueError: There is no such file, or it is damaged, foreign, oversized or of a newer
@@ -77,7 +77,7 @@ def read_residual(path: Path) -> Weights:
 
 
 def _weights(data: bytes, about: _About) -> Weights:
-    """The arrays, each checked."""
+    """Return the arrays, each checked."""
     if not 1 <= about.width <= MOST_WIDTH:
         raise ValueError(f"its width must be from 1 to {MOST_WIDTH}, not {about.width}")
     if not 0.0 <= about.trust <= MOST_TRUST:

@@ -14,7 +14,7 @@ class ResidualNetwork(nn.Module):
     """At first it says nothing, so that the rule decides."""
 
     def __init__(self, width: int, trust: float) -> None:
-        """Makes a network.
+        """Make a network.
 
         Args:
             width: Of the layers.
@@ -35,7 +35,7 @@ class ResidualNetwork(nn.Module):
         neighbours: Float[Tensor, "E G"],
         owner: Int[Tensor, "E"],
     ) -> Float[Tensor, "R"]:
-        """The logit of transmitting, for every robot that decides."""
+        """Return the logit of transmitting, for every robot that decides."""
         messages = self.message(torch.cat([neighbours, robots[owner]], dim=1))
         none = robots.new_zeros(len(robots), messages.shape[1])
         total = OF_MESSAGES * none.index_add(0, owner, messages)

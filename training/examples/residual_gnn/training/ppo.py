@@ -48,7 +48,7 @@ def improve(
     settings: PpoSettings,
     generator: torch.Generator,
 ) -> None:
-    """Takes a few steps on what some missions taught, in units of each one's own spread.
+    """Take a few steps on what some missions taught, in units of each one's own spread.
 
     Args:
         network: Changed in place.

@@ -123,7 +123,7 @@ def _learned_from(
 
 
 def _joined(parts: Sequence[_Part]) -> Lesson:
-    """The decisions of all slots in one."""
+    """Return the decisions of all slots in one."""
     robots, neighbours, owners, start = [], [], [], 0
     for part in parts:
         seen, chosen = part.decision.seen, part.chosen

@@ -212,7 +212,7 @@ class Run:
         *,
         is_deterministic: bool = False,
     ) -> dict[str, float]:
-        """The mean age of each kind of mission [windows]."""
+        """Return the mean age of each kind of mission [windows]."""
         seeds, ages = range(first_seed, first_seed + num_missions), {}
         for name, mission in self.training.missions.items():
             radio = radio_of(mission)

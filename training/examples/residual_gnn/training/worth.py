@@ -33,7 +33,7 @@ def worth(
     horizon: int,
     age_saved: Float[np.ndarray, "R"],
 ) -> None:
-    """Fills in how much age one slot that goes otherwise takes from the team.
+    """Fill in how much age one slot that goes otherwise takes from the team.
 
     Args:
         course: Of the missions as they went.
