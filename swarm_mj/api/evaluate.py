@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarm_mj.api.bars import AFTER_S, quiet_console
-from swarm_mj.api.estimates import check_fits, study_needs
+from swarm_mj.api.estimates import study_needs
 from swarm_mj.api.fly import SHARED, mission_of, names_of
 from swarm_mj.api.numbers import Numbers
 from swarm_mj.evaluation.batch import BatchCosts
@@ -26,6 +26,7 @@ from swarm_mj.mission.components import OwnParts
 from swarm_mj.policies.registry import listed, normalised
 from swarm_mj.system.fields import check_value, name_of
 from swarm_mj.system.machine import memory_errors
+from swarm_mj.system.needs import check_fits
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
 

@@ -11,18 +11,19 @@ from contextlib import suppress
 from dataclasses import asdict, replace
 from typing import Any, NamedTuple
 
-from swarm_mj.api.estimates import in_gb, replay_memory
 from swarm_mj.api.flight_table import flight_numbers
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import is_own_policy, is_stored, make_policy
+from swarm_mj.replay.estimates import replay_memory
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.machine import free_memory, memory_errors
+from swarm_mj.system.needs import in_gb
 from swarm_mj.system.progress import WorkBar
 from swarm_mj.system.provenance import commit, version
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.api.bars import quiet_bar
-from swarm_mj.api.estimates import check_fits, flight_needs
+from swarm_mj.api.estimates import flight_needs
 from swarm_mj.api.flight import (
     COMPILING_WINDOWS,
     compile_ahead,
@@ -28,6 +28,7 @@ from swarm_mj.replay.recorder import Recorder
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import check_kind, check_names
+from swarm_mj.system.needs import check_fits
 
 MISSION_FIELDS = tuple(spec.name for spec in fields(Mission) if spec.name != "task")
 SHARED = ("seed", "probability", "is_deterministic", "features", *PARTS)  # with `evaluate`

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from rich.console import Console
 
-from swarm_mj.api.estimates import check_fits, study_needs
+from swarm_mj.api.estimates import study_needs
 from swarm_mj.cli.mission_options import several_missions
 from swarm_mj.cli.policy_options import NAMED, NAMES, OTHERS, PolicyOptions
 from swarm_mj.evaluation import progress
@@ -32,6 +32,7 @@ from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import same_as, setting
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.machine import YES, memory_errors
+from swarm_mj.system.needs import check_fits
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.owned import owned
 from swarm_mj.system.packages import need

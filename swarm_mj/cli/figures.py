@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from swarm_mj.api.estimates import check_fits, figures_needs
+from swarm_mj.api.estimates import figures_needs
 from swarm_mj.cli.policy_options import NAMED
 from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS
 from swarm_mj.evaluation.results import Result, read_results
@@ -15,6 +15,7 @@ from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.policies.registry import stored_policies
 from swarm_mj.system.fields import setting
 from swarm_mj.system.machine import YES
+from swarm_mj.system.needs import check_fits
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.terminal import plain_console
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from rich.console import Console
 
-from swarm_mj.api.estimates import check_fits, flight_needs
+from swarm_mj.api.estimates import flight_needs
 from swarm_mj.api.flight import compile_ahead, flight_config, flight_summary, fly_swarm
 from swarm_mj.api.flight_table import flight_table, flight_title
 from swarm_mj.cli.mission_options import mission_flags, one_mission
@@ -36,6 +36,7 @@ from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.interrupt import deferred_interrupt, heard_interrupt
 from swarm_mj.system.machine import YES
+from swarm_mj.system.needs import check_fits
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
 from swarm_mj.system.progress import WorkBar

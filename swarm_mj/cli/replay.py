@@ -95,7 +95,8 @@ def run(options: Options) -> int:
 
 
 def _make_video(options: Options, video: Path) -> int:
-    from swarm_mj.api.estimates import check_fits, video_needs  # with all that flies
+    from swarm_mj.replay.estimates import video_needs  # with all that flies
+    from swarm_mj.system.needs import check_fits
 
     if options.web:
         raise ValueError("--web is not allowed with --video; leave one out")

@@ -7,7 +7,6 @@ from typing import Any, ClassVar
 
 from rich.console import Console
 
-from swarm_mj.api.estimates import check_fits, training_needs
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
 from swarm_mj.cli.train_progress import Watch
@@ -20,6 +19,7 @@ from swarm_mj.cli.train_settings import (
     own_names,
     refuse_others,
 )
+from swarm_mj.learning.estimates import training_needs
 from swarm_mj.learning.run_folder import (
     BUDGETS,
     CHECKPOINT,
@@ -38,6 +38,7 @@ from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import same_as, setting
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.machine import YES, memory_errors
+from swarm_mj.system.needs import check_fits
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.terminal import named_values, plain_console, tell_cores, this_command
 

@@ -163,6 +163,6 @@ def test_what_is_wrong_is_told(keywords, complaint):
 
 
 def test_memory_is_looked_at_before_the_work(monkeypatch):
-    monkeypatch.setattr("swarm_mj.api.estimates.free_memory", lambda: 1e6)
+    monkeypatch.setattr("swarm_mj.system.needs.free_memory", lambda: 1e6)
     with pytest.raises(ValueError, match="choose fewer num_robots or num_windows, or record=False"):
         module.fly(**SHORT)

@@ -7,12 +7,13 @@ from pathlib import Path
 import pytest
 from tries import tries
 
-from swarm_mj.api import estimates, flight
+from swarm_mj.api import flight
 from swarm_mj.cli import evaluate, main
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.replay.read import check_replay
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system import needs
 
 FACTOR = 2.0  # by which estimates and peaks may differ
 SMALL = ("--robots", "4", "--windows", "120")
@@ -45,7 +46,7 @@ def test_estimates_are_near_the_peaks(forks, tmp_path, record_property):
     assert done.returncode == 0, done.stderr
     for index, line in enumerate(lines):
         estimate, peak, file = json.loads((tmp_path / f"{index}.json").read_text())
-        estimate -= estimates.TORCH if line[0] == "train" or "gnn" in line else 0.0
+        estimate -= needs.TORCH if line[0] == "train" or "gnn" in line else 0.0
         assert peak / FACTOR < estimate < FACTOR * peak, line
         if "--record" in line:
             size = (tmp_path / line[-1]).stat().st_size
@@ -58,8 +59,8 @@ LONG = ("--robots", "1000", "--windows", "100000")
 @pytest.fixture
 def small_machine(monkeypatch):
     """4 GB of memory and 0.1 GB of disk, on which nothing may fly."""
-    monkeypatch.setattr(estimates, "free_memory", lambda: 4e9)
-    monkeypatch.setattr(estimates, "free_room", lambda _: 1e8)
+    monkeypatch.setattr(needs, "free_memory", lambda: 4e9)
+    monkeypatch.setattr(needs, "free_room", lambda _: 1e8)
     monkeypatch.setattr(Swarm, "__init__", lambda *_, **__: pytest.fail("the work began"))
 
 
@@ -92,7 +93,7 @@ def test_what_cannot_fit_is_refused_with_numbers(monkeypatch, tmp_path, capsys, 
 @pytest.mark.fault("memory: refused before the work")
 def test_yes_begins_all_the_same(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(estimates, "free_memory", lambda: 1.0)
+    monkeypatch.setattr(needs, "free_memory", lambda: 1.0)
     flight = ["fly", "--robots", "4", "--windows", "3", "--no-record"]
     assert main(flight) == 2
     assert main([*flight, "--yes"]) == 0

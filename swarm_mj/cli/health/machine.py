@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.api.estimates import in_gb
 from swarm_mj.cli.health.finding import Finding
 from swarm_mj.system.atomic import check_writable
 from swarm_mj.system.machine import free_memory, free_room
+from swarm_mj.system.needs import in_gb
 from swarm_mj.system.terminal import num_cores
 
 LITTLE_MEMORY = 2 * 10**9  # a flight with its replay takes half a gigabyte, a training two

@@ -1,0 +1,78 @@
+"""Memory and disk that a command needs, and whether this machine has them.
+
+The constants are peaks measured on Linux, with all tasks and policies, of 2 to 1000 robots. A test
+compares estimates with peaks; they should be right within a factor of 2, and rather too high.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from swarm_mj.system.machine import free_addresses, free_memory, free_room, largest_file
+
+GB = 1e9
+LIBRARIES, TORCH = 0.15 * GB, 0.4 * GB  # compiling included; torch with the code that trains
+# Address space that is reserved and never filled: by Python's libraries, by torch, by rerun.
+ADDRESSES, OF_TORCH, OF_RERUN = 0.5 * GB, 0.7 * GB, 3.0 * GB
+
+
+@dataclass(frozen=True, kw_only=True)
+class Needs:
+    """What a command takes beyond what its process has when it starts [bytes]."""
+
+    memory: float
+    addresses: float = ADDRESSES  # of these, beyond the memory
+    file: float = 0.0  # all that it writes
+    largest_file: float | None = None  # the largest file of these; None is all in one
+
+
+def check_fits(
+    needs: Needs,
+    output: Path | None,
+    way_out: str,
+    *,
+    is_forced: bool,
+    way_on: str = ", or try it with --yes",
+) -> None:
+    """Pass if a command's needs will be met, or nobody minds.
+
+    Args:
+        needs: The command's.
+        output: Where it writes, if it does.
+        way_out: What to choose instead.
+        is_forced: Whether `--yes` was given.
+        way_on: How to start all the same, if there is a way.
+
+    Raises:
+        ValueError: Memory, addresses or the disk will not suffice; it says by how much.
+    """
+    addresses = free_addresses()
+    has = [("of memory", needs.memory, free_memory(), "are free")]
+    if addresses is not None:
+        asked = needs.memory + needs.addresses
+        has.append(("of address space", asked, addresses, "are left by ulimit -v"))
+    if output is not None:
+        has.append(("on disk", needs.file, free_room(output), f"fit at {output}"))
+        most = largest_file()
+        if most is not None:
+            largest = needs.file if needs.largest_file is None else needs.largest_file
+            has.append(("in one file", largest, most, "are allowed by ulimit -f"))
+    for what, needed, free, where in has:
+        if needed > free and not is_forced:
+            raise ValueError(
+                f"this takes about {in_gb(needed)} {what}, and {in_gb(free)} {where}; "
+                f"{way_out}{way_on}"
+            )
+
+
+def missions_memory(num_robots: int, num_missions: int, *, is_learned: bool) -> float:
+    """Return the memory of missions side by side: the robots' tables, and a network's input."""
+    pairs = num_missions * num_robots**2
+    if not is_learned:
+        return LIBRARIES + 100.0 * pairs
+    # A learned policy remembers packets: N entries of each pair.
+    return LIBRARIES + TORCH + 450.0 * pairs + 4.0 * pairs * num_robots
+
+
+def in_gb(size: int | float) -> str:
+    """Return a size as messages name it."""
+    return f"{float(f'{size / GB:.3g}'):,g} GB"
