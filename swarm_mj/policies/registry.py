@@ -13,7 +13,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.components import is_own, make
 from swarm_mj.policies.aloha import Aloha
 from swarm_mj.policies.gossip import InnovationGossip
-from swarm_mj.policies.greedy_oracle.policy import GreedyOracle, LookaheadOracle
+from swarm_mj.policies.greedy_oracle.policy import GreedyOracle
 from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
 from swarm_mj.policies.planner.payloads import links_fit, snapshot_form
 from swarm_mj.policies.planner.policy import Planner
@@ -95,7 +95,6 @@ RULES: dict[str, Callable[..., Policy]] = {
     "planner": _planner,
     WITHOUT_PAYLOAD: _resting_planner,
     "greedy-oracle": lambda mission: GreedyOracle(radio_of(mission)),
-    "oracle-lookahead": lambda mission: LookaheadOracle(radio_of(mission)),
 }
 SHIPPED = "gnn"  # the learned policy that comes with the package, in assets/policies/
 POLICIES = (*RULES, SHIPPED)

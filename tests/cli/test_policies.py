@@ -15,8 +15,8 @@ from swarm_mj.policies.tuning import tuned_probability
 
 ROOT = Path(__file__).parents[2]
 MISSION = paper("flocking")
-CENTRALISED = {"round-robin", "mst", "greedy-oracle", "oracle-lookahead"}
-REQUEST = {"round-robin", "mst", "gnn", "greedy-oracle", "oracle-lookahead"}
+CENTRALISED = {"round-robin", "mst", "greedy-oracle"}
+REQUEST = {"round-robin", "mst", "gnn", "greedy-oracle"}
 
 
 def printed(capsys, *arguments):

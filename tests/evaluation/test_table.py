@@ -55,7 +55,7 @@ def printed(capsys, monkeypatch):
 
 @pytest.mark.parametrize("columns", [60, 100])
 def test_the_largest_numbers_are_whole_at_100_columns(printed, columns):
-    names = ("random-flooding", "oracle-lookahead", "planner --payload none")
+    names = ("random-flooding", "greedy-oracle", "planner --payload none")
     moving = {"task": "flocking"} | LARGEST
     results = [some_result(name, 123.456, **moving) for name in names]
     lines = printed(results, columns)

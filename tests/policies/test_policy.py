@@ -12,7 +12,7 @@ from swarm_mj.protocol.packets import PacketField
 from swarm_mj.simulation.swarm import Swarm
 
 MISSION = paper("flocking", num_robots=8)
-CENTRALISED = ["round-robin", "mst", "greedy-oracle", "oracle-lookahead"]
+CENTRALISED = ["round-robin", "mst", "greedy-oracle"]
 DECENTRALISED = [name for name in POLICIES if name not in CENTRALISED]
 # What robots learn from payload, or from others' T in packets, is in no view: the tests of these
 # policies hold them to Eq. 9.

@@ -11,7 +11,7 @@ from swarm_mj.mission import paper, reference
 from swarm_mj.policies.aloha import Aloha
 from swarm_mj.policies.gnn.policy import LearnedPolicy
 from swarm_mj.policies.gossip import InnovationGossip
-from swarm_mj.policies.greedy_oracle.policy import GreedyOracle, LookaheadOracle
+from swarm_mj.policies.greedy_oracle.policy import GreedyOracle
 from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner
@@ -155,7 +155,6 @@ def test_ii_b_the_planner_can_go_without_payload():
         ("planner", Planner, None),
         ("planner --payload none", RestingPlanner, None),
         ("greedy-oracle", GreedyOracle, None),
-        ("oracle-lookahead", LookaheadOracle, None),
     ],
 )
 def test_policies_by_name(name, kind, probability):

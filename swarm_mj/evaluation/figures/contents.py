@@ -16,8 +16,8 @@ OPTIONS = {
     "range_ratio": "--range-ratio",
     "velocity_ratio": "--velocity-ratio",
 }
-# All but two that are slow, the lookahead oracle and sotdma. The planners and gnn are drawn under
-# `paper` only: gnn was trained there, and they take several times as long as all others together.
+# All but sotdma, which is slow. The planners and gnn are drawn under `paper` only: gnn was trained
+# there, and they take several times as long as all others together.
 DRAWN = (
     "tdma",  # first: the others are compared to it
     "random-flooding",

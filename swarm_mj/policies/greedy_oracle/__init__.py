@@ -1,1 +1,1 @@
-"""The greedy oracles: schedules by someone who knows everything."""
+"""The greedy oracle: a schedule by a centre that knows everything."""

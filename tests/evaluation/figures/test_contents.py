@@ -31,7 +31,7 @@ def test_the_command_named_evaluates_the_drawn_policies_in_the_figures_regimes(f
     program, *arguments = shlex.split(figure.command(preset))
     study = parse(arguments)[1].study
     assert program == "swarm-mj"
-    left_out = {"oracle-lookahead", "sotdma"}
+    left_out = {"sotdma"}
     if preset == "reference":
         left_out |= {"planner", "planner --payload none", "gnn"}
     assert set(study.policies) == set(POLICIES) - left_out
