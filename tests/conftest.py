@@ -22,8 +22,10 @@ TRAINING = Path(__file__).parent.parent / "training"
 
 
 def stamps(folder):
-    """When each file was last written, but for those that Python caches."""
-    files = (path for path in folder.rglob("*") if path.is_file() and path.suffix != ".pyc")
+    """When each file was last written, except for those in Python's and numba's caches."""
+    files = (
+        path for path in folder.rglob("*") if path.is_file() and path.parent.name != "__pycache__"
+    )
     return {path: path.stat().st_mtime_ns for path in files}
 
 

@@ -21,7 +21,7 @@ from numba import config, njit
 from numba.core import caching
 
 PACKAGE = Path(__file__).parents[1]
-IMPORT = re.compile(rf"^from ({PACKAGE.name}(?:\.\w+)*) import ", re.MULTILINE)
+IMPORT = re.compile(r"^from (\w+(?:\.\w+)*) import ", re.MULTILINE)
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -54,7 +54,10 @@ def compiled(*, fastmath: bool | set[str] = False) -> Callable[[Function], Funct
 
 
 def digest(file: Path) -> bytes:
-    """A hash of a file and of the package's files that it imports, directly or by way of others."""
+    """Return a hash of a file and of all files that it imports, directly or through others.
+
+    Those are files of this package, and of the file's own: users compile loops across files, too.
+    """
     found, waiting = set(), [file]
     while waiting:
         path = waiting.pop()
@@ -67,12 +70,16 @@ def digest(file: Path) -> bytes:
 
 @functools.cache
 def _read(path: Path) -> tuple[bytes, list[Path]]:
-    """Return a file's hash, and the package's files that it imports."""
+    """Return a file's hash, and the files of this package and of its own that it imports."""
     source = path.read_bytes()
-    modules = [
-        PACKAGE.parent.joinpath(*name.split(".")) for name in IMPORT.findall(source.decode())
-    ]
-    files = [path / "__init__.py" if path.is_dir() else path.with_suffix(".py") for path in modules]
+    own = path.parent
+    while (own / "__init__.py").exists():
+        own = own.parent
+    files = []
+    for name in IMPORT.findall(source.decode()):
+        for module in (root.joinpath(*name.split(".")) for root in {own, PACKAGE.parent}):
+            file = module / "__init__.py" if module.is_dir() else module.with_suffix(".py")
+            files += [file] if file.is_file() else []
     return hashlib.sha256(source).digest(), files
 
 

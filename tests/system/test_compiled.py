@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import swarm_mj.system.compiled
+from swarm_mj.system.compiled import _read, digest
 
 PHYSICS = """
 from swarm_mj.system.compiled import compiled
@@ -123,3 +124,16 @@ def test_an_installation_that_cannot_be_written_uses_the_user_s_folder_or_none(c
 def test_assumptions_on_floats_are_never_those_of_the_caller(checkout):
     """The loop lets its sums be reordered; nobody said so of the function that it calls."""
     assert checkout.python(ASSUME) == "True False"
+
+
+def test_the_digest_of_a_users_file_watches_its_own_package(tmp_path):
+    package = tmp_path / "mine"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "outer.py").write_text("from mine.inner import loop\nfrom numpy import pi\n")
+    inner = package / "inner.py"
+    inner.write_text("loop = 1\n")
+    before = digest(package / "outer.py")
+    inner.write_text("loop = 2\n")
+    _read.cache_clear()
+    assert digest(package / "outer.py") != before

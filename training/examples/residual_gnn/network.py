@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from residual_gnn.features import NEIGHBOUR_FEATURES, ROBOT_FEATURES, Seen
+from residual_gnn.features import Neighbour, Own, Seen
 
 OF_MESSAGES = 0.2  # of their sum: robots have about five neighbours
 MESSAGE, DECISION, LOGIT = ("message.0", "message.2"), ("decision.0", "decision.2"), "logit"
@@ -23,7 +23,7 @@ class Weights:
     """All that a network's decisions follow from, but what it sees."""
 
     arrays: Mapping[str, Array]  # `LAYER.weight` and `LAYER.bias`, single precision
-    trust: float  # what the rule's own choice adds to the logit, or takes from it
+    prior_logit: float  # what the rule's own choice adds to the logit, or takes from it
     corrects_turns: bool  # whether it decides before the rule's schedule is in force, too
 
     @property
@@ -49,7 +49,7 @@ class Weights:
         hidden = np.concatenate([np.float32(OF_MESSAGES) * total, most, robots], axis=1)
         for layer in DECISION:
             hidden = np.maximum(self._linear(layer, hidden), 0.0)
-        return self._linear(LOGIT, hidden)[:, 0] + np.float32(self.trust) * robots[:, 0]
+        return self._linear(LOGIT, hidden)[:, 0] + np.float32(self.prior_logit) * robots[:, 0]
 
     def _linear(self, layer: str, rows: Array) -> Array:
         return rows @ self.arrays[f"{layer}.weight"].T + self.arrays[f"{layer}.bias"]
@@ -57,7 +57,7 @@ class Weights:
 
 def shapes(width: int) -> dict[str, tuple[int, ...]]:
     """Return the shapes of a network's arrays, by name."""
-    own, other = len(ROBOT_FEATURES), len(NEIGHBOUR_FEATURES)
+    own, other = len(Own), len(Neighbour)
     layers = {
         MESSAGE[0]: (own + other, width),
         MESSAGE[1]: (width, width),

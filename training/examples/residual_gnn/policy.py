@@ -13,11 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Int32
 
-from residual_gnn.beliefs import no_beliefs, note_slot
 from residual_gnn.features import Seen, room_to_see, see
+from residual_gnn.memory import empty_memory, note_slot
 from residual_gnn.network import Weights
-from residual_gnn.proposals import Proposal
-from residual_gnn.resting_rule import RestingRule
+from residual_gnn.rule import Proposal, RestingRule
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.policy import BroadcastPolicy, Parameters
 from swarm_mj.policies.tdma import slot_of
@@ -78,7 +77,7 @@ class ResidualPolicy(BroadcastPolicy):
     def parameters(self) -> Parameters:
         """Whether it draws, and a digest that changes with its network."""
         weights = self._weights
-        digest = hashlib.sha256(repr((weights.trust, weights.corrects_turns)).encode())
+        digest = hashlib.sha256(repr((weights.prior_logit, weights.corrects_turns)).encode())
         for name, array in sorted(weights.arrays.items()):
             digest.update(name.encode() + b"\0" + np.ascontiguousarray(array).tobytes())
         hexadecimal = digest.hexdigest()[:DIGITS]
@@ -94,7 +93,7 @@ class ResidualPolicy(BroadcastPolicy):
         self._rule.start(num_robots, rngs)
         self._own = Stream(rngs, uniform, (num_robots,))
         self._common = Stream(rngs, uniform, (num_robots,))
-        self._beliefs = no_beliefs(len(rngs), num_robots)
+        self._beliefs = empty_memory(len(rngs), num_robots)
         self._law = self._belief.law_over_noise(num_robots)
         self._last: Decision | None = None
 

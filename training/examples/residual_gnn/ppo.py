@@ -1,9 +1,9 @@
-"""Proximal policy optimisation (Schulman et al. 2017) where both actions' worth is known.
+"""Proximal policy optimisation (Schulman et al. 2017) with the advantage of both actions known.
 
-A robot transmits or it does not, and what either was worth follows from the recorded mission
-(`worth.py`). So the expectation over its own action is taken exactly, and no value has to be
-learned. stable-baselines3 has no place for either: its rewards come with the step, for the action
-that was drawn.
+A robot transmits or it does not, and the advantage of either follows from the recorded mission
+(`counterfactual.py`). So the expectation over its own action is taken exactly, and no value has to
+be learned. stable-baselines3 has no place for either: its rewards come with the step, for the
+action that was drawn.
 """
 
 from collections.abc import Sequence
@@ -17,8 +17,8 @@ from torch.nn.functional import softplus
 from torch.nn.utils import clip_grad_norm_
 
 from residual_gnn.features import Seen
-from residual_gnn.training.network import ResidualNetwork
-from residual_gnn.training.recording import Lesson
+from residual_gnn.recording import TrainingBatch
+from residual_gnn.torch_network import ResidualNetwork
 from swarm_mj.system.fields import check, setting
 
 CHUNK = 16  # decisions that stay together when they are shuffled
@@ -32,9 +32,9 @@ class PpoSettings:
     learning_rate: float = setting(7e-4, "of Adam", low=1e-9, high=1.0)
     epochs: int = setting(5, "passes over the decisions", low=1, high=100)
     minibatch: int = setting(6000, "decisions in a minibatch, about", low=CHUNK, high=10**7)
-    least_ratio: float = setting(0.7, "of probabilities", low=0.0, high=1.0)
-    most_ratio: float = setting(1.5, "of probabilities", low=1.0, high=100.0)
-    most_worth: float = setting(8.0, "of a packet, in standard deviations", low=0.1, high=1e6)
+    min_ratio: float = setting(0.7, "of probabilities", low=0.0, high=1.0)
+    max_ratio: float = setting(1.5, "of probabilities", low=1.0, high=100.0)
+    max_advantage: float = setting(8.0, "of a packet, in standard deviations", low=0.1, high=1e6)
     max_gradient_norm: float = setting(1.0, "of a step", low=1e-9, high=1e9)
 
     def __post_init__(self) -> None:
@@ -44,7 +44,7 @@ class PpoSettings:
 def improve(
     network: ResidualNetwork,
     optimiser: torch.optim.Optimizer,
-    lessons: Sequence[Lesson],
+    batches: Sequence[TrainingBatch],
     settings: PpoSettings,
     generator: torch.Generator,
 ) -> None:
@@ -53,11 +53,11 @@ def improve(
     Args:
         network: Changed in place.
         optimiser: Of its weights.
-        lessons: Of missions that this network flew; worths are in units of each one's own spread.
+        batches: Of missions that this network flew; worths are in units of each one's own spread.
         settings: Of the steps.
         generator: Shuffles the decisions.
     """
-    seen, logit, weight, worth = _batch(lessons, settings)
+    seen, logit, weight, advantage = _batch(batches, settings)
     num_rows = len(logit)
     first = torch.searchsorted(seen[2], torch.arange(num_rows + 1))
     chunks = torch.arange(-(-num_rows // CHUNK))
@@ -70,7 +70,7 @@ def improve(
             place = torch.empty(num_rows, dtype=torch.long)
             place[rows] = torch.arange(len(rows))
             now = network(seen[0][rows], seen[1][edges], place[seen[2][edges]])
-            gained = surrogate(now, logit[rows], worth[rows], settings)
+            gained = surrogate(now, logit[rows], advantage[rows], settings)
             loss = -(weight[rows] * gained).sum() / weight[rows].sum()
             optimiser.zero_grad()
             (SCALE * loss).backward()
@@ -81,7 +81,7 @@ def improve(
 def surrogate(
     now: Float[Tensor, "R"],
     before: Float[Tensor, "R"],
-    worth: Float[Tensor, "R"],
+    advantage: Float[Tensor, "R"],
     settings: PpoSettings,
 ) -> Float[Tensor, "R"]:
     """PPO's clipped objective, in expectation over a robot's own action.
@@ -89,38 +89,39 @@ def surrogate(
     Args:
         now: Logits of transmitting.
         before: The same when it was decided.
-        worth: Of transmitting rather than not.
+        advantage: Of transmitting rather than not.
         settings: Whose ratios clip.
     """
     p = torch.sigmoid(before)
     gained = torch.zeros_like(now)
-    for sign, probability, advantage in ((-1.0, p, (1.0 - p) * worth), (1.0, 1.0 - p, -p * worth)):
+    actions = ((-1.0, p, (1.0 - p) * advantage), (1.0, 1.0 - p, -p * advantage))
+    for sign, probability, value in actions:
         ratio = torch.exp(softplus(sign * before) - softplus(sign * now))
-        clipped = ratio.clamp(settings.least_ratio, settings.most_ratio)
-        gained = gained + probability * torch.minimum(ratio * advantage, clipped * advantage)
+        clipped = ratio.clamp(settings.min_ratio, settings.max_ratio)
+        gained = gained + probability * torch.minimum(ratio * value, clipped * value)
     return gained
 
 
 def _batch(
-    lessons: Sequence[Lesson], settings: PpoSettings
+    batches: Sequence[TrainingBatch], settings: PpoSettings
 ) -> tuple[tuple[Tensor, Tensor, Tensor], Tensor, Tensor, Tensor]:
-    """All lessons in one, with worths in standard deviations of their lesson's."""
-    starts = np.cumsum([0, *(len(lesson.logit) for lesson in lessons)])
+    """All batches in one, with worths in standard deviations of their lesson's."""
+    starts = np.cumsum([0, *(len(lesson.logit) for lesson in batches)])
     seen = Seen(
-        np.concatenate([lesson.seen.robots for lesson in lessons]),
-        np.concatenate([lesson.seen.neighbours for lesson in lessons]),
+        np.concatenate([lesson.seen.robots for lesson in batches]),
+        np.concatenate([lesson.seen.neighbours for lesson in batches]),
         np.concatenate(
-            [start + each.seen.owner for start, each in zip(starts, lessons, strict=False)]
+            [start + each.seen.owner for start, each in zip(starts, batches, strict=False)]
         ),
     )
-    scaled = [lesson.worth / max(float(np.std(lesson.worth)), 1e-9) for lesson in lessons]
-    worth = np.clip(np.concatenate(scaled), -settings.most_worth, settings.most_worth)
+    scaled = [lesson.advantage / max(float(np.std(lesson.advantage)), 1e-9) for lesson in batches]
+    advantage = np.clip(np.concatenate(scaled), -settings.max_advantage, settings.max_advantage)
     tensors = [torch.from_numpy(each) for each in seen]
-    logit = np.concatenate([lesson.logit for lesson in lessons])
-    weight = np.concatenate([lesson.weight for lesson in lessons])
+    logit = np.concatenate([lesson.logit for lesson in batches])
+    weight = np.concatenate([lesson.weight for lesson in batches])
     return (
         (tensors[0], tensors[1], tensors[2]),
         torch.from_numpy(logit),
         torch.from_numpy(weight),
-        torch.from_numpy(worth.astype(np.float32)),
+        torch.from_numpy(advantage.astype(np.float32)),
     )

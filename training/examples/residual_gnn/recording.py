@@ -1,4 +1,4 @@
-"""Missions flown by a residual policy, and what its decisions were worth."""
+"""Missions flown by a residual policy, with the advantage of each of its decisions."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 
+from residual_gnn.counterfactual import RecordedMissions, counterfactual_advantage
 from residual_gnn.features import Seen
 from residual_gnn.policy import Decision, ResidualPolicy, ticks
-from residual_gnn.training.worth import Course, worth
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.local_views import LocalViews
@@ -18,13 +18,13 @@ from swarm_mj.simulation.swarm import Swarm
 LIKELY = 0.02  # whoever may do otherwise than the rule with more is always learned from
 
 
-class Lesson(NamedTuple):
-    """What some decisions were, and what they were worth: R of them, with E neighbours in all."""
+class TrainingBatch(NamedTuple):
+    """R decisions with their advantages, and E neighbours in all."""
 
     seen: Seen
     logit: Float32[np.ndarray, "R"]  # of transmitting, when it was decided
     weight: Float32[np.ndarray, "R"]  # how many decisions each stands for
-    worth: Float32[np.ndarray, "R"]  # of transmitting rather than not [slots²], a mean over pairs
+    advantage: Float32[np.ndarray, "R"]  # of transmitting over silence, mean over pairs [slots²]
 
 
 class _Part(NamedTuple):
@@ -33,7 +33,7 @@ class _Part(NamedTuple):
     decision: Decision
     chosen: Bool[np.ndarray, "R"]
     weight: Float[np.ndarray, "C"]
-    worth: Float[np.ndarray, "C"]  # as `Lesson.worth`
+    advantage: Float[np.ndarray, "C"]  # as `TrainingBatch.advantage`
 
 
 class Recorder(ResidualPolicy):
@@ -55,10 +55,10 @@ class Recorder(ResidualPolicy):
         return decision
 
 
-def lesson(
+def collect_batch(
     swarm: Swarm, policy: Recorder, rng: np.random.Generator, *, share: float, horizon: int
-) -> tuple[Lesson, float]:
-    """Flies missions to their end, and works out what decisions were worth.
+) -> tuple[TrainingBatch, float]:
+    """Fly missions to their end, and compute the advantage of their decisions.
 
     Args:
         swarm: Of missions that have just begun.
@@ -68,7 +68,7 @@ def lesson(
             mission's.
         share: Of the decisions that are learned from, where robots hardly thought of doing
             otherwise than the rule.
-        horizon: Slots in which a packet's worth is counted; decisions that are closer to the end
+        horizon: Slots over which a packet's advantage is counted; decisions closer to the end
             than half of it are left out.
 
     Returns:
@@ -85,7 +85,7 @@ def lesson(
         active.append(states.is_active)
         heard += [phase.heard.copy() for phase in swarm.phases]
     last = ticks(swarm.buffers.timestamp)
-    course = Course(np.stack([*policy.observed, last]), np.stack(heard))
+    recorded = RecordedMissions(np.stack([*policy.observed, last]), np.stack(heard))
     num_slots = len(policy.decisions) - horizon // 2
     parts = []
     for s, decision in enumerate(policy.decisions[:num_slots]):
@@ -105,7 +105,9 @@ def lesson(
         if is_active is not None:
             decoded = np.where(is_active[rows[:, 0]], decoded, np.arange(num_robots))
         saved = np.empty(len(rows))
-        worth(course, np.full(len(rows), s), rows[:, 0], decoded, horizon, saved)
+        counterfactual_advantage(
+            recorded, np.full(len(rows), s), rows[:, 0], decoded, horizon, saved
+        )
         saved = np.where(did, -saved, saved) / num_robots**2
         parts.append(_Part(decision, chosen, weight, saved))
     return _joined(parts), float(np.mean(ages))
@@ -122,7 +124,7 @@ def _learned_from(
     return chosen, np.where(is_sure, 1.0, 1.0 / share)[chosen]
 
 
-def _joined(parts: Sequence[_Part]) -> Lesson:
+def _joined(parts: Sequence[_Part]) -> TrainingBatch:
     """Return the decisions of all slots in one."""
     robots, neighbours, owners, start = [], [], [], 0
     for part in parts:
@@ -134,9 +136,9 @@ def _joined(parts: Sequence[_Part]) -> Lesson:
         owners.append(start + place[seen.owner[is_kept]])
         start += int(np.count_nonzero(chosen))
     single = np.float32
-    return Lesson(
+    return TrainingBatch(
         Seen(np.concatenate(robots), np.concatenate(neighbours), np.concatenate(owners)),
         np.concatenate([part.decision.logit[part.chosen] for part in parts]),
         np.concatenate([part.weight for part in parts]).astype(single),
-        np.concatenate([part.worth for part in parts]).astype(single),
+        np.concatenate([part.advantage for part in parts]).astype(single),
     )

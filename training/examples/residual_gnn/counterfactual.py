@@ -1,4 +1,4 @@
-"""What a packet was worth: the age that it took from the team in the slots after it.
+"""The counterfactual advantage of a packet: the age it removed from the team afterwards.
 
 A recorded mission says who decoded whom in every slot. With one packet more or less, one slot
 goes otherwise, and from there on news spreads by the same receptions. So the difference that the
@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int, Int32
 from swarm_mj.system.compiled import compiled
 
 
-class Course(NamedTuple):
+class RecordedMissions(NamedTuple):
     """How B recorded missions of S slots went."""
 
     observed: Int32[np.ndarray, "S+1 B N N"]  # T before each slot, and at the end [ticks]
@@ -25,8 +25,8 @@ class Course(NamedTuple):
 
 
 @compiled()
-def worth(
-    course: Course,
+def counterfactual_advantage(
+    recorded: RecordedMissions,
     slot: Int[np.ndarray, "R"],
     mission: Int[np.ndarray, "R"],
     heard: Int[np.ndarray, "R N"],
@@ -36,7 +36,7 @@ def worth(
     """Fill in how much age one slot that goes otherwise takes from the team.
 
     Args:
-        course: Of the missions as they went.
+        recorded: Of the missions as they went.
         slot: Which slot goes otherwise, of each row.
         mission: Of which mission.
         heard: Whom everyone decodes in that slot instead; itself is nobody.
@@ -48,9 +48,9 @@ def worth(
     differs = np.empty(num_robots, dtype=np.bool_)
     for r in range(slot.shape[0]):
         s, b = slot[r], mission[r]
-        last = min(s + horizon, course.heard.shape[0])
+        last = min(s + horizon, recorded.heard.shape[0])
         differs[:] = False
-        _step(course, s, b, heard[r], differs, other)
+        _step(recorded, s, b, heard[r], differs, other)
         age_saved[r] = 0.0
         for t in range(s + 1, last + 1):
             if not np.any(differs):
@@ -58,14 +58,14 @@ def worth(
             for j in range(num_robots):
                 if differs[j]:
                     for k in range(num_robots):
-                        age_saved[r] += other[j, k] - course.observed[t, b, j, k]
+                        age_saved[r] += other[j, k] - recorded.observed[t, b, j, k]
             if t < last:
-                _step(course, t, b, course.heard[t, b], differs, other)
+                _step(recorded, t, b, recorded.heard[t, b], differs, other)
 
 
 @compiled()
 def _step(
-    course: Course,
+    recorded: RecordedMissions,
     s: int,
     b: int,
     heard: Int[np.ndarray, "N"],
@@ -76,7 +76,7 @@ def _step(
 
     Whoever transmits decodes nothing, so a sender's row is what its packet holds.
     """
-    before, after, went = course.observed[s, b], course.observed[s + 1, b], course.heard[s, b]
+    before, after, went = recorded.observed[s, b], recorded.observed[s + 1, b], recorded.heard[s, b]
     for j in range(heard.shape[0]):
         o = heard[j]
         is_as_it_was = o == went[j] and not differs[j] and (o == j or not differs[o])
@@ -87,8 +87,8 @@ def _step(
             known = other[j, k] if differs[j] else before[j, k]
             if o != j:
                 # The sender observes itself in the slot.
-                told = after[o, o] if k == o else (other[o, k] if differs[o] else before[o, k])
-                known = max(known, told)
+                sent = after[o, o] if k == o else (other[o, k] if differs[o] else before[o, k])
+                known = max(known, sent)
             other[j, k] = after[j, j] if k == j else known
             is_other = is_other or other[j, k] != after[j, k]
         differs[j] = is_other

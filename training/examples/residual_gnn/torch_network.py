@@ -6,23 +6,23 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor, nn
 
-from residual_gnn.features import NEIGHBOUR_FEATURES, ROBOT_FEATURES
+from residual_gnn.features import Neighbour, Own
 from residual_gnn.network import OF_MESSAGES, Weights
 
 
 class ResidualNetwork(nn.Module):
     """At first it says nothing, so that the rule decides."""
 
-    def __init__(self, width: int, trust: float) -> None:
+    def __init__(self, width: int, prior_logit: float) -> None:
         """Make a network.
 
         Args:
             width: Of the layers.
-            trust: What the rule's own choice adds to the logit, or takes from it.
+            prior_logit: What the rule's own choice adds to the logit, or takes from it.
         """
         super().__init__()
-        self.trust = trust
-        own, other = len(ROBOT_FEATURES), len(NEIGHBOUR_FEATURES)
+        self.prior_logit = prior_logit
+        own, other = len(Own), len(Neighbour)
         self.message = _layers(own + other, width, width)
         self.decision = _layers(2 * width + own, 2 * width, width)
         self.logit = nn.Linear(width, 1)
@@ -42,12 +42,12 @@ class ResidualNetwork(nn.Module):
         rows = owner[:, None].expand_as(messages)
         most = none.scatter_reduce(0, rows, messages, "amax")
         said = self.logit(self.decision(torch.cat([total, most, robots], dim=1))).squeeze(1)
-        return said + self.trust * robots[:, 0]
+        return said + self.prior_logit * robots[:, 0]
 
     def weights(self, *, corrects_turns: bool) -> Weights:
         """Its weights, to fly with."""
         arrays = {name: t.detach().numpy().copy() for name, t in self.state_dict().items()}
-        return Weights(arrays, self.trust, corrects_turns)
+        return Weights(arrays, self.prior_logit, corrects_turns)
 
     def state_dict_copy(self) -> dict[str, Tensor]:
         """Its weights as they are now."""

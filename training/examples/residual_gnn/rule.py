@@ -1,11 +1,11 @@
 """The rule of teams at rest: one plan from positions and the clock (`planner/standing_plan.py`)."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Int16
+from jaxtyping import Bool, Int, Int16
 
-from residual_gnn.proposals import FARTHEST, Proposal, turns
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.standing_plan import StandingPlan
 from swarm_mj.policies.tdma import draw_order, slot_of
@@ -14,6 +14,42 @@ from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.link_models import Belief
 
 MOST_PLANS = 512  # that are kept for positions that come again
+FARTHEST = 40  # later transmissions count as this far ahead [slots]
+
+
+class Proposal(NamedTuple):
+    """Of one slot: `[b, i, j]` is what robot i of mission b believes of j, or says of itself."""
+
+    is_due: Bool[np.ndarray, "B N N"]  # whether j transmits in the slot
+    due_in: Int16[np.ndarray, "B N N"]  # in how many slots it does so next
+    is_agreed: Bool[
+        np.ndarray, "B N"
+    ]  # whether the schedule is in force, or the turns of the start
+
+    @property
+    def transmits(self) -> Bool[np.ndarray, "B N"]:
+        """Who should transmit, by the rule."""
+        return np.diagonal(self.is_due, axis1=1, axis2=2)
+
+
+def turns(
+    order: Int[np.ndarray, "B N"], slot: Int[np.ndarray, "B"]
+) -> tuple[Bool[np.ndarray, "B N N"], Int16[np.ndarray, "B N N"]]:
+    """Whose turn it is in a common order, and when everyone's is next.
+
+    Args:
+        order: The robot at each place.
+        slot: Of each mission.
+
+    Returns:
+        As a proposal's first two parts.
+    """
+    num_robots = order.shape[1]
+    place = np.argsort(order, axis=1)
+    due_in = 1 + (place - slot[:, None] - 1) % num_robots
+    shape = (*order.shape, num_robots)
+    is_due = np.broadcast_to((due_in == num_robots)[:, None, :], shape)
+    return is_due.copy(), np.broadcast_to(due_in.astype(np.int16)[:, None, :], shape).copy()
 
 
 class RestingRule:
@@ -60,11 +96,11 @@ class RestingRule:
                 if key not in self._plans:
                     links = self._belief.links(buffers.position_m[b, robots[0]])
                     self._plans[key] = StandingPlan(links, PlannerSettings())
-                is_due[b, robots], due_in[b, robots] = _told(self._plans[key], int(slot[b]))
+                is_due[b, robots], due_in[b, robots] = _ahead(self._plans[key], int(slot[b]))
         return Proposal(is_due, due_in, knows_all)
 
 
-def _told(plan: StandingPlan, slot: int) -> tuple[Bool[np.ndarray, "N"], Int16[np.ndarray, "N"]]:
+def _ahead(plan: StandingPlan, slot: int) -> tuple[Bool[np.ndarray, "N"], Int16[np.ndarray, "N"]]:
     """Who transmits by the plan, and in how many slots next."""
     ahead = plan.ahead(slot, 1 + FARTHEST)
     later = ahead[1:]

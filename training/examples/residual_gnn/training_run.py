@@ -1,4 +1,4 @@
-"""The training of a residual policy: fly, learn what packets were worth, improve, again.
+"""The training of a residual policy: fly, compute advantages, improve, repeat.
 
 A run's folder holds `checkpoint.pt`, written after each improvement and each evaluation, from which
 it goes on as if it had never stopped, and `curve.csv`, one row an evaluation.
@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import torch
 
-from residual_gnn.making import check_rests, reads_packets
+from residual_gnn.factory import check_stationary, reads_packets
 from residual_gnn.network import Weights
 from residual_gnn.policy import ResidualPolicy
-from residual_gnn.resting_rule import RestingRule
-from residual_gnn.training.network import ResidualNetwork
-from residual_gnn.training.ppo import PpoSettings, improve
-from residual_gnn.training.recording import Lesson, Recorder, lesson
+from residual_gnn.ppo import PpoSettings, improve
+from residual_gnn.recording import Recorder, TrainingBatch, collect_batch
+from residual_gnn.rule import RestingRule
+from residual_gnn.torch_network import ResidualNetwork
 from swarm_mj.learning.torch_file import read_torch
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
@@ -31,11 +31,11 @@ from swarm_mj.system.atomic import write_bytes, write_csv
 from swarm_mj.system.fields import check, setting
 
 CHECKPOINT, CURVE = "checkpoint.pt", "curve.csv"
-MOST_BYTES = 100_000_000
+MAX_BYTES = 100_000_000
 FIRST_PLACE = 30_000  # seeds of the places where training flies
 HELD_OUT_SEED = 500_000  # of missions that judge
 CHOICE_SEED = 510_000  # of those that choose among the best
-USUAL = PpoSettings()
+DEFAULT_PPO = PpoSettings()
 NUM_BEST = 3  # that are chosen among, with the untrained one
 
 
@@ -45,13 +45,13 @@ class ResidualTraining:
 
     missions: dict[str, Mission]  # that are flown in turn, by their names
     width: int = setting(32, "of the network's layers", low=1, high=256)
-    trust: float = setting(
+    prior_logit: float = setting(
         5.0, "what the rule's choice adds to the logit of transmitting", low=0.0, high=50.0
     )
     corrects_turns: bool = setting(
         False, "let the network decide before everyone's plan is in force, too"
     )
-    ppo: PpoSettings = USUAL
+    ppo: PpoSettings = DEFAULT_PPO
     together: int = setting(4, "missions of each kind, between two improvements", low=1, high=1000)
     places: int = setting(40, "where robots may stand, of each kind", low=1, high=10_000)
     share: float = setting(
@@ -60,7 +60,7 @@ class ResidualTraining:
         low=1e-3,
         high=1.0,
     )
-    horizon: int = setting(120, "slots in which a packet's worth is counted", low=1, high=10_000)
+    horizon: int = setting(120, "slots over which an advantage is counted", low=1, high=10_000)
     seed: int = setting(0, "of all that is drawn", low=0, high=2**31)
     held_out: int = setting(8, "missions of each kind in an evaluation", low=1, high=1000)
     evaluate_every: int = setting(15, "improvements", low=1, high=10_000)
@@ -68,7 +68,7 @@ class ResidualTraining:
     def __post_init__(self) -> None:
         check(self)
         for name, mission in self.missions.items():
-            check_rests(mission)
+            check_stationary(mission)
             if not reads_packets(mission):
                 raise ValueError(
                     f"a packet of {name} does not say all that its sender knew before, so "
@@ -115,7 +115,7 @@ class Run:
         torch.manual_seed(training.seed)
         self._shuffle = torch.Generator().manual_seed(training.seed)
         self._rng = np.random.default_rng(training.seed)
-        self._network = ResidualNetwork(training.width, training.trust)
+        self._network = ResidualNetwork(training.width, training.prior_logit)
         self._optimiser = torch.optim.Adam(
             self._network.parameters(), lr=training.ppo.learning_rate
         )
@@ -139,24 +139,24 @@ class Run:
         """
         start, training = time.monotonic(), self.training
         weights = self._weights(self._network)
-        lessons: list[Lesson] = []
+        batches: list[TrainingBatch] = []
         ages = {}
         for name, mission in training.missions.items():
             places = self._rng.choice(training.places, training.together, replace=False)
             swarm = Swarm(mission, (FIRST_PLACE + places).tolist())
             policy = Recorder(weights, self._rules[radio_of(mission)], radio_of(mission))
             rng = self._rng.spawn(1)[0]
-            learned, ages[name] = lesson(
+            learned, ages[name] = collect_batch(
                 swarm, policy, rng, share=training.share, horizon=training.horizon
             )
             if len(learned.logit):
-                lessons.append(learned)
-        if not lessons:
+                batches.append(learned)
+        if not batches:
             raise ValueError(
                 "no robot had a plan to correct: missions are too short for teams to agree on one; "
                 "fly longer ones, or smaller teams"
             )
-        improve(self._network, self._optimiser, lessons, training.ppo, self._shuffle)
+        improve(self._network, self._optimiser, batches, training.ppo, self._shuffle)
         self.progress.improvements += 1
         self.progress.seconds += time.monotonic() - start
         self._save()
@@ -193,7 +193,7 @@ class Run:
         """
         ratios, all_weights = {}, {}
         for at, state in self.progress.best.items():
-            network = ResidualNetwork(self.training.width, self.training.trust)
+            network = ResidualNetwork(self.training.width, self.training.prior_logit)
             network.load_state_dict(state)
             all_weights[at] = self._weights(network)
         num_missions = self.training.held_out
@@ -249,7 +249,7 @@ class Run:
 
     def _load(self) -> None:
         path = self._folder / CHECKPOINT
-        state: Any = read_torch(path, MOST_BYTES)
+        state: Any = read_torch(path, MAX_BYTES)
         try:
             if state["settings"] != repr(self.training):
                 raise ValueError("it was made with other settings")

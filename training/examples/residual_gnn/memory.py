@@ -1,8 +1,8 @@
-"""What every robot remembers of the others: what they know, and how well it hears them.
+"""What every robot remembers of the others: what they know, and how well it inbound_ratio them.
 
 Whoever decodes a packet knows all that its sender knew. What the sender learns from then on can be
-reckoned from who is believed to transmit. Index order: `[b, i, j]` is what robot `i` of mission `b`
-believes of robot `j`. Times are ticks: a slot's tick is its number, counted from 1.
+predicted from who is believed to transmit. Index order: `[b, i, j]` is what robot `i` of mission
+`b` believes of robot `j`. Times are ticks: a slot's tick is its number, counted from 1.
 """
 
 from typing import NamedTuple
@@ -10,7 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Int32
 
-from residual_gnn.reckoning import NOBODY, Reckoned, decoded_by, reckon, room_for
+from residual_gnn.receptions import (
+    NOBODY,
+    PredictedReceptions,
+    decoded_by,
+    empty_receptions,
+    predict_receptions,
+)
 from swarm_mj.radio.power_law import PowerLaw, write_powers
 from swarm_mj.system.compiled import compiled
 
@@ -18,35 +24,35 @@ RECENT = 0.15  # the weight of the last packet in a share of packets
 FIRST_SHARE = 0.8  # before there was one
 
 
-class Beliefs(NamedTuple):
+class Memory(NamedTuple):
     """Of all robots of B missions."""
 
     held: Int32[np.ndarray, "B N N N"]  # [b, i, j, k]: when k observed what j knows of k, or 0
     decoded: Int32[np.ndarray, "B N N"]  # when i last decoded a packet of j, or 0
     sent: Int32[np.ndarray, "B N"]  # when i last transmitted, or 0
     heard: Int32[np.ndarray, "B N"]  # when i last decoded anything, or 0
-    hears: Float32[np.ndarray, "B N N"]  # share of j's packets, lately, that i decoded when due
-    heard_by: Float32[np.ndarray, "B N N"]  # and of i's that j knew of when i heard it next
-    from_afar: Float32[np.ndarray, "B N"]  # share of packets it decoded, lately, from out of range
+    inbound_ratio: Float32[np.ndarray, "B N N"]  # recent share of j's due packets that i decoded
+    outbound_ratio: Float32[np.ndarray, "B N N"]  # and of i's that j knew of when i heard it next
+    out_of_range: Float32[np.ndarray, "B N"]  # recent share of decoded packets from out of range
 
 
-def no_beliefs(num_missions: int, num_robots: int) -> Beliefs:
+def empty_memory(num_missions: int, num_robots: int) -> Memory:
     """Of robots that have heard nothing."""
     pairs = (num_missions, num_robots, num_robots)
-    return Beliefs(
+    return Memory(
         held=np.zeros((*pairs, num_robots), dtype=np.int32),
         decoded=np.zeros(pairs, dtype=np.int32),
         sent=np.zeros(pairs[:2], dtype=np.int32),
         heard=np.zeros(pairs[:2], dtype=np.int32),
-        hears=np.full(pairs, FIRST_SHARE, dtype=np.float32),
-        heard_by=np.full(pairs, FIRST_SHARE, dtype=np.float32),
-        from_afar=np.zeros(pairs[:2], dtype=np.float32),
+        inbound_ratio=np.full(pairs, FIRST_SHARE, dtype=np.float32),
+        outbound_ratio=np.full(pairs, FIRST_SHARE, dtype=np.float32),
+        out_of_range=np.zeros(pairs[:2], dtype=np.float32),
     )
 
 
 @compiled()
 def note_slot(
-    beliefs: Beliefs,
+    memory: Memory,
     tick: Int[np.ndarray, "B"],
     observed: Int32[np.ndarray, "B N N"],
     is_known: Bool[np.ndarray, "B N N"],
@@ -60,7 +66,7 @@ def note_slot(
     """Take note of a slot that has passed.
 
     Args:
-        beliefs: Written in place.
+        memory: Written in place.
         tick: The slot's.
         observed: T of everyone after it, in ticks; of a sender, what its packet said.
         is_known: Whom each robot has heard of.
@@ -72,36 +78,36 @@ def note_slot(
         threshold: Least SINR that decodes, linear [1].
     """
     num_missions, num_robots = transmitted.shape
-    reckoned, believed = room_for(num_robots), np.zeros(num_robots, dtype=np.bool_)
+    predicted, believed = empty_receptions(num_robots), np.zeros(num_robots, dtype=np.bool_)
     for b in range(num_missions):
         for i in range(num_robots):
             sender = int(heard[b, i]) if heard[b, i] != i else NOBODY
             for o in range(num_robots):
                 believed[o] = o != i and is_due[b, i, o] and is_known[b, i, o]
             if not transmitted[b, i]:
-                reckon(believed, position_m[b, i], law, reckoned)
-                _judge(beliefs.hears[b, i], decoded_by(i, reckoned, 0.0, threshold), sender)
+                predict_receptions(believed, position_m[b, i], law, predicted)
+                _judge(memory.inbound_ratio[b, i], decoded_by(i, predicted, 0.0, threshold), sender)
             if sender != NOBODY:
-                _read_packet(beliefs, b, i, sender, int(tick[b]), observed[b, sender])
+                _read_packet(memory, b, i, sender, int(tick[b]), observed[b, sender])
                 believed[sender] = True
             believed[i] = transmitted[b, i]
-            reckon(believed, position_m[b, i], law, reckoned)
-            write_powers(i, position_m[b, i], law, reckoned.power)
+            predict_receptions(believed, position_m[b, i], law, predicted)
+            write_powers(i, position_m[b, i], law, predicted.power)
             _pass_on(
                 i,
                 sender,
-                beliefs.held[b, i],
+                memory.held[b, i],
                 observed[b, i],
                 is_known[b, i],
                 believed,
                 threshold,
-                reckoned,
+                predicted,
             )
             if sender != NOBODY:  # links are alike in both directions, as far as i knows
-                is_far = is_known[b, i, sender] and reckoned.power[sender] < threshold
-                _count(beliefs.from_afar[b], i, is_far)
+                is_far = is_known[b, i, sender] and predicted.power[sender] < threshold
+                _count(memory.out_of_range[b], i, is_far)
             if transmitted[b, i]:
-                beliefs.sent[b, i] = tick[b]
+                memory.sent[b, i] = tick[b]
 
 
 @compiled()
@@ -119,14 +125,14 @@ def _judge(share: Float32[np.ndarray, "N"], due: int, sender: int) -> None:
 
 @compiled()
 def _read_packet(
-    beliefs: Beliefs, b: int, i: int, sender: int, now: int, told: Int32[np.ndarray, "N"]
+    memory: Memory, b: int, i: int, sender: int, now: int, sent: Int32[np.ndarray, "N"]
 ) -> None:
     """Take over what i decoded: all that the sender knows, and whether it knew of i's last one."""
-    last = beliefs.sent[b, i]
-    if last > 0 and beliefs.decoded[b, i, sender] < last:
-        _count(beliefs.heard_by[b, i], sender, told[i] >= last)
-    beliefs.held[b, i, sender] = told
-    beliefs.decoded[b, i, sender], beliefs.heard[b, i] = now, now
+    last = memory.sent[b, i]
+    if last > 0 and memory.decoded[b, i, sender] < last:
+        _count(memory.outbound_ratio[b, i], sender, sent[i] >= last)
+    memory.held[b, i, sender] = sent
+    memory.decoded[b, i, sender], memory.heard[b, i] = now, now
 
 
 @compiled()
@@ -138,7 +144,7 @@ def _pass_on(
     is_known: Bool[np.ndarray, "N"],
     transmits: Bool[np.ndarray, "N"],
     threshold: float,
-    reckoned: Reckoned,
+    predicted: PredictedReceptions,
 ) -> None:
     """Neighbours that should have decoded a packet now know what its sender is believed to know.
 
@@ -146,12 +152,12 @@ def _pass_on(
     observed itself.
     """
     for j in range(held.shape[0]):
-        is_near = is_known[j] and reckoned.power[j] >= threshold
+        is_near = is_known[j] and predicted.power[j] >= threshold
         if transmits[j] or not is_near or j in (i, sender):
             continue
-        o = decoded_by(j, reckoned, 0.0, threshold)
+        o = decoded_by(j, predicted, 0.0, threshold)
         if o == NOBODY:
             continue
-        told = observed if o == i else held[o]
+        sent = observed if o == i else held[o]
         for k in range(held.shape[1]):
-            held[j, k] = max(held[j, k], told[k])
+            held[j, k] = max(held[j, k], sent[k])

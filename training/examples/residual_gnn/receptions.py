@@ -12,7 +12,7 @@ from swarm_mj.system.compiled import compiled
 NOBODY = -1
 
 
-class Reckoned(NamedTuple):
+class PredictedReceptions(NamedTuple):
     """What a slot holds for every robot j, as robot i believes; powers in units of the noise."""
 
     total: Float[np.ndarray, "N"]  # power of all packets at j
@@ -22,9 +22,9 @@ class Reckoned(NamedTuple):
 
 
 @compiled()
-def room_for(num_robots: int) -> Reckoned:
+def empty_receptions(num_robots: int) -> PredictedReceptions:
     """Room for the reckoning of one robot."""
-    return Reckoned(
+    return PredictedReceptions(
         np.zeros(num_robots),
         np.zeros(num_robots),
         np.full(num_robots, NOBODY),
@@ -33,14 +33,14 @@ def room_for(num_robots: int) -> Reckoned:
 
 
 @compiled()
-def reckon(
+def predict_receptions(
     transmits: Bool[np.ndarray, "N"],
     position_m: Float[np.ndarray, "N 2"],
     law: PowerLaw,
-    reckoned: Reckoned,
+    predicted: PredictedReceptions,
 ) -> None:
-    """Works out what all receive if these robots transmit; `reckoned` is overwritten."""
-    total, strongest, sender, power = reckoned
+    """Works out what all receive if these robots transmit; `predicted` is overwritten."""
+    total, strongest, sender, power = predicted
     total[:], strongest[:], sender[:] = 0.0, 0.0, NOBODY
     for o in range(transmits.shape[0]):
         if transmits[o]:
@@ -53,8 +53,8 @@ def reckon(
 
 
 @compiled()
-def decoded_by(j: int, reckoned: Reckoned, more: float, threshold: float) -> int:
+def decoded_by(j: int, predicted: PredictedReceptions, more: float, threshold: float) -> int:
     """Whom j decodes beside so much more interference, or `NOBODY`."""
-    strongest = reckoned.strongest[j]
-    ratio = sinr(strongest, reckoned.total[j] - strongest + more, 1.0)
-    return reckoned.sender[j] if is_received(ratio, threshold) else NOBODY
+    strongest = predicted.strongest[j]
+    ratio = sinr(strongest, predicted.total[j] - strongest + more, 1.0)
+    return predicted.sender[j] if is_received(ratio, threshold) else NOBODY

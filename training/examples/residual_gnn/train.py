@@ -1,22 +1,23 @@
-"""Trains the shipped policy `residual-gnn`: a network that corrects the plan of teams at rest.
+"""Train the network that corrects the plan of stationary teams.
 
-    python training/residual.py
+    cd training/examples
+    python -m residual_gnn.train
 
 A run that has begun goes on where it was, with the same options but for the minutes; stopped by
 Ctrl-C or killed, it loses the improvement under way and nothing else. At the end the best networks,
-and the rule without one, fly missions that judged nothing so far; the best of them becomes
-`policy.safetensors` in the run's folder. `--ship` also puts it, and its card, into assets/policies.
+and the rule without one, fly fresh test missions; the best of them becomes `weights.safetensors` in
+the run's folder.
 """
 
 import sys
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
-from residual_gnn.stored import save_residual
-from residual_gnn.training.ppo import PpoSettings
-from residual_gnn.training.train import (
+from residual_gnn.ppo import PpoSettings
+from residual_gnn.stored import save_weights
+from residual_gnn.training_run import (
     CURVE,
-    USUAL,
+    DEFAULT_PPO,
     Progress,
     ResidualTraining,
     Run,
@@ -24,15 +25,11 @@ from residual_gnn.training.train import (
 )
 from swarm_mj.cli import script
 from swarm_mj.mission import Mission, paper
-from swarm_mj.system.atomic import write_text
 from swarm_mj.system.fields import as_typed, setting
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.owned import owned
 from swarm_mj.system.provenance import commit
 
-ROOT = Path(__file__).resolve().parent.parent
-POLICIES = ROOT / "assets" / "policies"
-SHIPPED = "residual-gnn"
 WINDOWS = 250  # of a mission that is learned from
 KINDS = {  # what 40 robots at rest meet; they believe in free space
     "free space": {},
@@ -57,35 +54,33 @@ class Residual:
     )
     seed: int = setting(0, "of all that is drawn", low=0, high=2**31)
     out: Path = setting(
-        ROOT / "runs" / "residual",
+        Path("runs/residual_gnn"),
         "the run; one that has begun goes on, with the same options but for the minutes",
         metavar="DIR",
-        shown="runs/residual",
+        shown="runs/residual_gnn",
     )
-    learning_rate: float = setting(USUAL.learning_rate, "of Adam", low=1e-9, high=1.0)
+    learning_rate: float = setting(DEFAULT_PPO.learning_rate, "of Adam", low=1e-9, high=1.0)
     corrects_turns: bool = setting(
         False, "let the network decide before everyone's plan is in force, too"
     )
     epochs: int = setting(
-        USUAL.epochs, "passes over the decisions of an improvement", low=1, high=100
+        DEFAULT_PPO.epochs, "passes over the decisions of an improvement", low=1, high=100
     )
     robots: int = setting(40, "in a team", low=2, high=200)
     windows: int = setting(WINDOWS, "of a mission", low=100, high=10_000)
     together: int = setting(4, "missions of each kind between two improvements", low=1, high=1000)
     places: int = setting(40, "where robots may stand, of each kind", low=1, high=10_000)
     held_out: int = setting(8, "missions of each kind in an evaluation", low=1, high=1000)
-    ship: bool = setting(False, "put the policy into assets/policies")
 
     def __call__(self) -> int:
-        """Trains, chooses, writes; returns the exit code.
+        """Train, choose, write; return the exit code.
 
         Raises:
             ValueError: The run's folder is another run's or damaged.
             OSError: Something cannot be read or written.
         """
-        policy = self.out / "policy.safetensors"
-        paths = [policy, *(POLICIES / f"{SHIPPED}{end}" for end in (".safetensors", ".md"))]
-        check_outputs(*(Output("policy", path) for path in (paths if self.ship else paths[:1])))
+        policy = self.out / "weights.safetensors"
+        check_outputs(Output("policy", policy))
         with owned(self.out / CURVE):
             _said("flying the rule alone, or reading how far the run is")
             run = Run(self.training(), self.out)
@@ -94,22 +89,19 @@ class Residual:
             _said("choosing among the best and the rule alone, on other missions")
             at, weights, ratios = run.choose()
             if not at:
-                _said("the rule alone is best, so nothing is written or shipped; train for longer")
+                _said("the rule alone is best, so no weights are written; train for longer")
                 return 0
             card = self._card(run.progress, at, ratios)
-            save_residual(policy, weights, card)
+            save_weights(policy, weights, card)
         _said(f"{policy}: made after {at} improvements, {ratios[at]:.3f} of the rule's age")
-        if self.ship:
-            save_residual(paths[1], weights, card)
-            write_text(paths[2], card)
         return 0
 
     def _command(self) -> str:
         """What was typed, with all that is not as usual."""
-        words = ["python training/residual.py"]
+        words = ["python -m residual_gnn.train"]
         for spec in fields(self):
             value = getattr(self, spec.name)
-            if spec.name not in ("out", "ship") and value != spec.default:
+            if spec.name != "out" and value != spec.default:
                 flag = f"--{spec.name.replace('_', '-')}"
                 words.append(flag if value is True else f"{flag} {as_typed(value)}")
         return " ".join(words)
@@ -143,9 +135,9 @@ class Residual:
         return CARD.format(
             width=self.training().width,
             listed=listed,
-            turns=", and those that still take turns, too"
+            turns="; so do those that still take turns"
             if self.corrects_turns
-            else ", and no others",
+            else "; no others do",
             kinds=kinds,
             chosen=chosen,
             robots=self.robots,
@@ -159,23 +151,23 @@ class Residual:
 
 CARD = """# A learned correction of a plan, of swarm_mj
 
-Teams at rest agree on one plan from positions and the clock (`planner --payload none`). In every
-slot, each robot that decides evaluates this network on what it remembers of its neighbours, and
-draws from the result whether it transmits, whatever the plan says. Those that follow the plan
-decide{turns}.
+A stationary team derives one plan from positions and the clock (`planner --payload none`). In every
+slot, each robot that decides evaluates this network on what it remembers of its neighbours. It then
+draws whether to transmit, whatever the plan says. Robots that follow the plan decide{turns}.
 
 - network: graph neural network of one hop, width {width}, over believed neighbours
-- packets: T, M and P, as the paper's, and nothing more
-- teams at rest alone; where robots move, `residual-gnn` is `sotdma`, without a network
+- packets: T, M and P, as in the paper
+- stationary teams only
 
 ## Fly it
 
-    swarm-mj fly --policy residual-gnn --task stationary
+    cd training/examples
+    swarm-mj fly --policy residual_gnn:policy --task stationary
 
 ## Training
 
-PPO on what every packet was worth (`swarm_mj/learning/residual`): {minutes:.0f} minutes on one
-core, {robots} robots, {windows} windows a mission, of these kinds in turn:
+PPO with each packet's counterfactual advantage: {minutes:.0f} minutes on one core, {robots}
+robots, {windows} windows a mission, of these kinds in turn:
 
 {kinds}
 
@@ -187,8 +179,8 @@ Commit {commit}.
 
 ## Choice
 
-Mean age over that of the rule alone, on {held_out} missions of each kind that judged nothing
-before. The least of several flatters; docs/channels.md has missions that chose nothing:
+Mean age relative to the rule alone, on {held_out} missions of each kind not used during training.
+The best of several noisy evaluations is biased:
 
 {chosen}
 

@@ -1,22 +1,32 @@
-"""The residual policy of a mission."""
+"""Residual policies of a mission, as `--policy residual_gnn:policy` and the training make them."""
+
+from pathlib import Path
 
 from residual_gnn.network import Weights
 from residual_gnn.policy import ResidualPolicy
-from residual_gnn.resting_rule import RestingRule
+from residual_gnn.rule import RestingRule
+from residual_gnn.stored import SHIPPED, load_weights
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.packets import fits, packet_of
 from swarm_mj.radio.mission_radio import radio_of
 
 
-def residual_policy(
+def policy(
+    mission: Mission, path: Path = SHIPPED, *, is_deterministic: bool = False
+) -> ResidualPolicy:
+    """Return the policy of a file of weights; raises as `load_weights` and `make_policy` do."""
+    return make_policy(load_weights(path), mission, is_deterministic=is_deterministic)
+
+
+def make_policy(
     weights: Weights, mission: Mission, *, is_deterministic: bool = False
 ) -> ResidualPolicy:
     """Return the policy that these weights make of a mission's rule.
 
     Raises:
-        ValueError: The mission's team moves: there is no rule for it.
+        ValueError: The team moves, so that there is no rule for it.
     """
-    check_rests(mission)
+    check_stationary(mission)
     radio = radio_of(mission)
     return ResidualPolicy(
         weights,
@@ -27,16 +37,16 @@ def residual_policy(
     )
 
 
-def check_rests(mission: Mission) -> None:
+def check_stationary(mission: Mission) -> None:
     """Raise ValueError if the mission's team moves: there is no rule for it."""
     if mission.task != "stationary":
         raise ValueError(
-            f"residual policies are for teams at rest, and those of {mission.task} move; add "
-            "--task stationary, or fly another policy"
+            "residual_gnn corrects the plan of stationary teams, and those of "
+            f"{mission.task} move; add --task stationary, or fly another policy"
         )
 
 
 def reads_packets(mission: Mission) -> bool:
-    """Whether a packet holds all of its sender's T as it was before the slot."""
+    """Return whether a packet holds all of its sender's T as it was before the slot."""
     # By the authors' rule a robot may decode while it transmits, which changes its T in that slot.
     return fits(packet_of(mission), mission) and mission.half_duplex == "strict"

@@ -1,1 +1,0 @@
-"""Training of residual policies: PPO on what every packet was worth."""
