@@ -6,23 +6,27 @@ Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted by Ctrl-C
 hang-up. A reader that closes the pipe, as `| head` does, and a terminal that is gone are no errors.
 """
 
+import argparse
 import importlib
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
+from swarm_mj.cli.options import Parser, parse_options
 from swarm_mj.mission.components import one_line_each
 from swarm_mj.system.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
+from swarm_mj.system.fields import did_you_mean
 from swarm_mj.system.interrupt import interruptible
 from swarm_mj.system.streams import lasting_streams
 
-Options = TypeVar("Options")
+T = TypeVar("T")
 
+NAME = "swarm-mj"
 WRONG_NAMES = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
-COMMANDS = {  # each a module here, with its options, `Options`, and what it does, `run`
+COMMANDS = {  # each is a module here: `fly` holds its options, `FlyOptions`, and its action, `run`
     "fly": "Fly one mission and record its replay.",
     "policies": "List the communication policies: what each knows and sends.",
     "evaluate": "Fly policies over the same missions and say where they stand.",
@@ -33,51 +37,52 @@ COMMANDS = {  # each a module here, with its options, `Options`, and what it doe
     "doctor": "Say what works on this machine, and how to mend what does not.",
     "bench": "Time the simulation and its parts.",
 }
+BEGINNING = {
+    "fly": "a flock of 40 robots flies 50 s; it records a replay",
+    "replay FILE": "opens that replay",
+    "policies": "what you can give to --policy, and what each one knows",
+    "evaluate": "flies several policies on the same missions",
+}
 
 
 def parse(arguments: Sequence[str]) -> tuple[Any, Any]:
-    """What was typed after `swarm-mj` asks for: a command's `run`, and the options to call it with.
-
-    It imports the command here, so that Ctrl-C is heard while modules load.
+    """Return the function to run for the arguments after `swarm-mj`, and its options.
 
     Raises:
         ValueError: A value is unknown or outside its range.
         SystemExit: The line cannot be read, or only help was asked for.
     """
-    if arguments and arguments[0] in COMMANDS:
-        from rich.console import Console
+    if not arguments or arguments[0] not in COMMANDS:
+        _show_or_refuse(arguments)
+    from rich.console import Console
 
-        from swarm_mj.cli import options
-        from swarm_mj.replay.rendering.opengl import check_choice
+    from swarm_mj.replay.rendering.opengl import check_choice
 
-        check_choice()  # before something imports MuJoCo
-        with Console(stderr=True).status("Loading ..."):
-            command = importlib.import_module(f"swarm_mj.cli.{arguments[0]}")
-        prog, summary = f"swarm-mj {arguments[0]}", COMMANDS[arguments[0]]
-        return command.run, options.parse(command.Options, arguments[1:], prog, summary)
-    from swarm_mj.cli.overview import show_or_refuse
-
-    show_or_refuse(arguments)
+    name = arguments[0]
+    check_choice()  # before something imports MuJoCo
+    # The command is imported here, not above, so that Ctrl-C is heard while modules load.
+    with Console(stderr=True).status("Loading ..."):
+        command = importlib.import_module(f"swarm_mj.cli.{name}")
+    kind = getattr(command, f"{name.title()}Options")
+    return command.run, parse_options(kind, arguments[1:], f"{NAME} {name}", COMMANDS[name])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line, or this process's if none is given; returns the exit code."""
+    """Run a command line, or this process's if none is given; return the exit code."""
 
     def work() -> int:
         run, options = parse(sys.argv[1:] if arguments is None else list(arguments))
         return run(options)
 
-    return _exit_code("swarm-mj", work)
+    return _exit_code(NAME, work)
 
 
 def end_process() -> NoReturn:
-    """Run this process's command line as `main` does, and ends the process with its exit code.
-
-    It ends at once when it was interrupted: compiled code that was broken off while it loaded may
-    crash if Python then takes its libraries down one by one.
-    """
+    """Run this process's command line as `main` does, and end the process with its exit code."""
     code = main()
     if code == INTERRUPTED:
+        # Compiled code that was broken off while it loaded may crash when Python unloads its
+        # libraries one by one, so an interrupted process ends at once.
         with suppress(OSError, ValueError):  # of streams that lead nowhere any more
             sys.stdout.flush()
             sys.stderr.flush()
@@ -85,68 +90,86 @@ def end_process() -> NoReturn:
     sys.exit(code)
 
 
-def script(
-    kind: type[Options], run: Callable[[Options], int], arguments: Sequence[str] | None = None
-) -> int:
-    """Run a program of its own, such as those of `tools/`, as `main` does a command.
+def script(kind: type[T], run: Callable[[T], int], arguments: Sequence[str] | None = None) -> int:
+    """Run a separate program, such as those of `tools/`, as `main` does a command.
 
     Args:
         kind: The dataclass of its options; its module's docstring says what it does.
-        run: What to do with them; it returns the exit code.
+        run: The action; it returns the exit code.
         arguments: What was typed after the program's name; None is this process's.
     """
-    from swarm_mj.cli import options
-
     module = sys.modules[kind.__module__]
     name = Path(str(module.__file__)).stem
     typed = sys.argv[1:] if arguments is None else list(arguments)
     summary = str(module.__doc__).partition("\n")[0]
-    return _exit_code(name, lambda: run(options.parse(kind, typed, name, summary)))
+    return _exit_code(name, lambda: run(parse_options(kind, typed, name, summary)))
+
+
+def _show_or_refuse(arguments: Sequence[str]) -> NoReturn:
+    """Print the overview or the version, or refuse a line that names no command."""
+    from swarm_mj.system.provenance import version
+
+    begin_with = {f"{NAME} {command}": meaning for command, meaning in BEGINNING.items()}
+    parser = Parser(
+        prog=NAME,
+        usage=f"{NAME} COMMAND [OPTIONS]",
+        description="Robot swarms on MuJoCo that share their state over a radio they compete for.",
+        epilog=f"{_listed('commands', COMMANDS)}\n{_listed('begin with', begin_with)}\n"
+        f"`{NAME} COMMAND --help` explains a command and its options.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"{NAME} {version()}")
+    if not arguments:
+        parser.print_help(sys.stderr)
+        parser.exit(BAD_INPUT)
+    if not arguments[0].startswith("-"):
+        hint = did_you_mean(arguments[0], COMMANDS)
+        parser.error(f"there is no command {arguments[0]!r}{hint}")
+    parser.known(arguments)
+    parser.error("name the command first")
+
+
+def _listed(title: str, meanings: Mapping[str, str]) -> str:
+    width = max(map(len, meanings))
+    return f"{title}:\n" + "".join(f"  {each:{width}}  {meanings[each]}\n" for each in meanings)
 
 
 def _exit_code(name: str, work: Callable[[], int]) -> int:
-    """Do the work; says in one line what is wrong, or that it was interrupted."""
+    """Do the work; print in one line what is wrong, or that it was interrupted."""
     with lasting_streams() as failure, interruptible() as was_interrupted:
-        code = _told(name, work, was_interrupted)
+        code, error = _outcome(work, was_interrupted)
+        if error:
+            sys.stderr.write(f"{name}: {error}\n")
         if lost := failure():
             sys.stderr.write(f"{name}: error: not all output was written: {lost.strerror}\n")
         return code or (FAILED if lost else DONE)
 
 
-def _told(name: str, work: Callable[[], int], was_interrupted: Callable[[], bool]) -> int:
+def _outcome(work: Callable[[], int], was_interrupted: Callable[[], bool]) -> tuple[int, str]:
+    """Return the exit code of some work, and the line to print of an error."""
     try:
-        try:
-            with one_line_each():
-                return work()
-        except (
-            ValueError,
-            OSError,
-            ImportError,
-        ) as error:  # perhaps what a library made of a Ctrl-C
-            if was_interrupted():
-                raise KeyboardInterrupt from error
-            raise
+        with one_line_each():
+            return work(), ""
     except SystemExit as end:  # of help, or of a line that cannot be read
-        return int(end.code or DONE)
-    except (ValueError, OSError) as error:
-        sys.stderr.write(f"{name}: error: {error}\n")
-        return BAD_INPUT if isinstance(error, (ValueError, *WRONG_NAMES)) else FAILED
-    except ModuleNotFoundError as error:
-        sys.stderr.write(f"{name}: error: {_missing(error)}\n")
-        return FAILED
-    except MemoryError:
-        sys.stderr.write(f"{name}: error: this machine's memory does not suffice\n")
-        return FAILED
+        return int(end.code or DONE), ""
+    except (ValueError, OSError, ImportError, MemoryError) as error:
+        if was_interrupted() and not isinstance(error, MemoryError):
+            return INTERRUPTED, "interrupted"  # which a library made into another exception
+        is_input = isinstance(error, (ValueError, *WRONG_NAMES))
+        return BAD_INPUT if is_input else FAILED, f"error: {_said(error)}"
     except KeyboardInterrupt:
-        sys.stderr.write(f"{name}: interrupted\n")
-        return INTERRUPTED
+        return INTERRUPTED, "interrupted"
 
 
-def _missing(error: ModuleNotFoundError) -> str:
-    """What to say of a package that is not installed; raises the error again if it is our own."""
+def _said(error: Exception) -> str:
+    """Return an error's message; raise it again if it is a fault of this package's imports."""
     from swarm_mj.system.packages import missing
 
+    if isinstance(error, MemoryError):
+        return "this machine's memory does not suffice"
+    if not isinstance(error, ImportError):
+        return str(error)
     module = (error.name or "").partition(".")[0]
-    if module == "swarm_mj":
+    if module == "swarm_mj" or not isinstance(error, ModuleNotFoundError):
         raise error
     return missing(module, "this") if str(error).startswith("No module named") else str(error)

@@ -29,7 +29,7 @@ team decision: the network decides for all robots of a team, in one window."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class BenchOptions:
     """The options of `swarm-mj bench`."""
 
     missions: tuple[int, ...] = setting((1, 32, 256), "missions side by side", low=1, high=10_000)
@@ -45,7 +45,7 @@ class Options:
     no_learning: bool = setting(False, "leave out the networks and the training")
 
 
-def run(options: Options) -> int:
+def run(options: BenchOptions) -> int:
     """Run the command; returns its exit code."""
     tell_cores(options.jobs if options.episodes else 1)
     tell_cores(options.threads, "threads")
@@ -92,7 +92,7 @@ class _Measured(NamedTuple):
         return table
 
 
-def _measure(options: Options, say: Callable[[str], None]) -> Iterator[_Measured]:
+def _measure(options: BenchOptions, say: Callable[[str], None]) -> Iterator[_Measured]:
     columns = []
     for num_missions in options.missions:
         say(f"Measuring with {num_missions} side by side ...")

@@ -25,14 +25,14 @@ VERDICTS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class DoctorOptions:
     """The options of `swarm-mj doctor`."""
 
     EPILOG: ClassVar = "Exit codes: 0 swarm_mj works, 1 something that it needs is broken."
     json: bool = setting(False, "print JSON in place of the table")
 
 
-def run(options: Options) -> int:
+def run(options: DoctorOptions) -> int:
     """Run the command; returns its exit code."""
     with Console(stderr=True).status("Trying things out ..."):
         found = [*about(), *packages(), *tried(), *machine()]

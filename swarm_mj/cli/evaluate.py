@@ -10,8 +10,7 @@ from typing import ClassVar
 from rich.console import Console
 
 from swarm_mj.api.estimates import study_needs
-from swarm_mj.cli.mission_options import several_missions
-from swarm_mj.cli.policy_options import NAMED, NAMES, OTHERS, PolicyOptions
+from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_missions
 from swarm_mj.evaluation import progress
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.results import write_csv
@@ -42,7 +41,7 @@ OUTPUT = "output"  # a heading of the help
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(PolicyOptions):
+class EvaluateOptions(PolicyOptions):
     """The options of `swarm-mj evaluate`."""
 
     EPILOG: ClassVar = (
@@ -53,7 +52,6 @@ class Options(PolicyOptions):
         DEFAULT_POLICIES,
         f"{NAMES}, all of these, {OTHERS}",
         convert=normalised,
-        offers=("all", *NAMED),
     )
     episodes: int = same_as(Study, "episodes")
     seed: int = same_as(Study, "seed")
@@ -88,7 +86,7 @@ class Options(PolicyOptions):
         )
 
 
-def run(options: Options) -> int:
+def run(options: EvaluateOptions) -> int:
     """Run the command; returns its exit code."""
     need("scipy", "an evaluation")
     study = options.study
@@ -107,7 +105,7 @@ def run(options: Options) -> int:
         return _evaluate(options, study)
 
 
-def _evaluate(options: Options, study: Study) -> int:
+def _evaluate(options: EvaluateOptions, study: Study) -> int:
     """Flies what is left of a study, and writes what it came to."""
     kept = _progress_file(options)
     tell_cores(options.jobs)
@@ -138,7 +136,7 @@ def _evaluate(options: Options, study: Study) -> int:
     return DONE
 
 
-def _progress_file(options: Options) -> Path | None:
+def _progress_file(options: EvaluateOptions) -> Path | None:
     """The progress file, or None without outputs; raises ValueError if it may not be replaced."""
     output = options.json or options.csv
     if output is None:
@@ -156,7 +154,7 @@ def _progress_file(options: Options) -> Path | None:
     return kept
 
 
-def _write(options: Options, evaluated: Sequence[Evaluated]) -> None:
+def _write(options: EvaluateOptions, evaluated: Sequence[Evaluated]) -> None:
     if options.json:
         write_evaluated(options.json, evaluated)
     if options.csv:

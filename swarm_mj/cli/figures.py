@@ -7,7 +7,6 @@ from pathlib import Path
 from rich.console import Console
 
 from swarm_mj.api.estimates import figures_needs
-from swarm_mj.cli.policy_options import NAMED
 from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS
 from swarm_mj.evaluation.results import Result, read_results
 from swarm_mj.mission.components import OwnParts
@@ -21,14 +20,13 @@ from swarm_mj.system.terminal import plain_console
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class FiguresOptions:
     """The options of `swarm-mj figures`."""
 
     results: tuple[Path, ...] = setting(
         help="files of one preset that `swarm-mj evaluate --csv` wrote",
         metavar="RESULTS.csv",
         is_positional=True,
-        ending=".csv",
     )
     out: Path = setting(help="where to write", metavar="DIR")
     figure: tuple[str, ...] = setting(
@@ -42,12 +40,11 @@ class Options:
         "who talks to whom in it",
         metavar="POLICY",
         group=f"the mission flown for {FLOCK}",
-        offers=NAMED,
     )
     flock_seed: int = setting(1, "its seed", group=f"the mission flown for {FLOCK}")
 
 
-def run(options: Options) -> int:
+def run(options: FiguresOptions) -> int:
     """Run the command; returns its exit code."""
     paths = _paths(options)
     needs = figures_needs(options.results, sum(map(len, paths.values())))
@@ -98,7 +95,7 @@ def _papers(path: Path) -> list[Result]:
     return results
 
 
-def _paths(options: Options) -> dict[str, list[Path]]:
+def _paths(options: FiguresOptions) -> dict[str, list[Path]]:
     """Return the files of each figure; raises ValueError for those that cannot be written."""
     endings = dict.fromkeys(options.format)
     paths = {

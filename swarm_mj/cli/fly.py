@@ -13,8 +13,7 @@ from rich.console import Console
 from swarm_mj.api.estimates import flight_needs
 from swarm_mj.api.flight import compile_ahead, flight_config, flight_summary, fly_swarm
 from swarm_mj.api.flight_table import flight_table, flight_title
-from swarm_mj.cli.mission_options import mission_flags, one_mission
-from swarm_mj.cli.policy_options import NAMED, NAMES, PolicyOptions
+from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, one_mission
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import notes_on
 from swarm_mj.policies.policy import Policy
@@ -49,7 +48,7 @@ COMPARED = ("planner", "tdma", "random-flooding")  # with what was flown, for a 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(PolicyOptions):
+class FlyOptions(PolicyOptions):
     """The options of `swarm-mj fly`."""
 
     EPILOG: ClassVar = (
@@ -60,7 +59,6 @@ class Options(PolicyOptions):
         "planner",
         f"{NAMES}, a directory with a learned policy, or module:Name of your own",
         convert=normalised,
-        offers=NAMED,
     )
     seed: int = setting(1, "the same seed is the same mission")
     mission: Mission = one_mission()
@@ -75,7 +73,7 @@ class Options(PolicyOptions):
     view: bool = setting(False, "open the replay afterwards", group=OUTPUT)
 
 
-def run(options: Options) -> int:
+def run(options: FlyOptions) -> int:
     """Run the command; returns its exit code."""
     options = replace(options, policy=with_payload([options.policy], options.payload)[0])
     mission = options.mission
@@ -124,7 +122,7 @@ def run(options: Options) -> int:
     return run_viewer(view_command(path)) if options.view and path else DONE
 
 
-def _next_commands(options: Options, path: Path | None) -> Iterator[tuple[str, str]]:
+def _next_commands(options: FlyOptions, path: Path | None) -> Iterator[tuple[str, str]]:
     """What to do next, and the commands that do it."""
     name, way = this_command(), "" if has_display() else "--web "
     if path:
@@ -136,7 +134,7 @@ def _next_commands(options: Options, path: Path | None) -> Iterator[tuple[str, s
     yield "Compare some:", f"{name} evaluate --policy {policies} --episodes 5 {flags}"
 
 
-def _replay_path(options: Options) -> Path | None:
+def _replay_path(options: FlyOptions) -> Path | None:
     """Return the replay's path, or None; raises ValueError for what could not be written later."""
     if options.no_record and options.record:
         raise ValueError("--no-record is not allowed with --record; leave one out")
@@ -155,7 +153,7 @@ def _replay_path(options: Options) -> Path | None:
     return path
 
 
-def _fresh_name(options: Options) -> Path:
+def _fresh_name(options: FlyOptions) -> Path:
     """Return a name of this process's own, for flights that start in the same second."""
     when = f"{datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}"
     task, policy = options.mission.task, _short(options.policy)
@@ -170,13 +168,13 @@ def _short(policy: str) -> str:
     return path.parent.name if path.name == "policy" else path.name
 
 
-def _recorder(options: Options, swarm: Swarm, policy: Policy) -> Recorder:
+def _recorder(options: FlyOptions, swarm: Swarm, policy: Policy) -> Recorder:
     is_broadcast = policy.window(swarm.mission).is_broadcast
     return Recorder(swarm, ego=options.observer, is_broadcast=is_broadcast)
 
 
 def _write(
-    options: Options, summary: dict[str, Any], path: Path | None, recorder: Recorder | None
+    options: FlyOptions, summary: dict[str, Any], path: Path | None, recorder: Recorder | None
 ) -> None:
     """Write both files, the replay even if the summary fails."""
     try:

@@ -1,16 +1,21 @@
-"""The options that make missions: those fields of `Mission` that have a help."""
+"""Options that several commands share: those that make missions, and those of policies."""
 
-import argparse
-from collections.abc import Collection, Sequence
-from dataclasses import Field, fields, replace
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import Field, dataclass, fields, replace
 from functools import partial
 from itertools import product
 from typing import Any
 
-from swarm_mj.cli.options import add_option, flag_of, nested
+from swarm_mj.cli.options import Option, flag_of, nested
 from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper
-from swarm_mj.system.fields import FieldOf, as_typed, kind_of
+from swarm_mj.mission.components import GROUP, SHOWN_AS, OwnParts
+from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
+from swarm_mj.system.fields import FieldOf, as_typed, kind_of, setting
 
+NAMED = tuple(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes the other
+NAMES = f"who talks when (`swarm-mj policies` says more): {', '.join(NAMED)}"
+OTHERS = "directories or .safetensors files of learned policies, or module:Name of your own"
+HEADING = "policies"
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]
 # Fields that count only where another has this value, or for None any above 0.
 NEEDED: dict[str, tuple[str, str | None]] = {
@@ -24,14 +29,54 @@ NEEDED: dict[str, tuple[str, str | None]] = {
 }
 
 
+@dataclass(frozen=True, kw_only=True)
+class PolicyOptions(OwnParts):
+    """Options that change a policy, or what it flies in."""
+
+    probability: float | None = setting(
+        None,
+        "of a transmission, for policies that have one",
+        low=0.0,
+        high=1.0,
+        shown="tuned for the regime",
+        group=HEADING,
+    )
+    is_deterministic: bool = setting(
+        False, "learned policies take the most probable recipient, not a draw", group=HEADING
+    )
+    payload: str = setting(
+        PAYLOADS[0],
+        "what the planner's packets carry beyond the buffers T, M and P",
+        choices=PAYLOADS,
+        group=HEADING,
+    )
+    features: tuple[str, ...] = setting(
+        (), "that a learned policy was trained on; give them again", group=GROUP, metavar=SHOWN_AS
+    )
+
+    @property
+    def parts(self) -> OwnParts:
+        """The parts that are the user's own."""
+        return OwnParts(**self.named)
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """What `make_policy` takes beside a policy's name and a mission."""
+        return {
+            "probability": self.probability,
+            "is_deterministic": self.is_deterministic,
+            "features": self.features,
+        }
+
+
 def one_mission() -> FieldOf:
     """Return a field that is a mission."""
-    return nested(_add, lambda given: missions_of(given)[0])
+    return nested(_mission_options, lambda given: missions_of(given)[0])
 
 
 def several_missions() -> FieldOf:
     """Return a field that is missions: options take several values, and those multiply."""
-    return nested(partial(_add, is_many=True), missions_of)
+    return nested(partial(_mission_options, is_many=True), missions_of)
 
 
 def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
@@ -41,7 +86,7 @@ def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
     """
     swept = {spec.name: place for spec in SPECS if (place := f"mission.{spec.name}") in given}
     values = [given[place] for place in swept.values()]
-    values = [list(dict.fromkeys(v)) if isinstance(v, list) else [v] for v in values]
+    values = [dict.fromkeys(v) if isinstance(v, tuple) else [v] for v in values]
     missions = [make_mission(**dict(zip(swept, each, strict=True))) for each in product(*values)]
     check_in_use(swept, missions)
     return tuple(missions)
@@ -75,19 +120,15 @@ def mission_flags(mission: Mission) -> str:
     )
 
 
-def _add(parser: argparse.ArgumentParser, *, is_many: bool = False) -> None:
-    about = "Each takes several values; those multiply." if is_many else None
-    usual = "missions" if is_many else "mission"
-    groups: dict[str, Any] = {}
+def _mission_options(*, is_many: bool = False) -> Iterator[Option]:
+    heading = "missions: each takes several values; those multiply" if is_many else "mission"
     for spec in SPECS:
-        title = spec.metadata.get("group", usual)
-        if title not in groups:
-            groups[title] = parser.add_argument_group(title, about if title == usual else None)
-        add_option(groups[title], spec, f"mission.{spec.name}", _default_of(spec), is_many=is_many)
+        own = spec.metadata.get("group", heading)
+        yield Option(spec, f"mission.{spec.name}", own, _default_of(spec), is_many=is_many)
 
 
 def _default_of(spec: Field[Any]) -> str:
-    """A mission's own value; where it depends on the task, the flock's beside the others'."""
+    """Return a mission's default; where it depends on the task, the flock's beside the others'."""
     flocks, others = (
         as_typed(getattr(paper(task), spec.name)) for task in ("flocking", "stationary")
     )

@@ -11,7 +11,6 @@ from rich.console import Console
 from rich.table import Table
 
 from swarm_mj.cli.mission_options import mission_flags, one_mission
-from swarm_mj.cli.policy_options import NAMED
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
 from swarm_mj.policies.registry import POLICIES, library_of, make_policy, normalised
@@ -40,7 +39,7 @@ Bytes and probabilities here are those for"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class PoliciesOptions:
     """The options of `swarm-mj policies`."""
 
     EPILOG: ClassVar = "Probabilities and bytes depend on the mission, so the options may name one."
@@ -50,13 +49,12 @@ class Options:
         is_positional=True,
         metavar="NAME",
         convert=normalised,
-        offers=NAMED,
     )
     json: bool = setting(False, "print JSON in place of the table")
     mission: Mission = one_mission()
 
 
-def run(options: Options) -> int:
+def run(options: PoliciesOptions) -> int:
     """Run the command; returns its exit code."""
     names = POLICIES if options.name is None else (options.name,)
     if options.name is None:

@@ -30,11 +30,11 @@ PIXELS = (160, 3840)  # of a side
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class ReplayOptions:
     """The options of `swarm-mj replay`."""
 
     file: tuple[Path, ...] = setting(
-        help=".rrd files that `swarm-mj fly` recorded", is_positional=True, ending=".rrd"
+        help=".rrd files that `swarm-mj fly` recorded", is_positional=True
     )
     web: bool = setting(
         False, "serve it to a browser, on this machine's loopback address only, until Ctrl-C"
@@ -75,7 +75,7 @@ class Options:
     yes: bool = setting(False, YES, group=VIDEO)
 
 
-def run(options: Options) -> int:
+def run(options: ReplayOptions) -> int:
     """Run the command; returns its exit code."""
     if options.video is not None:
         return _make_video(options, options.video)
@@ -94,7 +94,7 @@ def run(options: Options) -> int:
     return run_viewer(command)
 
 
-def _make_video(options: Options, video: Path) -> int:
+def _make_video(options: ReplayOptions, video: Path) -> int:
     from swarm_mj.replay.estimates import video_needs  # with all that flies
     from swarm_mj.system.needs import check_fits
 
@@ -131,7 +131,7 @@ def _make_video(options: Options, video: Path) -> int:
     return 0
 
 
-def _style(options: Options, suffix: str) -> Style:
+def _style(options: ReplayOptions, suffix: str) -> Style:
     """What is asked for, or usual; raises ValueError for what the kind of file cannot have."""
     usual = USUAL[suffix]
     width, height = _size(options.size, suffix) if options.size else (usual.width, usual.height)
@@ -139,7 +139,7 @@ def _style(options: Options, suffix: str) -> Style:
     return fitted(Style(width=width, height=height, seconds=seconds, fps=fps), suffix)
 
 
-def _read(options: Options) -> list["Footage"]:
+def _read(options: ReplayOptions) -> list["Footage"]:
     """What is to be seen."""
     from swarm_mj.replay.read import read_footage
     from swarm_mj.replay.rendering.movie import MOST_MISSIONS

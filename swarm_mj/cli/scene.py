@@ -14,7 +14,7 @@ from swarm_mj.system.terminal import plain_console, this_command
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class SceneOptions:
     """The options of `swarm-mj scene`."""
 
     mission: Mission = one_mission()
@@ -24,7 +24,7 @@ class Options:
     force: bool = setting(False, "replace an existing file")
 
 
-def run(options: Options) -> int:
+def run(options: SceneOptions) -> int:
     """Run the command; returns its exit code."""
     from swarm_mj.physics.scene import compose  # MuJoCo takes its time to import
     from swarm_mj.simulation.swarm import Swarm

@@ -12,12 +12,12 @@ from swarm_mj.cli.options import nested
 from swarm_mj.cli.train_progress import Watch
 from swarm_mj.cli.train_report import has_stopped_early, report, verdicts
 from swarm_mj.cli.train_settings import (
-    add_setting_options,
     asked_settings,
     given_settings,
     load_own,
     own_names,
     refuse_others,
+    setting_options,
 )
 from swarm_mj.learning.estimates import training_needs
 from swarm_mj.learning.run_folder import (
@@ -44,7 +44,7 @@ from swarm_mj.system.terminal import named_values, plain_console, tell_cores, th
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class TrainOptions:
     """The options of `swarm-mj train`."""
 
     EPILOG: ClassVar = (
@@ -61,11 +61,11 @@ class Options:
     replay_every: int | None = same_as(Limits, "replay_every")
     init: Path | None = setting(None, "begin with a stored policy", metavar="POLICY")
     yes: bool = setting(False, YES)
-    settings: dict[str, Any] = nested(add_setting_options, given_settings)
+    settings: dict[str, Any] = nested(setting_options, given_settings)
     typed: tuple[str, ...] = ()
 
 
-def run(options: Options) -> int:
+def run(options: TrainOptions) -> int:
     """Run the command; returns its exit code."""
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     with console.status("Preparing ..."):
@@ -95,7 +95,7 @@ def run(options: Options) -> int:
     return DONE if is_over else INTERRUPTED
 
 
-def _asked_run(options: Options) -> Run:
+def _asked_run(options: TrainOptions) -> Run:
     """What the options ask for; raises ValueError before anything is written."""
     run = _begun_run(options) if options.resume else _new_run(options)
     run = replace(run, limits=asked_limits(run.limits, options))
@@ -106,7 +106,7 @@ def _asked_run(options: Options) -> Run:
     return run
 
 
-def _begun_run(options: Options) -> Run:
+def _begun_run(options: TrainOptions) -> Run:
     named = own_names(options.settings)
     run = read_run(options.out, named)
     if options.init is not None:
@@ -116,7 +116,7 @@ def _begun_run(options: Options) -> Run:
     return run
 
 
-def _new_run(options: Options) -> Run:
+def _new_run(options: TrainOptions) -> Run:
     check_new(options.out)
     init = options.init
     training = asked_settings(options.settings, read_policy(init)[1] if init else None, init)
@@ -128,7 +128,7 @@ def _new_run(options: Options) -> Run:
     )
 
 
-def asked_limits(limits: Limits, options: Options) -> Limits:
+def asked_limits(limits: Limits, options: TrainOptions) -> Limits:
     """When a run stops: as before, or usual, unless the options say otherwise."""
     if options.budget is not None or options.minutes is not None:
         limits = replace(limits, decisions=options.budget, minutes=options.minutes)

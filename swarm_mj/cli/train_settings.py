@@ -4,14 +4,14 @@ The options are fields of the settings, by their dotted place in them. Unless gi
 usual one of the credit assignment, or in a resumed run the run's own.
 """
 
-import argparse
+from collections.abc import Iterator
 from dataclasses import Field, fields, replace
 from functools import reduce
 from pathlib import Path
 from typing import Any
 
 from swarm_mj.cli.mission_options import check_in_use
-from swarm_mj.cli.options import add_option, flag_of
+from swarm_mj.cli.options import Option, flag_of
 from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission, make_mission
 from swarm_mj.mission.components import GROUP, OwnParts, is_own
@@ -21,43 +21,33 @@ from swarm_mj.policies.policy_config import PolicyConfig
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.system.fields import as_typed
 
-PARTS = {
-    "": Training,
-    "network.": GnnShape,
-    "ppo.": PpoSettings,
-    "parts.": OwnParts,
-    "mission.": Mission,
-}
-HEADINGS = {
-    "": "run",
-    "network.": "network",
-    "ppo.": "PPO",
-    "parts.": GROUP,
-    "mission.": "missions",
+PARTS = {  # the dataclasses of settings and their headings in the help, by their dotted place
+    "": (Training, "run"),
+    "network.": (GnnShape, "network"),
+    "ppo.": (PpoSettings, "PPO"),
+    "parts.": (OwnParts, GROUP),
+    "mission.": (Mission, "missions"),
 }
 NOT_TRAINED = ("num_robots",)  # team sizes are the run's own
 SPECS: dict[str, Field[Any]] = {
     f"{part}{spec.name}": spec
-    for part, owner in PARTS.items()
+    for part, (owner, _) in PARTS.items()
     for spec in fields(owner)
     if "help" in spec.metadata and not (owner is Mission and spec.name in NOT_TRAINED)
 }
 
 
-def add_setting_options(parser: argparse.ArgumentParser) -> None:
-    """Declare them, under a heading for each part of the settings."""
-    groups = {part: parser.add_argument_group(title) for part, title in HEADINGS.items()}
+def setting_options() -> Iterator[Option]:
+    """Yield the settings as options, under a heading for each part of the settings."""
     for place, spec in SPECS.items():
-        add_option(groups[place.removesuffix(spec.name)], spec, place, _usual(place))
+        _, heading = PARTS[place.removesuffix(spec.name)]
+        yield Option(spec, place, heading, _usual(place))
 
 
 def given_settings(given: dict[str, Any]) -> dict[str, Any]:
-    """Return the settings that were given, by their places."""
+    """Return the settings that were given, by their places; a value of several counts once."""
     values = {place: given[place] for place in SPECS if place in given}
-    return {
-        place: tuple(dict.fromkeys(value)) if isinstance(value, list) else value
-        for place, value in values.items()
-    }
+    return {p: tuple(dict.fromkeys(x)) if isinstance(x, tuple) else x for p, x in values.items()}
 
 
 def asked_settings(

@@ -106,7 +106,6 @@ class Training:
         "extended",
         f"what the network sees of each teammate: {', '.join(FEATURE_SETS)}, or module:Name of "
         "your own",
-        offers=tuple(FEATURE_SETS),
     )
     network: GnnShape = ROBOTS_NETWORK  # that acts
     shares_trunk: bool = True  # whether values come from its last stage but one number

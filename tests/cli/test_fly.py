@@ -247,7 +247,7 @@ def test_viewing_needs_a_display_and_says_so_first(tmp_path):
 
 def test_the_next_commands_fit_the_mission_and_the_screen(monkeypatch):
     mission, path = paper("random-walk", num_robots=9), Path("a b.rrd")
-    options = fly.Options(mission=mission, policy="runs/my own/policy", channel="my:Radio")
+    options = fly.FlyOptions(mission=mission, policy="runs/my own/policy", channel="my:Radio")
     monkeypatch.setattr("swarm_mj.replay.view.sys.platform", "linux")
     for display, way in ((":1", ""), ("", "--web ")):
         monkeypatch.setenv("DISPLAY", display)

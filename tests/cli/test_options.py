@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from swarm_mj.cli import COMMANDS, main
-from swarm_mj.cli.options import parse
+from swarm_mj.cli.options import parse_options
 from swarm_mj.system.fields import setting
 
 
@@ -28,7 +28,7 @@ class Picnic:
 
 
 def picnic(*arguments):
-    return parse(Picnic, arguments, "picnic", "Have a picnic.")
+    return parse_options(Picnic, arguments, "picnic", "Have a picnic.")
 
 
 def test_defaults_are_the_dataclasss():

@@ -23,7 +23,6 @@ PURPOSES = {  # of what flying itself does without
     "rerun-sdk": "replays and their viewer",
     "safetensors": "learned policies",
     "scipy": "intervals of evaluations",
-    "shtab": "completion in the shell",
     "stable-baselines3": "training",
     "tensorboard": "curves of trainings",
     "torch": "learned policies, training",
