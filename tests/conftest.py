@@ -1,7 +1,6 @@
 """What every test runs under."""
 
 import os
-from ctypes.util import find_library
 from pathlib import Path
 
 import pytest
@@ -12,11 +11,6 @@ from sampled_types import check_again
 # Compiling takes its time on an example's first run; no law here is about time.
 settings.register_profile("swarm_mj", deadline=None, max_examples=50)
 settings.load_profile("swarm_mj")
-
-# dm_control settles on an OpenGL for the whole process when its tests are collected. Left to itself
-# without a display, it takes EGL at its word, and where that has no driver nothing draws any more.
-if find_library("OSMesa") and not os.environ.get("DISPLAY"):
-    os.environ.setdefault("MUJOCO_GL", "osmesa")
 
 TRAINING = Path(__file__).parent.parent / "training"
 
@@ -37,6 +31,18 @@ def _experiments_are_left_alone():
     after = stamps(TRAINING)
     written = {path for path in before | after if before.get(path) != after.get(path)}
     assert not written, f"tests wrote {', '.join(map(str, sorted(written)))}"
+
+
+@pytest.hookimpl(trylast=True)  # after the hook that has the types of all imported modules checked
+def pytest_configure(config):
+    """Decide once for all processes by what pictures are drawn, before a library chooses itself."""
+    if not hasattr(config, "workerinput"):  # workers inherit it
+        from swarm_mj.replay.rendering.opengl import CHOICE, backend
+
+        try:
+            backend()
+        except OSError:
+            os.environ[CHOICE] = "disable"
 
 
 def pytest_runtest_setup():

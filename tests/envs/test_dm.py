@@ -250,7 +250,7 @@ physics.free()
 def photographed(request, tmp_path_factory):
     path = tmp_path_factory.mktemp("picture") / "top.npz"
     command = [sys.executable, "-c", TAKE_PICTURE, str(path)]
-    environ = {**os.environ, "MUJOCO_GL": request.param}
+    environ = {**os.environ, "MUJOCO_GL": request.param, "PYOPENGL_PLATFORM": request.param}
     done = subprocess.run(command, env=environ, capture_output=True, text=True, check=False)
     if "no OpenGL: " in done.stderr:
         pytest.skip(f"{request.param} does not render here: {done.stderr.strip()[-200:]}")

@@ -1,17 +1,16 @@
 """OpenGL without a screen: which of MuJoCo's back ends works here, and a context of it.
 
-MuJoCo settles on a back end when it is imported, and PyOpenGL when it is; both fail in many words
-where there is no driver. So a back end that may fail is tried in a process of its own first.
+MuJoCo and dm_control settle on a back end when they are imported, PyOpenGL when it is, and all fail
+in many words where there is no driver. So a back end that may fail is first tried in a process of
+its own, and what works is written to `MUJOCO_GL`: libraries that are imported later and processes
+that are started later draw by the same.
 """
 
 import importlib
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import cache
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from swarm_mj.system.processes import PYTHON, running
 
@@ -53,27 +52,13 @@ def make_context(width: int, height: int) -> Context:
         raise unusable(error) from error
 
 
-@contextmanager
-def chosen() -> Iterator[None]:
-    """Within it MuJoCo's renderer may start: it asks for the back end once, by the variable."""
-    before = os.environ.get(CHOICE)
-    os.environ[CHOICE] = backend()
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[CHOICE]
-        else:
-            os.environ[CHOICE] = before
-
-
 def unusable(error: Exception) -> OSError:
-    """What to raise when the back end in use turns out not to work."""
+    """Return what to raise when the back end in use turns out not to work."""
     return OSError(f"{backend()} does not work here ({type(error).__name__}); {WAY_OUT}")
 
 
 def check_choice() -> str:
-    """What MUJOCO_GL says, in lower case; MuJoCo cannot even be imported with a name it lacks.
+    """Return MUJOCO_GL in lower case; MuJoCo cannot even be imported with a name it lacks.
 
     Raises:
         ValueError: It has no such back end.
@@ -90,38 +75,53 @@ def check_choice() -> str:
 def backend() -> str:
     """Return the back end in use: the one that MUJOCO_GL names, or else the first that works here.
 
+    What works is found once and written to MUJOCO_GL.
+
     Raises:
-        OSError: MUJOCO_GL says that there is to be none, or somebody else has settled on one that
-            does not work.
+        OSError: None works, or MUJOCO_GL says that there is to be none.
     """
     named = check_choice()
     if named in OFF:
         raise OSError(f"{CHOICE}={named} switches rendering off; unset it")
     if named in ("", *ON):
-        return _default()
-    return "glfw" if named == "glx" else named
+        named = _first_that_works()
+    os.environ[CHOICE] = "glfw" if named == "glx" else named
+    return os.environ[CHOICE]
 
 
-@cache
-def _default() -> str:
+def _first_that_works() -> str:
     if sys.platform == "darwin":
         return "cgl"
-    preset = os.environ.get(PYOPENGL, "").lower()  # of whoever has drawn already, or means to
-    if preset in WITHOUT_SCREEN and _works(preset):
-        return preset
-    found = "egl" if preset != "egl" and _works("egl") else "osmesa"
-    if preset in WITHOUT_SCREEN:
-        if "OpenGL.platform" in sys.modules:  # which settles for good
-            raise OSError(
-                f"another library has chosen {preset}, which does not work here; "
-                f"set {CHOICE}={found} before Python starts"
-            )
-        del os.environ[PYOPENGL]
+    settled = _settled()
+    preset = settled or os.environ.get(PYOPENGL, "").lower()
+    candidates = sorted(
+        WITHOUT_SCREEN, key=lambda name: name != preset
+    )  # stable: EGL before OSMesa
+    found = next(filter(_works, candidates), None)
+    if found is None:
+        raise OSError(f"neither EGL nor OSMesa works here; {WAY_OUT}")
+    if settled and found != settled:
+        raise OSError(
+            f"another library has chosen {settled}, which does not work here; "
+            f"set {CHOICE}={found} before Python starts"
+        )
+    if preset != found:  # MuJoCo refuses to draw by another back end than PyOpenGL's
+        os.environ.pop(PYOPENGL, None)
     return found
 
 
+def _settled() -> str | None:
+    """Return what PyOpenGL draws by in this process, if it is loaded: it cannot change.
+
+    dm_control's viewer loads it without a choice. Without a screen it then takes GLX, and EGL finds
+    no display in this process any more, although it does in a fresh one.
+    """
+    platform: Any = sys.modules.get("OpenGL.platform")
+    return platform and type(platform.PLATFORM).__name__.removesuffix("Platform").lower()
+
+
 def _works(name: str) -> bool:
-    """Whether a back end makes a context, in a process of its own."""
+    """Return whether a back end makes a context, in a process of its own."""
     command = [*PYTHON, "-c", TRIAL.format(name)]
     environment = {**os.environ, CHOICE: name, PYOPENGL: name}
     with (

@@ -25,7 +25,7 @@ from swarm_mj.physics.solid_geoms import obstacle_geoms
 from swarm_mj.replay.rendering.camera import ELEVATION_DEG, FOV_Y_DEG, Camera, look_at
 from swarm_mj.replay.rendering.contents import Contents
 from swarm_mj.replay.rendering.markers import GEOMS_PER_ROBOT, Markers
-from swarm_mj.replay.rendering.opengl import chosen, make_context, unusable
+from swarm_mj.replay.rendering.opengl import make_context, unusable
 
 MAX_PIXELS = 4096  # of a picture's side
 BEACONS = 2  # the group of the robots' own markers, assets/robot.xml: too small from afar
@@ -83,8 +83,7 @@ class SceneRenderer:
         """MuJoCo's own part of OpenGL."""
         self._opengl.make_current()
         try:
-            with chosen():
-                context = MjrContext(self._model, mjtFontScale.mjFONTSCALE_100.value)
+            context = MjrContext(self._model, mjtFontScale.mjFONTSCALE_100.value)
         except FatalError as error:  # GLFW without a screen says nothing before
             raise unusable(error) from error
         mjr_setBuffer(mjtFramebuffer.mjFB_OFFSCREEN.value, context)

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -13,9 +14,7 @@ from swarm_mj.replay.rendering import opengl
 def _fresh(monkeypatch):
     monkeypatch.setenv(opengl.CHOICE, "")
     monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
-    opengl._default.cache_clear()
-    yield
-    opengl._default.cache_clear()
+    monkeypatch.delitem(sys.modules, "OpenGL.platform", raising=False)
 
 
 @pytest.mark.parametrize(
@@ -44,15 +43,23 @@ def test_what_pyopengl_was_told_already_binds_if_it_works(monkeypatch, preset):
 
 @pytest.mark.skipif(sys.platform == "darwin", reason="Apple's own back end needs no choice")
 @pytest.mark.parametrize(("preset", "other"), [("osmesa", "egl"), ("egl", "osmesa")])
-def test_what_does_not_work_binds_only_if_pyopengl_has_settled_on_it(monkeypatch, preset, other):
+def test_what_pyopengl_was_told_does_not_bind_if_it_does_not_work(monkeypatch, preset, other):
     monkeypatch.setattr(opengl, "_works", lambda name: name == other)
     monkeypatch.setenv(opengl.PYOPENGL, preset)
-    monkeypatch.setitem(sys.modules, "OpenGL.platform", sys)
-    with pytest.raises(OSError, match=f"has chosen {preset}, .* set MUJOCO_GL={other} before"):
-        opengl.backend()
-    monkeypatch.delitem(sys.modules, "OpenGL.platform")
     assert opengl.backend() == other
     assert opengl.PYOPENGL not in os.environ
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="GLX is X's")
+@pytest.mark.parametrize(("loaded", "other"), [("GLX", "egl"), ("EGL", "osmesa")])
+def test_what_pyopengl_has_loaded_binds(monkeypatch, loaded, other):
+    """dm_control's viewer loads GLX: EGL then finds no display, although a fresh process does."""
+    platform = SimpleNamespace(PLATFORM=type(f"{loaded}Platform", (), {})())
+    monkeypatch.setitem(sys.modules, "OpenGL.platform", platform)
+    monkeypatch.setattr(opengl, "_works", lambda name: name == other)
+    chosen = loaded.lower()
+    with pytest.raises(OSError, match=f"has chosen {chosen}, .* set MUJOCO_GL={other} before"):
+        opengl.backend()
 
 
 @pytest.mark.parametrize(("trial", "works"), [("raise ImportError('{}')", False), ("'{}'", True)])
@@ -65,17 +72,22 @@ def test_a_trial_is_quiet_and_runs_nothing_of_the_folder_here(
     assert not trapped.exists()
 
 
-@pytest.mark.parametrize("before", ["", "osmesa"])
-def test_mujoco_alone_is_told_the_back_end(monkeypatch, before):
-    monkeypatch.setattr(opengl, "backend", lambda: "osmesa")
-    monkeypatch.setenv(opengl.CHOICE, before)
-    with opengl.chosen():
-        assert os.environ[opengl.CHOICE] == "osmesa"
-    assert os.environ[opengl.CHOICE] == before
-    monkeypatch.delenv(opengl.CHOICE)
-    with pytest.raises(KeyError), opengl.chosen():
-        raise KeyError
-    assert opengl.CHOICE not in os.environ
+@pytest.mark.skipif(sys.platform == "darwin", reason="Apple's own back end needs no choice")
+def test_it_is_decided_once_for_all_libraries_and_processes(monkeypatch):
+    asked = []
+    monkeypatch.setattr(opengl, "_works", lambda name: bool(asked.append(name)) or name == "osmesa")
+    assert [opengl.backend(), opengl.backend()] == ["osmesa", "osmesa"]
+    assert asked == ["egl", "osmesa"]
+    assert os.environ[opengl.CHOICE] == "osmesa"
+
+
+def test_where_none_works_nothing_is_chosen(monkeypatch):
+    """For MuJoCo cannot be imported with a back end that is not there."""
+    monkeypatch.setattr(opengl, "_works", lambda _: False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    with pytest.raises(OSError, match=r"neither EGL nor OSMesa works here; .*apt-get install"):
+        opengl.backend()
+    assert os.environ[opengl.CHOICE] == ""
 
 
 def test_no_opengl_is_one_line_with_the_way_out(monkeypatch):
