@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.figures.style import FAINT, as_it_is, look_of, styled
 from swarm_mj.evaluation.results import Result
-from swarm_mj.mission.components import OwnParts
+from swarm_mj.mission.components import components_in
 
 if TYPE_CHECKING:
     from swarm_mj.api.run import Run
@@ -59,7 +59,7 @@ def draw_evaluation(results: Sequence[Result]) -> Figure:
             figsize=(WIDTH_IN, HEAD_IN + ROW_IN * len(shown)),
         )
         about = f"{first.task}, {first.num_robots} robots, {first.episodes} missions from seed "
-        own = OwnParts(channel=first.channel, controller=first.controller, scene=first.scene)
+        own = components_in(vars(first))
         title = as_it_is(f"{about}{first.seed}{own.title}")
         figure.suptitle(title, x=0.01, ha="left", fontsize=TITLE_PT)
         for each, cost in zip(axes[0], costs, strict=True):

@@ -22,7 +22,7 @@ from swarm_mj.evaluation.study import Study
 from swarm_mj.evaluation.summary import Evaluated, summarise
 from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import OwnParts
+from swarm_mj.mission.components import Components
 from swarm_mj.policies.registry import listed, normalised
 from swarm_mj.system.fields import check_value, name_of
 from swarm_mj.system.machine import memory_errors
@@ -184,10 +184,9 @@ def evaluate(
     """
     need("scipy", "an evaluation")
     mission = mission_of("swarm_mj.evaluate", task, mission_fields, KEYWORDS)
-    parts = {"channel": channel, "controller": controller, "scene": scene}
-    for kind, name in parts.items():
-        if name is not None:
-            _check_named(kind, name)
+    components = Components(channel=channel, controller=controller, scene=scene)
+    for kind, name in components.given.items():
+        _check_named(kind, name)
     check_value(Processes.__dataclass_fields__["jobs"], num_jobs, "num_jobs")
     check_value(Study.__dataclass_fields__["episodes"], num_missions, "num_missions")
     study = Study(
@@ -199,7 +198,7 @@ def evaluate(
         is_deterministic=is_deterministic,
         baseline=baseline,
         features=names_of(features),
-        parts=OwnParts(**parts),
+        components=components,
     )
     way_out = "choose fewer num_jobs, num_robots, num_windows or num_missions"
     check_fits(study_needs(study, num_jobs), None, way_out, is_forced=False, way_on="")

@@ -16,10 +16,10 @@ from swarm_mj.api.flight import (
     fly_swarm,
 )
 from swarm_mj.api.numbers import Numbers
-from swarm_mj.api.run import PARTS, Run
+from swarm_mj.api.run import Run
 from swarm_mj.control.controller import Controller
 from swarm_mj.mission import Mission, make_mission
-from swarm_mj.mission.components import OwnParts
+from swarm_mj.mission.components import CALLED_WITH, Components
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import check_used, make_policy, normalised
@@ -31,7 +31,7 @@ from swarm_mj.system.fields import check_kind, check_names
 from swarm_mj.system.needs import check_fits
 
 MISSION_FIELDS = tuple(spec.name for spec in fields(Mission) if spec.name != "task")
-SHARED = ("seed", "probability", "is_deterministic", "features", *PARTS)  # with `evaluate`
+SHARED = ("seed", "probability", "is_deterministic", "features", *CALLED_WITH)  # with `evaluate`
 KEYWORDS = ("policy", "record", "observer", *SHARED)
 
 
@@ -84,12 +84,11 @@ def fly(
     how["features"] = names_of(features)
     chosen, name = _policy_of(policy, mission, how)
     check_used(how["features"], [chosen])
-    parts = {"channel": channel, "controller": controller, "scene": scene}
-    made, named = _parts_of(parts, mission)
+    components = Components(channel=channel, controller=controller, scene=scene)
     needs, way_out = flight_needs(mission, name, is_recorded=record), "choose fewer num_robots or "
     way_out += "num_windows" + (", or record=False" if record else "")
     check_fits(needs, None, way_out, is_forced=False, way_on="")
-    swarm = Swarm(mission, [seed], **made)
+    swarm = Swarm(mission, [seed], **components.given)
     is_broadcast = chosen.window(mission).is_broadcast
     recorder = Recorder(swarm, ego=observer, is_broadcast=is_broadcast) if record else None
     with quiet_bar("Compiling", COMPILING_WINDOWS, "windows") as compiling:
@@ -102,7 +101,8 @@ def fly(
         warnings.warn(f"{flown.ending} after {kept}", stacklevel=2)
     return Run(
         mission=mission,
-        config=flight_config(mission, name, chosen, seed=seed, observer=observer) | named,
+        config=flight_config(mission, name, chosen, seed=seed, observer=observer)
+        | components.names,
         summary=Numbers(flight_summary(mission, chosen, flown)),
         windows=tuple(flown.windows),
         log=recorder.log() if recorder else None,
@@ -157,14 +157,3 @@ def _policy_of(
             "probability and is_deterministic change policies by name; make it with them"
         )
     return policy, type(policy).__name__
-
-
-def _parts_of(given: Mapping[str, Any], mission: Mission) -> tuple[dict[str, Any], dict[str, str]]:
-    """Parts of one's own as `Swarm` takes them, and their names: as given, or their own."""
-    own = {kind: part for kind, part in given.items() if part is not None}
-    by_name = OwnParts(**{kind: part for kind, part in own.items() if isinstance(part, str)})
-    made = own | by_name.made(mission)
-    return made, {
-        kind: by_name.named.get(kind) or getattr(part, "__qualname__", type(part).__qualname__)
-        for kind, part in made.items()
-    }

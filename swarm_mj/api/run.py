@@ -14,7 +14,7 @@ from swarm_mj.api.bars import is_notebook
 from swarm_mj.api.flight_table import flight_rows, flight_title
 from swarm_mj.api.numbers import Numbers
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import OwnParts
+from swarm_mj.mission.components import components_in
 from swarm_mj.protocol.costs import PACKETS
 from swarm_mj.replay.recorder import Log
 from swarm_mj.simulation.rollout import WindowRecord
@@ -28,8 +28,6 @@ if TYPE_CHECKING:  # each takes its time to import, and flights do without
     from pandas import DataFrame
 
     from swarm_mj.replay.footage import Footage
-
-PARTS = ("channel", "controller", "scene")  # of one's own
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -71,9 +69,8 @@ class Run:
     @property
     def title(self) -> str:
         """What was flown, in a line."""
-        parts = (f", {kind} {self.config[kind]}" for kind in PARTS if kind in self.config)
         title = flight_title(self.mission, self.config["policy"], self.config["seed"])
-        return title + "".join(parts)
+        return title + components_in(self.config).title
 
     @property
     def task_cost(self) -> tuple[str, str] | None:
@@ -164,8 +161,8 @@ class Run:
         from swarm_mj.replay.footage import footage_of
 
         policy, seed = self.config["policy"], self.config["seed"]
-        own = OwnParts(**{kind: self.config[kind] for kind in PARTS if kind in self.config})
-        return footage_of(self._recorded(), self.mission, policy, seed, own)
+        components = components_in(self.config)
+        return footage_of(self._recorded(), self.mission, policy, seed, components)
 
     def save(self, path: str | Path) -> Path:
         """Write the flight, replacing the file if it exists.

@@ -81,7 +81,7 @@ class EvaluateOptions(PolicyOptions):
             probability=self.probability,
             is_deterministic=self.is_deterministic,
             features=self.features,
-            parts=self.parts,
+            components=self.components,
             baseline=None if self.baseline is None else flown.get(self.baseline, self.baseline),
         )
 

@@ -9,7 +9,7 @@ from rich.console import Console
 from swarm_mj.api.estimates import figures_needs
 from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS
 from swarm_mj.evaluation.results import Result, read_results
-from swarm_mj.mission.components import OwnParts
+from swarm_mj.mission.components import components_in
 from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.policies.registry import stored_policies
 from swarm_mj.system.fields import setting
@@ -82,8 +82,9 @@ def _papers(path: Path) -> list[Result]:
     """A file's results; raises ValueError for those that the paper's values cannot stand beside."""
     results = read_results(path)
     for row, result in enumerate(results, start=1):
-        parts = OwnParts(channel=result.channel, controller=result.controller, scene=result.scene)
-        added = parts.named | ({"radio": result.radio} if result.radio else {})
+        added = components_in(vars(result)).names | (
+            {"radio": result.radio} if result.radio else {}
+        )
         added |= {"arena": result.arena} if result.arena != OPEN else {}
         added |= {"prior knowledge": result.known} if result.known != NOTHING else {}
         for kind, name in added.items():

@@ -84,13 +84,13 @@ def run(options: FlyOptions) -> int:
     way_out = "choose fewer --robots or --windows" + (", or --no-record" if path else "")
     check_fits(needs, path, way_out, is_forced=options.yes)
     policy = make_policy(options.policy, mission, **options.how)
-    parts = options.parts.made(mission)
+    components = options.components.made(mission)
     check_used(options.features, [policy])
     console = Console(stderr=True, highlight=False)
     preparing = console.status("Preparing the swarm (compiles once, then it is cached) ...")
     with preparing, heard_interrupt() as was_pressed:
         compile_ahead(mission, options.policy, **options.how)
-        swarm = Swarm(mission, [options.seed], **parts)
+        swarm = Swarm(mission, [options.seed], **components.given)
         recorder = _recorder(options, swarm, policy) if path else None
         if was_pressed():
             raise KeyboardInterrupt
@@ -104,14 +104,14 @@ def run(options: FlyOptions) -> int:
         config = flight_config(
             mission, options.policy, policy, seed=options.seed, observer=options.observer
         )
-        config |= options.named
+        config |= options.names
         numbers = flight_summary(mission, policy, flown)
         summary = {"config": config} | numbers | {"replay": str(path) if path else None}
         try:  # either may fail
             with console.status("Writing ..."):
                 _write(options, summary, path, recorder)
         finally:
-            out.print(flight_table(title + options.parts.title, mission, numbers, flown.wall_s))
+            out.print(flight_table(title + options.title, mission, numbers, flown.wall_s))
     for label, line in _next_commands(options, path):
         out.print(f"{label:18}{line}")
     if flown.code != DONE:
@@ -129,7 +129,7 @@ def _next_commands(options: FlyOptions, path: Path | None) -> Iterator[tuple[str
         yield "Open the replay:", f"{name} replay {way}{shlex.quote(str(path))}"
     yield "Other policies:", f"{name} policies"
     policies = " ".join(map(shlex.quote, dict.fromkeys((options.policy, *COMPARED))))
-    parts = [f"--{kind} {shlex.quote(part)}" for kind, part in options.named.items()]
+    parts = [f"--{kind} {shlex.quote(part)}" for kind, part in options.names.items()]
     flags = " ".join((mission_flags(options.mission), *parts))
     yield "Compare some:", f"{name} evaluate --policy {policies} --episodes 5 {flags}"
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from swarm_mj.cli.options import Option, flag_of, nested
 from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper
-from swarm_mj.mission.components import GROUP, SHOWN_AS, OwnParts
+from swarm_mj.mission.components import GROUP, SHOWN_AS, Components
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
 from swarm_mj.system.fields import FieldOf, as_typed, kind_of, setting
 
@@ -30,7 +30,7 @@ NEEDED: dict[str, tuple[str, str | None]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class PolicyOptions(OwnParts):
+class PolicyOptions(Components):
     """Options that change a policy, or what it flies in."""
 
     probability: float | None = setting(
@@ -55,9 +55,9 @@ class PolicyOptions(OwnParts):
     )
 
     @property
-    def parts(self) -> OwnParts:
-        """The parts that are the user's own."""
-        return OwnParts(**self.named)
+    def components(self) -> Components:
+        """The channel, controller and scene, by name."""
+        return Components(**self.given)
 
     @property
     def how(self) -> dict[str, Any]:

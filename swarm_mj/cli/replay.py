@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from swarm_mj.mission.components import SHOWN_AS, OwnParts, is_own
+from swarm_mj.mission.components import SHOWN_AS, Components, is_own
 from swarm_mj.replay.rendering.style import LONGEST_S, USUAL, Style, fitted, usual_seconds
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
@@ -153,7 +153,7 @@ def _in_scene(footage: "Footage", scene: str | None) -> "Footage":
     """With the scene named here: the name in a file is somebody else's, and is never loaded."""
     flown_in = footage.facts.scene
     if scene is not None:
-        return replace(footage, **OwnParts(scene=scene).made(footage.facts.mission))
+        return replace(footage, **Components(scene=scene).made(footage.facts.mission).given)
     if flown_in is not None:
         hint = "; --scene shows it, too." if is_own(flown_in) else "."
         told = f"The video shows the bare arena. The mission was flown in the scene {flown_in!r}"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from swarm_mj.cli.mission_options import one_mission
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import OwnParts
+from swarm_mj.mission.components import Components
 from swarm_mj.system.atomic import write_text
 from swarm_mj.system.fields import same_as, setting
 from swarm_mj.system.outputs import Output, check_outputs
@@ -18,7 +18,7 @@ class SceneOptions:
     """The options of `swarm-mj scene`."""
 
     mission: Mission = one_mission()
-    scene: str | None = same_as(OwnParts, "scene")
+    scene: str | None = same_as(Components, "scene")
     seed: int = setting(1, "of the mission whose start is shown")
     out: Path = setting(Path("scene.xml"), "the file to write")
     force: bool = setting(False, "replace an existing file")
@@ -31,8 +31,8 @@ def run(options: SceneOptions) -> int:
 
     mission = options.mission
     check_outputs(Output("scene", options.out, ".xml|.mjcf"), must_be_new=not options.force)
-    parts = OwnParts(scene=options.scene).made(mission)
-    spec = compose(mission, start=Swarm(mission, [options.seed], **parts).states, **parts)
+    swarm = Swarm(mission, [options.seed], scene=options.scene)
+    spec = compose(mission, start=swarm.states, scene=swarm.scene)
     spec.compile()
     write_text(options.out, spec.to_xml())
     console = plain_console()

@@ -14,7 +14,7 @@ from swarm_mj.cli.mission_options import check_in_use
 from swarm_mj.cli.options import Option, flag_of
 from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission, make_mission
-from swarm_mj.mission.components import GROUP, OwnParts, is_own
+from swarm_mj.mission.components import GROUP, Components, is_own
 from swarm_mj.policies.gnn.feature_sets import check_named, is_own_set, load_features, num_features
 from swarm_mj.policies.gnn.shape import GnnShape
 from swarm_mj.policies.policy_config import PolicyConfig
@@ -25,7 +25,7 @@ PARTS = {  # the dataclasses of settings and their headings in the help, by thei
     "": (Training, "run"),
     "network.": (GnnShape, "network"),
     "ppo.": (PpoSettings, "PPO"),
-    "parts.": (OwnParts, GROUP),
+    "components.": (Components, GROUP),
     "mission.": (Mission, "missions"),
 }
 NOT_TRAINED = ("num_robots",)  # team sizes are the run's own
@@ -80,7 +80,7 @@ def asked_settings(
         check_named(init.features, own_names(given), f"policy {init_path}")
     missions = _missions(own.get("missions"), training.missions, len(sizes))
     training = replace(training, missions=missions)  # first, for its errors
-    training = replace(training, parts=OwnParts(**_part("parts.", given)))
+    training = replace(training, components=Components(**_part("components.", given)))
     load_own(own.get("features", training.features), training)
     if "features" in own:
         network["num_features"] = num_features(own["features"])
@@ -97,7 +97,7 @@ def asked_settings(
 
 def own_names(given: dict[str, Any]) -> list[str]:
     """Names of parts of the user's own among settings that were given."""
-    places = ("features", *(place for place in SPECS if place.startswith("parts.")))
+    places = ("features", *(place for place in SPECS if place.startswith("components.")))
     return [given[place] for place in places if place in given and is_own(given[place])]
 
 
@@ -109,7 +109,7 @@ def load_own(features: str, training: Training) -> None:
     """
     if is_own_set(features):
         load_features(features)
-    training.parts.made(training.mission)
+    training.components.made(training.mission)
 
 
 def refuse_others(given: dict[str, Any], training: Training, whose: str) -> None:

@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 
 from swarm_mj.envs.credit import as_it_is, credits_of
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import OwnParts
+from swarm_mj.mission.components import Components
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.graphs import Graphs, check_width
 from swarm_mj.protocol.costs import WindowCosts
@@ -56,7 +56,7 @@ class MissionBatch:
         rng: np.random.Generator,
         *,
         first_windows: int,
-        parts: OwnParts = OwnParts(),
+        components: Components = Components(),
     ) -> None:
         """Start the first missions, of so many windows; `rng` draws the missions' seeds."""
         self.mission = mission
@@ -66,7 +66,7 @@ class MissionBatch:
         self._extractor = make_extractor(features, mission)
         self.num_features = len(self._extractor.names)  # F
         seeds = self._draw_seeds()
-        self._swarm = Swarm(mission, seeds, **parts.made(mission))
+        self._swarm = Swarm(mission, seeds, **components.given)
         self._begin(ActionHistory(seeds=seeds, last_window=first_windows))
 
     def step(self, recipient: Int[np.ndarray, "B N"], *, with_credit: bool) -> Transition:
@@ -136,7 +136,7 @@ def make_batches(
     num_missions: int,
     num_batches: int,
     rng: np.random.Generator,
-    parts: OwnParts = OwnParts(),
+    components: Components = Components(),
 ) -> list[MissionBatch]:
     """Batches whose first missions are cut at different windows; team sizes take turns.
 
@@ -157,7 +157,7 @@ def make_batches(
             num_missions // num_batches,
             rng,
             first_windows=max(1, mission.num_windows * (place + 1) // num_batches),
-            parts=parts,
+            components=components,
         )
         for place in range(num_batches)
     ]

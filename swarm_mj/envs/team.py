@@ -19,15 +19,14 @@ from swarm_mj.envs.credit import as_it_is, credits_of
 from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED, LAST_TRAINING_SEED
 from swarm_mj.envs.options import check_features_named, check_fields, check_task
 from swarm_mj.mission import PRESETS, Mission
-from swarm_mj.mission.components import OwnParts
+from swarm_mj.mission.components import Components
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies.gnn.feature_sets import is_own_set, load_features, make_extractor
 from swarm_mj.policies.gnn.graphs import check_width
 from swarm_mj.protocol.costs import WindowCosts, age_of_information, velocity_variance
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.radio.free_space import Channel
-from swarm_mj.simulation.swarm import CALLED_WITH, Swarm
-from swarm_mj.system.fields import check_callable
+from swarm_mj.simulation.swarm import Swarm
 
 REWARDS = ("aoi", "velocity-variance", "task-cost", "credit")
 Observation = dict[str, np.ndarray]
@@ -88,9 +87,10 @@ class Team:
         check_count("num_missions", num_missions)
         self.mission = _mission_of(mission, preset, fields)
         self.num_missions = num_missions
-        parts = _made({"channel": channel, "controller": controller, "scene": scene}, self.mission)
-        self._parts = copy.deepcopy(parts)  # those that draw or remember do so for us only
-        self.reward = _checked(reward, self.mission, self._parts["controller"])
+        components = Components(channel=channel, controller=controller, scene=scene)
+        # Copies, as those that draw or remember do so for us only.
+        self._components = copy.deepcopy(components.made(self.mission))
+        self.reward = _checked(reward, self.mission, self._components.controller)
         self.with_parents = with_parents
         check_features_named(features)
         if is_own_set(features):
@@ -107,7 +107,7 @@ class Team:
             ValueError: There are not B seeds, one is negative, or a team cannot be connected.
         """
         if self.swarm is None:
-            self.swarm = Swarm(self.mission, seeds, **self._parts)
+            self.swarm = Swarm(self.mission, seeds, **self._components.given)
         else:
             self.swarm.restart(seeds)
         self.seeds = list(seeds)
@@ -237,15 +237,6 @@ def _mission_of(mission: Mission | str, preset: str | None, fields: dict[str, An
     preset = "paper" if preset is None else preset
     task = replace(Mission(), preset=preset, task=mission).task  # refuses what is unknown
     return PRESETS[preset](task, **fields)
-
-
-def _made(parts: dict[str, Any], mission: Mission) -> dict[str, Any]:
-    """The parts themselves, where some may be names; raises ValueError or TypeError as `Team`."""
-    named = {kind: part for kind, part in parts.items() if isinstance(part, str)}
-    made = parts | OwnParts(**named).made(mission)
-    for kind, part in made.items():
-        check_callable(kind, part, CALLED_WITH[kind])
-    return made
 
 
 def _checked(reward: str, mission: Mission, controller: Controller | None) -> str:

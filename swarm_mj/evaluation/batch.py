@@ -9,7 +9,7 @@ from msgspec import Meta
 
 from swarm_mj.evaluation.lower_bound import ConnectivityFloor
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import OwnParts, one_line_each
+from swarm_mj.mission.components import Components, one_line_each
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.window import SLOT_WINDOWS
@@ -40,7 +40,7 @@ class Batch:
     probability: float | None  # of a transmission; None is the policy's own
     is_deterministic: bool = False  # a learned policy takes its most probable recipient
     features: tuple[str, ...] = ()  # users' own, that a learned policy may see by
-    parts: OwnParts = OwnParts()  # by name, as they are made in other processes
+    components: Components = Components()  # by name, as they are made in other processes
     parameters: Parameters | None = None  # what it must have, where that is known
     mission: Mission
     seeds: tuple[int, ...]  # one per mission
@@ -86,7 +86,7 @@ def fly_batch(batch: Batch) -> BatchCosts:
 
 
 def _fly(batch: Batch) -> BatchCosts:
-    swarm = Swarm(batch.mission, batch.seeds, **batch.parts.made(batch.mission))
+    swarm = Swarm(batch.mission, batch.seeds, **batch.components.given)
     policy = make_policy(
         batch.policy,
         batch.mission,

@@ -10,7 +10,7 @@ from swarm_mj.control.controller import Costed
 from swarm_mj.control.motion import controller_of
 from swarm_mj.evaluation.batch import Batch
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import OwnParts, digest
+from swarm_mj.mission.components import Components, digest
 from swarm_mj.policies.policy import Parameters, Policy
 from swarm_mj.policies.registry import (
     check_used,
@@ -42,7 +42,7 @@ class Study:
     probability: float | None = setting(None, low=0.0, high=1.0)  # None is each policy's own
     is_deterministic: bool = False  # whether learned policies take the most probable recipient
     features: tuple[str, ...] = ()  # users' own, that learned policies may see by
-    parts: OwnParts = OwnParts()
+    components: Components = Components()
     baseline: str | None = setting(
         None,
         "whom the others are compared to, mission by mission",
@@ -67,7 +67,7 @@ class Study:
             )
         _ = self.parameters  # makes every policy, so that a bad one is refused now
         for regime in self.regimes:
-            self.parts.made(regime)
+            self.components.made(regime)
         if self.features:
             check_used(
                 self.features, (self.make_policy(name, self.regimes[0]) for name in self.policies)
@@ -100,7 +100,7 @@ class Study:
                 probability=self.probability,
                 is_deterministic=self.is_deterministic and is_learned(policy),
                 features=self.features,
-                parts=self.parts,
+                components=self.components,
                 parameters=self.parameters[regime, policy],
                 mission=regime,
                 seeds=tuple(seeds[start : start + BATCH_SIZE]),
@@ -129,7 +129,7 @@ class Study:
 
     def task_cost(self, regime: Mission) -> tuple[str, str] | None:
         """What a regime's controller calls its task's cost, and the unit; None if it has none."""
-        controller = self.parts.made(regime).get("controller") or controller_of(regime)
+        controller = self.components.made(regime).controller or controller_of(regime)
         if not isinstance(controller, Costed):
             return None
         return controller.cost_name, controller.cost_unit
@@ -140,7 +140,7 @@ class Study:
             **asdict(regime),
             "policy": policy,
             **self.parameters[regime, policy],
-            **self.parts.named,
+            **self.components.names,
         }
 
     def header(self) -> dict[str, Any]:
@@ -161,4 +161,4 @@ class Study:
     def _own_names(self) -> list[str]:
         """Return the names of all parts that are the user's own."""
         own = [name for name in self.policies if is_own_policy(name)]
-        return [*own, *self.features, *self.parts.named.values()]
+        return [*own, *self.features, *self.components.names.values()]

@@ -64,7 +64,7 @@ def summarise(
                 **_bytes(own, regime, study.make_policy(policy, regime)),
                 **_completeness(own),
                 **_differences(own, merged[regime, study.compared_to]),
-                **_published(policy, None if study.parts.named else regime),
+                **_published(policy, None if study.components.names else regime),
                 version=made_by["version"],
                 commit=made_by["commit"],
                 baseline=study.compared_to,
@@ -94,7 +94,7 @@ def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
     repeated = {name: value for name, value in asdict(regime).items() if name in COLUMNS}
     return (
         repeated
-        | study.parts.named
+        | study.components.names
         | {
             "policy": policy,
             "radio": regime.beyond_free_space or None,

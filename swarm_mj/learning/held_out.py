@@ -95,7 +95,7 @@ def record_replay(
     from swarm_mj.replay.write import write_replay  # rerun takes its time to import
 
     mission = held_out_missions(training)[0]
-    swarm = Swarm(mission, [HELD_OUT_SEED], **training.parts.made(mission))
+    swarm = Swarm(mission, [HELD_OUT_SEED], **training.components.given)
     recorder = Recorder(swarm)
     for window in rollout(swarm, held_out_policy(training, network, mission)):
         recorder.add(window)
@@ -117,7 +117,7 @@ def fly(
     missions = held_out_missions(training)
     sizes = []
     for mission in missions:
-        swarm = Swarm(mission, seeds, **training.parts.made(mission))
+        swarm = Swarm(mission, seeds, **training.components.given)
         policy = policy_of(mission)
         sizes.append([])
         for window in range(1, mission.num_windows + 1):

@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args
 
 from swarm_mj.envs.mission_batch import Reward
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import OwnParts
+from swarm_mj.mission.components import Components
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, check_fit, is_own_set, num_features
 from swarm_mj.policies.gnn.shape import GnnShape
 from swarm_mj.system.fields import FieldOf, check, check_value, setting
@@ -133,7 +133,7 @@ class Training:
         low=1,
         high=10_000,
     )
-    parts: OwnParts = setting(OwnParts(), may_lack=True)
+    components: Components = setting(Components(), may_lack=True)
     threads: int = setting(1, "torch's threads", low=1, high=256)
 
     def __post_init__(self) -> None:
@@ -148,7 +148,7 @@ class Training:
     def own(self) -> dict[str, str]:
         """The names of parts that are a user's own: to go on with them is to run their code."""
         features = {"features": self.features} if is_own_set(self.features) else {}
-        return features | self.parts.named
+        return features | self.components.names
 
     @property
     def own_options(self) -> str:

@@ -93,7 +93,7 @@ def _make_env(training: Training, rng: np.random.Generator) -> VecEnv:
         training.missions,
         training.groups,
         rng,
-        training.parts,
+        training.components,
     )
     if training.arm == "robot":
         return RobotEnv(batches)

@@ -12,19 +12,25 @@ import re
 import sys
 import sysconfig
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from swarm_mj.mission import Mission
-from swarm_mj.system.fields import did_you_mean, setting
+from swarm_mj.system.fields import check_callable, did_you_mean, setting
 
 FORM = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 GROUP, SHOWN_AS = "your own parts, each by module:Name", "MODULE:NAME"
+OWN = {"group": GROUP, "metavar": SHOWN_AS, "convert": str}
+CALLED_WITH = {  # the kinds of components, and the arguments of each
+    "channel": ("position_m", "recipient"),
+    "controller": ("buffers", "states"),
+    "scene": ("spec", "mission"),
+}
 OF_FUNCTIONS = 2  # a channel, controller or scene that is a plain function takes two arguments
 _loaded: dict[str, str] = {}  # modules that hold parts, and how a message calls the part
 
@@ -92,49 +98,65 @@ def digest(name: str) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class OwnParts:
-    """A user's own channel, controller and scene, by name; None is the mission's own."""
+class Components:
+    """A mission's channel, controller and scene: objects or names; None is the mission's own.
 
-    channel: str | None = setting(
-        None, "who decodes whose packet", group=GROUP, metavar=SHOWN_AS, shown="free space"
-    )
-    controller: str | None = setting(
-        None, "what drives the robots", group=GROUP, metavar=SHOWN_AS, shown="the task's"
-    )
-    scene: str | None = setting(
-        None, "what changes the arena", group=GROUP, metavar=SHOWN_AS, shown="the bare arena"
-    )
+    Raises:
+        TypeError: One is neither a name nor something that is called as its kind is.
+    """
+
+    # Any admits objects; files and command lines hold names only.
+    channel: Any = setting(None, "who decodes whose packet", shown="free space", **OWN)
+    controller: Any = setting(None, "what drives the robots", shown="the task's", **OWN)
+    scene: Any = setting(None, "a function that adds obstacles", shown="none", **OWN)
+
+    def __post_init__(self) -> None:
+        for kind, component in self.given.items():
+            # A channel that varies from slot to slot is asked for each slot's, not called.
+            if not isinstance(component, str) and not hasattr(component, "at"):
+                check_callable(kind, component, CALLED_WITH[kind])
 
     @property
-    def named(self) -> dict[str, str]:
-        """Those that are a user's own."""
-        parts = {"channel": self.channel, "controller": self.controller, "scene": self.scene}
-        return {kind: name for kind, name in parts.items() if name is not None}
+    def given(self) -> dict[str, Any]:
+        """Those that are not the mission's own, by their kind."""
+        return {kind: each for kind in CALLED_WITH if (each := getattr(self, kind)) is not None}
+
+    @property
+    def names(self) -> dict[str, str]:
+        """The names of those given; of an object, its function's or its class's."""
+        return {kind: _name(each) for kind, each in self.given.items()}
 
     @property
     def title(self) -> str:
-        """What to add to a flight's title."""
-        return "".join(f", {kind} {name}" for kind, name in self.named.items())
+        """The end of a flight's title."""
+        return "".join(f", {kind} {name}" for kind, name in self.names.items())
 
-    def made(self, mission: Mission) -> dict[str, Any]:
-        """Return the parts themselves, as `Swarm` takes them.
+    def made(self, mission: Mission) -> "Components":
+        """Return the components as objects.
 
         Raises:
-            ValueError: As for `make`, or a channel would take the place of what the mission asks.
+            ValueError: As for `make`, or a named channel would replace what the mission asks for.
+            TypeError: As for the class.
         """
-        if self.channel is not None and mission.beyond_free_space:
+        named = {kind: each for kind, each in self.given.items() if isinstance(each, str)}
+        if "channel" in named and mission.beyond_free_space:
             raise ValueError(
                 f"channel {self.channel} takes the place of the mission's own, so "
                 f"{mission.beyond_free_space} would change nothing; leave out either"
             )
-        made = {kind: make(kind, name, mission) for kind, name in self.named.items()}
-        for kind, part in made.items():
-            if isinstance(part, type) or not callable(part):
+        found = {kind: make(kind, name, mission) for kind, name in named.items()}
+        for kind, each in found.items():
+            if isinstance(each, type) or not callable(each):
                 raise ValueError(
-                    f"{kind} {self.named[kind]} must be a function of two arguments, or make an "
-                    f"object like one, not {_shown(part)}"
+                    f"{kind} {named[kind]} must be a function of two arguments, or make an "
+                    f"object like one, not {_shown(each)}"
                 )
-        return made
+        return replace(self, **found)
+
+
+def components_in(config: Mapping[str, Any]) -> Components:
+    """Return the components that a flight's configuration or a result names."""
+    return Components(**{kind: config[kind] for kind in CALLED_WITH if config.get(kind)})
 
 
 @contextmanager
@@ -223,6 +245,12 @@ def _is_users(home: str) -> bool:
 def _place(module: ModuleType) -> str:
     file = getattr(module, "__file__", None)
     return os.path.relpath(file) if file else module.__name__
+
+
+def _name(component: object) -> str:
+    if isinstance(component, str):
+        return component
+    return getattr(component, "__qualname__", type(component).__qualname__)
 
 
 def _shown(part: object) -> str:

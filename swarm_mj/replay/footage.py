@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, Int16, UInt8
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import OwnParts
+from swarm_mj.mission.components import Components, components_in
 from swarm_mj.physics.scene import Scene
 from swarm_mj.replay import palette
 from swarm_mj.replay.frame import Frame, frame
@@ -33,8 +33,7 @@ class Facts:
     @property
     def own_parts(self) -> list[str]:
         """Which are the user's own, in words."""
-        own = OwnParts(channel=self.channel, controller=self.controller, scene=self.scene)
-        return [f"{kind} {name}" for kind, name in own.named.items()]
+        return [f"{kind} {name}" for kind, name in components_in(vars(self)).names.items()]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +80,7 @@ class Footage:
         return palette.robot_colours(age, scale, is_known, self.is_on, self.facts.observer)
 
 
-def facts_of(log: Log, mission: Mission, policy: str, seed: int, parts: OwnParts) -> Facts:
+def facts_of(log: Log, mission: Mission, policy: str, seed: int, own: Components) -> Facts:
     """What does not change in a mission that was recorded."""
     return Facts(
         mission=mission,
@@ -90,12 +89,12 @@ def facts_of(log: Log, mission: Mission, policy: str, seed: int, parts: OwnParts
         observer=log.ego,
         is_broadcast=log.is_broadcast,
         full_scale=palette.nice_scale(log.age),
-        **parts.named,
+        **own.names,
     )
 
 
 def footage_of(
-    log: Log, mission: Mission, policy: str, seed: int, parts: OwnParts = OwnParts()
+    log: Log, mission: Mission, policy: str, seed: int, own: Components = Components()
 ) -> Footage:
     """What a video shows of a mission that was recorded.
 
@@ -104,10 +103,10 @@ def footage_of(
         mission: Its numbers.
         policy: Its name, for the title.
         seed: The mission's.
-        parts: Names of the user's own.
+        own: The user's own components.
     """
     return Footage(
-        facts=facts_of(log, mission, policy, seed, parts),
+        facts=facts_of(log, mission, policy, seed, own),
         window=log.window,
         position_m=log.position_m,
         velocity_mps=log.velocity_mps,

@@ -1,7 +1,7 @@
 """Writes a log as a rerun recording, its layout inside."""
 
 import json
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +9,7 @@ import rerun as rr
 import rerun_bindings as bindings
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import OwnParts
+from swarm_mj.mission.components import components_in
 from swarm_mj.physics.solid_geoms import obstacles_of
 from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 from swarm_mj.replay import arena, charts, palette
@@ -61,7 +61,8 @@ def _recorded(log: Log, mission: Mission, config: dict[str, object], name: str) 
         recording.set_log_time_enabled(False)
         recording.send_recording_name(name)
         recording.send_property("mission", rr.AnyValues(drop_untyped_nones=True, **config))
-        facts = facts_of(log, mission, str(config.get("policy") or ""), _seed(config), _own(config))
+        policy, own = str(config.get("policy") or ""), components_in(config)
+        facts = facts_of(log, mission, policy, _seed(config), own)
         recording.send_property(FACTS, rr.AnyValues(json=json.dumps(asdict(facts))))
         draw(Sheet(recording, log, shown, mission.window_s), mission, packets)
         said = config | _sent(log, mission, config)
@@ -69,11 +70,6 @@ def _recorded(log: Log, mission: Mission, config: dict[str, object], name: str) 
         about = "\n".join([f"# {name}", *lines])
         recording.log("about", rr.TextDocument(about, media_type="text/markdown"), static=True)
     return stream.read() or b""
-
-
-def _own(config: dict[str, object]) -> OwnParts:
-    kinds = (spec.name for spec in fields(OwnParts))
-    return OwnParts(**{kind: str(config[kind]) for kind in kinds if config.get(kind) is not None})
 
 
 def _sent(log: Log, mission: Mission, config: dict[str, object]) -> dict[str, object]:

@@ -11,7 +11,7 @@ from swarm_mj.control.controller import Controller, costed
 from swarm_mj.control.motion import controller_of, initial_velocity
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started
-from swarm_mj.mission.components import is_ours
+from swarm_mj.mission.components import Components, is_ours
 from swarm_mj.mission.geometry import overlaps_earlier
 from swarm_mj.mission.placement import connected_positions
 from swarm_mj.mission.robot_failures import draw_survivors, failure_window
@@ -35,13 +35,8 @@ from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.radio.mission_radio import belief_of, channel_of, truth_of
 from swarm_mj.radio.obstruction import blocked
-from swarm_mj.system.fields import check_callable, check_kind
+from swarm_mj.system.fields import check_kind
 
-CALLED_WITH = {  # what own parts are given
-    "channel": ("position_m", "recipient"),
-    "controller": ("buffers", "states"),
-    "scene": ("spec", "mission"),
-}
 MAX_THREADS = 1024
 MAX_SEED = 2**63 - 1  # the largest that a replay's properties keep
 
@@ -57,9 +52,9 @@ class Swarm:
         mission: Mission,
         seeds: Sequence[int],
         *,
-        channel: Channel | VaryingChannel | None = None,
-        controller: Controller | None = None,
-        scene: Scene | None = None,
+        channel: str | Channel | VaryingChannel | None = None,
+        controller: str | Controller | None = None,
+        scene: str | Scene | None = None,
         num_threads: int = 1,
     ) -> None:
         """Places the robots and starts all missions.
@@ -67,7 +62,8 @@ class Swarm:
         Args:
             mission: The numbers of every mission.
             seeds: One per mission; its length is B.
-            channel: Who decodes whom; the mission's own unless given.
+            channel: Who decodes whom, as an object or `module:Name`, like the next two; the
+                mission's own unless given.
             controller: What drives the robots; that of the mission's task unless given.
             scene: What changes the arena before it is compiled; nothing unless given. All missions
                 stand in the same arena.
@@ -76,24 +72,21 @@ class Swarm:
         Raises:
             ValueError: No seed, a negative one, no connected team could be drawn, or the scene
                 changed the robots.
-            TypeError: The mission is none, or a part of one's own cannot be called.
+            TypeError: The mission is none, or a component cannot be called.
         """
         check_kind("mission", mission, Mission, 'paper("flocking")')
-        parts = {"channel": channel, "controller": controller, "scene": scene}
-        for what, part in parts.items():
-            if not isinstance(part, VaryingChannel):
-                check_callable(what, part, CALLED_WITH[what])
+        own = Components(channel=channel, controller=controller, scene=scene).made(mission)
         _check_seeds(seeds)
         if not isinstance(num_threads, Integral) or not 1 <= num_threads <= MAX_THREADS:
             limits = f"from 1 to {MAX_THREADS}"
             raise ValueError(f"num_threads must be a whole number {limits}, not {num_threads!r}")
         self.mission = mission
-        self.controller = controller_of(mission) if controller is None else controller
+        self.controller = controller_of(mission) if own.controller is None else own.controller
         self._costed = costed(self.controller)
-        self.scene = scene
-        self._physics = Physics(mission, len(seeds), scene=scene, num_threads=num_threads)
+        self.scene = own.scene
+        self._physics = Physics(mission, len(seeds), scene=own.scene, num_threads=num_threads)
         self._obstacles = self._physics.obstacles
-        self.channel = channel_of(mission, self._obstacles) if channel is None else channel
+        self.channel = channel_of(mission, self._obstacles) if own.channel is None else own.channel
         self.belief = belief_of(mission, self._obstacles)
         self._truth = truth_of(mission, self.channel)
         self._num_missions = len(seeds)

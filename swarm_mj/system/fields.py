@@ -19,6 +19,9 @@ KINDS: dict[Any, tuple[type, str]] = {
     float: (Real, "a number"),
     bool: (bool, "True or False"),
 }
+# Fields by the names that they once had. Stored files are read with either name; command lines take
+# both; Python is told the new one.
+FORMER_NAMES = {"parts": "components"}
 FieldOf = Any  # what a field's maker returns: type checkers take it for the attribute's value
 
 
@@ -84,7 +87,8 @@ def did_you_mean(typed: object, known: Iterable[str]) -> str:
     """The end of a complaint about an unknown name: the known one most like it, or nothing."""
     names = {name.lstrip("-"): name for name in known}  # flags are not alike for their dashes
     bare = str(typed).lstrip("-")
-    likely = [name for name in names if bare in name.split("_")[1:]]  # windows of num_windows
+    likely = [new for new in names if new == FORMER_NAMES.get(bare)]
+    likely += [name for name in names if bare in name.split("_")[1:]]  # windows of num_windows
     likely += get_close_matches(bare, names, n=1)
     return f"; did you mean {names[likely[0]]}?" if likely else ""
 

@@ -17,6 +17,8 @@ from typing import Annotated, Any, BinaryIO, TypeVar
 
 import msgspec
 
+from swarm_mj.system.fields import FORMER_NAMES
+
 Kind = TypeVar("Kind")
 
 Row = tuple[int, dict[str, str]]
@@ -129,7 +131,7 @@ def read_plain(value: object, kind: type[Kind], bases: tuple[type, ...] = ()) ->
         ValueError: They are not of the kind.
     """
     try:
-        found = msgspec.convert(value, _strict(kind, bases), dec_hook=_made)
+        found = msgspec.convert(_by_new_names(value, kind), _strict(kind, bases), dec_hook=_made)
         return msgspec.convert(found, kind, from_attributes=True, dec_hook=_made)
     except msgspec.ValidationError as error:
         raise ValueError(_in_a_line(error)) from error
@@ -182,6 +184,16 @@ def _strict(kind: Any, bases: tuple[type, ...] = ()) -> Any:  # noqa: ANN401 - a
     return msgspec.defstruct(
         f"_{kind.__name__}", keys, bases=bases or None, forbid_unknown_fields=True, kw_only=True
     )
+
+
+def _by_new_names(value: Any, kind: object) -> Any:  # noqa: ANN401 - any plain value
+    """Return plain values with the present names of a dataclass's fields, nested ones included."""
+    if not (isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict)):
+        return value
+    kinds: dict[Any, Any] = {spec.name: spec.type for spec in fields(kind)}
+    new = {old: name for old, name in FORMER_NAMES.items() if old not in kinds and name in kinds}
+    named = {new.get(key, key): each for key, each in value.items()}
+    return {key: _by_new_names(each, kinds.get(key)) for key, each in named.items()}
 
 
 def _check_levels(values: Iterable[Any], num_levels: int = 0) -> None:

@@ -129,16 +129,16 @@ def test_what_is_wrong_with_a_part_is_one_line(swarm_mj, options, complaint):
 
 def test_a_channel_of_ones_own_gives_a_mission_the_same_course_beside_any_other(here):
     from swarm_mj.mission import paper
-    from swarm_mj.mission.components import OwnParts
+    from swarm_mj.mission.components import Components
     from swarm_mj.policies.registry import make_policy
     from swarm_mj.simulation.swarm import Swarm
 
     (here / "my_parts_too.py").write_text(PARTS)
     mission = paper("random-walk", num_robots=5, range_ratio=0.5)
-    parts = OwnParts(channel="my_parts_too:Lossy")
+    components = Components(channel="my_parts_too:Lossy")
     ages = []
     for seeds in ([3], [8, 3, 1]):
-        swarm = Swarm(mission, seeds, **parts.made(mission))
+        swarm = Swarm(mission, seeds, **components.given)
         policy = make_policy("my_parts_too:Coin", mission)
         course = [swarm.step(policy).age_windows[seeds.index(3)] for _ in range(150)]
         ages.append(course)

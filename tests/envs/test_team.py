@@ -10,7 +10,7 @@ from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.envs.spaces import robot_spaces
 from swarm_mj.envs.team import Team, next_seed
 from swarm_mj.mission import paper, reference
-from swarm_mj.mission.components import OwnParts
+from swarm_mj.mission.components import Components
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, make_extractor
 from swarm_mj.simulation.swarm import Swarm
 
@@ -183,9 +183,9 @@ def test_refusals(options, message):
 
 
 def test_credit_is_that_of_training_though_the_channel_draws():
-    rng, own = np.random.default_rng(1), OwnParts(channel="channels:Lossy")
+    rng, own = np.random.default_rng(1), Components(channel="channels:Lossy")
     mission = paper("random-walk", **SMALL)
-    batch = MissionBatch(mission, "extended", 2, rng, first_windows=10, parts=own)
+    batch = MissionBatch(mission, "extended", 2, rng, first_windows=10, components=own)
     team = begun(mission, reward="credit", channel=Lossy(), seeds=batch.history.seeds)
     for recipient in recipients(9):
         transition = batch.step(recipient, with_credit=True)

@@ -27,7 +27,7 @@ from swarm_mj.learning.run_folder import (
     write_run,
 )
 from swarm_mj.mission import paper
-from swarm_mj.mission.components import OwnParts
+from swarm_mj.mission.components import Components
 
 LIMITS = Limits(decisions=5, minutes=0.5, replay_every=3)
 ROW = {"decisions": 10.0, "aoi": 1 / 3, "objective": 0.2}
@@ -176,12 +176,21 @@ def test_a_curve_is_a_table_even_if_later_rows_have_more_columns(tmp_path):
 
 
 def test_a_run_from_before_there_were_parts_of_ones_own_is_read(tmp_path):
-    assert read_run(changed(tmp_path, lambda document: document["training"].pop("parts"))) == RUN
+    assert (
+        read_run(changed(tmp_path, lambda document: document["training"].pop("components"))) == RUN
+    )
+
+
+def test_a_runs_components_are_read_by_their_former_name(tmp_path):
+    def rename(document):
+        document["training"]["parts"] = document["training"].pop("components")
+
+    assert read_run(changed(tmp_path, rename)) == RUN
 
 
 def test_a_runs_own_parts_must_be_named(tmp_path):
-    parts = OwnParts(channel="my_parts:Lossy", scene="my_parts:walls")
-    run = replace(RUN, training=replace(RUN.training, parts=parts))
+    components = Components(channel="my_parts:Lossy", scene="my_parts:walls")
+    run = replace(RUN, training=replace(RUN.training, components=components))
     write_run(tmp_path, run)
     with pytest.raises(ValueError, match="--channel my_parts:Lossy --scene my_parts:walls again"):
         read_run(tmp_path, ["my_parts:Lossy"])

@@ -7,7 +7,7 @@ import textwrap
 import pytest
 
 from swarm_mj.mission import paper
-from swarm_mj.mission.components import OwnParts, digest, load, make, one_line_each
+from swarm_mj.mission.components import Components, digest, load, make, one_line_each
 
 MISSION = paper(num_robots=3)
 PARTS = '''
@@ -136,9 +136,9 @@ def test_what_cannot_be_made_is_said_in_one_line(parts, name, complaint):
 @pytest.mark.parametrize("name", ["number", "Plain", "maker"])
 @pytest.mark.usefixtures("parts")
 def test_parts_must_be_functions_or_like_them(name):
-    channel = OwnParts(channel=f"own_parts:{name}")
+    channel = Components(channel=f"own_parts:{name}")
     if name == "Plain":  # its object is called
-        assert callable(channel.made(MISSION)["channel"])
+        assert callable(channel.made(MISSION).channel)
     else:
         with pytest.raises(ValueError, match="must be a function of two arguments, or make an"):
             channel.made(MISSION)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarm_mj.mission.components import OwnParts
+from swarm_mj.mission.components import Components
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import footage_of
 from swarm_mj.replay.read import read_footage
@@ -126,7 +126,7 @@ def test_a_replay_without_facts_is_refused_in_one_line(two_way, tmp_path, monkey
 def test_a_replay_keeps_the_names_of_ones_own_parts(two_way, tmp_path):
     config = {"seed": 5, "policy": "mst", "channel": "my:Radio", "scene": None}
     write_replay(two_way.log, two_way.mission, config, tmp_path / "a.rrd")
-    parts = OwnParts(channel="my:Radio")
+    parts = Components(channel="my:Radio")
     read, made = (
         read_footage(tmp_path / "a.rrd"),
         footage_of(two_way.log, two_way.mission, "mst", 5, parts),
