@@ -6,8 +6,8 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
 
     II-A    Eq. 1   path loss                radio.free_space.path_loss_db
     II-A    Eq. 2   channel gain             radio.free_space.channel_gain
-    II-A    Eq. 3   SINR                     radio.kernels.sinr
-    II-A    Eq. 4   reception                radio.kernels.is_received
+    II-A    Eq. 3   SINR                     radio.reception.sinr
+    II-A    Eq. 4   reception                radio.reception.is_received
     II-B    Eq. 5   self-observation         protocol.buffers.observe_self
     II-B    Eq. 6   channel f                radio.free_space.Channel
     II-B    Eq. 7   last attempt             protocol.buffers.record_attempt

@@ -13,8 +13,8 @@ from jaxtyping import Bool, Float, Int, UInt64
 
 from swarm_mj.radio.counters import keyed_uniform, link_key, mixed
 from swarm_mj.radio.fading import NO_BURSTS, NO_FADING, Bursts, fade, is_in_burst
-from swarm_mj.radio.kernels import is_received, sinr
 from swarm_mj.radio.link_gains import LinkGains
+from swarm_mj.radio.reception import Air, decoded, incoming_at, silent_air, transmit
 from swarm_mj.system.compiled import compiled
 
 _FADES, _ERASURES, _BURSTS = np.uint64(1), np.uint64(2), np.uint64(3)  # what a key is used for
@@ -153,46 +153,36 @@ def _decode(
 ) -> None:
     """Fill `heard`: the strongest packet at each receiver, if it clears the threshold."""
     num_rows, num_robots = recipient.shape
-    sender = np.empty(num_robots, dtype=np.int64)
     for w in range(num_rows):
         key = np.uint64(mission_key[mission[w]])
-        num_senders = 0
-        for i in range(num_robots):
-            if recipient[w, i] != i:
-                sender[num_senders] = i
-                num_senders += 1
+        air = _air(received_mw[mission[w]], recipient[w], key, slot[w], rule)
         for j in range(num_robots):
-            i = _strongest(
-                j, sender[:num_senders], recipient[w], received_mw[mission[w]], key, slot[w], rule
-            )
+            i = decoded(incoming_at(air, j), j, rule.noise_mw, rule.threshold)
             heard[w, j] = j if i == j or _is_lost(i, j, key, slot[w], rule) else i
 
 
 @compiled()
-def _strongest(
-    j: int,
-    sender: Int[np.ndarray, "S"],
-    recipient: Int[np.ndarray, "N"],
+def _air(
     received_mw: Float[np.ndarray, "N N"],
+    recipient: Int[np.ndarray, "N"],
     key: np.uint64,
     slot: int,
     rule: _Rule,
-) -> int:
-    """Whose packet j decodes by Eqs. 3-4; itself is nobody."""
+) -> Air:
+    """Return all packets of a slot, faded."""
     fades = mixed(mixed(key, _FADES), np.uint64(slot))
-    total_mw, strongest_mw, strongest = 0.0, 0.0, j
-    is_silent = recipient[j] == j
-    for i in sender:
-        if i != j:
-            power_mw = received_mw[i, j]
-            if rule.rician_k != NO_FADING:
-                power_mw *= fade(link_key(fades, i, j), rule.rician_k)
-            total_mw += power_mw
-            may_hear = is_silent or (rule.hears_while_sending and recipient[i] == j)
-            if may_hear and power_mw > strongest_mw:
-                strongest_mw, strongest = power_mw, i
-    ratio = sinr(strongest_mw, total_mw - strongest_mw, rule.noise_mw)
-    return strongest if is_received(ratio, rule.threshold) else j
+    air = silent_air(recipient.shape[0])
+    for i in range(recipient.shape[0]):  # by sender: the powers of one stand side by side
+        if recipient[i] == i:
+            continue
+        for j in range(recipient.shape[0]):
+            if j != i:
+                power_mw = received_mw[i, j]
+                if rule.rician_k != NO_FADING:
+                    power_mw *= fade(link_key(fades, i, j), rule.rician_k)
+                may_hear = recipient[j] == j or (rule.hears_while_sending and recipient[i] == j)
+                transmit(air, i, j, power_mw if may_hear else 0.0, power_mw)
+    return air
 
 
 @compiled()

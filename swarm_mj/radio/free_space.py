@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from swarm_mj.mission.geometry import squared_distance
-from swarm_mj.radio.kernels import is_received, received_power, sinr
+from swarm_mj.radio.reception import Incoming, add_packet, decoded, received_power
 from swarm_mj.system.compiled import compiled
 
 
@@ -135,26 +135,19 @@ def _decode_strongest(
     num_missions, num_robots = recipient.shape
     sender = np.empty(num_robots, dtype=np.int64)
     for b in range(num_missions):
-        place_m = position_m[b]
         num_senders = 0
         for i in range(num_robots):
             if recipient[b, i] != i:
                 sender[num_senders] = i
                 num_senders += 1
         for j in range(num_robots):
-            total_mw = 0.0
-            strongest_mw = 0.0
-            strongest = j
+            incoming = Incoming(0.0, 0.0, j)
             is_silent = recipient[b, j] == j
             for s in range(num_senders):
                 i = sender[s]
                 if i != j:
-                    apart_m2 = squared_distance(place_m, i, j)
-                    received_mw = received_power(received_at_1_m_mw, apart_m2)
-                    total_mw += received_mw
+                    apart_m2 = squared_distance(position_m[b], i, j)
+                    power_mw = received_power(received_at_1_m_mw, apart_m2)
                     may_hear = is_silent or (hears_while_sending and recipient[b, i] == j)
-                    if may_hear and received_mw > strongest_mw:
-                        strongest_mw = received_mw
-                        strongest = i
-            ratio = sinr(strongest_mw, total_mw - strongest_mw, noise_mw)
-            heard[b, j] = strongest if is_received(ratio, threshold) else j
+                    incoming = add_packet(incoming, i, power_mw if may_hear else 0.0, power_mw)
+            heard[b, j] = decoded(incoming, j, noise_mw, threshold)

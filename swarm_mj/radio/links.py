@@ -16,10 +16,20 @@ from swarm_mj.radio.decode_curves import (
     row_of,
 )
 from swarm_mj.radio.free_space import FreeSpaceRadio
-from swarm_mj.radio.kernels import MIN_DISTANCE_M, decode_probability, received_power, sinr
+from swarm_mj.radio.reception import (
+    MIN_DISTANCE_M,
+    NOBODY,
+    Air,
+    Incoming,
+    add_packet,
+    decode_probability,
+    incoming_at,
+    received_power,
+    silent_air,
+    sinr,
+    transmit,
+)
 from swarm_mj.system.compiled import compiled
-
-NOBODY = -1
 
 
 class Links(NamedTuple):
@@ -37,14 +47,6 @@ class Links(NamedTuple):
     def is_doubtful(self) -> bool:
         """Whether powers fade, or are known up to an error, even where positions are known."""
         return len(self.curves) > 0
-
-
-class Air(NamedTuple):
-    """What is in the air at every receiver j."""
-
-    total_mw: Float[np.ndarray, "N"]
-    strongest_mw: Float[np.ndarray, "N"]
-    strongest: Int[np.ndarray, "N"]  # who is received with that power
 
 
 def links_between(
@@ -115,20 +117,10 @@ def _received_powers(
 
 
 @compiled()
-def silent_air(num_robots: int) -> Air:
-    """Return the air when nobody transmits."""
-    return Air(np.zeros(num_robots), np.zeros(num_robots), np.zeros(num_robots, dtype=np.int64))
-
-
-@compiled()
-def transmit(links: Links, air: Air, i: int) -> None:
-    """Add i's packet to the air."""
-    received_mw, interference_mw = links.received_mw, links.interference_mw
-    total_mw, strongest_mw, strongest = air.total_mw, air.strongest_mw, air.strongest
-    for j in range(received_mw.shape[0]):
-        total_mw[j] += interference_mw[i, j]
-        if received_mw[i, j] > strongest_mw[j]:
-            strongest_mw[j], strongest[j] = received_mw[i, j], i
+def broadcast(links: Links, air: Air, i: int) -> None:
+    """Add i's packet to the air at every receiver."""
+    for j in range(links.received_mw.shape[0]):
+        transmit(air, i, j, links.received_mw[i, j], links.interference_mw[i, j])
 
 
 @compiled()
@@ -137,14 +129,23 @@ def air_of(links: Links, transmits: Bool[np.ndarray, "N"]) -> Air:
     air = silent_air(transmits.shape[0])
     for i in range(transmits.shape[0]):
         if transmits[i]:
-            transmit(links, air, i)
+            broadcast(links, air, i)
     return air
 
 
 @compiled()
-def stronger(i: int, power_i: float, k: int, power_k: float) -> tuple[int, float]:
-    """Whose packet a receiver may decode of two, and its power; of equal ones the second."""
-    return (i, power_i) if power_i > power_k else (k, power_k)
+def incoming_with(links: Links, air: Air, i: int, j: int) -> Incoming:
+    """Return all packets at j when i transmits, too; a robot adds nothing at itself."""
+    signal_mw, interference_mw = links.received_mw[i, j], links.interference_mw[i, j]
+    return add_packet(incoming_at(air, j), i, signal_mw, interference_mw)
+
+
+@compiled()
+def chance_of_strongest(links: Links, incoming: Incoming, j: int) -> float:
+    """Return the probability that j decodes the strongest packet."""
+    others_mw = incoming.total - links.interference_mw[incoming.sender, j]
+    ratio = sinr(incoming.strongest, others_mw, links.noise_mw)
+    return chance(links, ratio, incoming.sender, j)
 
 
 @compiled()
@@ -156,29 +157,23 @@ def listen(
     heard: Int[np.ndarray, "N"],
     probability: Float[np.ndarray, "N"],
 ) -> None:
-    """Works out whom robots may decode, by Eqs. 3-4.
+    """Predict which packets robots may decode (Eqs. 3-4).
 
     Args:
         links: The radio.
-        air: What is in the air.
+        air: All packets but one.
         also: Who transmits besides, or `NOBODY`.
-        listens: Who listens; nobody does while it transmits.
-        heard: Whom each robot may decode, overwritten; itself is nobody.
+        listens: Which robots listen; nobody does while it transmits.
+        heard: The sender that each robot may decode, overwritten; itself is nobody.
         probability: That it does; overwritten.
     """
-    received_mw, interference_mw = links.received_mw, links.interference_mw
-    total_mw, strongest_mw, strongest = air.total_mw, air.strongest_mw, air.strongest
     for j in range(listens.shape[0]):
         heard[j], probability[j] = j, 0.0
         if listens[j] and j != also:
-            i = j if also == NOBODY else also  # a robot adds nothing to the air at itself
-            added_mw = received_mw[i, j]
-            sender, signal_mw = stronger(i, added_mw, strongest[j], strongest_mw[j])
-            if signal_mw > 0.0:
-                others_mw = total_mw[j] + interference_mw[i, j] - interference_mw[sender, j]
-                ratio = sinr(signal_mw, others_mw, links.noise_mw)
-                probability[j] = chance(links, ratio, sender, j)
-                heard[j] = sender if probability[j] > 0.0 else j
+            incoming = incoming_with(links, air, j if also == NOBODY else also, j)
+            if incoming.strongest > 0.0:
+                probability[j] = chance_of_strongest(links, incoming, j)
+                heard[j] = incoming.sender if probability[j] > 0.0 else j
 
 
 @compiled()

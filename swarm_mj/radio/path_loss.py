@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 
 from swarm_mj.radio.free_space import path_loss_db
-from swarm_mj.radio.kernels import received_power
+from swarm_mj.radio.reception import received_power
 from swarm_mj.system.compiled import compiled
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0

@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from swarm_mj.mission.geometry import squared_distance
-from swarm_mj.radio.kernels import is_received, received_power, sinr
 from swarm_mj.radio.power_law import PowerLaw, write_powers
+from swarm_mj.radio.reception import is_received, received_power, sinr
 from swarm_mj.system.compiled import compiled
 
 NOISE = 1.0
@@ -40,7 +40,11 @@ def told_of(law: PowerLaw, num_missions: int) -> Told:
 
 
 class _Slot(NamedTuple):
-    """Who broadcasts in a slot so far, and what every robot receives."""
+    """The senders of a slot so far, and the packets that stand.
+
+    No `Air`: a packet that decodes keeps its receiver, whatever comes later, and its SINR is judged
+    against the total before its own power is added, which rounds differently.
+    """
 
     is_sender: Bool[np.ndarray, "N"]
     signal: Float[np.ndarray, "N"]  # of the packet that each robot decodes; 0 is none

@@ -18,7 +18,7 @@ from swarm_mj.radio.free_space import (
     path_loss_db,
     transmit_power_dbm,
 )
-from swarm_mj.radio.kernels import MIN_DISTANCE_M
+from swarm_mj.radio.reception import MIN_DISTANCE_M
 
 RANGE_M = 250.0
 POWER_DBM = 39.013025

@@ -10,17 +10,15 @@ from scipy.spatial.distance import pdist, squareform
 
 from swarm_mj.mission import paper
 from swarm_mj.radio.decode_curves import KNOWN
-from swarm_mj.radio.kernels import MIN_DISTANCE_M
 from swarm_mj.radio.links import (
-    NOBODY,
     Links,
     air_of,
     links_between,
     listen,
     lone_probabilities,
-    stronger,
 )
 from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.radio.reception import MIN_DISTANCE_M, NOBODY, incoming_at
 
 seeds = st.integers(0, 2**32 - 1)
 RADIO = radio_of(paper("stationary"))  # decodes up to 250 m in silence
@@ -99,16 +97,11 @@ def test_eq3_packets_add_up_by_hand():
     links = Links(received_mw, np.full((3, 3), math.inf), 1.0, 2.0, KNOWN, row, received_mw)
     transmits, listens = np.array([False, True, True]), np.array([True, False, False])
     air = air_of(links, transmits)
-    assert (air.total_mw[0], air.strongest_mw[0], air.strongest[0]) == (8.0, 6.0, 1)
+    assert incoming_at(air, 0) == (8.0, 6.0, 1)
     assert listened(links, transmits, NOBODY, listens)[1][0] == 1.0
     received_mw[2, 0] = 2.5
     assert listened(links, transmits, NOBODY, listens)[1][0] == 0.0
     assert listened(links, transmits & (np.arange(3) < 2), 2, listens)[1][0] == 0.0
-
-
-def test_of_equally_strong_packets_the_second_wins():
-    assert stronger(3, 2.0, 4, 2.0) == (4, 2.0)
-    assert stronger(3, 2.5, 4, 2.0) == (3, 2.5)
 
 
 @pytest.mark.parametrize("deviation", [-1.5, -0.5, 0.0, 1.0])

@@ -35,9 +35,9 @@ def _compiled_code() -> Finding:
     """Where numba keeps what it compiled of the radio; without a place every start compiles."""
     name = "compiled code"
     try:
-        from swarm_mj.radio import kernels
+        from swarm_mj.radio import reception
 
-        compiled: Any = kernels.sinr
+        compiled: Any = reception.sinr
         folder = compiled.stats.cache_path
     except ImportError as error:
         return Finding("speed", name, "broken", str(error), "install what is missing")

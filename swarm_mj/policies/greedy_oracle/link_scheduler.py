@@ -16,7 +16,8 @@ from jaxtyping import Bool, Float, Float32, Int
 
 from swarm_mj.protocol.timestamps import merge_expected, observe_own, rise
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
-from swarm_mj.radio.links import NOBODY, Links, air_of, listen
+from swarm_mj.radio.links import Links, air_of, listen
+from swarm_mj.radio.reception import NOBODY
 from swarm_mj.system.compiled import compiled
 
 

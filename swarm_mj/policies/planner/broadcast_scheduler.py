@@ -18,19 +18,16 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32
 
 from swarm_mj.protocol.timestamps import merge_expected, observe_own, rise
-from swarm_mj.radio.kernels import sinr
 from swarm_mj.radio.links import (
-    NOBODY,
-    Air,
     Links,
     air_of,
-    chance,
+    broadcast,
+    chance_of_strongest,
+    incoming_with,
     listen,
     lone_probabilities,
-    silent_air,
-    stronger,
-    transmit,
 )
+from swarm_mj.radio.reception import NOBODY, Air, silent_air
 from swarm_mj.system.compiled import compiled
 
 
@@ -151,7 +148,7 @@ def _choose(
     if first != NOBODY:
         value = _value(links, gain, air, transmits, first)
         transmits[first] = True
-        transmit(links, air, first)
+        broadcast(links, air, first)
     while True:
         best, best_value = NOBODY, value * weights.least_share
         for i in range(num_robots):
@@ -163,7 +160,7 @@ def _choose(
             return
         value = best_value
         transmits[best] = True
-        transmit(links, air, best)
+        broadcast(links, air, best)
 
 
 @compiled()
@@ -204,17 +201,13 @@ def _value(
     also: int,
 ) -> float:
     """What the slot is worth when this robot transmits beside those in the air."""
-    received_mw, interference_mw = links.received_mw, links.interference_mw
-    total_mw, strongest_mw, strongest = air.total_mw, air.strongest_mw, air.strongest
     value = 0.0
     for j in range(gain.shape[0]):
         if not transmits[j] and j != also:
-            added_mw = received_mw[also, j]
-            sender, signal_mw = stronger(also, added_mw, strongest[j], strongest_mw[j])
-            if signal_mw > 0.0 and gain[sender, j] != 0.0:
-                others_mw = total_mw[j] + interference_mw[also, j] - interference_mw[sender, j]
-                ratio = sinr(signal_mw, others_mw, links.noise_mw)
-                value += gain[sender, j] * chance(links, ratio, sender, j)
+            incoming = incoming_with(links, air, also, j)
+            worth = gain[incoming.sender, j]
+            if incoming.strongest > 0.0 and worth != 0.0:
+                value += worth * chance_of_strongest(links, incoming, j)
     return value
 
 

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.radio.kernels import sinr
-from swarm_mj.radio.links import NOBODY
+from swarm_mj.radio.reception import NOBODY, Incoming, add_packet, sinr
 from swarm_mj.system.compiled import compiled
 
 BIN_DB = 2.0
@@ -80,6 +79,7 @@ def observe(
         i = heard[j] if is_decoded else _strongest(j, transmitted, believed_mw)
         if i == NOBODY:
             continue
+        # A sum of its own: the packet that j decoded need not be the strongest by this belief.
         others_mw = 0.0
         for k in range(num_robots):
             if transmitted[k] and k != i and k != j:
@@ -96,12 +96,12 @@ def observe(
 def _strongest(
     j: int, transmitted: Bool[np.ndarray, "N"], believed_mw: Float[np.ndarray, "N N"]
 ) -> int:
-    """Whose packet j should have decoded, or `NOBODY`'s."""
-    strongest, power_mw = NOBODY, 0.0
+    """Return the sender of the packet that j should have decoded, or `NOBODY`."""
+    incoming = Incoming(0.0, 0.0, NOBODY)
     for i in range(transmitted.shape[0]):
-        if transmitted[i] and i != j and believed_mw[i, j] > power_mw:
-            strongest, power_mw = i, believed_mw[i, j]
-    return strongest
+        if transmitted[i] and i != j:
+            incoming = add_packet(incoming, i, believed_mw[i, j], believed_mw[i, j])
+    return incoming.sender
 
 
 class Evidence:

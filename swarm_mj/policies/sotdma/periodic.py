@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from swarm_mj.radio.kernels import is_received, sinr
+from swarm_mj.radio.reception import Incoming, add_packet, decoded
 from swarm_mj.system.compiled import compiled
 
 NOWHERE = -1  # no slot of the frame
@@ -49,22 +49,17 @@ def empty_frame(
 
 @compiled()
 def listen(frame: Periodic, s: int) -> None:
-    """Works out whom everyone decodes in one slot: the strongest, if at all (Eqs. 3-4)."""
+    """Write the sender that each robot decodes in one slot (Eqs. 3-4)."""
     power, transmits, heard = frame.power, frame.transmits[s], frame.heard[s]
     for j in range(power.shape[0]):
-        heard[j] = j
         if transmits[j]:
+            heard[j] = j
             continue
-        total, strongest = 0.0, 0.0
-        sender = j
+        incoming = Incoming(0.0, 0.0, j)
         for i in range(power.shape[0]):
             if transmits[i] and i != j:
-                total += power[i, j]
-                if power[i, j] > strongest:
-                    strongest, sender = power[i, j], i
-        ratio = sinr(strongest, frame.interference * (total - strongest), 1.0)
-        if strongest > 0.0 and is_received(ratio, frame.threshold):
-            heard[j] = sender
+                incoming = add_packet(incoming, i, power[i, j], power[i, j])
+        heard[j] = decoded(incoming, j, 1.0, frame.threshold, factor=frame.interference)
 
 
 @compiled()

@@ -4,7 +4,7 @@ import pytest
 
 from swarm_mj.cli.health import machine as looked_at
 from swarm_mj.cli.health.machine import machine
-from swarm_mj.radio import kernels
+from swarm_mj.radio import reception
 
 
 def found():
@@ -40,7 +40,7 @@ def test_compiled_code_needs_a_place_that_can_be_written(monkeypatch, tmp_path):
         class stats:  # noqa: N801 - numba's name
             cache_path = str(tmp_path)
 
-    monkeypatch.setattr(kernels, "sinr", Kernel)
+    monkeypatch.setattr(reception, "sinr", Kernel)
     assert found()["compiled code"].found == f"kept in {tmp_path}"
     assert not list(tmp_path.iterdir())
     (tmp_path / "file").touch()

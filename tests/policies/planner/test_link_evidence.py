@@ -16,7 +16,7 @@ from swarm_mj.policies.planner.link_evidence import (
     no_observation,
     observe,
 )
-from swarm_mj.radio.links import NOBODY
+from swarm_mj.radio.reception import NOBODY
 
 ALL = np.ones(4, dtype=bool)
 NOISE_MW, THRESHOLD = 1.0, 10.0  # so a packet of 10 mW has a margin of 0 dB in silence

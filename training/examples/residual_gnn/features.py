@@ -19,8 +19,8 @@ from residual_gnn.receptions import (
     predict_receptions,
 )
 from residual_gnn.rule import FARTHEST, Proposal
-from swarm_mj.radio.kernels import is_received, sinr
 from swarm_mj.radio.power_law import PowerLaw, write_powers
+from swarm_mj.radio.reception import is_received, sinr
 from swarm_mj.system.compiled import compiled
 
 OLDEST = 400  # ages count no further [slots]

@@ -5,11 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.radio.kernels import is_received, sinr
 from swarm_mj.radio.power_law import PowerLaw, write_powers
+from swarm_mj.radio.reception import NOBODY, Air, decoded, incoming_at, transmit
 from swarm_mj.system.compiled import compiled
-
-NOBODY = -1
 
 
 class PredictedReceptions(NamedTuple):
@@ -47,14 +45,11 @@ def predict_receptions(
             write_powers(o, position_m, law, power)
             for j in range(power.shape[0]):
                 if j != o:
-                    total[j] += power[j]
-                    if power[j] > strongest[j]:
-                        strongest[j], sender[j] = power[j], o
+                    transmit(Air(total, strongest, sender), o, j, power[j], power[j])
 
 
 @compiled()
 def decoded_by(j: int, predicted: PredictedReceptions, more: float, threshold: float) -> int:
     """Whom j decodes beside so much more interference, or `NOBODY`."""
-    strongest = predicted.strongest[j]
-    ratio = sinr(strongest, predicted.total[j] - strongest + more, 1.0)
-    return predicted.sender[j] if is_received(ratio, threshold) else NOBODY
+    incoming = incoming_at(Air(predicted.total, predicted.strongest, predicted.sender), j)
+    return decoded(incoming, NOBODY, 1.0, threshold, more=more)

@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from swarm_mj.radio.kernels import decode_probability, is_received, received_power, sinr
+from swarm_mj.radio.reception import (
+    Incoming,
+    add_packet,
+    decode_probability,
+    decoded,
+    incoming_at,
+    is_received,
+    received_power,
+    silent_air,
+    sinr,
+    transmit,
+)
 
 
 def test_eq2_power_falls_with_the_square_of_the_distance_down_to_a_millimetre():
@@ -23,6 +34,37 @@ def test_eq3_sinr_by_hand():
 def test_eq4_the_threshold_itself_is_enough():
     assert is_received(1.25, 1.25)
     assert not is_received(np.nextafter(1.25, 0.0), 1.25)
+
+
+def incoming(j, *packets):
+    """All packets at j: senders, and the powers that j may decode and is disturbed by."""
+    result = Incoming(0.0, 0.0, j)
+    for i, signal, interference in packets:
+        result = add_packet(result, i, signal, interference)
+    return result
+
+
+def test_the_strongest_packet_counts_and_of_equal_ones_the_first():
+    assert incoming(7) == (0.0, 0.0, 7)
+    assert incoming(7, (1, 2.0, 2.0), (2, 6.0, 6.0), (3, 6.0, 6.0)) == (14.0, 6.0, 2)
+    assert incoming(7, (1, 2.0, 2.0), (2, 0.0, 6.0)) == (8.0, 2.0, 1), "jammed, not decodable"
+
+
+def test_eq4_a_packet_decodes_beside_all_others_by_hand():
+    """6 over a noise of 1 and another packet of 2: an SINR of 2."""
+    heard = incoming(7, (1, 6.0, 6.0), (2, 2.0, 2.0))
+    assert decoded(heard, 7, 1.0, 2.0) == 1
+    assert decoded(heard, 7, 1.0, np.nextafter(2.0, 3.0)) == 7
+    assert decoded(heard, 7, 1.0, 2.0, more=0.1) == decoded(heard, 7, 1.0, 2.0, factor=1.1) == 7
+    assert decoded(heard, 7, 1.0, 1.2, factor=2.0) == 1, "6 / (1 + 2 * 2)"
+    assert decoded(incoming(7), 7, 1.0, 0.5) == 7
+
+
+def test_the_air_holds_all_packets_at_every_receiver():
+    air = silent_air(3)
+    transmit(air, 1, 0, 2.0, 3.0)
+    transmit(air, 2, 0, 4.0, 5.0)
+    assert [incoming_at(air, j) for j in range(3)] == [(8.0, 4.0, 2), (0.0, 0.0, 1), (0.0, 0.0, 2)]
 
 
 def chance(ratio, distance_over_std):

@@ -1,0 +1,140 @@
+"""Reception (II-A): the one place that says which packet a robot decodes, and how probably.
+
+The channels, the schedulers and the policies that predict receptions all call these. Index order:
+`i` sends, `j` receives. Powers are in one unit, whichever it is.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from swarm_mj.system.compiled import compiled
+
+NOBODY = -1  # in place of a robot's index
+MIN_DISTANCE_M = 1e-3  # robots closer than this count as this far apart, which keeps gains finite
+LOGISTIC = 1.702  # 1 / (1 + exp(-1.702 z)) is within 0.01 of the normal distribution function
+CERTAIN = 2.5  # standard deviations beyond which a packet decodes for certain, or never
+
+
+class Incoming(NamedTuple):
+    """All packets of one slot at one receiver."""
+
+    total: float  # power of all packets
+    strongest: float  # power of the strongest that the receiver may decode; 0 is none
+    sender: int  # of that packet; the receiver itself is nobody
+
+
+class Air(NamedTuple):
+    """All packets of one slot, at every receiver j: an `Incoming` for each."""
+
+    total: Float[np.ndarray, "N"]
+    strongest: Float[np.ndarray, "N"]
+    sender: Int[np.ndarray, "N"]
+
+
+@compiled()
+def received_power(at_1_m: float, squared_distance_m2: float) -> float:
+    """Return the power over a distance in free space, in the unit of that over 1 m (Eqs. 1-2)."""
+    return at_1_m / max(squared_distance_m2, MIN_DISTANCE_M * MIN_DISTANCE_M)
+
+
+@compiled()
+def sinr(signal: float, interference: float, noise: float) -> float:
+    """Return the signal over interference plus noise, linear [1] (Eq. 3)."""
+    return signal / (noise + interference)
+
+
+@compiled()
+def is_received(signal_to_noise: float, threshold: float) -> bool:
+    """Return whether a packet decodes; both ratios are linear [1] (Eq. 4)."""
+    return signal_to_noise >= threshold
+
+
+@compiled()
+def add_packet(incoming: Incoming, i: int, signal: float, interference: float) -> Incoming:
+    """Return what a receiver gets when i transmits, too.
+
+    Signal and interference are two numbers because a receiver may be unable to decode a packet that
+    jams it all the same: while it transmits, or where a scheduler does not count on the link.
+
+    Args:
+        incoming: All other packets.
+        i: The sender.
+        signal: Power at which the packet can be decoded; 0 if it cannot.
+        interference: Power that it adds to all other packets.
+    """
+    # Two selections, not a branch: which packet is stronger is as random as the places of robots.
+    is_stronger = signal > incoming.strongest  # of equally strong packets the first counts
+    strongest = signal if is_stronger else incoming.strongest
+    sender = i if is_stronger else incoming.sender
+    return Incoming(incoming.total + interference, strongest, sender)
+
+
+@compiled()
+def decoded(
+    incoming: Incoming,
+    j: int,
+    noise: float,
+    threshold: float,
+    factor: float = 1.0,
+    more: float = 0.0,
+) -> int:
+    """Return the sender whose packet j decodes, or j itself: nobody.
+
+    Args:
+        incoming: All packets at j.
+        j: The receiver.
+        noise: Of the receiver.
+        threshold: Least SINR that decodes, linear [1].
+        factor: Of the interference, where a prediction allows for more than it knows of.
+        more: Interference besides.
+    """
+    # The total less the signal, not a second sum: loops stay linear in the senders, and all callers
+    # round alike, so that predictions agree with the channel to the last digit.
+    interference = factor * (incoming.total - incoming.strongest) + more
+    ratio = sinr(incoming.strongest, interference, noise)
+    return incoming.sender if is_received(ratio, threshold) else j
+
+
+@compiled()
+def silent_air(num_robots: int) -> Air:
+    """Return the air when nobody transmits."""
+    return Air(np.zeros(num_robots), np.zeros(num_robots), np.arange(num_robots))
+
+
+@compiled()
+def incoming_at(air: Air, j: int) -> Incoming:
+    """Return all packets at one receiver."""
+    return Incoming(air.total[j], air.strongest[j], air.sender[j])
+
+
+@compiled()
+def transmit(air: Air, i: int, j: int, signal: float, interference: float) -> None:
+    """Add i's packet to the air at j; powers as in `add_packet`."""
+    incoming = add_packet(incoming_at(air, j), i, signal, interference)
+    air.total[j], air.strongest[j], air.sender[j] = incoming
+
+
+@compiled()
+def decode_probability(signal_to_noise: float, threshold: float, distance_over_std: float) -> float:
+    """Return the probability that a packet over a believed distance decodes (Eqs. 3-4).
+
+    A lone packet decodes up to some distance; interference shortens it to d sqrt(SINR /
+    threshold), so a packet over a believed d comes through if the true distance is below that.
+
+    Args:
+        signal_to_noise: SINR over the believed distance, linear [1].
+        threshold: Least SINR that decodes, linear [1].
+        distance_over_std: The believed distance over its standard deviation; inf is certain.
+
+    Returns:
+        The probability, by a logistic approximation of the normal distribution.
+    """
+    if distance_over_std == np.inf:
+        return 1.0 if is_received(signal_to_noise, threshold) else 0.0
+    deviations = (math.sqrt(signal_to_noise / threshold) - 1.0) * distance_over_std
+    if abs(deviations) > CERTAIN:
+        return 1.0 if deviations > 0.0 else 0.0
+    return 1.0 / (1.0 + math.exp(-LOGISTIC * deviations))
