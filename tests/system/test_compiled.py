@@ -48,8 +48,8 @@ class Checkout:
     def __init__(self, root):
         self.root = root
         self.package = root / "swarm_mj"
-        self.package.mkdir()
-        shutil.copy(swarm_mj.system.compiled.__file__, self.package)
+        (self.package / "system").mkdir(parents=True)
+        shutil.copy(swarm_mj.system.compiled.__file__, self.package / "system")
         (self.package / "__init__.py").touch()
         (self.package / "loop.py").write_text(LOOP)
         self.write(factor=2.0)
