@@ -96,8 +96,13 @@ def parse_options(kind: type[T], arguments: Sequence[str], prog: str, summary: s
 
 def flag_of(spec: Field[Any]) -> str:
     """Return the flag of a field: `--windows` of `num_windows`."""
+    return flags_of(spec)[0]
+
+
+def flags_of(spec: Field[Any]) -> tuple[str, ...]:
+    """Return the flag of a field, and then the flags that it had in earlier releases."""
     name = spec.name.removeprefix("num_").removeprefix("is_")
-    return "--" + name.replace("_", "-")
+    return spec.metadata.get("flags") or ("--" + name.replace("_", "-"),)
 
 
 def _check_names(arguments: Sequence[str]) -> None:
@@ -153,14 +158,14 @@ def _add(group: argparse._ActionsContainer, option: Option) -> None:
     spec, kind, about = option.spec, kind_of(option.spec), option.spec.metadata
     how: dict[str, Any] = {"help": _help(spec, option.default)}
     if kind is bool:
-        group.add_argument(flag_of(spec), dest=option.dest, action="store_true", **how)
+        group.add_argument(*flags_of(spec), dest=option.dest, action="store_true", **how)
         return
     convert = about.get("convert") or CONVERT.get(about.get("unit")) or CONVERT.get(kind, kind)
     how |= {"type": convert, "metavar": _metavar(spec)}
     if option.is_many or get_origin(spec.type) is tuple:
         how |= {"nargs": "+", "action": "extend"}
     if not about.get("is_positional"):
-        group.add_argument(flag_of(spec), dest=option.dest, required=option.is_required, **how)
+        group.add_argument(*flags_of(spec), dest=option.dest, required=option.is_required, **how)
         return
     if spec.default is not MISSING:
         how["nargs"] = "?"

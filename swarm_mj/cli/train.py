@@ -120,9 +120,10 @@ def _new_run(options: TrainOptions) -> Run:
     check_new(options.out)
     init = options.init
     training = asked_settings(options.settings, read_policy(init)[1] if init else None, init)
+    credit = training.credit_assignment
     return Run(
         training=training,
-        limits=Limits(decisions=BUDGETS[training.arm], patience=PATIENCE[training.arm]),
+        limits=Limits(decisions=BUDGETS[credit], patience=PATIENCE[credit]),
         command=shlex.join(["swarm-mj", "train", *options.typed]),
         init=init,
     )
@@ -140,7 +141,9 @@ def _print(out: Path, asked: Run, progress: Progress, *, is_over: bool) -> None:
     """Print what the run came to, and what to do with it."""
     training, console = asked.training, plain_console()
     sizes = ", ".join(map(str, training.robots))
-    title = f"{out}: arm {training.arm}, {training.mission.task}, {sizes} robots"
+    title = (
+        f"{out}: credit per {training.credit_assignment}, {training.mission.task}, {sizes} robots"
+    )
     rows = {
         **report(asked, progress),
         "decisions": f"{progress.decisions:,}",

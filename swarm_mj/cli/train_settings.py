@@ -68,7 +68,7 @@ def asked_settings(
     asked = _part("mission.", given)
     mission = make_mission(**{"task": "stationary", "num_robots": sizes[0]} | asked)
     check_in_use(asked, [mission])
-    training = usual_settings(own.get("arm", "robot"), mission, sizes)
+    training = usual_settings(own.get("credit_assignment", "robot"), mission, sizes)
     if init is not None:
         training = replace(
             training, network=init.network, features=init.features, silence_logit=init.silence_logit
@@ -173,17 +173,17 @@ def _usual(place: str) -> str:
     """Return the default as text: per robot and, where it differs, per team."""
     if "shown" in SPECS[place].metadata:
         return SPECS[place].metadata["shown"]
-    robot, team = (_usual_of(arm, place) for arm in ("robot", "team"))
+    robot, team = (_usual_of(credit, place) for credit in ("robot", "team"))
     if robot == "False":
         return ""
-    return robot if place == "arm" or robot == team else f"{robot}, team: {team}"
+    return robot if place == "credit_assignment" or robot == team else f"{robot}, team: {team}"
 
 
-def _usual_of(arm: str, place: str) -> str:
+def _usual_of(credit: str, place: str) -> str:
     """Return the default as text, if it does not depend on preset or task."""
     missions = (PRESETS["paper"]("stationary"), PRESETS["reference"]("flocking"))
     usual, other = (
-        _stored(usual_settings(arm, each, (each.num_robots,)), place) for each in missions
+        _stored(usual_settings(credit, each, (each.num_robots,)), place) for each in missions
     )
     depends = usual != other and place not in ("mission.preset", "mission.task")
     return "the preset's own" if depends else as_typed(usual)

@@ -19,7 +19,7 @@ from swarm_mj.system.reading import read_document, read_file
 SETTINGS, CHECKPOINT, CURVE = "settings.json", "checkpoint.pt", "curve.csv"
 INIT, POLICY, REPLAYS, TENSORBOARD = "init", "policy", "replays", "tensorboard"
 FORMAT = "swarm_mj training run"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2  # 1 called the kind of credit `arm`
 MOST_BYTES = 1_000_000  # of the settings
 BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's way
 PATIENCE = {"robot": 8, "team": 40}  # evaluations
@@ -168,7 +168,9 @@ def read_run(folder: Path, named: Collection[str] = ()) -> Run:
     try:
         run = read_document(text, FORMAT, FORMAT_VERSION, Run)
     except ValueError as error:
-        raise ValueError(f"settings {path} are damaged, or no run's: {error}") from error
+        raise ValueError(
+            f"settings {path} are damaged, no run's, or from an earlier version: {error}"
+        ) from error
     for name in run.training.own.values():
         if name not in named:
             raise ValueError(

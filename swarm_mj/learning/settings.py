@@ -92,10 +92,12 @@ class Training:
         ValueError: A value is unknown, outside its range, or does not go with another.
     """
 
-    arm: CreditAssignment = setting(
+    credit_assignment: CreditAssignment = setting(
         "robot",
         "credit assignment, per robot (each is paid for what its own packets changed; learns "
         "in minutes) or per team (one reward for all, the paper's way)",
+        label="credit",
+        flags=("--credit", "--arm"),  # the latter for one release more
         choices=get_args(CreditAssignment),
     )
     mission: Mission
@@ -113,7 +115,7 @@ class Training:
         7.0, low=-100.0, high=100.0
     )  # what silence has ahead, but in a robot's own turn: e^7 to 1
     reward: Reward = setting(
-        "aoi", "the cost to lower; velocity-variance needs --arm team", choices=get_args(Reward)
+        "aoi", "the cost to lower; velocity-variance needs --credit team", choices=get_args(Reward)
     )
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)
@@ -141,8 +143,8 @@ class Training:
         check_fit(self.network, self.features)
         if not self.robots:
             raise ValueError("robots must have at least 1 size")
-        if self.arm == "robot" and self.reward != "aoi":
-            raise ValueError(f"reward {self.reward} is a team's; choose arm team, or reward aoi")
+        if self.credit_assignment == "robot" and self.reward != "aoi":
+            raise ValueError(f"reward {self.reward} is a team's; choose credit team, or reward aoi")
 
     @property
     def own(self) -> dict[str, str]:
@@ -168,10 +170,10 @@ class Training:
     @property
     def drops_silence(self) -> bool:
         """Whether silent rows, which without discount earn nothing, may be left out."""
-        return self.arm == "robot" and self.ppo.discount == 0.0
+        return self.credit_assignment == "robot" and self.ppo.discount == 0.0
 
 
-def usual_settings(arm: str, mission: Mission, robots: Sequence[int], seed: int = 0) -> Training:
+def usual_settings(credit: str, mission: Mission, robots: Sequence[int], seed: int = 0) -> Training:
     """Return the usual settings of credit per `robot` or per `team`, the paper's way (III-C).
 
     The mission's preset says whose way, where they differ; `dataclasses.replace` changes some.
@@ -179,8 +181,8 @@ def usual_settings(arm: str, mission: Mission, robots: Sequence[int], seed: int 
     Raises:
         ValueError: A value is unknown or outside its range.
     """
-    check_value(Training.__dataclass_fields__["arm"], arm)
-    own = _per_team(is_reference=mission.preset == "reference") if arm == "team" else {}
+    check_value(Training.__dataclass_fields__["credit_assignment"], credit)
+    own = _per_team(is_reference=mission.preset == "reference") if credit == "team" else {}
     return Training(mission=mission, robots=tuple(robots), seed=seed, **own)
 
 
@@ -193,7 +195,7 @@ def _per_team(*, is_reference: bool) -> dict[str, Any]:
     """
     features, num_outputs = ("reference", 2) if is_reference else ("paper", 1)
     return {
-        "arm": "team",
+        "credit_assignment": "team",
         "features": features,
         "network": GnnShape(
             num_features=num_features(features), num_outputs=num_outputs, edges="reference"

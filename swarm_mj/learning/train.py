@@ -60,7 +60,7 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "You have specified a mini-batch size")  # one is smaller
         model = PPO(
-            GnnActorCritic if training.arm == "robot" else TeamActorCritic,
+            GnnActorCritic if training.credit_assignment == "robot" else TeamActorCritic,
             env,
             learning_rate=ppo.learning_rate,
             n_steps=ppo.num_steps,
@@ -95,7 +95,7 @@ def _make_env(training: Training, rng: np.random.Generator) -> VecEnv:
         rng,
         training.components,
     )
-    if training.arm == "robot":
+    if training.credit_assignment == "robot":
         return RobotEnv(batches)
     env = TeamEnv(batches, training.reward)
     if training.reward == "velocity-variance":  # as in the authors' code
@@ -121,7 +121,11 @@ def _policy_settings(training: Training) -> dict[str, Any]:
         "silence_logit": training.silence_logit,
         "optimizer_kwargs": {"eps": training.ppo.adam_epsilon},
     }
-    return settings if training.arm == "robot" else settings | {"sums_nodes": training.sums_nodes}
+    return (
+        settings
+        if training.credit_assignment == "robot"
+        else settings | {"sums_nodes": training.sums_nodes}
+    )
 
 
 def decayed_rate(ppo: PpoSettings, num_epochs: int) -> float:

@@ -31,7 +31,7 @@ def test_bench_times_learning_and_leaves_the_evaluation_out(monkeypatch, capsys)
     assert main(["bench", "--missions", "1", "--seconds", "0.1", "--episodes", "0"]) == 0
     printed = capsys.readouterr().out
     assert "Evaluation" not in printed
-    for row in ("with gradients", "train --arm robot", "train --arm team", "decision"):
+    for row in ("with gradients", "train --credit robot", "train --credit team", "decision"):
         assert row in printed
 
 

@@ -35,7 +35,7 @@ def test_the_commands_to_begin_with_exist():
         ("fly --polcy=tdma", "did you mean --policy?"),
         ("fly --task flok", "task must be one of"),
         ("fly --task flok", "not 'flok'; did you mean flocking?"),
-        ("train --out r --arm tem", "did you mean team?"),
+        ("train --out r --credit tem", "did you mean team?"),
     ],
 )
 def test_a_slip_is_answered_with_the_likely_name(capsys, line, complaint):

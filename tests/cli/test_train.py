@@ -52,7 +52,7 @@ def test_a_run_prints_its_evaluations_and_what_it_came_to(whole):
         assert "held-out age" in line
     for row in ("policy kept", "spatial-tdma", "greedy-oracle", "decisions", "minutes"):
         assert row in done.stdout
-    assert "runs/whole: arm robot, stationary, 4 robots" in done.stdout
+    assert "runs/whole: credit per robot, stationary, 4 robots" in done.stdout
 
 
 def test_a_run_leaves_what_it_says(whole):
@@ -165,12 +165,12 @@ def test_limits_are_kept_and_may_be_moved(here, capsys):
 @pytest.mark.usefixtures("here")
 def test_options_of_the_run_may_be_repeated(capsys):
     train("--out", "r", *SMALL, "--budget", 128)
-    assert train("--out", "r", *SMALL, "--arm", "robot", "--seed", 0, "--resume") == 0
+    assert train("--out", "r", *SMALL, "--credit", "robot", "--seed", 0, "--resume") == 0
     capsys.readouterr()
 
 
 def test_a_run_begins_with_a_policy_and_its_network(whole, here, capsys):
-    """Which has 4 wide layers, whatever the arm's own are."""
+    """Which has 4 wide layers, whatever the usual ones are."""
     policy = whole[0] / "runs" / "whole" / "policy"
     assert train("--out", "r", *MISSIONS, "--held-out", 2, "--init", policy, "--budget", 1) == 0
     assert read_policy(here / "r" / "policy")[0].shape.latent == 4
@@ -179,7 +179,7 @@ def test_a_run_begins_with_a_policy_and_its_network(whole, here, capsys):
 
 @pytest.mark.usefixtures("here")
 def test_arm_team_trains_a_flock_for_its_velocities(capsys):
-    options = ("--arm", "team", "--task", "flocking", "--reward", "velocity-variance")
+    options = ("--credit", "team", "--task", "flocking", "--reward", "velocity-variance")
     assert train("--out", "r", *SMALL, *options, "--budget", 1) == 0
     assert "m²/s²" in capsys.readouterr().out
 
@@ -213,4 +213,4 @@ def test_a_path_with_odd_letters_is_kept_and_quoted(capsys):
     assert train("--out", out, *SMALL, "--budget", 1) == 0
     printed = capsys.readouterr().out
     assert "train --out 'runs/a [red] b' --resume" in printed
-    assert "runs/a [red] b: arm robot" in printed
+    assert "runs/a [red] b: credit per robot" in printed

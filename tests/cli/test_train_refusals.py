@@ -31,12 +31,12 @@ json.dump(ends, sys.stdout)
 NEW, DONE = ("--out", "new", "--budget", "1"), ("--out", "done", "--resume")
 REFUSED = [
     ((), "the following arguments are required: --out"),
-    ((*NEW, "--arm", "both"), "arm must be one of robot, team, not 'both'"),
+    ((*NEW, "--credit", "both"), "credit must be one of robot, team, not 'both'"),
     ((*NEW, "--features", "all"), "features must be one of paper, reference,"),
     ((*NEW, "--reward", "speed"), "reward must be one of aoi, velocity-variance, not 'speed'"),
-    ((*NEW, "--reward", "velocity-variance"), "choose arm team, or reward aoi"),
+    ((*NEW, "--reward", "velocity-variance"), "choose credit team, or reward aoi"),
     (
-        (*NEW, "--arm", "team", "--reward", "velocity-variance"),
+        (*NEW, "--credit", "team", "--reward", "velocity-variance"),
         "depends on who talks only if the robots flock; add --task flocking",
     ),
     ((*NEW, "--edges", "none"), "edges"),
@@ -72,7 +72,7 @@ REFUSED = [
         (*NEW, "--missions", "16", "--robots", "4", "5", "6"),
         "missions must be a multiple of the 3 team sizes, such as 15, 18, not 16",
     ),
-    ((*NEW, "--arm", "team", "--preset", "reference", "--missions", "1"), "is too small for 4"),
+    ((*NEW, "--credit", "team", "--preset", "reference", "--missions", "1"), "is too small for 4"),
     ((*NEW, "--missions", "4096", "--robots", "200"), "GB of memory, and"),
     ((*NEW, "--learning-rate", "0"), "learning rate must be a number from 1e-09 to 1, not 0"),
     ((*NEW, "--learning-rate", "nan"), "not nan"),
@@ -110,8 +110,8 @@ REFUSED = [
     ((*DONE, "--discount", "0.5"), "--discount 0.5 is not what the run in done has, 0; leave"),
     ((*DONE, "--init", "done/policy"), "done has begun, so --init done/policy is too late"),
     ((*DONE, "--budget", "-1"), "budget must be a whole number from 1"),
-    (("--out", "cut-settings", "--resume"), "settings.json are damaged, or no run's"),
-    (("--out", "new-settings", "--resume"), "format_version is 2, and this swarm_mj reads 1"),
+    (("--out", "cut-settings", "--resume"), "settings.json are damaged, no run's, or"),
+    (("--out", "new-settings", "--resume"), "format_version is 3, and this swarm_mj reads 2"),
     (
         ("--out", "text-seed", "--resume"),
         "Expected `int`, got `str` - at `$.training.seed`",
@@ -129,7 +129,7 @@ def prepare(folder):
         assert main(["train", "--out", "done", *SMALL]) == 0
     checkpoint = (folder / "done" / "checkpoint.pt").read_bytes()
     settings = json.loads((folder / "done" / "settings.json").read_text())
-    newer = settings | {"format_version": 2}
+    newer = settings | {"format_version": 3}
     ppo = settings["training"]["ppo"] | {"entropy": 0.125}
     other = settings | {"training": settings["training"] | {"ppo": ppo}}
     made = {

@@ -1,4 +1,4 @@
-"""From options to settings and limits; what the help says is what the arms have."""
+"""From options to settings and limits; what the help says is what both kinds of credit have."""
 
 from dataclasses import replace
 from functools import reduce
@@ -31,7 +31,9 @@ def asked(*arguments):
 def test_the_defaults_that_the_help_shows_are_the_usual_settings(capsys):
     main(["train", "--help"])
     shown = " ".join(capsys.readouterr().out.split())
-    robot, team = (usual_settings(arm, paper("stationary"), (40,)) for arm in ("robot", "team"))
+    robot, team = (
+        usual_settings(credit, paper("stationary"), (40,)) for credit in ("robot", "team")
+    )
     for text in (
         f"is applied, 0 to 16 (default: {robot.network.receptive_field}, team: 5)",
         f"width of every layer, 1 to 1024 (default: {robot.network.latent}, team: 64)",
@@ -50,9 +52,10 @@ def test_the_defaults_that_the_help_shows_are_the_usual_settings(capsys):
         assert text in shown
 
 
-@pytest.mark.parametrize("arm", BUDGETS)
-def test_without_options_a_run_has_the_usual_settings(arm):
-    assert asked("--arm", arm) == usual_settings(arm, paper("stationary"), (40,))
+@pytest.mark.parametrize("credit", BUDGETS)
+def test_without_options_a_run_has_the_usual_settings(credit):
+    assert asked("--credit", credit) == usual_settings(credit, paper("stationary"), (40,))
+    assert asked("--arm", credit) == asked("--credit", credit)  # its flag in earlier releases
 
 
 @pytest.mark.parametrize(
@@ -98,7 +101,7 @@ def test_the_linear_variant_is_asked_for_by_its_flag():
 
 
 def test_the_preset_decides_the_papers_way():
-    code = asked("--arm", "team", "--preset", "reference")
+    code = asked("--credit", "team", "--preset", "reference")
     assert (code.features, code.network.num_outputs, code.sums_nodes) == ("reference", 2, True)
     assert code.mission.half_duplex == "eavesdroppers"
 
@@ -135,8 +138,8 @@ def test_a_policy_to_begin_with_brings_its_network():
 def test_a_run_that_goes_on_has_its_own_settings():
     training = asked("--latent", 5)
     refuse_others(given("--latent", 5, "--robots", 40), training, "the run")
-    with pytest.raises(ValueError, match="--arm team is not what the run has, robot; leave it"):
-        refuse_others(given("--arm", "team"), training, "the run")
+    with pytest.raises(ValueError, match="--credit team is not what the run has, robot; leave it"):
+        refuse_others(given("--credit", "team"), training, "the run")
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ MEASURED = [
     ("fly", "--robots", "4", "--windows", "1000", *TDMA, "--record", "1.rrd"),
     ("evaluate", "--robots", "100", "--windows", "2", "--episodes", "25", "--policy", "gnn"),
     (
-        *("train", "--out", "a", "--arm", "team", "--robots", "10", "--windows", "8"),
+        *("train", "--out", "a", "--credit", "team", "--robots", "10", "--windows", "8"),
         *("--budget", "128", "--held-out", "1"),
     ),
     (

@@ -30,9 +30,9 @@ RESUMED = {
     "robot": {},
     "robot, discounted": {"discount": 0.9},
     "robot, walking, two sizes": {"task": "random-walk", "sizes": (4, 6)},
-    "team": {"arm": "team"},
-    "team, two sizes": {"arm": "team", "sizes": (4, 6)},
-    "team, for the flock": {"arm": "team", "task": "flocking", "reward": "velocity-variance"},
+    "team": {"credit": "team"},
+    "team, two sizes": {"credit": "team", "sizes": (4, 6)},
+    "team, for the flock": {"credit": "team", "task": "flocking", "reward": "velocity-variance"},
 }
 
 

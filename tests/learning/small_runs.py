@@ -13,10 +13,10 @@ from swarm_mj.mission import paper
 torch.set_num_threads(1)  # tests share the machine's cores
 
 
-def small_training(arm="robot", task="stationary", sizes=(5,), discount=None, **changes):
+def small_training(credit="robot", task="stationary", sizes=(5,), discount=None, **changes):
     """Settings of tiny networks on short missions; rollouts of 32 decisions, 64 of two sizes."""
     mission = paper(task, num_robots=sizes[0], num_windows=20, range_ratio=0.6)
-    its = usual_settings(arm, mission, sizes, seed=3)
+    its = usual_settings(credit, mission, sizes, seed=3)
     ppo = replace(its.ppo, num_steps=8, num_minibatches=3, num_epochs=2)
     network = replace(its.network, latent=6, depth=2, receptive_field=1)
     usual = {

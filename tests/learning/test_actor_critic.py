@@ -15,17 +15,17 @@ from swarm_mj.learning.train import make_model
 from swarm_mj.mission import PRESETS
 
 RUNS = [
-    (arm, preset, sizes)
-    for arm in ("robot", "team")
+    (credit, preset, sizes)
+    for credit in ("robot", "team")
     for preset in ("paper", "reference")
     for sizes in ((5,), (3, 5))
 ]
 
 
-def model_of(arm, preset, sizes):
+def model_of(credit, preset, sizes):
     """A model whose weights are large enough that decisions depend on what is seen."""
     mission = PRESETS[preset]("random-walk", num_robots=5, num_windows=20, range_ratio=0.6)
-    training = usual_settings(arm, mission, sizes, seed=1)
+    training = usual_settings(credit, mission, sizes, seed=1)
     training = replace(training, missions=4, network=replace(training.network, latent=8, depth=2))
     model, _ = make_model(training)
     with torch.no_grad():
@@ -88,15 +88,17 @@ def robot_by_robot(model, training):
     return missions
 
 
-@pytest.mark.parametrize(("arm", "preset", "sizes"), RUNS)
-def test_log_probabilities_entropies_and_values_are_those_of_a_loop_over_robots(arm, preset, sizes):
-    model, training = model_of(arm, preset, sizes)
+@pytest.mark.parametrize(("credit", "preset", "sizes"), RUNS)
+def test_log_probabilities_entropies_and_values_are_those_of_a_loop_over_robots(
+    credit, preset, sizes
+):
+    model, training = model_of(credit, preset, sizes)
     observation = after_some_windows(model)
     actions, value, log_p = model.policy(observation)
     again = model.policy.evaluate_actions(observation, actions)
     expected = {"value": [], "log_p": [], "entropy": []}
     missions = robot_by_robot(model, training)
-    if arm == "robot":
+    if credit == "robot":
         rows = actions.split([len(m) for m in missions])
         for robots, chosen in zip(missions, rows, strict=True):
             for i, (distribution, values) in enumerate(robots):
@@ -121,12 +123,12 @@ def test_log_probabilities_entropies_and_values_are_those_of_a_loop_over_robots(
     torch.testing.assert_close(model.policy.predict_values(observation), value)
 
 
-@pytest.mark.parametrize("arm", ["robot", "team"])
-def test_robots_that_do_not_exist_are_silent_and_add_nothing(arm):
-    model, _ = model_of(arm, "paper", (3, 5))
+@pytest.mark.parametrize("credit", ["robot", "team"])
+def test_robots_that_do_not_exist_are_silent_and_add_nothing(credit):
+    model, _ = model_of(credit, "paper", (3, 5))
     observation = after_some_windows(model)
     actions, _, _ = model.policy(observation)
-    if arm == "team":
+    if credit == "team":
         unused = ~observation["is_robot"].bool()
         everyone = torch.arange(5).expand_as(actions)
         assert torch.equal(actions[unused], everyone[unused])
@@ -165,9 +167,9 @@ def test_sums_over_robots_by_hand():
     torch.testing.assert_close(entropy(logits), torch.tensor([plain]).float())
 
 
-@pytest.mark.parametrize("arm", ["robot", "team"])
-def test_the_mode_is_taken_on_request(arm):
-    model, _ = model_of(arm, "paper", (5,))
+@pytest.mark.parametrize("credit", ["robot", "team"])
+def test_the_mode_is_taken_on_request(credit):
+    model, _ = model_of(credit, "paper", (5,))
     observation = after_some_windows(model)
     actions, _, _ = model.policy(observation, deterministic=True)
     logits, _ = model.policy.logits_and_value(observation)
@@ -178,9 +180,9 @@ def test_the_mode_is_taken_on_request(arm):
     np.testing.assert_array_equal(predicted, actions)
 
 
-@pytest.mark.parametrize("arm", ["robot", "team"])
-def test_the_acting_network_is_a_copy_of_what_acts(arm):
-    model, training = model_of(arm, "reference", (5,))
+@pytest.mark.parametrize("credit", ["robot", "team"])
+def test_the_acting_network_is_a_copy_of_what_acts(credit):
+    model, training = model_of(credit, "reference", (5,))
     dice = torch.get_rng_state()
     copied = model.policy.acting_network()
     assert torch.equal(torch.get_rng_state(), dice)
@@ -196,9 +198,9 @@ def test_the_acting_network_is_a_copy_of_what_acts(arm):
     assert all(torch.any(weight != 0.0) for weight in copied.parameters())
 
 
-@pytest.mark.parametrize("arm", ["robot", "team"])
-def test_training_begins_with_the_network_it_is_given(arm):
-    first, second = (make_model(small_training(arm, seed=seed))[0] for seed in (1, 2))
+@pytest.mark.parametrize("credit", ["robot", "team"])
+def test_training_begins_with_the_network_it_is_given(credit):
+    first, second = (make_model(small_training(credit, seed=seed))[0] for seed in (1, 2))
     given = first.policy.acting_network()
     assert torch.any(second.policy.acting_network().output.weight != given.output.weight)
     second.policy.take_acting_network(given)

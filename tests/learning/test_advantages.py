@@ -28,9 +28,9 @@ class Watch(BaseCallback):
         return True
 
 
-def one_rollout(arm, monkeypatch):
+def one_rollout(credit, monkeypatch):
     """A model after one rollout and before any optimiser step, and what happened in it."""
-    training = small_training(arm)
+    training = small_training(credit)
     ppo = replace(training.ppo, num_steps=STEPS, discount=DISCOUNT, gae_lambda=GAE_LAMBDA)
     training = replace(training, ppo=ppo, silence_logit=0.0)
     model, _ = make_model(training)
@@ -75,9 +75,9 @@ def advantages_by_hand(model, watch, e):
     return expected
 
 
-@pytest.mark.parametrize("arm", ["robot", "team"])
-def test_nothing_leaks_over_the_end_of_a_mission(arm, monkeypatch):
-    model, watch = one_rollout(arm, monkeypatch)
+@pytest.mark.parametrize("credit", ["robot", "team"])
+def test_nothing_leaks_over_the_end_of_a_mission(credit, monkeypatch):
+    model, watch = one_rollout(credit, monkeypatch)
     buffer, num_cut, num_over = model.rollout_buffer, 0, 0
     for e in range(model.n_envs):
         np.testing.assert_allclose(

@@ -28,7 +28,7 @@ def robots(tmp_path_factory):
 def team(tmp_path_factory):
     """A team that is paid for agreeing, so that rewards are normalised."""
     folder = tmp_path_factory.mktemp("team")
-    return kept(folder, arm="team", task="flocking", reward="velocity-variance")
+    return kept(folder, credit="team", task="flocking", reward="velocity-variance")
 
 
 def first(state):

@@ -13,10 +13,10 @@ from swarm_mj.policies.gnn.packet_memory import empty_memory
 from swarm_mj.replay.estimates import replay_file
 
 
-@pytest.mark.parametrize("arm", ["robot", "team"])
-def test_a_rollout_is_of_the_arrays_that_are_made(arm):
+@pytest.mark.parametrize("credit", ["robot", "team"])
+def test_a_rollout_is_of_the_arrays_that_are_made(credit):
     mission = paper("stationary", num_robots=6, range_ratio=0.5)
-    training = replace(usual_settings(arm, mission, (6,)), missions=4)
+    training = replace(usual_settings(credit, mission, (6,)), missions=4)
     buffer = make_model(training)[0].rollout_buffer
     made = sum(rows.nbytes for rows in buffer.observations.values())
     assert made < rollout_bytes(training) < 2.0 * made

@@ -59,14 +59,16 @@ def test_a_policy_is_named_by_its_whole_path(tmp_path, monkeypatch):
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", "{}", '{"format": "swarm_mj policy"}'])
 def test_what_is_no_settings_is_refused(tmp_path, text):
     (tmp_path / SETTINGS).write_text(text)
-    with pytest.raises(ValueError, match=r"settings .*settings.json are damaged, or no run's"):
+    with pytest.raises(
+        ValueError, match=r"settings .*settings.json are damaged, no run's, or from"
+    ):
         read_run(tmp_path)
 
 
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
-        (lambda d: d.update(format_version=2), "format_version is 2, and this swarm_mj reads 1"),
+        (lambda d: d.update(format_version=3), "format_version is 3, and this swarm_mj reads 2"),
         (
             lambda d: d["training"].update(seed="3"),
             r"Expected `int`, got `str` - at `.*seed`",
@@ -83,7 +85,8 @@ def test_what_is_no_settings_is_refused(tmp_path, text):
             lambda d: d["training"].update(robots=["4"]),
             r"Expected `int`, got `str` - at `.*robots.*`",
         ),
-        (lambda d: d["training"].pop("arm"), "arm"),
+        (lambda d: d["training"].update(arm="team"), "an earlier version: .*`arm`"),
+        (lambda d: d["training"].pop("credit_assignment"), "credit_assignment"),
         (
             lambda d: d["training"]["network"].update(latent=0),
             "latent must be a whole number from 1 to",

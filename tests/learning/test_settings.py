@@ -1,4 +1,4 @@
-"""A run's settings: the arms' own, what is refused, and JSON."""
+"""A run's settings: the usual ones of both kinds of credit, what is refused, and JSON."""
 
 import json
 from dataclasses import asdict, replace
@@ -13,18 +13,18 @@ from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.system.reading import read_json
 
-ARMS = [(arm, preset) for arm in ("robot", "team") for preset in PRESETS]
+CREDITS = [(credit, preset) for credit in ("robot", "team") for preset in PRESETS]
 
 
-@pytest.mark.parametrize(("arm", "preset"), ARMS)
-def test_settings_come_back_from_json_as_they_were(arm, preset):
-    training = usual_settings(arm, PRESETS[preset]("random-walk"), (10, 40), seed=2**62)
+@pytest.mark.parametrize(("credit", "preset"), CREDITS)
+def test_settings_come_back_from_json_as_they_were(credit, preset):
+    training = usual_settings(credit, PRESETS[preset]("random-walk"), (10, 40), seed=2**62)
     assert read_json(json.dumps(asdict(training)), Training) == training
 
 
-@pytest.mark.parametrize(("arm", "preset"), ARMS)
-def test_a_network_takes_what_its_features_are(arm, preset):
-    training = usual_settings(arm, PRESETS[preset]("random-walk"), (10,))
+@pytest.mark.parametrize(("credit", "preset"), CREDITS)
+def test_a_network_takes_what_its_features_are(credit, preset):
+    training = usual_settings(credit, PRESETS[preset]("random-walk"), (10,))
     names = make_extractor(training.features, training.mission).names
     assert training.network.num_features == len(names)
 
@@ -95,7 +95,7 @@ def test_whom_a_robot_addresses_can_depend_on_where_it_is(preset):
 
 
 def test_an_unknown_arm_is_refused():
-    with pytest.raises(ValueError, match="arm must be one of robot, team, not 'both'"):
+    with pytest.raises(ValueError, match="credit must be one of robot, team, not 'both'"):
         usual_settings("both", paper("stationary"), (40,))
 
 

@@ -58,26 +58,26 @@ GIVEN = {
 GIVEN["robot", "reference"] = GIVEN["robot", "paper"]
 
 
-def usual_model(arm, preset, task="stationary", **changes):
-    """What PPO trains with an arm's usual settings, of 5 robots."""
+def usual_model(credit, preset, task="stationary", **changes):
+    """What PPO trains with the usual settings, of 5 robots."""
     mission = PRESETS[preset](task, num_robots=5, num_windows=20)
-    return make_model(replace(usual_settings(arm, mission, (5,)), **changes))[0]
+    return make_model(replace(usual_settings(credit, mission, (5,)), **changes))[0]
 
 
-@pytest.mark.parametrize(("arm", "preset"), GIVEN)
-def test_ppo_is_given_the_papers_numbers_and_the_authors(arm, preset):
-    model = usual_model(arm, preset)
-    given = {name: getattr(model, name) for name in GIVEN[arm, preset]}
+@pytest.mark.parametrize(("credit", "preset"), GIVEN)
+def test_ppo_is_given_the_papers_numbers_and_the_authors(credit, preset):
+    model = usual_model(credit, preset)
+    given = {name: getattr(model, name) for name in GIVEN[credit, preset]}
     for name in ("clip_range", "clip_range_vf"):
         given[name] = given[name] and given[name](0.5)
-    assert given == GIVEN[arm, preset]
+    assert given == GIVEN[credit, preset]
     assert model.policy.optimizer.defaults["eps"] == 1e-6
-    is_robot = arm == "robot"
+    is_robot = credit == "robot"
     assert type(model.rollout_buffer) is (ActiveRolloutBuffer if is_robot else DictRolloutBuffer)
 
 
 @pytest.mark.parametrize(
-    ("arm", "preset", "rates"),
+    ("credit", "preset", "rates"),
     [
         # 2 minibatches a pass under `paper`, 4 under `reference`; 0.95 every 5000 of them.
         ("team", "paper", {0: 1e-4, 2499: 1e-4, 2500: 0.95e-4, 5000: 0.9025e-4, 10**6: 0.0}),
@@ -86,8 +86,8 @@ def test_ppo_is_given_the_papers_numbers_and_the_authors(arm, preset):
         ("robot", "paper", {0: 1e-3, 19: 1e-3, 20: 0.95e-3, 40: 0.9025e-3, 10**6: 1e-4}),
     ],
 )
-def test_the_presets_rates_decay_as_the_authors_do(arm, preset, rates):
-    model = usual_model(arm, preset)
+def test_the_presets_rates_decay_as_the_authors_do(credit, preset, rates):
+    model = usual_model(credit, preset)
     for passes, rate in rates.items():
         model._n_updates = passes
         assert model.lr_schedule(0.5) == pytest.approx(rate, abs=1e-12)
@@ -99,8 +99,8 @@ def test_rewards_are_normalised_only_where_velocity_variance_is_the_cost(preset)
     env = usual_model("team", preset, "flocking", reward="velocity-variance").get_env()
     assert isinstance(env, VecNormalize)
     assert (env.norm_reward, env.norm_obs, env.gamma) == (True, False, 0.99)
-    for arm in ("team", "robot"):
-        assert not isinstance(usual_model(arm, preset, "flocking").get_env(), VecNormalize)
+    for credit in ("team", "robot"):
+        assert not isinstance(usual_model(credit, preset, "flocking").get_env(), VecNormalize)
 
 
 def with_ppo(training, **changes):
@@ -153,11 +153,11 @@ def test_the_same_settings_are_the_same_policy_and_other_seeds_others(tmp_path):
     assert weights[0] == weights[1] != weights[2]
 
 
-@pytest.mark.parametrize("arm", ["robot", "team"])
-def test_a_run_begins_with_the_policy_it_is_given(tmp_path, arm):
+@pytest.mark.parametrize("credit", ["robot", "team"])
+def test_a_run_begins_with_the_policy_it_is_given(tmp_path, credit):
     """The best policy before the first rollout is that policy itself."""
     given = save_tiny(tmp_path / "given", "extended")
-    training = small_training(arm, network=given.shape, features="extended", held_out=1)
+    training = small_training(credit, network=given.shape, features="extended", held_out=1)
 
     def enough(status):
         return status.evaluated is not None or not status.progress.curve

@@ -35,11 +35,11 @@ def learning_rows(
     mission = paper("stationary", num_robots=num_robots)
     for num_missions in (1, 32):
         yield from _network_rows(mission, num_missions, seconds)
-    for arm in ("robot", "team"):
-        per_s = _training_per_s(arm, mission, threads, seconds)
-        yield Row(f"train --arm {arm}: team decisions", per_s, "{:.1f} / s")
+    for credit in ("robot", "team"):
+        per_s = _training_per_s(credit, mission, threads, seconds)
+        yield Row(f"train --credit {credit}: team decisions", per_s, "{:.1f} / s")
     robot = usual_settings("robot", mission, (num_robots,))
-    own = {"--arm robot": (robot.network, robot.features), "the paper": (SHAPE, "paper")}
+    own = {"--credit robot": (robot.network, robot.features), "the paper": (SHAPE, "paper")}
     for name, (shape, features) in own.items():
         node, parent = (rows[:1] for rows in _graphs(mission, features, 1))
         decision_us = _forward_us(FastAggregationGnn(shape), node, parent, seconds=seconds / 2)
@@ -76,9 +76,9 @@ def _forward_us(network: torch.nn.Module, *inputs: torch.Tensor, seconds: float)
     return microseconds(torch.inference_mode()(lambda: network(*inputs)), seconds)
 
 
-def _training_per_s(arm: str, mission: Mission, threads: int, seconds: float) -> float:
+def _training_per_s(credit: str, mission: Mission, threads: int, seconds: float) -> float:
     """Team decisions over whole rollouts and the optimisation after each, the first left out."""
-    settings = usual_settings(arm, mission, (mission.num_robots,))
+    settings = usual_settings(credit, mission, (mission.num_robots,))
     ppo, share = settings.ppo, settings.groups
     # One group of missions, and minibatches of about the usual size, so that it ends in time.
     fewer = replace(

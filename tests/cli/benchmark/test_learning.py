@@ -21,7 +21,7 @@ def test_networks_are_timed_alone_and_by_the_batch(rows):
 def test_both_arms_train_and_both_networks_decide(rows):
     named = {row.name: row.value for row in rows}
     for name in (
-        *("train --arm robot: team decisions", "train --arm team: team decisions"),
-        *(f"one robot's decision, network of {whose}" for whose in ("--arm robot", "the paper")),
+        *("train --credit robot: team decisions", "train --credit team: team decisions"),
+        *(f"one robot's decision, network of {whose}" for whose in ("--credit robot", "the paper")),
     ):
         assert named[name] > 0.0
