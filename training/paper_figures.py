@@ -18,7 +18,7 @@ from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.contents import RESULT_FIGURES, ResultFigure
 from swarm_mj.evaluation.progress import progress_path
-from swarm_mj.evaluation.results import MOST_BYTES, read_results
+from swarm_mj.evaluation.results import MAX_BYTES, read_results
 from swarm_mj.mission import PAPERS
 from swarm_mj.system.atomic import write_bytes
 from swarm_mj.system.fields import setting
@@ -94,7 +94,7 @@ def evaluate(settings: Settings, jobs: int, *, force: bool) -> int:
                 return code
     for part in missing:
         draft = settings.drafts / part.name
-        write_bytes(settings.results / part.name, read_file(draft, "draft", MOST_BYTES))
+        write_bytes(settings.results / part.name, read_file(draft, "draft", MAX_BYTES))
         draft.unlink()
     return 0
 

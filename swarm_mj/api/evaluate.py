@@ -16,10 +16,9 @@ from swarm_mj.evaluation.run_study import (
     Processes,
     fly_study,
     study_bar,
-    write_evaluated,
 )
 from swarm_mj.evaluation.study import Study
-from swarm_mj.evaluation.summary import Evaluated, summarise
+from swarm_mj.evaluation.summary import Evaluated, summarise, write_evaluated
 from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components

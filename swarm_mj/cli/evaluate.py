@@ -20,10 +20,9 @@ from swarm_mj.evaluation.run_study import (
     fly_study,
     num_flown,
     study_bar,
-    write_evaluated,
 )
 from swarm_mj.evaluation.study import Study
-from swarm_mj.evaluation.summary import Evaluated, summarise
+from swarm_mj.evaluation.summary import Evaluated, summarise, write_evaluated
 from swarm_mj.evaluation.table import print_results
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import listed, normalised, stored_policies, with_payload

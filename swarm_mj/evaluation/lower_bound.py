@@ -11,13 +11,13 @@ from swarm_mj.system.compiled import compiled
 class ConnectivityFloor:
     """The age of information if connected robots shared everything at once, in every mission.
 
-    Two robots are neighbours while a lone packet decodes between them. In each window everyone
-    takes over the newest that is known in its connected part of the disk graph, so what is left is
-    what teams that fall apart cannot know.
+    Two robots are neighbours while a lone packet decodes between them. In each window every robot
+    receives the newest entries of its connected part of the disk graph. The age that is left is
+    due to teams that fall apart.
     """
 
     def __init__(self, num_missions: int, num_robots: int, range_m: float) -> None:
-        """Start before the first window: nobody knows anyone; neighbours are within `range_m`."""
+        """Start before the first window, with empty buffers; neighbours are within `range_m`."""
         self._timestamp = np.full((num_missions, num_robots, num_robots), NEVER)
         self._range_m = range_m
 
@@ -27,15 +27,12 @@ class ConnectivityFloor:
         now: Float[np.ndarray, "B"],
         is_on: Bool[np.ndarray, "B N"] | None = None,
     ) -> Float[np.ndarray, "B"]:
-        """Shares within connected parts, and says how old what everyone knows then is.
+        """Share within connected parts, and return the mean age of all pairs as in II-C.
 
         Args:
             position_m: True positions, after the robots have moved [m].
             now: t at the end of the window [windows].
-            is_on: Who shares, and whose pairs count; None is everyone.
-
-        Returns:
-            The mean over all pairs, oneself included, as age of information has it [windows].
+            is_on: Robots that share, and whose pairs count; None is all.
         """
         age = np.empty(now.shape)
         shares = np.ones(position_m.shape[:2], dtype=np.bool_) if is_on is None else is_on
@@ -57,7 +54,7 @@ def _share(
     part = np.empty(num_robots, dtype=np.int64)
     newest = np.empty(num_robots)
     for b in range(num_missions):
-        is_met[:] = ~is_on[b]  # who is off passes nothing on
+        is_met[:] = ~is_on[b]  # robots that are off share nothing, so no part begins at them
         total = 0.0
         for i in range(num_robots):
             if not is_met[i]:
@@ -75,7 +72,7 @@ def _pool(
     now: float,
     newest: Float[np.ndarray, "N"],
 ) -> None:
-    """Give every member the newest that any of them knows, and `now` of the members."""
+    """Give every member the newest entry that any of them has, and `now` for the members."""
     newest[:] = timestamp[members[0]]
     for i in members[1:]:
         for j in range(newest.shape[0]):

@@ -20,7 +20,7 @@ import msgspec
 from swarm_mj.mission import PAPERS, Mission
 from swarm_mj.system.reading import read_rows
 
-MOST_BYTES = 1_000_000  # of the table
+MAX_BYTES = 1_000_000  # of the table
 METHODS = {
     "random flooding": "random-flooding",
     "round robin": "round-robin",
@@ -77,19 +77,18 @@ SWEEPS = {
 
 @cache
 def points() -> tuple[Point, ...]:
-    """All points of all curves, in the order of the file."""
-    _, rows = read_rows(Path(__file__).with_suffix(".csv"), "table", MOST_BYTES)
+    """Return all points of all curves, in the order of the file."""
+    _, rows = read_rows(Path(__file__).with_suffix(".csv"), "table", MAX_BYTES)
     return tuple(
         msgspec.convert(row | {"cost": COSTS[row["cost"]]}, Point, strict=False) for _, row in rows
     )
 
 
 def published(policy: str, mission: Mission) -> dict[str, Point]:
-    """What the paper reports for one of `POLICIES` in a regime, under either of its presets.
+    """Return what the paper reports for one of `POLICIES` in a regime, by cost.
 
-    Returns:
-        The points by cost, `aoi` and `velocity_variance`; empty where the paper has none, as where
-        the regime is not its preset's in all that its figure does not sweep.
+    Empty where the paper reports nothing, as where the regime is not its preset's in all that its
+    figure does not sweep.
     """
     if mission.task not in SWEEPS or mission.preset not in PAPERS:
         return {}

@@ -1,6 +1,7 @@
 """Results of evaluations as files: one row per policy and regime, as CSV or JSON."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import MISSING, Field, asdict, dataclass, fields
 from pathlib import Path
 from types import NoneType
@@ -107,73 +108,50 @@ class Result:
     config: str  # JSON: every field of the mission, the policy and its parameters
 
 
-CARRIES_MORE = "carry more than T, M, P"  # what is said of such policies wherever they are shown
+CARRIES_MORE = "carry more than T, M, P"  # said wherever such policies are shown
 
 
 def carries_more(result: Result) -> bool:
-    """Whether packets carry more than T, M and P (II-B); older files do not tell."""
+    """Return whether packets carry more than T, M and P (II-B); older files do not say."""
     return result.payload not in (None, "none")
 
 
 COLUMNS = tuple(spec.name for spec in fields(Result))
 NEEDED = tuple(spec.name for spec in fields(Result) if spec.default is MISSING)
 REPEATED = {spec.name: spec for spec in fields(Mission) if spec.name in COLUMNS}
-MOST_BYTES, MOST_CHARACTERS = 100_000_000, 10_000  # of a file, of a cell
-LEAST, MOST, MOST_WHOLE = -1e-6, 1e9, 2**63  # rounding may leave a little less than nothing
-NUMBERS = {int: "a whole number", float: "a finite number from {low} to 1e9", str: "a text"}
-WAY_OUT = "make them with `swarm-mj evaluate --csv FILE`"
+MAX_BYTES, MAX_CHARACTERS = 100_000_000, 10_000  # of a file, of a cell
+MIN_COST, MAX_NUMBER, MAX_COUNT = -1e-6, 1e9, 2**63  # a cost of 0 may be rounded to less
+EXPECTED = {int: "a whole number", float: "a finite number from {low} to 1e9", str: "a text"}
 
 
 def read_results(path: Path) -> list[Result]:
-    """The rows of a results file that `swarm-mj evaluate --csv` wrote, one or more, in its order.
+    """Return the rows of a file that `swarm-mj evaluate --csv` wrote, one or more, in its order.
 
-    Columns that no result has are passed over, and those with a default may be missing.
+    Columns that no result has are ignored, and those with a default may be missing.
 
     Raises:
         ValueError: The file cannot be read, is no CSV, lacks columns or rows, or a cell is not what
             it must be.
     """
+    what = f"results file {path}"
     try:
-        names, rows = read_rows(path, "results file", MOST_BYTES)
-        missing = [name for name in NEEDED if name not in names]
-        if missing:
-            raise ValueError(f"results file {path} lacks the columns {', '.join(missing)}")
+        names, rows = read_rows(path, "results file", MAX_BYTES)
+        if missing := [name for name in NEEDED if name not in names]:
+            raise ValueError(f"{what} lacks the columns {', '.join(missing)}")
         if not rows:
-            raise ValueError(f"results file {path} has no rows")
-        return [_result(f"results file {path}, line {line}", row) for line, row in rows]
+            raise ValueError(f"{what} has no rows")
+        return [_result(f"{what}, line {line}", row) for line, row in rows]
     except ValueError as error:
-        raise ValueError(f"{error}; {WAY_OUT}") from error
+        raise ValueError(f"{error}; make them with `swarm-mj evaluate --csv FILE`") from error
 
 
-def write_csv(path: Path, results: Sequence[Result]) -> None:
-    """Write results as the rows of a CSV file, replaced if it exists; None is an empty cell.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
+def write_csv(path: Path, results: Iterable[Result]) -> None:
+    """Write results as the rows of a CSV file, replaced if it exists; None is an empty cell."""
     atomic.write_csv(path, COLUMNS, (asdict(result) for result in results))
 
 
-def write_json(
-    path: Path, results: Sequence[Result], missions: Sequence[Mapping[str, Sequence[float]]]
-) -> None:
-    """Write `{"results": [...]}`; what does not exist is null.
-
-    Args:
-        path: The file, replaced if it exists.
-        results: Its objects.
-        missions: For each result, lists over its missions in the order of their seeds.
-
-    Raises:
-        ValueError: Not as many lists as results.
-        OSError: The file cannot be written.
-    """
-    objects = [{**asdict(one), **lists} for one, lists in zip(results, missions, strict=True)]
-    atomic.write_json(path, {"results": objects})
-
-
 def _result(place: str, row: dict[str, str]) -> Result:
-    """One row; `place` says which, for the message."""
+    """Return one row's result; `place` names the row in messages."""
     given = (spec for spec in fields(Result) if spec.name in row)
     try:
         return Result(**{spec.name: _value(spec, row[spec.name]) for spec in given})
@@ -182,32 +160,20 @@ def _result(place: str, row: dict[str, str]) -> Result:
 
 
 def _value(spec: Field[Any], text: str) -> Any:  # noqa: ANN401 - any field's value
-    """Return a cell as its field's type; raises ValueError if it is not, or out of its range."""
+    """Return a cell as its field's type; raise ValueError if it is not, or out of its range."""
     if text == "" and NoneType in get_args(spec.type):
         return None
     kind = kind_of(spec)
-    value = _text(text) if kind is str else _number(spec, kind, text)
-    if value is None:
-        described = NUMBERS[kind].format(low="-1e9" if _least(spec) == -MOST else "0")
-        raise ValueError(f"{spec.name} must be {described}, not {text!r:.60}")
+    is_signed = "difference" in spec.name
+    low = 1.0 if kind is str else -MAX_NUMBER if is_signed else MIN_COST
+    high = {str: MAX_CHARACTERS, int: MAX_COUNT, float: MAX_NUMBER}[kind]
+    value: Any = None
+    with suppress(ValueError):  # then it stays None
+        value = kind(text)
+    size = len(text) if kind is str else value
+    if size is None or not low <= size <= high:
+        expected = EXPECTED[kind].format(low="-1e9" if is_signed else "0")
+        raise ValueError(f"{spec.name} must be {expected}, not {text!r:.60}")
     if spec.name in REPEATED:
         check_value(REPEATED[spec.name], value)
     return value
-
-
-def _text(text: str) -> str | None:
-    return text if 0 < len(text) <= MOST_CHARACTERS else None
-
-
-def _number(spec: Field[Any], kind: type, text: str) -> int | float | None:
-    """What a cell says, if it is a number that such a cost or count can be."""
-    try:
-        value = kind(text)
-    except ValueError:
-        return None
-    return value if _least(spec) <= value <= (MOST if kind is float else MOST_WHOLE) else None
-
-
-def _least(spec: Field[Any]) -> float:
-    """Return a difference may be less than nothing."""
-    return -MOST if "difference" in spec.name else LEAST

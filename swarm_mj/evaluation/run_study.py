@@ -1,18 +1,15 @@
 """Flies a study's missions, and writes what each policy cost."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
-from pathlib import Path
 
 from rich.console import Console
 
 from swarm_mj.evaluation.batch import BatchCosts, fly_batch
 from swarm_mj.evaluation.jobs import run_jobs
 from swarm_mj.evaluation.published import BASELINES
-from swarm_mj.evaluation.results import write_json
 from swarm_mj.evaluation.study import Study
-from swarm_mj.evaluation.summary import Evaluated
 from swarm_mj.system.fields import setting
 from swarm_mj.system.interrupt import deferred_interrupt, heard_interrupt
 from swarm_mj.system.progress import WorkBar
@@ -64,13 +61,3 @@ def fly_study(
             if is_interrupted() or was_pressed():
                 raise KeyboardInterrupt
             bar.move_to(num_flown(study, costs))
-
-
-def write_evaluated(path: Path, evaluated: Sequence[Evaluated]) -> None:
-    """Write results and what each mission cost, as JSON."""
-    missions = [
-        {"episode_aoi": each.aoi, "episode_velocity_variance": each.velocity_variance}
-        | ({} if each.task_cost is None else {"episode_task_cost": each.task_cost})
-        for each in evaluated
-    ]
-    write_json(path, [each.result for each in evaluated], missions)

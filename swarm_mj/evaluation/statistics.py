@@ -1,7 +1,6 @@
 """Statistics over missions: means with their errors, bootstrap intervals, quantiles of counts."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -13,39 +12,32 @@ RESAMPLING_SEED = 0  # the same samples have the same interval, wherever they co
 ROUNDING = 1e-12  # samples that differ by no more than this share of their size are constant
 
 
-@dataclass(frozen=True, kw_only=True)
-class Spread:
-    """How samples are spread, in their own unit."""
+def spread(samples: Float[np.ndarray, "n"]) -> dict[str, float | None]:
+    """Return mean, errors and quantiles of independent samples, in their own unit.
 
-    mean: float
-    std: float | None  # of the sample, n - 1 in the denominator; None of one sample
-    sem: float | None  # the mean's standard error, std / sqrt(n)
-    ci_low: float | None  # the bootstrap interval of the mean, as below
-    ci_high: float | None
-    median: float
-    p95: float  # between samples, linear
-    worst: float  # the largest
+    `std` is the sample's standard deviation, `sem` the mean's standard error, `ci_low` and
+    `ci_high` the ends of `bootstrap_interval`; p95 is linear between samples.
 
-
-def spread(samples: Float[np.ndarray, "n"]) -> Spread:
-    """Mean, errors and quantiles of independent samples; raises ValueError if there are none."""
+    Raises:
+        ValueError: There are no samples.
+    """
     if samples.size == 0:
         raise ValueError("statistics need at least 1 sample, not 0")
     ci_low, ci_high = bootstrap_interval(samples)
-    return Spread(
-        mean=float(np.mean(samples)),
-        std=standard_deviation(samples),
-        sem=standard_error(samples),
-        ci_low=ci_low,
-        ci_high=ci_high,
-        median=float(np.median(samples)),
-        p95=float(np.percentile(samples, 95.0)),
-        worst=float(np.max(samples)),
-    )
+    return {
+        "mean": float(np.mean(samples)),
+        "std": standard_deviation(samples),
+        "sem": standard_error(samples),
+        "ci_low": ci_low,
+        "ci_high": ci_high,
+        "median": float(np.median(samples)),
+        "p95": float(np.percentile(samples, 95.0)),
+        "worst": float(np.max(samples)),
+    }
 
 
 def standard_deviation(samples: Float[np.ndarray, "n"]) -> float | None:
-    """The standard deviation of the sample, n - 1 in the denominator; None of fewer than two."""
+    """Return the sample's standard deviation (n - 1 below); None of fewer than two samples."""
     return float(np.std(samples, ddof=1)) if samples.size > 1 else None
 
 
@@ -56,10 +48,10 @@ def standard_error(samples: Float[np.ndarray, "n"]) -> float | None:
 
 
 def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> tuple[float | None, float | None]:
-    """Bias-corrected and accelerated bootstrap interval of the mean, 95 % (Efron 1987).
+    """Return the bias-corrected and accelerated bootstrap interval of the mean (Efron 1987).
 
-    The samples are independent; of paired differences, one difference a pair. The interval is the
-    same whenever the samples are; None and None where they do not vary, or there is only one.
+    The samples are independent; paired differences are one sample a pair. Both ends are None where
+    the samples do not vary, or there is only one.
     """
     largest = float(np.max(np.abs(samples), initial=0.0))
     if samples.size < 2 or float(np.ptp(samples)) <= ROUNDING * largest:
@@ -79,7 +71,7 @@ def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> tuple[float | None, f
 
 
 def quantile_of_counts(counts: Int[np.ndarray, "bins"], share: float) -> int:
-    """The first bin at or below which at least this share (0 to 1) of everything counted lies.
+    """Return the first bin at or below which at least this share of all counts lies.
 
     Raises:
         ValueError: Nothing was counted.

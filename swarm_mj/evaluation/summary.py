@@ -1,8 +1,9 @@
-"""What batches cost, summed up: one result per policy and regime."""
+"""Results of a study from the costs of its batches: one per policy and regime."""
 
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
 from swarm_mj.protocol.window import SLOT_WINDOWS
+from swarm_mj.system.atomic import write_json
 
 COSTS = ("aoi", "velocity_variance")  # of each mission
 
@@ -33,35 +35,45 @@ class Evaluated:
     velocity_variance: list[float]  # Eq. 17, mean over windows [m²/s²]
     task_cost: list[float] | None  # mean over windows; None if the controller has none
 
+    @property
+    def row(self) -> dict[str, Any]:
+        """The result's columns, and the missions' costs as lists."""
+        costs = {"aoi": self.aoi, "velocity_variance": self.velocity_variance}
+        costs |= {} if self.task_cost is None else {"task_cost": self.task_cost}
+        return asdict(self.result) | {f"episode_{name}": each for name, each in costs.items()}
+
+
+def write_evaluated(path: Path, evaluated: Sequence[Evaluated]) -> None:
+    """Write `{"results": [...]}` as JSON, replaced if it exists; what does not exist is null."""
+    write_json(path, {"results": [each.row for each in evaluated]})
+
 
 def summarise(
     study: Study, costs: Mapping[int, BatchCosts], made_by: Mapping[str, Any]
 ) -> list[Evaluated]:
-    """Return the results of a study, one per policy and regime: regime by regime, policy by policy.
+    """Return the results of a study, regime by regime, policy by policy.
 
     Args:
-        study: What was asked for.
-        costs: What each batch cost, by its index in `study.batches`, in any order.
+        study: The policies and regimes.
+        costs: The costs of each batch, by its index in `study.batches`, in any order.
         made_by: The code's `version` and `commit` when the first of them began.
 
     Raises:
         ValueError: A batch is missing.
     """
-    missing = len(study.batches) - len(costs)
-    if missing:
+    if missing := len(study.batches) - len(costs):
         raise ValueError(f"{missing} of {len(study.batches)} batches are missing")
-    parts: dict[tuple[Mission, str], list[BatchCosts]] = {pair: [] for pair in study.pairs}
+    batches: dict[tuple[Mission, str], list[BatchCosts]] = {pair: [] for pair in study.pairs}
     for index, batch in enumerate(study.batches):
-        parts[batch.mission, batch.policy].append(costs[index])
-    merged = {pair: merge(batches) for pair, batches in parts.items()}
+        batches[batch.mission, batch.policy].append(costs[index])
+    merged = {pair: merge(each) for pair, each in batches.items()}
     return [
         Evaluated(
             result=Result(
                 **_regime(study, policy, regime),
                 **_costs(own),
                 **_task_costs(own, study.task_cost(regime)),
-                **_packets(own, regime),
-                **_bytes(own, regime, study.make_policy(policy, regime)),
+                **_packets(own, regime, study.make_policy(policy, regime)),
                 **_completeness(own),
                 **_differences(own, merged[regime, study.compared_to]),
                 **_published(policy, None if study.components.names else regime),
@@ -79,7 +91,7 @@ def summarise(
 
 
 def merge(batches: Sequence[BatchCosts]) -> BatchCosts:
-    """Batches of the same policy and regime as one, in the order given."""
+    """Return batches of the same policy and regime as one, in the order given."""
     lists = {
         spec.name: [number for batch in batches for number in getattr(batch, spec.name)]
         for spec in fields(BatchCosts)
@@ -90,7 +102,7 @@ def merge(batches: Sequence[BatchCosts]) -> BatchCosts:
 
 
 def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
-    """What was flown: the numbers of the mission that a result repeats, and the policy."""
+    """Return the numbers of the mission that a result repeats, and the policy."""
     repeated = {name: value for name, value in asdict(regime).items() if name in COLUMNS}
     return (
         repeated
@@ -107,10 +119,10 @@ def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
 
 
 def _costs(costs: BatchCosts) -> dict[str, Any]:
-    """Age of information and velocity variance over missions, and ages over pairs of robots."""
+    """Return age of information and velocity variance over missions, and ages over pairs."""
     columns: dict[str, Any] = {}
     for cost in COSTS:
-        found = asdict(spread(np.array(getattr(costs, cost))))
+        found = spread(np.array(getattr(costs, cost)))
         columns |= {f"{cost}_{name}": value for name, value in found.items()}
     columns |= _mean_and_sem("aoi_steady", costs.aoi_steady)
     columns |= _mean_and_sem("aoi_floor", costs.aoi_floor)
@@ -120,7 +132,7 @@ def _costs(costs: BatchCosts) -> dict[str, Any]:
 
 
 def _task_costs(costs: BatchCosts, label: tuple[str, str] | None) -> dict[str, Any]:
-    """What the task cost over missions, and what its controller calls that."""
+    """Return the task's cost over missions, and its controller's name for it."""
     if label is None:
         return {}
     columns: dict[str, Any] = {"task_cost_name": label[0], "task_cost_unit": label[1]}
@@ -130,7 +142,7 @@ def _task_costs(costs: BatchCosts, label: tuple[str, str] | None) -> dict[str, A
 
 
 def _mean_and_sem(name: str, costs: Sequence[float | None]) -> dict[str, float | None]:
-    """The mean over missions and its standard error; None unless all missions have the cost."""
+    """Return mean over missions and standard error; None unless all missions have the cost."""
     samples = _known(costs)
     if samples is None:
         return {f"{name}_mean": None, f"{name}_sem": None}
@@ -139,28 +151,24 @@ def _mean_and_sem(name: str, costs: Sequence[float | None]) -> dict[str, float |
 
 
 def _known(costs: Sequence[float | None]) -> list[float] | None:
-    """Every mission's cost; None unless all have one."""
+    """Return every mission's cost; None unless all have one."""
     known = [cost for cost in costs if cost is not None]
     return known if len(known) == len(costs) else None
 
 
-def _packets(costs: BatchCosts, regime: Mission) -> dict[str, Any]:
-    """How many were sent, and what became of them."""
-    sent = sum(costs.packets_sent)
+def _packets(costs: BatchCosts, regime: Mission, policy: Policy) -> dict[str, Any]:
+    """Return how many were sent, how many were decoded, and their bytes."""
+    sent, num_windows = sum(costs.packets_sent), len(costs.aoi) * regime.num_windows
+    packet_bytes = policy.packet(regime).num_bytes
+    sent_bytes = packet_bytes * sum(costs.packets_transmitted)
     return {
-        "packets_per_window": sent / (len(costs.aoi) * regime.num_windows),
+        "packets_per_window": sent / num_windows,
+        "packet_bytes": packet_bytes,
+        "bytes_per_second": sent_bytes / (num_windows * regime.window_s),
         "delivery_ratio": _per_packet(costs.packets_delivered, sent),
         "heard_ratio": _per_packet(costs.packets_heard, sent),
         "hearers_per_packet": _per_packet(costs.receptions, sent),
     }
-
-
-def _bytes(costs: BatchCosts, regime: Mission, policy: Policy) -> dict[str, Any]:
-    """What a packet weighs, and all of them in a second of a mission."""
-    packet_bytes = policy.packet(regime).num_bytes
-    flown_s = len(costs.aoi) * regime.num_windows * regime.window_s
-    sent = sum(costs.packets_transmitted)
-    return {"packet_bytes": packet_bytes, "bytes_per_second": packet_bytes * sent / flown_s}
 
 
 def _per_packet(counts: Sequence[int | None], sent: int) -> float | None:
@@ -170,7 +178,7 @@ def _per_packet(counts: Sequence[int | None], sent: int) -> float | None:
 
 
 def _completeness(costs: BatchCosts) -> dict[str, Any]:
-    """Hops, and when everyone had heard of everyone."""
+    """Return mean hops, and when every robot knew every other."""
     complete = [window for window in costs.complete_window if window is not None]
     episodes = len(costs.aoi)
     median = np.median(complete + [np.inf] * (episodes - len(complete)))
@@ -182,7 +190,7 @@ def _completeness(costs: BatchCosts) -> dict[str, Any]:
 
 
 def _differences(costs: BatchCosts, baseline: BatchCosts) -> dict[str, Any]:
-    """Paired: the same missions, mission by mission; None of the baseline to itself."""
+    """Return paired differences, mission by mission; None of the baseline to itself."""
     differences: dict[str, Any] = {}
     for cost in (*COSTS, "task_cost"):
         mean, low, high = None, None, None
@@ -196,7 +204,7 @@ def _differences(costs: BatchCosts, baseline: BatchCosts) -> dict[str, Any]:
 
 
 def _published(policy: str, regime: Mission | None) -> dict[str, Any]:
-    """Return the paper's values; none for missions with parts of the user's own."""
+    """Return the paper's values; none for missions with custom parts."""
     points = {} if regime is None else published(policy, regime)
     return {
         f"published_{cost}_{figure}": getattr(points[cost], figure) if cost in points else None

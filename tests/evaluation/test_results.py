@@ -1,15 +1,13 @@
 """Result files: written and read back as they were, and refused with a reason otherwise."""
 
 import csv
-import json
-import math
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, fields
 from types import NoneType
 from typing import get_args
 
 import pytest
 
-from swarm_mj.evaluation.results import COLUMNS, Result, read_results, write_csv, write_json
+from swarm_mj.evaluation.results import COLUMNS, Result, read_results, write_csv
 
 TEXTS = {
     "policy": "mst",
@@ -52,22 +50,6 @@ def test_columns_stand_in_the_order_of_the_fields(tmp_path):
     assert header.startswith("policy,task,preset,num_robots,range_ratio,velocity_ratio,boundary")
     assert header.endswith("published_velocity_variance_sem,version,commit,config")
     assert row.startswith(f"mst,flocking,reference,4,{5 / 300!r},")
-
-
-def test_json_is_the_same_with_each_missions_costs(tmp_path):
-    results = [some_result(), some_result(commit=None)]
-    missions = [{"episode_aoi": [1.0, 0.1 + 0.2]}, {"episode_aoi": [2.0]}]
-    write_json(tmp_path / "r.json", results, missions)
-    document = json.loads((tmp_path / "r.json").read_text())
-    expected = [asdict(r) | lists for r, lists in zip(results, missions, strict=True)]
-    assert document == {"results": expected}
-    assert list(document["results"][0]) == [*COLUMNS, "episode_aoi"]
-
-
-def test_json_needs_missions_of_every_result(tmp_path):
-    with pytest.raises(ValueError, match="argument 2 is shorter"):
-        write_json(tmp_path / "r.json", [some_result()], [])
-    assert not list(tmp_path.iterdir())
 
 
 def test_columns_that_no_result_has_are_passed_over(tmp_path):
@@ -180,9 +162,3 @@ def test_a_file_that_was_cut_off_is_refused(tmp_path):
 def test_a_missing_file_says_so(tmp_path):
     with pytest.raises(ValueError, match=r"there is no results file .*none\.csv"):
         read_results(tmp_path / "none.csv")
-
-
-def test_numbers_that_are_none_are_never_written_to_json(tmp_path):
-    with pytest.raises(ValueError, match="not JSON compliant"):
-        write_json(tmp_path / "r.json", [replace(some_result(), aoi_mean=math.nan)], [{}])
-    assert not list(tmp_path.iterdir())

@@ -22,12 +22,12 @@ NO_INTERVAL = (None, None)
 def test_spread_by_hand():
     """Squares of the distances to the mean of 3: 4, 1, 0, 1, 4 are 10; 10 / (5 - 1) = 2.5."""
     found = spread(np.array([5.0, 1.0, 3.0, 2.0, 4.0]))
-    assert found.mean == 3.0
-    assert found.std == pytest.approx(math.sqrt(2.5))
-    assert found.sem == pytest.approx(math.sqrt(2.5 / 5.0))
-    assert found.median == 3.0
-    assert found.p95 == pytest.approx(4.0 + 0.8)  # 95 % of the way over 4 gaps: 3.8 gaps
-    assert found.worst == 5.0
+    assert found["mean"] == 3.0
+    assert found["std"] == pytest.approx(math.sqrt(2.5))
+    assert found["sem"] == pytest.approx(math.sqrt(2.5 / 5.0))
+    assert found["median"] == 3.0
+    assert found["p95"] == pytest.approx(4.0 + 0.8)  # 95 % of the way over 4 gaps: 3.8 gaps
+    assert found["worst"] == 5.0
 
 
 def test_errors_as_scipys():
@@ -65,14 +65,14 @@ def test_the_interval_is_the_same_each_time():
 def test_samples_that_do_not_vary_have_no_interval(samples):
     assert bootstrap_interval(np.array(samples)) == NO_INTERVAL
     found = spread(np.array(samples))
-    assert (found.ci_low, found.ci_high) == NO_INTERVAL
+    assert (found["ci_low"], found["ci_high"]) == NO_INTERVAL
 
 
 def test_one_sample_has_no_errors():
     found = spread(np.array([7.0]))
-    assert (found.mean, found.median, found.p95, found.worst) == (7.0, 7.0, 7.0, 7.0)
-    assert found.std is None
-    assert found.sem is None
+    assert (found["mean"], found["median"], found["p95"], found["worst"]) == (7.0, 7.0, 7.0, 7.0)
+    assert found["std"] is None
+    assert found["sem"] is None
 
 
 @pytest.mark.parametrize("samples", [[1.0, 2.0], [0.0, 0.0, 0.0, 1.0], [1e-9, 2e-9, 1e9]])

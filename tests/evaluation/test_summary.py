@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -10,8 +10,9 @@ import scipy.stats
 
 from swarm_mj.evaluation import study as study_module
 from swarm_mj.evaluation.batch import BatchCosts
+from swarm_mj.evaluation.results import COLUMNS
 from swarm_mj.evaluation.study import Study
-from swarm_mj.evaluation.summary import merge, summarise
+from swarm_mj.evaluation.summary import merge, summarise, write_evaluated
 from swarm_mj.mission import paper, reference
 
 STATIONARY = reference("stationary")
@@ -238,3 +239,21 @@ def test_a_floor_that_no_mission_has_is_left_out():
     unknown = [costs([1.0, 2.0], aoi_floor=[None, None]), costs([3.0], aoi_floor=[None])]
     found, _ = summarise(two_policies(), dict(enumerate(unknown + ROUND_ROBIN)), MADE_BY)
     assert (found.result.aoi_floor_mean, found.result.aoi_floor_sem) == (None, None)
+
+
+def test_json_has_the_columns_with_each_missions_costs(tmp_path):
+    parts = dict(enumerate([*MST, *ROUND_ROBIN]))
+    evaluated = summarise(two_policies(), parts, MADE_BY)
+    write_evaluated(tmp_path / "r.json", evaluated)
+    first, second = json.loads((tmp_path / "r.json").read_text())["results"]
+    costs_of = ["episode_aoi", "episode_velocity_variance", "episode_task_cost"]
+    assert list(first) == [*COLUMNS, *costs_of]
+    assert first["episode_aoi"] == [40.0, 46.0, 43.0]
+    assert second["episode_task_cost"] == pytest.approx([4.1, 4.8, 4.9])
+    assert {name: second[name] for name in COLUMNS} == asdict(evaluated[1].result)
+    (tmp_path / "r.json").unlink()
+    without = [replace(evaluated[0], task_cost=None, aoi=[math.nan])]
+    assert "episode_task_cost" not in without[0].row
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        write_evaluated(tmp_path / "r.json", without)
+    assert not list(tmp_path.iterdir())
