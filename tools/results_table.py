@@ -99,7 +99,11 @@ def _plus_minus(result: Result, name: str, digits: int) -> str:
 
 def _kind(result: Result, *, is_by_rate: bool) -> tuple[str, ...]:
     """What makes tables of their own, in words."""
-    fate = [f"{result.switched_off:.0%} of the robots off half-way"] if result.switched_off else []
+    fate = (
+        [f"{result.failure_fraction:.0%} of the robots off half-way"]
+        if result.failure_fraction
+        else []
+    )
     team = [f"{result.num_robots} robots"] if is_by_rate else []
     return (result.task, f"preset {result.preset}", *team, *fate)
 

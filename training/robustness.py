@@ -19,8 +19,10 @@ from swarm_mj.system.outputs import Output, check_outputs
 
 RESULTS = Path(__file__).resolve().parent / "results" / "robustness"
 QUESTIONS = {
-    "switched-off": "--task stationary --switched-off 0.1 0.2 --episodes 12",
-    "switched-off-walking": "--task random-walk --robots 10 40 --switched-off 0.1 --episodes 12",
+    "switched-off": "--task stationary --failure-fraction 0.1 0.2 --episodes 12",
+    "switched-off-walking": (
+        "--task random-walk --robots 10 40 --failure-fraction 0.1 --episodes 12"
+    ),
     "reference": "--preset reference --task stationary --range-ratio 0.25 0.5 --episodes 8",
     "reference-walking": "--preset reference --task random-walk --robots 10 40 --episodes 8",
     "reference-flocking": "--preset reference --task flocking --episodes 8",

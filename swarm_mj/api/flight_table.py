@@ -46,9 +46,9 @@ def flight_numbers(mission: Mission, policy: Policy, summary: Summary) -> dict[s
 def flight_title(mission: Mission, policy: str, seed: int) -> str:
     """What was flown, in a line."""
     team = f"{mission.num_robots} robots" + (" that collide" if mission.collide else "")
-    if mission.switched_off:
-        team += f", {mission.switched_off:.0%} of them off half-way"
-    known = [f"known {mission.known}"] if mission.known != NOTHING else []
+    if mission.failure_fraction:
+        team += f", {mission.failure_fraction:.0%} of them off half-way"
+    known = [f"known {mission.prior_knowledge}"] if mission.prior_knowledge != NOTHING else []
     rate = [] if mission.bit_rate is None else [bits_per_second(mission.bit_rate)]
     flown = (mission.task, policy, team, f"seed {seed}")
     return ", ".join((*flown, *where_flown(mission), *known, *rate))

@@ -86,7 +86,9 @@ def _papers(path: Path) -> list[Result]:
             {"radio": result.radio} if result.radio else {}
         )
         added |= {"arena": result.arena} if result.arena != OPEN else {}
-        added |= {"prior knowledge": result.known} if result.known != NOTHING else {}
+        added |= (
+            {"prior knowledge": result.prior_knowledge} if result.prior_knowledge != NOTHING else {}
+        )
         for kind, name in added.items():
             raise ValueError(
                 f"figures compare with the paper's values, but row {row} of {path} was flown with "

@@ -25,7 +25,7 @@ NEEDED: dict[str, tuple[str, str | None]] = {
     "shadowing_distance_m": ("shadowing_db", None),
     "rician_k": ("fading", "rician"),
     "burst_end": ("burst_begin", None),
-    "strong_db": ("strong_share", None),
+    "high_power_db": ("high_power_fraction", None),
 }
 
 

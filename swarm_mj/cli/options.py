@@ -7,13 +7,22 @@ the last of `--robots 10 --robots 20`.
 import argparse
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from copy import copy
 from dataclasses import MISSING, Field, field, fields
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn, TypeVar, get_origin
 
 from swarm_mj.system.exit_codes import BAD_INPUT
-from swarm_mj.system.fields import FieldOf, as_typed, check, did_you_mean, kind_of, range_of
+from swarm_mj.system.fields import (
+    FORMER_NAMES,
+    FieldOf,
+    as_typed,
+    check,
+    did_you_mean,
+    kind_of,
+    range_of,
+)
 
 T = TypeVar("T")
 
@@ -51,6 +60,13 @@ class Parser(argparse.ArgumentParser):
 
 
 class _Formatter(argparse.HelpFormatter):
+    def _format_action_invocation(self, action: argparse.Action) -> str:
+        """Return a flag without those that it had in earlier releases."""
+        shown = copy(action)
+        if shown.dest != "help":
+            shown.option_strings = action.option_strings[:1]
+        return super()._format_action_invocation(shown)
+
     def _format_args(self, action: argparse.Action, default_metavar: str | None) -> str:
         """Return `NAME ...` rather than argparse's `NAME [NAME ...]`."""
         if action.nargs == "+":
@@ -102,7 +118,9 @@ def flag_of(spec: Field[Any]) -> str:
 def flags_of(spec: Field[Any]) -> tuple[str, ...]:
     """Return the flag of a field, and then the flags that it had in earlier releases."""
     name = spec.name.removeprefix("num_").removeprefix("is_")
-    return spec.metadata.get("flags") or ("--" + name.replace("_", "-"),)
+    former = (old for old, present in FORMER_NAMES.items() if present == spec.name)
+    flags = ["--" + each.replace("_", "-") for each in (name, *former)]
+    return (spec.metadata.get("flag", flags[0]), *flags[1:])
 
 
 def _check_names(arguments: Sequence[str]) -> None:

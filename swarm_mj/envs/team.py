@@ -248,10 +248,10 @@ def _checked(reward: str, mission: Mission, controller: Controller | None) -> st
             f"reward task-cost needs a task that has a cost, and {mission.task} has none; choose "
             "another task, or reward aoi"
         )
-    if reward == "credit" and mission.switched_off > 0.0:
+    if reward == "credit" and mission.failure_fraction > 0.0:
         raise ValueError(
-            "reward credit needs robots that do not fail, but switched_off is "
-            f"{mission.switched_off:g}; set it to 0, or choose reward aoi"
+            "reward credit needs robots that do not fail, but failure_fraction is "
+            f"{mission.failure_fraction:g}; set it to 0, or choose reward aoi"
         )
     if reward == "credit":
         check_whole("reward credit", mission)

@@ -10,7 +10,7 @@ from typing import Any, get_args
 from swarm_mj.mission import Mission
 from swarm_mj.mission.specification import NOTHING
 from swarm_mj.system import atomic
-from swarm_mj.system.fields import check_value, kind_of
+from swarm_mj.system.fields import FORMER_NAMES, check_value, kind_of
 from swarm_mj.system.reading import read_rows
 
 
@@ -32,13 +32,13 @@ class Result:
     boundary: str
     physics: str
     num_windows: int
-    switched_off: float = 0.0  # fraction of the robots, half-way; files made before it have none
+    failure_fraction: float = 0.0  # of the robots, half-way; files made before it have none
     episodes: int
     seed: int  # of the first mission; the others follow one by one
     probability: float | None  # of a transmission, for the policies that have one
     arena: str = "open"  # what stands in the area
     radio: str | None = None  # what the channel has beyond free space; None is nothing
-    known: str = NOTHING  # what robots were told beforehand
+    prior_knowledge: str = NOTHING  # what robots knew before the mission
     channel: str | None = None  # the user's own, as module:Name; None is the mission's
     controller: str | None = None  # as above
     scene: str | None = None  # as above
@@ -140,7 +140,8 @@ def read_results(path: Path) -> list[Result]:
             raise ValueError(f"{what} lacks the columns {', '.join(missing)}")
         if not rows:
             raise ValueError(f"{what} has no rows")
-        return [_result(f"{what}, line {line}", row) for line, row in rows]
+        present = [(n, {FORMER_NAMES.get(k, k): v for k, v in row.items()}) for n, row in rows]
+        return [_result(f"{what}, line {line}", row) for line, row in present]
     except ValueError as error:
         raise ValueError(f"{error}; make them with `swarm-mj evaluate --csv FILE`") from error
 

@@ -55,9 +55,10 @@ def _regime(result: Result) -> str:
     }
     parts["bit rate"] = None if result.bit_rate is None else bits_per_second(result.bit_rate)
     parts["arena"] = None if result.arena == OPEN else result.arena
-    parts["known"] = None if result.known == NOTHING else result.known
+    known, failing = result.prior_knowledge, result.failure_fraction
+    parts["known"] = None if known == NOTHING else known
     own = "".join(f",\n{kind} {name}" for kind, name in parts.items() if name)
-    fate = f", {result.switched_off:.0%} of the robots off half-way" if result.switched_off else ""
+    fate = f", {failing:.0%} of the robots off half-way" if failing else ""
     return (
         f"{result.task}, preset {result.preset}: {result.num_robots} robots, range ratio "
         f"{result.range_ratio:g}, velocity ratio {result.velocity_ratio:g},\nboundary "

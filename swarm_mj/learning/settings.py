@@ -97,7 +97,7 @@ class Training:
         "credit assignment, per robot (each is paid for what its own packets changed; learns "
         "in minutes) or per team (one reward for all, the paper's way)",
         label="credit",
-        flags=("--credit", "--arm"),  # the latter for one release more
+        flag="--credit",
         choices=get_args(CreditAssignment),
     )
     mission: Mission

@@ -16,9 +16,9 @@ MIN_SURVIVORS = 2  # whatever the fraction, so that there is an age of informati
 
 def num_failures(mission: Mission) -> int:
     """How many robots fail: to the nearest, at least 1, but at least 2 survive."""
-    if mission.switched_off == 0.0:
+    if mission.failure_fraction == 0.0:
         return 0
-    nearest = max(1, round(mission.switched_off * mission.num_robots))
+    nearest = max(1, round(mission.failure_fraction * mission.num_robots))
     return min(nearest, mission.num_robots - MIN_SURVIVORS)
 
 

@@ -63,11 +63,11 @@ def _radio_choice(default: str, label: str, source: str, choices: object, help: 
     return setting(default, help, group=CHANNEL, label=label, source=source, choices=allowed)
 
 
-def in_order(known: str) -> str:
+def in_order(prior_knowledge: str) -> str:
     """Grants as they are kept: each once, in one order, joined by commas; what is none stays."""
-    grants = dict.fromkeys(name.strip() for name in known.split(","))
+    grants = dict.fromkeys(name.strip() for name in prior_knowledge.split(","))
     if NOTHING in grants and len(grants) > 1:
-        return known
+        return prior_knowledge
     named = [name for name in KNOWABLE if name in grants]
     return ",".join([*named, *(name for name in grants if name not in KNOWABLE)])
 
@@ -115,14 +115,14 @@ class Mission:
     noise_dbm: float = _quantity(-50.0, "noise power", "dBm", "IV-B", -200.0, 50.0)
     frequency_hz: float = _quantity(2.4e9, "centre frequency", "Hz", "IV-B", 1e6, 1e12)
     # `robot_failures.num_failures` says how many robots that is.
-    switched_off: float = _quantity(
+    failure_fraction: float = _quantity(
         0.0,
-        "fraction of the robots that is switched off",
+        "fraction of the robots that fail",
         "of the team",
         "not the paper's",
         0.0,
         0.9,
-        "robots switched off half-way, unannounced",
+        "robots that fail half-way, unannounced",
     )
 
     arena: str = setting(
@@ -166,20 +166,20 @@ class Mission:
     burst_end: float = _radio(
         0.05, "burst end", "per slot", 0.001, 0.5, "probability that it hears again"
     )
-    strong_share: float = _radio(
+    high_power_fraction: float = _radio(
         0.0,
-        "share of strong radios",
+        "fraction of high-power radios",
         "of the team",
         0.0,
         1.0,
         "robots with more transmit power",
     )
-    strong_db: float = _radio(6.0, "strong radios", "dB", 0.0, 60.0, "how much more that is")
-    known: str = setting(
+    high_power_db: float = _radio(6.0, "extra power", "dB", 0.0, 60.0, "how much more that is")
+    prior_knowledge: str = setting(
         NOTHING,
-        "what robots are told beforehand, several joined by commas",
+        "what robots know before the mission, several joined by commas",
         group=CHANNEL,
-        label="what is known",
+        label="prior knowledge",
         source="not the paper's",
         choices=KNOWABLE,
         is_joined=True,
@@ -226,10 +226,12 @@ class Mission:
 
     def __post_init__(self) -> None:
         check(self)
-        object.__setattr__(self, "known", in_order(self.known))
-        if NOTHING in self.known.split(",") and self.known != NOTHING:
+        object.__setattr__(self, "prior_knowledge", in_order(self.prior_knowledge))
+        if NOTHING in self.prior_knowledge.split(",") and self.prior_knowledge != NOTHING:
             some = ", ".join(get_args(Grant))
-            raise ValueError(f"what is known must be nothing or some of {some}, not {self.known}")
+            raise ValueError(
+                f"prior knowledge must be nothing or some of {some}, not {self.prior_knowledge}"
+            )
         if self.arena != OPEN and self.physics == "exact":
             raise ValueError(
                 f"exact physics knows no collisions, and arena {self.arena} has obstacles; choose "
@@ -276,7 +278,7 @@ class Mission:
             "fading": ("rician_k",) if self.fading == "rician" else (),
             "erasure": (),
             "burst_begin": ("burst_end",),
-            "num_strong": ("strong_db",),
+            "num_high_power": ("high_power_db",),
         }
         on = [name for name in parts if getattr(self, name) not in (usual.get(name), 0)]
         named = [name for part in on for name in (part, *parts[part])]
@@ -284,12 +286,12 @@ class Mission:
 
     def grants(self, what: Grant) -> bool:
         """Whether robots are told this beforehand."""
-        return what in self.known.split(",")
+        return what in self.prior_knowledge.split(",")
 
     @property
-    def num_strong(self) -> int:
+    def num_high_power(self) -> int:
         """How many robots transmit with more power: the first ones, to the nearest."""
-        return round(self.strong_share * self.num_robots) if self.strong_db > 0.0 else 0
+        return round(self.high_power_fraction * self.num_robots) if self.high_power_db > 0.0 else 0
 
     @property
     def has_walls(self) -> bool:

@@ -94,7 +94,7 @@ def truth_of(mission: Mission, channel: Channel | VaryingChannel) -> TrueLinks:
 def by_robot(mission: Mission, usual_mw: float) -> Float[np.ndarray, "N"]:
     """Return a power of each robot's packets where a usual radio has this one [mW]."""
     power_mw = np.full(mission.num_robots, usual_mw)
-    power_mw[: mission.num_strong] *= from_db(mission.strong_db)
+    power_mw[: mission.num_high_power] *= from_db(mission.high_power_db)
     return power_mw
 
 

@@ -21,7 +21,14 @@ KINDS: dict[Any, tuple[type, str]] = {
 }
 # Fields by the names that they once had. Stored files are read with either name; command lines take
 # both; Python is told the new one.
-FORMER_NAMES = {"parts": "components"}
+FORMER_NAMES = {
+    "known": "prior_knowledge",
+    "switched_off": "failure_fraction",
+    "strong_share": "high_power_fraction",
+    "strong_db": "high_power_db",
+    "parts": "components",
+    "arm": "credit_assignment",
+}
 FieldOf = Any  # what a field's maker returns: type checkers take it for the attribute's value
 
 
@@ -34,9 +41,8 @@ def setting(default: object = MISSING, help: str = "", **metadata: Any) -> Field
         **metadata: `label`, the name in words; `unit`; `source`, where the default comes from;
             `low` and `high`, the range; `choices`, and `is_joined` where several may be joined by
             commas; and what `cli.options` shows: `group`, the heading it stands under; `metavar`;
-            `shown`, the default in words; `is_positional`, for an option without a flag; `flags`,
-            if they are not made from the name, older ones last;
-            `convert`, which makes a value of what was typed.
+            `shown`, the default in words; `is_positional`, for an option without a flag; `flag`, if
+            it is not made from the name; `convert`, which makes a value of what was typed.
     """
     return field(default=default, metadata=metadata | ({"help": help} if help else {}))
 

@@ -191,7 +191,8 @@ def _by_new_names(value: Any, kind: object) -> Any:  # noqa: ANN401 - any plain 
     if not (isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict)):
         return value
     kinds: dict[Any, Any] = {spec.name: spec.type for spec in fields(kind)}
-    new = {old: name for old, name in FORMER_NAMES.items() if old not in kinds and name in kinds}
+    missing = kinds.keys() - value.keys()
+    new = {old: name for old, name in FORMER_NAMES.items() if name in missing}
     named = {new.get(key, key): each for key, each in value.items()}
     return {key: _by_new_names(each, kinds.get(key)) for key, each in named.items()}
 

@@ -177,7 +177,7 @@ def test_the_title_names_the_arena_and_what_the_channel_adds():
     assert flight_title(paper("flocking"), "tdma", 3) == "flocking, tdma, 40 robots, seed 3"
     title = flight_title(paper("random-walk", collide=True), "tdma", 3)
     assert title == "random-walk, tdma, 40 robots that collide, seed 3"
-    mission = paper("random-walk", arena="blocks", fading="rayleigh", known="map")
+    mission = paper("random-walk", arena="blocks", fading="rayleigh", prior_knowledge="map")
     title = flight_title(mission, "tdma", 3)
     assert title == "random-walk, tdma, 40 robots, seed 3, arena blocks, fading rayleigh, known map"
     title = flight_title(paper("flocking", bit_rate=250e3), "tdma", 3)

@@ -34,7 +34,7 @@ class Silent(DecentralisedPolicy):
             {"task": "stationary", "policy": "aloha", "probability": 0.2, "preset": "reference"},
             ("--policy", "aloha", "--probability", "0.2", "--preset", "reference"),
         ),
-        ({"switched_off": 0.3, "record": False, "observer": 2}, ("--switched-off", "0.3")),
+        ({"failure_fraction": 0.3, "record": False, "observer": 2}, ("--failure-fraction", "0.3")),
     ],
 )
 def test_it_is_what_the_command_line_flies(here, keywords, options):

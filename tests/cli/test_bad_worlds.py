@@ -39,7 +39,7 @@ OPTIONS = {
     "--rician-k -1": "Rician K must be a number from 0 to 10000 [1], not -1",
     "--shadowing-db -1": "shadowing must be a number from 0 to 30 [dB], not -1",
     "--loss-exponent 0": "path loss exponent must be a number from 1 to 10 [1], not 0",
-    "--strong-db -6": "strong radios must be a number from 0 to 60 [dB], not -6",
+    "--high-power-db -6": "extra power must be a number from 0 to 60 [dB], not -6",
     "--erasure 1": "erasure probability must be a number from 0 to 0.99 [1], not 1",
     "--burst-begin 0.6": "burst begin must be a number from 0 to 0.5 [per slot], not 0.6",
     "--arena sea": "open, blocks, forest, rooms, or an MJCF file, not 'sea'",

@@ -173,29 +173,29 @@ def test_resuming_what_never_began_begins_it(swarm_mj, tmp_path, whole):
     same_files(tmp_path, whole)
 
 
-FAIL = ("--switched-off", "0", "0.4", "--policy", "mst", "--episodes", "3")
+FAIL = ("--failure-fraction", "0", "0.4", "--policy", "mst", "--episodes", "3")
 
 
 def test_robots_that_fail_are_another_regime_in_results_and_progress(
     evaluate_and_end, swarm_mj, tmp_path
 ):
     evaluate_and_end(tmp_path, signal.SIGKILL, 1, *SMALL, *FAIL, *BOTH)
-    other = swarm_mj("evaluate", *SMALL, *FAIL, *BOTH, "--resume", "--switched-off", 0.2)
-    alike = ("--switched-off", "0", "0.2", *FAIL[3:])
+    other = swarm_mj("evaluate", *SMALL, *FAIL, *BOTH, "--resume", "--failure-fraction", 0.2)
+    alike = ("--failure-fraction", "0", "0.2", *FAIL[3:])
     another = swarm_mj("evaluate", *SMALL, *alike, *BOTH, "--resume")
     assert other.returncode == another.returncode == 2
-    assert "its switched_off is 0.4, not 0.2; repeat that one" in another.stderr
+    assert "its failure_fraction is 0.4, not 0.2; repeat that one" in another.stderr
     done = swarm_mj("evaluate", *SMALL, *FAIL, *BOTH, "--resume")
     assert done.returncode == 0, done.stderr
     said = " ".join(done.stdout.split())
     assert "12 windows of exact physics, 40% of the robots off half-way" in said
     results = read_results(tmp_path / "r.csv")
-    assert [result.switched_off for result in results] == [0.0, 0.4]
-    assert [json.loads(result.config)["switched_off"] for result in results] == [0.0, 0.4]
+    assert [result.failure_fraction for result in results] == [0.0, 0.4]
+    assert [json.loads(result.config)["failure_fraction"] for result in results] == [0.0, 0.4]
     rows = json.loads((tmp_path / "r.json").read_text())["results"]
     for fraction, row in zip((0.0, 0.4), rows, strict=True):
         mission = paper("flocking", num_robots=5, num_windows=12, range_ratio=0.5)
-        mission = replace(mission, switched_off=fraction)
+        mission = replace(mission, failure_fraction=fraction)
         flight = rollout(Swarm(mission, [1000, 1001, 1002]), make_policy("mst", mission))
         np.testing.assert_allclose(row["episode_aoi"], summarise(list(flight)).aoi_mean)
     assert rows[0]["aoi_mean"] != rows[1]["aoi_mean"]
@@ -232,8 +232,8 @@ def test_one_mission_of_one_window_has_results(swarm_mj, tmp_path):
         (["--jobs", "0"], "jobs must be a whole number from 1 to 256, not 0"),
         (["--robots", "10", "1"], "a whole number from 2 to 1000 [robots], not 1"),
         (
-            ["--switched-off", "0.95"],
-            "switched off must be a number from 0 to 0.9 [of the team], not 0.95",
+            ["--failure-fraction", "0.95"],
+            "robots that fail must be a number from 0 to 0.9 [of the team], not 0.95",
         ),
         (
             ["--preset", "mine"],

@@ -148,7 +148,7 @@ def test_help_names_the_figures_and_formats(swarm_mj):
 
 def test_results_of_robots_that_were_told_more_are_not_drawn_beside_the_papers(swarm_mj, tmp_path):
     everything = SYNTHETIC["everything"]()
-    write_csv(tmp_path / "all.csv", [replace(everything[0], known="map,start")])
+    write_csv(tmp_path / "all.csv", [replace(everything[0], prior_knowledge="map,start")])
     line = refusal(swarm_mj("figures", "all.csv", "--out", "."))
     assert "row 1 of all.csv was flown with the prior knowledge map,start" in line
 

@@ -84,16 +84,18 @@ def test_every_task_and_preset_flies(swarm_mj, tmp_path, task, preset):
 
 def test_robots_can_be_switched_off(swarm_mj, tmp_path):
     options = ("--task", "stationary", "--seed", 7, "--policy", "mst", "--probability", 0.3)
-    options += ("--switched-off", 0.5)
+    options += ("--failure-fraction", 0.5)
     done = swarm_mj("fly", *SHORT, *options, "--record", "a.rrd", "--json", "a.json")
     assert done.returncode == 0, done.stderr
     assert "stationary, mst, 6 robots, 50% of them off half-way, seed 7" in done.stdout
-    assert "--switched-off" in swarm_mj("fly", "--help").stdout
+    assert "--failure-fraction" in swarm_mj("fly", "--help").stdout
     summary = json.loads((tmp_path / "a.json").read_text())
-    mission = paper("stationary", num_robots=6, num_windows=20, range_ratio=0.5, switched_off=0.5)
+    mission = paper(
+        "stationary", num_robots=6, num_windows=20, range_ratio=0.5, failure_fraction=0.5
+    )
     expected = summarise(list(rollout(Swarm(mission, [7]), make_policy("mst", mission, 0.3))))
     assert summary["aoi_mean"] == expected.aoi_mean[0]
-    assert summary["config"]["switched_off"] == 0.5
+    assert summary["config"]["failure_fraction"] == 0.5
     assert len(windows(tmp_path / "a.rrd")) == 20
 
 
@@ -131,10 +133,10 @@ def test_contact_physics_flies(swarm_mj, tmp_path, boundary):
         (["--velocity-ratio", "inf"], "not inf"),
         (["--velocity-ratio", "-0.15"], "not -0.15"),
         (
-            ["--switched-off", "1"],
-            "switched off must be a number from 0 to 0.9 [of the team], not 1",
+            ["--failure-fraction", "1"],
+            "robots that fail must be a number from 0 to 0.9 [of the team], not 1",
         ),
-        (["--switched-off", "-0.1"], "not -0.1"),
+        (["--failure-fraction", "-0.1"], "not -0.1"),
         (
             ["--task", "swim"],
             "task must be one of stationary, random-walk, flocking, formation, coverage, not",

@@ -58,11 +58,11 @@ def test_every_option_reaches_its_field():
     given = mission(
         "--task", "random-walk", "--robots", "7", "--velocity-ratio", "0.5", "--range-ratio",
         "0.3", "--windows", "9", "--physics", "contact", "--boundary", "none",
-        "--switched-off", "0.2",
+        "--failure-fraction", "0.2",
     )  # fmt: skip
     assert given == paper(
         "random-walk", num_robots=7, velocity_ratio=0.5, range_ratio=0.3, num_windows=9,
-        physics="contact", boundary="none", switched_off=0.2,
+        physics="contact", boundary="none", failure_fraction=0.2,
     )  # fmt: skip
 
 
@@ -80,15 +80,31 @@ def test_sweeps_multiply_and_values_follow_one_flag_or_several():
 
 
 def test_what_is_known_is_swept_and_has_one_order():
-    assert missions("--known", "nothing", "start,map", "--known", "map,start", "map") == tuple(
-        paper("flocking", known=known) for known in ("nothing", "map,start", "map")
+    assert missions(
+        "--prior-knowledge", "nothing", "start,map", "--prior-knowledge", "map,start", "map"
+    ) == tuple(
+        paper("flocking", prior_knowledge=known) for known in ("nothing", "map,start", "map")
     )
 
 
+@pytest.mark.parametrize(
+    ("former", "present", "value"),
+    [
+        ("--known", "--prior-knowledge", "map,start"),
+        ("--switched-off", "--failure-fraction", 0.2),
+        ("--strong-share", "--high-power-fraction", 0.5),
+    ],
+)
+def test_former_options_still_count(former, present, value):
+    assert missions(former, value) == missions(present, value)
+    db = ("--high-power-fraction", 0.5, "--strong-db", 3)
+    assert missions(*db)[0].high_power_db == 3.0
+
+
 def test_how_many_fail_is_swept_too():
-    assert missions("--robots", 10, "--switched-off", 0, 0.2) == (
+    assert missions("--robots", 10, "--failure-fraction", 0, 0.2) == (
         paper("flocking", num_robots=10),
-        paper("flocking", num_robots=10, switched_off=0.2),
+        paper("flocking", num_robots=10, failure_fraction=0.2),
     )
 
 
@@ -97,13 +113,13 @@ def test_how_many_fail_is_swept_too():
     [
         paper("stationary"),
         paper("flocking", boundary="reflect", range_ratio=1 / 3, num_windows=7),
-        reference("random-walk", physics="contact", switched_off=0.1),
+        reference("random-walk", physics="contact", failure_fraction=0.1),
         PRESETS["urban"](),
         PRESETS["urban"](collide=True),
         paper("random-walk", collide=True),
         PRESETS["urban"]("stationary", arena="open", num_robots=9),
         PRESETS["open-field"]("flocking", path_loss="free-space", fading="none"),
-        paper("stationary", fading="rayleigh", known="statistics,start"),
+        paper("stationary", fading="rayleigh", prior_knowledge="statistics,start"),
     ],
 )
 def test_the_flags_of_a_mission_make_it_again(wanted):
@@ -134,7 +150,7 @@ def test_unknown_names_are_refused_by_name(swarm_mj, command):
         (("--shadowing-distance-m", 5), "--shadowing-db above 0"),
         (("--rician-k", 3), "--fading rician"),
         (("--burst-end", 0.1), "--burst-begin above 0"),
-        (("--strong-db", 3), "--strong-share above 0"),
+        (("--high-power-db", 3), "--high-power-fraction above 0"),
     ],
 )
 @pytest.mark.parametrize("command", ["fly", "evaluate", "train"])

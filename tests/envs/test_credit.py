@@ -182,7 +182,9 @@ def test_a_channel_that_draws_replays_a_window_with_its_own_numbers():
 def test_credits_are_those_of_a_replay_without_each_robot_also_after_robots_have_failed():
     """Only pairs of robots that still work count; those that failed neither send nor answer."""
     rng = np.random.default_rng(5)
-    mission = paper("stationary", num_robots=8, range_ratio=0.5, num_windows=16, switched_off=0.3)
+    mission = paper(
+        "stationary", num_robots=8, range_ratio=0.5, num_windows=16, failure_fraction=0.3
+    )
     swarm, num_credited = Swarm(mission, [1, 2]), 0
     for _ in range(16):
         buffers, now = copy.deepcopy(swarm.buffers), swarm.now

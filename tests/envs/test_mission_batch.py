@@ -136,7 +136,9 @@ def test_credit_is_what_silence_would_have_cost_the_team():
 
 
 def test_robots_that_were_switched_off_may_only_be_silent():
-    mission = paper("stationary", num_robots=5, range_ratio=1.0, num_windows=8, switched_off=0.4)
+    mission = paper(
+        "stationary", num_robots=5, range_ratio=1.0, num_windows=8, failure_fraction=0.4
+    )
     batch = MissionBatch(mission, "paper", 2, np.random.default_rng(1), first_windows=8)
     for window in range(1, 8):
         graphs = batch.step(np.tile(np.arange(5), (2, 1)), with_credit=True).graphs

@@ -136,7 +136,7 @@ class Sb3Teams(Sb3Robots):
 FACES = [Single, Made, Parallel, DmControl, Vector, MaskedVector, Sb3Robots, Sb3Teams]
 
 
-@pytest.mark.parametrize("numbers", [{}, {"switched_off": 0.3, "physics": "contact"}])
+@pytest.mark.parametrize("numbers", [{}, {"failure_fraction": 0.3, "physics": "contact"}])
 @pytest.mark.parametrize("face", FACES)
 def test_every_face_flies_the_same_missions(face, numbers):
     mission = paper("flocking", num_robots=NUM_ROBOTS, range_ratio=0.4, num_windows=50, **numbers)
@@ -156,7 +156,7 @@ def test_every_face_flies_the_same_missions(face, numbers):
                 other.states.velocity_mps[row], swarm.states.velocity_mps[b]
             )
             assert other.now[row] == swarm.now[b]
-    assert (swarm.states.is_active is not None) == ("switched_off" in numbers)
+    assert (swarm.states.is_active is not None) == ("failure_fraction" in numbers)
     assert np.all(np.mean(swarm.buffers.timestamp > 0.0, axis=(1, 2)) > 0.4)  # they did talk
 
 

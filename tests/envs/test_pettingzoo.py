@@ -16,7 +16,7 @@ from swarm_mj.mission import paper
 from swarm_mj.simulation.swarm import Swarm
 
 SMALL = {"num_robots": 6, "num_windows": 12, "range_ratio": 0.4}
-FAILING = {**SMALL, "switched_off": 0.3}  # 2 of 6, at the start of the 7th window
+FAILING = {**SMALL, "failure_fraction": 0.3}  # 2 of 6, at the start of the 7th window
 
 
 @pytest.mark.parametrize("options", [SMALL, {**FAILING, "with_parents": True}])

@@ -107,7 +107,7 @@ def test_masks_leave_out_teammates_believed_out_of_range():
 
 
 def test_a_robot_that_failed_may_only_be_silent():
-    team = begun("flocking", switched_off=0.4)
+    team = begun("flocking", failure_fraction=0.4)
     for recipient in recipients(6):
         team.step(recipient)
     failed = ~team.is_active
@@ -165,7 +165,7 @@ def test_drawn_seeds_are_none_of_an_evaluations():
             {"reward": "age"},
             "reward must be one of aoi, velocity-variance, task-cost, credit, not 'age'",
         ),
-        ({"reward": "credit", "switched_off": 0.2}, "switched_off is 0.2; set it to 0"),
+        ({"reward": "credit", "failure_fraction": 0.2}, "failure_fraction is 0.2; set it to 0"),
         ({"reward": "credit", "bit_rate": 5000.0}, "reward credit reckons with whole packets"),
         ({"mission": "stationary", "reward": "task-cost"}, "stationary has none; choose"),
         ({"features": "mine"}, "features must be one of"),

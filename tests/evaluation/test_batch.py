@@ -26,10 +26,10 @@ def batch(mission, policy="mst", seeds=SEEDS, probability=0.3):
     return Batch(policy=policy, probability=probability, mission=mission, seeds=seeds)
 
 
-@pytest.mark.parametrize("switched_off", [0.0, 0.5])
+@pytest.mark.parametrize("failure_fraction", [0.0, 0.5])
 @pytest.mark.parametrize("policy", ["mst", "random-flooding"])
-def test_costs_are_those_of_the_flight(policy, switched_off):
-    mission = small("flocking", switched_off=switched_off)
+def test_costs_are_those_of_the_flight(policy, failure_fraction):
+    mission = small("flocking", failure_fraction=failure_fraction)
     costs = fly_batch(batch(mission, policy))
     swarm = Swarm(mission, SEEDS)
     flown, ages = [], []
@@ -75,7 +75,7 @@ def test_the_floor_is_the_age_that_falling_apart_leaves():
 
 
 def test_the_floor_is_that_of_the_robots_that_are_on():
-    mission = small("stationary", num_robots=12, switched_off=0.6)
+    mission = small("stationary", num_robots=12, failure_fraction=0.6)
     swarm, by_hand = Swarm(mission, SEEDS), ConnectivityFloor(3, 12, mission.range_m)
     floors = [
         by_hand.next(swarm.states.position_m, swarm.now, swarm.states.is_active)

@@ -85,7 +85,9 @@ def test_no_policy_goes_below_the_floor(name, task):
 def test_nor_with_robots_that_fail(name):
     _assert_above_the_floor(
         name,
-        paper("random-walk", num_robots=8, num_windows=60, velocity_ratio=2.0, switched_off=0.4),
+        paper(
+            "random-walk", num_robots=8, num_windows=60, velocity_ratio=2.0, failure_fraction=0.4
+        ),
     )
 
 

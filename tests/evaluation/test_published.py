@@ -85,7 +85,7 @@ def test_each_figures_regime_has_its_value(preset):
         paper("flocking", boundary="reflect"),
         paper("flocking", range_ratio=0.5),
         paper("flocking", physics="contact"),
-        paper("flocking", known="start"),
+        paper("flocking", prior_knowledge="start"),
         reference("flocking", velocity_ratio=0.25, sinr_threshold_db=2.0),
     ],
 )

@@ -15,7 +15,7 @@ TEXTS = {
     "preset": "reference",
     "boundary": "none",
     "physics": "contact",
-    "known": "map,start",
+    "prior_knowledge": "map,start",
     "config": '{"a": "b, \\"c\\""}',
 }
 
@@ -41,6 +41,14 @@ def test_a_csv_comes_back_bit_for_bit(tmp_path):
     ]
     write_csv(tmp_path / "new" / "r.csv", results)
     assert read_results(tmp_path / "new" / "r.csv") == results
+
+
+def test_columns_are_read_by_their_former_names(tmp_path):
+    write_csv(tmp_path / "r.csv", [some_result()])
+    header, row = (tmp_path / "r.csv").read_text().splitlines()
+    header = header.replace("failure_fraction", "switched_off").replace("prior_knowledge", "known")
+    (tmp_path / "r.csv").write_text(f"{header}\n{row}\n")
+    assert read_results(tmp_path / "r.csv") == [some_result()]
 
 
 def test_columns_stand_in_the_order_of_the_fields(tmp_path):
@@ -112,15 +120,15 @@ def test_files_from_before_broadcasts_were_counted_are_read(tmp_path):
 
 
 def test_files_from_before_robots_could_be_switched_off_are_read(tmp_path):
-    write_csv(tmp_path / "r.csv", [some_result(switched_off=0.0)])
+    write_csv(tmp_path / "r.csv", [some_result(failure_fraction=0.0)])
     header, row = (tmp_path / "r.csv").read_text().splitlines()
-    place = COLUMNS.index("switched_off")
+    place = COLUMNS.index("failure_fraction")
     old = [",".join(cells[:place] + cells[place + 1 :]) for cells in [header.split(",")]]
     cells = row.split(",", place + 1)
     (tmp_path / "old.csv").write_text("\n".join([*old, ",".join(cells[:place] + cells[-1:])]))
-    assert read_results(tmp_path / "old.csv") == [some_result(switched_off=0.0)]
-    write_csv(tmp_path / "r.csv", [some_result(switched_off=0.2)])
-    assert read_results(tmp_path / "r.csv")[0].switched_off == 0.2
+    assert read_results(tmp_path / "old.csv") == [some_result(failure_fraction=0.0)]
+    write_csv(tmp_path / "r.csv", [some_result(failure_fraction=0.2)])
+    assert read_results(tmp_path / "r.csv")[0].failure_fraction == 0.2
 
 
 def test_missing_columns_are_named(tmp_path):

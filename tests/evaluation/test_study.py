@@ -39,7 +39,7 @@ def test_the_header_tells_what_costs_depend_on():
     assert (first["num_robots"], second["num_robots"]) == (6, 8)
     assert first["probability"] == second["probability"] == 0.2
     assert first["sinr_threshold_db"] == 1.0
-    assert first["switched_off"] == 0.0
+    assert first["failure_fraction"] == 0.0
 
 
 @pytest.mark.parametrize(

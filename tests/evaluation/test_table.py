@@ -81,7 +81,10 @@ def test_the_freshest_comes_first_in_each_regime(printed):
 
 
 def test_regimes_in_which_robots_fail_are_apart_and_say_so(printed):
-    results = [some_result("a", 3.0, switched_off=0.0), some_result("a", 4.0, switched_off=0.2)]
+    results = [
+        some_result("a", 3.0, failure_fraction=0.0),
+        some_result("a", 4.0, failure_fraction=0.2),
+    ]
     lines = printed(results, 100)
     assert sum("preset paper: 1 robots" in line for line in lines) == 2
     assert sum(" 1 windows of paper physics" in line for line in lines) == 2
@@ -163,8 +166,13 @@ def test_the_lower_bound_stands_below(printed):
 
 
 def test_regimes_of_other_channels_and_arenas_are_tables_of_their_own(printed):
-    plain = {"arena": "open", "known": "nothing"}
-    others = ({}, {"arena": "blocks"}, {"radio": "fading rayleigh"}, {"known": "map,start"})
+    plain = {"arena": "open", "prior_knowledge": "nothing"}
+    others = (
+        {},
+        {"arena": "blocks"},
+        {"radio": "fading rayleigh"},
+        {"prior_knowledge": "map,start"},
+    )
     lines = printed([some_result("a", 1.0, **plain | other) for other in others], 100)
     text = "\n".join(lines)
     assert text.count("lower bound (connectivity)") == 4

@@ -24,9 +24,9 @@ SEEDS = [1, 2, 3]
 KINDS = [(preset, name) for preset in (paper, reference) for name in ("mst", "random-flooding")]
 
 
-def small(task="random-walk", preset=paper, switched_off=0.4, **numbers):
+def small(task="random-walk", preset=paper, failure_fraction=0.4, **numbers):
     numbers = {"num_robots": 8, "num_windows": NUM_WINDOWS, "velocity_ratio": 1.0} | numbers
-    return preset(task, switched_off=switched_off, **numbers)
+    return preset(task, failure_fraction=failure_fraction, **numbers)
 
 
 def flight(mission, name, probability=0.4):
@@ -56,7 +56,7 @@ def copies(buffers):
     ],
 )
 def test_how_many(fraction, num_robots, num_off):
-    mission = paper(switched_off=fraction, num_robots=num_robots)
+    mission = paper(failure_fraction=fraction, num_robots=num_robots)
     assert num_failures(mission) == num_off
     is_active = draw_survivors(mission, [np.random.default_rng(seed) for seed in range(5)])
     if num_off == 0:
@@ -94,7 +94,7 @@ def test_placement_motion_and_policy_draw_as_if_nobody_ever_failed(seed):
 
 @pytest.mark.parametrize(("preset", "name"), KINDS)
 def test_missions_are_the_same_until_half_way(preset, name):
-    missions = small(preset=preset), small(preset=preset, switched_off=0.0)
+    missions = small(preset=preset), small(preset=preset, failure_fraction=0.0)
     flights = zip(*(flight(mission, name) for mission in missions), strict=True)
     for window_, ((some, its), (all_, theirs)) in enumerate(flights):
         is_same = all(

@@ -46,7 +46,7 @@ def test_the_papers_numbers(preset):
     assert mission.sinr_threshold_db == 1.0
     assert mission.noise_dbm == -50.0
     assert mission.frequency_hz == 2.4e9
-    assert mission.switched_off == 0.0
+    assert mission.failure_fraction == 0.0
     # "The team of 40 robots operates in a mission area of 1 km²", "250 meters", "V_max = 3 m/s".
     assert mission.side_m == pytest.approx(1000.0)
     assert mission.half_side_m == pytest.approx(500.0)
@@ -76,7 +76,13 @@ def test_the_bare_mission_is_the_papers_text_with_walls():
 
 
 # What the paper's missions have none of.
-NOTHING_UNLESS_ASKED = {"switched_off", "shadowing_db", "erasure", "burst_begin", "strong_share"}
+NOTHING_UNLESS_ASKED = {
+    "failure_fraction",
+    "shadowing_db",
+    "erasure",
+    "burst_begin",
+    "high_power_fraction",
+}
 
 
 @pytest.mark.parametrize("spec", QUANTITIES, ids=lambda spec: spec.name)
@@ -147,7 +153,7 @@ def test_every_range_keeps_out_what_no_mission_can_have():
         "shadowing_distance_m",
         "rician_k",
         "burst_end",
-        "strong_db",
+        "high_power_db",
         "bit_rate",
         *NOTHING_UNLESS_ASKED,
     }
@@ -190,8 +196,8 @@ def test_a_mission_cannot_change():
             {"shadowing_db": 6.0, "erasure": 0.1},
             "shadowing_db 6, shadowing_distance_m 20, erasure 0.1",
         ),
-        ({"strong_share": 0.25, "num_robots": 8}, "num_strong 2, strong_db 6"),
-        ({"strong_share": 0.25, "strong_db": 0.0}, ""),
+        ({"high_power_fraction": 0.25, "num_robots": 8}, "num_high_power 2, high_power_db 6"),
+        ({"high_power_fraction": 0.25, "high_power_db": 0.0}, ""),
         ({"burst_begin": 0.02}, "burst_begin 0.02, burst_end 0.05"),
     ],
 )
@@ -209,8 +215,8 @@ def test_what_the_channel_has_beyond_free_space_is_told_in_words(fields, said):
     ],
 )
 def test_what_is_known_has_one_order(given, kept):
-    mission = Unchecked(known=given)
-    assert mission.known == kept
+    mission = Unchecked(prior_knowledge=given)
+    assert mission.prior_knowledge == kept
     granted = [what for what in ("map", "statistics", "start") if mission.grants(what)]
     assert granted == [what for what in kept.split(",") if what != "nothing"]
 
@@ -226,6 +232,6 @@ def test_what_is_known_has_one_order(given, kept):
     ],
 )
 def test_what_cannot_be_known_is_refused(given, complaint):
-    with pytest.raises(ValueError, match=r"^what is known must be") as refusal:
-        Unchecked(known=given)
+    with pytest.raises(ValueError, match=r"^prior knowledge must be") as refusal:
+        Unchecked(prior_knowledge=given)
     assert complaint in str(refusal.value)

@@ -86,7 +86,7 @@ class Mind:
     @property
     def is_told(self):
         """Whether it was told before the mission where everyone starts."""
-        return "start" in self.mission.known
+        return "start" in self.mission.prior_knowledge
 
     def length(self, epoch):
         """The discovery, two early ones, then all others [windows]."""

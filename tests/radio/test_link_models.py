@@ -34,9 +34,9 @@ def chances(position_m=ON_A_LINE_M, *, obstacles=None, **fields):
     "fields",
     [
         {"fading": "rayleigh", "shadowing_db": 6.0, "path_loss": "two-ray", "erasure": 0.5},
-        {"fading": "rayleigh", "known": "map"},  # there is nothing on it
-        {"known": "statistics"},  # are those of free space
-        {"known": "map,statistics,start"},
+        {"fading": "rayleigh", "prior_knowledge": "map"},  # there is nothing on it
+        {"prior_knowledge": "statistics"},  # are those of free space
+        {"prior_knowledge": "map,statistics,start"},
     ],
 )
 def test_without_knowledge_belief_is_free_space_to_the_last_digit(fields):
@@ -51,7 +51,9 @@ def test_without_knowledge_belief_is_free_space_to_the_last_digit(fields):
 @pytest.mark.parametrize("known", KNOWABLE)
 def test_only_who_knows_the_map_reckons_with_a_wall(known):
     """Its 10 dB are as much as a factor of 3.2 in distance: 120 and 200 m are too far then."""
-    linked = chances(obstacles=WALL, known=known, path_loss="log-distance", reference_m=900.0)
+    linked = chances(
+        obstacles=WALL, prior_knowledge=known, path_loss="log-distance", reference_m=900.0
+    )
     through = [linked[0, 2], linked[2, 0], linked[1, 2], linked[2, 1]]
     assert through == ([0.0] * 4 if known == "map" else [1.0] * 4)
     assert linked[0, 1] == linked[1, 0] == 1.0
@@ -63,14 +65,14 @@ def test_rayleigh_outage_by_its_law():
     Bursts take 0.02 / (0.02 + 0.06) of the slots.
     """
     fields = {"fading": "rayleigh", "erasure": 0.3, "burst_begin": 0.02, "burst_end": 0.06}
-    probability = chances(known="statistics", **fields)
+    probability = chances(prior_knowledge="statistics", **fields)
     for i, j, apart_m in ((0, 1, 80.0), (1, 2, 120.0), (2, 0, 200.0)):
         expected = 0.7 * 0.75 * math.exp(-((apart_m / 250.0) ** 2))
         assert probability[i, j] == pytest.approx(expected, abs=2e-3)
 
 
 def test_unknown_shadowing_is_doubt_by_its_law():
-    probability = chances(known="statistics", shadowing_db=6.0)
+    probability = chances(prior_knowledge="statistics", shadowing_db=6.0)
     for i, j, apart_m in ((0, 1, 80.0), (1, 2, 120.0), (2, 0, 200.0)):
         margin_db = 20.0 * math.log10(250.0 / apart_m)
         assert probability[i, j] == pytest.approx(norm.cdf(margin_db / 6.0), abs=5e-3)
@@ -79,13 +81,16 @@ def test_unknown_shadowing_is_doubt_by_its_law():
 def test_strong_radios_are_known_by_their_statistics():
     """12 dB more are as much as a factor of 4 in distance, in one direction."""
     far_m = np.array([[0.0, 0.0], [900.0, 0.0]])
-    fields = {"strong_share": 0.5, "strong_db": 12.0}
-    assert chances(far_m, known="statistics", **fields).tolist() == [[0.0, 1.0], [0.0, 0.0]]
-    assert not np.any(chances(far_m, known="map", **fields))
+    fields = {"high_power_fraction": 0.5, "high_power_db": 12.0}
+    assert chances(far_m, prior_knowledge="statistics", **fields).tolist() == [
+        [0.0, 1.0],
+        [0.0, 0.0],
+    ]
+    assert not np.any(chances(far_m, prior_knowledge="map", **fields))
 
 
 def test_who_is_unknown_is_not_counted_on_by_any_law():
-    belief = belief_of(paper(num_robots=3, path_loss="two-ray", known="statistics"))
+    belief = belief_of(paper(num_robots=3, path_loss="two-ray", prior_knowledge="statistics"))
     links = belief.links(ON_A_LINE_M, np.zeros(3), np.array([True, True, False]))
     assert links.received_mw[0, 1] > 0.0
     assert not np.any(links.received_mw[2])
@@ -95,7 +100,7 @@ def test_who_is_unknown_is_not_counted_on_by_any_law():
 def test_an_error_of_distance_weighs_more_where_power_falls_more_steeply():
     """At 100 m, known to sqrt(2) 5 m: with d⁻⁴ beyond 20 m that counts twice."""
     fields = {"path_loss": "log-distance", "loss_exponent": 4.0, "reference_m": 20.0}
-    belief = belief_of(paper(num_robots=3, known="statistics", **fields))
+    belief = belief_of(paper(num_robots=3, prior_knowledge="statistics", **fields))
     position_m = np.array([[0.0, 0.0], [10.0, 0.0], [100.0, 0.0]])
     over_std = belief.links(position_m, np.full(3, 5.0)).distance_over_std
     assert over_std[0, 1] == pytest.approx(10.0 / (5.0 * math.sqrt(2.0)))
@@ -103,7 +108,12 @@ def test_an_error_of_distance_weighs_more_where_power_falls_more_steeply():
 
 
 FADING = {"fading": "rician", "rician_k": 2.0, "shadowing_db": 6.0, "erasure": 0.2}
-LOSSES = {"path_loss": "log-distance", "strong_share": 0.5, "burst_begin": 0.05, "burst_end": 0.2}
+LOSSES = {
+    "path_loss": "log-distance",
+    "high_power_fraction": 0.5,
+    "burst_begin": 0.05,
+    "burst_end": 0.2,
+}
 
 
 @pytest.mark.parametrize("fields", [{"shadowing_db": 6.0}, FADING, FADING | LOSSES])

@@ -48,13 +48,17 @@ BEYOND_FREE_SPACE = (
     {"fading": "rician"},
     {"erasure": 0.1},
     {"burst_begin": 0.02},
-    {"strong_share": 0.2},
+    {"high_power_fraction": 0.2},
 )
 
 
 def test_the_papers_missions_have_the_papers_channel():
     assert channel_of(paper()) == radio_of(paper())
-    for unused in ({"rician_k": 1.0}, {"burst_end": 0.5}, {"strong_share": 0.5, "strong_db": 0.0}):
+    for unused in (
+        {"rician_k": 1.0},
+        {"burst_end": 0.5},
+        {"high_power_fraction": 0.5, "high_power_db": 0.0},
+    ):
         assert isinstance(channel_of(paper(**unused)), FreeSpaceRadio)
 
 
@@ -93,7 +97,7 @@ def test_powers_follow_the_missions_laws():
     assert received_mw(log, 200.0)[0] == pytest.approx(at_20_m * 10**-3.5)
     two_ray = paper(path_loss="two-ray", antenna_height_m=2.0)
     assert received_mw(two_ray, 800.0)[0] == pytest.approx(sent_mw * 2.0**4 / 800.0**4, rel=1e-3)
-    strong = paper(num_robots=4, strong_share=0.25, strong_db=3.0)
+    strong = paper(num_robots=4, high_power_fraction=0.25, high_power_db=3.0)
     forth, back = received_mw(strong, 100.0)
     assert forth / back == pytest.approx(10**0.3)
 

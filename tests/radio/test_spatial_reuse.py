@@ -74,8 +74,8 @@ def test_eq3_by_what_was_told_of_the_channel_its_own_rule_is_the_judge(
     """Steeper path loss, strong radios and walls, all of them known; slot after slot."""
     rng = np.random.default_rng(seed)
     mission = paper(
-        "stationary", num_robots=num_robots, known="map,statistics", path_loss="log-distance",
-        loss_exponent=2.5, strong_share=0.4,
+        "stationary", num_robots=num_robots, prior_knowledge="map,statistics",
+        path_loss="log-distance", loss_exponent=2.5, high_power_fraction=0.4,
     )  # fmt: skip
     channel, belief = channel_of(mission, WALLS), belief_of(mission, WALLS)
     channel.start(num_robots, [rng])
@@ -96,7 +96,7 @@ def test_eq3_by_what_was_told_of_the_channel_its_own_rule_is_the_judge(
 
 def test_each_robot_reckons_with_its_own_beliefs_of_what_it_was_told():
     """Robot 2 takes itself to be far from the owner of the turn, and joins; the others know it."""
-    mission = paper("stationary", num_robots=4, known="statistics", path_loss="two-ray")
+    mission = paper("stationary", num_robots=4, prior_knowledge="statistics", path_loss="two-ray")
     belief = belief_of(mission)
     law = belief.law._replace(at_1_m=belief.law.at_1_m / belief.radio.noise_mw)
     position_m = np.array([[0.0, 0.0], [30.0, 0.0], [60.0, 0.0], [61.0, 0.0]])

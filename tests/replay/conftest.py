@@ -67,7 +67,7 @@ def still():
 @pytest.fixture(scope="session")
 def failing():
     """Of 12 robots 3 are switched off after 15 of 30 windows."""
-    return record("mst", 0.3, switched_off=0.25)
+    return record("mst", 0.3, failure_fraction=0.25)
 
 
 @pytest.fixture(scope="session")

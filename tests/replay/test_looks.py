@@ -13,7 +13,7 @@ from swarm_mj.replay import looks
 from swarm_mj.replay.looks import EVERY, NO_SURPRISES, in_turn, joined, look, stride_of
 from swarm_mj.simulation.swarm import Swarm
 
-CITY = {"arena": "blocks", "shadowing_db": 6.0, "num_robots": 14, "strong_share": 0.3}
+CITY = {"arena": "blocks", "shadowing_db": 6.0, "num_robots": 14, "high_power_fraction": 0.3}
 WALL_DB = 3.0
 
 
@@ -55,9 +55,9 @@ def test_surprises_are_where_lone_packets_and_the_range_disagree(index):
 
 
 def test_what_was_told_before_the_mission_does_not_surprise():
-    told = {"arena": "blocks", "num_robots": 14, "strong_share": 0.3, "path_loss": "two-ray"}
+    told = {"arena": "blocks", "num_robots": 14, "high_power_fraction": 0.3, "path_loss": "two-ray"}
     for known, surprises in (("nothing", True), ("map", True), ("map,statistics", False)):
-        seen = look(Swarm(paper("random-walk", **told, known=known), [3])).surprises
+        seen = look(Swarm(paper("random-walk", **told, prior_knowledge=known), [3])).surprises
         assert (len(seen.row) > 0) == surprises
 
 
@@ -89,7 +89,7 @@ def test_losses_behind_a_wall_by_hand():
 
 
 def test_a_strong_radio_surprises_in_its_own_direction_only():
-    mission = paper("stationary", num_robots=12, strong_share=0.5, strong_db=3.0)
+    mission = paper("stationary", num_robots=12, high_power_fraction=0.5, high_power_db=3.0)
     found = look(Swarm(mission, [2])).surprises
     assert not np.any(found.is_too_weak)
     assert np.all(found.sender < 6)

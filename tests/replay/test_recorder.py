@@ -43,7 +43,7 @@ def test_ages_are_those_of_the_buffers():
 
 
 def test_statistics_are_of_the_robots_that_are_on():
-    mission = paper("random-walk", num_robots=7, num_windows=9, switched_off=0.3)
+    mission = paper("random-walk", num_robots=7, num_windows=9, failure_fraction=0.3)
     swarm = Swarm(mission, [3])
     record = Recorder(swarm)
     ages = []

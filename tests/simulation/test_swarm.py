@@ -156,7 +156,7 @@ def test_iv_b_start_is_connected_inside_and_known_to_nobody_else():
 
 
 def test_start_is_known_to_everyone_where_the_mission_grants_it():
-    mission = small("random-walk", known="start")
+    mission = small("random-walk", prior_knowledge="start")
     swarm = Swarm(mission, [3, 4])
     assert np.all(swarm.buffers.is_known)
     for i in range(8):
@@ -513,7 +513,7 @@ def hears_nothing_and_writes(position_m, recipient):
 
 
 def test_parts_of_ones_own_cannot_move_what_they_are_shown():
-    mission = small(switched_off=0.3, num_windows=NUM_WINDOWS)
+    mission = small(failure_fraction=0.3, num_windows=NUM_WINDOWS)
     honest = Swarm(mission, [1, 2], channel=to_nobody, controller=Pulls(meddles=False))
     channel, controller = hears_nothing_and_writes, Pulls(meddles=True)
     meddled = Swarm(mission, [1, 2], channel=channel, controller=controller)
@@ -610,7 +610,9 @@ def wall_across(spec, mission):
 @pytest.mark.parametrize(("known", "has_law"), [("nothing", False), ("map", True)])
 def test_policies_are_told_of_the_channel_by_their_kind_before_they_start(known, has_law):
     """The scene's own wall is on the map."""
-    swarm = Swarm(small("stationary", known=known, physics="contact"), [1], scene=wall_across)
+    swarm = Swarm(
+        small("stationary", prior_knowledge=known, physics="contact"), [1], scene=wall_across
+    )
     policy, centre = Told(), ToldTheTruth()
     swarm.step(policy)
     ((belief, has_begun),) = policy.told

@@ -76,7 +76,7 @@ def test_who_carries_more_than_the_paper_s_packets_is_named_so(tool):
 def test_robots_that_fail_have_a_table_of_their_own(tool, tmp_path, capsys):
     rows = [
         result("mst", aoi_mean=43.0, aoi_sem=1.0),
-        result("mst", aoi_mean=50.0, aoi_sem=1.0, switched_off=0.2),
+        result("mst", aoi_mean=50.0, aoi_sem=1.0, failure_fraction=0.2),
     ]
     write_csv(tmp_path / "some.csv", rows)
     assert tool.main([str(tmp_path / "some.csv")]) == 0

@@ -106,8 +106,8 @@ def test_missions_that_differ_from_the_preset_in_their_config_alone_are_refused(
     other = result("mst", wall_hit="mirror")
     with pytest.raises(ValueError, match="wall_hit is clip, not mirror"):
         results_of(FIG4, [other])
-    with pytest.raises(ValueError, match=r"switched_off is 0\.0, not 0\.2"):
-        results_of(FIG4, [result("mst", switched_off=0.2)])
+    with pytest.raises(ValueError, match=r"failure_fraction is 0\.0, not 0\.2"):
+        results_of(FIG4, [result("mst", failure_fraction=0.2)])
 
 
 def test_two_presets_and_unknown_ones_are_refused():

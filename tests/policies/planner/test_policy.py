@@ -68,7 +68,7 @@ def test_eq9_sharing_is_planning_apart_in_a_team_of_40(task):
 
 @pytest.mark.parametrize("task", ["stationary", "flocking"])
 def test_eq9_sharing_is_planning_apart_where_everyone_knows_how_all_start(task):
-    mission = paper(task, num_robots=10, known="start")
+    mission = paper(task, num_robots=10, prior_knowledge="start")
     flight = Witnessed(mission, 10)
     flight.fly(windows_before(4, 10) + 2)
     assert flight.num_taken > 0
@@ -76,7 +76,7 @@ def test_eq9_sharing_is_planning_apart_where_everyone_knows_how_all_start(task):
 
 def test_a_team_that_knows_how_all_start_plans_from_the_first_slot():
     """One robot transmits first, whom most hear; without the plan four would, in the discovery."""
-    flight = Flight(paper("stationary", num_robots=10, known="start"), 4)
+    flight = Flight(paper("stationary", num_robots=10, prior_knowledge="start"), 4)
     transmitted = flight.fly(1)
     assert np.sum(transmitted[0]) >= 1
     (plan,) = flight.team._plans.values()
@@ -268,7 +268,7 @@ def test_a_new_start_forgets_and_the_same_seed_is_the_same_mission():
 
 def test_eq10_robots_switched_off_do_not_break_it():
     """Half-way 8 of 40 fall silent, and nobody is told: the others stay younger than by TDMA."""
-    mission = paper("stationary", num_robots=40, num_windows=240, switched_off=0.2)
+    mission = paper("stationary", num_robots=40, num_windows=240, failure_fraction=0.2)
     age = {}
     policies = {"planner": planner_of(mission, NEAR_SIGHTED), "tdma": make_policy("tdma", mission)}
     for name, policy in policies.items():

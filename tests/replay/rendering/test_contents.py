@@ -13,7 +13,7 @@ from swarm_mj.simulation.swarm import Swarm
 
 @pytest.fixture
 def swarm():
-    return Swarm(paper("flocking", num_robots=8, num_windows=20, switched_off=0.25), [3, 4])
+    return Swarm(paper("flocking", num_robots=8, num_windows=20, failure_fraction=0.25), [3, 4])
 
 
 def test_before_the_first_window_everyone_is_grey_but_the_white_observer(swarm):

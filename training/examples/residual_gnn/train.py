@@ -38,7 +38,7 @@ KINDS = {  # what 40 robots at rest meet; they believe in free space
     "Rayleigh": {"fading": "rayleigh"},
     "bursts": {"burst_begin": 0.02},
     "blocks": {"arena": "blocks"},
-    "10 % off": {"switched_off": 0.1},
+    "10 % off": {"failure_fraction": 0.1},
 }
 
 
