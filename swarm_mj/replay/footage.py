@@ -9,11 +9,37 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components, components_in
 from swarm_mj.physics.scene import Scene
 from swarm_mj.replay import palette
-from swarm_mj.replay.frame import Frame, frame
-from swarm_mj.replay.links import fates
-from swarm_mj.replay.looks import NO_SURPRISES, Looks, Surprises
+from swarm_mj.replay.mismatch import LinkMismatch
+from swarm_mj.replay.packets import PacketSegments, packet_segments
 from swarm_mj.replay.recorder import Log
-from swarm_mj.replay.shots import Shots, shots
+
+NEAR = 1.5  # times the area: robots that stay within it are shown around the area
+
+
+@dataclass(frozen=True, kw_only=True)
+class Frame:
+    """The part of the ground that is shown: a square of constant size that may move."""
+
+    centre_m: Float[np.ndarray, "T 2"]  # in each window [m]
+    reach_m: float  # half its width [m]
+
+    @property
+    def moves(self) -> bool:
+        """Whether it follows the team."""
+        return bool(np.any(self.centre_m))
+
+
+def frame(position_m: Float[np.ndarray, "T N 2"], half_side_m: float) -> Frame:
+    """Return the smallest square that holds the area and all ways, or else all robots at any time.
+
+    It follows the team if robots go far beyond the area, which is centred on the origin.
+    """
+    farthest_m = float(np.max(np.abs(position_m)))
+    if farthest_m <= NEAR * half_side_m:
+        centre_m = np.zeros((len(position_m), 2))
+        return Frame(centre_m=centre_m, reach_m=max(half_side_m, farthest_m))
+    low_m, high_m = np.min(position_m, axis=1), np.max(position_m, axis=1)
+    return Frame(centre_m=(low_m + high_m) / 2.0, reach_m=float(np.max(high_m - low_m)) / 2.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +58,7 @@ class Facts:
 
     @property
     def own_parts(self) -> list[str]:
-        """Which are the user's own, in words."""
+        """The user's own parts, in words."""
         return [f"{kind} {name}" for kind, name in components_in(vars(self)).names.items()]
 
 
@@ -46,10 +72,10 @@ class Footage:
     velocity_mps: Float[np.ndarray, "T N 2"]  # of any length: only its direction is shown
     age: Float[np.ndarray, "T N"]  # of what the observer knows [windows]; nan: nothing
     is_on: Bool[np.ndarray, "T N"]  # whether a robot was switched on
-    shots: Shots
+    segments: dict[str, PacketSegments]  # packets by their fate, in the order of drawing
     age_mean: Float[np.ndarray, "T"]  # Eq. 10 [windows]
-    is_cut_off: Bool[np.ndarray, "T N"]  # whether it can exchange no news with the observer
-    looks: Looks | None = None  # at the channel; None in free space
+    is_cut_off: Bool[np.ndarray, "T N"]  # whether it can exchange no packets with the observer
+    mismatch: LinkMismatch | None = None  # None in free space
     scene: Scene | None = None  # what changed the arena; files have its name only
 
     @property
@@ -63,25 +89,27 @@ class Footage:
         centre_m = np.tile((low_m + high_m) / 2.0, (len(self.window), 1))
         return Frame(centre_m=centre_m, reach_m=max(1.0, float(np.max(high_m - low_m)) / 2.0))
 
-    def surprises(self, row: int) -> Surprises:
-        """Links that surprise in one window, counted from 0."""
-        return NO_SURPRISES if self.looks is None else self.looks.at(int(self.window[row]))
+    def mismatch_at(self, row: int) -> LinkMismatch | None:
+        """Return the links that differ from the belief in one window, counted from 0."""
+        return None if self.mismatch is None else self.mismatch.at(int(self.window[row]))
 
     def shortfalls(self, row: int) -> tuple[Int16[np.ndarray, "K"], Int16[np.ndarray, "K"]]:
-        """Robots whose links with the observer are too weak, and their margins, below 0 [dB]."""
-        links, own = self.surprises(row).by_kind["too_weak"], self.facts.observer
-        links = links.chosen((links.sender == own) | (links.receiver == own))
+        """Return the robots whose links with the observer are too weak, and the margins [dB]."""
+        if (links := self.mismatch_at(row)) is None:
+            return np.zeros(0, np.int16), np.zeros(0, np.int16)
+        own = self.facts.observer
+        links = links.chosen(links.is_too_weak & links.of_robot(own))
         return np.where(links.sender == own, links.receiver, links.sender), links.margin_db
 
     def colours(self, full_scale: float | None = None) -> UInt8[np.ndarray, "T N 3"]:
-        """The robots' colours, by the replay's own scale of ages unless one is given [windows]."""
+        """Return the robots' colours, by the replay's own scale of ages unless given [windows]."""
         scale = self.facts.full_scale if full_scale is None else full_scale
         is_known, age = ~np.isnan(self.age), np.nan_to_num(self.age)
         return palette.robot_colours(age, scale, is_known, self.is_on, self.facts.observer)
 
 
 def facts_of(log: Log, mission: Mission, policy: str, seed: int, own: Components) -> Facts:
-    """What does not change in a mission that was recorded."""
+    """Return what does not change in a recorded mission; arguments as of `footage_of`."""
     return Facts(
         mission=mission,
         policy=policy,
@@ -96,12 +124,12 @@ def facts_of(log: Log, mission: Mission, policy: str, seed: int, own: Components
 def footage_of(
     log: Log, mission: Mission, policy: str, seed: int, own: Components = Components()
 ) -> Footage:
-    """What a video shows of a mission that was recorded.
+    """Return what a video shows of a recorded mission.
 
     Args:
-        log: What was flown.
+        log: The record.
         mission: Its numbers.
-        policy: Its name, for the title.
+        policy: The policy's name, for the title.
         seed: The mission's.
         own: The user's own components.
     """
@@ -112,9 +140,9 @@ def footage_of(
         velocity_mps=log.velocity_mps,
         age=log.known_age,
         is_on=log.is_on,
-        shots=shots(fates(log), log.position_m),
+        segments=packet_segments(log.packets, log.position_m),
         age_mean=log.age_mean,
         is_cut_off=log.is_cut_off,
-        looks=log.looks,
+        mismatch=log.mismatch,
         scene=log.scene,
     )

@@ -9,23 +9,13 @@ import rerun.blueprint as rrb
 
 from swarm_mj.replay import legend, palette
 from swarm_mj.replay.arena import square_m
-from swarm_mj.replay.charts import (
-    RATE_WINDOWS,
-    TREE_HEIGHT,
-    TREE_WIDTH,
-    packet_counts,
-    rate,
-    shown_cost,
-    surprise_shares,
-)
-from swarm_mj.replay.frame import Frame
-from swarm_mj.replay.links import Links
+from swarm_mj.replay.charts import TREE_HEIGHT, TREE_WIDTH
+from swarm_mj.replay.footage import Frame
+from swarm_mj.replay.plots import Plot
 from swarm_mj.replay.recorder import Log
-from swarm_mj.replay.sheet import TIMELINE
+from swarm_mj.replay.rerun_log import TIMELINE
 
 WINDOWS_PER_SECOND = 30.0  # windows of 100 ms: three times as fast as the mission
-# Curves that would dwarf the others; the viewer can show them.
-HIDDEN = {"age": "worst", "radio": "overheard"}
 MARGIN = 1.06  # of the map, around what it must show
 
 
@@ -37,21 +27,21 @@ class Layout(rrb.Blueprint):
         super()._log_to_stream(stream)
 
     def close(self) -> None:
-        """Lets go of it, once it was sent."""
+        """Release the stream, once it was sent."""
         self._stream.disconnect()
         del self._stream
 
 
-def layout(log: Log, frame: Frame, packets: dict[str, Links]) -> Layout:
-    """The blueprint of a replay: tabs of the mission, its scene, and the radio of every robot."""
+def layout(log: Log, frame: Frame, shown: Sequence[Plot]) -> Layout:
+    """Return the blueprint: tabs of the mission, its scene, and the radio of every robot."""
     reach, follows = MARGIN * frame.reach_m, ", follows the team" if frame.moves else ""
     name = f"Map, squares of {square_m(frame):g} m{follows}"
-    shown = _drawing("/", name, (-reach, reach), (-reach, reach), contents=["/arena/**"])
+    ground = _drawing("/", name, (-reach, reach), (-reach, reach), contents=["/arena/**"])
     height = legend.height(log)
     samples = _drawing("/legend", "Legend", (0.0, legend.WIDTH), (-3.5, height), titlebar=False)
-    charts = _charts(log, packets)
+    charts = [_tree_and_ages(log), *map(_plot, shown)]
     mission = rrb.Horizontal(
-        rrb.Vertical(shown, samples, row_shares=[4, height / legend.TWO_ROWS]),
+        rrb.Vertical(ground, samples, row_shares=[4, height / legend.TWO_ROWS]),
         rrb.Vertical(*charts, row_shares=[4, *[3] * (len(charts) - 1)]),
         column_shares=[11, 10],
         name="Mission",
@@ -79,7 +69,7 @@ def _drawing(
     y_range: tuple[float, float],
     **options: Any,
 ) -> rrb.Spatial2DView:
-    """Return a part of the plane; the look does not depend on the viewer's theme."""
+    # The background is set so that colours do not depend on the viewer's theme.
     bounds = rrb.VisualBounds2D(x_range=x_range, y_range=y_range)
     return rrb.Spatial2DView(
         origin=origin, name=name, background=palette.BACKGROUND, visual_bounds=bounds, **options
@@ -87,7 +77,6 @@ def _drawing(
 
 
 def _space(frame: Frame) -> rrb.Spatial3DView:
-    """MuJoCo's scene, seen from the south and above."""
     reach = frame.reach_m
     eye = rrb.EyeControls3D(
         position=(0.0, -1.35 * reach, 1.75 * reach),
@@ -104,17 +93,8 @@ def _space(frame: Frame) -> rrb.Spatial3DView:
     )
 
 
-def _charts(log: Log, packets: dict[str, Links]) -> list[rrb.View | rrb.Container]:
-    """Return the ego robot's tree and the ages of all pairs; below them the plots."""
-    ego = f"r{log.ego}"
-    ages = [log.age_mean + log.age_std, np.mean(log.ego_age, axis=1)]
-    radio = f"Packets in {RATE_WINDOWS} windows: " + (
-        "sent (grey), heard by anyone (blue)"
-        if log.is_broadcast
-        else "delivered (green), lost (orange), answered (blue)"
-    )
-    counts = packet_counts(log, packets)
-    rates = [rate(of) for name, (_, of) in counts.items() if name != HIDDEN["radio"]]
+def _tree_and_ages(log: Log) -> rrb.Horizontal:
+    """Return the ego robot's tree next to the ages of all pairs."""
     width, height = ((-0.05 * size, 1.05 * size) for size in (TREE_WIDTH, TREE_HEIGHT))
     matrix = rrb.TensorView(
         origin="/ages",
@@ -122,32 +102,27 @@ def _charts(log: Log, packets: dict[str, Links]) -> list[rrb.View | rrb.Containe
         scalar_mapping=rrb.TensorScalarMapping(colormap="Viridis", mag_filter="Nearest"),
         view_fit="Fill",
     )
-    charts: list[rrb.View | rrb.Container] = [
-        rrb.Horizontal(_drawing("/tree", f"Tree of {ego}, in hops", width, height), matrix),
-        _plot("age", f"Age of information [windows]: team ± std (green), {ego} (white)", ages),
-        _plot("radio", radio, rates),
-    ]
-    if log.looks is not None:
-        shares = [share for _, share in surprise_shares(log, log.looks).values()]
-        name = "believed, too weak (red); works, unbelieved (green); cut off (white)"
-        charts.append(_plot("world", f"Share [%]: {name}", shares))
-    if (cost := shown_cost(log)) is not None:
-        name = f"{cost.name[:1].upper()}{cost.name[1:]} [{cost.unit}]"
-        charts.append(_plot("task", name, [cost.value]))
-    return charts
+    return rrb.Horizontal(_drawing("/tree", f"Tree of r{log.ego}, in hops", width, height), matrix)
 
 
-def _plot(entity: str, name: str, shown: Sequence[np.ndarray]) -> rrb.TimeSeriesView:
-    """Return a plot without a legend, which would cover curves: its name says what they are."""
-    hidden: dict[Any, Any] = {}
-    if entity in HIDDEN:
-        hidden[f"/plots/{entity}/{HIDDEN[entity]}"] = rrb.EntityBehavior(visible=False)
-    top = palette.nice_top(max(float(np.max(values)) for values in shown))
+def _plot(plot: Plot) -> rrb.TimeSeriesView:
+    hidden: dict[Any, Any] = {
+        f"/plots/{curve.path}": rrb.EntityBehavior(visible=False)
+        for curve in plot.curves
+        if curve.is_hidden
+    }
+    top = palette.nice_top(
+        max(
+            float(np.max(curve.values if curve.std is None else curve.values + curve.std))
+            for curve in plot.curves
+            if not curve.is_hidden
+        )
+    )
     return rrb.TimeSeriesView(
         overrides=hidden,
         axis_y=rrb.ScalarAxis(range=(0.0, 1.06 * top)),  # so that both ends have numbers
-        origin=f"/plots/{entity}",
-        name=name,
-        plot_legend=rrb.PlotLegend(visible=False),
+        origin=f"/plots/{plot.curves[0].path.split('/')[0]}",
+        name=plot.name,
+        plot_legend=rrb.PlotLegend(visible=False),  # it would cover curves; the name says the same
         background=rrb.archetypes.PlotBackground(color=palette.PLOT, show_grid=False),
     )

@@ -1,7 +1,7 @@
-"""The replay's colours: one ramp for every age, one colour and one shape for every packet's fate.
+"""The colours of replays and videos: one ramp for every age, one colour for every packet's fate.
 
 The ramp is viridis reversed (bright is fresh); the packets' colours are Okabe and Ito's, which stay
-apart for colour-blind eyes. The radio plot and the map share them.
+apart for colour-blind eyes. Maps, scenes, plots and legends share them.
 """
 
 from typing import TypeAlias
@@ -34,13 +34,33 @@ LOST: Colour = (240, 98, 42)
 OVERHEARD: Colour = (204, 121, 167)
 ANSWERED: Colour = (86, 180, 233)
 
-TOO_WEAK: Colour = (232, 70, 94)  # what the world takes of what is believed
-UNBELIEVED: Colour = (0, 148, 108)  # what it gives beyond
+TOO_WEAK: Colour = (232, 70, 94)  # links that policies believe in, but that do not decode
+UNBELIEVED: Colour = (0, 148, 108)  # links that decode, but that policies do not believe in
 CUT_OFF: Colour = (150, 38, 56)
 
 MEAN_AGE: Colour = (53, 183, 121)
 WORST_AGE: Colour = (150, 158, 172)
 VARIANCE: Colour = (240, 200, 80)
+
+
+def dim(colour: Colour, share: float) -> Colour:
+    """Return a darker shade: alpha on 2D lines only darkens, so darken plainly."""
+    return (int(colour[0] * share), int(colour[1] * share), int(colour[2] * share))
+
+
+LOST_SHARE = 0.6  # a lost packet stops short of its receiver
+# Packets by their fate: colour in space, and the share of the way that is drawn. What is drawn
+# first may be covered by what follows.
+PACKETS: dict[str, tuple[Colour, float]] = {
+    "overheard": (dim(OVERHEARD, 0.6), 1.0),
+    "unanswered": (dim(ANSWERED, 0.6), LOST_SHARE),
+    "heard": (BROADCAST, 1.0),
+    "lost": (LOST, LOST_SHARE),
+    "delivered": (DELIVERED, 1.0),
+    "answered": (ANSWERED, 1.0),
+}
+# Links on which channel and belief differ, by kind, in the same order.
+MISMATCH: dict[str, Colour] = {"unbelieved": UNBELIEVED, "too_weak": dim(TOO_WEAK, 0.7)}
 
 # Nine equal steps of viridis (van der Walt and Smith, 2015, CC0), stale to fresh.
 _VIRIDIS = np.frombuffer(
@@ -48,11 +68,6 @@ _VIRIDIS = np.frombuffer(
 ).reshape(-1, 3)
 ROUND = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 10.0)
 _STALEST = 0.10  # the darkest end of viridis would vanish on the background
-
-
-def dim(colour: Colour, share: float) -> Colour:
-    """Return a darker shade: alpha on 2D lines only darkens, so darken plainly."""
-    return (int(colour[0] * share), int(colour[1] * share), int(colour[2] * share))
 
 
 def age_colours(
@@ -67,6 +82,12 @@ def age_colours(
     return rgb.astype(np.uint8)
 
 
+def ramp(full_scale: float, num_shades: int) -> UInt8[np.ndarray, "S 3"]:
+    """Return the colours of ages from 0 to `full_scale`, for a legend."""
+    ages = np.linspace(0.0, full_scale, num_shades)
+    return age_colours(ages, full_scale, np.ones(num_shades, dtype=bool))
+
+
 def robot_colours(
     age_windows: Float[np.ndarray, "*T N"],
     full_scale: float,
@@ -77,13 +98,6 @@ def robot_colours(
     """RGB of robots by the age of what the ego robot knows of them; it is white, dark ones off."""
     colours = age_colours(age_windows, full_scale, is_known)
     colours[..., ego, :] = EGO
-    return with_switched_off(colours, is_on)
-
-
-def with_switched_off(
-    colours: UInt8[np.ndarray, "*T N 3"], is_on: Bool[np.ndarray, "*T N"]
-) -> UInt8[np.ndarray, "*T N 3"]:
-    """Return the same colours, but dark for robots that are off."""
     return np.where(is_on[..., None], colours, np.array(SWITCHED_OFF, np.uint8))
 
 

@@ -1,23 +1,53 @@
-"""Reads a replay back: whether it is whole, which windows it holds, and what a video shows."""
+"""Reads a replay back: whether it is whole, which windows it holds, and what a video shows.
 
+Rerun's format has no checksum of what it holds, so a replay ends in a digest: a second recording
+stream that is empty but for a field that rerun passes over. It repeats the first stream's footer,
+so that rerun finds it where it looks.
+"""
+
+import hashlib
 import shlex
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from rerun.chunk import RrdReader
 
-from swarm_mj.replay.arcs import SEGMENTS
-from swarm_mj.replay.digest import has_digest
+from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Facts, Footage
-from swarm_mj.replay.looks import Looks, Surprises, in_turn
-from swarm_mj.replay.sheet import TIMELINE
-from swarm_mj.replay.shots import LOOKS, Shots, in_order
-from swarm_mj.replay.strokes import STROKES
-from swarm_mj.system.reading import read_json
+from swarm_mj.replay.mismatch import LinkMismatch, by_row
+from swarm_mj.replay.packets import SEGMENTS, PacketSegments
+from swarm_mj.replay.rerun_log import TIMELINE
+from swarm_mj.system.reading import open_file, read_json
 
 FACTS = "footage"  # the recording's property that holds them
+HEADER_BYTES = 12  # at the beginning of a stream
+FOOTER_BYTES, FOOTER = 32, b"RRF2FOOT\x01\x00\x00\x00"  # at its end; how the footer ends
+END = (0).to_bytes(8, "little")  # the kind of a stream's last message
+FIELD = b"\xfa\x7f\x20"  # protobuf's tag of field 2047, and the length of a SHA-256
+SEAL_BYTES = HEADER_BYTES + len(END) + 8 + len(FIELD) + 32 + FOOTER_BYTES
+
+Columns = dict[str, pa.Array]  # timed components, named "/entity component", one row per window
+
+
+def with_digest(recorded: bytes) -> bytes:
+    """Return a recording and its digest; raise OSError if rerun did not write its end."""
+    if not recorded.endswith(FOOTER):
+        raise OSError("rerun did not record the replay to its end")
+    return recorded + _seal(memoryview(recorded))
+
+
+def has_digest(content: bytes) -> bool:
+    """Tell whether this is a replay as it was written, to the last bit."""
+    recorded = memoryview(content)[:-SEAL_BYTES]
+    return content.endswith(FOOTER) and content[-SEAL_BYTES:] == _seal(recorded)
+
+
+def _seal(recorded: memoryview) -> bytes:
+    field = FIELD + hashlib.sha256(recorded).digest()
+    header, footer = recorded[:HEADER_BYTES], recorded[-FOOTER_BYTES:]
+    return b"".join([header, END, len(field).to_bytes(8, "little"), field, footer])
 
 
 def check_replay(path: Path) -> None:
@@ -27,9 +57,11 @@ def check_replay(path: Path) -> None:
         ValueError: There is no such file, or it is not as `write_replay` left it.
         OSError: The disk fails.
     """
-    if not has_digest(path):
-        if path.suffix.lower() != ".rrd":
-            raise ValueError(f"{path} is no .rrd file; `swarm-mj fly` records them")
+    with open_file(path, "replay") as file:
+        is_whole = has_digest(file.read())
+    if not is_whole and path.suffix.lower() != ".rrd":
+        raise ValueError(f"{path} is no .rrd file; `swarm-mj fly` records them")
+    if not is_whole:
         raise ValueError(
             f"{path} is no whole replay: damaged, truncated, or not recorded by this version of "
             f"swarm-mj; record it again, or see what `rerun {shlex.quote(str(path))}` makes of it"
@@ -38,11 +70,11 @@ def check_replay(path: Path) -> None:
 
 def windows(path: Path) -> Int[np.ndarray, "T"]:
     """Return the numbers of a whole replay's windows, in order; 1 is a mission's first."""
-    return _timed(path, "/arena/robots", TIMELINE).to_numpy(zero_copy_only=False).astype(np.int64)
+    return _windows(_columns(path), "/scene/robots")
 
 
 def read_footage(path: Path) -> Footage:
-    """What a video shows of a whole replay.
+    """Return what a video shows of a whole replay.
 
     Raises:
         ValueError: The file is no whole replay, or of an earlier version of swarm-mj.
@@ -50,20 +82,22 @@ def read_footage(path: Path) -> Footage:
     """
     check_replay(path)
     try:
-        facts = _facts(path)
+        facts, columns = _facts(path), _columns(path)
         shape = (-1, facts.mission.num_robots)
-        position_m = _numbers(path, "/scene/robots", "Cylinders3D:centers").reshape(*shape, 3)
+        position_m = _numbers(columns["/scene/robots Cylinders3D:centers"]).reshape(*shape, 3)
+        nobody = np.zeros(position_m.shape[:2], dtype=bool)
+        cut_off = columns.get("/scene/robots is_cut_off")  # absent in free space
         return Footage(
             facts=facts,
-            window=windows(path),
+            window=_windows(columns, "/scene/robots"),
             position_m=position_m[..., :2],
-            velocity_mps=_headings(path, position_m),
-            age=_numbers(path, "/scene/robots", "age").reshape(shape),
-            is_cut_off=_is_cut_off(path).reshape(shape),
-            looks=_looks(path),
-            is_on=_numbers(path, "/scene/robots", "is_on").reshape(shape) > 0.0,
-            shots=_shots(path),
-            age_mean=_numbers(path, "/plots/age/mean", "Measurements:values"),
+            velocity_mps=_headings(columns, nobody.shape),
+            age=_numbers(columns["/scene/robots age"]).reshape(shape),
+            is_cut_off=nobody if cut_off is None else _numbers(cut_off).reshape(shape) > 0.0,
+            mismatch=_mismatch(columns),
+            is_on=_numbers(columns["/scene/robots is_on"]).reshape(shape) > 0.0,
+            segments=_segments(columns),
+            age_mean=_numbers(columns["/plots/age/mean Measurements:values"]),
         )
     except (KeyError, ValueError, pa.ArrowException) as error:
         raise ValueError(
@@ -78,89 +112,71 @@ def _facts(path: Path) -> Facts:
     return read_json(text, Facts)
 
 
-def _headings(path: Path, position_m: Float[np.ndarray, "T N 3"]) -> Float[np.ndarray, "T N 2"]:
-    """Directions of flight; teams at rest have none."""
-    if not _has(path, "/scene/heading"):
-        return np.zeros((*position_m.shape[:2], 2))
-    ends = _numbers(path, "/scene/heading", "LineStrips3D:strips").reshape(*position_m.shape[:2], 6)
+def _columns(path: Path) -> Columns:
+    """Read what a video shows, each component in the order of its windows."""
+    found: dict[str, list[pa.Table]] = {}
+    shown = ["/scene/**", "/plots/age/mean"]
+    for chunk in RrdReader(path).stream().filter(content=shown, is_static=False):
+        table = pa.table(chunk.to_record_batch())
+        for name in table.schema.names:
+            column = table.select(list({TIMELINE, name}))
+            found.setdefault(f"{chunk.entity_path} {name}", []).append(column)
+    return {
+        path: pa.concat_tables(tables).sort_by(TIMELINE).column(path.split()[-1]).combine_chunks()
+        for path, tables in found.items()
+    }
+
+
+def _headings(columns: Columns, shape: tuple[int, ...]) -> Float[np.ndarray, "T N 2"]:
+    """Return directions of flight; teams at rest have none."""
+    if (lines := columns.get("/scene/heading LineStrips3D:strips")) is None:
+        return np.zeros((*shape, 2))
+    ends = _numbers(lines).reshape(*shape, 6)
     return ends[..., 3:5] - ends[..., :2]
 
 
-def _shots(path: Path) -> Shots:
-    rows, starts, ends, colours = [], [], [], []
-    for fate, (colour, _) in LOOKS.items():
-        entity = f"/scene/packets/{fate}"
-        if not _has(path, entity):
-            continue
-        strips = _timed(path, entity, "LineStrips3D:strips")
-        points = _flat(strips).to_numpy().reshape(-1, SEGMENTS + 1, 3).astype(float)
-        per_window = np.diff(strips.offsets.to_numpy())
-        rows.append(np.repeat(np.arange(len(per_window)), per_window))
-        starts.append(points[:, 0, :2])
-        ends.append(points[:, -1, :2])
-        colours.append(np.tile(np.array(colour, dtype=np.uint8), (len(points), 1)))
-    return in_order(rows, starts, ends, colours)
+def _segments(columns: Columns) -> dict[str, PacketSegments]:
+    segments = {}
+    for fate in palette.PACKETS:
+        if (strips := columns.get(f"/scene/packets/{fate} LineStrips3D:strips")) is not None:
+            points_m = _numbers(strips).reshape(-1, SEGMENTS + 1, 3)
+            start_m, end_m = points_m[:, 0, :2], points_m[:, -1, :2]
+            segments[fate] = PacketSegments(row=_rows(strips), start_m=start_m, end_m=end_m)
+    return segments
 
 
-def _is_cut_off(path: Path) -> Bool[np.ndarray, "K"]:
-    """Of each robot in each window; nobody is in free space, and in files of an earlier version."""
-    if _has(path, "/scene/robots", "is_cut_off"):
-        return _numbers(path, "/scene/robots", "is_cut_off") > 0.0
-    return np.zeros(len(_numbers(path, "/scene/robots", "age")), dtype=bool)
-
-
-def _looks(path: Path) -> Looks | None:
-    """Links that surprise, of missions beyond free space."""
-    if not all(_has(path, f"/scene/world/{kind}", "margin_db") for kind in STROKES):
+def _mismatch(columns: Columns) -> LinkMismatch | None:
+    """Return links on which channel and belief differ, of missions beyond free space."""
+    entities = {kind: f"/scene/world/{kind}" for kind in palette.MISMATCH}
+    if not all(f"{entity} margin_db" in columns for entity in entities.values()):
         return None
-    found = [_surprises(path, kind) for kind in STROKES]
-    window = _timed(path, f"/scene/world/{next(iter(STROKES))}", TIMELINE)
-    return Looks(
-        window=window.to_numpy(zero_copy_only=False).astype(np.int64), surprises=in_turn(found)
-    )
+    names, kinds = ("sender", "receiver", "loss_db", "margin_db"), []
+    for kind, entity in entities.items():
+        row = _rows(columns[f"{entity} sender"])
+        kinds.append(
+            LinkMismatch(
+                window=_windows(columns, entity),
+                row=row,
+                is_too_weak=np.full(len(row), kind == "too_weak"),
+                **{name: _numbers(columns[f"{entity} {name}"]).astype(np.int16) for name in names},
+            )
+        )
+    return by_row(kinds)
 
 
-def _surprises(path: Path, kind: str) -> Surprises:
-    entity = f"/scene/world/{kind}"
-    names = ("sender", "receiver", "loss_db", "margin_db")
-    columns = {name: _timed(path, entity, name) for name in names}
-    per_look = np.diff(columns["sender"].offsets.to_numpy())
-    numbers = {name: _flat(column).to_numpy().astype(np.int16) for name, column in columns.items()}
-    row = np.repeat(np.arange(len(per_look)), per_look)
-    strokes = Surprises(row=row, is_too_weak=np.full(len(row), kind == "too_weak"), **numbers)
-    # Earlier versions drew some links in two pieces, each with the numbers of its link.
-    link = np.stack([strokes.row, strokes.sender, strokes.receiver])
-    return strokes.chosen(np.any(np.diff(link, prepend=-1), axis=0))
+def _rows(column: pa.Array) -> Int[np.ndarray, "L"]:
+    """Return the window, from 0, of each thing in lists of things."""
+    per_window = np.diff(column.offsets.to_numpy())
+    return np.repeat(np.arange(len(per_window)), per_window)
 
 
-def _has(path: Path, entity: str, component: str = "") -> bool:
-    return any(
-        not chunk.is_static and component in ("", *chunk.to_record_batch().schema.names)
-        for chunk in RrdReader(path).stream().filter(content=entity)
-    )
+def _windows(columns: Columns, entity: str) -> Int[np.ndarray, "T"]:
+    # An entity that was written in several parts has each window as often.
+    return np.unique(columns[f"{entity} {TIMELINE}"].to_numpy(zero_copy_only=False)).astype(int)
 
 
-def _numbers(path: Path, entity: str, component: str) -> Float[np.ndarray, "K"]:
-    return _flat(_timed(path, entity, component)).to_numpy(zero_copy_only=False).astype(float)
-
-
-def _flat(column: pa.Array) -> pa.Array:
-    """All numbers of nested lists in one row."""
+def _numbers(column: pa.Array) -> Float[np.ndarray, "K"]:
+    """Return all numbers of nested lists in one row."""
     while pa.types.is_list(column.type) or pa.types.is_fixed_size_list(column.type):
         column = column.flatten()
-    return column
-
-
-def _timed(path: Path, entity: str, component: str) -> pa.Array:
-    """Return a component's values in all windows, in order."""
-    batches = [
-        chunk.to_record_batch()
-        for chunk in RrdReader(path).stream().filter(content=entity)
-        if not chunk.is_static
-    ]
-    table = pa.concat_tables(
-        pa.Table.from_batches([batch]).select(list({TIMELINE, component}))
-        for batch in batches
-        if component in batch.schema.names
-    )
-    return table.sort_by(TIMELINE).column(component).combine_chunks()
+    return column.to_numpy(zero_copy_only=False).astype(float)

@@ -1,4 +1,4 @@
-"""What a flight leaves for its replay: one mission's windows as plain arrays."""
+"""The record of a flight for its replay: one mission's windows as plain arrays."""
 
 from dataclasses import dataclass, replace
 from numbers import Integral
@@ -9,22 +9,21 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.physics.scene import Scene
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.costs import TaskCost
-from swarm_mj.replay.looks import Looks, Surprises, joined, look, stride_of
+from swarm_mj.replay.mismatch import LinkMismatch, joined, radio_snapshot, stride_of
+from swarm_mj.replay.packets import PacketLinks, fates
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.simulation.swarm import Swarm
 
 # Longer or larger flights keep the age matrix of every k-th window only.
 MAX_AGE_MATRIX_BYTES = 64e6
 AGE_BYTES = 4  # float32
-STANDS = ("group", "num_believed", "num_working")  # of a look, until the next one
 
 
 @dataclass(frozen=True, kw_only=True)
 class Log:
     """T windows of one mission of N robots, each at its end; packets flew during it.
 
-    Ages are those of the whole team; what is believed, and the parents, are one robot's: the ego
-    robot's.
+    Ages are those of the whole team; positions believed, and parents, are the ego robot's.
     """
 
     ego: int
@@ -33,7 +32,7 @@ class Log:
     velocity_mps: Float[np.ndarray, "T N 2"]  # v [m/s]
     recipient: Int[np.ndarray, "T 2 N"]  # S^i in both phases; itself: silent
     is_on: Bool[np.ndarray, "T N"]  # whether a robot was switched on
-    heard: Int[np.ndarray, "T 2 N"]  # whom robot j decoded in both phases; itself: nobody
+    heard: Int[np.ndarray, "T 2 N"]  # the sender that robot j decoded in both phases; itself: none
     is_broadcast: bool  # packets have no addressee; otherwise the second phase answers the first
     is_known: Bool[np.ndarray, "T N"]  # whether the ego robot has heard of j
     believed_m: Float[np.ndarray, "T N 2"]  # M: where j was, as the ego robot knows it [m]
@@ -47,10 +46,15 @@ class Log:
     velocity_variance_m2ps2: Float[np.ndarray, "T"]  # Eq. 17
     scene: Scene | None = None  # what changed the arena, if anything did
     task_cost: TaskCost | None = None  # one value a window; None if the controller has none
-    group: Int[np.ndarray, "T N"] | None = None  # the first robot that each exchanges news with
+    group: Int[np.ndarray, "T N"] | None = None  # the first robot of each one's connected group
     num_believed: Int[np.ndarray, "T"] | None = None  # links that policies believe in
     num_working: Int[np.ndarray, "T"] | None = None  # links whose packets decode but for fades
-    looks: Looks | None = None  # at the channel; all four are None in free space
+    mismatch: LinkMismatch | None = None  # all four are None in free space
+
+    @property
+    def packets(self) -> dict[str, PacketLinks]:
+        """All packets by their fate."""
+        return fates(self.recipient, self.heard, is_broadcast=self.is_broadcast)
 
     @property
     def has_motion(self) -> bool:
@@ -74,7 +78,7 @@ class Log:
 
     @property
     def is_cut_off(self) -> Bool[np.ndarray, "T N"]:
-        """Whether a robot can exchange no news with the ego robot, over whatever hops."""
+        """Whether a robot can exchange no packets with the ego robot, over whatever hops."""
         if self.group is None:
             return np.zeros(self.is_on.shape, dtype=bool)
         is_apart = self.group != self.group[:, [self.ego]]
@@ -88,7 +92,7 @@ class Recorder:
         """Prepare the record.
 
         Args:
-            swarm: Whose mission 0 is recorded.
+            swarm: Its mission 0 is recorded.
             ego: The robot whose knowledge is shown.
             is_broadcast: Whether windows are two broadcasts (IV-C) instead of those of Alg. 1.
 
@@ -106,9 +110,9 @@ class Recorder:
         self._rows: list[dict[str, np.ndarray]] = []
         self._age: list[np.ndarray] = []
         self._task_costs: list[TaskCost] = []
-        self._look_stride = stride_of(swarm, self._stride)
-        self._looks: list[Surprises] = []
-        self._latest: dict[str, object] = {}  # of looks, what stands until the next one
+        self._radio_stride = stride_of(swarm, self._stride)
+        self._mismatches: list[LinkMismatch] = []
+        self._radio: dict[str, object] = {}  # of the last snapshot, which stands until the next
 
     def add(self, flown: WindowRecord) -> None:
         """Record the window that was just flown."""
@@ -120,9 +124,10 @@ class Recorder:
         own = self._ego
         if len(self._rows) % self._stride == 0:
             self._age.append(age.astype(np.float32))
-        if len(self._rows) % self._look_stride == 0 and (seen := look(self._swarm)) is not None:
-            self._looks.append(seen.surprises)
-            self._latest = {name: getattr(seen, name) for name in STANDS}
+        if len(self._rows) % self._radio_stride == 0:
+            self._add_snapshot()
+        if flown.costs.task_cost is not None:
+            self._task_costs.append(flown.costs.task_cost)
         shown = {
             "position_m": states.position_m[0],
             "velocity_mps": states.velocity_mps[0],
@@ -137,47 +142,46 @@ class Recorder:
             "age_std": np.std(others),
             "age_max": np.max(others),
             "velocity_variance_m2ps2": flown.costs.velocity_variance_m2ps2[0],
-            **self._latest,
+            **self._radio,
         }
-        if flown.costs.task_cost is not None:
-            self._task_costs.append(flown.costs.task_cost)
-        # Copies: the swarm writes its arrays in place, and a view would keep a whole matrix.
+        # Copies: the swarm writes its arrays in place, and a view would keep a whole matrix. The
+        # row comes last: whatever an interrupt leaves unfinished, rows count the whole windows.
         self._rows.append({name: np.array(value) for name, value in shown.items()})
 
     @property
     def num_bytes(self) -> int:
-        """What is recorded so far takes of memory; every window takes the same."""
+        """The memory taken so far; every window takes the same."""
         row = sum(value.nbytes for value in self._rows[0].values()) if self._rows else 0
-        looks = sum(each.num_bytes for each in self._looks)
-        return len(self._rows) * row + sum(age.nbytes for age in self._age) + looks
+        links = sum(array.nbytes for each in self._mismatches for array in vars(each).values())
+        return len(self._rows) * row + sum(age.nbytes for age in self._age) + links
 
     def log(self) -> Log:
-        """Everything recorded so far; raises ValueError if that is nothing."""
+        """Return everything recorded so far; raise ValueError if that is nothing."""
         if not self._rows:
             raise ValueError("a replay needs at least 1 window flown, not 0")
         columns = {name: np.stack([row[name] for row in self._rows]) for name in self._rows[0]}
         window = np.arange(1, len(self._rows) + 1)
-        age_window = window[:: self._stride]
+        age_window, seen = window[:: self._stride], window[:: self._radio_stride]
+        costs = self._task_costs[: len(window)]
+        value = np.array([cost.value[0] for cost in costs])
         return Log(
             ego=self._ego,
             window=window,
             is_broadcast=self._is_broadcast,
             scene=self._swarm.scene,
             age_window=age_window,
-            # An interrupt between the two appends of `add` leaves one matrix too many.
+            # An interrupt within `add` leaves one matrix, snapshot or cost too many.
             age=np.stack(self._age[: len(age_window)]),
-            task_cost=self._task_cost(len(window)),
-            looks=self._seen(window[:: self._look_stride]),
+            task_cost=replace(costs[0], value=value) if costs else None,
+            mismatch=joined(self._mismatches[: len(seen)], seen) if self._mismatches else None,
             **columns,
         )
 
-    def _seen(self, window: Int[np.ndarray, "C"]) -> Looks | None:
-        """Return the looks at the channel, if it can be looked at."""
-        return joined(self._looks[: len(window)], window) if self._looks else None
-
-    def _task_cost(self, num_windows: int) -> TaskCost | None:
-        """What the task cost in each window of the mission recorded."""
-        costs = self._task_costs[:num_windows]
-        return (
-            replace(costs[0], value=np.array([cost.value[0] for cost in costs])) if costs else None
-        )
+    def _add_snapshot(self) -> None:
+        if (seen := radio_snapshot(self._swarm)) is not None:
+            self._mismatches.append(seen.mismatch)
+            self._radio = {
+                "group": seen.group,
+                "num_believed": seen.num_believed,
+                "num_working": seen.num_working,
+            }

@@ -8,8 +8,7 @@ from reading import column, counts, rows, rows_of_strips, static
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.arena import square_m
-from swarm_mj.replay.frame import Frame
-from swarm_mj.replay.links import fates
+from swarm_mj.replay.footage import Frame
 from swarm_mj.replay.write import write_replay
 
 
@@ -25,7 +24,7 @@ def test_arrows_are_as_many_as_the_packets_counted(replay, two_way, fate):
 
 
 def test_a_delivered_packet_s_arrow_ends_at_its_receiver(replay, two_way):
-    links = fates(two_way.log)["delivered"]
+    links = two_way.log.packets["delivered"]
     entity = "/arena/radio/delivered"
     start = rows(replay, entity, "Arrows2D:origins", 2)
     way = rows(replay, entity, "Arrows2D:vectors", 2)
@@ -34,7 +33,7 @@ def test_a_delivered_packet_s_arrow_ends_at_its_receiver(replay, two_way):
 
 
 def test_a_lost_packet_s_arrow_stops_short(replay, two_way):
-    links = fates(two_way.log)["lost"]
+    links = two_way.log.packets["lost"]
     start = two_way.log.position_m[links.row, links.sender]
     full = two_way.log.position_m[links.row, links.receiver] - start
     way = rows(replay, "/arena/radio/lost", "Arrows2D:vectors", 2)
@@ -90,7 +89,7 @@ def test_headings_have_one_length_and_the_direction_of_flight(replay, two_way):
 
 
 def test_lines_lead_from_transmitters_to_hearers(flood_replay, flooded):
-    log, links = flooded.log, fates(flooded.log)["heard"]
+    log, links = flooded.log, flooded.log.packets["heard"]
     strips = rows_of_strips(flood_replay, "/arena/radio/heard")
     expected = np.stack(
         [log.position_m[links.row, links.sender], log.position_m[links.row, links.receiver]], axis=1

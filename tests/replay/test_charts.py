@@ -1,19 +1,10 @@
-"""What the charts show, against plain loops."""
+"""What the tree, the age matrix and the state lanes show, against plain loops."""
 
 import numpy as np
 from reading import column, rows_of_strips
 
 from swarm_mj.mission.geometry import spanning_tree
-from swarm_mj.replay.charts import (
-    packet_counts,
-    radio_states,
-    rate,
-    surprise_shares,
-    walk,
-)
-from swarm_mj.replay.links import fates
-
-FATES = ["delivered", "lost", "overheard", "answered"]
+from swarm_mj.replay.charts import dendrogram, radio_states, walk
 
 
 def test_a_walk_visits_everyone_once_and_children_after_parents(two_way):
@@ -23,13 +14,6 @@ def test_a_walk_visits_everyone_once_and_children_after_parents(two_way):
     for j, k in enumerate(parent):
         if k >= 0:
             assert order.index(k) < order.index(j)
-
-
-def test_the_rate_counts_the_last_ten_windows():
-    counts = np.arange(25)
-    np.testing.assert_array_equal(
-        rate(counts), [sum(counts[max(0, t - 9) : t + 1]) for t in range(25)]
-    )
 
 
 def test_states_follow_a_plain_reading_of_the_log(two_way):
@@ -61,36 +45,6 @@ def test_a_broadcasting_robot_transmits_hears_or_is_silent(flooded):
         assert names[state[t, i]] == expected
 
 
-def test_the_packet_plot_counts_as_the_costs_do(two_way, flooded):
-    for recorded, curves in ((two_way, FATES), (flooded, ["sent", "heard"])):
-        counts = packet_counts(recorded.log, fates(recorded.log))
-        assert list(counts) == list(curves)
-        for name, (_, per_window) in counts.items():
-            np.testing.assert_array_equal(per_window, recorded.counted(name))
-
-
-def test_the_plot_of_the_world_has_shares_of_links_and_robots(blocked, blocked_replay):
-    log = blocked.log
-    expected = {"believed, too weak": [], "works, unbelieved": [], "cut off from r4": []}
-    weak, works, cut_off = expected.values()
-    for window in log.looks.window.tolist():
-        where, seen = log.position_m[window - 1], log.looks.at(window)
-        num_near = sum(
-            np.linalg.norm(where[i] - where[j]) <= 250.0 for i in range(14) for j in range(i)
-        )
-        num_weak = seen.is_too_weak.tolist().count(True)
-        num_extra = len(seen.row) - num_weak
-        weak.append(100.0 * num_weak / num_near)
-        works.append(100.0 * num_extra / (num_near - num_weak + num_extra))
-        team = log.group[window - 1].tolist()
-        cut_off.append(100.0 * sum(of != team[4] for of in team) / 13)
-    shares = surprise_shares(log, log.looks)
-    for name, values in expected.items():
-        np.testing.assert_allclose(shares[name][1], values)
-    shown = column(blocked_replay, "/plots/world/cut_off_from_r4", "Scalars:scalars")
-    np.testing.assert_allclose(shown.flatten().to_numpy(), cut_off)
-
-
 def test_rows_of_the_matrix_own_and_columns_are_owned(replay, two_way):
     """The ego robot's row, wherever the walk put it, is what the ego robot knows."""
     tensors = column(replay, "/ages", "Tensor:data").flatten().to_pylist()
@@ -114,13 +68,6 @@ def test_the_matrix_holds_every_pair_s_age(replay, two_way):
     )
 
 
-def test_plots_are_the_costs(replay, two_way):
-    shown = column(replay, "/plots/task/cost", "Scalars:scalars").flatten().to_numpy()
-    np.testing.assert_allclose(shown, two_way.log.velocity_variance_m2ps2, rtol=1e-12)
-    values = column(replay, "/plots/age/mean", "Measurements:values").flatten().to_numpy()
-    np.testing.assert_allclose(values, two_way.log.age_mean, rtol=1e-6)
-
-
 def test_the_tree_s_lines_join_nodes_a_hop_apart(replay, two_way):
     strips = rows_of_strips(replay, "/tree/edges")
     known = two_way.log.is_known & (np.arange(12) != two_way.log.ego)
@@ -128,3 +75,39 @@ def test_the_tree_s_lines_join_nodes_a_hop_apart(replay, two_way):
     hop = np.unique(np.round(strips[:, 1, 0] - strips[:, 0, 0], 3))
     assert len(hop) == 1
     assert hop[0] > 0
+
+
+def test_a_small_tree_by_hand():
+    # 0 - 1, 0 - 2, 2 - 3, 2 - 4; 5 is unknown. Leaves from the top: 1, 3, 4.
+    parent = np.array([[-1, 0, 0, 2, 2, -1]], dtype=np.int32)
+    is_known = np.array([[True, True, True, True, True, False]])
+    place = dendrogram(parent, is_known, 0)[0]
+    np.testing.assert_array_equal(place[:5, 0], [0, 1, 1, 2, 2])
+    np.testing.assert_allclose(place[[1, 3, 4], 1], [0.0, 0.5, 1.0])
+    np.testing.assert_allclose(place[2, 1], 0.75)  # amid 3 and 4
+    np.testing.assert_allclose(place[0, 1], 0.375)  # amid 1 and 2
+    assert np.all(np.isnan(place[5]))
+
+
+def test_a_lone_observer_stands_in_the_middle():
+    place = dendrogram(np.full((1, 3), -1, dtype=np.int32), np.array([[False, True, False]]), 1)
+    np.testing.assert_array_equal(place[0, 1], [0.0, 0.5])
+
+
+def test_depth_is_the_number_of_hops_to_the_observer(two_way):
+    log = two_way.log
+    place = dendrogram(log.parent, log.is_known, log.ego)
+    for t in range(len(log.window)):
+        for j in np.flatnonzero(log.is_known[t]):
+            hops, at = 0, j
+            while at != log.ego:
+                at = log.parent[t, at]
+                hops += 1
+            assert place[t, j, 0] == hops
+
+
+def test_no_two_robots_share_a_place(two_way):
+    log = two_way.log
+    place = dendrogram(log.parent, log.is_known, log.ego)[-1]
+    known = place[~np.isnan(place[:, 0])]
+    assert len(np.unique(known, axis=0)) == len(known) == np.sum(log.is_known[-1])

@@ -1,4 +1,4 @@
-"""What a video shows is the same from a log and from its replay."""
+"""What a video shows is the same from a log and from its replay; the map's frame, by hand."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 
 from swarm_mj.mission.components import Components
 from swarm_mj.replay import palette
-from swarm_mj.replay.footage import footage_of
+from swarm_mj.replay.footage import footage_of, frame
 from swarm_mj.replay.read import read_footage
 from swarm_mj.replay.write import write_replay
 
@@ -27,37 +27,29 @@ def test_a_replay_holds_what_a_video_shows(name, request, tmp_path):
     np.testing.assert_array_equal(read.age, made.age)
     np.testing.assert_array_equal(read.is_on, log.is_on)
     np.testing.assert_array_equal(read.is_cut_off, log.is_cut_off)
-    assert (read.looks is None) == (made.looks is None)
+    assert (read.mismatch is None) == (made.mismatch is None)
     np.testing.assert_allclose(read.age_mean, made.age_mean)
     speed = np.maximum(np.linalg.norm(made.velocity_mps, axis=2, keepdims=True), 1e-9)
     length = np.maximum(np.linalg.norm(read.velocity_mps, axis=2, keepdims=True), 1e-9)
     headings = read.velocity_mps / length, made.velocity_mps / speed
     np.testing.assert_allclose(*headings, atol=1e-3)
-    np.testing.assert_array_equal(read.shots.row, made.shots.row)
-    np.testing.assert_array_equal(read.shots.colour, made.shots.colour)
-    for end in ("start_m", "end_m"):
-        shown, expected = (getattr(each.shots, end) for each in (read, made))
-        np.testing.assert_allclose(shown, expected, rtol=1e-5, atol=1e-2)
+    assert list(read.segments) == list(made.segments)
+    for fate, expected in made.segments.items():
+        np.testing.assert_array_equal(read.segments[fate].row, expected.row)
+        for end in ("start_m", "end_m"):
+            ends = (getattr(each, end) for each in (read.segments[fate], expected))
+            np.testing.assert_allclose(*ends, rtol=1e-5, atol=1e-2)
 
 
 def test_a_replay_holds_the_links_that_surprise(blocked, blocked_replay):
-    read, made = read_footage(blocked_replay).looks, blocked.log.looks
+    read, made = read_footage(blocked_replay).mismatch, blocked.log.mismatch
     np.testing.assert_array_equal(read.window, made.window)
     for window in made.window.tolist():
         for kind, expected in made.at(window).by_kind.items():
             found = read.at(window).by_kind[kind]
             for name in ("sender", "receiver", "loss_db", "margin_db"):
                 np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
-    assert all(len(of.row) > 0 for of in made.surprises.by_kind.values())
-
-
-def test_a_replay_from_before_there_were_such_links_is_shown_without(blocked, tmp_path):
-    earlier = replace(blocked.log, looks=None)
-    write_replay(earlier, blocked.mission, {"seed": 5}, tmp_path / "old.rrd")
-    footage = read_footage(tmp_path / "old.rrd")
-    assert footage.looks is None
-    assert not np.any(footage.is_cut_off)
-    assert len(footage.surprises(3).row) == 0
+    assert all(len(of.row) > 0 for of in made.by_kind.values())
 
 
 def test_shortfalls_are_those_of_robots_that_the_observer_misses(blocked):
@@ -66,7 +58,7 @@ def test_shortfalls_are_those_of_robots_that_the_observer_misses(blocked):
     num_said = 0
     for row, window in enumerate(log.window.tolist()):
         others, margin_db = footage.shortfalls(row)
-        found = log.looks.at(window)
+        found = log.mismatch.at(window)
         missed = [
             (j if i == log.ego else i, margin)
             for i, j, margin, weak in zip(
@@ -77,18 +69,6 @@ def test_shortfalls_are_those_of_robots_that_the_observer_misses(blocked):
         assert list(zip(others, margin_db, strict=True)) == missed
         num_said += len(missed)
     assert num_said > 0
-
-
-def test_links_that_an_earlier_version_drew_in_two_pieces_are_read_once(blocked, tmp_path):
-    looks = blocked.log.looks
-    twice = np.repeat(np.arange(len(looks.surprises.row)), 2)
-    earlier = replace(blocked.log, looks=replace(looks, surprises=looks.surprises.chosen(twice)))
-    write_replay(earlier, blocked.mission, {"seed": 5}, tmp_path / "old.rrd")
-    read = read_footage(tmp_path / "old.rrd").looks
-    for kind, expected in looks.surprises.by_kind.items():
-        found = read.surprises.by_kind[kind]
-        np.testing.assert_array_equal(found.row, expected.row)
-        np.testing.assert_array_equal(found.receiver, expected.receiver)
 
 
 def test_colours_are_by_age_white_for_the_observer_and_dark_for_the_fallen(failing):
@@ -107,13 +87,6 @@ def test_an_open_area_is_shown_where_robots_ever_are(two_way):
     assert offset.max() == pytest.approx(seen.reach_m)
     walled = footage_of(two_way.log, two_way.mission, "mst", 5).frame
     assert walled.reach_m == two_way.mission.half_side_m
-
-
-def test_a_damaged_replay_is_refused(replay, tmp_path):
-    cut = tmp_path / "cut.rrd"
-    cut.write_bytes(replay.read_bytes()[:-7])
-    with pytest.raises(ValueError, match="no whole replay"):
-        read_footage(cut)
 
 
 def test_a_replay_without_facts_is_refused_in_one_line(two_way, tmp_path, monkeypatch):
@@ -139,3 +112,44 @@ def test_a_file_of_another_kind_is_called_so(tmp_path):
     (tmp_path / "fading.py").write_text("text")
     with pytest.raises(ValueError, match=r"fading.py is no .rrd file; `swarm-mj fly` records them"):
         read_footage(tmp_path / "fading.py")
+
+
+def moved(log, *, by_m):
+    """The log with a team that drifts, so much in all."""
+    drift = np.linspace(0.0, 1.0, len(log.window))[:, None, None] * np.array(by_m)
+    return replace(log, position_m=log.position_m + drift)
+
+
+def test_a_team_that_stays_is_shown_with_the_area(two_way):
+    half_side_m = two_way.mission.half_side_m
+    assert np.max(np.abs(two_way.log.position_m)) <= half_side_m  # the boundary reflects
+    shown = frame(two_way.log.position_m, half_side_m)
+    assert shown.reach_m == half_side_m
+    assert not shown.moves
+
+
+def test_a_team_that_leaves_the_area_a_little_is_shown_with_it(two_way):
+    log = moved(two_way.log, by_m=(0.0, 100.0))
+    shown = frame(log.position_m, two_way.mission.half_side_m)
+    assert shown.reach_m == np.max(np.abs(log.position_m)) > two_way.mission.half_side_m
+    assert not shown.moves
+
+
+@pytest.mark.parametrize(("farthest_m", "moves"), [(150.0, False), (150.1, True)])
+def test_a_team_within_one_and_a_half_times_the_area_is_shown_with_it(two_way, farthest_m, moves):
+    """An area of half side 100 m; one robot stands as far out, in one window."""
+    position_m = np.zeros_like(two_way.log.position_m)
+    position_m[3, 5, 1] = -farthest_m
+    shown = frame(position_m, 100.0)
+    assert shown.moves == moves
+
+
+def test_a_team_that_flies_off_is_followed(two_way):
+    log = moved(two_way.log, by_m=(9000.0, -500.0))
+    shown = frame(log.position_m, two_way.mission.half_side_m)
+    assert shown.moves
+    for here, centre in zip(log.position_m, shown.centre_m, strict=True):
+        assert np.max(np.abs(here - centre)) <= shown.reach_m + 1e-6
+    assert shown.reach_m == pytest.approx(
+        max(np.ptp(here, axis=0).max() for here in log.position_m) / 2
+    )

@@ -49,9 +49,8 @@ def test_beyond_free_space(blocked_replay):
 
 
 def test_nothing_surprises_where_packets_only_fade(blocked, tmp_path):
-    of_none = blocked.log.looks.surprises.chosen(np.s_[:0])
-    looks = replace(blocked.log.looks, surprises=of_none)
-    log = replace(blocked.log, looks=looks, group=np.zeros_like(blocked.log.group))
+    none = blocked.log.mismatch.chosen(np.s_[:0])
+    log = replace(blocked.log, mismatch=none, group=np.zeros_like(blocked.log.group))
     write_replay(log, blocked.mission, {"seed": 5}, tmp_path / "a.rrd")
     assert texts(tmp_path / "a.rrd") == BROADCAST | MOVING | {"r4's tree", "range in\nfree space"}
 

@@ -6,7 +6,7 @@ import pytest
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay import recorder
-from swarm_mj.replay.looks import look
+from swarm_mj.replay.mismatch import radio_snapshot
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
@@ -85,24 +85,24 @@ def test_looks_are_taken_every_few_windows_and_groups_stand_until_the_next():
     record, seen = Recorder(swarm, ego=2), []
     for window in rollout(swarm, make_policy("tdma", mission)):
         record.add(window)
-        seen.append(look(swarm))
+        seen.append(radio_snapshot(swarm))
     log = record.log()
-    np.testing.assert_array_equal(log.looks.window, [1, 6, 11])
+    np.testing.assert_array_equal(log.mismatch.window, [1, 6, 11])
     np.testing.assert_array_equal(log.group, [seen[5 * (w // 5)].group for w in range(12)])
     for window in (1, 6, 11):
-        shown, expected = log.looks.at(window), seen[window - 1].surprises
+        shown, expected = log.mismatch.at(window), seen[window - 1].mismatch
         np.testing.assert_array_equal(shown.sender, expected.sender)
         np.testing.assert_array_equal(shown.margin_db, expected.margin_db)
     is_apart = np.array([[of != team[2] for of in team] for team in log.group])
     np.testing.assert_array_equal(log.is_cut_off, is_apart)
     kept = [*record._age, *(value for row in record._rows for value in row.values())]
-    found = sum(seen[w].surprises.num_bytes for w in (0, 5, 10))
+    found = sum(array.nbytes for w in (0, 5, 10) for array in vars(seen[w].mismatch).values())
     assert record.num_bytes == sum(each.nbytes for each in kept) + found
 
 
 def test_free_space_is_not_looked_at():
     log, _ = flown_log()
-    assert log.looks is None
+    assert log.mismatch is None
     assert log.group is None
     assert not np.any(log.is_cut_off)
 

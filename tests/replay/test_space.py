@@ -7,8 +7,7 @@ from mujoco import mjtGeom
 from reading import column, counts, rows, static
 from rerun.chunk import RrdReader
 
-from swarm_mj.replay.arcs import SEGMENTS
-from swarm_mj.replay.links import fates
+from swarm_mj.replay.packets import SEGMENTS
 from swarm_mj.replay.write import write_replay
 
 
@@ -25,7 +24,7 @@ def test_bodies_stand_where_the_robots_are(replay, two_way):
 
 
 def test_a_window_s_arcs_are_its_packets(replay, two_way):
-    links = fates(two_way.log)["delivered"]
+    links = two_way.log.packets["delivered"]
     entity = "/scene/packets/delivered"
     per_window = counts(replay, entity, "LineStrips3D:strips")
     np.testing.assert_array_equal(per_window, two_way.counted("delivered"))

@@ -1,22 +1,21 @@
 """What a picture shows of one moment of a mission."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.frame import frame
-from swarm_mj.replay.links import fates
-from swarm_mj.replay.looks import NO_SURPRISES, look
-from swarm_mj.replay.shots import shots
-from swarm_mj.replay.strokes import strokes_at_once
+from swarm_mj.replay.footage import frame
+from swarm_mj.replay.mismatch import LinkMismatch, coloured_lines, radio_snapshot
+from swarm_mj.replay.packets import PacketSegments, fates, packet_segments
 from swarm_mj.simulation.swarm import Swarm
 
 
 @dataclass(frozen=True, kw_only=True)
 class Contents:
-    """N robots, L packets, S lines of links that surprise, and the ground that a picture shows."""
+    """N robots, L packets, S lines of mismatched links, and the ground that a picture shows."""
 
     position_m: Float[np.ndarray, "N 2"]  # p [m]
     velocity_mps: Float[np.ndarray, "N 2"]  # v; only its direction is drawn
@@ -24,21 +23,46 @@ class Contents:
     observer: int  # the robot that is drawn larger
     start_m: Float[np.ndarray, "L 2"]  # where packets begin and end [m]
     end_m: Float[np.ndarray, "L 2"]
-    link_colour: UInt8[np.ndarray, "L 3"]
-    strokes_m: Float[np.ndarray, "S 2 2"]  # links that surprise, from start to end [m]
-    stroke_colour: UInt8[np.ndarray, "S 3"]
-    is_cut_off: Bool[np.ndarray, "N"]  # whether it can exchange no news with the observer
+    packet_colour: UInt8[np.ndarray, "L 3"]
+    lines_m: Float[np.ndarray, "S 2 2"]  # mismatched links, from start to end [m]
+    line_colour: UInt8[np.ndarray, "S 3"]
+    is_cut_off: Bool[np.ndarray, "N"]  # whether it can exchange no packets with the observer
     centre_m: Float[np.ndarray, "2"]  # of the square [m]
     reach_m: float  # half its side [m]
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Flown:
-    """The packets of a swarm's last window, as `fates` takes them."""
+def links_of(
+    segments: Mapping[str, PacketSegments],
+    mismatch: LinkMismatch | None,
+    position_m: Float[np.ndarray, "N 2"],
+    observer: int,
+    row: int = 0,
+) -> dict[str, np.ndarray]:
+    """Return the packets and mismatched links of one window, as fields of `Contents`.
 
-    recipient: Int[np.ndarray, "1 2 N"]
-    heard: Int[np.ndarray, "1 2 N"]
-    is_broadcast: bool
+    Args:
+        segments: Packets of all windows, by their fate.
+        mismatch: Links of this window.
+        position_m: The robots' [m].
+        observer: The robot whose links that are too weak are shown.
+        row: The window, from 0.
+    """
+    starts, ends = [np.zeros((0, 2))], [np.zeros((0, 2))]
+    colours = [np.zeros((0, 3), dtype=np.uint8)]
+    for fate, drawn in segments.items():
+        first, last = np.searchsorted(drawn.row, [row, row + 1])
+        starts.append(drawn.start_m[first:last])
+        ends.append(drawn.end_m[first:last])
+        colour = np.array(palette.PACKETS[fate][0], dtype=np.uint8)
+        colours.append(np.tile(colour, (last - first, 1)))
+    lines_m, line_colour = coloured_lines(mismatch, position_m, observer)
+    return {
+        "start_m": np.concatenate(starts),
+        "end_m": np.concatenate(ends),
+        "packet_colour": np.concatenate(colours),
+        "lines_m": lines_m,
+        "line_colour": line_colour,
+    }
 
 
 def contents_of(
@@ -49,18 +73,15 @@ def contents_of(
     is_broadcast: bool = False,
     full_scale: float | None = None,
 ) -> Contents:
-    """What a swarm looks like now, with the packets of the window just flown.
+    """Return what a swarm looks like now, with the packets of the window just flown.
 
     Args:
         swarm: The missions.
-        index: Which of them is shown.
+        index: The mission that is shown.
         observer: The robot by whose knowledge the others are coloured; it is white itself.
         is_broadcast: Whether windows are two broadcasts (IV-C) instead of those of Alg. 1.
         full_scale: The age from which robots are darkest [windows]; unless given, the number of
             robots: a round in which everyone has its turn.
-
-    Returns:
-        The contents of a picture.
 
     Raises:
         ValueError: There is no such mission or robot.
@@ -69,51 +90,39 @@ def contents_of(
     for what, value, end in (("index", index, len(swarm.now)), ("observer", observer, num_robots)):
         if not 0 <= value < end:
             raise ValueError(f"{what} must be from 0 to {end - 1}, not {value}")
-    states = swarm.states
+    states, buffers = swarm.states, swarm.buffers
     position_m = states.position_m[index].copy()
-    seen = shots(fates(_flown(swarm, index, is_broadcast)), position_m[None])
+    is_on = np.ones(num_robots, bool) if states.is_active is None else states.is_active[index]
+    age = swarm.now[index] - buffers.timestamp[index, observer]
+    is_known = buffers.is_known[index, observer]
+    seen = radio_snapshot(swarm, index)
+    group = np.zeros(num_robots, np.int16) if seen is None else seen.group
     half_side_m = swarm.mission.half_side_m
     square = frame(position_m[None], half_side_m)
-    granted = look(swarm, index)
-    group = np.zeros(num_robots, np.int16) if granted is None else granted.group
-    surprises = NO_SURPRISES if granted is None else granted.surprises
-    lines_m, line_colour = strokes_at_once(surprises, position_m, observer)
-    is_on = _is_on(swarm, index)
     return Contents(
         position_m=position_m,
         velocity_mps=states.velocity_mps[index].copy(),
-        colour=_colours(swarm, index, observer, full_scale or float(num_robots)),
+        colour=palette.robot_colours(
+            age, full_scale or float(num_robots), is_known, is_on, observer
+        ),
         observer=observer,
-        start_m=seen.start_m,
-        end_m=seen.end_m,
-        link_colour=seen.colour,
-        strokes_m=lines_m,
-        stroke_colour=line_colour,
+        **links_of(
+            _last_packets(swarm, index, is_broadcast),
+            None if seen is None else seen.mismatch,
+            position_m,
+            observer,
+        ),
         is_cut_off=is_on & is_on[observer] & (group != group[observer]),
         centre_m=square.centre_m[0],
         reach_m=max(half_side_m, square.reach_m),  # as wide wherever the team is
     )
 
 
-def _flown(swarm: Swarm, index: int, is_broadcast: bool) -> _Flown:
-    silent = np.tile(np.arange(swarm.mission.num_robots), (1, 2, 1))
-    phases = swarm.phases
-    return _Flown(
-        recipient=np.stack([[p.recipient[index] for p in phases]]) if phases else silent,
-        heard=np.stack([[p.heard[index] for p in phases]]) if phases else silent,
-        is_broadcast=is_broadcast,
-    )
-
-
-def _colours(
-    swarm: Swarm, index: int, observer: int, full_scale: float
-) -> UInt8[np.ndarray, "N 3"]:
-    age = swarm.now[index] - swarm.buffers.timestamp[index, observer]
-    is_known = swarm.buffers.is_known[index, observer]
-    is_on = _is_on(swarm, index)
-    return palette.robot_colours(age, full_scale, is_known, is_on, observer)
-
-
-def _is_on(swarm: Swarm, index: int) -> Bool[np.ndarray, "N"]:
-    is_active = swarm.states.is_active
-    return np.ones(swarm.mission.num_robots, bool) if is_active is None else is_active[index]
+def _last_packets(swarm: Swarm, index: int, is_broadcast: bool) -> dict[str, PacketSegments]:
+    """Return the packets of one mission's last window; before the first one there are none."""
+    if not swarm.phases:
+        return {}
+    recipient = np.stack([[phase.recipient[index] for phase in swarm.phases]])
+    heard = np.stack([[phase.heard[index] for phase in swarm.phases]])
+    packets = fates(recipient, heard, is_broadcast=is_broadcast)
+    return packet_segments(packets, swarm.states.position_m[index][None])

@@ -11,8 +11,8 @@ from PIL import Image, ImageDraw, ImageFont
 from swarm_mj.mission.presets import where_flown
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
+from swarm_mj.replay.mismatch import DASHES, WHOLE
 from swarm_mj.replay.palette import Colour, dim
-from swarm_mj.replay.strokes import PIECES, STROKES, WHOLE
 
 CURVES: tuple[Colour, ...] = (palette.MEAN_AGE, palette.VARIANCE)  # of one flight, and a second
 FAINT = 0.45  # what is still to come, and texts that matter less
@@ -122,7 +122,7 @@ def _draw_sample(
         disc = (centre - radius, middle - radius, centre + radius, middle + radius)
         draw.ellipse(disc, colour)
         return
-    pieces = PIECES["too_weak"] if colour == STROKES["too_weak"] else WHOLE
+    pieces = DASHES if colour == palette.MISMATCH["too_weak"] else WHOLE
     for a, b in (x + 1.2 * size * pieces).round().tolist():
         draw.line((a, middle, b - 1, middle), colour, max(2, size // 6))
 
@@ -196,13 +196,13 @@ def _packet_colours(footages: Sequence[Footage]) -> dict[str, Colour]:
 
 def _surprise_colours(footages: Sequence[Footage]) -> dict[str, Colour]:
     """What links that surprise look like, if there are any, and robots that are cut off."""
-    found = [each.looks.surprises.by_kind for each in footages if each.looks is not None]
+    found = [each.mismatch.by_kind for each in footages if each.mismatch is not None]
     texts = {
         "too_weak": f"{_observers(footages)}'s link, too weak",
         "unbelieved": "works, unbelieved",
     }
     shown = [kind for kind in texts if any(len(of[kind].row) for of in found)]
-    colours = {texts[kind]: STROKES[kind] for kind in shown}
+    colours = {texts[kind]: palette.MISMATCH[kind] for kind in shown}
     if "too_weak" in shown:
         colours[SHORTFALL] = palette.TOO_WEAK
     if any(np.any(each.is_cut_off) for each in footages):

@@ -9,7 +9,7 @@ from mujoco._functions import mjv_connector, mjv_initGeom
 from mujoco._structs import MjvGeom, MjvScene
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.arcs import SEGMENTS, arcs
+from swarm_mj.replay.packets import SEGMENTS, arcs
 from swarm_mj.replay.rendering.camera import Camera
 from swarm_mj.replay.rendering.contents import Contents
 
@@ -59,7 +59,7 @@ class Markers:
     def _draw_links(self, contents: Contents, picture_m: float) -> None:
         """Packets as arcs."""
         lifted = arcs(contents.start_m, contents.end_m, ROBOT * picture_m)
-        for points, colour in zip(lifted, contents.link_colour, strict=True):
+        for points, colour in zip(lifted, contents.packet_colour, strict=True):
             for start, end in itertools.pairwise(points):
                 self._add_line(start, end, colour)
 
@@ -67,8 +67,8 @@ class Markers:
         """Links that surprise as straight lines, as many as there is room for."""
         room = self._scene.maxgeom - self._scene.ngeom
         height_m = ROBOT_HEIGHT * ROBOT * picture_m
-        lifted = np.pad(contents.strokes_m, ((0, 0), (0, 0), (0, 1)), constant_values=height_m)
-        for (start, end), colour in zip(lifted[:room], contents.stroke_colour[:room], strict=True):
+        lifted = np.pad(contents.lines_m, ((0, 0), (0, 0), (0, 1)), constant_values=height_m)
+        for (start, end), colour in zip(lifted[:room], contents.line_colour[:room], strict=True):
             self._add_line(start, end, colour)
 
     def _add_disc(

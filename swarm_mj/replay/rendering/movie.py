@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
-from swarm_mj.replay.rendering.contents import Contents
+from swarm_mj.replay.rendering.contents import Contents, links_of
 from swarm_mj.replay.rendering.drawing import (
     CURVES,
     AgePlot,
@@ -22,7 +22,6 @@ from swarm_mj.replay.rendering.drawing import (
 )
 from swarm_mj.replay.rendering.scene import SceneRenderer
 from swarm_mj.replay.rendering.style import Style
-from swarm_mj.replay.strokes import strokes_at_once
 
 MOST_MISSIONS = 2  # side by side
 STRIP = 0.22  # of the height, below the scenes
@@ -120,21 +119,14 @@ class Movie:
         return np.minimum(rows, len(footage.window) - 1)
 
     def _contents(self, k: int, row: int) -> Contents:
-        footage, seen = self._footages[k], self._footages[k].shots
-        first, last = np.searchsorted(seen.row, [row, row + 1])
-        lines_m, line_colour = strokes_at_once(
-            footage.surprises(row), footage.position_m[row], footage.facts.observer
-        )
+        footage = self._footages[k]
+        position_m, observer = footage.position_m[row], footage.facts.observer
         return Contents(
-            position_m=footage.position_m[row],
+            position_m=position_m,
             velocity_mps=footage.velocity_mps[row],
             colour=self._colours[k][row],
-            observer=footage.facts.observer,
-            start_m=seen.start_m[first:last],
-            end_m=seen.end_m[first:last],
-            link_colour=seen.colour[first:last],
-            strokes_m=lines_m,
-            stroke_colour=line_colour,
+            observer=observer,
+            **links_of(footage.segments, footage.mismatch_at(row), position_m, observer, row),
             is_cut_off=footage.is_cut_off[row],
             centre_m=self._frames[k].centre_m[row],
             reach_m=self._frames[k].reach_m,

@@ -6,7 +6,7 @@ import pytest
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay import palette
-from swarm_mj.replay.looks import look
+from swarm_mj.replay.mismatch import radio_snapshot
 from swarm_mj.replay.rendering.contents import contents_of
 from swarm_mj.simulation.swarm import Swarm
 
@@ -40,7 +40,7 @@ def test_packets_are_those_of_the_last_window(swarm):
             i = phase.heard[0, j]
             if i != j:
                 expected.append((*where[i], *where[j]))
-    colours = {tuple(colour) for colour in contents.link_colour.tolist()}
+    colours = {tuple(colour) for colour in contents.packet_colour.tolist()}
     if request.heard[0, 1] == 0:
         assert palette.DELIVERED in colours
         assert palette.LOST not in colours
@@ -57,7 +57,7 @@ def test_a_broadcast_leads_to_all_who_hear_it(swarm):
     contents = contents_of(swarm, 1, is_broadcast=True)
     num_heard = sum(int(np.sum(phase.heard[1] != np.arange(8))) for phase in swarm.phases)
     assert len(contents.start_m) == num_heard
-    assert {tuple(colour) for colour in contents.link_colour.tolist()} <= {palette.BROADCAST}
+    assert {tuple(colour) for colour in contents.packet_colour.tolist()} <= {palette.BROADCAST}
 
 
 def test_links_that_surprise_are_seen_and_who_is_cut_off():
@@ -65,11 +65,11 @@ def test_links_that_surprise_are_seen_and_who_is_cut_off():
     city = Swarm(mission, [3, 4])
     for _ in range(60):
         city.move()
-    seen, contents = look(city, 1), contents_of(city, 1, observer=2)
-    kinds = seen.surprises.by_kind
+    seen, contents = radio_snapshot(city, 1), contents_of(city, 1, observer=2)
+    kinds = seen.mismatch.by_kind
     ends = kinds["too_weak"].sender.tolist() + kinds["too_weak"].receiver.tolist()
     assert ends.count(2) > 0
-    assert len(contents.strokes_m) == 4 * ends.count(2) + len(kinds["unbelieved"].row)
+    assert len(contents.lines_m) == 4 * ends.count(2) + len(kinds["unbelieved"].row)
     np.testing.assert_array_equal(contents.is_cut_off, seen.group != seen.group[2])
 
 

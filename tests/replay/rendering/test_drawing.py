@@ -8,7 +8,7 @@ from PIL import ImageDraw
 from swarm_mj.mission import paper
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Facts, Footage
-from swarm_mj.replay.looks import Looks, Surprises
+from swarm_mj.replay.mismatch import LinkMismatch
 from swarm_mj.replay.rendering.drawing import (
     SHADE,
     AgePlot,
@@ -18,8 +18,6 @@ from swarm_mj.replay.rendering.drawing import (
     draw_shortfalls,
     draw_title,
 )
-from swarm_mj.replay.shots import Shots
-from swarm_mj.replay.strokes import STROKES
 
 BOX = Box(20, 10, 380, 150)
 
@@ -35,13 +33,6 @@ def footage(age_mean, *, is_broadcast=False):
         is_broadcast=is_broadcast,
         full_scale=10.0,
     )
-    nobody = np.zeros((0, 2))
-    packets = Shots(
-        row=np.zeros(0, dtype=int),
-        start_m=nobody,
-        end_m=nobody,
-        colour=np.zeros((0, 3), dtype=np.uint8),
-    )
     return Footage(
         facts=facts,
         window=np.arange(1, num + 1),
@@ -49,7 +40,7 @@ def footage(age_mean, *, is_broadcast=False):
         velocity_mps=np.zeros((num, 2, 2)),
         age=np.zeros((num, 2)),
         is_on=np.ones((num, 2), dtype=bool),
-        shots=packets,
+        segments={},
         age_mean=np.array(age_mean, dtype=float),
         is_cut_off=np.zeros((num, 2), dtype=bool),
     )
@@ -89,7 +80,8 @@ def test_the_legend_names_what_is_drawn_only():
 def with_one_too_weak(seen):
     """The same footage, in which robot 1 is cut off from robot 0 as their link is too weak."""
     number = np.zeros(1, dtype=np.int16)
-    link = Surprises(
+    link = LinkMismatch(
+        window=np.array([1]),
         row=np.zeros(1, dtype=int),
         sender=number,
         receiver=number + 1,
@@ -98,8 +90,7 @@ def with_one_too_weak(seen):
         margin_db=number - 11,
     )
     is_cut_off = np.tile([False, True], (len(seen.window), 1))
-    looks = Looks(window=np.array([1]), surprises=link)
-    return replace(seen, looks=looks, is_cut_off=is_cut_off)
+    return replace(seen, mismatch=link, is_cut_off=is_cut_off)
 
 
 def test_the_legend_names_links_that_surprise_if_there_are_any():
@@ -107,7 +98,7 @@ def test_the_legend_names_links_that_surprise_if_there_are_any():
     for seen in (footage([1.0]), with_one_too_weak(footage([1.0]))):
         picture = blank(400, 160)
         draw_legend(ImageDraw.Draw(picture), [seen], 10.0, BOX, 12)
-        colours = (STROKES["too_weak"], palette.CUT_OFF, STROKES["unbelieved"])
+        colours = (palette.MISMATCH["too_weak"], palette.CUT_OFF, palette.MISMATCH["unbelieved"])
         found.append([bool(np.any(has(picture, colour, 0))) for colour in colours])
     assert found == [[False] * 3, [True, True, False]]
 

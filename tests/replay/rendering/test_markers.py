@@ -7,7 +7,7 @@ import numpy as np
 from moments import moment
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.arcs import SEGMENTS
+from swarm_mj.replay.packets import SEGMENTS
 from swarm_mj.replay.rendering.camera import look_at
 from swarm_mj.replay.rendering.markers import Markers
 
@@ -43,7 +43,7 @@ def test_links_that_surprise_are_drawn_until_there_is_no_room():
     for num in (3, 500):
         lines = np.tile([[(0.0, 0.0), (100.0, 0.0)]], (num, 1, 1))
         colour = np.tile(np.array([[255, 0, 0]], np.uint8), (num, 1))
-        geoms = drawn(replace(contents, strokes_m=lines, stroke_colour=colour))
+        geoms = drawn(replace(contents, lines_m=lines, line_colour=colour))
         assert len(geoms) == min(2 + num, 100)
         np.testing.assert_array_equal(geoms[-1].rgba, (1, 0, 0, 1))
 

@@ -104,7 +104,7 @@ def test_links_that_surprise_and_their_shortfalls_are_seen():
     mission = paper("random-walk", num_robots=10, num_windows=6, arena="blocks", shadowing_db=6.0)
     city = flown("tdma", mission)
     assert len(city.shortfalls(5)[1]) > 0
-    without = replace(city, looks=None, is_cut_off=np.zeros_like(city.is_cut_off))
+    without = replace(city, mismatch=None, is_cut_off=np.zeros_like(city.is_cut_off))
     num_red = []
     for footage in (city, without):
         with Movie([footage], STYLE) as movie:

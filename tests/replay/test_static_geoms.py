@@ -1,10 +1,10 @@
-"""MuJoCo's solids as rerun draws them, by numbers that are known."""
+"""MuJoCo's static geoms as rerun draws them, by numbers that are known."""
 
 import mujoco
 import numpy as np
 import rerun as rr
 
-from swarm_mj.replay.solids import FLOOR_M, fixed_solids
+from swarm_mj.replay.static_geoms import FLOOR_M, static_geoms
 
 SCENE = """
 <mujoco><worldbody>
@@ -23,7 +23,7 @@ def numbers(batch):
 
 def test_obstacles_are_of_glass_and_the_rest_is_not():
     scene = SCENE.replace('name="box"', 'name="box" group="1"')
-    solids = fixed_solids(mujoco.MjModel.from_xml_string(scene))
+    solids = static_geoms(mujoco.MjModel.from_xml_string(scene))
     modes = {name: numbers(solid.fill_mode)[0] for name, solid in solids.items()}
     glass = modes.pop("box")
     assert set(modes.values()) == {rr.components.FillMode.Solid.value}
@@ -31,7 +31,7 @@ def test_obstacles_are_of_glass_and_the_rest_is_not():
 
 
 def test_what_stands_still_is_drawn_where_it_stands():
-    solids = fixed_solids(mujoco.MjModel.from_xml_string(SCENE))
+    solids = static_geoms(mujoco.MjModel.from_xml_string(SCENE))
     assert solids.keys() == {"box", "floor", "pole", "ball"}
     assert numbers(solids["box"].half_sizes) == [1, 2, 3]
     assert numbers(solids["box"].centers) == [4, 5, 6]

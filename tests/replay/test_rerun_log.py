@@ -1,18 +1,22 @@
-"""What lies over what on the map, and that there is no layer which no mission draws."""
+"""The timelines, what lies over what on the map, and that every layer is drawn by some mission."""
 
 from dataclasses import replace
 
+import numpy as np
 from reading import static
 from rerun.chunk import RrdReader
 
-from swarm_mj.replay.layers import LAYERS
+from swarm_mj.replay.rerun_log import LAYERS
 from swarm_mj.replay.write import write_replay
+
+DRAWN = ("arena/", "tree/", "scene/grid", "scene/heading", "scene/packets", "scene/world")
+OTHERS = {"scene/world/cut_off"}  # solids, whose width is in metres
 
 
 def entities(path):
-    """What a replay shows on its map and in its tree."""
+    """What a replay shows of the layers."""
     found = {chunk.entity_path.removeprefix("/") for chunk in RrdReader(path).stream()}
-    return {name for name in found if name.startswith(("arena/", "tree/"))}
+    return {name for name in found if name.startswith(DRAWN)} - OTHERS
 
 
 def test_every_layer_is_drawn_by_some_mission_and_nothing_else(
@@ -55,3 +59,13 @@ def test_a_layer_s_look_is_kept_in_the_file(replay):
     assert static(replay, entity, "Arrows2D:draw_order").tolist() == [layer.order]
     # rerun takes radii below 0 as points of the screen.
     assert float(static(replay, entity, "Arrows2D:radii")[0]) < 0.0
+
+
+def test_the_clock_of_the_mission_runs_beside_the_windows(replay, two_way):
+    (chunk,) = (
+        chunk.to_record_batch()
+        for chunk in RrdReader(replay).stream().filter(content="/arena/robots")
+        if not chunk.is_static
+    )
+    nanoseconds = chunk.column("mission_time").to_numpy(zero_copy_only=False).astype(np.int64)
+    np.testing.assert_allclose(nanoseconds / 1e9, 0.1 * two_way.log.window)

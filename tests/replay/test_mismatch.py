@@ -1,4 +1,4 @@
-"""Links that surprise: by lone packets through the channel itself, and by hand behind one wall."""
+"""Mismatched links: by lone packets through the channel itself, and by hand behind one wall."""
 
 from dataclasses import replace
 
@@ -9,9 +9,38 @@ from mujoco import mjtGeom
 
 from swarm_mj.mission import paper
 from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP
-from swarm_mj.replay import looks
-from swarm_mj.replay.looks import EVERY, NO_SURPRISES, in_turn, joined, look, stride_of
+from swarm_mj.replay import palette
+from swarm_mj.replay.mismatch import (
+    DASHES,
+    EVERY,
+    WHOLE,
+    LinkMismatch,
+    by_row,
+    coloured_lines,
+    joined,
+    mismatch_lines,
+    radio_snapshot,
+    shades,
+    stride_of,
+)
 from swarm_mj.simulation.swarm import Swarm
+
+WHERE = np.array([[0.0, 0.0], [100.0, 0.0], [0.0, 50.0]])
+
+
+def links(*pairs, row=None):
+    """Links between pairs of robots; those of robot 0 and 1 are too weak."""
+    sender, receiver = np.array(pairs, dtype=np.int16).T
+    return LinkMismatch(
+        window=np.arange(2),
+        row=np.zeros(len(pairs), dtype=int) if row is None else np.array(row),
+        sender=sender,
+        receiver=receiver,
+        is_too_weak=np.array([set(pair) == {0, 1} for pair in pairs]),
+        loss_db=np.zeros(len(pairs), dtype=np.int16),
+        margin_db=np.zeros(len(pairs), dtype=np.int16),
+    )
+
 
 CITY = {"arena": "blocks", "shadowing_db": 6.0, "num_robots": 14, "high_power_fraction": 0.3}
 WALL_DB = 3.0
@@ -36,14 +65,14 @@ def apart_m(swarm, index):
 @pytest.mark.parametrize("index", [0, 1])
 def test_surprises_are_where_lone_packets_and_the_range_disagree(index):
     swarm = Swarm(paper("random-walk", **CITY), [3, 4])
-    seen = look(swarm, index)
+    seen = radio_snapshot(swarm, index)
     decodes, is_near = lone_links(swarm, index), apart_m(swarm, index) <= swarm.mission.range_m
     expected = {}
     for i in range(14):
         for j in range(14):
             if i != j and decodes[i, j] != is_near[i, j] and (j, i) not in expected:
                 expected[i, j] = bool(is_near[i, j])
-    found = seen.surprises
+    found = seen.mismatch
     pairs = zip(found.sender.tolist(), found.receiver.tolist(), strict=True)
     assert dict(zip(pairs, found.is_too_weak.tolist(), strict=True)) == expected
     assert set(expected.values()) == {True, False}
@@ -57,7 +86,9 @@ def test_surprises_are_where_lone_packets_and_the_range_disagree(index):
 def test_what_was_told_before_the_mission_does_not_surprise():
     told = {"arena": "blocks", "num_robots": 14, "high_power_fraction": 0.3, "path_loss": "two-ray"}
     for known, surprises in (("nothing", True), ("map", True), ("map,statistics", False)):
-        seen = look(Swarm(paper("random-walk", **told, prior_knowledge=known), [3])).surprises
+        seen = radio_snapshot(
+            Swarm(paper("random-walk", **told, prior_knowledge=known), [3])
+        ).mismatch
         assert (len(seen.row) > 0) == surprises
 
 
@@ -75,7 +106,7 @@ def test_losses_behind_a_wall_by_hand():
     """88.0 dB over 250 m in free space, where the margin is 0; a wall takes 3 dB more."""
     swarm = Swarm(paper("stationary", num_robots=20), [1], scene=wall)
     where, distance_m = swarm.states.position_m[0], apart_m(swarm, 0)
-    found, expected = look(swarm).surprises, {}
+    found, expected = radio_snapshot(swarm).mismatch, {}
     for i in range(20):
         for j in range(i + 1, 20):
             is_behind = where[i, 0] * where[j, 0] < 0.0
@@ -89,8 +120,8 @@ def test_losses_behind_a_wall_by_hand():
 
 
 def test_a_strong_radio_surprises_in_its_own_direction_only():
-    mission = paper("stationary", num_robots=12, high_power_fraction=0.5, high_power_db=3.0)
-    found = look(Swarm(mission, [2])).surprises
+    mission = paper("stationary", num_robots=12, high_power_fraction=0.5, strong_db=3.0)
+    found = radio_snapshot(Swarm(mission, [2])).mismatch
     assert not np.any(found.is_too_weak)
     assert np.all(found.sender < 6)
     assert len(found.sender) > 0
@@ -101,22 +132,22 @@ def test_a_strong_radio_surprises_in_its_own_direction_only():
 
 def test_free_space_and_a_channel_of_one_s_own_cannot_surprise():
     mission = paper("stationary", num_robots=6)
-    assert look(Swarm(mission, [0])) is None
-    assert look(Swarm(mission, [0], channel=lambda _, recipient: recipient)) is None
-    faded = look(Swarm(replace(mission, fading="rayleigh", erasure=0.2), [0]))
-    assert len(faded.surprises.row) == 0
+    assert radio_snapshot(Swarm(mission, [0])) is None
+    assert radio_snapshot(Swarm(mission, [0], channel=lambda _, recipient: recipient)) is None
+    faded = radio_snapshot(Swarm(replace(mission, fading="rayleigh", erasure=0.2), [0]))
+    assert len(faded.mismatch.row) == 0
     assert np.all(faded.group == 0)
 
 
 def test_robots_that_are_off_have_no_links():
     swarm = Swarm(paper("stationary", **CITY), [3])
     swarm._physics.deactivate(np.arange(14)[None] != 5)
-    seen = look(swarm)
-    assert not np.any((seen.surprises.sender == 5) | (seen.surprises.receiver == 5))
+    seen = radio_snapshot(swarm)
+    assert not np.any((seen.mismatch.sender == 5) | (seen.mismatch.receiver == 5))
     assert np.sum(seen.group == 5) == 1
 
 
-def test_looking_changes_nothing():
+def test_a_snapshot_changes_nothing():
     heard = []
     for is_looked_at in (False, True):
         swarm = Swarm(paper("random-walk", **CITY, fading="rayleigh"), [3, 4])
@@ -125,8 +156,8 @@ def test_looking_changes_nothing():
             swarm.exchange(rng.integers(0, 14, (2, 14)))
             heard.append([phase.heard.copy() for phase in swarm.phases])
             if is_looked_at:
-                look(swarm)
-                look(swarm, 1)
+                radio_snapshot(swarm)
+                radio_snapshot(swarm, 1)
     np.testing.assert_array_equal(heard[:6], heard[6:])
 
 
@@ -139,15 +170,47 @@ def test_a_fast_team_is_looked_at_more_often():
     assert (stride_of(slow), stride_of(slow, 9), stride_of(fast)) == (EVERY, 9, 2)
 
 
-def test_each_look_stands_for_the_windows_until_the_next_one():
-    one = replace(
-        NO_SURPRISES,
-        row=np.zeros(1, dtype=int),
-        is_too_weak=np.ones(1, dtype=bool),
-        **dict.fromkeys(("sender", "receiver", "loss_db", "margin_db"), np.ones(1, np.int16)),
-    )
-    seen = joined([one, NO_SURPRISES, one], np.array([1, 6, 11]))
+def test_each_snapshot_stands_for_the_windows_until_the_next_one():
+    one = replace(links((0, 1)), window=np.array([1]))
+    none = one.chosen(np.s_[:0])
+    seen = joined([one, none, one], np.array([1, 6, 11]))
     found = [len(seen.at(window).row) for window in (1, 5, 6, 10, 11, 99)]
     assert found == [1, 1, 0, 0, 1, 1]
-    assert in_turn([seen.surprises, seen.surprises]).row.tolist() == [0, 0, 2, 2]
-    assert looks.NO_SURPRISES.num_bytes == 0
+    assert by_row([seen, seen]).row.tolist() == [0, 0, 2, 2]
+
+
+def test_dashes_lead_from_robot_to_robot_as_long_as_one_another():
+    """Four dashes of 3 units with three gaps of 2 between them: a line of 18 units."""
+    lines, link = mismatch_lines(links((0, 1)), 0.18 * WHERE[None], DASHES)
+    ends = [[(0, 0), (3, 0)], [(5, 0), (8, 0)], [(10, 0), (13, 0)], [(15, 0), (18, 0)]]
+    np.testing.assert_allclose(lines, ends, atol=1e-12)
+    assert link.tolist() == [0, 0, 0, 0]
+
+
+def test_a_link_is_where_its_robots_are_at_its_look():
+    moved = np.stack([WHERE, WHERE + 7.0])
+    lines, link = mismatch_lines(links((1, 2), (1, 2), row=[0, 1]), moved, WHOLE)
+    np.testing.assert_allclose(lines, [[(100, 0), (0, 50)], [(107, 7), (7, 57)]])
+    assert link.tolist() == [0, 1]
+
+
+def test_all_kinds_at_once_each_in_its_colour():
+    lines, colour = coloured_lines(links((0, 1), (0, 2), row=[4, 4]), WHERE, observer=1)
+    weak = [int(0.85 * c) for c in palette.TOO_WEAK]
+    assert colour.tolist() == [list(palette.MISMATCH["unbelieved"]), weak, weak, weak, weak]
+    np.testing.assert_allclose(lines[0], [(0, 0), (0, 50)])
+
+
+def test_at_once_only_the_observer_s_links_are_too_weak():
+    """Robot 2 has none of that kind."""
+    for observer, num_lines in ((0, 5), (1, 5), (2, 1)):
+        lines, _ = coloured_lines(links((0, 1), (0, 2)), WHERE, observer)
+        assert len(lines) == num_lines
+
+
+def test_the_more_is_missing_the_darker():
+    found = links((0, 1), (0, 1), (0, 1), (0, 1))
+    found.margin_db[:] = (-1, -15, -30, -99)
+    brightness = shades("too_weak", found).astype(int).sum(axis=1)
+    assert np.all(np.diff(brightness[:3]) < 0)
+    assert brightness[2] == brightness[3]

@@ -1,0 +1,109 @@
+"""Packets of recorded windows: what became of each, and where it is drawn."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from swarm_mj.replay import palette
+
+SEGMENTS = 6  # straight pieces of an arc
+RISE = 0.22  # of an arc's top, by its span
+
+
+@dataclass(frozen=True, kw_only=True)
+class PacketLinks:
+    """L packets with the same fate, sorted by window."""
+
+    row: Int[np.ndarray, "L"]  # the window, 0 to T - 1
+    sender: Int[np.ndarray, "L"]
+    receiver: Int[np.ndarray, "L"]
+
+    def ends(
+        self, position_m: Float[np.ndarray, "T N 2"]
+    ) -> tuple[Float[np.ndarray, "L 2"], Float[np.ndarray, "L 2"]]:
+        """Return the positions of the senders and of the receivers [m]."""
+        return position_m[self.row, self.sender], position_m[self.row, self.receiver]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PacketSegments:
+    """L packets with the same fate as they are drawn, sorted by window."""
+
+    row: Int[np.ndarray, "L"]
+    start_m: Float[np.ndarray, "L 2"]
+    end_m: Float[np.ndarray, "L 2"]
+
+
+def fates(
+    recipient: Int[np.ndarray, "T 2 N"], heard: Int[np.ndarray, "T 2 N"], *, is_broadcast: bool
+) -> dict[str, PacketLinks]:
+    """Sort the packets of T windows by their fate.
+
+    Addressed packets are delivered, lost, overheard, answered or unanswered. `lost` and
+    `unanswered` ones end at the robot they were meant for, which did not decode them; a packet that
+    k other robots overheard is k links. Broadcasts have no addressee: `heard` leads to each hearer.
+
+    Args:
+        recipient: S^i in both phases; a robot's own number is silence.
+        heard: The sender that each robot decoded in both phases; its own number is none.
+        is_broadcast: Whether packets have no addressee; otherwise the second phase answers the
+            first.
+    """
+    row, phase, hearer = np.nonzero(is_other(heard))
+    speaker = heard[row, phase, hearer]
+    received = (row, speaker, hearer)
+    if is_broadcast:
+        return {"heard": _chosen(received, np.ones(len(row), dtype=bool))}
+    is_overheard = recipient[row, phase, speaker] != hearer
+    row, phase, sender = np.nonzero(is_other(recipient))
+    receiver = recipient[row, phase, sender]
+    is_decoded = heard[row, phase, receiver] == sender
+    sent, is_request = (row, sender, receiver), phase == 0
+    return {
+        "delivered": _chosen(sent, is_request & is_decoded),
+        "lost": _chosen(sent, is_request & ~is_decoded),
+        "overheard": _chosen(received, is_overheard),
+        "answered": _chosen(sent, ~is_request & is_decoded),
+        "unanswered": _chosen(sent, ~is_request & ~is_decoded),
+    }
+
+
+def is_other(robot: Int[np.ndarray, "T 2 N"]) -> Bool[np.ndarray, "T 2 N"]:
+    """Tell where a robot addresses, or decodes, another one."""
+    return robot != np.arange(robot.shape[2])
+
+
+def transmitters(
+    recipient: Int[np.ndarray, "T 2 N"], *, is_broadcast: bool
+) -> Bool[np.ndarray, "T N"]:
+    """Tell who sent a request, or a broadcast in either phase."""
+    return np.any(is_other(recipient)[:, : 2 if is_broadcast else 1], axis=1)
+
+
+def packet_segments(
+    packets: dict[str, PacketLinks], position_m: Float[np.ndarray, "T N 2"]
+) -> dict[str, PacketSegments]:
+    """Return where packets are drawn, in the order of drawing; lost ones stop on their way."""
+    segments = {}
+    for fate in (fate for fate in palette.PACKETS if fate in packets):
+        start_m, end_m = packets[fate].ends(position_m)
+        end_m = start_m + palette.PACKETS[fate][1] * (end_m - start_m)
+        segments[fate] = PacketSegments(row=packets[fate].row, start_m=start_m, end_m=end_m)
+    return segments
+
+
+def arcs(
+    start_m: Float[np.ndarray, "L 2"], end_m: Float[np.ndarray, "L 2"], base_m: float
+) -> Float[np.ndarray, "L P 3"]:
+    """Return points along parabolas that start and end at `base_m` above the ground [m]."""
+    share = np.linspace(0.0, 1.0, SEGMENTS + 1)
+    span_m = np.linalg.norm(end_m - start_m, axis=1)
+    height_m = base_m + 4.0 * RISE * span_m[:, None] * share * (1.0 - share)
+    ground_m = start_m[:, None] + share[:, None] * (end_m - start_m)[:, None]
+    return np.concatenate([ground_m, height_m[..., None]], axis=2)
+
+
+def _chosen(packets: tuple[np.ndarray, ...], which: Bool[np.ndarray, "P"]) -> PacketLinks:
+    row, sender, receiver = (column[which] for column in packets)
+    return PacketLinks(row=row, sender=sender, receiver=receiver)

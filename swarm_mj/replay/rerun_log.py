@@ -1,0 +1,160 @@
+"""A replay as rerun's recording: how each entity looks, and its rows on the mission's timelines."""
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+import rerun as rr
+from jaxtyping import Float, Int
+
+from swarm_mj.replay import palette
+from swarm_mj.replay.footage import Frame
+from swarm_mj.replay.palette import Colour, dim
+from swarm_mj.replay.recorder import Log
+
+TIMELINE = "window"
+
+
+def screen(points: float) -> float:
+    """Return a radius in points of the screen, which rerun marks as negative."""
+    return -points
+
+
+class Layer(NamedTuple):
+    """How the things of one entity are drawn, and their samples in the legend."""
+
+    kind: Any  # rerun's archetype
+    colour: Colour | None  # None: each thing has its own
+    width: float  # of lines, or the radius of points, on the screen [points]
+    order: float | None = None  # in 2-D, the higher is drawn over the lower
+
+    @property
+    def style(self) -> dict[str, Any]:
+        """The archetype's fields that are the same for all things, at all times."""
+        radii = "line_radii" if self.kind is rr.Ellipses2D else "radii"
+        order = {} if self.order is None else {"draw_order": self.order}
+        colours = {} if self.colour is None else {"colors": [self.colour]}
+        return {radii: screen(self.width), **order, **colours}
+
+
+LAYERS = {
+    "arena/area/grid": Layer(rr.LineStrips2D, palette.GRID, 0.5, -20.0),
+    "arena/area/outline": Layer(rr.LineStrips2D, palette.OUTLINE, 1.5, -19.0),
+    "arena/area/walls": Layer(rr.LineStrips2D, palette.WALL, 1.5, -19.0),
+    "arena/world/filling": Layer(rr.LineStrips2D, palette.OBSTACLE, 0.5, -11.0),
+    "arena/world/obstacle": Layer(rr.LineStrips2D, palette.WALL, 0.8, -10.0),
+    "arena/trail": Layer(rr.LineStrips2D, palette.TRAIL, 1.0, -5.0),
+    "arena/radio/range": Layer(rr.Ellipses2D, palette.RANGE, 0.6, 1.0),
+    "arena/world/unbelieved": Layer(rr.LineStrips2D, None, 0.6, 2.0),
+    "arena/world/too_weak": Layer(rr.LineStrips2D, None, 0.5, 2.5),
+    "arena/belief/error": Layer(rr.LineStrips2D, dim(palette.BELIEF, 0.8), 0.6, 3.0),
+    "arena/belief/ring": Layer(rr.Ellipses2D, palette.BELIEF, 0.8, 4.0),
+    "arena/tree": Layer(rr.LineStrips2D, palette.TREE, 0.8, 6.0),
+    "arena/radio/overheard": Layer(rr.LineStrips2D, dim(palette.OVERHEARD, 0.6), 0.7, 10.0),
+    "arena/radio/heard": Layer(rr.LineStrips2D, palette.BROADCAST, 1.0, 18.0),
+    "arena/radio/unanswered": Layer(rr.Arrows2D, dim(palette.ANSWERED, 0.6), 1.2, 18.0),
+    "arena/radio/lost/rest": Layer(rr.LineStrips2D, dim(palette.LOST, 0.5), 0.7, 18.0),
+    "arena/radio/lost": Layer(rr.Arrows2D, palette.LOST, 1.8, 19.0),
+    "arena/radio/delivered": Layer(rr.Arrows2D, palette.DELIVERED, 2.0, 20.0),
+    "arena/radio/answered": Layer(rr.Arrows2D, palette.ANSWERED, 1.5, 21.0),
+    "arena/world/cut_off": Layer(rr.Points2D, palette.CUT_OFF, 12.0, 24.0),
+    "arena/radio/transmitter": Layer(rr.Points2D, palette.BROADCAST, 9.0, 25.0),
+    "arena/heading": Layer(rr.LineStrips2D, palette.HEADING, 0.8, 29.0),
+    "arena/robots": Layer(rr.Points2D, None, 5.5, 30.0),
+    "arena/ego/name": Layer(rr.Points2D, palette.EGO, 0.1, 30.0),
+    "arena/ego": Layer(rr.Ellipses2D, palette.EGO, 1.2, 31.0),
+    "tree/hops": Layer(rr.LineStrips2D, palette.GRID, 0.5, 0.0),
+    "tree/edges": Layer(rr.LineStrips2D, palette.TREE, 0.8, 1.0),
+    "tree/nodes": Layer(rr.Points2D, None, 4.5, 2.0),
+    "scene/grid": Layer(rr.LineStrips3D, palette.OUTLINE, 0.5),
+    "scene/heading": Layer(rr.LineStrips3D, palette.HEADING, 0.8),
+    "scene/world/unbelieved": Layer(rr.LineStrips3D, None, 0.6),
+    "scene/world/too_weak": Layer(rr.LineStrips3D, None, 0.5),
+    **{
+        f"scene/packets/{fate}": Layer(rr.LineStrips3D, colour, 1.0)
+        for fate, (colour, _) in palette.PACKETS.items()
+    },
+}
+
+
+class RerunLog:
+    """Writes a log's entities; one that changes shows the row of the last window."""
+
+    def __init__(
+        self, recording: rr.RecordingStream, log: Log, frame: Frame, window_s: float
+    ) -> None:
+        self._recording = recording
+        self._window_s = window_s
+        self.log = log
+        self.frame = frame
+
+    def fixed(self, path: str, *archetypes: Any) -> None:
+        """Write what never changes. It would hide the same component written in time."""
+        self._recording.log(path, *archetypes, static=True)
+
+    def timed(
+        self,
+        path: str,
+        columns: Iterable[rr.ComponentColumn],
+        window: Int[np.ndarray, "K"] | None = None,
+    ) -> None:
+        """Write one row per window: of the log, or of the windows given."""
+        at = self.log.window if window is None else window
+        times = [
+            rr.TimeColumn(TIMELINE, sequence=at),
+            rr.TimeColumn("mission_time", duration=at * self._window_s),
+        ]
+        self._recording.send_columns(path, indexes=times, columns=list(columns))
+
+    def fixed_layer(self, path: str, **fields: Any) -> None:
+        """Write things of a layer that never change, by the fields of the layer's archetype."""
+        layer = LAYERS[path]
+        self.fixed(path, layer.kind.from_fields(**layer.style, **fields))
+
+    def layer(
+        self, path: str, row: Int[np.ndarray, "L"] | None = None, **columns: np.ndarray
+    ) -> None:
+        """Write things of a layer that change.
+
+        Args:
+            path: One of `LAYERS`.
+            row: The log's window of each thing, ascending; None: all windows have as many.
+            **columns: The fields of the layer's archetype, with a value for each thing.
+        """
+        self.fixed_layer(path)
+        self.timed(path, self.partitioned(LAYERS[path].kind.columns(**columns), row))
+
+    def partitioned(
+        self, columns: rr.ComponentColumnList, row: Int[np.ndarray, "L"] | None = None
+    ) -> rr.ComponentColumnList:
+        """Divide columns by the windows of their things; `row` as for `layer`."""
+        num_windows = len(self.log.window)
+        if row is None:
+            return columns.partition([self.log.is_on.shape[1]] * num_windows)
+        return columns.partition(np.bincount(row, minlength=num_windows))
+
+    def lines(
+        self,
+        path: str,
+        start: Float[np.ndarray, "L A"],
+        end: Float[np.ndarray, "L A"],
+        row: Int[np.ndarray, "L"] | None = None,
+    ) -> None:
+        """Write straight lines; `row` as for `layer`."""
+        self.layer(path, row, strips=np.stack([start, end], axis=1))
+
+    def rings(
+        self,
+        path: str,
+        centre: Float[np.ndarray, "L 2"],
+        radius_m: float,
+        row: Int[np.ndarray, "L"] | None = None,
+    ) -> None:
+        """Write circles; `row` as for `layer`."""
+        self.layer(path, row, centers=centre, half_sizes=np.full(centre.shape, radius_m))
+
+
+def lifted(at_m: Float[np.ndarray, "*S 2"], height_m: float) -> Float[np.ndarray, "*S 3"]:
+    """Return points at a height above the ground [m]."""
+    width = [(0, 0)] * (at_m.ndim - 1) + [(0, 1)]
+    return np.pad(at_m, width, constant_values=height_m)

@@ -1,0 +1,105 @@
+"""Packets as lines, against the costs' counts and a plain loop."""
+
+import numpy as np
+import pytest
+
+from swarm_mj.replay.packets import RISE, SEGMENTS, arcs, packet_segments, transmitters
+from swarm_mj.replay.palette import LOST_SHARE
+
+
+def per_window(recorded, fate):
+    """How many packets of a fate each window has."""
+    return np.bincount(recorded.log.packets[fate].row, minlength=len(recorded.log.window))
+
+
+@pytest.mark.parametrize("fate", ["delivered", "lost", "overheard", "answered"])
+def test_links_are_as_many_as_the_costs_count(two_way, fate):
+    np.testing.assert_array_equal(per_window(two_way, fate), two_way.counted(fate))
+
+
+def test_lines_of_broadcasts_are_as_many_as_the_receptions_that_the_costs_count(flooded):
+    assert list(flooded.log.packets) == ["heard"]  # no addressee, so no other fate
+    np.testing.assert_array_equal(per_window(flooded, "heard"), flooded.counted("receptions"))
+
+
+def test_a_broadcast_leads_to_each_robot_that_decoded_it(flooded):
+    log, links = flooded.log, flooded.log.packets["heard"]
+    expected = [
+        (t, log.heard[t, slot, hearer], hearer)
+        for t in range(len(log.window))
+        for slot in (0, 1)
+        for hearer in range(12)
+        if log.heard[t, slot, hearer] != hearer
+    ]
+    assert list(zip(links.row, links.sender, links.receiver, strict=True)) == expected
+
+
+@pytest.mark.parametrize(("flight", "slots"), [("two_way", (0,)), ("flooded", (0, 1))])
+def test_transmitters_are_who_speaks_without_being_asked(flight, slots, request):
+    log = request.getfixturevalue(flight).log
+    found = transmitters(log.recipient, is_broadcast=log.is_broadcast)
+    for t, i in np.ndindex(len(log.window), 12):
+        assert found[t, i] == any(log.recipient[t, slot, i] != i for slot in slots)
+
+
+def test_every_fate_occurs_in_the_fixture(two_way):
+    for fate, links in two_way.log.packets.items():
+        assert len(links.row) > 0, fate
+
+
+def test_answers_heard_or_not_are_the_delivered_requests_turned_round(two_way):
+    links = two_way.log.packets
+    delivered = links["delivered"]
+    requests = set(zip(delivered.row, delivered.sender, delivered.receiver, strict=True))
+    answers = {
+        (row, receiver, sender)
+        for fate in ("answered", "unanswered")
+        for row, sender, receiver in zip(
+            links[fate].row, links[fate].sender, links[fate].receiver, strict=True
+        )
+    }
+    assert answers == requests
+
+
+def test_lines_run_from_sender_to_receiver(two_way):
+    links = two_way.log.packets["overheard"]
+    start, end = links.ends(two_way.log.position_m)
+    for n, (row, sender, receiver) in enumerate(
+        zip(links.row, links.sender, links.receiver, strict=True)
+    ):
+        np.testing.assert_array_equal(start[n], two_way.log.position_m[row, sender])
+        np.testing.assert_array_equal(end[n], two_way.log.position_m[row, receiver])
+    assert np.all(np.diff(links.row) >= 0)
+
+
+def test_segments_are_as_many_as_packets_of_their_fate_in_the_order_of_drawing(two_way, flooded):
+    segments = packet_segments(two_way.log.packets, two_way.log.position_m)
+    assert list(segments) == ["overheard", "unanswered", "lost", "delivered", "answered"]
+    for fate in ("delivered", "lost", "answered"):
+        found = np.bincount(segments[fate].row, minlength=30)
+        np.testing.assert_array_equal(found, two_way.counted(fate))
+    assert list(packet_segments(flooded.log.packets, flooded.log.position_m)) == ["heard"]
+
+
+def test_a_lost_packet_stops_short_and_a_delivered_one_arrives(two_way):
+    log, packets = two_way.log, two_way.log.packets
+    for fate, share in (("lost", LOST_SHARE), ("unanswered", LOST_SHARE), ("delivered", 1.0)):
+        links, drawn = packets[fate], packet_segments(packets, log.position_m)[fate]
+        start = log.position_m[links.row, links.sender]
+        end = log.position_m[links.row, links.receiver]
+        np.testing.assert_allclose(drawn.start_m, start)
+        np.testing.assert_allclose(drawn.end_m, share * end + (1.0 - share) * start)
+
+
+def test_an_arc_starts_and_ends_at_its_ends_and_is_highest_in_the_middle():
+    start, end = np.array([[0.0, 0.0], [10.0, 5.0]]), np.array([[100.0, 0.0], [10.0, -35.0]])
+    points = arcs(start, end, 2.0)
+    assert points.shape == (2, SEGMENTS + 1, 3)
+    np.testing.assert_allclose(points[:, 0], np.pad(start, ((0, 0), (0, 1)), constant_values=2.0))
+    np.testing.assert_allclose(points[:, -1], np.pad(end, ((0, 0), (0, 1)), constant_values=2.0))
+    np.testing.assert_allclose(points[:, SEGMENTS // 2, 2], 2.0 + RISE * np.array([100.0, 40.0]))
+    np.testing.assert_allclose(points[0, :, 1], 0.0)
+
+
+def test_no_packets_are_no_arcs():
+    assert arcs(np.zeros((0, 2)), np.zeros((0, 2)), 0.0).shape == (0, SEGMENTS + 1, 3)
