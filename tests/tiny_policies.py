@@ -6,7 +6,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.fast import FastAggregationGnn
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.shape import GnnShape
-from swarm_mj.policies.policy_config import PolicyConfig
+from swarm_mj.policies.policy_config import GnnConfig
 from swarm_mj.policies.stored import save_policy
 
 torch.set_num_threads(1)  # tests share the machine's cores
@@ -32,11 +32,11 @@ def tiny_config(network, features="extended", **overrides):
         "commit": "abc123",
         "version": "1.2.3",
     }
-    return PolicyConfig(network=network.shape, **its | overrides)
+    return GnnConfig(network=network.shape, **its | overrides)
 
 
-def save_tiny(folder, features="extended", seed=1, **shape):
+def save_tiny(path, features="extended", seed=1, **shape):
     """Saves a tiny policy; returns its network."""
     network = tiny_network(features, seed, **shape)
-    save_policy(folder, network, tiny_config(network, features))
+    save_policy(path, network, tiny_config(network, features))
     return network

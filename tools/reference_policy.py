@@ -2,7 +2,7 @@
 
     python tools/reference_policy.py stationary_40_receptive_field_5.npz
 
-Their weights (NumPy arrays by TensorFlow name) become a policy directory, which flies under the
+Their weights (NumPy arrays by TensorFlow name) become a policy, which flies under the
 `reference` preset; its mean age of information is compared with theirs in standard errors.
 """
 
@@ -25,7 +25,7 @@ from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import reference
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.gnn.shape import GnnShape
-from swarm_mj.policies.policy_config import PolicyConfig
+from swarm_mj.policies.policy_config import GnnConfig
 from swarm_mj.policies.stored import save_policy
 from swarm_mj.system.fields import setting
 from swarm_mj.system.provenance import version
@@ -81,9 +81,9 @@ def network_of(path: Path) -> AggregationGnn:
     return network
 
 
-def store(path: Path, folder: Path) -> None:
-    """Write the authors' weights as a policy directory."""
-    config = PolicyConfig(
+def store(path: Path, policy: Path) -> None:
+    """Write the authors' weights as a policy."""
+    config = GnnConfig(
         network=SHAPE,
         features="reference",
         training={"weights": "by Tolstaya et al., MIT licence", "task": "stationary"},
@@ -91,13 +91,13 @@ def store(path: Path, folder: Path) -> None:
         commit=None,
         version=version(),
     )
-    save_policy(folder, network_of(path), config, card=CARD)
+    save_policy(policy, network_of(path), config, card=CARD)
 
 
-def costs_of(folder: Path, episodes: int, seed: int, num_jobs: int) -> list[float]:
+def costs_of(policy: Path, episodes: int, seed: int, num_jobs: int) -> list[float]:
     """Each mission's mean age of information under the `reference` preset [windows]."""
     study = Study(
-        policies=(str(folder),), regimes=(reference("stationary"),), episodes=episodes, seed=seed
+        policies=(str(policy),), regimes=(reference("stationary"),), episodes=episodes, seed=seed
     )
     flown = dict(run_jobs(fly_batch, study.batches, num_jobs))
     return [aoi for index in sorted(flown) for aoi in flown[index].aoi]
@@ -112,7 +112,7 @@ class Options:
         "input."
     )
     weights: Path = setting(help="the authors' .npz", is_positional=True)
-    out: Path | None = setting(None, "keep the policy directory here", metavar="DIR")
+    out: Path | None = setting(None, "keep the policy here", metavar="FILE.safetensors")
     episodes: int = setting(100, "missions", low=2, high=100_000)
     seed: int = setting(2000, "of the first mission")
     jobs: int = setting(2, "processes", low=1, high=256)
@@ -122,9 +122,9 @@ def run(options: Options) -> int:
     """Flies the policy and compares; returns 1 if the costs are too far apart."""
     tell_cores(options.jobs)
     with tempfile.TemporaryDirectory() as scratch:
-        folder = options.out or Path(scratch) / "policy"
-        store(options.weights, folder)
-        costs = costs_of(folder, options.episodes, options.seed, options.jobs)
+        policy = options.out or Path(scratch) / "policy.safetensors"
+        store(options.weights, policy)
+        costs = costs_of(policy, options.episodes, options.seed, options.jobs)
     mean, sem = float(np.mean(costs)), float(np.std(costs, ddof=1) / math.sqrt(len(costs)))
     apart = (mean - THEIR_AOI) / math.hypot(sem, THEIR_SEM)
     print(f"here {mean:.2f} ± {sem:.2f} windows over {len(costs)} missions")

@@ -25,8 +25,8 @@ from experiments import MOST_BYTES, Experiment, Scale, read_experiment, typed
 from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import parse, script
 from swarm_mj.evaluation.results import Result, read_results, write_csv
-from swarm_mj.learning.run_folder import CURVE, POLICY, SETTINGS, read_run
-from swarm_mj.policies.stored import read_policy
+from swarm_mj.learning.run_folder import CURVE, SETTINGS, read_run
+from swarm_mj.policies.stored import POLICY, read_policy
 from swarm_mj.system import atomic
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import script
+from swarm_mj.policies.stored import POLICY
 from swarm_mj.system.atomic import write_bytes
 from swarm_mj.system.fields import setting
 from swarm_mj.system.outputs import Output, check_outputs
@@ -71,13 +72,13 @@ class ShippedGnn:
         return 0
 
     def _train(self, name: str, missions: str) -> str:
-        """Trains a candidate or goes on training it; returns its policy's folder."""
+        """Trains a candidate or goes on training it; returns where its policy is."""
         folder = self.runs / name
         resume = ["--resume"] if (folder / "settings.json").exists() else []
         options = f"{missions} {TRAINING} --minutes {self.minutes:g}".split()
         _run(["train", *options, "--out", str(folder), *resume])
         write_bytes(self._curve(name), read_file(folder / "curve.csv", "curve", MOST_BYTES))
-        return str(folder / "policy")
+        return str(folder / POLICY)
 
     def _compare(self, name: str, policies: Sequence[str], missions: str) -> None:
         """Flies the candidates and the schedules of TDMA on the same missions."""

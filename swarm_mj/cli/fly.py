@@ -17,7 +17,7 @@ from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, on
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import notes_on
 from swarm_mj.policies.policy import Policy
-from swarm_mj.policies.policy_folder import ONE_FILE
+from swarm_mj.policies.policy_config import SUFFIX
 from swarm_mj.policies.registry import (
     check_used,
     is_stored,
@@ -161,10 +161,10 @@ def _fresh_name(options: FlyOptions) -> Path:
 
 
 def _short(policy: str) -> str:
-    """Return a policy's name without the path: `x` of runs/x/policy and of x.safetensors."""
+    """Return a policy's name without the path: `x` of runs/x/policy.safetensors and of runs/x."""
     if not is_stored(policy):
         return policy.replace(" --", "-").replace(" ", "-").replace(":", "-")
-    path = Path(policy.removesuffix(ONE_FILE)).resolve()
+    path = Path(policy.removesuffix(SUFFIX)).resolve()
     return path.parent.name if path.name == "policy" else path.name
 
 

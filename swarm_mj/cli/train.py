@@ -33,7 +33,7 @@ from swarm_mj.learning.run_folder import (
     read_run,
 )
 from swarm_mj.learning.settings import Training
-from swarm_mj.policies.stored import read_policy
+from swarm_mj.policies.stored import POLICY, read_policy
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import same_as, setting
 from swarm_mj.system.interrupt import deferred_interrupt
@@ -49,9 +49,9 @@ class TrainOptions:
 
     EPILOG: ClassVar = (
         "A run that was interrupted, or killed, goes on with --out OUT --resume and ends as if it "
-        "had not been. OUT holds policy, the one to fly; settings.json, curve.csv, tensorboard "
-        "and checkpoint.pt. Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted "
-        "(--resume goes on)."
+        "had not been. OUT holds policy.safetensors, the one to fly; settings.json, curve.csv, "
+        "tensorboard and checkpoint.pt. Exit codes: 0 done, 1 the machine failed, 2 bad input, "
+        "130 interrupted (--resume goes on)."
     )
     out: Path = setting(help="the run's folder", metavar="runs/NAME")
     resume: bool = setting(False, "go on with the run in OUT")
@@ -99,7 +99,7 @@ def _asked_run(options: TrainOptions) -> Run:
     """What the options ask for; raises ValueError before anything is written."""
     run = _begun_run(options) if options.resume else _new_run(options)
     run = replace(run, limits=asked_limits(run.limits, options))
-    written = (Output("run", options.out / name) for name in (SETTINGS, CHECKPOINT, CURVE))
+    written = (Output("run", options.out / name) for name in (SETTINGS, CHECKPOINT, CURVE, POLICY))
     check_outputs(*written, inputs=[options.init] if options.init else [])
     needs, way_out = training_needs(run.training, run.limits), "choose fewer --missions or --robots"
     check_fits(needs, options.out, way_out, is_forced=options.yes)
@@ -148,7 +148,7 @@ def _print(out: Path, asked: Run, progress: Progress, *, is_over: bool) -> None:
         **report(asked, progress),
         "decisions": f"{progress.decisions:,}",
         "minutes": f"{progress.minutes:.1f}",
-        "its folder": str(out / "policy") if progress.best else "none yet",
+        "its policy": str(out / POLICY) if progress.best else "none yet",
     }
     console.print(named_values(title, rows))
     for line in verdicts(asked, progress):
@@ -161,7 +161,7 @@ def _next_commands(
     out: Path, asked: Run, progress: Progress, *, is_over: bool
 ) -> list[tuple[str, str]]:
     """What to do next, and the commands that do it."""
-    name, policy = this_command(), shlex.quote(str(out / "policy"))
+    name, policy = this_command(), shlex.quote(str(out / POLICY))
     training, more = asked.training, ""
     if has_stopped_early(asked, progress) and progress.has_chosen:
         more = " --patience 0"

@@ -17,7 +17,7 @@ from swarm_mj.mission import PRESETS, Mission, make_mission
 from swarm_mj.mission.components import GROUP, Components, is_own
 from swarm_mj.policies.gnn.feature_sets import check_named, is_own_set, load_features, num_features
 from swarm_mj.policies.gnn.shape import GnnShape
-from swarm_mj.policies.policy_config import PolicyConfig
+from swarm_mj.policies.policy_config import GnnConfig
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.system.fields import as_typed
 
@@ -51,7 +51,7 @@ def given_settings(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def asked_settings(
-    given: dict[str, Any], init: PolicyConfig | None = None, init_path: Path | None = None
+    given: dict[str, Any], init: GnnConfig | None = None, init_path: Path | None = None
 ) -> Training:
     """The settings of a new run: the usual ones of the credit assignment, changed by those given.
 

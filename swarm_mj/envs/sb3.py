@@ -23,8 +23,9 @@ from swarm_mj.envs.spaces import robot_spaces, team_spaces
 from swarm_mj.envs.team import Observation, Team, next_seed
 from swarm_mj.mission import Mission
 from swarm_mj.policies.mlp import MlpShape
-from swarm_mj.policies.mlp_folder import MlpConfig, save_mlp
-from swarm_mj.system.provenance import version
+from swarm_mj.policies.policy_config import MlpConfig
+from swarm_mj.policies.stored import save_weights
+from swarm_mj.system.provenance import commit, version
 
 AGENTS = ("robot", "team")  # what an environment is
 ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}  # of networks that can be stored as policies
@@ -167,20 +168,23 @@ class SwarmVecEnv(VecEnv):
         return {name: values.reshape(-1, *values.shape[2:]) for name, values in seen.items()}
 
 
-def save_policy(model: BaseAlgorithm, folder: Path | str) -> None:
-    """Store a trained actor as a policy that `swarm-mj fly --policy FOLDER` flies.
+def save_policy(model: BaseAlgorithm, path: Path | str) -> Path:
+    """Store a trained actor as a policy that `swarm-mj fly --policy FILE` flies.
 
-    The folder holds the network's weights, no code and no pickle; the model itself is not kept.
+    The file holds the network's weights, no code and no pickle; the model itself is not kept.
 
     Args:
         model: PPO, A2C or MaskablePPO with its own "MultiInputPolicy", trained on an environment
             of `make_vec_env` whose agents are robots; `VecNormalize` may have normalised its
             rewards. A model that was loaded needs it again: `PPO.load(path, env=env)`.
-        folder: What is there is replaced if it is a policy.
+        path: Where; `.safetensors` is appended unless it ends so. A file there is replaced.
+
+    Returns:
+        The file.
 
     Raises:
-        ValueError: The model is another, or the folder holds other files than a policy's.
-        OSError: The folder cannot be written.
+        ValueError: The model is another.
+        OSError: The file cannot be written.
     """
     team = _trained_on(model)
     layers = _actor(model)
@@ -204,9 +208,10 @@ def save_policy(model: BaseAlgorithm, folder: Path | str) -> None:
         "reward": team.reward,
         **{f"mission.{name}": value for name, value in asdict(team.mission).items()},
     }
-    save_mlp(
-        Path(folder), weights, MlpConfig(network=network, training=training, version=version())
+    config = MlpConfig(
+        network=network, training=training, evaluation={}, commit=commit(), version=version()
     )
+    return save_weights(Path(path), weights, config)
 
 
 def _trained_on(model: BaseAlgorithm) -> Team:

@@ -19,7 +19,6 @@ from swarm_mj.learning.held_out import HeldOut, evaluate, record_replay
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
     CURVE,
-    POLICY,
     REPLAYS,
     Accumulator,
     Progress,
@@ -33,8 +32,8 @@ from swarm_mj.learning.selection import (
     told_of_choice,
     told_of_evaluation,
 )
-from swarm_mj.policies.policy_config import PolicyConfig
-from swarm_mj.policies.stored import save_policy
+from swarm_mj.policies.policy_config import GnnConfig
+from swarm_mj.policies.stored import POLICY, save_policy
 from swarm_mj.system.provenance import commit, version
 
 OPTIMISER = tuple(
@@ -244,7 +243,7 @@ class TrainingCallback(BaseCallback):
     def _keep(self, row: Row, costs: HeldOut, how: dict[str, Any]) -> None:
         """Store the policy of an evaluation, with what it costs, and where."""
         training, decisions = self._training, int(row["decisions"])
-        config = PolicyConfig(
+        config = GnnConfig(
             network=training.network,
             features=training.features,
             silence_logit=training.silence_logit,

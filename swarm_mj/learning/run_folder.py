@@ -11,13 +11,14 @@ from msgspec import Meta
 
 from swarm_mj.learning.choice import MANY_DECISIONS, Amount, Choice, Count
 from swarm_mj.learning.settings import Training
+from swarm_mj.policies.stored import POLICY
 from swarm_mj.protocol.costs import WindowCosts
 from swarm_mj.system.atomic import write_csv, write_json
 from swarm_mj.system.fields import check, setting
 from swarm_mj.system.reading import read_document, read_file
 
 SETTINGS, CHECKPOINT, CURVE = "settings.json", "checkpoint.pt", "curve.csv"
-INIT, POLICY, REPLAYS, TENSORBOARD = "init", "policy", "replays", "tensorboard"
+INIT, REPLAYS, TENSORBOARD = "init.safetensors", "replays", "tensorboard"
 FORMAT = "swarm_mj training run"
 FORMAT_VERSION = 2  # 1 called the kind of credit `arm`
 MOST_BYTES = 1_000_000  # of the settings

@@ -1,8 +1,8 @@
 """The PPO run (III-C): stable-baselines3's loop, from empty folder to stored policy.
 
 A run's folder holds `settings.json`, `checkpoint.pt`, `curve.csv` (one row an evaluation),
-`tensorboard/`, `policy/` (the one that is kept), `init/` (the policy it began with, if any) and, on
-request, `replays/`.
+`tensorboard/`, `policy.safetensors` (the one that is kept), `init.safetensors` (the one it began
+with, if any) and, on request, `replays/`.
 """
 
 import warnings
@@ -27,7 +27,6 @@ from swarm_mj.learning.run_folder import (
     CHECKPOINT,
     CURVE,
     INIT,
-    POLICY,
     SETTINGS,
     TENSORBOARD,
     Limits,
@@ -40,8 +39,7 @@ from swarm_mj.learning.run_folder import (
 )
 from swarm_mj.learning.settings import PpoSettings, Training
 from swarm_mj.policies.gnn.network import AggregationGnn
-from swarm_mj.policies.policy_config import PolicyConfig
-from swarm_mj.policies.policy_folder import check_replaceable
+from swarm_mj.policies.policy_config import GnnConfig
 from swarm_mj.policies.stored import read_policy, save_policy
 from swarm_mj.system.owned import owned
 
@@ -152,7 +150,6 @@ def train(run: Run, folder: Path, *, listener: Listener, is_resumed: bool = Fals
     check_folder(folder)
     with owned(folder / SETTINGS):
         check_folder(folder)  # a run may have begun, or come further, meanwhile
-        check_replaceable(folder / POLICY)
         model, rng = make_model(run.training)
         progress, networks = _begun(folder, run, model, rng)
         model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))
@@ -204,7 +201,7 @@ def _begun(
     return progress, networks
 
 
-def _read_init(path: Path, training: Training) -> tuple[AggregationGnn, PolicyConfig]:
+def _read_init(path: Path, training: Training) -> tuple[AggregationGnn, GnnConfig]:
     """The policy that a run begins with; raises ValueError if its network is not the run's."""
     network, config = read_policy(path)
     if config.network != training.network:

@@ -20,7 +20,7 @@ from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
-from swarm_mj.policies.policy_folder import ONE_FILE, is_mlp
+from swarm_mj.policies.policy_config import SUFFIX
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.round_robin import RoundRobin
 from swarm_mj.policies.sotdma.policy import SelfOrganisedTdma
@@ -115,7 +115,8 @@ def is_stored(name: str) -> bool:
 
     It has a separator, or the ending of such files, or there is a directory of this name.
     """
-    is_named_so = _is_path(name) or name.endswith(ONE_FILE) or os.path.isdir(name)
+    is_named_so = _is_path(name) or name.endswith(SUFFIX) or os.path.isdir(name)
+    is_named_so = is_named_so or os.path.isfile(name + SUFFIX)
     return name not in POLICIES and is_named_so
 
 
@@ -197,7 +198,7 @@ def make_policy(
         return _learned(name, mission, is_deterministic=is_deterministic, features=features)
     if name not in RULES:
         raise ValueError(
-            f"policy must be one of {', '.join(POLICIES)}, a directory or {ONE_FILE} file with a "
+            f"policy must be one of {', '.join(POLICIES)}, a directory or {SUFFIX} file with a "
             "learned policy, or module:Name of your own, not "
             f"{name!r}{did_you_mean(name, POLICIES)}"
         )
@@ -229,12 +230,8 @@ def is_own_policy(name: str) -> bool:
 
 def _learned(name: str, mission: Mission, **options: Any) -> Policy:
     """Return a trained network, which takes its libraries' time to import."""
-    if name != SHIPPED and is_mlp(Path(name)):
-        need("safetensors", f"policy {name}", "fly another")
-        from swarm_mj.policies.mlp_folder import load_mlp
-
-        return load_mlp(Path(name), mission, **options)
-    need("torch", f"policy {name}", "fly another")
+    for library in ("safetensors", *(("torch",) if name == SHIPPED else ())):
+        need(library, f"policy {name}", "fly another")
     from swarm_mj.policies.stored import load_policy
 
     path = asset(f"policies/{SHIPPED}.safetensors") if name == SHIPPED else Path(name)

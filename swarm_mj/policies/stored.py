@@ -1,66 +1,95 @@
-"""A policy on disk: a folder of weights, what they belong to, and a card; or all in one file."""
+"""A policy on disk: one `.safetensors` file of weights, whose metadata says what they belong to.
+
+Nothing in such a file is code: no pickle, no name that would be imported. The metadata has one
+entry, JSON, of the format, its version, the kind of the network, the config and the card.
+"""
 
 import json
+import os
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
-import torch
-from safetensors import SafetensorError
-from safetensors.torch import load, save
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.gnn.fast import FastAggregationGnn
 from swarm_mj.policies.gnn.feature_sets import is_own_set, trained_extractor
-from swarm_mj.policies.gnn.network import AggregationGnn
-from swarm_mj.policies.gnn.policy import LearnedPolicy
-from swarm_mj.policies.model_card import model_card
-from swarm_mj.policies.policy_config import PolicyConfig, from_json, to_json
-from swarm_mj.policies.policy_folder import (
-    CARD,
-    CONFIG,
-    MAX_BYTES,
-    ONE_FILE,
-    WAY_OUT,
-    WEIGHTS,
-    check_tensors,
-    kind_of_tensor,
-    metadata_of,
-    present_policy,
-    read_part,
-    write_policy,
-)
+from swarm_mj.policies.mlp import MlpPolicy, Weights
+from swarm_mj.policies.policy import Policy
+from swarm_mj.policies.policy_config import SUFFIX, GnnConfig, MlpConfig, model_card
 from swarm_mj.system.atomic import write_bytes
-from swarm_mj.system.reading import check_size, read_file, read_json
+from swarm_mj.system.packages import need
+from swarm_mj.system.reading import check_size, open_file, read_document, read_file, read_plain
 
-METADATA = "swarm_mj policy"  # the entry of a one-file policy's metadata that has config and card
+if TYPE_CHECKING:  # a plain network flies without torch
+    from swarm_mj.policies.gnn.network import AggregationGnn
+
+POLICY = f"policy{SUFFIX}"  # the policy of a run, in its folder
+FORMAT, VERSION = "swarm_mj policy", 2  # and the metadata's entry; version 1 was a folder
+OLD_FOLDER, OLD_WEIGHTS, OLD_CONFIG = "policy", "model.safetensors", "config.json"
+CONFIGS = {"gnn": GnnConfig, "mlp": MlpConfig}
+MAX_BYTES = 64_000_000
+MAX_SHOWN = 8  # policies in a message
+WAY_OUT = "copy it again, or make one with `swarm-mj train`"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Metadata:
+    kind: Literal["gnn", "mlp"]
+    config: dict[str, Any]
+    card: str
 
 
 def save_policy(
-    path: Path, network: AggregationGnn, config: PolicyConfig, card: str | None = None
-) -> None:
-    """Write a policy, whole or not at all; whoever is killed leaves the old one or the new one.
-
-    A policy there is replaced; the card is `model_card` of the config unless given. A path that
-    ends in `.safetensors` becomes one file, any other a folder.
+    path: Path, network: "AggregationGnn", config: GnnConfig, card: str | None = None
+) -> Path:
+    """Store a GNN with its weights; as `save_weights`.
 
     Raises:
-        ValueError: `load_policy` would not take it, or the folder holds other files than a
-            policy's.
-        OSError: The path cannot be written.
+        ValueError: The config is of another network; else as `save_weights`.
+        OSError: The file cannot be written.
     """
     if config.network != network.shape:
         raise ValueError(f"config describes {config.network}, but the network is {network.shape}")
-    tensors = {name: t.detach().cpu().contiguous() for name, t in network.state_dict().items()}
-    _check(tensors, _empty(config))
-    text, card = to_json(config), model_card(config) if card is None else card
-    if path.suffix == ONE_FILE:
-        # In one entry: several would be in another order every time.
-        data = save(tensors, {METADATA: json.dumps({CONFIG: text, CARD: card})})
-        check_size(path.name, len(data), MAX_BYTES[WEIGHTS])
-        write_bytes(path, data, check=_read_file)
-        return
-    contents = {WEIGHTS: save(tensors), CONFIG: text.encode(), CARD: card.encode()}
-    write_policy(path, contents, check=read_policy)
+    weights = {name: t.detach().cpu().numpy() for name, t in network.state_dict().items()}
+    return save_weights(path, weights, config, card)
+
+
+def save_weights(
+    path: Path, weights: Weights, config: GnnConfig | MlpConfig, card: str | None = None
+) -> Path:
+    """Store a policy, whole or not at all; a file there is replaced.
+
+    Args:
+        path: Where; `.safetensors` is appended unless it ends so.
+        weights: Of the config's network, by name.
+        config: What they belong to.
+        card: In Markdown; `model_card` of the config unless given.
+
+    Returns:
+        The file.
+
+    Raises:
+        ValueError: `load_policy` would not take it.
+        OSError: The file cannot be written.
+    """
+    path = path if path.suffix == SUFFIX else Path(f"{path}{SUFFIX}")
+    check_tensors(_shapes(config, path), weights)
+    kind = "gnn" if isinstance(config, GnnConfig) else "mlp"
+    said = {"kind": kind, "config": asdict(config), "card": card or model_card(config)}
+    try:
+        text = json.dumps({"format": FORMAT, "format_version": VERSION, **said}, allow_nan=False)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ValueError(f"config must be JSON all through: {error}") from error
+    _config_of(text)
+    # In one entry: safetensors would write several in another order every time.
+    data = save({n: np.ascontiguousarray(w) for n, w in weights.items()}, {FORMAT: text})
+    check_size(path.name, len(data), MAX_BYTES)
+    write_bytes(path, data)
+    return path
 
 
 def load_policy(
@@ -69,7 +98,7 @@ def load_policy(
     *,
     is_deterministic: bool = False,
     features: Sequence[str] = (),
-) -> LearnedPolicy:
+) -> Policy:
     """Return a policy, ready to fly a mission, which may be of another kind than it was trained on.
 
     The mission's area, duration and range normalise what the robots see. A deterministic policy
@@ -78,19 +107,23 @@ def load_policy(
 
     Raises:
         ValueError: There is none, or it is damaged, foreign, oversized or of a newer version, or
-            its features are not those that may be imported.
+            its features are not those that may be imported, or it flies teams of another size.
         OSError: It cannot be read.
     """
-    network, config = read_policy(path)
+    weights, config = read_weights(path)
+    num_features, where = config.network.num_features, f"policy {path}"
+    if isinstance(config, MlpConfig):
+        _check_size_of_team(config.network.num_robots, mission, where)
     extractor = trained_extractor(
-        config.features,
-        config.network.num_features,
-        mission,
-        named=features,
-        where=f"policy {path}",
+        config.features, num_features, mission, named=features, where=where
     )
+    if isinstance(config, MlpConfig):
+        return MlpPolicy(config.network, weights, extractor, is_deterministic=is_deterministic)
+    from swarm_mj.policies.gnn.fast import network_of
+    from swarm_mj.policies.gnn.policy import LearnedPolicy
+
     return LearnedPolicy(
-        network,
+        network_of(config.network, weights),
         extractor,
         silence_logit=config.silence_logit,
         is_deterministic=is_deterministic,
@@ -98,56 +131,122 @@ def load_policy(
     )
 
 
-def read_policy(path: Path) -> tuple[AggregationGnn, PolicyConfig]:
-    """Return a policy's network, with its weights, and its config; errors as of `load_policy`."""
-    present = present_policy(path)
-    if present.is_file():
-        try:
-            return _read_file(present)
-        except ValueError as error:
-            raise ValueError(f"{path}: {error}; {WAY_OUT}") from error
-    name = CONFIG
+def read_policy(path: Path) -> tuple["AggregationGnn", GnnConfig]:
+    """Return a GNN, with its weights, and its config; errors as of `read_weights`."""
+    weights, config = read_weights(path)
+    if not isinstance(config, GnnConfig):
+        raise ValueError(f"policy {path} is a plain network; name one that `swarm-mj train` made")
+    from swarm_mj.policies.gnn.fast import network_of
+
+    return network_of(config.network, weights), config
+
+
+def read_weights(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
+    """Return a policy's weights, each of them checked, and its config.
+
+    Raises:
+        ValueError: There is no policy, or it is damaged, foreign, oversized or of a newer version.
+        OSError: It cannot be read.
+    """
+    place = find_policy(path)
     try:
-        config = from_json(read_part(present, name))
-        name = WEIGHTS
-        return _network(config, read_part(present, name)), config
+        weights, config = _read_folder(place) if place.is_dir() else _read_file(place)
+        check_tensors(_shapes(config, path), weights)
     except ValueError as error:
-        raise ValueError(f"{path / name}: {error}; {WAY_OUT}") from error
+        raise ValueError(f"policy {place}: {error}; {WAY_OUT}") from error
+    return weights, config
 
 
-def _read_file(path: Path) -> tuple[AggregationGnn, PolicyConfig]:
-    """As `read_policy`, of one file, whose metadata is in the JSON at its head."""
-    data = read_file(path, "policy", MAX_BYTES[WEIGHTS])
-    about = metadata_of(data)
+def find_policy(path: Path) -> Path:
+    """Return where a policy is: the file `path` or `path.safetensors`, or that in a run's folder.
+
+    Folders are those of swarm_mj 0.1; so `runs/mine` and `runs/mine/policy` name a run's policy,
+    whichever version trained it.
+
+    Raises:
+        ValueError: There is none.
+    """
+    for place in (path, Path(f"{path}{SUFFIX}"), path / POLICY, path / OLD_FOLDER):
+        if os.path.isfile(place) or os.path.isfile(place / OLD_WEIGHTS):
+            return place
+    found = sorted({*path.glob(f"*{SUFFIX}"), *path.glob(f"*/{POLICY}")})
+    if found:
+        more = f" and {len(found) - MAX_SHOWN} more" if len(found) > MAX_SHOWN else ""
+        shown = ", ".join(map(str, found[:MAX_SHOWN]))
+        raise ValueError(f"{path} holds policies; name one of them: {shown}{more}")
+    raise ValueError(
+        f"there is no policy {path}; name a {SUFFIX} file, or the folder of a run that "
+        "`swarm-mj train` wrote, such as runs/NAME"
+    )
+
+
+def read_tensors(path: Path) -> tuple[Weights, dict[str, str]]:
+    """Return the tensors and the metadata of a `.safetensors` file.
+
+    Raises:
+        ValueError: It cannot be read, is oversized or damaged, or no such file.
+    """
+    with open_file(path, "policy") as file:  # which refuses pipes; `safe_open` would wait for them
+        check_size(f"policy {path}", os.fstat(file.fileno()).st_size, MAX_BYTES)
     try:
-        config = from_json(read_json(about[METADATA], dict)[CONFIG])
-    except (KeyError, TypeError) as error:
-        raise ValueError(
-            "it has weights, but does not say of which policy; if a policy's folder holds it, "
-            "name that"
-        ) from error
-    return _network(config, data), config
-
-
-def _network(config: PolicyConfig, data: bytes) -> AggregationGnn:
-    """Return the network with the weights of a safetensors file."""
-    try:
-        tensors = {name: tensor.clone() for name, tensor in load(data).items()}
-    except (SafetensorError, AssertionError, KeyError, RuntimeError, ValueError) as error:
+        with safe_open(path, "numpy") as tensors:
+            return {n: tensors.get_tensor(n) for n in tensors.keys()}, tensors.metadata() or {}  # noqa: SIM118 - it cannot be iterated over
+    except (
+        SafetensorError,
+        AttributeError,
+        TypeError,
+    ) as error:  # the last two: no type of NumPy's
         raise ValueError(f"it is damaged, or no safetensors file ({error})") from error
-    network = _empty(config)
-    _check(tensors, network)
-    network.load_state_dict(tensors, assign=True)
-    return network
 
 
-def _empty(config: PolicyConfig) -> AggregationGnn:
-    """Return the network without weights: it takes no memory, and draws no random numbers."""
-    with torch.device("meta"):
-        return FastAggregationGnn(config.network)
+def check_tensors(shapes: Mapping[str, tuple[int, ...]], tensors: Weights) -> None:
+    """Pass if these are tensors of these shapes, all numbers single and finite.
+
+    Raises:
+        ValueError: One is missing, unknown, of another shape or type, or not finite.
+    """
+    for name in sorted(shapes.keys() ^ tensors.keys()):
+        known = "lacks the" if name in shapes else "has an unknown"
+        raise ValueError(f"it {known} tensor {name:.80}")
+    for name, tensor in tensors.items():
+        given = f"{list(tensor.shape)} of {tensor.dtype}"
+        if given != f"{list(shapes[name])} of float32":
+            raise ValueError(f"tensor {name} must be {list(shapes[name])} of float32, not {given}")
+        if not np.all(np.isfinite(tensor)):
+            raise ValueError(f"tensor {name} has numbers that are not finite")
 
 
-def _check(tensors: Mapping[str, torch.Tensor], network: AggregationGnn) -> None:
-    """Raise ValueError unless these are a network's tensors, all of them finite."""
-    expected = {n: kind_of_tensor(t.shape, t.dtype) for n, t in network.state_dict().items()}
-    check_tensors(expected, tensors, lambda tensor: torch.isfinite(tensor).all())
+def _read_file(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
+    weights, metadata = read_tensors(path)
+    if FORMAT not in metadata:
+        raise ValueError("it has weights, but does not say of which policy")
+    return weights, _config_of(metadata[FORMAT])
+
+
+def _config_of(text: str) -> GnnConfig | MlpConfig:
+    said = read_document(text, FORMAT, VERSION, _Metadata)
+    return read_plain(said.config, CONFIGS[said.kind])
+
+
+def _read_folder(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
+    """Return a GNN as swarm_mj 0.1 stored it."""
+    text = read_file(path / OLD_CONFIG, "config", MAX_BYTES)
+    return read_tensors(path / OLD_WEIGHTS)[0], read_document(text, FORMAT, 1, GnnConfig)
+
+
+def _check_size_of_team(num_robots: int, mission: Mission, where: str) -> None:
+    if mission.num_robots != num_robots:
+        raise ValueError(
+            f"{where} flies teams of {num_robots} robots, for which it was trained, not "
+            f"{mission.num_robots}; choose --robots {num_robots}"
+        )
+
+
+def _shapes(config: GnnConfig | MlpConfig, path: Path) -> Mapping[str, tuple[int, ...]]:
+    """Return the shapes of a network's tensors by their names."""
+    if isinstance(config, MlpConfig):
+        return config.network.tensors()
+    need("torch", f"policy {path}", "fly another")
+    from swarm_mj.policies.gnn.fast import empty_network
+
+    return {n: tuple(t.shape) for n, t in empty_network(config.network).state_dict().items()}

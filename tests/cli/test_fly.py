@@ -249,7 +249,7 @@ def test_viewing_needs_a_display_and_says_so_first(tmp_path):
 
 def test_the_next_commands_fit_the_mission_and_the_screen(monkeypatch):
     mission, path = paper("random-walk", num_robots=9), Path("a b.rrd")
-    options = fly.FlyOptions(mission=mission, policy="runs/my own/policy", channel="my:Radio")
+    options = fly.FlyOptions(mission=mission, policy="runs/my own", channel="my:Radio")
     monkeypatch.setattr("swarm_mj.replay.view.sys.platform", "linux")
     for display, way in ((":1", ""), ("", "--web ")):
         monkeypatch.setenv("DISPLAY", display)
@@ -257,7 +257,7 @@ def test_the_next_commands_fit_the_mission_and_the_screen(monkeypatch):
         told = dict(fly._next_commands(options, path))
         assert told["Open the replay:"].endswith(f"swarm-mj replay {way}'a b.rrd'")
     assert told["Compare some:"].endswith(
-        "evaluate --policy 'runs/my own/policy' planner tdma random-flooding --episodes 5 "
+        "evaluate --policy 'runs/my own' planner tdma random-flooding --episodes 5 "
         "--task random-walk --robots 9 --channel my:Radio"
     )
     assert "Open the replay:" not in dict(fly._next_commands(options, None))

@@ -23,7 +23,7 @@ def runs(tmp_path, monkeypatch):
     """A working directory with two trained policies."""
     monkeypatch.chdir(tmp_path)
     save_tiny(tmp_path / "runs" / "x" / "policy", "extended")
-    save_tiny(tmp_path / "runs" / "y", "paper", seed=2)
+    save_tiny(tmp_path / "runs" / "y" / "policy", "paper", seed=2)
     return tmp_path / "runs"
 
 
@@ -66,13 +66,12 @@ def test_the_mode_is_flown_on_request(runs):
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        (["fly", "--policy", "runs/z"], "policy runs/z does not exist; name a directory"),
-        (["fly", "--policy", "runs/x"], "runs/x is a run; name the policy in it, runs/x/policy"),
-        (["fly", "--policy", "runs/y/config.json"], "is a file; name the directory"),
+        (["fly", "--policy", "runs/z"], "there is no policy runs/z; name a .safetensors file"),
+        (["fly", "--policy", "runs"], "runs holds policies; name one of them: runs/x/policy.saf"),
         (["fly", "--policy", "runs/y", "--probability", "0.1"], "takes no transmission probab"),
         (["fly", "--policy", "mst", "--deterministic"], "mst draws from no network"),
         (["evaluate", "--policy", "mst", "--deterministic"], "none is among mst; leave it out"),
-        (["evaluate", "--policy", "mst", "runs/z"], "policy runs/z does not exist"),
+        (["evaluate", "--policy", "mst", "runs/z"], "there is no policy runs/z"),
         (["evaluate", "--policy", "runs/y", "--probability", "0.1"], "takes no transmission prob"),
         (
             ["evaluate", "--policy", "runs/y", "--baseline", "runs/x"],
@@ -140,10 +139,10 @@ def test_a_resumed_evaluation_is_of_the_same_weights(capsys, runs, tmp_path):
         episodes=2,
     )
     start(progress, study.header())
-    save_tiny(runs / "y", "paper", seed=3)
+    save_tiny(runs / "y" / "policy", "paper", seed=3)
     assert main([*evaluated, "--resume"]) == 2
     assert "is of another evaluation: its digest is" in capsys.readouterr().err
-    save_tiny(runs / "y", "paper", seed=2)
+    save_tiny(runs / "y" / "policy", "paper", seed=2)
     assert main([*evaluated, "--resume"]) == 0
     assert not progress.exists()
 
@@ -154,7 +153,7 @@ def test_weights_that_change_amid_an_evaluation_are_noticed(runs):
     study = Study(policies=("runs/y",), regimes=(mission,), episodes=1)
     fly_batch(study.batches[0])
     before = study.config("runs/y", mission)
-    save_tiny(runs / "y", "paper", seed=3)
+    save_tiny(runs / "y" / "policy", "paper", seed=3)
     with pytest.raises(ValueError, match="policy runs/y has changed since the evaluation began"):
         fly_batch(study.batches[0])
     assert study.config("runs/y", mission) == before

@@ -60,15 +60,12 @@ def test_a_run_leaves_what_it_says(whole):
     left = [name for name in files(folder) if "tfevents" not in name]
     assert left == [
         *(f"runs/whole/{name}" for name in ("checkpoint.pt", "curve.csv")),
-        *(
-            f"runs/whole/policy/{name}"
-            for name in ("README.md", "config.json", "model.safetensors")
-        ),
+        "runs/whole/policy.safetensors",
         *(f"runs/whole/replays/decisions-000000{n}.rrd" for n in ("000", "256")),
         "runs/whole/settings.json",
     ]
     assert len(windows(folder / "runs/whole/replays/decisions-000000256.rrd")) == 12
-    _, config = read_policy(folder / "runs/whole/policy")
+    _, config = read_policy(folder / "runs/whole")
     assert config.training["command"].startswith("swarm-mj train --out runs/whole --robots 4 ")
     assert read_run(folder / "runs/whole").limits.decisions == 256
 
@@ -125,7 +122,7 @@ def test_ctrl_c_in_an_evaluation_leaves_it_for_later(here, monkeypatch, capsys):
         assert train("--out", "r", *SMALL, "--budget", 128) == 130
     assert "none yet" in capsys.readouterr().out
     assert train("--out", "r", "--resume") == 0
-    assert (here / "r" / "policy" / "config.json").exists()
+    assert (here / "r" / "policy.safetensors").exists()
 
 
 def test_a_second_ctrl_c_breaks_off_and_leaves_nothing_half_done(here, monkeypatch, capsys):
@@ -171,9 +168,9 @@ def test_options_of_the_run_may_be_repeated(capsys):
 
 def test_a_run_begins_with_a_policy_and_its_network(whole, here, capsys):
     """Which has 4 wide layers, whatever the usual ones are."""
-    policy = whole[0] / "runs" / "whole" / "policy"
+    policy = whole[0] / "runs" / "whole"
     assert train("--out", "r", *MISSIONS, "--held-out", 2, "--init", policy, "--budget", 1) == 0
-    assert read_policy(here / "r" / "policy")[0].shape.latent == 4
+    assert read_policy(here / "r")[0].shape.latent == 4
     capsys.readouterr()
 
 

@@ -91,14 +91,14 @@ REFUSED = [
     ((*NEW, "--minutes", "inf"), "minutes must be a number from 1e-09 to 1e+06, not inf"),
     ((*NEW, "--wings", "2"), "unrecognized arguments: --wings 2"),
     ((*NEW, "--resume"), "new holds no run to go on with; to begin one, leave out --resume"),
-    ((*NEW, "--init", "nothing"), "policy nothing does not exist"),
-    ((*NEW, "--init", "damaged"), "damaged/config.json"),
+    ((*NEW, "--init", "nothing"), "there is no policy nothing"),
+    ((*NEW, "--init", "damaged"), "damaged/policy.safetensors"),
     (
-        (*NEW, "--init", "done/policy", "--latent", "8"),
-        "--latent 8 is not what the policy done/policy has, 4; leave it out",
+        (*NEW, "--init", "done", "--latent", "8"),
+        "--latent 8 is not what the policy done has, 4; leave it out",
     ),
-    ((*NEW, "--init", "done/policy", "--features", "paper"), "--features paper is not what the"),
-    ((*NEW, "--init", "done/policy", "--linear"), "--linear True is not what the policy"),
+    ((*NEW, "--init", "done", "--features", "paper"), "--features paper is not what the"),
+    ((*NEW, "--init", "done", "--linear"), "--linear True is not what the policy"),
     (("--out", "done"), "done holds a run; go on with it by --resume, or name another folder"),
     (("--out", "done/checkpoint.pt"), "is a file; name a folder"),
     (("--out", "done/checkpoint.pt/new"), "cannot be written"),
@@ -108,7 +108,7 @@ REFUSED = [
     ((*DONE, "--seed", "1"), "--seed 1 is not what the run in done has, 0; leave it out"),
     ((*DONE, "--task", "flocking"), "--task flocking is not what the run in done has, stationary"),
     ((*DONE, "--discount", "0.5"), "--discount 0.5 is not what the run in done has, 0; leave"),
-    ((*DONE, "--init", "done/policy"), "done has begun, so --init done/policy is too late"),
+    ((*DONE, "--init", "done"), "done has begun, so --init done is too late"),
     ((*DONE, "--budget", "-1"), "budget must be a whole number from 1"),
     (("--out", "cut-settings", "--resume"), "settings.json are damaged, no run's, or"),
     (("--out", "new-settings", "--resume"), "format_version is 3, and this swarm_mj reads 2"),
@@ -117,7 +117,7 @@ REFUSED = [
         "Expected `int`, got `str` - at `$.training.seed`",
     ),
     (("--out", "cut-checkpoint", "--resume"), "checkpoint.pt is damaged, or none; begin a new"),
-    (("--out", "strange", "--resume"), "policy holds thesis.tex, which is no policy's"),
+    (("--out", "strange", "--resume"), "run strange/policy.safetensors is a folder; name a file"),
     (("--out", "mixed-up", "--resume"), "it was made with other settings than the run's"),
 ]
 
@@ -134,7 +134,7 @@ def prepare(folder):
     other = settings | {"training": settings["training"] | {"ppo": ppo}}
     made = {
         "other/thesis.tex": b"precious",
-        "damaged/config.json": b"{",
+        "damaged/policy.safetensors": b"{",
         "cut-settings/settings.json": as_bytes(settings)[:-40],
         "new-settings/settings.json": as_bytes(newer),
         "text-seed/settings.json": as_bytes(
@@ -144,7 +144,7 @@ def prepare(folder):
         "cut-checkpoint/checkpoint.pt": checkpoint[:-40],
         "strange/settings.json": as_bytes(settings),
         "strange/checkpoint.pt": checkpoint,
-        "strange/policy/thesis.tex": b"precious",
+        "strange/policy.safetensors/thesis.tex": b"precious",
         "mixed-up/settings.json": as_bytes(other),
         "mixed-up/checkpoint.pt": checkpoint,
     }

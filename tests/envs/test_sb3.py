@@ -1,8 +1,11 @@
 """The `VecEnv` of stable-baselines3, and what sb3-contrib learns on it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
+from safetensors import safe_open
 from sb3_contrib import MaskablePPO, RecurrentPPO
 from sb3_contrib.common.maskable.utils import get_action_masks, is_masking_supported
 from stable_baselines3 import A2C, DQN, PPO
@@ -210,14 +213,16 @@ def test_a_stored_actor_flies_from_the_command_line(here, forks):
 
 def test_an_actor_that_sees_by_ones_own_features_flies_if_they_are_named(here, forks):
     own = "swarm_mj.policies.gnn.graphs:PaperFeatures"
-    save_policy(trained(env=make_vec_env("stationary", 2, seed=1, features=own, **SMALL)), "own")
-    fly = ("fly", "--policy", "own/", "--task", "stationary", "--robots", 4, "--windows", 5)
+    model = trained(env=make_vec_env("stationary", 2, seed=1, features=own, **SMALL))
+    assert save_policy(model, "own") == Path("own.safetensors")
+    fly = ("fly", "--policy", "own", "--task", "stationary", "--robots", 4, "--windows", 5)
     done = forks.run(here, "swarm_mj", *fly, "--no-record")
     assert done.returncode == 2
     assert done.stderr.rstrip().endswith(f"if you trust that code, add --features {own}")
     done = forks.run(here, "swarm_mj", *fly, "--no-record", "--features", own)
     assert (done.returncode, done.stderr) == (0, "")
-    assert f"--robots 4 --features {own}" in (here / "own" / "README.md").read_text()
+    with safe_open("own.safetensors", "numpy") as file:
+        assert f"--robots 4 --features {own}" in file.metadata()["swarm_mj policy"]
 
 
 def test_a_model_read_back_is_stored_with_its_environment(tmp_path):
@@ -227,13 +232,13 @@ def test_a_model_read_back_is_stored_with_its_environment(tmp_path):
         save_policy(PPO.load(tmp_path / "model.zip"), tmp_path / "policy")
     env = make_vec_env("stationary", 1, **SMALL)
     save_policy(PPO.load(tmp_path / "model.zip", env=env), tmp_path / "policy")
-    assert (tmp_path / "policy" / "config.json").exists()
+    assert (tmp_path / "policy.safetensors").exists()
 
 
 def test_normalised_rewards_are_no_part_of_a_policy(tmp_path):
     env = VecMonitor(VecNormalize(make_vec_env("stationary", 2, **SMALL), norm_obs=False))
     save_policy(trained(PPO, env), tmp_path / "policy")
-    assert (tmp_path / "policy" / "config.json").exists()
+    assert (tmp_path / "policy.safetensors").exists()
 
 
 class Halved(CombinedExtractor):
@@ -263,4 +268,4 @@ class Halved(CombinedExtractor):
 def test_models_that_no_policy_can_be_made_of(tmp_path, model, message):
     with pytest.raises(ValueError, match=message):
         save_policy(model(), tmp_path / "policy")
-    assert not (tmp_path / "policy").exists()
+    assert not list(tmp_path.glob("policy*"))

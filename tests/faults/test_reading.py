@@ -41,7 +41,7 @@ def test_damaged_replays_are_told_by_all_readers(replay, tmp_path, capsys, recor
 
 
 @pytest.mark.fault("damaged files are told")
-@pytest.mark.parametrize("what", ["results", "table", "policy", "weights", "curve"])
+@pytest.mark.parametrize("what", ["results", "table", "policy", "curve"])
 def test_damaged_files_are_told_or_sound(what, tmp_path, record_property):
     """Faults 15, 16: what can be read is within its ranges, and all else is told in a line."""
     path, read = READERS[what](tmp_path)
@@ -63,12 +63,10 @@ def _table(folder):
     return folder / "t.csv", lambda: read_table(folder / "t.csv")
 
 
-def _policy(name):
-    def made(folder):
-        save_tiny(folder / "policy")
-        return folder / "policy" / name, lambda: read_policy(folder / "policy")
-
-    return made
+def _policy(folder):
+    path = folder / "policy.safetensors"
+    save_tiny(path)
+    return path, lambda: read_policy(path)
 
 
 def _curve(folder):
@@ -81,8 +79,7 @@ def _curve(folder):
 READERS = {
     "results": _results,
     "table": _table,
-    "policy": _policy("config.json"),
-    "weights": _policy("model.safetensors"),
+    "policy": _policy,
     "curve": _curve,
 }
 

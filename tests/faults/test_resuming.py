@@ -180,7 +180,7 @@ def begin_with(folder, init):
     """Makes of a run one that has begun with a policy and was killed at once."""
     for name in (CHECKPOINT, "curve.csv"):
         (folder / name).unlink()
-    shutil.rmtree(folder / "policy")
+    (folder / "policy.safetensors").unlink()
     settings = json.loads((folder / SETTINGS).read_text())
     (folder / SETTINGS).write_text(json.dumps(settings | {"init": str(init)}))
 
@@ -192,14 +192,13 @@ def test_the_policy_a_run_begins_with_is_a_policy_and_no_other_folder(begun, tmp
     home.mkdir()
     (home / "secret").write_text("x")
     begin_with(begun, home)
-    refused(begun, capsys, "config.json")
-    (home / "secret").unlink()
-    save_tiny(home)
+    refused(begun, capsys, "there is no policy")
+    save_tiny(home / "policy.safetensors")
     refused(begun, capsys, "has another network than the run")
     (tmp_path / "mine").write_text("a secret")
-    (home / "config.json").unlink()
-    (home / "config.json").symlink_to(tmp_path / "mine")
-    refused(begun, capsys, "config.json: JSON is malformed")
+    (home / "policy.safetensors").unlink()
+    (home / "policy.safetensors").symlink_to(tmp_path / "mine")
+    refused(begun, capsys, "it is damaged, or no safetensors file")
 
 
 PPO = [

@@ -300,21 +300,23 @@ def test_links_that_lead_in_circles_are_told_before_the_work(forks, tmp_path, pr
     [
         (["--json", "o.json", "--csv", "o.json.progress"], "must be named *.csv"),  # fault 13
         (["--csv", "a.csv", "--policy", "p", "--force"], None),
-        (["--json", "p/config.json", "--policy", "./p", "--force"], "is an input, or part of one"),
+        (["--json", "p/s.json", "--policy", "./p", "--force"], "is an input, or part of one"),
         (["--csv", "pipe.csv"], "is a device or a pipe"),
     ],
 )
 def test_outputs_are_no_inputs_and_no_progress(here, capsys, arguments, complaint):
     """Fault 13: two outputs are two files, and none is what is read."""
-    save_tiny(here / "p", "paper")
+    save_tiny(here / "p" / "policy", "paper")
+    (here / "p" / "s.json").write_text("{}")
     os.mkfifo(here / "pipe.csv")
-    before = (here / "p" / "config.json").read_bytes()
+    before = (here / "p" / "policy.safetensors").read_bytes()
     code = main(["evaluate", *SMALL, "--episodes", "2", *arguments])
     assert code == (0 if complaint is None else 2)
     if complaint:
         said_in_one_line(capsys, "", complaint)
         assert "o.json" not in names(here)
-    assert (here / "p" / "config.json").read_bytes() == before
+    assert (here / "p" / "policy.safetensors").read_bytes() == before
+    assert (here / "p" / "s.json").read_text() == "{}"
 
 
 @pytest.mark.fault("outputs that cannot be")

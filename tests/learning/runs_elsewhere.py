@@ -95,7 +95,7 @@ def killed(folder):
     os.chdir(folder)
     _load_compiled_functions()
     policy = _in_a_child(lambda: main(["train", "--out", "first", "--latent", "4", *ASKED]))
-    asked = ("train", "--init", "first/policy", *ASKED)
+    asked = ("train", "--init", "first", *ASKED)
     moments = folder / "moments"
     whole = _in_a_child(lambda: _train_and_die([*asked, "--out", "whole"], None, moments))
     found = {"exit codes": [policy, whole], "moments": {}}

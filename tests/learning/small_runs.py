@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import torch
+from safetensors.torch import load_file
 
 from swarm_mj.learning.run_folder import CHECKPOINT, Limits, Run
 from swarm_mj.learning.settings import usual_settings
@@ -60,7 +61,7 @@ def end_of(folder):
     progress["evaluation_minutes"] = None
     for row in progress["curve"]:
         row["minutes"] = row["rollout/decisions_per_s"] = None
-    policy = (folder / "policy" / "model.safetensors").read_bytes()
+    policy = load_file(folder / "policy.safetensors")
     curve = (folder / "curve.csv").read_text().splitlines()
     return {**state, "progress": progress, "policy file": policy, "curve rows": len(curve)}
 

@@ -11,11 +11,11 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 from swarm_mj.learning import callback
 from swarm_mj.learning.choice import TEST_SEED
-from swarm_mj.learning.run_folder import CURVE, POLICY, REPLAYS, TENSORBOARD, Limits, Run
+from swarm_mj.learning.run_folder import CURVE, REPLAYS, TENSORBOARD, Limits, Run
 from swarm_mj.learning.settings import HELD_OUT_SEED
 from swarm_mj.learning.train import train
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.policies.stored import read_policy
+from swarm_mj.policies.stored import POLICY, read_policy
 from swarm_mj.replay.read import windows
 from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm

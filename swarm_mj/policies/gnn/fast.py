@@ -7,15 +7,17 @@ behind it. Input edges are encoded once for each direction, as they are all alik
 are asked for go through the last layers, and edges of one hidden layer are compiled on a CPU.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
+import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from swarm_mj.policies.gnn.edge_means import EdgeMeans
 from swarm_mj.policies.gnn.network import AggregationGnn, Core
-from swarm_mj.policies.gnn.shape import Edges
+from swarm_mj.policies.gnn.shape import Edges, GnnShape
 
 NODES_AT_ONCE = 6400  # on a CPU: with more the caches spill, with fewer every step starts in vain
 IS_UPWARD = {"paper": (True,), "reference": (False,), "both": (True, False)}  # child to parent
@@ -38,6 +40,20 @@ class FastAggregationGnn(AggregationGnn):
         rows = (node, parent) if is_wanted is None else (node, parent, is_wanted)
         chunks = zip(*(each.chunk(max(1, num_chunks)) for each in rows), strict=True)
         return torch.cat([evaluate(*chunk) for chunk in chunks])
+
+
+def empty_network(shape: GnnShape) -> FastAggregationGnn:
+    """Return a network without weights: it takes no memory, and draws no random numbers."""
+    with torch.device("meta"):
+        return FastAggregationGnn(shape)
+
+
+def network_of(shape: GnnShape, weights: Mapping[str, np.ndarray]) -> FastAggregationGnn:
+    """Return a network with these weights, which are its own."""
+    network = empty_network(shape)
+    tensors = {name: torch.from_numpy(array) for name, array in weights.items()}
+    network.load_state_dict(tensors, assign=True)
+    return network
 
 
 class Layer(NamedTuple):
