@@ -24,7 +24,6 @@ from swarm_mj.policies.tuning import TABLE, Tuned, read_table
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.atomic import write_csv
 from swarm_mj.system.fields import same_as, setting
-from swarm_mj.system.interrupt import heard_interrupt
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.owned import owned
 from swarm_mj.system.progress import WorkBar
@@ -183,12 +182,10 @@ def _tune(options: Options, console: Console) -> int:
 def _tune_all(work: Sequence[Search], seeds: range, console: Console) -> list[Tuned]:
     """Tunes with a progress bar, and says where a grid may have been too narrow."""
     rows: list[Tuned] = []
-    with WorkBar("Tuning", len(work), "regimes") as bar, heard_interrupt() as was_pressed:
+    with WorkBar("Tuning", len(work), "regimes") as bar:
         for search in work:
             bar.text = search.policy
             row = tune(search, seeds, _guess(search.grid, rows))
-            if was_pressed():
-                raise KeyboardInterrupt
             rows.append(row)
             _report_edge(row, search.grid, console)
             bar.advance()

@@ -33,7 +33,7 @@ from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.atomic import write_json
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
-from swarm_mj.system.interrupt import deferred_interrupt, heard_interrupt
+from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.machine import YES
 from swarm_mj.system.needs import check_fits
 from swarm_mj.system.outputs import Output, check_outputs
@@ -88,12 +88,10 @@ def run(options: FlyOptions) -> int:
     check_used(options.features, [policy])
     console = Console(stderr=True, highlight=False)
     preparing = console.status("Preparing the swarm (compiles once, then it is cached) ...")
-    with preparing, heard_interrupt() as was_pressed:
+    with preparing:
         compile_ahead(mission, options.policy, **options.how)
         swarm = Swarm(mission, [options.seed], **components.given)
         recorder = _recorder(options, swarm, policy) if path else None
-        if was_pressed():
-            raise KeyboardInterrupt
     for note in notes_on(mission):
         console.print(note)
     bar = WorkBar("Flying", mission.num_windows, "windows", console=console)

@@ -14,7 +14,6 @@ from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
 from swarm_mj.system.atomic import write_bytes
 from swarm_mj.system.fields import setting
-from swarm_mj.system.interrupt import heard_interrupt
 from swarm_mj.system.machine import YES
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
@@ -114,14 +113,11 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
         make_video,
     )
 
-    with heard_interrupt() as was_pressed:
-        with Console(stderr=True, highlight=False).status("Reading ..."):
-            footages = _read(options)
-        style = replace(style, seconds=options.seconds or usual_seconds(footages))
-        with WorkBar("Rendering", style.num_frames, "pictures") as bar:
-            content = make_video(footages, suffix, style, bar.advance)
-        if was_pressed():
-            raise KeyboardInterrupt
+    with Console(stderr=True, highlight=False).status("Reading ..."):
+        footages = _read(options)
+    style = replace(style, seconds=options.seconds or usual_seconds(footages))
+    with WorkBar("Rendering", style.num_frames, "pictures") as bar:
+        content = make_video(footages, suffix, style, bar.advance)
     write_bytes(video, content, check=lambda part: check_video(part, suffix, style))
     number, name = style.num_frames, shlex.quote(str(video))
     plain_console().print(

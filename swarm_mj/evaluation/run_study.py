@@ -11,7 +11,7 @@ from swarm_mj.evaluation.jobs import run_jobs
 from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.evaluation.study import Study
 from swarm_mj.system.fields import setting
-from swarm_mj.system.interrupt import deferred_interrupt, heard_interrupt
+from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.progress import WorkBar
 
 DEFAULT_POLICIES = ("planner", *BASELINES)
@@ -51,13 +51,13 @@ def fly_study(
     """
     left = [index for index in range(len(study.batches)) if index not in costs]
     flown = run_jobs(fly_batch, [study.batches[index] for index in left], num_jobs)
-    with bar, closing(flown), heard_interrupt() as was_pressed:
+    with bar, closing(flown):
         for which, batch_costs in flown:
             index = left[which]
             with deferred_interrupt() as is_interrupted:
                 costs[index] = batch_costs
                 if keep:
                     keep(index, batch_costs)
-            if is_interrupted() or was_pressed():
+            if is_interrupted():
                 raise KeyboardInterrupt
             bar.move_to(num_flown(study, costs))

@@ -20,6 +20,8 @@ from typing import Any, TypeVar, cast
 from numba import config, njit
 from numba.core import caching
 
+from swarm_mj.system.interrupt import held_interrupts
+
 PACKAGE = Path(__file__).parents[1]
 IMPORT = re.compile(r"^from (\w+(?:\.\w+)*) import ", re.MULTILINE)
 
@@ -44,13 +46,30 @@ def compiled(*, fastmath: bool | set[str] = False) -> Callable[[Function], Funct
         numba: Any = config
         before, numba.CACHE_LOCATOR_CLASSES = numba.CACHE_LOCATOR_CLASSES, LOCATORS
         try:
-            return cast(Function, njit(cache=True, **options)(plain))
+            dispatcher: Any = njit(cache=True, **options)(plain)
         except RuntimeError:  # no place for a cache
-            return cast(Function, njit(**options)(plain))
+            dispatcher = njit(**options)(plain)
         finally:
             numba.CACHE_LOCATOR_CLASSES = before
+        dispatcher.compile = _whole(dispatcher.compile)
+        return cast(Function, dispatcher)
 
     return decorate
+
+
+def _whole(compile: Function) -> Function:
+    """Let a Ctrl-C wait until a function is compiled, or loaded from the cache.
+
+    LLVM calls back into Python meanwhile. There an exception is lost, a function is left half
+    made, and the process fails later, or crashes when it ends.
+    """
+
+    @functools.wraps(compile)
+    def compile_whole(*arguments: object) -> object:
+        with held_interrupts():
+            return compile(*arguments)
+
+    return cast(Function, compile_whole)
 
 
 def digest(file: Path) -> bytes:

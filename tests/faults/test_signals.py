@@ -2,14 +2,12 @@
 
 import random
 import signal
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from left_over import signalled
 from tries import tries
 
-from swarm_mj.cli import main
 from swarm_mj.replay.read import check_replay
 
 RESULTS = Path(__file__).parent.parent.parent / "training" / "results" / "paper-random-walk.csv"
@@ -60,20 +58,6 @@ def test_a_flight_leaves_a_whole_replay(forks, tmp_path, record_property, wishes
 
 
 @pytest.mark.fault("signals")
-def test_a_signal_that_a_library_swallows_while_it_loads_is_not_lost(tmp_path, monkeypatch):
-    """As numba may, when it loads a kernel."""
-
-    def swallow(*_arguments, **_how):
-        with suppress(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGTERM)
-
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("swarm_mj.cli.fly.compile_ahead", swallow)
-    assert main(["fly", "--robots", "3", "--windows", "3"]) == 130
-    assert files(tmp_path) == []
-
-
-@pytest.mark.fault("signals")
 @pytest.mark.parametrize("wishes", WISHES, ids=str)
 def test_an_evaluation_can_be_resumed(forks, tmp_path, record_property, wishes):
     """Fault 24."""
@@ -117,7 +101,6 @@ def test_under_nohup_the_work_goes_on(forks, tmp_path):
 # Runs `swarm-mj` with standard streams whose reader has gone.
 UNREAD = """
 import os, pty, sys
-from swarm_mj.cli import main
 if __name__ == "__main__":
     reader, writer = getattr({"os": os, "pty": pty}[sys.argv[1]], sys.argv[2])()
     os.dup2(writer, 1)
@@ -150,7 +133,6 @@ def test_a_reader_that_goes_away_is_no_error(forks, tmp_path, kind, arguments, l
 # Runs `swarm-mj` with some of its standard streams on a full disk.
 FULL = """
 import os, sys
-from swarm_mj.cli import main
 if __name__ == "__main__":
     for number in sys.argv[1]:
         os.dup2(os.open("/dev/full", os.O_WRONLY), int(number))

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import swarm_mj.system.compiled
+import swarm_mj.system.interrupt
 from swarm_mj.system.compiled import _read, digest
 
 PHYSICS = """
@@ -42,15 +43,37 @@ print(*(" fast " in str(function.inspect_llvm()) for function in (total, scaled)
 """
 
 
+# Presses Ctrl-C where LLVM calls back into Python, both when a function is compiled and when it is
+# loaded, and then uses the function all the same.
+INTERRUPTED = """
+import signal
+from numba.core.codegen import JITCodeLibrary
+finalize = JITCodeLibrary.finalize
+def interrupted(self):
+    signal.raise_signal(signal.SIGINT)
+    return finalize(self)
+JITCodeLibrary.finalize = interrupted
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from swarm_mj.loop import total
+try:
+    print("was not interrupted", total(4))
+except KeyboardInterrupt:
+    print(sum(map(len, (total.stats.cache_hits, total.stats.cache_misses))), total(4))
+"""
+
+
 class Checkout:
     """A package of two modules, of which one calls the other."""
 
     def __init__(self, root):
         self.root = root
         self.package = root / "swarm_mj"
-        (self.package / "system").mkdir(parents=True)
-        shutil.copy(swarm_mj.system.compiled.__file__, self.package / "system")
-        (self.package / "__init__.py").touch()
+        self.package.mkdir()
+        (self.package / "system").mkdir()
+        for module in (swarm_mj.system.compiled, swarm_mj.system.interrupt):
+            shutil.copy(module.__file__, self.package / "system")
+        for folder in (self.package, self.package / "system"):
+            (folder / "__init__.py").touch()
         (self.package / "loop.py").write_text(LOOP)
         self.write(factor=2.0)
 
@@ -119,6 +142,12 @@ def test_an_installation_that_cannot_be_written_uses_the_user_s_folder_or_none(c
     assert path.startswith(home)
     nowhere = str(checkout.package / "__init__.py")
     assert checkout.run(XDG_CACHE_HOME=nowhere, HOME=nowhere) == (4.0, False, "None")
+
+
+def test_ctrl_c_interrupts_only_once_a_function_is_whole(checkout):
+    """Broken off, the process crashed when it ended, or failed of a function half made."""
+    for _ in ("compiled", "loaded"):
+        assert checkout.python(INTERRUPTED) == "1 4.0"
 
 
 def test_assumptions_on_floats_are_never_those_of_the_caller(checkout):

@@ -175,7 +175,7 @@ def test_bad_input_is_one_clear_line_and_leaves_nothing(run, tmp_path, arguments
 TUNE_AND_TELL = f"""
 import runpy, signal, sys
 from pathlib import Path
-from swarm_mj import swarm
+from swarm_mj.simulation import swarm
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
 step = swarm.Swarm.step
 def told(self, policy):
