@@ -77,7 +77,7 @@ def imports(path):
 @pytest.mark.parametrize(
     ("name", "known"),
     [
-        ("system/compiled", set()),
+        ("system/compiled", {"system.interrupt"}),
         ("system/fields", set()),
         ("mission/specification", {"system.fields"}),
         ("mission/batched_rng", set()),
