@@ -1,4 +1,4 @@
-"""What drives the robots: a controller, and what it may declare beside its accelerations.
+"""The interface of controllers: accelerations, and perhaps a task cost.
 
 Index order: `[b, i]` is robot `i` of mission `b`.
 """
@@ -11,41 +11,41 @@ from jaxtyping import Float
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import Buffers
 
+STIFFNESS_PER_S2 = 0.25  # k: a robot begins to brake V_max c / k before its target, 12 m by default
+DAMPING_PER_S = 1.0  # c: critical, 2 sqrt(k)
+
 
 @runtime_checkable
 class Controller(Protocol):
-    """What the robots want in the next window, from what they have heard.
+    """Drives the robots by what they have heard.
 
-    One that draws or remembers is also `Started`: it gets the missions' own random streams.
+    A controller that draws or remembers is also `Started`: it gets the missions' random streams.
     """
 
     def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N 2"]:
-        """Return the accelerations u [m/s²]; row [b, i] may use buffer and body [b, i] only.
+        """Return the accelerations u [m/s²], which the physics clips to plus or minus A_max.
 
         Args:
-            buffers: What each robot has heard; they cannot be written.
+            buffers: What each robot has heard; read-only. Row [b, i] may use row [b, i] only.
             states: The robots' own states.
-
-        Returns:
-            The accelerations; the physics clips them to plus or minus A_max.
         """
         ...
 
 
 @runtime_checkable
 class Costed(Protocol):
-    """A controller that says what its task costs, beside the age of information."""
+    """A controller with a task cost, next to the age of information."""
 
     cost_name: str  # such as "formation error"
     cost_unit: str  # such as "m"
 
     def cost(self, states: RobotStates, /) -> Float[np.ndarray, "B"]:
-        """What the task costs while the robots are like this, per mission; 0 or more."""
+        """Return the task cost of these states, per mission; 0 or more."""
         ...
 
 
 def costed(controller: Controller) -> Costed | None:
-    """Return a controller that says what its task costs, or None.
+    """Return a controller that has a task cost, or None.
 
     Raises:
         TypeError: It has a cost without a name or a unit.
@@ -60,19 +60,7 @@ def costed(controller: Controller) -> Costed | None:
     return None
 
 
-STIFFNESS_PER_S2 = 0.25  # k: a robot begins to brake V_max c / k before its target, 12 m by default
-DAMPING_PER_S = 1.0  # c: critical, 2 sqrt(k)
-
-
 def steer(target_m: Float[np.ndarray, "B N 2"], states: RobotStates) -> Float[np.ndarray, "B N 2"]:
-    """Accelerations towards targets, critically damped: k (target - p) - c v [m/s²].
-
-    Args:
-        target_m: Where each robot wants to be [m].
-        states: The robots' own states.
-
-    Returns:
-        The accelerations, not yet clipped.
-    """
+    """Accelerate towards targets [m], critically damped: k (target - p) - c v [m/s²]."""
     apart_m = target_m - states.position_m
     return STIFFNESS_PER_S2 * apart_m - DAMPING_PER_S * states.velocity_mps

@@ -1,7 +1,4 @@
-"""What the robots do (IV-A): stand still, walk at random, or flock on what they have heard.
-
-`formation` and `coverage` are tasks of ours, each in a module of its own.
-"""
+"""The paper's controllers (IV-A): stand still, walk at random, flock; the table of all tasks."""
 
 from collections.abc import Callable, Sequence
 
@@ -25,10 +22,7 @@ def controller_of(mission: Mission) -> Controller:
 
 
 def initial_velocity(mission: Mission, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
-    """Velocities at the start [m/s]: uniform in plus or minus V_max per axis, or 0.
-
-    The paper's moving teams start moving (IV-A).
-    """
+    """Draw the initial velocities [m/s]: uniform in plus or minus V_max per axis, or 0 (IV-A)."""
     if mission.task not in ("random-walk", "flocking"):
         return np.zeros((mission.num_robots, 2))
     limit = mission.max_velocity_mps
@@ -36,7 +30,7 @@ def initial_velocity(mission: Mission, rng: np.random.Generator) -> Float[np.nda
 
 
 def stand(_buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N 2"]:
-    """No acceleration."""
+    """Accelerate no robot."""
     return np.zeros_like(states.velocity_mps)
 
 
@@ -59,8 +53,7 @@ class RandomWalk:
 class Flocking:
     """Velocity consensus by `flocking`, clipped to plus or minus A_max (IV-A)."""
 
-    cost_name = "velocity variance"
-    cost_unit = "m²/s²"
+    cost_name, cost_unit = "velocity variance", "m²/s²"
 
     def __init__(self, mission: Mission) -> None:
         self._limit_mps2 = mission.max_acceleration_mps2
@@ -88,33 +81,26 @@ CONTROLLERS: dict[Task, Callable[[Mission], Controller]] = {
 def flocking(
     buffers: Buffers, velocity_mps: Float[np.ndarray, "B N 2"], flocking_set: FlockingSet
 ) -> Float[np.ndarray, "B N 2"]:
-    """Mean difference of the known velocities to one's own, per second [m/s²] (Eq. 16).
+    """Return the mean difference of known velocities to the own one, per second [m/s²] (Eq. 16).
 
     Args:
         buffers: What each robot has heard.
         velocity_mps: Every robot's own velocity [m/s].
         flocking_set: F: robots with T > T_0 (`heard`, the paper) or, per axis, with a velocity
-            other than 0 in the buffer (`moving`, the authors' code). Oneself is in it; while it is
-            empty the acceleration is 0.
-
-    Returns:
-        The accelerations, not yet clipped.
+            other than 0 in the buffer (`moving`, the authors' code). The robot itself is in it;
+            while F is empty the acceleration is 0.
     """
-    acceleration = np.empty_like(velocity_mps)
-    _mean_difference(
-        buffers.timestamp,
-        buffers.velocity_mps,
-        velocity_mps,
-        flocking_set == "heard",
-        acceleration,
-    )
+    counts_heard = flocking_set == "heard"
+    acceleration = np.zeros_like(velocity_mps)
+    known_mps = buffers.velocity_mps
+    _mean_difference(buffers.timestamp, known_mps, velocity_mps, counts_heard, acceleration)
     return acceleration
 
 
 @compiled()
 def _mean_difference(
     timestamp: Float[np.ndarray, "B N N"],
-    believed_mps: Float[np.ndarray, "B N N 2"],
+    known_mps: Float[np.ndarray, "B N N 2"],
     velocity_mps: Float[np.ndarray, "B N 2"],
     counts_heard: bool,
     acceleration: Float[np.ndarray, "B N 2"],
@@ -123,11 +109,11 @@ def _mean_difference(
     for b in range(num_missions):
         for i in range(num_robots):
             for axis in range(2):
-                total = 0.0
-                num_counted = 0
+                total, num_counted = 0.0, 0
                 for j in range(num_robots):
-                    believed = believed_mps[b, i, j, axis]
-                    if (timestamp[b, i, j] > NEVER) if counts_heard else (believed != 0.0):
-                        total += believed - velocity_mps[b, i, axis]
+                    known = known_mps[b, i, j, axis]
+                    if (timestamp[b, i, j] > NEVER) if counts_heard else (known != 0.0):
+                        total += known - velocity_mps[b, i, axis]
                         num_counted += 1
-                acceleration[b, i, axis] = total / num_counted if num_counted else 0.0
+                if num_counted:
+                    acceleration[b, i, axis] = total / num_counted

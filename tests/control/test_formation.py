@@ -4,11 +4,21 @@ from channels import to_nobody
 from truth import tell_everyone_the_truth
 
 from swarm_mj.control.controller import DAMPING_PER_S, STIFFNESS_PER_S2
-from swarm_mj.control.formation import Formation, block, formation_error
+from swarm_mj.control.formation import Formation, block
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.simulation.swarm import Swarm
+
+
+def formation_error(position_m, place_m, is_active=None):
+    """The task's cost, with these places."""
+    task = Formation(paper("formation", num_robots=len(place_m)))
+    task._place_m = place_m
+    velocity_mps = np.zeros_like(position_m)
+    return task.cost(
+        RobotStates(position_m=position_m, velocity_mps=velocity_mps, is_active=is_active)
+    )
 
 
 def test_a_block_of_five_by_hand():
