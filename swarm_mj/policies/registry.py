@@ -15,7 +15,7 @@ from swarm_mj.policies.aloha import Aloha
 from swarm_mj.policies.gossip import InnovationGossip
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle
 from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
-from swarm_mj.policies.planner.payloads import links_fit, snapshot_form
+from swarm_mj.policies.planner.payloads import carries, link_fields, snapshot_fields
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.planner.settings import PlannerSettings
@@ -51,21 +51,12 @@ def _sotdma(mission: Mission) -> SelfOrganisedTdma:
 
 def _planner(mission: Mission) -> Planner | RestingPlanner:
     if mission.task != "stationary":
-        return _moving_planner(mission)
-    if not links_fit(mission):
+        return Planner(mission)
+    if not carries(link_fields(mission), mission):
         return _resting_planner(mission)
-    return _resting_planner(mission, learns=True, moving=_moving_planner(mission))
-
-
-def _moving_planner(mission: Mission) -> Planner:
-    return Planner(
-        radio_of(mission),
-        PlannerSettings(),
-        snapshot_form(mission),
-        window_s=mission.window_s,
-        range_m=mission.range_m,
-        side_m=mission.side_m,
-    )
+    # Snapshots outgrow what is learned of links in large teams; then there is no plan for motion.
+    moving = Planner(mission) if carries(snapshot_fields(mission), mission) else None
+    return _resting_planner(mission, learns=True, moving=moving)
 
 
 def _resting_planner(

@@ -62,9 +62,9 @@ def test_every_policy_says_what_its_packets_weigh(capsys, robots, bytes_of):
 
 
 def test_a_policy_s_packet_is_that_of_the_bit_rate_named(capsys):
-    shown = printed(capsys, "planner", "--bit-rate", "250k")
-    assert "lean snapshots" in shown
-    assert "721 bytes" in shown
+    """Of 367 bytes a slot holds 250, as many entries as fit."""
+    shown = printed(capsys, "gossip", "--bit-rate", "40k")
+    assert "250 bytes" in shown
 
 
 def test_probabilities_are_those_of_the_mission_named(capsys):

@@ -11,8 +11,7 @@ import numpy as np
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.planner.broadcast_scheduler import schedule
-from swarm_mj.policies.planner.payloads import snapshot_form
-from swarm_mj.policies.planner.plan import foresight_of
+from swarm_mj.policies.planner.plan import lookahead_of
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.weights import heuristic_weights
@@ -174,14 +173,14 @@ class Mind:
         for k in np.flatnonzero(~held.is_fresh):
             known[k] = np.minimum(known[k], held.seen[k])
             known[:, k] = np.minimum(known[:, k], held.seen[k])
-        foresight = foresight_of(len(known), is_certain=rests, settings=self.settings.schedule)
+        lookahead = lookahead_of(len(known), is_certain=rests, settings=self.settings.schedule)
         is_free = [
             not (self.calls(h) or self.seeks(h)) for h in range(2 * begun, 2 * self.begins)
-        ] + [True] * foresight.slots
+        ] + [True] * lookahead.depth
         halves = (2 * known).astype(np.float32)
         transmits = np.zeros((2 * length, len(known)), dtype=bool)
         weights = heuristic_weights(links, self.settings.weights)
-        schedule(halves, 2.0 * begun, links, weights, foresight, np.array(is_free), transmits)
+        schedule(halves, 2.0 * begun, links, weights, lookahead, np.array(is_free), transmits)
         self.schedule, self.after = transmits[:, self.me].tolist(), halves.astype(float) / 2
 
     def calls(self, slot):
@@ -239,25 +238,13 @@ def rows(buffers, i):
     return [array[0, i].copy() for array in arrays]
 
 
-def planner_of(mission, settings):
-    """The planner of a mission with other numbers."""
-    return Planner(
-        radio_of(mission),
-        settings,
-        snapshot_form(mission),
-        window_s=mission.window_s,
-        range_m=mission.range_m,
-        side_m=mission.side_m,
-    )
-
-
 class Flight(BroadcastPolicy):
     """A planner that flies one mission, and notes what it decides."""
 
     def __init__(self, mission, seed, *, channel=None, settings=SETTINGS):
         self.settings = settings
         self.mission, self.seed = mission, seed
-        self.planner = planner_of(mission, settings)
+        self.planner = Planner(mission, settings)
         self.swarm = Swarm(mission, [seed], channel=channel)
         self.transmitted = []  # [slot][robot]
 
@@ -357,8 +344,8 @@ class PlannedApart(BroadcastPolicy):
         transmits = np.zeros((120, num_robots), dtype=bool)
         nothing = np.zeros((num_robots, num_robots), dtype=np.float32)
         weights = heuristic_weights(links, SETTINGS.weights)
-        foresight = foresight_of(num_robots, is_certain=True, settings=SETTINGS.schedule)
-        schedule(nothing, 0.0, links, weights, foresight, np.ones(200, dtype=bool), transmits)
+        lookahead = lookahead_of(num_robots, is_certain=True, settings=SETTINGS.schedule)
+        schedule(nothing, 0.0, links, weights, lookahead, np.ones(200, dtype=bool), transmits)
         return transmits
 
     def fly(self, num_windows):

@@ -13,9 +13,9 @@ import numpy as np
 from decentralised_reference import rows
 
 from swarm_mj.policies.planner.broadcast_scheduler import schedule
-from swarm_mj.policies.planner.link_tables import LAWS, LinkTable, fit, learned
+from swarm_mj.policies.planner.link_tables import LAWS, LinkTable, corrected, fit
 from swarm_mj.policies.planner.payloads import link_fields
-from swarm_mj.policies.planner.plan import foresight_of
+from swarm_mj.policies.planner.plan import lookahead_of
 from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.planner.settings import LearningSettings, PlannerSettings
 from swarm_mj.policies.planner.weights import heuristic_weights
@@ -34,7 +34,7 @@ SHORT = PlannerSettings(
         flown_rounds=1.0,
         spread_rounds=0.5,
         min_round_windows=8,
-        least_log_odds=1.0,
+        min_log_odds=1.0,
     )
 )
 
@@ -56,11 +56,11 @@ def planned(links, settings, num_slots):
         transmits = np.zeros((num_slots, num_robots), dtype=bool)
         nothing = np.zeros((num_robots, num_robots), dtype=np.float32)
         weights = heuristic_weights(links, settings.weights)
-        foresight = foresight_of(
+        lookahead = lookahead_of(
             num_robots, is_certain=not links.is_doubtful, settings=settings.schedule
         )
-        free = np.ones(num_slots + foresight.slots, dtype=bool)
-        schedule(nothing, 0.0, links, weights, foresight, free, transmits)
+        free = np.ones(num_slots + lookahead.depth, dtype=bool)
+        schedule(nothing, 0.0, links, weights, lookahead, free, transmits)
         PLANNED[key] = transmits
     return PLANNED[key]
 
@@ -188,7 +188,7 @@ class LearningMind:
             if table is not None:
                 believed = believed * 10.0 ** (table.mean_db / 10.0)
                 of = LinkTable(law=table.law, mean_db=table.mean_db, std_db=table.std_db)
-                links = learned(prior, of, self.settings.learning)
+                links = corrected(prior, of, self.settings.learning)
             self.plans[key] = (begin, planned(links, self.settings, num_slots), believed, prior)
         return self.plans[key]
 

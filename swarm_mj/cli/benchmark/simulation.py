@@ -26,7 +26,7 @@ from swarm_mj.mission import Mission, paper
 from swarm_mj.physics.arenas import BLOCK_M, HALF_HEIGHT_M
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP
-from swarm_mj.policies.planner.plan import Plan
+from swarm_mj.policies.planner.plan import epoch_plan
 from swarm_mj.policies.planner.policy import regular_length
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import take_snapshots
@@ -192,7 +192,7 @@ def _planning(mission: Mission) -> Callable[[], object]:
         )
         is_free = np.ones(2 * num_windows, dtype=bool)
         timestamp = buffers.timestamp[0]
-        return Plan(belief, settings, snapshots, 0, timestamp, now, is_free).outcome()
+        return epoch_plan(belief, settings, snapshots, 0, timestamp, now, is_free).outcome()
 
     return plan
 

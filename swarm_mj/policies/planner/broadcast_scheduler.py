@@ -1,15 +1,18 @@
 """Schedules of broadcasts: who transmits in each slot, chosen greedily, looking ahead.
 
-A slot's transmitters are added one by one: always the one whose packet makes what the slot is
-worth highest, while that keeps at least a share of what it was worth before. A share below 1 lets
-robots far apart transmit at the same time, each heard by those near it: worth less at that moment,
-but news then travels on many ways at once. Looking ahead, several first transmitters are followed
-for a few slots, and the one that leaves the team youngest is taken.
+A slot's transmitters are added one by one: always the one whose packet raises the slot's value
+most, while that keeps at least a share of the value before. A share below 1 lets robots far apart
+transmit at the same time, each heard by those near it: less valuable at that moment, but news then
+travels on many ways at once. Looking ahead, several first transmitters are followed for a few
+slots, and the one that leaves the team youngest is taken.
 
-A packet that raises T^{j,k} (Eq. 8) by r is worth r² times a weight of receiver j and subject k.
-Where positions are only believed, a packet decodes with a probability, and timestamps are expected
-ones. Index order: `i` sends, `j` receives. Times are in slots, float32, which keeps them exact for
-8 million windows.
+A packet that raises T^{j,k} (Eq. 8) by r has the value r² times a weight of receiver j and subject
+k. Where positions are only believed, a packet decodes with a probability, and timestamps are
+expected ones. Index order: `i` sends, `j` receives. Times are in slots, float32, which keeps them
+exact for 8 million windows.
+
+The first flight compiles these functions, so there are few, and they write loops where an array
+expression or a sort would take numba seconds to compile.
 """
 
 from typing import NamedTuple
@@ -32,17 +35,17 @@ from swarm_mj.system.compiled import compiled
 
 
 class Weights(NamedTuple):
-    """What it is worth that a receiver (row) hears of a subject (column)."""
+    """The value of news to a receiver (row) about a subject (column)."""
 
     squared_rise: Float32[np.ndarray, "N N"]  # times the square of what T rises by
-    least_share: float  # of a slot's worth that must remain when a transmitter is added
+    min_share: float  # of a slot's value that must remain when a transmitter is added
 
 
-class Foresight(NamedTuple):
+class Lookahead(NamedTuple):
     """How far a schedule looks ahead."""
 
-    branches: int  # first transmitters that are tried; 1: none but the best
-    slots: int  # how long each is followed, the slot in question included
+    width: int  # first transmitters that are tried; 1: none but the best
+    depth: int  # how long each is followed, the slot in question included [slots]
 
 
 @compiled()
@@ -51,34 +54,37 @@ def schedule(
     now: float,
     links: Links,
     weights: Weights,
-    foresight: Foresight,
+    lookahead: Lookahead,
     is_free: Bool[np.ndarray, "P"],
     transmits: Bool[np.ndarray, "P N"],
 ) -> None:
-    """Fill `transmits`, slot by slot, and brings `timestamp` to the end of the last.
+    """Fill `transmits`, slot by slot, and bring `timestamp` to the end of the last.
 
     Args:
         timestamp: T, written in place [slots].
         now: t before the first slot [slots].
         links: The radio; the robots stand still.
-        weights: What news is worth.
-        foresight: How far to look ahead.
-        is_free: Which slots the schedule may fill; in the others nobody transmits.
+        weights: Of news.
+        lookahead: How far to look ahead.
+        is_free: The slots that the schedule may fill; in the others nobody transmits.
         transmits: Who transmits in each.
     """
-    reach = lone_probabilities(links) > 0.0
+    reach = lone_probabilities(links)
     after = np.empty_like(timestamp)
     for p in range(transmits.shape[0]):
         now += 1.0
         observe_own(timestamp, now)
-        transmits[p] = False
         if is_free[p]:
             first = NOBODY
-            if foresight.branches > 1:
-                first = _best_first(timestamp, now, links, reach, weights, foresight, is_free[p:])
-            _choose(timestamp, links, reach, weights, first, transmits[p])
-            _advance(timestamp, links, transmits[p], after)
-            timestamp[:] = after
+            if lookahead.width > 1:
+                first = _best_first(timestamp, now, links, reach, weights, lookahead, is_free[p:])
+            _choose(timestamp, links, reach, weights, first, transmits[p], after)
+            for i in range(timestamp.shape[0]):
+                for k in range(timestamp.shape[0]):
+                    timestamp[i, k] = after[i, k]
+        else:
+            for i in range(timestamp.shape[0]):
+                transmits[p, i] = False
 
 
 @compiled()
@@ -86,20 +92,32 @@ def _best_first(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
     links: Links,
-    reach: Bool[np.ndarray, "N N"],
+    reach: Float[np.ndarray, "N N"],
     weights: Weights,
-    foresight: Foresight,
+    lookahead: Lookahead,
     is_free: Bool[np.ndarray, "P"],
 ) -> int:
-    """The first transmitter whose branch knows most, summed over its slots; `NOBODY`: none."""
-    alone = _worth_alone(timestamp, links, reach, weights)
+    """Return the first transmitter whose branch knows most, summed over its slots, or `NOBODY`."""
+    num_robots = timestamp.shape[0]
+    gain = np.zeros((num_robots, num_robots))
+    _fill_gains(timestamp, reach, weights, gain)
+    air, nobody = silent_air(num_robots), np.zeros(num_robots, dtype=np.bool_)
+    alone = np.empty(num_robots)
+    for i in range(num_robots):
+        alone[i] = _value(links, gain, air, nobody, i)
     best, most_known = NOBODY, -np.inf
-    for first in np.argsort(-alone, kind="mergesort")[: foresight.branches]:
-        if alone[first] > 0.0:
-            num_ahead = min(foresight.slots, len(is_free))
-            known = _follow(timestamp, now, links, reach, weights, first, is_free[:num_ahead])
-            if known > most_known:
-                best, most_known = first, known
+    num_ahead = min(lookahead.depth, is_free.shape[0])
+    for _ in range(lookahead.width):
+        first, first_value = NOBODY, 0.0
+        for i in range(num_robots):
+            if alone[i] > first_value:
+                first, first_value = i, alone[i]
+        if first == NOBODY:
+            return best
+        alone[first] = 0.0
+        known = _follow(timestamp, now, links, reach, weights, first, is_free[:num_ahead])
+        if known > most_known:
+            best, most_known = first, known
     return best
 
 
@@ -108,24 +126,28 @@ def _follow(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
     links: Links,
-    reach: Bool[np.ndarray, "N N"],
+    reach: Float[np.ndarray, "N N"],
     weights: Weights,
     first: int,
     is_free: Bool[np.ndarray, "P"],
 ) -> float:
     """Return the sum of all timestamps after each of the slots that begin with this transmitter."""
-    known = 0.0
+    num_robots = timestamp.shape[0]
     before, after = timestamp.copy(), np.empty_like(timestamp)
-    transmits = np.zeros(timestamp.shape[0], dtype=np.bool_)
-    for p in range(len(is_free)):
+    transmits = np.zeros(num_robots, dtype=np.bool_)
+    known = 0.0
+    for p in range(is_free.shape[0]):
         if p > 0:
             now += 1.0
             observe_own(before, now)
         if is_free[p]:
-            _choose(before, links, reach, weights, first if p == 0 else NOBODY, transmits)
-            _advance(before, links, transmits, after)
+            _choose(before, links, reach, weights, first if p == 0 else NOBODY, transmits, after)
             before, after = after, before
-        known += float(before.sum())
+        total = np.float32(0.0)
+        for i in range(num_robots):
+            for k in range(num_robots):
+                total += before[i, k]
+        known += float(total)
     return known
 
 
@@ -133,63 +155,44 @@ def _follow(
 def _choose(
     timestamp: Float32[np.ndarray, "N N"],
     links: Links,
-    reach: Bool[np.ndarray, "N N"],
+    reach: Float[np.ndarray, "N N"],
     weights: Weights,
     first: int,
     transmits: Bool[np.ndarray, "N"],
+    after: Float32[np.ndarray, "N N"],
 ) -> None:
-    """Fill `transmits` with a slot's transmitters, a given first one before all others."""
+    """Fill `transmits` with a slot's transmitters, a given first one before all others.
+
+    Fill `after`, too: T as expected after the slot.
+    """
     num_robots = timestamp.shape[0]
-    gain = _gains(timestamp, reach, weights)
-    has_news = _has_news(gain)
+    gain = np.zeros((num_robots, num_robots))
+    has_news = _fill_gains(timestamp, reach, weights, gain)
     air = silent_air(num_robots)
-    transmits[:] = False
+    heard, probability = np.empty(num_robots, dtype=np.int64), np.empty(num_robots)
+    listens = np.ones(num_robots, dtype=np.bool_)
+    for i in range(num_robots):
+        transmits[i] = False
     value = 0.0
     if first != NOBODY:
         value = _value(links, gain, air, transmits, first)
-        transmits[first] = True
+        transmits[first], listens[first] = True, False
         broadcast(links, air, first)
     while True:
-        best, best_value = NOBODY, value * weights.least_share
+        best, best_value = NOBODY, value * weights.min_share
         for i in range(num_robots):
-            if not transmits[i] and has_news[i]:
+            if listens[i] and has_news[i]:
                 with_i = _value(links, gain, air, transmits, i)
                 if with_i > best_value:
                     best, best_value = i, with_i
         if best == NOBODY:
-            return
+            break
         value = best_value
-        transmits[best] = True
+        transmits[best], listens[best] = True, False
         broadcast(links, air, best)
-
-
-@compiled()
-def _has_news(gain: Float[np.ndarray, "N N"]) -> Bool[np.ndarray, "N"]:
-    """Whether it is worth anything to anyone that i transmits; who has none had better listen."""
-    has_news = np.zeros(gain.shape[0], dtype=np.bool_)
-    for i in range(gain.shape[0]):
-        for j in range(gain.shape[0]):
-            if gain[i, j] > 0.0:
-                has_news[i] = True
-    return has_news
-
-
-@compiled()
-def _worth_alone(
-    timestamp: Float32[np.ndarray, "N N"],
-    links: Links,
-    reach: Bool[np.ndarray, "N N"],
-    weights: Weights,
-) -> Float[np.ndarray, "N"]:
-    """What a slot is worth in which i alone transmits."""
-    num_robots = timestamp.shape[0]
-    gain = _gains(timestamp, reach, weights)
-    air = silent_air(num_robots)
-    nobody = np.zeros(num_robots, dtype=np.bool_)
-    alone = np.empty(num_robots)
-    for i in range(num_robots):
-        alone[i] = _value(links, gain, air, nobody, i)
-    return alone
+    # The sum of powers anew, since its rounding depends on the order of the transmitters.
+    listen(links, air_of(links, transmits), NOBODY, listens, heard, probability)
+    merge_expected(timestamp, heard, probability, after)
 
 
 @compiled()
@@ -200,44 +203,37 @@ def _value(
     transmits: Bool[np.ndarray, "N"],
     also: int,
 ) -> float:
-    """What the slot is worth when this robot transmits beside those in the air."""
+    """Return the value of the slot when this robot transmits in addition to those in the air."""
     value = 0.0
     for j in range(gain.shape[0]):
         if not transmits[j] and j != also:
             incoming = incoming_with(links, air, also, j)
-            worth = gain[incoming.sender, j]
-            if incoming.strongest > 0.0 and worth != 0.0:
-                value += worth * chance_of_strongest(links, incoming, j)
+            news = gain[incoming.sender, j]
+            if incoming.strongest > 0.0 and news != 0.0:
+                value += news * chance_of_strongest(links, incoming, j)
     return value
 
 
 @compiled()
-def _advance(
+def _fill_gains(
     timestamp: Float32[np.ndarray, "N N"],
-    links: Links,
-    transmits: Bool[np.ndarray, "N"],
-    after: Float32[np.ndarray, "N N"],
-) -> None:
-    """Fill `after`: T as expected after a slot with these transmitters."""
-    num_robots = timestamp.shape[0]
-    air = air_of(links, transmits)
-    heard, probability = np.arange(num_robots), np.zeros(num_robots)
-    listen(links, air, NOBODY, ~transmits, heard, probability)
-    merge_expected(timestamp, heard, probability, after)
+    reach: Float[np.ndarray, "N N"],
+    weights: Weights,
+    gain: Float[np.ndarray, "N N"],
+) -> Bool[np.ndarray, "N"]:
+    """Fill in the value of j decoding i, where it can; return who has news for anyone.
 
-
-@compiled()
-def _gains(
-    timestamp: Float32[np.ndarray, "N N"], reach: Bool[np.ndarray, "N N"], weights: Weights
-) -> Float[np.ndarray, "N N"]:
-    """What it is worth that j decodes i; 0 where it cannot."""
+    A robot without news should listen.
+    """
     num_robots = timestamp.shape[0]
-    gains = np.zeros((num_robots, num_robots))
+    has_news = np.zeros(num_robots, dtype=np.bool_)
     for i in range(num_robots):
         for j in range(num_robots):
-            if reach[i, j]:
-                gains[i, j] = _gain(timestamp[i], timestamp[j], weights.squared_rise[j])
-    return gains
+            if reach[i, j] > 0.0:
+                gain[i, j] = _gain(timestamp[i], timestamp[j], weights.squared_rise[j])
+                if gain[i, j] > 0.0:
+                    has_news[i] = True
+    return has_news
 
 
 # Adding in any order lets the compiler use its vectors. Whole slots add up exactly; products to
@@ -248,14 +244,15 @@ def _gain(
     older: Float32[np.ndarray, "N"],
     weight: Float32[np.ndarray, "N"],
 ) -> float:
-    """Return the worth of raising T from one row to another, summed over subjects."""
+    """Return the value of raising T from one row to another, summed over subjects."""
     total = np.float32(0.0)
     for k in range(older.shape[0]):
         total += _weighed(rise(newer[k], older[k]), weight[k])
     return float(total)
 
 
+# Apart from `_gain`, whose permission to reorder sums would extend to this product.
 @compiled()
 def _weighed(r: np.floating, weight: np.floating) -> np.floating:
-    """A squared rise times its weight, multiplied in this order, whatever that of the sum is."""
+    """Return a squared rise times its weight, multiplied in this order."""
     return r * (weight * r)

@@ -1,4 +1,4 @@
-"""Who transmits while no plan says so: the discovery of the team, and the search for the missing.
+"""Turns to transmit without a plan: the discovery of the team, and the search for the missing.
 
 Both need only what is common before the mission: identities, the team's size and area, orders and
 the clock. What a robot hears meanwhile can only keep it silent.
@@ -23,7 +23,7 @@ class Discovery:
         settings: PlannerSettings,
         rng: np.random.Generator,
     ) -> None:
-        """Draws the orders.
+        """Draw the orders.
 
         Args:
             num_robots: N.
@@ -40,8 +40,8 @@ class Discovery:
         self._place = np.argsort(self._order)
         self._groups = [
             group
-            for count in _group_sizes(num_robots, num_reaches, settings.discovery)
-            for group in _groups(rng.permutation(num_robots), count)
+            for size in _group_sizes(num_robots, num_reaches, settings.discovery)
+            for group in _cut(rng.permutation(num_robots), size)
         ]
 
     def is_discovered(self, slot: int, is_complete: bool) -> bool:
@@ -50,44 +50,41 @@ class Discovery:
 
     def is_sought(self, slot: int, is_fresh: Bool[np.ndarray, "N"]) -> bool:
         """Whether a slot is the search's, by a snapshot in which these are fresh."""
-        if not self._is_late(slot) or bool(np.all(is_fresh)):
-            return False
-        return (slot // SLOTS_PER_WINDOW) % self._search.every_windows == 0
+        is_turn = (slot // SLOTS_PER_WINDOW) % self._search.every_windows == 0
+        return is_turn and self._is_late(slot) and not np.all(is_fresh)
 
     def transmits(self, slot: int, buffers: Buffers, b: int) -> Bool[np.ndarray, "N"]:
-        """The robots whose turn it is, except those that know one nearby that comes before them."""
+        """Return whose turn it is, except robots that know one nearby that comes before them."""
         group = self._groups[slot % len(self._groups)]
         transmits = np.zeros(self.num_robots, dtype=bool)
         for turn, i in enumerate(group.tolist()):
-            before = group[:turn]
             here_m = buffers.position_m[b, i, i]
             is_near = self._are_near(buffers, b, i, here_m, self._polite_ranges)
-            transmits[i] = not np.any(is_near[before])
+            transmits[i] = not np.any(is_near[group[:turn]])
         return transmits
 
     def seeks(
         self,
         slot: int,
         is_fresh: Bool[np.ndarray, "N"],
-        was_fresh: Bool[np.ndarray, "*rows N"],
+        was_fresh: Bool[np.ndarray, "N N"],
         heard: Int[np.ndarray, "N"],
         buffers: Buffers,
         b: int,
     ) -> Bool[np.ndarray, "N"]:
-        """In a window's first slot one robot of all; in its second those that found someone.
+        """Return who transmits: one robot in a window's first slot, those that hear it in the next.
+
+        A robot that has just heard a missing one answers, unless another robot near that one comes
+        first. Of the missing that hold this snapshot, one after the other transmits.
 
         Args:
             slot: The slot.
             is_fresh: Who is fresh, in the snapshot that a robot flies by.
-            was_fresh: Who was, in the snapshot that robot i flew by before it decoded somebody.
-            heard: Whom each robot decoded in the slot before.
+            was_fresh: The same in the snapshot that robot i flew by before the last slot, since
+                the call itself may bring a snapshot in which the caller is fresh.
+            heard: The sender that each robot decoded in the slot before; itself: none.
             buffers: All robots'.
             b: The mission.
-
-        Returns:
-            Who transmits. A robot that has just heard a missing one answers, unless another robot
-            near that one comes first; of the missing that hold this snapshot, one after the other
-            transmits.
         """
         transmits = np.zeros(self.num_robots, dtype=bool)
         turn = slot // SLOTS_PER_WINDOW // self._search.every_windows
@@ -96,13 +93,11 @@ class Discovery:
             return transmits
         missing = self._order[~is_fresh[self._order]]
         transmits[missing[turn % len(missing)]] = True
-        was_fresh = np.broadcast_to(was_fresh, (self.num_robots, self.num_robots))
         everyone = np.arange(self.num_robots)
         has_found = (heard != everyone) & ~was_fresh[everyone, heard]
         for i in np.flatnonzero(has_found).tolist():
-            found = heard[i]
-            could = self._are_near(buffers, b, i, buffers.position_m[b, i, found], 1.0)
-            could &= was_fresh[i]
+            there_m = buffers.position_m[b, i, heard[i]]
+            could = was_fresh[i] & self._are_near(buffers, b, i, there_m, 1.0)
             transmits[i] = not np.any(could & (self._place < self._place[i]))
         return transmits
 
@@ -115,22 +110,23 @@ class Discovery:
     def _are_near(
         self, buffers: Buffers, b: int, i: int, position_m: Float[np.ndarray, "2"], ranges: float
     ) -> Bool[np.ndarray, "N"]:
-        """Whom i knows within so many ranges of a place."""
+        """Return the robots that i knows within some ranges of a place."""
         apart_m = buffers.position_m[b, i] - position_m
         is_near = np.hypot(apart_m[:, 0], apart_m[:, 1]) < ranges * self._range_m
         return is_near & buffers.is_known[b, i]
 
 
 def _group_sizes(num_robots: int, num_reaches: float, settings: DiscoverySettings) -> list[int]:
-    """How many robots transmit at once, in each round."""
+    """Return how many robots transmit at once, in each round."""
     at_once = round(settings.transmitters_per_reach * num_reaches)
     at_once = int(np.clip(at_once, 1, settings.max_transmitters))
+    # The first round is fast although packets collide in it, since few robots know any other yet.
     later = max(1, int(at_once * settings.later_share))
     num_later = settings.num_rounds - settings.num_fast_rounds
     sizes = [at_once] * settings.num_fast_rounds + [later] * num_later
     return [min(size, num_robots - 1) for size in sizes]
 
 
-def _groups(order: Int[np.ndarray, "N"], count: int) -> list[Int[np.ndarray, "K"]]:
+def _cut(order: Int[np.ndarray, "N"], size: int) -> list[Int[np.ndarray, "K"]]:
     """Return an order cut into groups that transmit at the same time."""
-    return [order[begin : begin + count] for begin in range(0, len(order), count)]
+    return [order[begin : begin + size] for begin in range(0, len(order), size)]

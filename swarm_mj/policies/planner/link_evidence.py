@@ -1,4 +1,4 @@
-"""What robots observe of links: packets they decoded or missed, by the margin these should have.
+"""Evidence of links: packets that robots decoded or missed, by the margin these should have.
 
 A robot that knows the schedule knows who transmitted in the slot before, and so which packet it
 should have decoded. Index order: `[j, i]`: robot j listens to robot i. Margins are counted in bins.
@@ -18,21 +18,21 @@ LEAST_MARGIN_DB = -15.0  # of the lowest bin; packets that are expected to be we
 NUM_BINS = 24
 
 MAX_KINDS = 64  # kinds of packets, by sender, margin and fate, that one robot notes
-MOST_TIMES = 256  # that it notes one kind, plus one
+MAX_TIMES = 255  # that it notes one kind
 
 Counts = Int[np.ndarray, "N N K"]  # packets of i that j decoded, or missed, by bins of margin
 
 
 class Observation(NamedTuple):
-    """What one slot taught every robot: at most one packet each."""
+    """The evidence of one slot: at most one packet for every robot."""
 
-    sender: Int[np.ndarray, "N"]  # whose packet, or `NOBODY`
+    sender: Int[np.ndarray, "N"]  # of the packet, or `NOBODY`
     margin: Int[np.ndarray, "N"]  # its bin
     is_decoded: Bool[np.ndarray, "N"]
 
 
 def no_observation(num_robots: int) -> Observation:
-    """That of robots that learned nothing."""
+    """Return that of robots that learned nothing."""
     return Observation(
         np.full(num_robots, NOBODY),
         np.zeros(num_robots, dtype=np.int64),
@@ -50,7 +50,6 @@ def observe(
     listens: Bool[np.ndarray, "N"],
     heard: Int[np.ndarray, "N"],
     transmitted: Bool[np.ndarray, "N"],
-    knows_all: Bool[np.ndarray, "N"],
     believed_mw: Float[np.ndarray, "N N"],
     prior_mw: Float[np.ndarray, "N N"],
     noise_mw: float,
@@ -60,11 +59,10 @@ def observe(
     """Fill in what these robots learn from a slot in which they followed one plan.
 
     Args:
-        listens: Which robots followed the plan and did not transmit.
-        heard: Whom each robot decoded; itself is nobody.
-        transmitted: Who did, by the plan.
-        knows_all: Who knows that all others follow plans, too; nobody else can say what was in
-            the air.
+        listens: Robots that followed the plan, did not transmit, and know that all others follow
+            plans, too; nobody else can say what was in the air.
+        heard: The sender that each robot decoded; itself: none.
+        transmitted: The transmitters by the plan.
         believed_mw: Power of i at j by which the plan was made, [i, j] [mW].
         prior_mw: The same before anything was learned; margins are counted from there [mW].
         noise_mw: Of every receiver [mW].
@@ -73,7 +71,7 @@ def observe(
     """
     num_robots = heard.shape[0]
     for j in range(num_robots):
-        if not (listens[j] and knows_all[j]):
+        if not listens[j]:
             continue
         is_decoded = heard[j] != j
         i = heard[j] if is_decoded else _strongest(j, transmitted, believed_mw)
@@ -105,38 +103,33 @@ def _strongest(
 
 
 class Evidence:
-    """What all robots of a team observed, slot by slot."""
+    """All observations of a team, slot by slot."""
 
     def __init__(self, num_robots: int) -> None:
-        self._num_robots = num_robots
         self._slots: list[Observation] = []
         # How often j noted that it decoded (1) or missed (0) a packet of i, by bins.
         self._times = np.zeros((2, num_robots, num_robots, NUM_BINS), dtype=np.int64)
         self._num_kinds = np.zeros(num_robots, dtype=np.int64)
 
     def add(self, observation: Observation) -> None:
-        """Take down what the next slot taught; full notes count on only what they have."""
+        """Note the observation of the next slot; full notes count on only what they have."""
         sender, margin, is_decoded = observation
         j = np.flatnonzero(sender != NOBODY)
         kind = is_decoded[j].astype(np.int64), j, sender[j], margin[j]
         is_new = self._times[kind] == 0
-        is_noted = np.where(is_new, self._num_kinds[j] < MAX_KINDS, True)
-        is_noted &= self._times[kind] < MOST_TIMES - 1
+        is_noted = np.where(is_new, self._num_kinds[j] < MAX_KINDS, self._times[kind] < MAX_TIMES)
         self._num_kinds[j] += is_new & is_noted
         self._times[kind] += is_noted
         sender[j[~is_noted]] = NOBODY
         self._slots.append(observation)
 
     def counts(self, known_until: Int[np.ndarray, "N"]) -> tuple[Counts, Counts]:
-        """What the robots had observed by then.
+        """Return how many packets were decoded, and how many missed.
 
         Args:
             known_until: The last slot that counts, robot by robot.
-
-        Returns:
-            How many packets were decoded, and how many missed.
         """
-        decoded, missed = np.zeros((2, *self._times.shape[1:]), dtype=np.int64)
+        decoded, missed = np.zeros_like(self._times)
         if self._slots:
             columns = zip(*self._slots, strict=True)
             sender, margin, is_decoded = (np.stack(column) for column in columns)

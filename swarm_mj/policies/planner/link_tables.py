@@ -1,9 +1,9 @@
-"""What observed links say about the channel, and what a schedule makes of it.
+"""Tables of links, fitted to what robots observed, and links corrected by them.
 
-A link's excess loss is how much stronger it is than was believed, in dB, the same in both
-directions. Every pair of a law of fades and a prior of excess losses is a hypothesis. The one that
-explains most of what was observed is taken, unless the channel that was believed does about as
-well; then each link's excess follows by Bayes' rule.
+A link's excess is how much stronger it is than was believed, in dB, the same in both directions.
+Every pair of a law of fades and a prior of the excess is a hypothesis. The most probable one is
+taken, unless the channel that was believed explains the observations about as well; then each
+link's excess follows by Bayes' rule.
 """
 
 from dataclasses import dataclass
@@ -12,34 +12,30 @@ from functools import cache, cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from swarm_mj.policies.planner.link_evidence import (
-    BIN_DB,
-    Counts,
-    Evidence,
-    bin_centres_db,
-)
+from swarm_mj.policies.planner.link_evidence import BIN_DB, Counts, Evidence, bin_centres_db
 from swarm_mj.policies.planner.settings import LearningSettings
 from swarm_mj.radio.decode_curves import Curves, decode_curves, probability_at
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.links import Links, doubtful
 
-EXCESS_DB = np.arange(-30.0, 18.1, 3.0)  # the values that are told apart
+EXCESS_DB = np.arange(-30.0, 18.1, 3.0)  # the values that are distinguished
 ERASURES = (0.0, 0.15, 0.3, 0.45)
 LAWS = tuple((rician_k, loss) for rician_k in (NO_FADING, NO_LINE_OF_SIGHT) for loss in ERASURES)
 SPREADS_DB = (0.0, 3.0, 6.0, 9.0)  # of normal priors; the first says that beliefs are right
 BLOCKED_SHARES = (0.3, 0.6)  # of priors in which links are as believed, or blocked
 BLOCKED_BELOW_DB = -20.0
 STEP_DB = 0.25  # to which tables are rounded
-SURPRISE = 0.005  # probability that a packet decodes, or not, against all laws
+SURPRISE = 0.005  # probability that a packet decodes, or not, against all laws: no single
+# packet may rule out a hypothesis, since no law here is exactly true
 
 
 @dataclass(frozen=True, kw_only=True)
 class LinkTable:
-    """What one robot makes of what it knows of all links; packets carry it."""
+    """One robot's estimate of all links; packets carry it."""
 
     law: int  # in `LAWS`
     mean_db: Float[np.ndarray, "N N"]  # excess of each link, as expected [dB]
-    std_db: Float[np.ndarray, "N N"]  # and how far that may be wrong [dB]
+    std_db: Float[np.ndarray, "N N"]  # its standard deviation [dB]
 
     @cached_property
     def changes_nothing(self) -> bool:
@@ -49,19 +45,16 @@ class LinkTable:
 
 
 class Tables:
-    """What every robot made of what it knew at one time; each is worked out when asked for."""
+    """The tables of all robots at one time; each is fitted when asked for."""
 
     def __init__(
-        self,
-        evidence: Evidence,
-        known_until: Int[np.ndarray, "N N"],
-        settings: LearningSettings,
+        self, evidence: Evidence, known_until: Int[np.ndarray, "N N"], settings: LearningSettings
     ) -> None:
         """Keep what every robot knew.
 
         Args:
-            evidence: What all robots observed, of which later slots do not count.
-            known_until: [j, i]: the slot in which i told what reached j last.
+            evidence: Observations of all robots, of which later slots do not count.
+            known_until: [j, i]: the last slot of which j knows what i observed.
             settings: How much a hypothesis must be better.
         """
         self._evidence = evidence
@@ -73,7 +66,7 @@ class Tables:
     def better(
         self, mine: Int[np.ndarray, "N"], theirs: Int[np.ndarray, "N"]
     ) -> Int[np.ndarray, "N"]:
-        """Whichever of two robots' tables is better, by the least age of what they know."""
+        """Return the owner of the better of two tables, by the least age of what they know."""
         return np.where(self._rank[theirs] < self._rank[mine], theirs, mine)
 
     def table(self, owner: int) -> LinkTable:
@@ -84,17 +77,10 @@ class Tables:
         return self._tables[owner]
 
 
-def fit(
-    decoded: Counts,
-    missed: Counts,
-    settings: LearningSettings,
-) -> LinkTable:
-    """Return the table that follows from what was observed, rounded as packets carry it.
+def fit(decoded: Counts, missed: Counts, settings: LearningSettings) -> LinkTable:
+    """Return the table that follows from packets decoded and missed, rounded as packets carry it.
 
-    Args:
-        decoded: Packets that were.
-        missed: Packets that should have been.
-        settings: How much a hypothesis must be better.
+    Rounding here rather than on the air keeps the plan of a table's owner that of everyone.
     """
     num_robots = len(decoded)
     log_decoded, log_missed = _log_probabilities()
@@ -106,7 +92,7 @@ def fit(
     most = log_likelihood.max(axis=2, keepdims=True)
     likelihood = np.exp(log_likelihood - most)
     evidence = np.einsum("lfx,px->lfp", likelihood, prior) + np.finfo(np.float64).tiny
-    law, of_prior = _best(np.sum(np.log(evidence) + most, axis=0), settings.least_log_odds)
+    law, of_prior = _best(np.sum(np.log(evidence) + most, axis=0), settings.min_log_odds)
     weight = likelihood[:, law] * prior[of_prior]
     weight /= weight.sum(axis=1, keepdims=True)
     mean_db = weight @ EXCESS_DB
@@ -118,38 +104,33 @@ def fit(
     return LinkTable(law=law, mean_db=table[0], std_db=table[1])
 
 
-def expected(links: Links, table: LinkTable) -> Float[np.ndarray, "N N"]:
+def expected_mw(links: Links, table: LinkTable) -> Float[np.ndarray, "N N"]:
     """Return the power of i at j, by a table [mW]."""
     return links.received_mw * 10.0 ** (table.mean_db / 10.0)
 
 
-def learned(links: Links, table: LinkTable, settings: LearningSettings) -> Links:
-    """Links corrected by a table; cautious where it is doubtful.
+def corrected(links: Links, table: LinkTable, settings: LearningSettings) -> Links:
+    """Return links as a table has them, cautious where it is doubtful.
 
-    A packet is expected to be weaker than in the mean, and to disturb others more.
-
-    Args:
-        links: As believed before anything was learned.
-        table: What was learned.
-        settings: How cautious.
+    A packet is expected to be weaker than in the mean, and to interfere more: a plan that fails
+    costs more than one that is too careful.
     """
     weaker = 10.0 ** ((table.mean_db - settings.cautious_stds * table.std_db) / 10.0)
     louder = 10.0 ** ((table.mean_db + settings.disturbing_stds * table.std_db) / 10.0)
-    corrected = links._replace(
+    links = links._replace(
         received_mw=links.received_mw * weaker,
         interference_mw=links.interference_mw * louder,
     )
-    std_db = np.minimum(table.std_db, settings.max_std_db)
-    return doubtful(corrected, _curves(table.law), std_db)
+    return doubtful(links, _curves(table.law), np.minimum(table.std_db, settings.max_std_db))
 
 
-def _best(explained: Float[np.ndarray, "F P"], least_log_odds: float) -> tuple[int, int]:
-    """The law and the prior that explain most, each step away from the believed ones at a price."""
+def _best(explained: Float[np.ndarray, "F P"], min_log_odds: float) -> tuple[int, int]:
+    """Return the most probable law and prior, at a price for each step from the believed ones."""
     steps = (np.arange(len(LAWS)) > 0).astype(np.float64)
     steps += [rician_k != NO_FADING for rician_k, _ in LAWS]
-    worth = explained - least_log_odds * steps[:, None]
-    worth[:, 1:] -= least_log_odds
-    law, prior = np.unravel_index(np.argmax(worth), worth.shape)
+    log_odds = explained - min_log_odds * steps[:, None]
+    log_odds[:, 1:] -= min_log_odds
+    law, prior = np.unravel_index(np.argmax(log_odds), log_odds.shape)
     return int(law), int(prior)
 
 
@@ -161,12 +142,10 @@ def _curves(law: int) -> Curves:
 
 @cache
 def _log_probabilities() -> tuple[Float[np.ndarray, "K F X"], Float[np.ndarray, "K F X"]]:
-    """Of a packet that is decoded, and missed: by bin, law and excess loss.
-
-    A link's margin lies somewhere in its bin, always at the same place. So for either outcome it is
-    taken to be where that is most probable; else what is certain would look like luck.
-    """
+    """Return those of a packet that is decoded, and missed: by bin, law and excess."""
     margin_db = bin_centres_db()[:, None] + EXCESS_DB[None, :]
+    # A link's margin lies somewhere in its bin, always at the same place. So for either outcome it
+    # is taken to be where that is most probable; else what is certain would look like luck.
     decoded = _decodes(margin_db + BIN_DB / 2.0)
     missed = 1.0 - _decodes(margin_db - BIN_DB / 2.0)
     possible = 1.0 - 2.0 * SURPRISE
@@ -174,7 +153,7 @@ def _log_probabilities() -> tuple[Float[np.ndarray, "K F X"], Float[np.ndarray, 
 
 
 def _decodes(margin_db: Float[np.ndarray, "K X"]) -> Float[np.ndarray, "K F X"]:
-    """How probably a packet decodes, by each law."""
+    """Return how probably a packet decodes, by each law."""
     ratios = (10.0 ** (margin_db / 10.0)).tolist()
     by_law = [
         [[probability_at(_curves(law), 0, ratio) for ratio in row] for row in ratios]
@@ -185,7 +164,7 @@ def _decodes(margin_db: Float[np.ndarray, "K X"]) -> Float[np.ndarray, "K F X"]:
 
 @cache
 def _priors() -> Float[np.ndarray, "P X"]:
-    """Distributions of a link's excess loss."""
+    """Return distributions of a link's excess."""
     is_expected = (EXCESS_DB == 0.0).astype(np.float64)
     is_blocked = (EXCESS_DB < BLOCKED_BELOW_DB).astype(np.float64)
     normal = [np.exp(-0.5 * (EXCESS_DB / spread_db) ** 2) for spread_db in SPREADS_DB[1:]]

@@ -1,117 +1,142 @@
-"""Plans: who should transmit in an epoch, by one snapshot of the team."""
+"""Plans: who should transmit in each slot, computed as far as they are asked for."""
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.policies.planner.broadcast_scheduler import Foresight, schedule
+from swarm_mj.policies.planner.broadcast_scheduler import Lookahead, schedule
 from swarm_mj.policies.planner.settings import PlannerSettings, ScheduleSettings
 from swarm_mj.policies.planner.snapshots import Snapshots
 from swarm_mj.policies.planner.weights import heuristic_weights
+from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 from swarm_mj.radio.link_models import Belief
+from swarm_mj.radio.links import Links
 
 
-def foresight_of(num_robots: int, *, is_certain: bool, settings: ScheduleSettings) -> Foresight:
-    """How far a team of this size looks ahead, on positions that are certain or only believed."""
-    if num_robots > settings.max_foresight_robots:
-        return Foresight(1, 1)
+def lookahead_of(num_robots: int, *, is_certain: bool, settings: ScheduleSettings) -> Lookahead:
+    """Return how far a team of this size looks ahead, on certain or on merely believed links."""
+    if num_robots > settings.max_lookahead_robots:
+        return Lookahead(1, 1)
     if is_certain:
-        return Foresight(settings.rest_branches, settings.rest_slots)
-    return Foresight(settings.moving_branches, settings.moving_slots)
+        return Lookahead(settings.rest_width, settings.rest_depth)
+    return Lookahead(settings.moving_width, settings.moving_depth)
 
 
 class Plan:
-    """Who transmits in each slot of an epoch; it depends on one snapshot and on nothing else.
+    """The transmitters of each slot, numbered from 0, between robots that stand still.
 
-    It is computed as far as somebody asks for.
+    Without more arguments, the plan is endless and begins with a team that knows nothing.
     """
 
     def __init__(
         self,
-        belief: Belief,
+        links: Links,
         settings: PlannerSettings,
-        snapshots: Snapshots,
-        owner: int,
-        timestamp: Float[np.ndarray, "N N"],
-        now: float,
-        is_free: Bool[np.ndarray, "P"],
+        *,
+        is_certain: bool | None = None,
+        timestamp: Float[np.ndarray, "N N"] | None = None,
+        now: float = 0.0,
+        is_free: Bool[np.ndarray, "P"] | None = None,
     ) -> None:
         """Prepare the plan.
 
         Args:
-            belief: What the robots take the channel for.
+            links: Between the robots.
             settings: Of the planner, for its schedules and weights.
-            snapshots: Those taken for this epoch.
-            owner: The robot whose snapshot counts.
-            timestamp: T as the epoch begins, as far as is known with that snapshot [windows].
-            now: t as the epoch begins [windows].
-            is_free: Which slots of the epoch the plan may fill.
+            is_certain: Whether to look ahead as far as on certain links; None: if links are.
+            timestamp: T as the plan begins [windows].
+            now: t as the plan begins [windows].
+            is_free: The slots that the plan may fill, of a plan that ends.
         """
-        is_known, is_fresh = snapshots.is_known[owner], snapshots.is_fresh[owner]
-        position_std_m = snapshots.position_std_m[owner]
-        num_robots = len(timestamp)
-        round_windows = max(num_robots, settings.schedule.min_round_windows)
-        age = now - snapshots.timestamp[owner]
-        is_gone = age > settings.schedule.gone_rounds * round_windows
-        self._links = belief.links(
-            snapshots.position_m[owner], position_std_m, is_known & ~(is_gone & ~is_fresh)
+        num_robots = len(links.received_mw)
+        self._links = links
+        self._settings = settings.schedule
+        self._weights = heuristic_weights(links, settings.weights)
+        is_certain = not links.is_doubtful if is_certain is None else is_certain
+        self._lookahead = lookahead_of(
+            num_robots, is_certain=is_certain, settings=settings.schedule
         )
-        self._weights = heuristic_weights(self._links, settings.weights)
-        self._foresight = foresight_of(
-            num_robots, is_certain=not np.any(position_std_m), settings=settings.schedule
-        )
-        self._chunk_slots = settings.schedule.chunk_slots
+        if timestamp is None:
+            timestamp = np.full((num_robots, num_robots), NEVER)
+        self._timestamp = (SLOTS_PER_WINDOW * timestamp).astype(np.float32)  # [slots]
         self._now = SLOTS_PER_WINDOW * now
-        expected = _corrected(timestamp, snapshots, owner)
-        self._timestamp = (SLOTS_PER_WINDOW * expected).astype(np.float32)  # [slots]
-        ahead = np.ones(self._foresight.slots, dtype=bool)
-        self._is_free = np.concatenate([is_free, ahead])
-        self._transmits = np.zeros((len(is_free), num_robots), dtype=bool)
-        self._num_planned = 0
-        self.is_complete = bool(np.all(is_known))  # whether the snapshot had all robots
-        self.is_fresh = is_fresh  # who was fresh in it
+        self._is_endless = is_free is None
+        self._is_free = np.ones(0, dtype=bool) if is_free is None else is_free
+        self._transmits = []  # by slots
 
     def transmits(self, slot: int) -> Bool[np.ndarray, "N"]:
-        """Who transmits in a slot of the epoch.
+        """Return who transmits in a slot.
 
         Raises:
-            IndexError: The epoch is over.
+            IndexError: The plan ends before.
         """
-        if slot >= len(self._transmits):
-            raise IndexError(f"the plan has {len(self._transmits)} slots, not {slot}")
-        while self._num_planned <= slot:
+        while slot >= len(self._transmits):
             self._extend()
         return self._transmits[slot]
 
     def outcome(self) -> Float[np.ndarray, "N N"]:
-        """T after the epoch, as expected [windows]."""
-        while self._num_planned < len(self._transmits):
+        """Return T after the last slot of a plan that ends, as expected [windows]."""
+        while len(self._transmits) < len(self._is_free):
             self._extend()
         return self._timestamp.astype(np.float64) / SLOTS_PER_WINDOW
 
     def _extend(self) -> None:
-        begin = self._num_planned
-        end = min(begin + self._chunk_slots, len(self._transmits))
+        """Compute the next slots: as many whatever is asked for, which plans must not depend on."""
+        begin, num_slots = len(self._transmits), self._settings.chunk_slots
+        if not self._is_endless:
+            num_slots = min(num_slots, len(self._is_free) - begin)
+            if num_slots == 0:
+                raise IndexError(f"the plan has {begin} slots")
+        # Looking ahead reaches beyond these slots, and beyond the plan's end, where all are free.
+        is_free = np.ones(num_slots + self._lookahead.depth, dtype=bool)
+        known = self._is_free[begin : begin + len(is_free)]
+        is_free[: len(known)] = known
+        transmits = np.empty((num_slots, len(self._timestamp)), dtype=bool)
         schedule(
             self._timestamp,
             self._now + begin,
             self._links,
             self._weights,
-            self._foresight,
-            self._is_free[begin:],
-            self._transmits[begin:end],
+            self._lookahead,
+            is_free,
+            transmits,
         )
-        self._num_planned = end
+        self._transmits.extend(transmits)
 
 
-def _corrected(
-    timestamp: Float[np.ndarray, "N N"], snapshots: Snapshots, owner: int
-) -> Float[np.ndarray, "N N"]:
-    """T without what the last plan expected of robots that were not heard of since.
+def epoch_plan(
+    belief: Belief,
+    settings: PlannerSettings,
+    snapshots: Snapshots,
+    owner: int,
+    timestamp: Float[np.ndarray, "N N"],
+    now: float,
+    is_free: Bool[np.ndarray, "P"],
+) -> Plan:
+    """Return the plan of an epoch, which depends on one snapshot and on nothing else.
 
-    Nobody can know anything newer of such a robot than the snapshot does, nor can it know anything
-    newer itself.
+    Args:
+        belief: The robots' belief about the channel.
+        settings: Of the planner.
+        snapshots: Those taken for this epoch.
+        owner: The robot whose snapshot counts.
+        timestamp: T as the epoch begins, as far as is known with that snapshot [windows].
+        now: t as the epoch begins [windows].
+        is_free: The slots of the epoch that the plan may fill.
     """
-    missing = ~snapshots.is_fresh[owner]
-    heard = np.where(missing, snapshots.timestamp[owner], np.inf)
-    return np.minimum(timestamp, np.minimum(heard[:, None], heard[None, :]))
+    is_fresh, observed = snapshots.is_fresh[owner], snapshots.timestamp[owner]
+    round_windows = max(len(observed), settings.schedule.min_round_windows)
+    is_gone = now - observed > settings.schedule.gone_rounds * round_windows
+    is_there = snapshots.is_known[owner] & (is_fresh | ~is_gone)
+    std_m = snapshots.position_std_m[owner]
+    # The last plan may have expected news of a robot that went missing. In truth nobody knows
+    # anything newer of it than the snapshot does, nor does it know anything newer itself.
+    newest = np.where(is_fresh, np.inf, observed)
+    return Plan(
+        belief.links(snapshots.position_m[owner], std_m, is_there),
+        settings,
+        is_certain=not np.any(std_m),
+        timestamp=np.minimum(timestamp, np.minimum(newest[:, None], newest[None, :])),
+        now=now,
+        is_free=is_free,
+    )

@@ -1,16 +1,16 @@
 """The planner of teams at rest: robots agree from their buffers, and may learn their links.
 
-Where nobody moves, whoever has heard of everyone holds the same positions as every other robot that
-has. A schedule that follows from these positions and the clock is the same on all of them, whatever
-else their buffers say (`resting_team.py`). So every robot takes its turns as in spatial TDMA until
-it has heard of everyone, and from then on transmits when the schedule says so. The schedule begins
-with a team that knows nothing when the mission begins, so that it does not matter when a robot
-joins it. With packets of T, M and P alone robots go on so. With larger ones they learn which links
-are not as they believed, and plan anew.
+Where nobody moves, robots that have heard of all hold the same positions. A schedule that follows
+from these positions and the clock is the same on all of them, whatever else their buffers say
+(`resting_team.py`). So every robot takes its turns as in spatial TDMA until it has heard of
+everyone, and from then on transmits when the schedule says so. The schedule begins with a team that
+knows nothing when the mission begins, so that it does not matter when a robot joins it. Without a
+payload they keep this schedule. With one they learn which links are not as they believed, and plan
+anew.
 
 Where robots move, no two buffers hold the same positions for long, and schedules made from them
-would jam each other. A robot that hears of motion does as the planner of moving teams, or goes on
-with spatial TDMA, whose rule bears small differences, if packets carry T, M and P alone.
+would jam each other. A robot that hears of motion does as the planner of moving teams, or, without
+a payload, goes on with spatial TDMA, whose rule tolerates small differences.
 """
 
 from collections.abc import Sequence
@@ -53,11 +53,11 @@ class RestingPlanner(BroadcastPolicy):
         """Prepare the policy.
 
         Args:
-            radio: What robots believe in unless the policy is informed otherwise.
+            radio: The robots believe in it unless the policy is informed otherwise.
             settings: Of the planner.
-            turns: What robots follow that cannot plan.
+            turns: Followed by robots that cannot plan.
             learns: Whether packets carry what robots observed of links.
-            moving: What robots follow that hear of motion, in place of turns.
+            moving: Followed by robots that hear of motion, in place of turns.
         """
         self._belief = Belief(radio=radio)
         self._settings = settings
@@ -78,18 +78,19 @@ class RestingPlanner(BroadcastPolicy):
         return "links" if self._learns else "none"
 
     def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:
-        """Of what robots observed of links; arguments as in `Policy.payload_fields`."""
+        """Return those of observed links; arguments as in `Policy.payload_fields`."""
         return link_fields(mission) if self._learns else ()
 
     def inform(self, belief: Belief) -> None:
-        """Plans by this belief from now on, and so do the turns."""
+        """Plan by this belief from now on, also in the turns."""
         self._belief = belief
         self._turns.inform(belief)
         if self._moving is not None:
             self._moving.inform(belief)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Draws each mission's order of turns and forgets; arguments as in `Policy.start`."""
+        """Draw each mission's order of turns and forget; arguments as in `Policy.start`."""
+        # The turns draw first: without a payload, missions begin as those of spatial TDMA do.
         self._turns.start(num_robots, rngs)
         if self._moving is not None:
             self._moving.start(num_robots, rngs)
@@ -100,14 +101,14 @@ class RestingPlanner(BroadcastPolicy):
         self._first = None  # each mission's slot in which the first decision was asked for
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
-        """Whoever does by the schedule it knows, or in its turn."""
+        """Return who transmits, by the schedule it knows or in its turn."""
         buffers, slot = views.buffers, slot_of(views.now)
         if self._first is None:
             self._first = slot
         knows_motion = np.any(buffers.velocity_mps, axis=(2, 3))
         can_plan = np.all(buffers.is_known, axis=2) & ~knows_motion
         heard = views.phases[-1].heard if views.phases else views.silence
-        # What a packet says of its sender is what it knew before the slot in which it was sent.
+        # A packet's news of its sender is from before the slot in which it was sent.
         known_until = np.rint(buffers.timestamp * SLOTS_PER_WINDOW).astype(np.int64)
         known_until -= 2 + self._first[:, None, None]
         transmits = self._turns.transmits(views)
@@ -121,18 +122,8 @@ class RestingPlanner(BroadcastPolicy):
                 known_until[b],
             )
         if self._moving is not None:
-            self._follow_motion(self._moving, views, knows_motion, transmits)
+            self._has_moved |= np.any(knows_motion, axis=1)
+            for b in np.flatnonzero(self._has_moved).tolist():
+                by_snapshot = self._moving.transmits_in(views, b)
+                transmits[b, knows_motion[b]] = by_snapshot[knows_motion[b]]
         return transmits
-
-    def _follow_motion(
-        self,
-        moving: Planner,
-        views: LocalViews,
-        knows_motion: Bool[np.ndarray, "B N"],
-        transmits: Bool[np.ndarray, "B N"],
-    ) -> None:
-        """Lets robots that know a moving teammate do as in a team that moves."""
-        self._has_moved |= np.any(knows_motion, axis=1)
-        for b in np.flatnonzero(self._has_moved).tolist():
-            by_snapshot = moving.transmits_in(views, b)
-            transmits[b, knows_motion[b]] = by_snapshot[knows_motion[b]]

@@ -5,7 +5,7 @@ seeds from 1000, mostly of 40 robots, at rest and walking (`training/RESULTS.md`
 windows, where N is the size of the team.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,7 +17,7 @@ class EpochSettings:
     regular_rounds: float = 0.5  # all others; a snapshot must reach the whole team [rounds]
     min_regular_windows: int = 10  # shortest regular epoch [windows]
     min_early_windows: int = 2  # shortest of the others [windows]
-    forget_every: int = 5  # after so many, teams at rest plan from nothing, so that all agree again
+    forget_every: int = 5  # of these epochs, teams at rest plan one from nothing, to agree again
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,15 +26,15 @@ class DiscoverySettings:
 
     transmitters_per_reach: float = 0.4  # at once, per area that a lone packet covers [1]
     max_transmitters: int = 8  # at once
-    num_fast_rounds: int = 1  # times that everyone transmits beside so many others
+    num_fast_rounds: int = 1  # in which that many transmit at once
     later_share: float = 0.5  # of these transmit at once from then on [1]
     polite_ranges: float = 1.5  # a transmitter nearer than that comes first [ranges]
-    num_rounds: int = 40  # times that everyone transmits, after which the orders repeat
+    num_rounds: int = 40  # after which the orders repeat
 
 
 @dataclass(frozen=True, kw_only=True)
 class SearchSettings:
-    """When robots that were not heard of for long are looked for."""
+    """When robots that were not heard from for long are looked for."""
 
     start_rounds: float = 5.0  # when the discovery ends and the search begins [rounds]
     latest_start_windows: int = 200  # when it begins at the latest [windows]
@@ -43,14 +43,14 @@ class SearchSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class SnapshotSettings:
-    """What a robot makes of its buffer."""
+    """Which robots count as fresh, and how far beliefs err."""
 
-    fresh_rounds: float = 1.0  # a robot not heard of for longer is missing [rounds]
+    fresh_rounds: float = 1.0  # a robot not heard from for longer is missing [rounds]
     min_fresh_windows: float = 20.0  # but never earlier [windows]
     steady_windows: float = 15.0  # for which a robot is expected to keep its velocity [windows]
     std_per_distance: float = 0.45  # of the distance that robots drift apart: how far beliefs err
     # At rest, a team of which fewer are fresh is not scattered but flies by plans that differ.
-    least_fresh_share: float = 0.75
+    min_fresh_share: float = 0.75
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,19 +61,19 @@ class ScheduleSettings:
     come true as they are, and looking further ahead pays.
     """
 
-    rest_branches: int = 6  # first transmitters that are tried where nobody moves
-    rest_slots: int = 6  # for which each of these is followed
-    moving_branches: int = 4  # the same where robots move
-    moving_slots: int = 4
-    max_foresight_robots: int = 50  # largest team that looks ahead
-    gone_rounds: float = 3.0  # a robot not heard of for longer is planned without [rounds]
+    rest_width: int = 6  # first transmitters that are tried where nobody moves
+    rest_depth: int = 6  # for which each of these is followed [slots]
+    moving_width: int = 4  # the same where robots move
+    moving_depth: int = 4
+    max_lookahead_robots: int = 50  # largest team that looks ahead
+    gone_rounds: float = 3.0  # a robot not heard from for longer is planned without [rounds]
     min_round_windows: int = 20  # in which that round is counted for small teams [windows]
     chunk_slots: int = 10  # planned at a time; any number gives the same plan
 
 
 @dataclass(frozen=True, kw_only=True)
 class WeightSettings:
-    """The heuristic that says what news is worth to whom.
+    """The heuristic weights of news, by receiver and subject.
 
     Chosen on 8 missions at rest, of 10 and 40 robots at range ratios from 0.2 to 1, and on 20
     walking ones.
@@ -81,17 +81,15 @@ class WeightSettings:
 
     downstream_exponent: float = 0.6  # of the number of robots that a receiver passes news on to
     hops_exponent: float = -0.3  # of the number of hops that the news has come
-    share_unlinked: float = (
-        0.95  # least share of a slot's worth that another transmitter must leave
-    )
-    share_per_link: float = -0.3  # added to it, times the share of all pairs that are linked
-    share_per_std: float = 3.0  # added, times the relative standard deviation of distances
-    share_isolated: float = 0.1  # added, if a robot has no link
-    max_share: float = 1.05  # and no more than this
+    # The least share of a slot's value that must remain when another robot transmits is the first
+    # of these, plus the others times what they name, up to the last.
+    share_unlinked: float = 0.95
+    share_per_link: float = -0.3  # times the share of all pairs that are linked
+    share_per_std: float = 3.0  # times the relative standard deviation of distances
+    share_isolated: float = 0.1  # if a robot has no link
+    max_share: float = 1.05
     min_probability: float = 0.05  # links that decode more rarely count as none [1]
-    slack_hops: float = (
-        0.25  # by which a path may exceed the shortest and still count as one [hops]
-    )
+    slack_hops: float = 0.25  # by which a path may exceed the shortest, and still is one [hops]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +103,7 @@ class LearningSettings:
     spread_rounds: float = 0.75  # that a table is given to reach everyone before it is flown by
     flown_rounds: float = 1.5  # for which it is flown by at least, before the next is [rounds]
     first_rounds: float = 3.0  # when the first is flown by [rounds]
-    least_log_odds: float = 5.0  # of what is learned, over what was believed
+    min_log_odds: float = 5.0  # of a hypothesis, over the channel that was believed
     cautious_stds: float = 0.5  # by which a packet is expected to be weaker than in the mean
     disturbing_stds: float = 1.0  # by which it is expected to disturb others more
     max_std_db: float = 2.0  # so doubtful schedulers take a link to be at most: errors last [dB]
@@ -116,10 +114,10 @@ class LearningSettings:
 class PlannerSettings:
     """Everything about the planner that was tuned."""
 
-    epochs: EpochSettings = field(default_factory=EpochSettings)
-    discovery: DiscoverySettings = field(default_factory=DiscoverySettings)
-    search: SearchSettings = field(default_factory=SearchSettings)
-    snapshots: SnapshotSettings = field(default_factory=SnapshotSettings)
-    schedule: ScheduleSettings = field(default_factory=ScheduleSettings)
-    weights: WeightSettings = field(default_factory=WeightSettings)
-    learning: LearningSettings = field(default_factory=LearningSettings)
+    epochs: EpochSettings = EpochSettings()
+    discovery: DiscoverySettings = DiscoverySettings()
+    search: SearchSettings = SearchSettings()
+    snapshots: SnapshotSettings = SnapshotSettings()
+    schedule: ScheduleSettings = ScheduleSettings()
+    weights: WeightSettings = WeightSettings()
+    learning: LearningSettings = LearningSettings()

@@ -13,17 +13,21 @@ from swarm_mj.policies.planner.settings import SnapshotSettings
 
 @dataclass(frozen=True, kw_only=True)
 class Snapshots:
-    """What each robot i believed of every robot k when the epoch began: one snapshot a robot.
+    """Each robot i's belief about every robot k when the epoch began: one snapshot a robot.
 
     A snapshot never changes. Packets carry it whole, so the identity of its owner stands for it.
     """
 
     is_known: Bool[np.ndarray, "N N"]  # whether i had ever heard of k
     is_fresh: Bool[np.ndarray, "N N"]  # whether that was not too long ago
-    position_m: Float[np.ndarray, "N N 2"]  # where k will be in the middle of the epoch [m]
-    position_std_m: Float[np.ndarray, "N N"]  # standard deviation of that, per axis [m]
-    timestamp: Float[np.ndarray, "N N"]  # when k observed what is believed of it [windows]
+    position_m: Float[np.ndarray, "N N 2"]  # of k in the middle of the epoch [m]
+    position_std_m: Float[np.ndarray, "N N"]  # its standard deviation, per axis [m]
+    timestamp: Float[np.ndarray, "N N"]  # when k observed itself so [windows]
     rank: Int[np.ndarray, "N"]  # the best snapshot has rank 0
+
+    def is_complete(self, owner: int) -> bool:
+        """Whether someone's snapshot has all robots."""
+        return bool(np.all(self.is_known[owner]))
 
 
 def take_snapshots(
@@ -36,7 +40,7 @@ def take_snapshots(
     windows_ahead: float,
     settings: SnapshotSettings,
 ) -> Snapshots:
-    """Every robot's snapshot, row i from buffer i alone.
+    """Return every robot's snapshot, row i from buffer i alone.
 
     Args:
         position_m: M^{i,k}: positions [m].
@@ -52,17 +56,19 @@ def take_snapshots(
         The snapshots. The best has most robots fresh, then the least mean age of these, then the
         lowest identity.
     """
-    num_known = np.sum(is_known, axis=1)
+    num_robots, num_known = len(is_known), np.sum(is_known, axis=1)
     age = np.where(is_known, now - timestamp, 0.0)
     ahead = age + windows_ahead
     mean_mps = np.sum(velocity_mps * is_known[..., None], axis=1) / num_known[:, None]
     apart_mps = (velocity_mps - mean_mps[:, None]) * is_known[..., None]
     variance = np.sum(apart_mps**2, axis=(1, 2)) / num_known
-    is_fresh = is_known & (age <= _fresh_windows(is_known.shape[1], settings))
-    num_fresh = np.maximum(np.sum(is_fresh, axis=1), 1)  # a robot that is off grows old to itself
     position_std_m = settings.std_per_distance * np.sqrt(variance)[:, None] * window_s * ahead
+    fresh_windows = max(settings.fresh_rounds * num_robots, settings.min_fresh_windows)
+    is_fresh = is_known & (age <= fresh_windows)
+    num_fresh = np.maximum(np.sum(is_fresh, axis=1), 1)  # a robot that is off grows old to itself
+    # A team at rest of which many are stale has lost nobody: its robots fly plans that differ.
     rests = np.all(is_known, axis=1) & ~np.any(position_std_m, axis=1)
-    is_divided = rests & (num_fresh < settings.least_fresh_share * is_known.shape[1])
+    is_divided = rests & (num_fresh < settings.min_fresh_share * num_robots)
     steady = np.minimum(ahead, settings.steady_windows)
     return Snapshots(
         is_known=is_known.copy(),
@@ -72,8 +78,3 @@ def take_snapshots(
         timestamp=timestamp.copy(),
         rank=np.argsort(np.lexsort((np.sum(age * is_fresh, axis=1) / num_fresh, -num_fresh))),
     )
-
-
-def _fresh_windows(num_robots: int, settings: SnapshotSettings) -> float:
-    """Return the age up to which a robot counts as fresh [windows]."""
-    return max(settings.fresh_rounds * num_robots, settings.min_fresh_windows)

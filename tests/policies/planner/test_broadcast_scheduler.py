@@ -10,7 +10,7 @@ from standing_teams import flooded_team
 
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.policies.planner.broadcast_scheduler import Foresight, Weights, schedule
+from swarm_mj.policies.planner.broadcast_scheduler import Lookahead, Weights, schedule
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.window import SLOT_WINDOWS, transmit
 from swarm_mj.radio.decode_curves import KNOWN
@@ -20,7 +20,7 @@ from swarm_mj.radio.mission_radio import radio_of
 seeds = st.integers(0, 2**32 - 1)
 shares = st.sampled_from([0.0, 0.5, 0.8, 0.95, 1.0, 1.05])
 sizes = st.integers(3, 6)
-GREED = Foresight(1, 1)
+GREED = Lookahead(1, 1)
 RADIO = radio_of(paper("stationary"))  # decodes up to 250 m in silence
 
 
@@ -37,12 +37,12 @@ def whole_weights(num_robots, seed, least_share=0.9):
     return Weights(weight, least_share)
 
 
-def scheduled(team, links, weights, is_free, foresight=GREED):
+def scheduled(team, links, weights, is_free, lookahead=GREED):
     """Who speaks in each slot, and T after the last [slots]."""
     timestamp = (2 * team.timestamp).astype(np.float32)
     speaks = np.ones((len(is_free), team.num_robots), dtype=bool)
-    ahead = np.append(is_free, np.ones(foresight.slots, dtype=bool))
-    schedule(timestamp, 2.0 * team.now, links, weights, foresight, ahead, speaks)
+    ahead = np.append(is_free, np.ones(lookahead.depth, dtype=bool))
+    schedule(timestamp, 2.0 * team.now, links, weights, lookahead, ahead, speaks)
     return speaks, timestamp
 
 
@@ -99,9 +99,9 @@ def choices(known, links, weights, first=(), tolerance=0.0):
     }
     others = [i for i in robots if i in has_news and i not in speakers]
     values = {i: worth_of(known, links, weights, [*speakers, i]) for i in others}
-    enough = {i: v for i, v in values.items() if v > value * weights.least_share - tolerance}
+    enough = {i: v for i, v in values.items() if v > value * weights.min_share - tolerance}
     best = max(enough.values(), default=-math.inf)
-    ends = not enough or best <= value * weights.least_share + tolerance
+    ends = not enough or best <= value * weights.min_share + tolerance
     answers = [sorted(speakers)] if ends else []
     good = [i for i, v in enough.items() if v >= best - tolerance]
     for i in good if tolerance else good[:1]:
@@ -161,21 +161,21 @@ def test_eq8_expected_times_are_the_real_ones(seed, num_robots, share, branches)
     team, weights = sparse_team(num_robots, seed), whole_weights(num_robots, seed, share)
     links = links_between(team.radio, team.position_m)
     is_free = np.random.default_rng(seed).random(9) < 0.7
-    speaks, after = scheduled(team, links, weights, is_free, Foresight(branches, 3))
+    speaks, after = scheduled(team, links, weights, is_free, Lookahead(branches, 3))
     assert not np.any(speaks[~is_free])
     np.testing.assert_array_equal(after, 2 * really(team, speaks)[-1])
 
 
-def best_branch(team, links, weights, foresight, is_free):
+def best_branch(team, links, weights, lookahead, is_free):
     """The speakers of a slot, by trying the best first ones to the end."""
     now = 2.0 * team.now + 1.0
     known = as_loops_see(team.timestamp, now)
     alone = [worth_of(known, links, weights, [i]) for i in range(team.num_robots)]
     best, most_known = None, -math.inf
-    for first in sorted(range(team.num_robots), key=lambda i: -alone[i])[: foresight.branches]:
+    for first in sorted(range(team.num_robots), key=lambda i: -alone[i])[: lookahead.width]:
         if alone[first] > 0.0:
             rows = [choices(known, links, weights, [first])[0]]
-            for p in range(1, foresight.slots):
+            for p in range(1, lookahead.depth):
                 before = really(team, [np.isin(range(team.num_robots), row) for row in rows])[-1]
                 seen = as_loops_see(before, now + p)
                 rows += choices(seen, links, weights) if is_free[p] else [[]]
@@ -189,13 +189,13 @@ def best_branch(team, links, weights, foresight, is_free):
 @settings(max_examples=25)
 def test_the_branch_that_knows_most_is_taken(seed, branches, slots):
     """Over its slots, those among them in which nobody may speak included."""
-    team, foresight = sparse_team(5, seed), Foresight(branches, slots)
+    team, lookahead = sparse_team(5, seed), Lookahead(branches, slots)
     weights = whole_weights(5, seed)
     links = links_between(team.radio, team.position_m)
     is_free = np.array([True, *(np.random.default_rng(seed).random(slots - 1) < 0.6)])
     timestamp, speaks = (2 * team.timestamp).astype(np.float32), np.zeros((1, 5), dtype=bool)
-    schedule(timestamp, 2.0 * team.now, links, weights, foresight, is_free, speaks)
-    expected = best_branch(team, links, weights, foresight, is_free)
+    schedule(timestamp, 2.0 * team.now, links, weights, lookahead, is_free, speaks)
+    expected = best_branch(team, links, weights, lookahead, is_free)
     if expected is not None:
         assert np.flatnonzero(speaks[0]).tolist() == expected
 
@@ -210,8 +210,8 @@ def test_more_branches_never_know_less_over_their_horizon(seed, slots):
     for branches in (1, 2, 6, 100):
         timestamp, now = (2 * team.timestamp).astype(np.float32), 2.0 * team.now
         speaks = np.zeros((slots, 8), dtype=bool)
-        foresight = Foresight(branches, slots)
-        schedule(timestamp, now, links, weights, foresight, free, speaks[:1])
+        lookahead = Lookahead(branches, slots)
+        schedule(timestamp, now, links, weights, lookahead, free, speaks[:1])
         schedule(timestamp, now + 1.0, links, weights, GREED, free[1:], speaks[1:])
         known.append(really(team, speaks).sum())
     assert known == sorted(known)
@@ -257,6 +257,6 @@ def test_who_is_alone_in_the_world_says_nothing():
     silence_mw, row = np.zeros((2, 2)), np.zeros((2, 2), dtype=np.int64)
     links = Links(silence_mw, np.full((2, 2), math.inf), 1.0, 1.0, KNOWN, row, silence_mw)
     timestamp, speaks = np.zeros((2, 2), np.float32), np.ones((3, 2), dtype=bool)
-    schedule(timestamp, 0.0, links, weights, Foresight(2, 2), np.ones(3, bool), speaks)
+    schedule(timestamp, 0.0, links, weights, Lookahead(2, 2), np.ones(3, bool), speaks)
     assert not np.any(speaks)
     assert timestamp.tolist() == [[3.0, 0.0], [0.0, 3.0]]

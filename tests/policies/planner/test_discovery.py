@@ -186,7 +186,7 @@ def sought(slot, lost, heard=None, places_m=None, knows=None, was_missing=None, 
         decoded[j] = i
     position_m = np.zeros((NUM_ROBOTS, 2)) if places_m is None else places_m
     buffers = at_places(position_m, knows or {})
-    was_fresh = fresh(*(lost if was_missing is None else was_missing))
+    was_fresh = np.tile(fresh(*(lost if was_missing is None else was_missing)), (NUM_ROBOTS, 1))
     transmits = discovery_of(NUM_ROBOTS, 1.0, seed).seeks(
         slot, fresh(*lost), was_fresh, decoded, buffers, 0
     )

@@ -8,7 +8,7 @@ import pytest
 from swarm_mj.policies.planner.link_evidence import (
     LEAST_MARGIN_DB,
     MAX_KINDS,
-    MOST_TIMES,
+    MAX_TIMES,
     NUM_BINS,
     Evidence,
     Observation,
@@ -18,7 +18,6 @@ from swarm_mj.policies.planner.link_evidence import (
 )
 from swarm_mj.radio.reception import NOBODY
 
-ALL = np.ones(4, dtype=bool)
 NOISE_MW, THRESHOLD = 1.0, 10.0  # so a packet of 10 mW has a margin of 0 dB in silence
 
 
@@ -30,14 +29,13 @@ def powers(**of_link):
     return power_mw
 
 
-def observed(heard, transmitted, believed_mw, *, prior_mw=None, listens=None, knows_all=ALL):
+def observed(heard, transmitted, believed_mw, *, prior_mw=None, listens=None):
     """Whom each robot notes, in which bin, and whether as decoded; None if nothing."""
     observation, transmitted = no_observation(4), np.array(transmitted, dtype=bool)
     observe(
         ~transmitted if listens is None else listens,
         np.array(heard),
         transmitted,
-        knows_all,
         believed_mw,
         believed_mw if prior_mw is None else prior_mw,
         NOISE_MW,
@@ -100,12 +98,11 @@ def test_what_is_very_strong_is_in_the_last_bin():
 
 
 def test_who_notes_nothing():
-    """Who transmits or flies no plan, does not know that all fly one, or when nobody transmits."""
+    """Who does not listen to a plan, or anybody when nobody transmits."""
     power_mw = powers(p01=100.0, p02=100.0, p03=100.0)
-    listens = np.array([False, True, True, False])
-    knows_all = np.array([True, True, False, True])
+    listens = np.array([False, True, False, False])
     heard = [0, 0, 0, 0]
-    noted = observed(heard, [1, 0, 0, 0], power_mw, listens=listens, knows_all=knows_all)
+    noted = observed(heard, [1, 0, 0, 0], power_mw, listens=listens)
     assert noted == [None, (0, 13, True), None, None]
     assert observed([0, 1, 2, 3], [0, 0, 0, 0], power_mw) == [None] * 4
 
@@ -152,11 +149,11 @@ def test_who_observed_nothing_counts_nothing():
 
 def test_a_kind_is_noted_255_times_and_no_more():
     evidence = Evidence(2)
-    for _ in range(MOST_TIMES + 3):
+    for _ in range(MAX_TIMES + 4):
         evidence.add(of_one(1, 5, True))
     evidence.add(of_one(1, 5, False))  # another kind is counted on its own
     decoded, missed = evidence.counts(np.full(2, 1000))
-    assert decoded[0, 1, 5] == decoded.sum() == 255 == MOST_TIMES - 1
+    assert decoded[0, 1, 5] == decoded.sum() == 255 == MAX_TIMES
     assert missed[0, 1, 5] == missed.sum() == 1
     assert evidence.counts(np.full(2, 99))[0].sum() == 100  # those noted first
 

@@ -7,7 +7,14 @@ import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.planner.link_evidence import NUM_BINS, Evidence
-from swarm_mj.policies.planner.link_tables import LAWS, LinkTable, Tables, expected, fit, learned
+from swarm_mj.policies.planner.link_tables import (
+    LAWS,
+    LinkTable,
+    Tables,
+    corrected,
+    expected_mw,
+    fit,
+)
 from swarm_mj.policies.planner.payloads import link_fields
 from swarm_mj.policies.planner.settings import LearningSettings
 from swarm_mj.radio.links import links_between
@@ -127,7 +134,7 @@ def test_a_step_from_what_was_believed_has_its_price():
     decoded, missed = nothing.copy(), nothing.copy()
     decoded[0, 1, 20], missed[0, 1, 20] = 50, 10
     assert LAWS[fit(decoded, missed, SETTINGS).law] == (math.inf, 0.15)
-    stubborn = LearningSettings(least_log_odds=1000.0)
+    stubborn = LearningSettings(min_log_odds=1000.0)
     assert LAWS[fit(decoded, missed, stubborn).law] == (math.inf, 0.0)
 
 
@@ -145,14 +152,14 @@ def test_learned_links_by_hand():
     prior = links_between(radio_of(MISSION), np.array([[0.0, 0.0], [100.0, 0.0]]))
     settings = LearningSettings(cautious_stds=0.5, disturbing_stds=1.0, max_std_db=2.0)
     table = table_of_two(-10.0, 4.0, LAWS.index((math.inf, 0.3)))
-    links = learned(prior, table, settings)
+    links = corrected(prior, table, settings)
     ratio = links.received_mw[0, 1] / prior.received_mw[0, 1]
     assert ratio == pytest.approx(10.0**-1.2)
     assert links.interference_mw[0, 1] / prior.received_mw[0, 1] == pytest.approx(10.0**-0.6)
     assert links.row[0, 1] == 4
     assert links.curves.max() == pytest.approx(0.7)  # 30 % are lost, however strong they are
     assert links.is_doubtful
-    assert expected(prior, table)[1, 0] == pytest.approx(0.1 * prior.received_mw[1, 0])
+    assert expected_mw(prior, table)[1, 0] == pytest.approx(0.1 * prior.received_mw[1, 0])
 
 
 def test_only_links_that_differ_or_fade_call_for_another_plan():

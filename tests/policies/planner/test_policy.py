@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 from channels import to_nobody, unreliable
-from decentralised_reference import SETTINGS, Flight, Witnessed, common_orders, planner_of
+from decentralised_reference import SETTINGS, Flight, Witnessed, common_orders
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies.planner.policy import epoch_starts, regular_length
+from swarm_mj.policies.planner.policy import Planner, epoch_start, regular_length
 from swarm_mj.policies.planner.settings import EpochSettings, PlannerSettings, ScheduleSettings
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.radio.mission_radio import radio_of
@@ -15,12 +15,16 @@ TASKS = ["stationary", "random-walk", "flocking"]
 
 
 # Plans that look no further than the slot in question: seconds less of large teams.
-NEAR_SIGHTED = PlannerSettings(schedule=ScheduleSettings(max_foresight_robots=0))
+NEAR_SIGHTED = PlannerSettings(schedule=ScheduleSettings(max_lookahead_robots=0))
 SEEK_EVERY = SETTINGS.search.every_windows
 
 
+def starts(num_robots, epochs, num_epochs=4):
+    return tuple(epoch_start(epoch, num_robots, epochs) for epoch in range(num_epochs))
+
+
 def first_epochs(num_robots):
-    return epoch_starts(num_robots, SETTINGS.epochs)
+    return starts(num_robots, SETTINGS.epochs)
 
 
 def length_of(num_robots):
@@ -79,8 +83,8 @@ def test_a_team_that_knows_how_all_start_plans_from_the_first_slot():
     flight = Flight(paper("stationary", num_robots=10, prior_knowledge="start"), 4)
     transmitted = flight.fly(1)
     assert np.sum(transmitted[0]) >= 1
-    (plan,) = flight.team._plans.values()
-    assert plan.is_complete
+    ((owner, plan),) = flight.team._plans.items()
+    assert flight.team._current.is_complete(owner)
     np.testing.assert_array_equal(transmitted, [plan.transmits(slot) for slot in (0, 1)])
 
 
@@ -125,9 +129,9 @@ def test_epochs_by_hand():
         min_regular_windows=10,
         min_early_windows=2,
     )
-    assert epoch_starts(40, epochs) == (0, 40, 50, 60)
-    assert epoch_starts(12, epochs) == (0, 12, 15, 18)
-    assert epoch_starts(2, epochs) == (0, 2, 4, 6)
+    assert starts(40, epochs, 6) == (0, 40, 50, 60, 80, 100)
+    assert starts(12, epochs) == (0, 12, 15, 18)
+    assert starts(2, epochs) == (0, 2, 4, 6)
     assert [regular_length(n, epochs) for n in (2, 20, 21, 40, 81)] == [10, 10, 10, 20, 40]
 
 
@@ -154,10 +158,10 @@ def test_nobody_plans_before_the_snapshots_of_the_discovery_have_spread():
         assert bool(flight.team._plans) == (window >= first_plans)
 
 
-def held_plan(flight):
-    """The one plan that all robots fly by, if they hold the same snapshot."""
+def held_by_all(flight):
+    """The owner of the one snapshot that all robots fly by, if they hold the same."""
     held = np.unique(flight.team._holds).tolist()
-    return flight.team._plans[held[0]] if len(held) == 1 else None
+    return held[0] if len(held) == 1 else None
 
 
 def assert_flies_as_planned(flight, num_epochs):
@@ -165,8 +169,9 @@ def assert_flies_as_planned(flight, num_epochs):
     length = length_of(flight.mission.num_robots)
     for _ in range(num_epochs):
         transmitted = flight.fly(length)
-        held = held_plan(flight)
-        assert held.is_complete
+        owner = held_by_all(flight)
+        held = flight.team._plans[owner]
+        assert flight.team._current.is_complete(owner)
         np.testing.assert_array_equal(transmitted, [held.transmits(h) for h in range(2 * length)])
         np.testing.assert_array_equal(flight.swarm.buffers.timestamp[0], held.outcome())
 
@@ -188,7 +193,7 @@ def test_a_robot_unheard_in_the_discovery_is_found_later(robot):
     others = np.delete(np.arange(8), robot)
     flight.fly(35)
     assert not np.any(flight.swarm.buffers.is_known[0, others, robot])
-    assert not any(held.is_complete for held in flight.team._plans.values())
+    assert not any(map(flight.team._current.is_complete, flight.team._plans))
     flight.fly(windows_before(13, 8) - 35)
     assert np.all(flight.swarm.buffers.is_known)
     assert_flies_as_planned(flight, 2)
@@ -199,16 +204,15 @@ def test_a_robot_lost_late_is_sought_and_found_again():
     flight = Flight(SMALL, 2, channel=cut_off(SMALL, 2, range(40, 100)))
     order, _ = common_orders(2, SMALL)
     flight.fly(95)
-    assert not held_plan(flight)  # the lost one knows better
-    lacks = [bool(held.is_fresh[2]) for held in flight.team._plans.values()]
-    assert lacks.count(False) >= 1
+    assert held_by_all(flight) is None  # the lost one knows better
+    assert not np.all(flight.team._current.is_fresh[list(flight.team._plans), 2])
     turn = 95 // SEEK_EVERY
     for window in range(95, 100):
         calls, _ = flight.fly(1)
         if window % SEEK_EVERY == 0:
             assert np.flatnonzero(calls).tolist() == [order[turn % 6]]
     flight.fly(80)
-    assert np.all(held_plan(flight).is_fresh)
+    assert np.all(flight.team._current.is_fresh[held_by_all(flight)])
 
 
 def test_who_misses_the_best_snapshot_flies_by_the_best_it_has():
@@ -270,7 +274,7 @@ def test_eq10_robots_switched_off_do_not_break_it():
     """Half-way 8 of 40 fall silent, and nobody is told: the others stay younger than by TDMA."""
     mission = paper("stationary", num_robots=40, num_windows=240, failure_fraction=0.2)
     age = {}
-    policies = {"planner": planner_of(mission, NEAR_SIGHTED), "tdma": make_policy("tdma", mission)}
+    policies = {"planner": Planner(mission, NEAR_SIGHTED), "tdma": make_policy("tdma", mission)}
     for name, policy in policies.items():
         flights = rollout(Swarm(mission, [0, 1]), policy)
         age[name] = np.array([flown.costs.age_windows for flown in flights])

@@ -21,7 +21,7 @@ def believing(fresh_windows):
         min_fresh_windows=fresh_windows,
         steady_windows=15.0,
         std_per_distance=0.45,
-        least_fresh_share=0.75,
+        min_fresh_share=0.75,
     )
 
 

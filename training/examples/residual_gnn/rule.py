@@ -1,4 +1,4 @@
-"""The rule of teams at rest: one plan from positions and the clock (`planner/standing_plan.py`)."""
+"""The rule of teams at rest: one plan from positions and the clock (`planner/plan.py`)."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -6,8 +6,12 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Int, Int16
 
+<<<<<<< HEAD:training/examples/residual_gnn/rule.py
+=======
+from residual_gnn.proposals import FARTHEST, Proposal, turns
+from swarm_mj.policies.planner.plan import Plan
+>>>>>>> 420652c (Make the planner smaller, without lean snapshots):training/examples/residual_gnn/resting_rule.py
 from swarm_mj.policies.planner.settings import PlannerSettings
-from swarm_mj.policies.planner.standing_plan import StandingPlan
 from swarm_mj.policies.tdma import draw_order, slot_of
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import FreeSpaceRadio
@@ -66,7 +70,7 @@ class RestingRule:
     def __init__(self, radio: FreeSpaceRadio) -> None:
         """Prepare the rule; robots believe in the radio unless it is informed otherwise."""
         self._belief = Belief(radio=radio)
-        self._plans: dict[bytes, StandingPlan] = {}
+        self._plans: dict[bytes, Plan] = {}
 
     def inform(self, belief: Belief) -> None:
         """Plans by this belief from now on."""
@@ -95,14 +99,23 @@ class RestingRule:
             for key, robots in members.items():
                 if key not in self._plans:
                     links = self._belief.links(buffers.position_m[b, robots[0]])
+<<<<<<< HEAD:training/examples/residual_gnn/rule.py
                     self._plans[key] = StandingPlan(links, PlannerSettings())
                 is_due[b, robots], due_in[b, robots] = _ahead(self._plans[key], int(slot[b]))
         return Proposal(is_due, due_in, knows_all)
 
 
 def _ahead(plan: StandingPlan, slot: int) -> tuple[Bool[np.ndarray, "N"], Int16[np.ndarray, "N"]]:
+=======
+                    self._plans[key] = Plan(links, PlannerSettings())
+                is_due[b, robots], due_in[b, robots] = _told(self._plans[key], int(slot[b]))
+        return Proposal(is_due, due_in, knows_all)
+
+
+def _told(plan: Plan, slot: int) -> tuple[Bool[np.ndarray, "N"], Int16[np.ndarray, "N"]]:
+>>>>>>> 420652c (Make the planner smaller, without lean snapshots):training/examples/residual_gnn/resting_rule.py
     """Who transmits by the plan, and in how many slots next."""
-    ahead = plan.ahead(slot, 1 + FARTHEST)
+    ahead = np.stack([plan.transmits(slot + n) for n in range(1 + FARTHEST)])
     later = ahead[1:]
     due_in = np.where(np.any(later, axis=0), 1 + np.argmax(later, axis=0), len(ahead))
     return ahead[0], due_in.astype(np.int16)
