@@ -124,6 +124,23 @@ def test_functions_are_compiled_anew_when_what_they_call_changes(checkout):
     assert files_of(beside) == before
 
 
+def test_an_index_that_names_a_class_that_is_gone_is_overwritten(checkout):
+    """The function keeps its name and line, so the index of before is found."""
+    source = """
+from typing import NamedTuple
+from swarm_mj.system.compiled import compiled
+class {name}(NamedTuple):
+    x: float
+@compiled()
+def doubled(pair: {name}) -> float:
+    return 2.0 * pair.x
+"""
+    for name in ("Before", "After"):
+        (checkout.package / "pairs.py").write_text(source.format(name=name))
+        code = f"from swarm_mj.pairs import {name}, doubled\nprint(doubled({name}(3.0)))"
+        assert checkout.python(code) == "6.0"
+
+
 def test_a_folder_given_holds_the_cache(checkout, tmp_path):
     value, _, path = checkout.run(NUMBA_CACHE_DIR=str(tmp_path / "given"))
     assert value == 4.0

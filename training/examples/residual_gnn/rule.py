@@ -6,11 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Int, Int16
 
-<<<<<<< HEAD:training/examples/residual_gnn/rule.py
-=======
-from residual_gnn.proposals import FARTHEST, Proposal, turns
 from swarm_mj.policies.planner.plan import Plan
->>>>>>> 420652c (Make the planner smaller, without lean snapshots):training/examples/residual_gnn/resting_rule.py
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.tdma import draw_order, slot_of
 from swarm_mj.protocol.local_views import LocalViews
@@ -99,21 +95,12 @@ class RestingRule:
             for key, robots in members.items():
                 if key not in self._plans:
                     links = self._belief.links(buffers.position_m[b, robots[0]])
-<<<<<<< HEAD:training/examples/residual_gnn/rule.py
-                    self._plans[key] = StandingPlan(links, PlannerSettings())
+                    self._plans[key] = Plan(links, PlannerSettings())
                 is_due[b, robots], due_in[b, robots] = _ahead(self._plans[key], int(slot[b]))
         return Proposal(is_due, due_in, knows_all)
 
 
-def _ahead(plan: StandingPlan, slot: int) -> tuple[Bool[np.ndarray, "N"], Int16[np.ndarray, "N"]]:
-=======
-                    self._plans[key] = Plan(links, PlannerSettings())
-                is_due[b, robots], due_in[b, robots] = _told(self._plans[key], int(slot[b]))
-        return Proposal(is_due, due_in, knows_all)
-
-
-def _told(plan: Plan, slot: int) -> tuple[Bool[np.ndarray, "N"], Int16[np.ndarray, "N"]]:
->>>>>>> 420652c (Make the planner smaller, without lean snapshots):training/examples/residual_gnn/resting_rule.py
+def _ahead(plan: Plan, slot: int) -> tuple[Bool[np.ndarray, "N"], Int16[np.ndarray, "N"]]:
     """Who transmits by the plan, and in how many slots next."""
     ahead = np.stack([plan.transmits(slot + n) for n in range(1 + FARTHEST)])
     later = ahead[1:]
