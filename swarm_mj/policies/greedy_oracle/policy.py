@@ -22,7 +22,7 @@ class GreedyOracle(CentralisedPolicy):
     where the authors' code would let that robot hear.
     """
 
-    uses = "all buffers, all true positions and the true channel but for its fades, at every moment"
+    uses = "all buffers, all true positions and the true channel except its fades, at every moment"
 
     def __init__(self, radio: FreeSpaceRadio) -> None:
         """Prepare the policy for a radio, which is true unless the policy is informed otherwise."""

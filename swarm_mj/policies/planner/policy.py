@@ -58,8 +58,8 @@ class Planner(BroadcastPolicy):
     """
 
     uses = (
-        "its buffer, the clock, common orders, the area, the radio as far as it was told of it; "
-        "and snapshots of the team that packets carry"
+        "its buffer, the clock, common orders, the area, its prior knowledge of the radio; and "
+        "snapshots of the team in packets"
     )
 
     def __init__(self, mission: Mission, settings: PlannerSettings | None = None) -> None:

@@ -65,11 +65,11 @@ class RestingPlanner(BroadcastPolicy):
         self._learns = learns
         self._moving = moving
         self.uses = (
-            "its buffer, the clock, a common order, the radio as far as it was told of it; and "
-            "what all robots observed of their links, which packets carry"
+            "its buffer, the clock, a common order, its prior knowledge of the radio; and all "
+            "robots' observations of their links, in packets"
             if learns
-            else "as planner, without a payload: robots at rest agree from their buffers alone, "
-            "others take the turns of spatial-tdma"
+            else "as planner, without a payload: stationary robots agree from their buffers alone; "
+            "moving teams fly spatial-tdma"
         )
 
     @property

@@ -39,7 +39,8 @@ class SelfOrganisedTdma(BroadcastPolicy):
 
     uses = (
         "its buffer, T and P in packets, a common random order, the clock and the radio: robots "
-        "own slots, which T tells, and choose the slot in which the news would stay youngest"
+        "own slots, announced implicitly by transmitting, and choose the slot that keeps the "
+        "information freshest"
     )
 
     def __init__(
