@@ -46,11 +46,7 @@ def compiled(*, fastmath: bool | set[str] = False) -> Callable[[Function], Funct
         numba: Any = config
         before, numba.CACHE_LOCATOR_CLASSES = numba.CACHE_LOCATOR_CLASSES, LOCATORS
         try:
-<<<<<<< HEAD
-            dispatcher: Any = njit(cache=True, **options)(plain)
-=======
-            return _stamped(cast(Function, njit(cache=True, **options)(plain)))
->>>>>>> 4c6f4e8 (Skip cached indices of other code before numba unpickles them)
+            dispatcher: Any = _stamped(njit(cache=True, **options)(plain))
         except RuntimeError:  # no place for a cache
             dispatcher = njit(**options)(plain)
         finally:
@@ -61,7 +57,6 @@ def compiled(*, fastmath: bool | set[str] = False) -> Callable[[Function], Funct
     return decorate
 
 
-<<<<<<< HEAD
 def _whole(compile: Function) -> Function:
     """Let a Ctrl-C wait until a function is compiled, or loaded from the cache.
 
@@ -75,17 +70,17 @@ def _whole(compile: Function) -> Function:
             return compile(*arguments)
 
     return cast(Function, compile_whole)
-=======
-def _stamped(dispatcher: Function) -> Function:
+
+
+def _stamped(dispatcher: Any) -> Any:  # noqa: ANN401
     """Let numba compare the digest before it unpickles the rest of an index.
 
     An index of other code may name classes that no longer exist, which would end the program.
     numba compares its own version first, so the digest joins it.
     """
-    index: Any = cast(Any, dispatcher)._cache._cache_file
+    index = dispatcher._cache._cache_file
     index._version += index._source_stamp.hex()
     return dispatcher
->>>>>>> 4c6f4e8 (Skip cached indices of other code before numba unpickles them)
 
 
 def digest(file: Path) -> bytes:
