@@ -37,8 +37,8 @@ def credits_of(
         timestamp: T at the end of the window before [windows].
         position_m: Where the robots are in this window [m].
         recipient: Whom each robot addresses; itself is silence.
-        channel: Who decodes whom; of one that draws or remembers, what `as_it_is` gave before the
-            window.
+        channel: Who decodes whom; a `snapshot_channel` from before the window, as channels may
+            draw or remember.
         now: t at the start of the window [windows].
         is_active: Who took part in the window, and whose age counts; None is everyone.
 
@@ -63,7 +63,7 @@ def credits_of(
     return credit
 
 
-def as_it_is(channel: Kind) -> Kind:
+def snapshot_channel(channel: Kind) -> Kind:
     """Return a channel that later draws of this one do not change, to replay a window with."""
     draws = isinstance(channel, Started) and not isinstance(channel, VaryingChannel)
     return copy.deepcopy(channel) if draws else channel
@@ -79,7 +79,7 @@ class _Rows:
         """Take the channel as it was before the window, and each row's mission."""
         self._mission = mission
         self._turn = np.array([np.sum(mission[:w] == b) for w, b in enumerate(mission)])
-        self._channels = [as_it_is(channel) for _ in range(int(np.max(self._turn)) + 1)]
+        self._channels = [snapshot_channel(channel) for _ in range(int(np.max(self._turn)) + 1)]
 
     def __call__(
         self, position_m: Float[np.ndarray, "W N 2"], recipient: Int[np.ndarray, "W N"]

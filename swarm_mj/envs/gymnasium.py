@@ -7,10 +7,10 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from jaxtyping import Bool, UInt8
 
-from swarm_mj.envs.options import check_reset
+from swarm_mj.envs.mission_batch import Info, Observation, next_seed
+from swarm_mj.envs.options import check_reset, check_team_reward, make_batch
 from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.envs.spaces import team_spaces
-from swarm_mj.envs.team import Info, Observation, Team, next_seed
 from swarm_mj.mission import Mission
 
 
@@ -30,23 +30,23 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        """Take a mission or its task, and options as `Team` does: any field of `Mission`, too.
+        """Take a mission or its task, and options of `make_batch`, such as fields of `Mission`.
 
         Raises:
             ValueError: A value is unknown or out of range.
             TypeError: An option is unknown.
         """
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
-        self.team = Team(mission, **options)
-        check_paid_together(self.team)
+        self.batch = make_batch(mission, **options)
+        check_team_reward(self.batch)
         self._screen = Screen(render_mode)
         self.render_mode = render_mode
-        self.observation_space, self.action_space = team_spaces(self.team)
+        self.observation_space, self.action_space = team_spaces(self.batch)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, Info]:
-        """Begins a mission, whose seed is in `info`. There are no options.
+        """Begin a mission, whose seed is in `info`. There are no options.
 
         Raises:
             ValueError: There is such an option, or no connected team could be drawn.
@@ -54,12 +54,12 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         check_reset(options or {})
         super().reset(seed=seed, options=options)
         begun = next_seed(self.np_random) if seed is None else seed
-        self.team.restart([begun])
-        self._screen.update(self.team)
+        self.batch.restart([begun])
+        self._screen.update(self.batch)
         return self._observation(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, Info]:
-        """One window; `action[i]` is whom robot i addresses, itself for silence.
+        """Fly one window; `action[i]` is whom robot i addresses, itself for silence.
 
         Returns:
             What the robots see, the reward, False, whether the mission was cut off here, and what
@@ -69,14 +69,14 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
             ValueError: The action is not one integer from 0 to N - 1 per robot, or the mission is
                 over.
         """
-        reward = self.team.step(np.asarray(action)[np.newaxis])
-        self._screen.update(self.team)
-        is_over = self.team.is_over
+        reward = self.batch.step(np.asarray(action)[np.newaxis])
+        self._screen.update(self.batch)
+        is_over = self.batch.is_over
         return self._observation(), float(reward[0, 0]), False, is_over, self._info()
 
     def action_masks(self) -> Bool[np.ndarray, "A"]:
-        """Which recipients are worth a thought, robot by robot, as `MaskablePPO` asks for it."""
-        return self.team.observation["action_mask"].ravel().astype(np.bool_)
+        """Return where an action may help, robot by robot, in the form of `MaskablePPO`."""
+        return self.batch.observation["action_mask"].ravel().astype(np.bool_)
 
     def render(self) -> UInt8[np.ndarray, "H W 3"] | None:
         """Return the mission as it is now, in the render mode "rgb_array".
@@ -84,23 +84,14 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         Raises:
             OSError: No OpenGL works here; it says what to install.
         """
-        return self._screen.picture(self.team) if self.render_mode == "rgb_array" else None
+        return self._screen.picture(self.batch) if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
         """Give back what pictures took."""
         self._screen.close()
 
     def _info(self) -> Info:
-        return {name: values[0].item() for name, values in self.team.infos().items()}
+        return {name: values[0].item() for name, values in self.batch.infos().items()}
 
     def _observation(self) -> Observation:
-        return {name: values[0] for name, values in self.team.observation.items()}
-
-
-def check_paid_together(team: Team) -> None:
-    """Raise ValueError if a reward is each robot's own where a team has one."""
-    if team.reward == "credit":
-        raise ValueError(
-            "reward credit is each robot's own, and this environment pays the team; choose reward "
-            "aoi, or an environment whose agents are robots (swarm_mj.envs.pettingzoo)"
-        )
+        return {name: values[0] for name, values in self.batch.observation.items()}

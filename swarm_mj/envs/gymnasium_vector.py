@@ -1,10 +1,10 @@
 """Gymnasium's vector face: B missions in as few swarms as can be.
 
-Missions that begin together are one group, played as one swarm. A mission that is begun alone,
-by `reset_mask`, leaves its group for one of its own; its row there flies on, silent and unseen.
+Missions that begin together are one group, played as one swarm. A mission that begins alone, by
+`reset_mask`, leaves its group for a new one; its row in the old group flies on, silent and unseen.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -12,13 +12,12 @@ import numpy as np
 from gymnasium.utils import EzPickle, seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space, create_empty_array
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Int, UInt8
 
-from swarm_mj.envs.gymnasium import check_paid_together
-from swarm_mj.envs.options import check_reset
+from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, next_seed
+from swarm_mj.envs.options import check_count, check_reset, check_team_reward, make_batch
 from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.envs.spaces import team_spaces
-from swarm_mj.envs.team import Info, Observation, Team, check_count, next_seed
 from swarm_mj.mission import Mission
 from swarm_mj.system.fields import did_you_mean
 
@@ -30,9 +29,9 @@ Step = tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Info]
 class _Group:
     """Missions that began together, and the environments that they still are."""
 
-    team: Team
-    rows: Int[np.ndarray, "E"]  # of the team's missions
-    envs: Int[np.ndarray, "E"]  # and which environment each is
+    batch: MissionBatch
+    rows: Int[np.ndarray, "E"]  # of the batch's missions
+    envs: Int[np.ndarray, "E"]  # the environment of each row
 
 
 class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
@@ -53,34 +52,27 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        """Take how many missions, and which; options as `Team` does.
+        """Take the number of missions, the mission or its task, and options of `make_batch`.
 
         Raises:
             ValueError: A value is unknown or out of range.
             TypeError: An option is unknown.
         """
-        EzPickle.__init__(
-            self,
-            num_envs,
-            mission,
-            autoreset_mode=autoreset_mode,
-            render_mode=render_mode,
-            **options,
-        )
+        modes = {"autoreset_mode": autoreset_mode, "render_mode": render_mode}
+        EzPickle.__init__(self, num_envs, mission, **modes, **options)
         check_count("num_envs", num_envs)
         self.num_envs = num_envs
         self._mode = _mode_of(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self._mode}
         self._screen = Screen(render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
-        self._mission: Mission | str = mission
-        self._options = options
+        self._mission, self._options = mission, options
         self._groups: list[_Group] = []
         self._is_over = np.zeros(num_envs, dtype=np.bool_)
         self._rngs: dict[int, np.random.Generator] = {}  # that draw seeds, by environment
-        team = self._make_team(1)
-        check_paid_together(team)
-        self.single_observation_space, self.single_action_space = team_spaces(team)
+        batch = self._make_batch(1)
+        check_team_reward(batch)
+        self.single_observation_space, self.single_action_space = team_spaces(batch)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._seen = cast(
@@ -93,7 +85,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Observation, Info]:
-        """Begins missions, all or those of `options["reset_mask"]` [B].
+        """Begin missions, all or those of `options["reset_mask"]` [B].
 
         Args:
             seed: One for each environment; or the first one's, which the others count on from; or
@@ -113,32 +105,33 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         return self._copied(), infos
 
     def step(self, actions: np.ndarray) -> Step:
-        """One window of every mission; `actions[b, i]` is whom robot i of mission b addresses.
+        """Fly one window of every mission; `actions[b, i]` is whom robot i of mission b addresses.
 
         Raises:
             ValueError: A recipient is no robot, there is not one per robot, or a mission is over
                 and nothing begins it anew.
         """
-        begun = np.flatnonzero(self._is_over)
-        if begun.size and self._mode == AutoresetMode.DISABLED:
-            raise ValueError(
-                f"environment {begun[0]} is over; begin it anew by reset(options="
-                '{"reset_mask": mask})'
-            )
-        reward, infos = np.zeros(self.num_envs), {}
-        self._play(np.asarray(actions), reward, infos)
+        actions = np.asarray(actions)
+        self._check_actions(actions)
+        reward, infos, final = np.zeros(self.num_envs), {}, {}
+        late = np.flatnonzero(self._is_over)  # in the mode NEXT_STEP; they begin in this step
+        for group in self._groups:
+            if not self._is_over[group.envs[0]]:
+                reward[group.envs] = self._play(group, actions)
+                is_final = group.batch.is_over and self._mode == AutoresetMode.SAME_STEP
+                self._note(final if is_final else infos, group)
         is_over = self._is_over.copy()
-        is_over[begun] = False
+        is_over[late] = False
+        if final:
+            infos |= {"final_obs": self._last_seen(is_over), "_final_obs": is_over.copy()}
+            infos |= {"final_info": final, "_final_info": is_over.copy()}
+        begun = np.flatnonzero(is_over) if final else late
         if begun.size:
             self._begin(begun, [None] * begun.size, infos)
-        elif self._mode == AutoresetMode.SAME_STEP and is_over.any():
-            infos = self._finals(is_over, infos)
-            ended = np.flatnonzero(is_over)
-            self._begin(ended, [None] * ended.size, infos)
         return self._copied(), reward, np.zeros_like(is_over), is_over, infos
 
     def render(self) -> tuple[UInt8[np.ndarray, "H W 3"], ...] | None:
-        """Every mission as it is now, in the render mode "rgb_array".
+        """Draw every mission as it is now, in the render mode "rgb_array".
 
         Raises:
             OSError: No OpenGL works here; it says what to install.
@@ -146,7 +139,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         if self.render_mode != "rgb_array":
             return None
         places = {
-            int(env): (group.team, int(row))
+            int(env): (group.batch, int(row))
             for group in self._groups
             for row, env in zip(group.rows, group.envs, strict=True)
         }
@@ -156,11 +149,11 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         """Give back what pictures took."""
         self._screen.close()
 
-    def _make_team(self, num_missions: int) -> Team:
-        return Team(self._mission, num_missions, **self._options)
+    def _make_batch(self, num_missions: int) -> MissionBatch:
+        return make_batch(self._mission, num_missions, **self._options)
 
     def _mask_of(self, options: dict[str, Any]) -> Bool[np.ndarray, "B"]:
-        """Which environments are to begin."""
+        """Return which environments are to begin."""
         mask = np.asarray(options.get("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
             raise ValueError(
@@ -179,87 +172,78 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
             )
         return seed
 
-    def _begin(self, envs: Int[np.ndarray, "E"], seeds: Sequence[int | None], infos: Info) -> None:
-        """Begins these environments' missions; writes what they say into `infos`."""
-        for env, seed in zip(envs, seeds, strict=True):
-            if seed is not None or env not in self._rngs:
-                self._rngs[env], _ = seeding.np_random(seed)
-        begun = [
-            next_seed(self._rngs[env]) if seed is None else seed
-            for env, seed in zip(envs, seeds, strict=True)
-        ]
-        team = self._spare_team(envs)
-        team.restart(begun)
-        group = _Group(team=team, rows=np.arange(len(envs)), envs=envs)
-        self._groups = [*self._without(envs), group]
-        self._is_over[envs] = False
-        self._show(group)
-        self._note(infos, envs, team.infos())
-
-    def _spare_team(self, envs: Int[np.ndarray, "E"]) -> Team:
-        """Return a team of so many missions that no other environment is part of."""
-        for group in self._groups:
-            if group.team.num_missions == len(envs) and np.isin(group.envs, envs).all():
-                return group.team
-        return self._make_team(len(envs))
-
-    def _without(self, envs: Int[np.ndarray, "E"]) -> Iterator[_Group]:
-        """Return the groups, without environments that begin anew."""
-        for group in self._groups:
-            stays = ~np.isin(group.envs, envs)
-            if stays.any():
-                yield _Group(team=group.team, rows=group.rows[stays], envs=group.envs[stays])
-
-    def _play(self, actions: np.ndarray, reward: Float[np.ndarray, "B"], infos: Info) -> None:
-        """One window of every mission that is not over yet; fills rewards and infos."""
+    def _check_actions(self, actions: np.ndarray) -> None:
+        if self._is_over.any() and self._mode == AutoresetMode.DISABLED:
+            raise ValueError(
+                f"environment {np.argmax(self._is_over)} is over; begin it anew by reset(options="
+                '{"reset_mask": mask})'
+            )
         if actions.shape != self.action_space.shape:
             raise ValueError(
                 f"actions must have shape {self.action_space.shape}, environments by robots, not "
                 f"{actions.shape}"
             )
+
+    def _begin(self, envs: Int[np.ndarray, "E"], seeds: Sequence[int | None], infos: Info) -> None:
+        """Begin these environments' missions in a group of their own; note their infos."""
+        for env, seed in zip(envs, seeds, strict=True):
+            if seed is not None or env not in self._rngs:
+                self._rngs[env], _ = seeding.np_random(seed)
+        batch = self._spare_batch(envs)
+        batch.restart(
+            [
+                next_seed(self._rngs[env]) if seed is None else seed
+                for env, seed in zip(envs, seeds, strict=True)
+            ]
+        )
+        left = [(group, ~np.isin(group.envs, envs)) for group in self._groups]
+        self._groups = [
+            _Group(batch=group.batch, rows=group.rows[stays], envs=group.envs[stays])
+            for group, stays in left
+            if stays.any()
+        ]
+        self._groups.append(_Group(batch=batch, rows=np.arange(len(envs)), envs=envs))
+        self._is_over[envs] = False
+        self._note(infos, self._groups[-1])
+
+    def _spare_batch(self, envs: Int[np.ndarray, "E"]) -> MissionBatch:
+        """Return a batch of the right size that no other environment needs; reuse saves a swarm."""
         for group in self._groups:
-            if not self._is_over[group.envs[0]]:
-                recipient = group.team.flown.views.silence.astype(actions.dtype)
-                recipient[group.rows] = actions[group.envs]
-                reward[group.envs] = group.team.step(recipient)[group.rows, 0]
-                self._is_over[group.envs] = group.team.is_over
-                self._show(group)
-                said = group.team.infos().items()
-                self._note(infos, group.envs, {name: each[group.rows] for name, each in said})
+            if group.batch.num_missions == len(envs) and np.isin(group.envs, envs).all():
+                return group.batch
+        return self._make_batch(len(envs))
 
-    def _finals(self, is_over: Bool[np.ndarray, "B"], infos: Info) -> Info:
-        """What was seen last, and the last window's costs, out of the way of what begins now."""
-        left: Info = {}
-        last = {name: each for name, each in infos.items() if not name.startswith("_")}
-        final: Info = {}
-        for envs, place in ((~is_over, left), (is_over, final)):
-            if (chosen := np.flatnonzero(envs)).size:
-                self._note(place, chosen, {name: each[chosen] for name, each in last.items()})
-        seen = np.full(self.num_envs, None, dtype=object)
-        for env in np.flatnonzero(is_over):
-            seen[env] = {name: each[env].copy() for name, each in self._seen.items()}
-        mask = {"_final_obs": is_over.copy(), "_final_info": is_over.copy()}
-        return {**left, "final_obs": seen, "final_info": final, **mask}
+    def _play(self, group: _Group, actions: np.ndarray) -> np.ndarray:
+        """Fly one window of a group; return its environments' rewards."""
+        recipient = group.batch.flown.views.silence.astype(actions.dtype)
+        recipient[group.rows] = actions[group.envs]
+        reward = group.batch.step(recipient)[group.rows, 0]
+        self._is_over[group.envs] = group.batch.is_over
+        return reward
 
-    def _show(self, group: _Group) -> None:
-        """Take over what a group sees."""
-        for name, each in group.team.observation.items():
+    def _note(self, infos: Info, group: _Group) -> None:
+        """Keep a group's view, and write its infos next to masks of whose they are."""
+        for name, each in group.batch.observation.items():
             self._seen[name][group.envs] = each[group.rows]
-
-    def _note(self, infos: Info, envs: Int[np.ndarray, "E"], values: dict[str, np.ndarray]) -> None:
-        """Write what these environments say into `infos`, beside masks of who said it."""
-        for name, each in values.items():
+        for name, each in group.batch.infos().items():
             if name not in infos:
                 infos[name] = np.zeros(self.num_envs, dtype=each.dtype)
                 infos[f"_{name}"] = np.zeros(self.num_envs, dtype=np.bool_)
-            infos[name][envs], infos[f"_{name}"][envs] = each, True
+            infos[name][group.envs], infos[f"_{name}"][group.envs] = each[group.rows], True
+
+    def _last_seen(self, is_over: Bool[np.ndarray, "B"]) -> np.ndarray:
+        """Return the last view of each environment that is over, and None for the others."""
+        seen = np.full(self.num_envs, None, dtype=object)
+        for env in np.flatnonzero(is_over):
+            seen[env] = {name: each[env].copy() for name, each in self._seen.items()}
+        return seen
 
     def _copied(self) -> Observation:
         return {name: each.copy() for name, each in self._seen.items()}
 
 
 def _mode_of(mode: str | AutoresetMode) -> AutoresetMode:
-    """What happens after a mission's last window; raises ValueError if it is no such thing."""
+    """Return the autoreset mode of this name; raises ValueError for another."""
     modes = [each.value for each in AutoresetMode]
     if mode not in (*modes, *AutoresetMode):
         raise ValueError(

@@ -1,163 +1,186 @@
-"""Missions side by side for training: batches that end at different times, of several team sizes.
+"""Missions side by side, as environments and training fly them: views, rewards, infos.
 
-A batch is one swarm: its missions have one team size and begin and end together. Batches are
-staggered, so that every rollout holds windows from all parts of a mission.
+All faces but dm_control's are made of this, so the same seeds and actions are the same missions
+through each of them.
 """
 
-import copy
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
-from swarm_mj.envs.credit import as_it_is, credits_of
+from swarm_mj.control.controller import Costed
+from swarm_mj.envs.credit import credits_of, snapshot_channel
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.graphs import Graphs, check_width
-from swarm_mj.protocol.costs import WindowCosts
+from swarm_mj.protocol.costs import WindowCosts, age_of_information, velocity_variance
 from swarm_mj.simulation.swarm import Swarm
 
-Reward = Literal["aoi", "velocity-variance"]  # the cost whose negative a team is paid
-# Training and environments draw seeds from here on, so that small ones are never seen.
+Observation = dict[str, np.ndarray]
+Info = dict[str, Any]
+
+# A team's reward is minus a cost, here by its name in infos. "credit" is each robot's own.
+COSTS = {
+    "aoi": "age_windows",
+    "velocity-variance": "velocity_variance_m2ps2",
+    "task-cost": "task_cost",
+}
+REWARDS = (*COSTS, "credit")
+PACKETS = ("sent", "delivered", "lost", "overheard", "answered")  # counts, in infos
+# Training and environments draw seeds from here on, so small ones are left for evaluations.
 FIRST_TRAINING_SEED, LAST_TRAINING_SEED = 2**40, 2**62
 
 
-@dataclass(kw_only=True)
-class ActionHistory:
-    """How a batch came to where it is: replayed, it leads to the same state."""
-
-    seeds: list[int]  # of the missions under way
-    last_window: int  # when they end [windows]
-    recipients: list[Int[np.ndarray, "B N"]] = field(default_factory=list)  # window by window
-
-
-@dataclass(frozen=True, kw_only=True)
-class Transition:
-    """What one window of a batch brought."""
-
-    credit: Float[np.ndarray, "B N"]  # ages removed by each robot [windows]; 0 unless asked for
-    costs: WindowCosts
-    graphs: Graphs  # what the robots see next; of new missions if these ended
-    last_graphs: Graphs | None  # what they saw at the end, if the missions ended here
-    is_cut: bool  # whether they ended before the mission did, to stagger the batches
-
-
 class MissionBatch:
-    """Missions of one team size that begin and end together; the first ones are cut off."""
+    """B missions of one team size that begin and end together.
+
+    Index order: `[b, i]` is robot `i` of mission `b`.
+    """
 
     def __init__(
         self,
         mission: Mission,
-        features: str,
-        num_missions: int,
-        rng: np.random.Generator,
+        num_missions: int = 1,
         *,
-        first_windows: int,
+        features: str = "extended",
+        reward: str = "aoi",
+        with_parents: bool = False,
         components: Components = Components(),
     ) -> None:
-        """Start the first missions, of so many windows; `rng` draws the missions' seeds."""
-        self.mission = mission
-        self.num_missions = num_missions
-        self._rng = rng
-        self._features = features
+        """Take the missions, which `restart` begins; arguments as in `options.make_batch`."""
+        self.mission, self.num_missions = mission, num_missions
+        self.features, self.reward, self.with_parents = features, reward, with_parents
+        self.swarm: Swarm | None = None  # made when it begins
+        self._components = components
         self._extractor = make_extractor(features, mission)
         self.num_features = len(self._extractor.names)  # F
-        seeds = self._draw_seeds()
-        self._swarm = Swarm(mission, seeds, **components.given)
-        self._begin(ActionHistory(seeds=seeds, last_window=first_windows))
 
-    def step(self, recipient: Int[np.ndarray, "B N"], *, with_credit: bool) -> Transition:
-        """One window; missions that end start anew."""
-        swarm, mission = self._swarm, self.mission
-        before, now = swarm.buffers.timestamp.copy(), swarm.now
-        channel = as_it_is(swarm.channel) if with_credit else swarm.channel
-        costs = swarm.exchange(recipient)
-        credit = np.zeros(recipient.shape)
-        if with_credit:
-            states = swarm.states
-            credit = credits_of(
-                before, states.position_m, recipient, channel, now, states.is_active
-            )
-        self.history.recipients.append(recipient.astype(np.int16))
-        graphs = self._see()
-        last_graphs = None
-        is_cut = False
-        if swarm.now[0] >= self.history.last_window:
-            is_cut = self.history.last_window < mission.num_windows
-            last_graphs = graphs
-            graphs = self._begin(
-                ActionHistory(seeds=self._draw_seeds(), last_window=mission.num_windows)
-            )
-        return Transition(
-            credit=credit, costs=costs, graphs=graphs, last_graphs=last_graphs, is_cut=is_cut
-        )
+    def restart(self, seeds: Sequence[int], last_window: int | None = None) -> None:
+        """Begin the missions of these seeds, to be cut off after `last_window` if that is given.
 
-    def restart(self) -> Graphs:
-        """Goes to the start of the missions under way; returns what the robots see there."""
-        return self._begin(replace(self.history, recipients=[]))
-
-    def replay(self, history: ActionHistory) -> Graphs:
-        """Goes to the end of a history; returns what the robots see there."""
-        graphs = self._begin(copy.deepcopy(history))
-        for recipient in history.recipients:
-            self._swarm.exchange(recipient.astype(np.int64))
-            graphs = self._see()
-        return graphs
-
-    def _see(self) -> Graphs:
-        """What the robots see; one that was switched off may only be silent."""
-        graphs, is_active = self._extractor.graphs(self._swarm.views), self._swarm.states.is_active
-        if is_active is None:
-            return graphs
-        own = np.tile(np.eye(self.mission.num_robots, dtype=np.bool_), (self.num_missions, 1))
-        return replace(graphs, may_address=graphs.may_address & (is_active.reshape(-1, 1) | own))
-
-    def _begin(self, history: ActionHistory) -> Graphs:
-        """What the robots see at the start of a history's missions."""
-        self.history = history
-        self._swarm.restart(history.seeds)
+        Raises:
+            ValueError: There are not B seeds, one is negative, or a team cannot be connected.
+        """
+        if self.swarm is None:
+            self.swarm = Swarm(self.mission, seeds, **self._components.given)
+        else:
+            self.swarm.restart(seeds)
+        self.seeds = list(seeds)
+        self.last_window = last_window or self.mission.num_windows
+        self.costs: WindowCosts | None = None  # of the last window
         self._extractor.start(self.num_missions, self.mission.num_robots)
-        graphs = self._see()
-        check_width(self._features, self._extractor, graphs)
-        return graphs
+        self._see()
+        check_width(self.features, self._extractor, self.graphs)
 
-    def _draw_seeds(self) -> list[int]:
-        size = self.num_missions
-        return self._rng.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED, size=size).tolist()
+    def step(self, recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B N"]:
+        """Fly one window of Alg. 1, in which each robot addresses a recipient; itself is silence.
+
+        Returns:
+            The reward of each robot; all of a team alike, unless the reward is credit.
+
+        Raises:
+            ValueError: No mission has begun, they are over, or a recipient is no robot; nothing has
+                moved.
+        """
+        if self.reward == "credit":
+            return self._step_with_credit(recipient)
+        self.fly(recipient)
+        cost = self.infos()[COSTS[self.reward]]
+        return np.broadcast_to(-cost[:, None], recipient.shape)
+
+    def _step_with_credit(self, recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B N"]:
+        swarm = self.flown
+        # The credit replays this window, so it needs T and the channel's draws from before it.
+        before, start = swarm.buffers.timestamp.copy(), swarm.now
+        channel = snapshot_channel(swarm.channel)
+        self.fly(recipient)
+        states = swarm.states
+        credit = credits_of(before, states.position_m, recipient, channel, start, states.is_active)
+        return credit / self.mission.num_robots**2  # a mean over pairs: team sizes count alike
+
+    def fly(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
+        """Fly a window as `step` does, without working out rewards."""
+        if self.is_over:
+            windows = f"its {self.last_window} windows"
+            raise ValueError(f"the mission is over after {windows}; call reset()")
+        self.costs = self.flown.exchange(recipient)
+        self._see()
+        return self.costs
+
+    def _see(self) -> None:
+        """Keep the robots' present graphs; a robot that has failed may only be silent."""
+        graphs, is_active = self._extractor.graphs(self.flown.views), self.flown.states.is_active
+        if is_active is not None:
+            own = np.tile(np.eye(self.mission.num_robots, dtype=np.bool_), (self.num_missions, 1))
+            may_address = graphs.may_address & (is_active.reshape(-1, 1) | own)
+            graphs = replace(graphs, may_address=may_address)
+        self.graphs: Graphs = graphs
+
+    @property
+    def flown(self) -> Swarm:
+        """The swarm that flies the missions; raises ValueError before they have begun."""
+        if self.swarm is None:
+            raise ValueError("no mission has begun; call reset() first")
+        return self.swarm
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the last window has been flown."""
+        return bool(self.flown.now[0] >= self.last_window)
+
+    @property
+    def is_active(self) -> Bool[np.ndarray, "B N"]:
+        """Robots that have not been switched off."""
+        is_active = self.flown.states.is_active
+        shape = (self.num_missions, self.mission.num_robots)
+        return np.ones(shape, dtype=np.bool_) if is_active is None else is_active
+
+    @property
+    def observation(self) -> Observation:
+        """The robots' present view, new arrays of shape [B, N, ...]; see `spaces.robot_spaces`."""
+        num_robots = self.mission.num_robots
+        shape = (self.num_missions, num_robots, num_robots)
+        # Silence is always allowed: a user's own features may forget it, and samplers need one way.
+        may_address = self.graphs.may_address.reshape(shape) | np.eye(num_robots, dtype=np.bool_)
+        seen = {
+            "action_mask": may_address.astype(np.int8),
+            "observation": self.graphs.node.reshape(*shape, self.num_features),
+        }
+        if self.with_parents:  # a copy: graphs may share P with the swarm, which writes it in place
+            seen["parent"] = self.graphs.parent.reshape(shape).copy()
+        return seen
+
+    def infos(self) -> Info:
+        """Return the missions' seeds and the last window's costs, by name, [B] each.
+
+        Names and numbers are those of `swarm-mj fly --json`. Before the first window, when nothing
+        is known and nothing was sent, ages and packets are 0.
+        """
+        swarm, costs, controller = self.flown, self.costs, self.flown.controller
+        if costs is None:
+            age_windows, is_complete = age_of_information(swarm.buffers, swarm.now)
+            variance_m2ps2 = velocity_variance(swarm.states.velocity_mps)
+            packets = dict.fromkeys(PACKETS, np.zeros(self.num_missions))
+            task_cost = controller.cost(swarm.states) if isinstance(controller, Costed) else None
+        else:
+            age_windows, is_complete = costs.age_windows, costs.is_complete
+            variance_m2ps2 = costs.velocity_variance_m2ps2
+            packets = {name: getattr(costs.packets, name) for name in PACKETS}
+            task_cost = costs.task_cost.value if costs.task_cost else None
+        return {
+            "seed": np.array(self.seeds),
+            "age_windows": age_windows,
+            "velocity_variance_m2ps2": variance_m2ps2,
+            "is_complete": is_complete,
+            **{f"packets_{name}": count for name, count in packets.items()},
+            **({} if task_cost is None else {"task_cost": task_cost}),
+        }
 
 
-def make_batches(
-    mission: Mission,
-    team_sizes: Sequence[int],
-    features: str,
-    num_missions: int,
-    num_batches: int,
-    rng: np.random.Generator,
-    components: Components = Components(),
-) -> list[MissionBatch]:
-    """Batches whose first missions are cut at different windows; team sizes take turns.
-
-    So many missions in all are shared out evenly; `rng` draws their seeds.
-
-    Raises:
-        ValueError: The missions cannot be shared out evenly, or a size would have no batch.
-    """
-    if num_missions % num_batches or not 1 <= len(team_sizes) <= num_batches <= num_missions:
-        raise ValueError(
-            f"missions must be a multiple of their {num_batches} batches, of which each of the "
-            f"{len(team_sizes)} team sizes needs one, not {num_missions}"
-        )
-    return [
-        MissionBatch(
-            replace(mission, num_robots=team_sizes[place % len(team_sizes)]),
-            features,
-            num_missions // num_batches,
-            rng,
-            first_windows=max(1, mission.num_windows * (place + 1) // num_batches),
-            components=components,
-        )
-        for place in range(num_batches)
-    ]
+def next_seed(rng: np.random.Generator) -> int:
+    """Draw the seed of a mission for which none was given; never one of an evaluation."""
+    return int(rng.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED))

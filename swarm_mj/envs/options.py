@@ -1,52 +1,89 @@
-"""Names that an environment does not have, and what their users most likely mean."""
+"""Options of environments: from what a user asked for to missions, or to a likely other option."""
 
+import copy
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
+from dataclasses import replace
+from numbers import Integral
 from typing import Any, get_args
 
+from swarm_mj.control.controller import Controller, Costed
+from swarm_mj.control.motion import controller_of
+from swarm_mj.envs.mission_batch import REWARDS, MissionBatch
 from swarm_mj.envs.registration import NAMESPACE, environment_id
-from swarm_mj.mission import Mission, Task
+from swarm_mj.mission import PRESETS, Mission, Task
+from swarm_mj.mission.components import Components
+from swarm_mj.physics.scene import Scene
+from swarm_mj.policies.gnn.feature_sets import is_own_set, load_features
+from swarm_mj.protocol.packets import check_whole
+from swarm_mj.radio.free_space import Channel
 from swarm_mj.system.fields import did_you_mean
 
 
-def check_task(mission: Mission | str) -> None:
-    """Pass for a mission, or a task.
+def make_batch(
+    mission: Mission | str = "flocking",
+    num_missions: int = 1,
+    *,
+    preset: str | None = None,
+    features: str = "extended",
+    reward: str = "aoi",
+    with_parents: bool = False,
+    channel: Channel | str | None = None,
+    controller: Controller | str | None = None,
+    scene: Scene | str | None = None,
+    **fields: Any,
+) -> MissionBatch:
+    """Return missions that have not begun, by the options that all environments share.
+
+    Args:
+        mission: The mission, or its task.
+        num_missions: B.
+        preset: Of a task's mission: "paper", which None is, or any other of `PRESETS`.
+        features: Features of each teammate: the name of a feature set, or `module:Name` of your
+            own.
+        reward: "aoi", minus the age of information [windows]; "velocity-variance", minus the
+            variance of Eq. 17 [m²/s²]; "task-cost", minus the controller's cost of the task, in its
+            unit; or "credit", each robot's own: by how much the team's age would be higher had the
+            robot been silent in this window [windows].
+        with_parents: Whether robots see the parents P as well, for graph networks.
+        channel: As of `Swarm`, or its name, `module:Name`. The environment uses a copy of it, and
+            of the next two.
+        controller: As of `Swarm`.
+        scene: As of `Swarm`.
+        **fields: Any other field of `Mission`.
 
     Raises:
-        ValueError: There is no such task; what looks like an environment's name may mean one.
+        ValueError: A value is unknown or out of range, or does not go with another.
+        TypeError: A field is not one of `Mission`'s, the features are no name, or a component
+            cannot be called.
     """
-    tasks = get_args(Task)
-    if not isinstance(mission, Mission) and mission not in tasks:
-        plain = str(mission).removeprefix(f"{NAMESPACE}/").partition("-v")[0]
-        typed = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", plain).lower()
-        raise ValueError(
-            f"task must be one of {', '.join(tasks)}, not {mission!r:.80}"
-            f"{did_you_mean(typed, tasks)}"
-        )
+    check_count("num_missions", num_missions)
+    mission = _mission_of(mission, preset, fields)
+    components = Components(channel=channel, controller=controller, scene=scene)
+    # Copies: a component may draw or remember, and another environment may be given the same one.
+    components = copy.deepcopy(components.made(mission))
+    _check_reward(reward, mission, components.controller)
+    check_features_named(features)
+    if is_own_set(features):
+        load_features(features)
+    return MissionBatch(
+        mission,
+        num_missions,
+        features=features,
+        reward=reward,
+        with_parents=with_parents,
+        components=components,
+    )
 
 
-def check_fields(mission: Mission | str, fields: Mapping[str, Any]) -> None:
-    """Pass unless an option has its place elsewhere; names unknown to all are left to `Mission`.
-
-    Raises:
-        TypeError: It has.
-    """
-    if "seed" in fields:
-        raise TypeError("seed is no option of an environment; give it to reset(seed=...)")
-    if "task" in fields and not isinstance(mission, Mission):
-        task = fields["task"]
-        raise TypeError(
-            f"the environment's name or first argument settles the task, here {mission!r:.80}; use "
-            f"{environment_id(str(task)):.80} or {task!r:.80} there, and leave task= out"
-        )
+def check_count(what: str, number: object) -> None:
+    """Raise ValueError unless a number of missions, or of environments, is positive."""
+    if not isinstance(number, Integral) or number < 1:
+        raise ValueError(f"{what} must be 1 or more, not {number!r}")
 
 
 def check_features_named(features: object) -> None:
-    """Pass for a name, which stored policies keep.
-
-    Raises:
-        TypeError: The features are a class, or something else.
-    """
+    """Raise TypeError unless the features are a name, which stored policies keep."""
     if not isinstance(features, str):
         is_class = isinstance(features, type)
         name = f"{features.__module__}:{features.__qualname__}" if is_class else "module:Name"
@@ -56,13 +93,70 @@ def check_features_named(features: object) -> None:
 
 
 def check_reset(options: Collection[str], known: Collection[str] = ()) -> None:
-    """Pass if these are options of `reset`.
-
-    Raises:
-        ValueError: One is not.
-    """
+    """Raise ValueError for an option that `reset` does not have."""
     for name in options:
         if name not in known:
             raise ValueError(
                 f"reset has no option {name!r:.80}; it has {', '.join(known) or 'none'}"
             )
+
+
+def check_team_reward(batch: MissionBatch) -> None:
+    """Raise ValueError for rewards of single robots, where the agent is the team."""
+    if batch.reward == "credit":
+        raise ValueError(
+            "reward credit is each robot's own, and this environment pays the team; choose reward "
+            "aoi, or an environment whose agents are robots (swarm_mj.envs.pettingzoo)"
+        )
+
+
+def _mission_of(mission: Mission | str, preset: str | None, fields: dict[str, Any]) -> Mission:
+    """Return a mission as it is, or a task's, with other values of some fields."""
+    if "seed" in fields:
+        raise TypeError("seed is no option of an environment; give it to reset(seed=...)")
+    if isinstance(mission, Mission):
+        if preset not in (None, mission.preset):
+            raise ValueError(
+                f"preset {preset} goes with a task's name, and this mission is given whole, from "
+                f"the preset {mission.preset}; leave it out"
+            )
+        return replace(mission, **fields)
+    _check_task(mission, fields)
+    preset = "paper" if preset is None else preset
+    task = replace(Mission(), preset=preset, task=mission).task  # refuses what is unknown
+    return PRESETS[preset](task, **fields)
+
+
+def _check_task(mission: str, fields: dict[str, Any]) -> None:
+    """Refuse unknown tasks, of which some look like an environment's name, and second tasks."""
+    tasks = get_args(Task)
+    if mission not in tasks:
+        plain = str(mission).removeprefix(f"{NAMESPACE}/").partition("-v")[0]
+        typed = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", plain).lower()
+        raise ValueError(
+            f"task must be one of {', '.join(tasks)}, not {mission!r:.80}"
+            f"{did_you_mean(typed, tasks)}"
+        )
+    if "task" in fields:
+        task = fields["task"]
+        raise TypeError(
+            f"the environment's name or first argument settles the task, here {mission!r:.80}; use "
+            f"{environment_id(str(task)):.80} or {task!r:.80} there, and leave task= out"
+        )
+
+
+def _check_reward(reward: str, mission: Mission, controller: Controller | None) -> None:
+    if reward not in REWARDS:
+        raise ValueError(f"reward must be one of {', '.join(REWARDS)}, not {reward!r}")
+    if reward == "task-cost" and not isinstance(controller or controller_of(mission), Costed):
+        raise ValueError(
+            f"reward task-cost needs a task that has a cost, and {mission.task} has none; choose "
+            "another task, or reward aoi"
+        )
+    if reward == "credit" and mission.failure_fraction > 0.0:
+        raise ValueError(
+            "reward credit needs robots that do not fail, but failure_fraction is "
+            f"{mission.failure_fraction:g}; set it to 0, or choose reward aoi"
+        )
+    if reward == "credit":
+        check_whole("reward credit", mission)

@@ -7,9 +7,10 @@ from gymnasium import Space
 from gymnasium.utils import EzPickle, seeding
 from jaxtyping import UInt8
 
+from swarm_mj.envs.mission_batch import Info, Observation, next_seed
+from swarm_mj.envs.options import make_batch
 from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.envs.spaces import robot_spaces
-from swarm_mj.envs.team import Info, Observation, Team, next_seed
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.buffers import check_robots
 
@@ -40,19 +41,19 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        """Take a mission or its task, and options as `Team` does: any field of `Mission`, too.
+        """Take a mission or its task, and options of `make_batch`, such as fields of `Mission`.
 
         Raises:
             ValueError: A value is unknown or out of range.
             TypeError: An option is unknown.
         """
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
-        self.team = Team(mission, **options)
+        self.batch = make_batch(mission, **options)
         self._screen = Screen(render_mode)
         self.render_mode = render_mode
-        self.possible_agents = [f"robot_{i}" for i in range(self.team.mission.num_robots)]
+        self.possible_agents = [f"robot_{i}" for i in range(self.batch.mission.num_robots)]
         self.agents: list[str] = []
-        self._spaces = {agent: robot_spaces(self.team) for agent in self.possible_agents}
+        self._spaces = {agent: robot_spaces(self.batch) for agent in self.possible_agents}
         self._rng, _ = seeding.np_random()
 
     def observation_space(self, agent: str) -> Space[Any]:
@@ -75,8 +76,8 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         if seed is not None:
             self._rng, _ = seeding.np_random(seed)
         begun = next_seed(self._rng) if seed is None else seed
-        self.team.restart([begun])
-        self._screen.update(self.team)
+        self.batch.restart([begun])
+        self._screen.update(self.batch)
         self.agents = list(self.possible_agents)
         return self._observations(), self._infos()
 
@@ -100,7 +101,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         Raises:
             ValueError: There is no such agent, or an action is no robot; nothing has moved.
         """
-        [chosen] = self.team.flown.views.silence.tolist()
+        [chosen] = self.batch.flown.views.silence.tolist()
         for agent, action in actions.items():
             self._check_action(agent, action)
             if agent in self.agents:
@@ -108,10 +109,10 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         if not self.agents:
             return {}, {}, {}, {}, {}
         recipient = np.array([chosen])
-        check_robots("action", recipient, self.team.flown.buffers.shape)
-        reward = self.team.step(recipient)[0]
-        self._screen.update(self.team)
-        is_active, is_over = self.team.is_active[0], self.team.is_over
+        check_robots("action", recipient, self.batch.flown.buffers.shape)
+        reward = self.batch.step(recipient)[0]
+        self._screen.update(self.batch)
+        is_active, is_over = self.batch.is_active[0], self.batch.is_over
         seen = self._observations()
         rewards = {agent: float(reward[self._robot(agent)]) for agent in self.agents}
         ended = {agent: not is_active[self._robot(agent)] for agent in self.agents}
@@ -126,7 +127,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         Raises:
             OSError: No OpenGL works here; it says what to install.
         """
-        return self._screen.picture(self.team) if self.render_mode == "rgb_array" else None
+        return self._screen.picture(self.batch) if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
         """Give back what pictures took."""
@@ -150,12 +151,12 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
 
     def _infos(self) -> dict[str, Info]:
         """The same for every agent: the mission's seed, and what the window cost the team."""
-        info = {name: values[0].item() for name, values in self.team.infos().items()}
+        info = {name: values[0].item() for name, values in self.batch.infos().items()}
         return {agent: dict(info) for agent in self.agents}
 
     def _observations(self) -> dict[str, Observation]:
         """What each agent sees."""
-        seen = self.team.observation
+        seen = self.batch.observation
         return {
             agent: {name: values[0, self._robot(agent)] for name, values in seen.items()}
             for agent in self.agents

@@ -12,7 +12,7 @@ NAMESPACE = "swarm_mj"
 def register_environments() -> None:
     """Lets `gymnasium.make` and `make_vec` know `swarm_mj/Flocking-v0` and the other tasks' names.
 
-    Each takes the options of `envs.team.Team`, among them any field of `Mission`.
+    Each takes the options of `envs.options.make_batch`, among them any field of `Mission`.
     """
     for task in get_args(Task):
         name = environment_id(task)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import UInt8
 
-from swarm_mj.envs.team import Team
+from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.replay.rendering.contents import contents_of
 from swarm_mj.replay.rendering.scene import SceneRenderer
 
@@ -39,7 +39,7 @@ class Screen:
         self._viewer: SceneViewer | None = None
         self._shown_s = 0.0
 
-    def update(self, team: Team) -> None:
+    def update(self, batch: MissionBatch) -> None:
         """Show the team's first mission to a human, if one looks on.
 
         Raises:
@@ -52,21 +52,21 @@ class Screen:
                 SceneViewer,  # looks for a display when imported
             )
 
-            self._viewer = SceneViewer(team.mission, scene=team.flown.scene)
-        self._viewer.show(contents_of(team.flown))
-        time.sleep(max(0.0, self._shown_s + team.mission.window_s - time.monotonic()))
+            self._viewer = SceneViewer(batch.mission, scene=batch.flown.scene)
+        self._viewer.show(contents_of(batch.flown))
+        time.sleep(max(0.0, self._shown_s + batch.mission.window_s - time.monotonic()))
         self._shown_s = time.monotonic()
 
-    def picture(self, team: Team, index: int = 0) -> UInt8[np.ndarray, "H W 3"]:
+    def picture(self, batch: MissionBatch, index: int = 0) -> UInt8[np.ndarray, "H W 3"]:
         """One of a team's missions as it is now, RGB.
 
         Raises:
             ValueError: It has not begun.
             OSError: No OpenGL works here; it says what to install.
         """
-        contents = contents_of(team.flown, index)
+        contents = contents_of(batch.flown, index)
         if self._renderer is None:
-            self._renderer = SceneRenderer(team.mission, WIDTH, HEIGHT, scene=team.flown.scene)
+            self._renderer = SceneRenderer(batch.mission, WIDTH, HEIGHT, scene=batch.flown.scene)
         return self._renderer.frame(contents)
 
     def close(self) -> None:

@@ -6,13 +6,13 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector.utils import batch_space
 
-from swarm_mj.envs.team import Team
+from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 from swarm_mj.policies.gnn.feature_sets import is_own_set
 from swarm_mj.protocol.buffers import NO_PARENT
 
 
-def robot_spaces(team: Team) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
+def robot_spaces(batch: MissionBatch) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
     """What one robot sees, and whom it addresses.
 
     `observation` [N, F] is what it knows of every teammate, itself included: see `FEATURES` of the
@@ -20,21 +20,21 @@ def robot_spaces(team: Team) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
     worth a thought; itself, which is silence, always is. `parent` [N] is the robot that a
     teammate's news came over first, or -1.
     """
-    num_robots = team.mission.num_robots
-    most = np.inf if is_own_set(team.features) else _largest_feature(team.mission)
+    num_robots = batch.mission.num_robots
+    most = np.inf if is_own_set(batch.features) else _largest_feature(batch.mission)
     seen: dict[str, spaces.Space] = {
         "action_mask": spaces.Box(0, 1, (num_robots,), np.int8),
-        "observation": spaces.Box(-most, most, (num_robots, team.num_features), np.float32),
+        "observation": spaces.Box(-most, most, (num_robots, batch.num_features), np.float32),
     }
-    if team.with_parents:
+    if batch.with_parents:
         seen["parent"] = spaces.Box(NO_PARENT, num_robots - 1, (num_robots,), np.int32)
     return spaces.Dict(seen), spaces.Discrete(num_robots)
 
 
-def team_spaces(team: Team) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
+def team_spaces(batch: MissionBatch) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
     """What all robots see, with a leading axis N, and whom each addresses."""
-    num_robots = team.mission.num_robots
-    seen, _ = robot_spaces(team)
+    num_robots = batch.mission.num_robots
+    seen, _ = robot_spaces(batch)
     return batch_space(seen, num_robots), spaces.MultiDiscrete([num_robots] * num_robots)
 
 

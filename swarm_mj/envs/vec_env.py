@@ -1,230 +1,158 @@
-"""Missions behind stable-baselines3's `VecEnv`, by both kinds of credit assignment."""
+"""The `VecEnv` of stable-baselines3, whose environments are robots or teams.
 
-from abc import abstractmethod
+Training's own, `learning.graph_vec_env`, differs in what its networks see and where missions end.
+"""
+
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from stable_baselines3 import PPO
+from gymnasium.utils import seeding
+from jaxtyping import Bool
 from stable_baselines3.common.vec_env import VecEnv
-from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
-from swarm_mj.envs.mission_batch import MissionBatch, Reward, Transition
-from swarm_mj.policies.gnn.graphs import Graphs
-from swarm_mj.protocol.buffers import NO_PARENT
+from swarm_mj.envs.mission_batch import MissionBatch, Observation, next_seed
 
-Observation = dict[str, np.ndarray]
-Step = tuple[Observation, np.ndarray, np.ndarray, list[dict[str, Any]]]
+AGENTS = ("robot", "team")  # what an environment is
 
 
-class MissionsEnv(VecEnv):
-    """Batches of missions, already started, each one swarm; no Python loop runs over environments.
+class SwarmVecEnv(VecEnv):
+    """Missions, each batch of them one swarm; no Python loop runs over robots.
 
-    Environments run batch by batch, mission by mission and, if a robot is one, robot by robot:
-    `sizes` says how many each batch has.
+    Environments run batch by batch, mission by mission and, if a robot is one, robot by robot.
     """
 
     def __init__(
         self,
         batches: Sequence[MissionBatch],
-        sizes: Sequence[int],
-        observation: spaces.Space,
-        action: spaces.Space,
+        agent: str,
+        observation_space: spaces.Space,
+        action_space: spaces.Space,
     ) -> None:
-        self.batches = list(batches)
-        self.num_nodes = _largest_team(batches)
-        self.transitions: list[Transition] = []  # of the last window, batch by batch
-        self._actions = np.zeros(0)
-        ends = np.cumsum(sizes)
+        """Take missions that have not begun, and whether an agent is a robot or a team."""
+        self.batches, self.agent, self.render_mode = list(batches), agent, None
+        sizes = [
+            batch.num_missions * (batch.mission.num_robots if agent == "robot" else 1)
+            for batch in batches
+        ]
+        ends = np.cumsum(sizes).tolist()
         self._envs = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
-        self.render_mode = None
-        super().__init__(sum(sizes), observation, action)
+        super().__init__(sum(sizes), observation_space, action_space)
+        self.seed(None)
 
-    def observe(self, graphs: Sequence[Graphs]) -> Observation:
-        """Return the graphs of all batches, one each, as the observation of all environments."""
-        return self._observe(graphs, slice(0, self.num_envs))
-
-    @abstractmethod
-    def _observe(self, graphs: Sequence[Graphs], envs: slice) -> Observation:
-        """Return the graphs of neighbouring batches, which are these environments."""
-
-    @abstractmethod
-    def _step_batch(
-        self, batch: MissionBatch, actions: np.ndarray
-    ) -> tuple[Transition, np.ndarray]:
-        """One window of a batch, and the rewards of its environments."""
-
-    @property
-    def num_teams(self) -> int:
-        """Missions, and so team decisions a window."""
-        return sum(batch.num_missions for batch in self.batches)
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Let the next reset begin the missions of seeds from this one on; return each one's."""
+        num_missions = sum(batch.num_missions for batch in self.batches)
+        self._given = [None if seed is None else seed + b for b in range(num_missions)]
+        self._rngs = [seeding.np_random(each)[0] for each in self._given]
+        per_mission = [self._per_mission(each) for each in self.batches]
+        num_agents = np.repeat(per_mission, [each.num_missions for each in self.batches])
+        return [each for each, n in zip(self._given, num_agents, strict=True) for _ in range(n)]
 
     def reset(self) -> Observation:
-        """What is seen at the start of the missions under way, which start over."""
-        return self.observe([batch.restart() for batch in self.batches])
+        """Begin the missions of the seeds given, and else others; their seeds are in infos."""
+        for n in range(len(self.batches)):
+            self._begin(n)
+        self.reset_infos = self._infos()
+        return self._observe()
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions; `step_wait` plays them."""
         self._actions = actions
 
-    def step_wait(self) -> Step:
-        """One window of all missions; of those that were cut, also what was seen at the end."""
-        done = np.zeros(self.num_envs, dtype=np.bool_)
-        reward = np.zeros(self.num_envs, dtype=np.float32)
-        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        self.transitions = []
-        for batch, envs in zip(self.batches, self._envs, strict=True):
-            transition, reward[envs] = self._step_batch(batch, self._actions[envs])
-            self.transitions.append(transition)
-            done[envs] = transition.last_graphs is not None
-            if transition.last_graphs is not None and transition.is_cut:
-                last = self._observe([transition.last_graphs], envs)
-                infos[envs] = [
-                    {
-                        "terminal_observation": {name: rows[n] for name, rows in last.items()},
-                        "TimeLimit.truncated": True,
-                    }
-                    for n in range(envs.stop - envs.start)
-                ]
-        return self.observe([each.graphs for each in self.transitions]), reward, done, infos
+    def step_wait(self) -> VecEnvStepReturn:
+        """Fly one window of all missions; after the last one, others begin.
 
-    def close(self) -> None:
-        """There is nothing to release."""
+        Raises:
+            ValueError: A recipient is no robot; nothing has moved.
+        """
+        reward, done = np.zeros(self.num_envs, np.float32), np.zeros(self.num_envs, np.bool_)
+        for batch, envs in zip(self.batches, self._envs, strict=True):
+            # Teams smaller than the largest one are padded; nobody else may be addressed there.
+            recipient = self._actions[envs].reshape(batch.num_missions, -1)
+            paid = batch.step(recipient[:, : batch.mission.num_robots])
+            reward[envs] = self._scaled(paid, batch)[:, : self._per_mission(batch)].ravel()
+            done[envs] = batch.is_over
+        # Of this window: a restart, below, forgets them.
+        self.costs = [batch.costs for batch in self.batches if batch.costs is not None]
+        seen, infos = self._observe(), self._infos()
+        if done.any():
+            for env in np.flatnonzero(done & self._is_truncated()):
+                last = {name: rows[env] for name, rows in seen.items()}
+                infos[env] |= {"terminal_observation": last, "TimeLimit.truncated": True}
+            for n in np.flatnonzero([batch.is_over for batch in self.batches]).tolist():
+                self._begin(n)
+            seen, self.reset_infos = self._observe(), self._infos()
+        return seen, reward, done, infos
+
+    def action_masks(self) -> Bool[np.ndarray, "E A"]:
+        """Actions that may help: a recipient each, or a team's, robot by robot."""
+        return self._observe()["action_mask"].reshape(self.num_envs, -1).astype(np.bool_)
+
+    def env_method(
+        self, method_name: str, *_: object, indices: VecEnvIndices = None, **__: object
+    ) -> list[Any]:
+        """Call `action_masks`, the one method of environments; raises AttributeError for others."""
+        if method_name != "action_masks":
+            raise AttributeError(f"no environment has its own {method_name}")
+        masks = self.action_masks()
+        return [masks[env] for env in self._get_indices(indices)]
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """Return the attribute of this object, once per environment."""
         return [getattr(self, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, *_: object, **__: object) -> None:
-        """Environments have no attributes of their own; raises AttributeError."""
+        """Raise AttributeError: environments have no attributes of their own."""
         raise AttributeError(f"no environment has its own {attr_name}")
 
-    def env_method(self, method_name: str, *_: object, **__: object) -> list[Any]:
-        """Environments have no methods of their own; raises AttributeError."""
-        raise AttributeError(f"no environment has its own {method_name}")
-
     def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
-        """No environment is wrapped."""
+        """Return False for each environment: none is wrapped."""
         del wrapper_class
         return [False for _ in self._get_indices(indices)]
 
+    def close(self) -> None:
+        """Do nothing: there is nothing to release."""
 
-class RobotEnv(MissionsEnv):
-    """R environments, one a robot; the action is whom it addresses, the reward its credit per pair.
+    # Training's environment differs in the following.
 
-    Credit is what the team would not have gained in this window had the robot been silent
-    (`credit.credits_of`), over the number of pairs, so that all team sizes count alike.
-    """
+    def _begin(self, n: int) -> None:
+        """Begin other missions of batch n: of the seeds given, or else drawn from them."""
+        first = sum(batch.num_missions for batch in self.batches[:n])
+        mine = range(first, first + self.batches[n].num_missions)
+        seeds = [next_seed(self._rngs[b]) if (s := self._given[b]) is None else s for b in mine]
+        for b in mine:
+            self._given[b] = None
+        self.batches[n].restart(seeds)
 
-    def __init__(self, batches: Sequence[MissionBatch]) -> None:
-        num_nodes = _largest_team(batches)
-        observation = _graph_spaces((num_nodes,), batches[0].num_features)
-        observation["owner"] = spaces.Box(0, num_nodes - 1, (1,), np.int32)
-        owners = [
-            np.tile(np.arange(batch.mission.num_robots, dtype=np.int32), batch.num_missions)
-            for batch in batches
-        ]
-        self._owner = np.concatenate(owners)[:, None]
-        super().__init__(
-            batches, [*map(len, owners)], spaces.Dict(observation), spaces.Discrete(num_nodes)
-        )
+    def _is_truncated(self) -> Bool[np.ndarray, "E"]:
+        """Return where a mission's end is a cut in time; as Gymnasium has it, everywhere."""
+        return np.ones(self.num_envs, dtype=np.bool_)
 
-    def _observe(self, graphs: Sequence[Graphs], envs: slice) -> Observation:
-        """Return the robots' graphs, stacked and padded."""
-        return {**padded(graphs, self.num_nodes), "owner": self._owner[envs]}
+    def _scaled(self, reward: np.ndarray, batch: MissionBatch) -> np.ndarray:
+        """Return rewards [B, N] in the unit that agents are paid in."""
+        del batch
+        return reward
 
-    def _step_batch(
-        self, batch: MissionBatch, actions: np.ndarray
-    ) -> tuple[Transition, np.ndarray]:
-        transition = batch.step(actions.reshape(batch.num_missions, -1), with_credit=True)
-        return transition, transition.credit.ravel() / batch.mission.num_robots**2
+    def _infos(self) -> list[dict[str, Any]]:
+        """Return each environment's mission's seed and the window's costs there."""
+        infos: list[dict[str, Any]] = []
+        for batch in self.batches:
+            items = [(name, values.tolist()) for name, values in batch.infos().items()]
+            for b in range(batch.num_missions):
+                info = {name: values[b] for name, values in items}
+                infos += [dict(info) for _ in range(self._per_mission(batch))]
+        return infos
 
+    def _observe(self) -> Observation:
+        """Return the present view of all environments."""
+        seen = [batch.observation for batch in self.batches]
+        together = {name: np.concatenate([each[name] for each in seen]) for name in seen[0]}
+        if self.agent == "team":
+            return together
+        return {name: rows.reshape(-1, *rows.shape[2:]) for name, rows in together.items()}
 
-class TeamEnv(MissionsEnv):
-    """B environments; the joint action is everyone's recipient, the reward the negative cost.
-
-    With `aoi` the reward is the mean age of information (Eq. 10) over the mission's duration,
-    negative: that of `envs.team.Team` over the number of windows. With `velocity-variance` it is
-    the negative variance (Eq. 17), as in Fig. 6. Smaller teams are padded with robots that do not
-    exist: they are silent and see nothing.
-    """
-
-    def __init__(self, batches: Sequence[MissionBatch], reward: Reward = "aoi") -> None:
-        num_nodes = _largest_team(batches)
-        observation = _graph_spaces((num_nodes, num_nodes), batches[0].num_features)
-        observation["is_robot"] = spaces.MultiBinary(num_nodes)
-        num_missions = [batch.num_missions for batch in batches]
-        action = spaces.MultiDiscrete([num_nodes] * num_nodes)
-        super().__init__(batches, num_missions, spaces.Dict(observation), action)
-        self._reward: Reward = reward
-        sizes = np.repeat([batch.mission.num_robots for batch in batches], num_missions)
-        self._is_robot = np.arange(num_nodes) < sizes[:, None]
-
-    def _observe(self, graphs: Sequence[Graphs], envs: slice) -> Observation:
-        """The teams' graphs, stacked and padded; robots that do not exist may only be silent."""
-        is_robot = self._is_robot[envs]
-        observation = {"is_robot": is_robot}
-        for name, rows in padded(graphs, self.num_nodes).items():
-            teams = np.zeros((*is_robot.shape, *rows.shape[1:]), dtype=rows.dtype)
-            teams[is_robot] = rows
-            observation[name] = teams
-        observation["parent"][~is_robot] = NO_PARENT
-        observation["may_address"] |= np.eye(self.num_nodes, dtype=np.bool_)
-        return observation
-
-    def _step_batch(
-        self, batch: MissionBatch, actions: np.ndarray
-    ) -> tuple[Transition, np.ndarray]:
-        transition = batch.step(actions[:, : batch.mission.num_robots], with_credit=False)
-        if self._reward == "velocity-variance":
-            return transition, -transition.costs.velocity_variance_m2ps2
-        return transition, -transition.costs.age_windows / batch.mission.num_windows
-
-
-def missions_of(model: PPO) -> MissionsEnv:
-    """Return a model's environment, inside what may be wrapped around it."""
-    env = model.get_env()
-    inner = env.unwrapped if env is not None else None
-    assert isinstance(inner, MissionsEnv)
-    return inner
-
-
-def padded(graphs: Sequence[Graphs], num_nodes: int) -> Observation:
-    """All batches' graphs in one, by name, with unconnected nodes that nobody may address.
-
-    Their R rows have M = `num_nodes` nodes, at least as many as the batches'; `has_turn` is [R, 1].
-    """
-
-    def rows_of(name: str, fill: int, dtype: type) -> np.ndarray:
-        parts = [getattr(each, name) for each in graphs]
-        if all(part.shape[1] == num_nodes for part in parts):
-            return np.concatenate(parts, dtype=dtype)
-        shape = (sum(map(len, parts)), num_nodes, *parts[0].shape[2:])
-        rows, start = np.full(shape, fill, dtype=dtype), 0
-        for part in parts:
-            rows[start : start + len(part), : part.shape[1]] = part
-            start += len(part)
-        return rows
-
-    return {
-        "node": rows_of("node", 0, np.float32),
-        "parent": rows_of("parent", NO_PARENT, np.int32),
-        "may_address": rows_of("may_address", False, np.bool_),
-        "has_turn": np.concatenate([each.has_turn for each in graphs])[:, None],
-    }
-
-
-def _largest_team(batches: Sequence[MissionBatch]) -> int:
-    """Robots of the largest team, to which the others are padded."""
-    return max(batch.mission.num_robots for batch in batches)
-
-
-def _graph_spaces(nodes: tuple[int, ...], num_features: int) -> dict[str, spaces.Space]:
-    """Return the spaces of one environment's graphs, of so many nodes, as `padded` orders them."""
-    return {
-        "node": spaces.Box(-np.inf, np.inf, (*nodes, num_features), np.float32),
-        "parent": spaces.Box(-1, nodes[-1] - 1, nodes, np.int32),
-        "may_address": spaces.MultiBinary(nodes),
-        "has_turn": spaces.MultiBinary([*nodes[:-1], 1]),
-    }
+    def _per_mission(self, batch: MissionBatch) -> int:
+        return batch.mission.num_robots if self.agent == "robot" else 1

@@ -12,9 +12,9 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
-from swarm_mj.envs.vec_env import missions_of
 from swarm_mj.learning import checkpoint
 from swarm_mj.learning.choice import Row, candidates, has_stalled, reserved_minutes
+from swarm_mj.learning.graph_vec_env import env_of
 from swarm_mj.learning.held_out import HeldOut, evaluate, record_replay
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
@@ -85,7 +85,7 @@ class TrainingCallback(BaseCallback):
         self._networks = networks
         self._rng = rng
         self._listener = listener
-        self._env = missions_of(model)
+        self._env = env_of(model)
         self._counted_s = time.monotonic()  # up to here, time is in the progress
         self._saved_s = -np.inf
         self._aoi = float("nan")
@@ -122,7 +122,7 @@ class TrainingCallback(BaseCallback):
         return self.minutes + reserved >= limit
 
     def _on_step(self) -> bool:
-        costs = [transition.costs for transition in self._env.transitions]
+        costs = self._env.costs
         self._progress.since_evaluation.add(costs)
         self._aoi = float(np.mean([each.age_windows.mean() for each in costs]))
         self._tell()

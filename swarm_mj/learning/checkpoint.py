@@ -15,11 +15,10 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
-from swarm_mj.envs.mission_batch import ActionHistory
-from swarm_mj.envs.vec_env import missions_of
 from swarm_mj.learning.actor_critic import GnnActorCritic
 from swarm_mj.learning.checkpoint_state import check_state
 from swarm_mj.learning.choice import NUM_BEST
+from swarm_mj.learning.graph_vec_env import ActionHistory, env_of
 from swarm_mj.learning.run_folder import Progress
 from swarm_mj.learning.settings import Training
 from swarm_mj.learning.torch_file import read_torch
@@ -56,9 +55,9 @@ def save(
         "num_updates": model._n_updates,
         "episode_starts": torch.tensor(model._last_episode_starts),
         "histories": [
-            vars(batch.history)
-            | {"recipients": torch.tensor(np.array(batch.history.recipients, dtype=np.int16))}
-            for batch in missions_of(model).batches
+            vars(history)
+            | {"recipients": torch.tensor(np.array(history.recipients, dtype=np.int16))}
+            for history in env_of(model).histories
         ],
         "reward_normaliser": _normaliser_state(model),
         "torch_rng": torch.get_rng_state(),
@@ -119,7 +118,7 @@ def _most_bytes(model: PPO) -> int:
     """What a checkpoint of a model takes, and much more for its curve."""
     weights = sum(weight.nbytes for weight in model.policy.parameters())
     weights *= 3 + NUM_BEST + 1  # and Adam's two, and the candidates'
-    batches = missions_of(model).batches
+    batches = env_of(model).batches
     decisions = sum(b.mission.num_windows * b.num_missions * b.mission.num_robots for b in batches)
     return 2 * (weights + np.dtype(np.int16).itemsize * decisions) + SPARE_BYTES
 
@@ -142,12 +141,13 @@ def _restore(state: dict[str, Any], model: PPO, rng: np.random.Generator) -> Non
     model.set_parameters(state["parameters"], device=model.device)
     model.num_timesteps = state["num_timesteps"]
     model._n_updates = state["num_updates"]
-    env = missions_of(model)
-    graphs = [
-        batch.replay(ActionHistory(**history | {"recipients": [*history["recipients"].numpy()]}))
-        for batch, history in zip(env.batches, state["histories"], strict=True)
-    ]
-    model._last_obs = env.observe(graphs)
+    env = env_of(model)
+    model._last_obs = env.replay(
+        [
+            ActionHistory(**history | {"recipients": [*history["recipients"].numpy()]})
+            for history in state["histories"]
+        ]
+    )
     model._last_episode_starts = state["episode_starts"].numpy()
     _restore_normaliser(model, state["reward_normaliser"])
     torch.set_rng_state(state["torch_rng"])

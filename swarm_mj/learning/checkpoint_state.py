@@ -15,9 +15,9 @@ from stable_baselines3.common.vec_env import VecNormalize
 from torch import Tensor
 
 from swarm_mj.envs.mission_batch import MissionBatch
-from swarm_mj.envs.vec_env import missions_of
 from swarm_mj.learning.actor_critic import GnnActorCritic
 from swarm_mj.learning.choice import Amount, Count, candidates
+from swarm_mj.learning.graph_vec_env import env_of
 from swarm_mj.learning.held_out import HeldOut
 from swarm_mj.learning.run_folder import Progress
 from swarm_mj.system.reading import read_plain
@@ -70,7 +70,7 @@ def check_state(state: Mapping[str, Any], model: PPO) -> Progress:
     starts = torch.zeros(model.n_envs, dtype=torch.bool)
     _check_tensors({"episode_starts": state["episode_starts"]}, {"episode_starts": starts})
     _check_tensors({"torch_rng": state["torch_rng"]}, {"torch_rng": torch.get_rng_state()})
-    for batch, history in zip(missions_of(model).batches, state["histories"], strict=True):
+    for batch, history in zip(env_of(model).batches, state["histories"], strict=True):
         _check_history(history, batch)
     _check_normaliser(state["reward_normaliser"], model)
     return counters.progress

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
-from swarm_mj.envs.mission_batch import Reward
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, check_fit, is_own_set, num_features
@@ -13,6 +12,7 @@ from swarm_mj.policies.gnn.shape import GnnShape
 from swarm_mj.system.fields import FieldOf, check, check_value, setting
 
 CreditAssignment = Literal["robot", "team"]  # per robot, per team
+Reward = Literal["aoi", "velocity-variance"]  # the cost whose negative a team is paid
 HELD_OUT_SEED = 500_000  # of the first held-out mission; training draws from 2^40 on
 EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as speech
 MOST_ROBOTS = 200  # a team decision takes robots² nodes

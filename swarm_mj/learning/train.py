@@ -17,12 +17,11 @@ from stable_baselines3.common.buffers import DictRolloutBuffer
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from swarm_mj.envs.mission_batch import make_batches
-from swarm_mj.envs.vec_env import RobotEnv, TeamEnv, missions_of
 from swarm_mj.learning import checkpoint
 from swarm_mj.learning.active_rollout_buffer import ActiveRolloutBuffer
 from swarm_mj.learning.actor_critic import GnnActorCritic, TeamActorCritic
 from swarm_mj.learning.callback import Listener, Stopped, TrainingCallback
+from swarm_mj.learning.graph_vec_env import GraphVecEnv, env_of
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
     CURVE,
@@ -84,18 +83,7 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
 
 def _make_env(training: Training, rng: np.random.Generator) -> VecEnv:
     """Fresh missions, with rewards as PPO gets them; the generator draws their seeds."""
-    batches = make_batches(
-        training.mission,
-        training.robots,
-        training.features,
-        training.missions,
-        training.groups,
-        rng,
-        training.components,
-    )
-    if training.credit_assignment == "robot":
-        return RobotEnv(batches)
-    env = TeamEnv(batches, training.reward)
+    env = GraphVecEnv(training, rng)
     if training.reward == "velocity-variance":  # as in the authors' code
         return VecNormalize(env, norm_obs=False, norm_reward=True, gamma=training.ppo.discount)
     return env
@@ -164,7 +152,7 @@ def train(run: Run, folder: Path, *, listener: Listener, is_resumed: bool = Fals
 
 
 def _learn(model: PPO, limits: Limits, callback: TrainingCallback) -> None:
-    env = missions_of(model)
+    env = env_of(model)
     wanted = -(-(limits.decisions or NO_BUDGET) // env.num_teams) * env.num_envs
     if wanted > model.num_timesteps:
         model.learn(

@@ -9,7 +9,7 @@ from channels import to_the_addressee
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_mj.envs.credit import as_it_is, credits_of, gain
+from swarm_mj.envs.credit import credits_of, gain, snapshot_channel
 from swarm_mj.mission import PRESETS, paper, reference
 from swarm_mj.protocol.window import window
 from swarm_mj.radio.free_space import FreeSpaceRadio
@@ -160,7 +160,11 @@ def test_a_channel_that_draws_replays_a_window_with_its_own_numbers():
     swarm = Swarm(mission, [5, 6, 7], channel=Lossy(mission))
     num_lost = 0
     for _ in range(15):
-        buffers, now, before = copy.deepcopy(swarm.buffers), swarm.now, as_it_is(swarm.channel)
+        buffers, now, before = (
+            copy.deepcopy(swarm.buffers),
+            swarm.now,
+            snapshot_channel(swarm.channel),
+        )
         recipient = random_recipients(rng, (3, 6), 0.4)
         swarm.exchange(recipient)
         found = credits_of(buffers.timestamp, swarm.states.position_m, recipient, before, now)

@@ -89,7 +89,7 @@ def test_missions_without_a_seed_differ():
 def test_a_mission_may_be_given_whole_and_changed():
     register_environments()
     env = gymnasium.make("swarm_mj/Flocking-v0", mission=paper("stationary", **SMALL), num_robots=3)
-    assert env.unwrapped.team.mission == paper("stationary", **{**SMALL, "num_robots": 3})
+    assert env.unwrapped.batch.mission == paper("stationary", **{**SMALL, "num_robots": 3})
 
 
 def test_a_copy_by_pickle_flies_the_same():

@@ -1,148 +1,209 @@
-"""Batches of missions: staggered ends, fresh seeds, histories replayed."""
+"""What every face is made of: rewards by hand, masks, and what is refused."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from channels import Lossy, to_nobody, to_the_addressee
 
-from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED, MissionBatch, make_batches
-from swarm_mj.learning.settings import HELD_OUT_SEED
-from swarm_mj.mission import paper
+from swarm_mj.envs.mission_batch import next_seed
+from swarm_mj.envs.options import make_batch
+from swarm_mj.envs.spaces import robot_spaces
+from swarm_mj.mission import paper, reference
+from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, make_extractor
 from swarm_mj.simulation.swarm import Swarm
 
-MISSION = paper("random-walk", num_robots=5, num_windows=20, range_ratio=0.6)
+SMALL = {"num_robots": 5, "num_windows": 10, "range_ratio": 0.4}
 
 
-def batches_of(sizes=(5,), num_missions=8, num_batches=4, seed=1):
-    rng = np.random.default_rng(seed)
-    return make_batches(MISSION, sizes, "extended", num_missions, num_batches, rng)
+def begun(*args, seeds=(1, 2), **options):
+    batch = make_batch(*args, len(seeds), **{**SMALL, **options})
+    batch.restart(seeds)
+    return batch
 
 
-def random_recipients(rng, batch):
-    shape = (batch.num_missions, batch.mission.num_robots)
-    silence = np.broadcast_to(np.arange(shape[1]), shape)
-    return np.where(rng.random(shape) < 0.3, rng.integers(0, shape[1], shape), silence)
+def recipients(num_windows, num_missions=2, num_robots=5):
+    return np.random.default_rng(5).integers(0, num_robots, (num_windows, num_missions, num_robots))
 
 
-def test_batches_end_at_different_times_and_then_whole_missions_later():
-    batches, rng = batches_of(), np.random.default_rng(2)
-    ends = {n: [] for n in range(4)}
-    cuts = {n: [] for n in range(4)}
-    for window in range(1, 46):
-        for n, batch in enumerate(batches):
-            transition = batch.step(random_recipients(rng, batch), with_credit=False)
-            assert (transition.last_graphs is None) == (not np.all(batch._swarm.now == 0.0))
-            if transition.last_graphs is not None:
-                ends[n].append(window)
-                cuts[n].append(transition.is_cut)
-    assert ends == {0: [5, 25, 45], 1: [10, 30], 2: [15, 35], 3: [20, 40]}
-    assert cuts == {
-        0: [True, False, False], 1: [True, False], 2: [True, False], 3: [False, False],
-    }  # fmt: skip
+def test_eq10_reward_is_minus_the_mean_age_over_all_pairs():
+    batch = begun("random-walk")
+    for now, recipient in enumerate(recipients(10), start=1):
+        reward = batch.step(recipient)
+        for b in range(2):
+            ages = [now - t for row in batch.swarm.buffers.timestamp[b] for t in row]
+            assert reward[b] == pytest.approx([-sum(ages) / 25] * 5, rel=1e-14)
 
 
-def test_every_mission_has_a_seed_of_its_own_that_is_not_held_out():
-    batches, rng, seen = batches_of(), np.random.default_rng(2), []
-    for _ in range(45):
-        for batch in batches:
-            seeds = batch.history.seeds
-            if seeds not in seen:
-                seen.append(seeds)
-            batch.step(random_recipients(rng, batch), with_credit=False)
-    drawn = [seed for seeds in seen for seed in seeds]
-    assert len(drawn) == len(set(drawn)) >= 2 * (4 + 5)
-    assert min(drawn) >= FIRST_TRAINING_SEED == 2**40 > HELD_OUT_SEED
+def test_eq17_reward_is_minus_the_variance_of_velocities():
+    batch = begun("flocking", reward="velocity-variance")
+    for recipient in recipients(5):
+        reward = batch.step(recipient)
+        for b in range(2):
+            velocity = batch.swarm.states.velocity_mps[b]
+            variance = sum(
+                ((velocity[:, axis] - velocity[:, axis].mean()) ** 2).mean() for axis in (0, 1)
+            )
+            assert reward[b] == pytest.approx([-variance] * 5, rel=1e-12)
 
 
-def test_what_is_seen_after_an_end_is_the_new_missions_start():
-    batch = batches_of(num_missions=4, num_batches=1)[0]
-    rng = np.random.default_rng(2)
-    for _ in range(20):
-        transition = batch.step(random_recipients(rng, batch), with_credit=False)
-    assert transition.last_graphs is not None
-    new = Swarm(MISSION, batch.history.seeds)
-    extractor = batch._extractor
-    extractor.start(4, 5)
-    expected = extractor.graphs(new.views)
-    np.testing.assert_array_equal(transition.graphs.node, expected.node)
-    np.testing.assert_array_equal(transition.graphs.parent, expected.parent)
-    assert np.any(transition.last_graphs.node != transition.graphs.node)
+@pytest.mark.parametrize("task", ["formation", "coverage", "flocking"])
+def test_task_cost_is_what_the_controller_says(task):
+    batch = begun(task, reward="task-cost")
+    swarm = Swarm(batch.mission, [1, 2])
+    start = batch.infos()["task_cost"]
+    np.testing.assert_array_equal(start, swarm.controller.cost(swarm.states))
+    for recipient in recipients(5):
+        reward, costs = batch.step(recipient), swarm.exchange(recipient)
+        np.testing.assert_array_equal(reward, np.tile(-costs.task_cost.value[:, None], 5))
+        np.testing.assert_array_equal(batch.infos()["task_cost"], costs.task_cost.value)
+    assert not np.array_equal(batch.infos()["task_cost"], start)
+    assert "task_cost" not in begun("stationary").infos()
 
 
-def test_a_history_replayed_leads_to_the_same_state():
-    """Also that of the features' memory, of the motion's dice, and of what follows."""
-    first, rng = batches_of()[1], np.random.default_rng(2)
-    for _ in range(17):  # beyond the first end
-        transition = first.step(random_recipients(rng, first), with_credit=False)
-    second = batches_of(seed=9)[1]
-    graphs = second.replay(first.history)
-    np.testing.assert_array_equal(graphs.node, transition.graphs.node)
-    for _ in range(9):
-        recipient = random_recipients(rng, first)
-        one, other = (batch.step(recipient, with_credit=True) for batch in (first, second))
-        np.testing.assert_array_equal(one.graphs.node, other.graphs.node)
-        np.testing.assert_array_equal(one.credit, other.credit)
-        np.testing.assert_array_equal(one.costs.age_windows, other.costs.age_windows)
+def test_credit_is_the_age_that_a_window_without_the_robot_would_have_left():
+    """Every robot's window is flown again by a team in which it alone is silent."""
+    batch = begun("random-walk", reward="credit", seeds=(3,))
+    past = []
+    for recipient in recipients(6, 1):
+        reward = batch.step(recipient)
+        ages = batch.infos()["age_windows"][0]
+        for i in range(5):
+            twin = Swarm(batch.mission, [3])
+            for each in past:
+                twin.exchange(each)
+            silent = recipient.copy()
+            silent[0, i] = i
+            assert reward[0, i] == pytest.approx(twin.exchange(silent).age_windows[0] - ages)
+        past.append(recipient)
 
 
-def test_a_history_of_no_windows_is_the_start():
-    batch = batches_of()[2]
-    graphs = batch.replay(batch.history)
-    np.testing.assert_array_equal(graphs.node, batch.restart().node)
-    assert len(batch.history.recipients) == 0
+def test_what_is_seen_is_what_the_networks_see():
+    batch = begun("stationary", features="paper", with_parents=True)
+    extractor = make_extractor("paper", batch.mission)
+    for recipient in recipients(6):
+        batch.step(recipient)
+        graphs = extractor.graphs(batch.swarm.views)
+        np.testing.assert_array_equal(
+            batch.observation["observation"].reshape(10, 5, 8), graphs.node
+        )
+        np.testing.assert_array_equal(batch.observation["parent"].reshape(10, 5), graphs.parent)
+        assert np.all(batch.observation["action_mask"] == 1)
 
 
-def test_sizes_take_turns():
-    assert [g.mission.num_robots for g in batches_of((3, 5))] == [3, 5, 3, 5]
+def test_masks_leave_out_teammates_believed_out_of_range():
+    """Beyond 1.2 ranges; whoever is unknown, and silence, may always be chosen."""
+    batch = begun("stationary", num_robots=8, num_windows=60, range_ratio=0.15, seeds=(1, 2, 3))
+    for recipient in recipients(60, 3, 8):
+        batch.step(recipient)
+    buffers, num_masked = batch.swarm.buffers, 0
+    for b, i, k in np.ndindex(3, 8, 8):
+        distance_m = np.hypot(*(buffers.position_m[b, i, k] - buffers.position_m[b, i, i]))
+        may = k == i or buffers.timestamp[b, i, k] == 0.0 or distance_m <= 1.2 * 150.0
+        assert batch.observation["action_mask"][b, i, k] == may
+        num_masked += not may
+    assert num_masked > 0
 
 
-@pytest.mark.parametrize(("missions", "batches"), [(7, 4), (2, 4), (4, 1)])
-def test_missions_that_cannot_be_shared_out_are_refused(missions, batches):
-    with pytest.raises(ValueError, match=f"not {missions}"):
-        batches_of((3, 5), missions, batches)
+def test_a_robot_that_failed_may_only_be_silent():
+    batch = begun("flocking", failure_fraction=0.4)
+    for recipient in recipients(6):
+        batch.step(recipient)
+    failed = ~batch.is_active
+    assert np.all(failed.sum(axis=1) == 2)
+    masks = batch.observation["action_mask"]
+    np.testing.assert_array_equal(masks[failed], np.broadcast_to(np.eye(5), masks.shape)[failed])
+    assert masks[~failed].sum() > 6
 
 
-def test_a_mission_of_one_window_starts_anew_every_window():
-    rng = np.random.default_rng(1)
-    mission = paper("stationary", num_robots=3, num_windows=1, range_ratio=1.0)
-    batch = MissionBatch(mission, "paper", 2, rng, first_windows=1)
-    before = batch.history.seeds
-    transition = batch.step(np.array([[0, 1, 2], [1, 1, 2]]), with_credit=True)
-    assert transition.last_graphs is not None
-    assert not transition.is_cut
-    assert not set(before) & set(batch.history.seeds)
+def test_a_part_of_ones_own_is_used_and_left_alone():
+    class Counting:
+        calls = 0
+
+        def __call__(self, position_m, recipient):
+            self.calls += 1
+            return to_nobody(position_m, recipient)
+
+    mission = paper("stationary", **SMALL)
+    mine = Counting()
+    batch = make_batch(mission, channel=mine)
+    batch.restart([1])
+    batch.step(np.array([[1, 2, 3, 4, 0]]))
+    assert batch.infos()["packets_lost"] == [5]
+    assert (batch.swarm.channel.calls, mine.calls) == (2, 0)
 
 
-def test_credit_is_what_silence_would_have_cost_the_team():
-    """Beside teams that fly alike until the last window, in which one robot each is silent.
-
-    How much T falls short there, summed over pairs; T of robots themselves is always now.
-    """
-    batch, rng = batches_of(num_missions=2, num_batches=1)[0], np.random.default_rng(3)
-    recipients = [random_recipients(rng, batch) for _ in range(10)]
-    for recipient in recipients:
-        transition = batch.step(recipient, with_credit=True)
-
-    def known(last):
-        """The sum of T after the same windows but for the last one."""
-        swarm = Swarm(MISSION, batch.history.seeds)
-        for recipient in [*recipients[:-1], last]:
-            swarm.exchange(recipient)
-        return swarm.buffers.timestamp.sum(axis=(1, 2))
-
-    for i in range(MISSION.num_robots):
-        without = recipients[-1].copy()
-        without[:, i] = i
-        np.testing.assert_allclose(transition.credit[:, i], known(recipients[-1]) - known(without))
-    assert np.any(transition.credit > 0.0)
+@pytest.mark.parametrize("features", FEATURE_SETS)
+@pytest.mark.parametrize(
+    "mission",
+    [
+        paper("flocking", num_windows=40),
+        reference("random-walk", num_windows=40, window_s=10.0, velocity_ratio=5.0),
+        paper("flocking", num_windows=40, window_s=10.0, velocity_ratio=5.0, density_per_km2=1e4),
+    ],
+)
+def test_no_feature_leaves_its_bounds(mission, features):
+    batch = make_batch(replace(mission, num_robots=4), 2, features=features)
+    seen, _ = robot_spaces(batch)
+    batch.restart([1, 2])
+    for recipient in recipients(40, 2, 4):
+        batch.step(recipient)
+        most = np.abs(batch.observation["observation"]).max()
+        assert most <= seen["observation"].high.max()
 
 
-def test_robots_that_were_switched_off_may_only_be_silent():
-    mission = paper(
-        "stationary", num_robots=5, range_ratio=1.0, num_windows=8, failure_fraction=0.4
-    )
-    batch = MissionBatch(mission, "paper", 2, np.random.default_rng(1), first_windows=8)
-    for window in range(1, 8):
-        graphs = batch.step(np.tile(np.arange(5), (2, 1)), with_credit=True).graphs
-        choices = graphs.may_address.reshape(2, 5, 5).sum(axis=2)
-        assert np.sum(choices == 1) == (4 if window > 4 else 0)
-        is_off = np.argwhere(choices == 1)
-        assert all(graphs.may_address.reshape(2, 5, 5)[b, i, i] for b, i in is_off)
+def test_drawn_seeds_are_none_of_an_evaluations():
+    rng = np.random.default_rng(0)
+    assert min(next_seed(rng) for _ in range(1000)) >= 2**40
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            {"reward": "age"},
+            "reward must be one of aoi, velocity-variance, task-cost, credit, not 'age'",
+        ),
+        ({"reward": "credit", "failure_fraction": 0.2}, "failure_fraction is 0.2; set it to 0"),
+        ({"reward": "credit", "bit_rate": 5000.0}, "reward credit reckons with whole packets"),
+        ({"mission": "stationary", "reward": "task-cost"}, "stationary has none; choose"),
+        ({"features": "mine"}, "features must be one of"),
+        ({"preset": "mine"}, "preset must be one of"),
+        ({"num_robots": 1}, "number of robots must be"),
+        ({"num_missions": 0}, "num_missions must be 1 or more, not 0"),
+        ({"mission": paper(), "preset": "reference"}, "preset reference goes with a task's name"),
+        ({"channel": "channels:lost"}, r"channels.py has no lost"),
+        ({"scene": "wall"}, "must be named module:Name"),
+    ],
+)
+def test_refusals(options, message):
+    with pytest.raises(ValueError, match=message):
+        make_batch(**options)
+
+
+def test_parts_may_be_named():
+    by_name = begun("stationary", channel="channels:to_the_addressee")
+    itself = begun("stationary", channel=to_the_addressee)
+    for recipient in recipients(10):
+        np.testing.assert_array_equal(by_name.step(recipient), itself.step(recipient))
+
+
+def test_a_part_that_cannot_be_called_is_refused_at_once():
+    with pytest.raises(TypeError, match="channel must be a function"):
+        make_batch(channel=Lossy)
+
+
+def test_nothing_flies_on_after_the_last_window():
+    batch = begun("stationary")
+    for recipient in recipients(10):
+        batch.step(recipient)
+    with pytest.raises(ValueError, match=r"over after its 10 windows; call reset\(\)"):
+        batch.step(recipient)
+    assert batch.flown.now[0] == 10.0
+    batch.restart([1, 2])
+    batch.step(recipient)
+
+
+def test_before_it_has_begun():
+    with pytest.raises(ValueError, match="call reset"):
+        make_batch().step(np.zeros((1, 40), dtype=int))

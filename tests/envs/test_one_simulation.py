@@ -45,7 +45,7 @@ class Single(Flown):
         return env.step(recipient)[1]
 
     def swarm(self, env):
-        return env.unwrapped.team.swarm
+        return env.unwrapped.batch.swarm
 
 
 class Made(Single):
@@ -71,7 +71,7 @@ class Parallel(Flown):
         return rewards.pop()
 
     def swarm(self, env):
-        return env.team.swarm
+        return env.batch.swarm
 
 
 class DmControl(Flown):
@@ -97,7 +97,7 @@ class Vector:
 
     def swarms(self):
         (group,) = self.env._groups
-        return [(group.team.swarm, 0), (group.team.swarm, 1)]
+        return [(group.batch.swarm, 0), (group.batch.swarm, 1)]
 
 
 class MaskedVector(Vector):
@@ -111,7 +111,7 @@ class MaskedVector(Vector):
 
     def swarms(self):
         groups = self.env._groups
-        return [(g.team.swarm, row) for g in groups for row in g.rows]
+        return [(g.batch.swarm, row) for g in groups for row in g.rows]
 
 
 class Sb3Robots:
@@ -126,7 +126,8 @@ class Sb3Robots:
         return reward.reshape(2, -1)[:, 0]
 
     def swarms(self):
-        return [(self.env.team.swarm, 0), (self.env.team.swarm, 1)]
+        swarm = self.env.batches[0].swarm
+        return [(swarm, 0), (swarm, 1)]
 
 
 class Sb3Teams(Sb3Robots):

@@ -8,8 +8,7 @@ from gymnasium.vector import AutoresetMode
 import swarm_mj  # noqa: F401 - which registers environments
 from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
-from swarm_mj.envs.options import check_features_named
-from swarm_mj.envs.team import Team
+from swarm_mj.envs.options import check_features_named, make_batch
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.graphs import PaperFeatures
 
@@ -19,13 +18,13 @@ SMALL = {"num_robots": 3, "num_windows": 5}
 @pytest.mark.parametrize("name", ["RandomWalk", "swarm_mj/RandomWalk-v0", "random_walk"])
 def test_tasks_by_other_names(name):
     with pytest.raises(ValueError, match=r"must be one of .*; did you mean random-walk\?"):
-        Team(name)
+        make_batch(name)
 
 
 def test_an_environments_name_settles_its_task():
     with pytest.raises(TypeError, match="here 'flocking'; use swarm_mj/Coverage-v0 or 'coverage'"):
         gymnasium.make("swarm_mj/Flocking-v0", task="coverage")
-    assert Team(paper("flocking"), task="coverage").mission.task == "coverage"
+    assert make_batch(paper("flocking"), task="coverage").mission.task == "coverage"
 
 
 def test_seeds_are_given_to_reset():
@@ -49,7 +48,7 @@ class Three(PaperFeatures):
 def test_own_features_name_all_their_numbers(here, monkeypatch):
     monkeypatch.syspath_prepend(here)
     (here / "two_of_three.py").write_text(OWN)
-    team = Team(features="two_of_three:Three", **SMALL)
+    team = make_batch(features="two_of_three:Three", **SMALL)
     with pytest.raises(ValueError, match="two_of_three:Three names 3 features, but its node has 2"):
         team.restart([1])
 

@@ -87,7 +87,7 @@ def test_refused_actions_move_nothing(actions, message):
     env.reset(seed=0)
     with pytest.raises(ValueError, match=message):
         env.step(actions)
-    assert env.team.flown.now[0] == 0
+    assert env.batch.flown.now[0] == 0
 
 
 @pytest.mark.parametrize("action", [1.0, 1.7, np.float32(1.0)])
@@ -96,7 +96,7 @@ def test_actions_that_are_no_integers_are_refused(action):
     env.reset(seed=0)
     with pytest.raises(ValueError, match="must be integers from 0 to 5, not float"):
         env.step({"robot_0": 0, "robot_2": action})
-    assert env.team.flown.now[0] == 0.0
+    assert env.batch.flown.now[0] == 0.0
 
 
 def test_nothing_flies_on_when_nobody_is_left():
@@ -107,7 +107,7 @@ def test_nothing_flies_on_when_nobody_is_left():
     while env.agents:
         env.step({})
     assert env.step({"robot_0": 1}) == ({}, {}, {}, {}, {})
-    assert env.team.flown.now[0] == 12.0
+    assert env.batch.flown.now[0] == 12.0
 
 
 def test_a_copy_by_pickle_flies_the_same():

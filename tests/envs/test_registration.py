@@ -11,8 +11,8 @@ from swarm_mj.mission import Task
 def test_every_task_has_an_environment(task):
     register_environments()
     env = gymnasium.make(environment_id(task), num_robots=3)
-    assert env.unwrapped.team.mission.task == task
-    assert env.unwrapped.team.mission.num_robots == 3
+    assert env.unwrapped.batch.mission.task == task
+    assert env.unwrapped.batch.mission.num_robots == 3
     assert gymnasium.spec(environment_id(task)).vector_entry_point is not None
 
 

@@ -7,7 +7,6 @@ import pytest
 import torch
 from safetensors import safe_open
 from sb3_contrib import MaskablePPO, RecurrentPPO
-from sb3_contrib.common.maskable.utils import get_action_masks, is_masking_supported
 from stable_baselines3 import A2C, DQN, PPO
 from stable_baselines3.common.torch_layers import CombinedExtractor
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
@@ -26,75 +25,6 @@ def actions(env, num_steps):
     return [
         np.array([env.action_space.sample() for _ in range(env.num_envs)]) for _ in range(num_steps)
     ]
-
-
-@pytest.mark.parametrize(("agent", "num_envs", "seen"), [("robot", 12, (4,)), ("team", 3, (4, 4))])
-def test_environments_are_robots_or_teams(agent, num_envs, seen):
-    env = make_vec_env("stationary", 3, agent=agent, seed=1, **SMALL)
-    assert env.num_envs == num_envs
-    assert env.reset()["action_mask"].shape == (num_envs, *seen)
-    assert env.observation_space["action_mask"].shape == seen
-    assert [info["seed"] for info in env.reset_infos] == [
-        b for b in (1, 2, 3) for _ in range(num_envs // 3)
-    ]
-
-
-def test_a_models_own_seed_wins():
-    env = make_vec_env("stationary", 3, agent="team", seed=1000, **SMALL)
-    PPO("MultiInputPolicy", env, seed=7, n_steps=2, batch_size=6)
-    env.reset()
-    assert [info["seed"] for info in env.reset_infos] == [7, 8, 9]
-
-
-def test_after_the_last_window_another_mission_begins():
-    env = make_vec_env("random-walk", 2, seed=1, **SMALL)
-    first = env.reset()
-    for window, action in enumerate(actions(env, 12), start=1):
-        seen, _, done, infos = env.step(action)
-        assert np.all(done) == np.any(done) == (window % 6 == 0)
-        if window % 6 == 0:
-            for n, info in enumerate(infos):
-                assert info["TimeLimit.truncated"]
-                last = info["terminal_observation"]["observation"]
-                assert not np.array_equal(last, seen["observation"][n])
-            assert np.all(seen["observation"][:, :, 1].sum(axis=1) == 1)  # knows but itself
-        else:
-            assert "terminal_observation" not in infos[0]
-    env.seed(1)
-    np.testing.assert_array_equal(env.reset()["observation"], first["observation"])
-
-
-def test_rewards_are_each_robots_own():
-    env = make_vec_env("stationary", 2, reward="credit", seed=1, **SMALL)
-    env.reset()
-    silence = np.tile(np.arange(4), 2)
-    spoken = silence.copy()
-    spoken[5] = 0  # robot 1 of the second mission
-    reward = env.step(spoken)[1]
-    assert np.flatnonzero(reward).tolist() == [5]
-
-
-@pytest.mark.parametrize(("agent", "size"), [("robot", 4), ("team", 16)])
-def test_sb3_contrib_gets_the_masks(agent, size):
-    far_apart = {**SMALL, "range_ratio": 0.15, "num_windows": 100}
-    env = make_vec_env("stationary", 2, agent=agent, seed=1, **far_apart)
-    seen = env.reset()
-    assert is_masking_supported(env)
-    for action in actions(env, 80):
-        masks = get_action_masks(env)
-        np.testing.assert_array_equal(masks, seen["action_mask"].reshape(env.num_envs, size) == 1)
-        seen = env.step(action)[0]
-    assert not np.array_equal(env.action_masks(), env.action_masks()[::-1])
-    assert np.array_equal(env.env_method("action_masks", indices=[1])[0], env.action_masks()[1])
-
-
-def test_sb3_contrib_gets_the_masks_of_a_single_environment():
-    model = MaskablePPO("MultiInputPolicy", SwarmEnv("stationary", **SMALL), n_steps=8)
-    env = model.get_env()
-    assert is_masking_supported(env)
-    seen = env.reset()
-    np.testing.assert_array_equal(get_action_masks(env)[0], seen["action_mask"].ravel() == 1)
-    assert model.learn(16).num_timesteps == 16
 
 
 @pytest.mark.parametrize("agent", ["robot", "team"])
@@ -154,16 +84,6 @@ def test_what_others_call_missions(name):
         make_vec_env(**{name: 3})
 
 
-def test_what_environments_do_not_have():
-    env = make_vec_env(**SMALL)
-    with pytest.raises(AttributeError, match="no environment has its own fly"):
-        env.env_method("fly")
-    with pytest.raises(AttributeError, match="no environment has its own wind"):
-        env.set_attr("wind", 3)
-    assert not any(env.env_is_wrapped(VecMonitor))
-    assert env.get_attr("render_mode") == [None] * 4
-
-
 # A trained network as a policy.
 
 
@@ -182,14 +102,14 @@ def test_a_stored_actor_decides_as_the_trained_one(tmp_path, algorithm, net_arch
     save_policy(model, tmp_path / "policy")
     env = make_vec_env("stationary", 2, seed=7, **SMALL)
     env.reset()
-    policy = make_policy(str(tmp_path / "policy"), env.team.mission)
+    policy = make_policy(str(tmp_path / "policy"), env.batches[0].mission)
     for action in actions(env, 5):
         seen, *_ = env.step(action)
         masks = {"action_masks": env.action_masks()} if algorithm is MaskablePPO else {}
         with torch.no_grad():
             tensors = {name: torch.as_tensor(each) for name, each in seen.items()}
             expected = model.policy.get_distribution(tensors, **masks).distribution.probs.numpy()
-        team = env.team.observation
+        team = env.batches[0].observation
         logits = policy.logits(team["action_mask"].astype(bool), team["observation"])
         odds = np.exp(logits - logits.max(axis=2, keepdims=True))
         found = (odds / odds.sum(axis=2, keepdims=True)).reshape(expected.shape)

@@ -4,13 +4,13 @@ from pathlib import Path
 import numpy as np
 from gymnasium import spaces
 
+from swarm_mj.envs.options import make_batch
 from swarm_mj.envs.spaces import robot_spaces, team_spaces
-from swarm_mj.envs.team import Team
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 
 
 def test_a_robot_sees_a_row_of_what_the_team_sees():
-    team = Team("stationary", num_robots=4, features="paper", with_parents=True)
+    team = make_batch("stationary", num_robots=4, features="paper", with_parents=True)
     seen, action = robot_spaces(team)
     assert action == spaces.Discrete(4)
     assert {name: (each.shape, each.dtype) for name, each in seen.items()} == {
@@ -32,7 +32,7 @@ def test_a_robot_sees_a_row_of_what_the_team_sees():
 
 
 def test_parents_are_seen_on_request_only():
-    assert set(robot_spaces(Team("stationary"))[0]) == {"action_mask", "observation"}
+    assert set(robot_spaces(make_batch("stationary"))[0]) == {"action_mask", "observation"}
 
 
 OWN = """
@@ -52,7 +52,7 @@ class Mine(PaperFeatures):
 def test_features_of_ones_own_have_no_bounds(here, monkeypatch):
     monkeypatch.syspath_prepend(here)
     (here / "mine_features.py").write_text(OWN)
-    team = Team("stationary", num_robots=3, features="mine_features:Mine")
+    team = make_batch("stationary", num_robots=3, features="mine_features:Mine")
     seen, _ = robot_spaces(team)
     team.restart([1])
     assert team.observation["observation"].shape == (1, 3, 3, 2)

@@ -18,10 +18,11 @@ import torch._dynamo  # noqa: F401 - optimisers import it late, so every child w
 from small_runs import StopAfter, difference, end_of, go_on, run, small_training
 
 from swarm_mj.cli import main
-from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.learning import callback
+from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.run_folder import Limits, Progress, Run
 from swarm_mj.learning.selection import reference_columns
+from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import train
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.sampling import sample
@@ -134,9 +135,11 @@ def _train_and_die(arguments, moment, moments):
 def _load_compiled_functions():
     """Once, for all children: the simulation, features, credits, draws, the policies compared."""
     mission = paper("stationary", num_robots=4, range_ratio=1.0)
-    batch = MissionBatch(mission, "extended", 2, np.random.default_rng(1), first_windows=2)
-    for _ in range(2):
-        batch.step(np.array([[1, 1, 2, 3], [0, 1, 0, 3]]), with_credit=True)
+    training = replace(usual_settings("robot", mission, (4,)), missions=1, groups=1)
+    env = GraphVecEnv(training, np.random.default_rng(1))
+    env.reset()
+    for recipients in ([1, 1, 2, 3], [0, 1, 0, 3]):
+        env.step(np.array(recipients))
     sample(np.zeros((2, 3), dtype=np.float32), np.array([0.1, 0.9]))
     reference_columns(small_training(), lambda _share: None)
 

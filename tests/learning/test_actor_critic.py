@@ -8,8 +8,8 @@ import torch
 from small_runs import small_training
 from torch.distributions import Categorical
 
-from swarm_mj.envs.vec_env import missions_of
 from swarm_mj.learning.actor_critic import boltzmann_sample, entropy, log_probability
+from swarm_mj.learning.graph_vec_env import env_of
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import make_model
 from swarm_mj.mission import PRESETS
@@ -36,7 +36,7 @@ def model_of(credit, preset, sizes):
 
 def after_some_windows(model, count=3):
     """What everyone sees after a few windows of the model's own decisions, and its actions."""
-    env = missions_of(model)
+    env = env_of(model)
     observation = model.get_env().reset()
     for _ in range(count):
         actions, _ = model.predict(observation)
@@ -64,9 +64,9 @@ def robot_by_robot(model, training):
     A row for each mission of: the robots' distributions, and their graphs' values, node by node.
     """
     policy, missions = model.policy, []
-    env = missions_of(model)
-    for batch, transition in zip(env.batches, env.transitions, strict=True):
-        graphs = transition.graphs
+    env = env_of(model)
+    for batch in env.batches:
+        graphs = batch.graphs
         num_robots = batch.mission.num_robots
         for b in range(batch.num_missions):
             robots = []

@@ -8,7 +8,7 @@ import torch
 from small_runs import small_training
 from stable_baselines3.common.callbacks import BaseCallback
 
-from swarm_mj.envs.vec_env import missions_of
+from swarm_mj.learning.graph_vec_env import env_of
 from swarm_mj.learning.train import make_model
 
 DISCOUNT, GAE_LAMBDA, STEPS = 0.9, 0.7, 26  # missions are of 20 windows, cut at 5, 10 and 15
@@ -86,7 +86,7 @@ def test_nothing_leaks_over_the_end_of_a_mission(credit, monkeypatch):
         for t in range(STEPS):
             num_cut += "terminal_observation" in watch.infos[t][e]
             num_over += watch.dones[t][e] and "terminal_observation" not in watch.infos[t][e]
-    rows = model.n_envs // len(missions_of(model).batches)
+    rows = model.n_envs // len(env_of(model).batches)
     assert num_cut == 3 * rows
     assert num_over == 2 * rows  # of the batch that is not cut, and of the first one once more
     np.testing.assert_allclose(buffer.returns, buffer.advantages + buffer.values, rtol=1e-5)

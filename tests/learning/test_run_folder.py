@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from small_runs import small_training
 
-from swarm_mj.envs.mission_batch import make_batches
-from swarm_mj.envs.vec_env import TeamEnv
+from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
     CURVE,
@@ -26,7 +25,6 @@ from swarm_mj.learning.run_folder import (
     write_curve,
     write_run,
 )
-from swarm_mj.mission import paper
 from swarm_mj.mission.components import Components
 
 LIMITS = Limits(decisions=5, minutes=0.5, replay_every=3)
@@ -150,18 +148,17 @@ def test_the_best_is_the_least_objective_and_the_first_of_equals():
 
 
 def test_totals_are_per_mission_and_window():
-    mission = paper("stationary", num_robots=3, num_windows=9, range_ratio=1.0)
-    env = TeamEnv(make_batches(mission, (3,), "paper", 4, 2, np.random.default_rng(1)))
+    training = small_training("team", sizes=(3,), groups=2)
+    env = GraphVecEnv(training, np.random.default_rng(1))
     env.reset()
     accumulator, ages, sent, arrived = Accumulator(), [], 0, 0
     assert accumulator.means() == {}
     for _ in range(5):
         env.step(np.array([[1, 1, 2], [0, 2, 0], [0, 1, 2], [0, 1, 1]]))
-        costs = [transition.costs for transition in env.transitions]
-        accumulator.add(costs)
-        ages += [age for its in costs for age in its.age_windows]
-        sent += sum(its.packets.attempted.sum() for its in costs)
-        arrived += sum(its.packets.delivered.sum() for its in costs)
+        accumulator.add(env.costs)
+        ages += [age for its in env.costs for age in its.age_windows]
+        sent += sum(its.packets.attempted.sum() for its in env.costs)
+        arrived += sum(its.packets.delivered.sum() for its in env.costs)
     accumulator.seconds = 4.0
     means = accumulator.means()
     assert means["rollout/aoi"] == pytest.approx(sum(ages) / 20)

@@ -11,9 +11,9 @@ from stable_baselines3.common.buffers import DictRolloutBuffer
 from stable_baselines3.common.vec_env import VecNormalize
 from tiny_policies import save_tiny
 
-from swarm_mj.envs.vec_env import missions_of
 from swarm_mj.learning import train
 from swarm_mj.learning.active_rollout_buffer import ActiveRolloutBuffer
+from swarm_mj.learning.graph_vec_env import env_of
 from swarm_mj.learning.run_folder import CHECKPOINT, INIT, SETTINGS
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import make_model
@@ -174,7 +174,7 @@ def test_a_run_begins_with_the_policy_it_is_given(tmp_path, credit):
 def test_mixed_sizes_are_trained_on_and_evaluated_together(tmp_path):
     training = small_training(sizes=(3, 6))
     model, _ = make_model(training)
-    sizes = [batch.mission.num_robots for batch in missions_of(model).batches]
+    sizes = [batch.mission.num_robots for batch in env_of(model).batches]
     assert sizes == [3, 6, 3, 6]
     progress = run(training, tmp_path / "run", 64)
     _, config = read_policy(tmp_path / "run")

@@ -1,0 +1,212 @@
+"""Training's missions: batches that end at different times, seen as graphs of the largest team.
+
+Batches are staggered, so that every rollout holds windows from all parts of a mission.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from jaxtyping import Bool, Int
+from stable_baselines3 import PPO
+
+from swarm_mj.envs.mission_batch import (
+    FIRST_TRAINING_SEED,
+    LAST_TRAINING_SEED,
+    MissionBatch,
+    Observation,
+)
+from swarm_mj.envs.vec_env import SwarmVecEnv
+from swarm_mj.learning.settings import Training
+from swarm_mj.policies.gnn.graphs import Graphs
+from swarm_mj.protocol.buffers import NO_PARENT
+
+Spaces = dict[str, spaces.Space]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ActionHistory:
+    """How a batch came to where it is: replayed, it leads to the same state."""
+
+    seeds: list[int]  # of the missions under way
+    last_window: int  # when they end [windows]
+    recipients: list[Int[np.ndarray, "B N"]]  # window by window
+
+
+class GraphVecEnv(SwarmVecEnv):
+    """Environments for PPO over the Aggregation GNN, per robot or per team by its credit.
+
+    Per robot, the reward is the robot's credit, over the number of pairs. Per team, it is the
+    negative mean age of information (Eq. 10) over the mission's duration, or the negative velocity
+    variance, as in Fig. 6. Smaller teams are padded: per team with robots that do not exist, which
+    are silent and see nothing.
+    """
+
+    def __init__(self, training: Training, rng: np.random.Generator) -> None:
+        """Begin missions, whose seeds `rng` draws; the first ones are cut off at different windows.
+
+        Raises:
+            ValueError: The missions cannot be shared out evenly, or a size would have no batch.
+        """
+        self._rng, self._agent_reward = rng, training.reward
+        per_robot = training.credit_assignment == "robot"
+        batches = _make_batches(training, "credit" if per_robot else training.reward)
+        self.num_nodes = max(training.robots)  # of every graph
+        sizes = [batch.mission.num_robots for batch in batches for _ in range(batch.num_missions)]
+        self._owner = np.concatenate([np.arange(size, dtype=np.int32) for size in sizes])[:, None]
+        self._is_robot = np.arange(self.num_nodes) < np.array(sizes)[:, None]
+        make_spaces = _robot_spaces if per_robot else _team_spaces
+        seen, action = make_spaces(self.num_nodes, batches[0].num_features)
+        super().__init__(batches, training.credit_assignment, spaces.Dict(seen), action)
+        self._recipients: list[list[np.ndarray]] = [[] for _ in batches]
+        for n, batch in enumerate(batches):
+            last_window = training.mission.num_windows * (n + 1) // len(batches)
+            batch.restart(self._draw_seeds(batch), max(1, last_window))
+
+    @property
+    def num_teams(self) -> int:
+        """Missions, and so team decisions a window."""
+        return sum(batch.num_missions for batch in self.batches)
+
+    @property
+    def histories(self) -> list[ActionHistory]:
+        """The way of each batch to its present state."""
+        return [
+            ActionHistory(seeds=batch.seeds, last_window=batch.last_window, recipients=recipients)
+            for batch, recipients in zip(self.batches, self._recipients, strict=True)
+        ]
+
+    def reset(self) -> Observation:
+        """Start the missions under way over; others would shift the seeds of all that follow."""
+        return self.replay([replace(each, recipients=[]) for each in self.histories])
+
+    def replay(self, histories: Sequence[ActionHistory]) -> Observation:
+        """Go to the end of histories, one a batch; return the observation there."""
+        for n, (batch, history) in enumerate(zip(self.batches, histories, strict=True)):
+            batch.restart(history.seeds, history.last_window)
+            for recipient in history.recipients:
+                batch.fly(recipient.astype(np.int64))
+            self._recipients[n] = list(history.recipients)
+        return self._observe()
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Take the actions, and note them in the histories."""
+        super().step_async(actions)
+        for batch, envs, recipients in zip(self.batches, self._envs, self._recipients, strict=True):
+            recipient = actions[envs].reshape(batch.num_missions, -1)
+            recipients.append(recipient[:, : batch.mission.num_robots].astype(np.int16))
+
+    def _begin(self, n: int) -> None:
+        self._recipients[n] = []
+        self.batches[n].restart(self._draw_seeds(self.batches[n]))
+
+    def _draw_seeds(self, batch: MissionBatch) -> list[int]:
+        # One generator for all batches: a checkpoint keeps its state alone.
+        size = batch.num_missions
+        return self._rng.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED, size=size).tolist()
+
+    def _is_truncated(self) -> Bool[np.ndarray, "E"]:
+        """Return where missions are cut off early: their value goes on, that of ended ones is 0."""
+        is_cut = [batch.last_window < batch.mission.num_windows for batch in self.batches]
+        return np.repeat(is_cut, [envs.stop - envs.start for envs in self._envs])
+
+    def _scaled(self, reward: np.ndarray, batch: MissionBatch) -> np.ndarray:
+        is_age = self.agent == "team" and self._agent_reward == "aoi"
+        return reward / batch.mission.num_windows if is_age else reward
+
+    def _infos(self) -> list[dict[str, Any]]:
+        return [{} for _ in range(self.num_envs)]  # nothing reads them, and each takes its time
+
+    def _observe(self) -> Observation:
+        """Return the graphs of all robots, per team stacked with those of robots that are not."""
+        rows_of = padded([batch.graphs for batch in self.batches], self.num_nodes)
+        if self.agent == "robot":
+            return {**rows_of, "owner": self._owner}
+        observation = {"is_robot": self._is_robot}
+        for name, rows in rows_of.items():
+            teams = np.zeros((*self._is_robot.shape, *rows.shape[1:]), dtype=rows.dtype)
+            teams[self._is_robot] = rows
+            observation[name] = teams
+        observation["parent"][~self._is_robot] = NO_PARENT
+        observation["may_address"] |= np.eye(self.num_nodes, dtype=np.bool_)
+        return observation
+
+
+def env_of(model: PPO) -> GraphVecEnv:
+    """Return a model's environment, inside any wrappers."""
+    env = model.get_env()
+    inner = env.unwrapped if env is not None else None
+    assert isinstance(inner, GraphVecEnv)
+    return inner
+
+
+def padded(graphs: Sequence[Graphs], num_nodes: int) -> Observation:
+    """Join all batches' graphs by name, with unconnected nodes that nobody may address.
+
+    Their R rows have M = `num_nodes` nodes, at least as many as the batches'; `has_turn` is [R, 1].
+    """
+
+    def rows_of(name: str, fill: int, dtype: type) -> np.ndarray:
+        parts = [getattr(each, name) for each in graphs]
+        if all(part.shape[1] == num_nodes for part in parts):
+            return np.concatenate(parts, dtype=dtype)
+        shape = (sum(map(len, parts)), num_nodes, *parts[0].shape[2:])
+        rows, start = np.full(shape, fill, dtype=dtype), 0
+        for part in parts:
+            rows[start : start + len(part), : part.shape[1]] = part
+            start += len(part)
+        return rows
+
+    return {
+        "node": rows_of("node", 0, np.float32),
+        "parent": rows_of("parent", NO_PARENT, np.int32),
+        "may_address": rows_of("may_address", False, np.bool_),
+        "has_turn": np.concatenate([each.has_turn for each in graphs])[:, None],
+    }
+
+
+def _robot_spaces(num_nodes: int, num_features: int) -> tuple[Spaces, spaces.Space]:
+    """Return one robot's spaces: the graph, and the recipient."""
+    seen = _graph_spaces((num_nodes,), num_features)
+    return seen | {"owner": spaces.Box(0, num_nodes - 1, (1,), np.int32)}, spaces.Discrete(
+        num_nodes
+    )
+
+
+def _team_spaces(num_nodes: int, num_features: int) -> tuple[Spaces, spaces.Space]:
+    """Return a team's spaces: a graph for each robot, and everyone's recipient."""
+    seen = _graph_spaces((num_nodes, num_nodes), num_features)
+    seen["is_robot"] = spaces.MultiBinary(num_nodes)
+    return seen, spaces.MultiDiscrete([num_nodes] * num_nodes)
+
+
+def _graph_spaces(nodes: tuple[int, ...], num_features: int) -> Spaces:
+    """Return the spaces of one environment's graphs, as `padded` orders them."""
+    return {
+        "node": spaces.Box(-np.inf, np.inf, (*nodes, num_features), np.float32),
+        "parent": spaces.Box(-1, nodes[-1] - 1, nodes, np.int32),
+        "may_address": spaces.MultiBinary(nodes),
+        "has_turn": spaces.MultiBinary([*nodes[:-1], 1]),
+    }
+
+
+def _make_batches(training: Training, reward: str) -> list[MissionBatch]:
+    """Return batches that share out all missions evenly; team sizes take turns."""
+    num_missions, num_batches, sizes = training.missions, training.groups, training.robots
+    if num_missions % num_batches or not len(sizes) <= num_batches <= num_missions:
+        raise ValueError(
+            f"missions must be a multiple of their {num_batches} batches, of which each of the "
+            f"{len(sizes)} team sizes needs one, not {num_missions}"
+        )
+    return [
+        MissionBatch(
+            replace(training.mission, num_robots=sizes[n % len(sizes)]),
+            num_missions // num_batches,
+            features=training.features,
+            reward=reward,
+            components=training.components,
+        )
+        for n in range(num_batches)
+    ]

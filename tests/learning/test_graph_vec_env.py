@@ -1,0 +1,298 @@
+"""Training's VecEnv: staggered ends, fresh seeds, histories, rewards, padding."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor
+
+from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED
+from swarm_mj.learning.graph_vec_env import GraphVecEnv, padded
+from swarm_mj.learning.settings import HELD_OUT_SEED, usual_settings
+from swarm_mj.mission import paper
+from swarm_mj.policies.gnn.feature_sets import num_features
+from swarm_mj.protocol.buffers import NO_PARENT
+from swarm_mj.simulation.swarm import Swarm
+
+CREDITS = ("robot", "team")
+WINDOWS, MISSIONS = 12, 8
+
+
+def env_of(credit, sizes=(4,), task="random-walk", features="extended", seed=1, **changes):
+    mission = paper(task, num_robots=sizes[0], num_windows=WINDOWS, range_ratio=0.7)
+    usual = usual_settings(credit, mission, sizes)
+    network = replace(usual.network, num_features=num_features(features))
+    its = {"network": network, "features": features, "missions": MISSIONS, "groups": 4}
+    return GraphVecEnv(replace(usual, **(its | changes)), np.random.default_rng(seed))
+
+
+def rows_of(observation):
+    """The observation of each environment on its own."""
+    count = len(observation["node"])
+    return [{name: rows[e] for name, rows in observation.items()} for e in range(count)]
+
+
+def drawn(env, rng):
+    """Actions that speak now and then, to robots that exist."""
+    teams = []
+    for batch in env.batches:
+        shape = (batch.num_missions, batch.mission.num_robots)
+        silence = np.broadcast_to(np.arange(shape[1]), shape)
+        team = np.where(rng.random(shape) < 0.3, rng.integers(0, shape[1], shape), silence)
+        if env.agent == "team":
+            unused = np.arange(shape[1], env.num_nodes)
+            team = np.hstack([team, np.tile(unused, (len(team), 1))])
+        teams.append(team)
+    return np.concatenate([t if env.agent == "team" else t.ravel() for t in teams])
+
+
+@pytest.mark.parametrize("features", ["paper", "reference", "extended"])
+@pytest.mark.parametrize("credit", CREDITS)
+def test_random_actions_pass_stable_baselines_checks(credit, features):
+    env = VecCheckNan(env_of(credit, features=features), raise_exception=True)
+    monitored = VecMonitor(env)
+    env.action_space.seed(1)
+    observation = monitored.reset()
+    num_episodes = 0
+    for _ in range(2 * WINDOWS):
+        assert all(map(env.observation_space.contains, rows_of(observation)))
+        actions = np.array([env.action_space.sample() for _ in range(env.num_envs)])
+        observation, reward, done, infos = monitored.step(actions)
+        assert reward.shape == done.shape == (env.num_envs,)
+        assert reward.dtype == np.float32
+        assert done.dtype == np.bool_
+        assert len(infos) == env.num_envs
+        num_episodes += sum("episode" in info for info in infos)
+    assert num_episodes == env.num_envs * (2 + 2 + 2 + 2) / 4
+
+
+@pytest.mark.parametrize("sizes", [(4,), (3, 5)])
+@pytest.mark.parametrize("credit", CREDITS)
+def test_observations_have_the_shapes_and_types_of_their_space(credit, sizes):
+    env, rng = env_of(credit, sizes), np.random.default_rng(2)
+    space = env.observation_space
+    observation = env.reset()
+    for _ in range(WINDOWS + 2):
+        assert observation.keys() == space.spaces.keys()
+        for name, rows in observation.items():
+            assert rows.shape == (env.num_envs, *space[name].shape)
+            assert np.can_cast(rows.dtype, space[name].dtype) or rows.dtype == np.bool_
+        assert all(map(space.contains, rows_of(observation)))
+        observation, _, _, infos = env.step(drawn(env, rng))
+        for info in infos:
+            if info:
+                assert space.contains(info["terminal_observation"])
+
+
+@pytest.mark.parametrize("credit", CREDITS)
+def test_missions_that_are_cut_are_truncated_and_others_end(credit):
+    """Four batches of two missions of 12 windows; the first three are cut at 3, 6 and 9."""
+    env, rng = env_of(credit), np.random.default_rng(2)
+    env.reset()
+    rows = env.num_envs // 4
+    for window in range(1, 2 * WINDOWS + 1):
+        _, _, done, infos = env.step(drawn(env, rng))
+        for n in range(4):
+            batch = slice(n * rows, (n + 1) * rows)
+            first = 3 * (n + 1)
+            ends = window in (first, first + WINDOWS)
+            assert np.all(done[batch] == ends)
+            for info in infos[batch]:
+                assert bool(info) == (ends and window == first < WINDOWS)
+                assert not info or info["TimeLimit.truncated"]
+
+
+@pytest.mark.parametrize("credit", CREDITS)
+def test_a_terminal_observation_is_what_was_seen_at_the_end(credit):
+    env, rng = env_of(credit, (3, 5)), np.random.default_rng(2)
+    env.reset()
+    for _ in range(3):
+        observation, _, done, infos = env.step(drawn(env, rng))
+    assert 0 < done.sum() < env.num_envs
+    for row in np.flatnonzero(done):
+        last = infos[row]["terminal_observation"]
+        first = {name: rows[row] for name, rows in observation.items()}
+        assert last.keys() == first.keys()
+        assert np.any(last["node"] != first["node"])
+        np.testing.assert_array_equal(last["node"].shape, first["node"].shape)
+    if credit == "robot":
+        np.testing.assert_array_equal(
+            [infos[row]["terminal_observation"]["owner"] for row in np.flatnonzero(done)],
+            observation["owner"][done],
+        )
+
+
+def test_a_robots_reward_is_its_credit_per_pair():
+    """Next to teams that fly alike until the last window, in which one robot each is silent.
+
+    How much T falls short there, a mean over pairs; T of robots themselves is always now.
+    """
+    env, rng = env_of("robot", (3, 5)), np.random.default_rng(2)
+    env.reset()
+    for _ in range(3):
+        before = env.histories
+        before = [replace(each, recipients=list(each.recipients)) for each in before]
+        actions = drawn(env, rng)
+        _, reward, _, _ = env.step(actions)
+    by_hand, last = [], np.split(actions, [6, 16, 22])
+    for batch, history, recipient in zip(env.batches, before, last, strict=True):
+        size = batch.mission.num_robots
+        recipient = recipient.reshape(2, size)
+
+        def known(last_recipient, batch=batch, history=history):
+            swarm = Swarm(batch.mission, history.seeds)
+            for each in [*history.recipients, last_recipient]:
+                swarm.exchange(each.astype(int))
+            return swarm.buffers.timestamp.sum(axis=(1, 2))
+
+        without = [np.where(np.arange(size) == i, i, recipient) for i in range(size)]
+        credit = [known(recipient) - known(each) for each in without]
+        by_hand += (np.stack(credit, axis=1) / size**2).ravel().tolist()
+    np.testing.assert_allclose(reward, by_hand, rtol=1e-5, atol=1e-7)
+    assert np.any(reward != 0.0)
+
+
+def test_eq10_a_teams_reward_is_the_age_over_the_missions_duration():
+    env, rng = env_of("team", (3, 5)), np.random.default_rng(2)
+    env.reset()
+    for window in (1, 2):
+        _, reward, _, _ = env.step(drawn(env, rng))
+        ages = []
+        for batch in env.batches:
+            for timestamp in batch.swarm.buffers.timestamp:
+                each = [window - t for row in timestamp for t in row]
+                ages.append(sum(each) / len(each))
+        np.testing.assert_allclose(reward, [-age / WINDOWS for age in ages], rtol=1e-6)
+
+
+def test_eq17_the_other_reward_is_the_velocity_variance():
+    env = env_of("team", task="flocking", reward="velocity-variance")
+    rng = np.random.default_rng(2)
+    env.reset()
+    for _ in range(2):
+        _, reward, _, _ = env.step(drawn(env, rng))
+        by_hand = []
+        for batch in env.batches:
+            for velocity in batch.swarm.states.velocity_mps:
+                mean = [sum(v[axis] for v in velocity) / len(velocity) for axis in range(2)]
+                squares = [(v[0] - mean[0]) ** 2 + (v[1] - mean[1]) ** 2 for v in velocity]
+                by_hand.append(-sum(squares) / len(velocity))
+        np.testing.assert_allclose(reward, by_hand, rtol=1e-5)
+        assert np.all(reward < 0.0)
+
+
+def test_robots_that_do_not_exist_see_nothing_and_may_only_be_silent():
+    env = env_of("team", (3, 5))
+    observation = env.reset()
+    is_robot = observation["is_robot"].astype(bool)
+    np.testing.assert_array_equal(is_robot.sum(axis=1), [3, 3, 5, 5, 3, 3, 5, 5])
+    for e, i in zip(*np.nonzero(~is_robot), strict=True):
+        np.testing.assert_array_equal(observation["may_address"][e, i], np.arange(5) == i)
+        assert np.all(observation["node"][e, i] == 0.0)
+        assert np.all(observation["parent"][e, i] == -1)
+    for e, i in zip(*np.nonzero(is_robot), strict=True):
+        assert not np.any(observation["may_address"][e, i][~is_robot[e]])
+
+
+def test_rows_of_credit_per_robot_are_teams_robot_by_robot():
+    env = env_of("robot", (3, 5))
+    expected = [*range(3), *range(3), *range(5), *range(5)] * 2
+    np.testing.assert_array_equal(env.reset()["owner"][:, 0], expected)
+
+
+def test_padding_adds_nodes_that_nobody_hears_or_addresses():
+    env = env_of("robot", (3, 5), missions=4, groups=2)
+    small, large = (batch.graphs for batch in env.batches)
+    rows = padded([small, large], 5)
+    assert rows["node"].shape[:2] == (2 * 3 + 2 * 5, 5)
+    for name in ("node", "parent", "may_address"):
+        np.testing.assert_array_equal(rows[name][:6, :3], getattr(small, name))
+        np.testing.assert_array_equal(rows[name][6:], getattr(large, name))
+    assert np.all(rows["node"][:6, 3:] == 0.0)
+    assert np.all(rows["parent"][:6, 3:] == NO_PARENT)
+    assert not np.any(rows["may_address"][:6, 3:])
+    turns = np.concatenate([small.has_turn, large.has_turn])
+    np.testing.assert_array_equal(rows["has_turn"][:, 0], turns)
+
+
+@pytest.mark.parametrize("credit", CREDITS)
+def test_reset_starts_missions_over(credit):
+    env, rng = env_of(credit), np.random.default_rng(2)
+    first = env.reset()
+    actions = [drawn(env, rng) for _ in range(2)]
+    rewards = [env.step(action)[1] for action in actions]
+    again = env.reset()
+    for name, rows in first.items():
+        np.testing.assert_array_equal(again[name], rows)
+    for action, reward in zip(actions, rewards, strict=True):
+        np.testing.assert_array_equal(env.step(action)[1], reward)
+
+
+@pytest.mark.parametrize("sizes", [(4,), (3, 5)])
+def test_every_mission_has_its_own_seed_that_is_not_held_out(sizes):
+    env, rng = env_of("team", sizes), np.random.default_rng(2)
+    assert [batch.mission.num_robots for batch in env.batches] == [*sizes] * (4 // len(sizes))
+    seen = []
+    for _ in range(2 * WINDOWS + 3):
+        seen += [each.seeds for each in env.histories if each.seeds not in seen]
+        env.step(drawn(env, rng))
+    drawn_seeds = [seed for seeds in seen for seed in seeds]
+    assert len(drawn_seeds) == len(set(drawn_seeds)) == 2 * (4 + 4 + 4)
+    assert min(drawn_seeds) >= FIRST_TRAINING_SEED == 2**40 > HELD_OUT_SEED
+
+
+def test_the_view_after_an_end_is_the_new_missions_start():
+    env, rng = env_of("robot"), np.random.default_rng(2)
+    for _ in range(3):
+        observation, _, done, _ = env.step(drawn(env, rng))
+    first = env.batches[0]
+    first._extractor.start(2, 4)
+    expected = first._extractor.graphs(Swarm(first.mission, first.seeds).views)
+    np.testing.assert_array_equal(observation["node"][done], expected.node)
+    np.testing.assert_array_equal(observation["parent"][done], expected.parent)
+
+
+@pytest.mark.parametrize("credit", CREDITS)
+def test_histories_replayed_lead_to_the_same_state(credit):
+    """Also that of the features' memory, of the motion's dice, and of all that follows."""
+    first, rng = env_of(credit, (3, 5)), np.random.default_rng(2)
+    for _ in range(17):  # beyond the first ends
+        observation, *_ = first.step(drawn(first, rng))
+    second = env_of(credit, (3, 5), seed=9)
+    replayed = second.replay(first.histories)
+    second._rng.bit_generator.state = first._rng.bit_generator.state
+    for _ in range(WINDOWS):
+        for name, rows in observation.items():
+            np.testing.assert_array_equal(replayed[name], rows)
+        action = drawn(first, rng)
+        (observation, *one), (replayed, *other) = (env.step(action) for env in (first, second))
+        np.testing.assert_array_equal(one[0], other[0])
+
+
+@pytest.mark.parametrize(("missions", "groups"), [(7, 4), (2, 4), (4, 1)])
+def test_missions_that_cannot_be_shared_out_are_refused(missions, groups):
+    with pytest.raises(ValueError, match=f"not {missions}"):
+        env_of("robot", (3, 5), missions=missions, groups=groups)
+
+
+def test_a_mission_of_one_window_starts_anew_every_window():
+    mission = paper("stationary", num_robots=3, num_windows=1, range_ratio=1.0)
+    env = env_of("robot", (3,), mission=mission, missions=2, groups=1)
+    before = env.batches[0].seeds
+    _, _, done, infos = env.step(np.array([0, 1, 2, 1, 1, 2]))
+    assert np.all(done)
+    assert infos == [{}] * 6
+    assert not set(before) & set(env.batches[0].seeds)
+
+
+def test_robots_that_were_failure_fraction_may_only_be_silent():
+    mission = paper(
+        "stationary", num_robots=5, range_ratio=1.0, num_windows=8, failure_fraction=0.4
+    )
+    env = env_of("robot", (5,), mission=mission, missions=2, groups=1)
+    for window in range(1, 8):
+        seen, *_ = env.step(np.tile(np.arange(5), 2))
+        choices = seen["may_address"].sum(axis=1)
+        assert np.sum(choices == 1) == (4 if window > 4 else 0)
+        is_off = np.flatnonzero(choices == 1)
+        assert np.all(seen["may_address"][is_off, is_off % 5])
