@@ -22,7 +22,7 @@ from swarm_mj.mission import Mission, make_mission
 from swarm_mj.mission.components import CALLED_WITH, Components
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies.policy import Policy
-from swarm_mj.policies.registry import check_used, make_policy, normalised
+from swarm_mj.policies.registry import check_used, flown_name, make_policy, normalised
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.simulation.swarm import Swarm
@@ -150,7 +150,7 @@ def _policy_of(
     """Return a policy and its name: what was given, or its class's."""
     if not isinstance(policy, Policy):
         check_kind("policy", policy, (str, Path), '"planner"')
-        name = normalised(str(policy))
+        name = flown_name(normalised(str(policy)), mission)
         return make_policy(name, mission, **how), name
     if how["probability"] is not None or how["is_deterministic"]:
         raise TypeError(

@@ -20,6 +20,7 @@ from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.policy_config import SUFFIX
 from swarm_mj.policies.registry import (
     check_used,
+    flown_name,
     is_stored,
     make_policy,
     normalised,
@@ -75,8 +76,9 @@ class FlyOptions(PolicyOptions):
 
 def run(options: FlyOptions) -> int:
     """Run the command; returns its exit code."""
-    options = replace(options, policy=with_payload([options.policy], options.payload)[0])
     mission = options.mission
+    (asked,) = with_payload([options.policy], options.payload)
+    options = replace(options, policy=flown_name(asked, mission))
     path = _replay_path(options)
     if path:
         need("rerun", "a replay", "fly without one: --no-record")

@@ -13,7 +13,7 @@ from rich.table import Table
 from swarm_mj.cli.mission_options import mission_flags, one_mission
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
-from swarm_mj.policies.registry import POLICIES, library_of, make_policy, normalised
+from swarm_mj.policies.registry import POLICIES, SHIPPED, flown_name, make_policy, normalised
 from swarm_mj.protocol.packets import Packet, times
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import as_typed, setting
@@ -56,9 +56,11 @@ class PoliciesOptions:
 
 def run(options: PoliciesOptions) -> int:
     """Run the command; returns its exit code."""
-    names = POLICIES if options.name is None else (options.name,)
     if options.name is None:
-        names = [name for name in names if _can_be_made(name)]
+        flown = dict.fromkeys(flown_name(name, options.mission) for name in POLICIES)
+        names = [name for name in flown if _can_be_made(name)]
+    else:
+        names = [options.name]
     with Console(stderr=True).status("Loading ..."):
         made = {name: make_policy(name, options.mission) for name in names}
     facts = [facts_of(name, policy, options.mission) for name, policy in made.items()]
@@ -136,10 +138,9 @@ def _packet_table(fields: list[dict[str, Any]]) -> Table:
 
 def _can_be_made(name: str) -> bool:
     """Whether a policy's library is installed; says so if it is not."""
-    library = library_of(name)
-    if library is None or is_installed(library):
+    if name != SHIPPED or is_installed("torch"):
         return True
-    plain_console(is_error=True).print(missing(library, f"{name} is left out: it"))
+    plain_console(is_error=True).print(missing("torch", f"{name} is left out: it"))
     return False
 
 

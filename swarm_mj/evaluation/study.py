@@ -14,6 +14,7 @@ from swarm_mj.mission.components import Components, digest
 from swarm_mj.policies.policy import Parameters, Policy
 from swarm_mj.policies.registry import (
     check_used,
+    flown_name,
     is_learned,
     is_own_policy,
     make_policy,
@@ -72,7 +73,8 @@ class Study:
             check_used(
                 self.features, (self.make_policy(name, self.regimes[0]) for name in self.policies)
             )
-        if len(set(self.pairs)) < len(self.pairs):
+        asked = list(product(self.regimes, self.policies))
+        if len(set(asked)) < len(asked):
             raise ValueError("an evaluation needs each policy and each regime once")
         if self.baseline is not None and self.baseline not in self.policies:
             raise ValueError(
@@ -88,7 +90,8 @@ class Study:
     @property
     def pairs(self) -> list[tuple[Mission, str]]:
         """Every regime with every policy, regime by regime."""
-        return list(product(self.regimes, self.policies))
+        pairs = product(self.regimes, self.policies)
+        return list(dict.fromkeys((regime, flown_name(name, regime)) for regime, name in pairs))
 
     @cached_property
     def batches(self) -> tuple[Batch, ...]:

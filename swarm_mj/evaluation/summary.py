@@ -20,6 +20,7 @@ from swarm_mj.evaluation.statistics import (
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
+from swarm_mj.policies.registry import flown_name
 from swarm_mj.protocol.window import SLOT_WINDOWS
 from swarm_mj.system.atomic import write_json
 
@@ -75,11 +76,11 @@ def summarise(
                 **_task_costs(own, study.task_cost(regime)),
                 **_packets(own, regime, study.make_policy(policy, regime)),
                 **_completeness(own),
-                **_differences(own, merged[regime, study.compared_to]),
+                **_differences(own, merged[regime, flown_name(study.compared_to, regime)]),
                 **_published(policy, None if study.components.names else regime),
                 version=made_by["version"],
                 commit=made_by["commit"],
-                baseline=study.compared_to,
+                baseline=flown_name(study.compared_to, regime),
                 config=json.dumps(study.config(policy, regime)),
             ),
             aoi=own.aoi,

@@ -20,7 +20,7 @@ class InnovationGossip(RandomTransmission, BroadcastPolicy):
     robot's own buffer, and what it remembers of it.
     """
 
-    uses = "how much it has learned since it last transmitted"
+    uses = "how much it has learned since its last transmission"
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Give every robot its own numbers, and all to tell; arguments as in `Policy.start`."""

@@ -1,7 +1,7 @@
-"""The one table of policies by their names on the command line.
+"""The one table of policies by their names on the command line, and `make_policy`.
 
-A learned policy has no name but that of the directory or file that holds it, except the shipped
-one, `gnn`.
+A name is one of `POLICIES`, the file of a learned policy or its run's folder, or `module:Name` of a
+user's own. `gnn` is the learned policy that comes with the package.
 """
 
 import os
@@ -60,10 +60,10 @@ def _planner(mission: Mission) -> Planner | RestingPlanner:
 
 
 def _resting_planner(
-    mission: Mission, *, learns: bool = False, moving: Planner | None = None
+    mission: Mission, *, learns: bool = False, **moving: Planner
 ) -> RestingPlanner:
     turns = _spatial_tdma(mission)
-    return RestingPlanner(radio_of(mission), PlannerSettings(), turns, learns=learns, moving=moving)
+    return RestingPlanner(radio_of(mission), PlannerSettings(), turns, learns=learns, **moving)
 
 
 # What makes each policy, given the mission and, for these four, a transmission probability.
@@ -87,32 +87,101 @@ RULES: dict[str, Callable[..., Policy]] = {
     WITHOUT_PAYLOAD: _resting_planner,
     "greedy-oracle": lambda mission: GreedyOracle(radio_of(mission)),
 }
-SHIPPED = "gnn"  # the learned policy that comes with the package, in assets/policies/
+SHIPPED = "gnn"  # in assets/policies/
 POLICIES = (*RULES, SHIPPED)
 
 
-def is_learned(name: str) -> bool:
-    """Whether a policy is a trained network: the shipped one, or one in a directory or file."""
-    return name == SHIPPED or is_stored(name)
+def make_policy(
+    name: str,
+    mission: Mission,
+    probability: float | None = None,
+    *,
+    is_deterministic: bool = False,
+    features: Sequence[str] = (),
+) -> Policy:
+    """Return a policy by its name.
+
+    Args:
+        name: See the module.
+        mission: Whose preset says how the baseline behaves where paper and code differ, and whose
+            numbers normalise what a learned policy sees.
+        probability: Of transmission, for `HAVE_PROBABILITY`; None is the one tuned for the regime
+            nearest to the mission's.
+        is_deterministic: Whether a learned policy takes the most probable recipient, not a draw.
+        features: Names, as `module:Name`, of own feature sets that may be imported for a learned
+            policy.
+
+    Raises:
+        ValueError: The name is unknown, no sound policy is there, a probability is out of range or
+            not the policy's, or a policy that is not learned is to be deterministic.
+        OSError: A learned policy cannot be read.
+        TypeError: The name or the mission is none.
+    """
+    check_kind("policy", name, str, '"planner"')
+    check_kind("mission", mission, Mission, 'paper("flocking")')
+    name = flown_name(name, mission)
+    if not (name in POLICIES or is_stored(name) or is_own_policy(name)):
+        raise ValueError(
+            f"policy must be one of {', '.join(POLICIES)}, a run's folder or a {SUFFIX} file with "
+            f"a learned policy, or module:Name of your own, not {name!r}"
+            f"{did_you_mean(name, POLICIES)}"
+        )
+    if probability is not None and name not in HAVE_PROBABILITY:
+        per_value = "name one policy per value in its file, as `p01 = functools.partial(Mine, 0.1)`"
+        hint = f", and {per_value}" if is_own_policy(name) else ""
+        raise ValueError(f"{name} takes no transmission probability; leave out {probability}{hint}")
+    if is_learned(name):
+        return _learned(name, mission, is_deterministic=is_deterministic, features=features)
+    if is_deterministic:
+        raise ValueError(
+            f"--deterministic applies to learned policies only, not to {name}; leave it out"
+        )
+    if is_own_policy(name):
+        return _own(name, mission)
+    if name not in HAVE_PROBABILITY:
+        return RULES[name](mission)
+    tuned = tuned_probability(name, mission) if probability is None else probability
+    return RULES[name](mission, tuned)
 
 
-def library_of(name: str) -> str | None:
-    """Return the library that the shipped policy needs and others do not, if any."""
-    return "torch" if name == SHIPPED else None
+def _learned(name: str, mission: Mission, **options: Any) -> Policy:
+    # The core of the package flies without these libraries, and torch takes its time to import.
+    need("torch" if name == SHIPPED else "safetensors", f"policy {name}", "fly another")
+    from swarm_mj.policies.stored import load_policy
+
+    path = asset(f"policies/{SHIPPED}{SUFFIX}") if name == SHIPPED else Path(name)
+    return load_policy(path, mission, **options)
+
+
+def _own(name: str, mission: Mission) -> Policy:
+    policy = make("policy", name, mission)
+    if not isinstance(policy, CentralisedPolicy | DecentralisedPolicy):
+        raise ValueError(
+            f"policy {name} must make a DecentralisedPolicy or a CentralisedPolicy, not "
+            f"{policy!r:.80}"
+        )
+    return policy
 
 
 def is_stored(name: str) -> bool:
-    """Whether a policy's name is that of a directory or a file that holds one.
+    """Whether a policy's name is that of a file or a folder, there or not."""
+    is_path = any(separator in name for separator in (os.sep, os.altsep) if separator)
+    is_there = os.path.isdir(name) or os.path.isfile(f"{name}{SUFFIX}")
+    return name not in POLICIES and (is_path or name.endswith(SUFFIX) or is_there)
 
-    It has a separator, or the ending of such files, or there is a directory of this name.
-    """
-    is_named_so = _is_path(name) or name.endswith(SUFFIX) or os.path.isdir(name)
-    is_named_so = is_named_so or os.path.isfile(name + SUFFIX)
-    return name not in POLICIES and is_named_so
+
+def is_learned(name: str) -> bool:
+    """Whether a policy is a trained network: the shipped one, or a stored one."""
+    return name == SHIPPED or is_stored(name)
+
+
+def is_own_policy(name: str) -> bool:
+    """Whether a policy is a user's own, named `module:Name`."""
+    return is_own(name) and not is_stored(name)
 
 
 def stored_policies(names: Iterable[str]) -> list[Path]:
-    """Return the directories and files among policies' names."""
+    """Return the files and folders among policies' names."""
     return [Path(name) for name in names if is_stored(name)]
 
 
@@ -125,14 +194,23 @@ def normalised(name: str) -> str:
 
 
 def listed(names: Iterable[str]) -> list[str]:
-    """Policies' names, each once; `all` stands for `POLICIES`, after the others."""
+    """Return policies' names, each once; `all` stands for `POLICIES`, after the others."""
     names = list(names)
     named = [name for name in names if name != "all"]
     return list(dict.fromkeys([*named, *(POLICIES if "all" in names else ())]))
 
 
+def flown_name(name: str, mission: Mission) -> str:
+    """Return the name of what flies a mission when a policy is asked for.
+
+    Without a payload, robots that move cannot agree on a plan, so they fly `spatial-tdma`. Tables
+    and charts say so, and show it once.
+    """
+    return "spatial-tdma" if name == WITHOUT_PAYLOAD and mission.task != "stationary" else name
+
+
 def with_payload(names: Sequence[str], payload: str) -> list[str]:
-    """Names of policies whose packets carry this beyond T, M and P, where they can carry anything.
+    """Return the names of policies whose packets carry this beyond T, M and P, where they can.
 
     Raises:
         ValueError: No such payload, or no policy that can go without.
@@ -149,111 +227,9 @@ def with_payload(names: Sequence[str], payload: str) -> list[str]:
     return [WITHOUT_PAYLOAD if name == "planner" else name for name in names]
 
 
-def make_policy(
-    name: str,
-    mission: Mission,
-    probability: float | None = None,
-    *,
-    is_deterministic: bool = False,
-    features: Sequence[str] = (),
-) -> Policy:
-    """Return a policy by its name on the command line.
-
-    Args:
-        name: One of `POLICIES`, a directory or a file with a learned policy, or the `module:Name`
-            of one's own.
-        mission: Whose preset says how the baseline behaves where paper and code differ, and whose
-            numbers normalise what a learned policy sees.
-        probability: Of transmission, for the policies that have one; None is the one tuned for
-            the regime nearest to the mission's.
-        is_deterministic: Whether a learned policy takes the most probable recipient instead of a
-            draw.
-        features: Names, as `module:Name`, of own feature sets that may be imported for a learned
-            policy.
-
-    Returns:
-        The policy.
-
-    Raises:
-        ValueError: Unknown name, a directory without a sound policy, a probability that is out of
-            range or not the policy's, or a policy that is not learned made deterministic.
-        OSError: A learned policy cannot be read.
-        TypeError: The name or the mission is none.
-    """
-    check_kind("policy", name, str, '"planner"')
-    check_kind("mission", mission, Mission, 'paper("flocking")')
-    if is_own_policy(name):
-        return _own_policy(name, mission, probability, is_deterministic)
-    if is_learned(name):
-        _refuse(probability, name)
-        return _learned(name, mission, is_deterministic=is_deterministic, features=features)
-    if name not in RULES:
-        raise ValueError(
-            f"policy must be one of {', '.join(POLICIES)}, a directory or {SUFFIX} file with a "
-            "learned policy, or module:Name of your own, not "
-            f"{name!r}{did_you_mean(name, POLICIES)}"
-        )
-    if is_deterministic:
-        raise ValueError(f"{name} draws from no network's distribution; leave --deterministic out")
-    if name in HAVE_PROBABILITY:
-        tuned = tuned_probability(name, mission) if probability is None else probability
-        return RULES[name](mission, tuned)
-    _refuse(probability, name)
-    return RULES[name](mission)
-
-
 def check_used(features: Sequence[str], policies: Iterable[Policy]) -> None:
-    """Pass if own feature sets that were named are those of some policy.
-
-    Raises:
-        ValueError: Nobody was trained on one.
-    """
+    """Raise ValueError unless own feature sets that were named are those of some policy."""
     used = {policy.parameters.get("features") for policy in policies}
     for name in features:
         if name not in used:
             raise ValueError(f"no policy here was trained on the features {name}; leave them out")
-
-
-def is_own_policy(name: str) -> bool:
-    """Whether a policy is a user's own, named `module:Name`."""
-    return is_own(name) and not is_stored(name)
-
-
-def _learned(name: str, mission: Mission, **options: Any) -> Policy:
-    """Return a trained network, which takes its libraries' time to import."""
-    for library in ("safetensors", *(("torch",) if name == SHIPPED else ())):
-        need(library, f"policy {name}", "fly another")
-    from swarm_mj.policies.stored import load_policy
-
-    path = asset(f"policies/{SHIPPED}.safetensors") if name == SHIPPED else Path(name)
-    return load_policy(path, mission, **options)
-
-
-def _own_policy(
-    name: str, mission: Mission, probability: float | None, is_deterministic: bool
-) -> Policy:
-    """Return a user's own; raises ValueError as `make_policy`."""
-    if probability is not None:
-        raise ValueError(
-            f"{name} takes no transmission probability; leave out {probability}, and name one "
-            "policy per value in its file, as `p01 = functools.partial(Mine, 0.1)`"
-        )
-    if is_deterministic:
-        raise ValueError(f"{name} is no learned policy; leave --deterministic out")
-    policy = make("policy", name, mission)
-    if not isinstance(policy, CentralisedPolicy | DecentralisedPolicy):
-        raise ValueError(
-            f"policy {name} must make a DecentralisedPolicy or a CentralisedPolicy, not "
-            f"{policy!r:.80}"
-        )
-    return policy
-
-
-def _is_path(name: str) -> bool:
-    return any(separator in name for separator in (os.sep, os.altsep) if separator)
-
-
-def _refuse(probability: float | None, name: str) -> None:
-    """Raise ValueError if a policy that has no probability is given one."""
-    if probability is not None:
-        raise ValueError(f"{name} takes no transmission probability; leave out {probability}")

@@ -69,7 +69,10 @@ def test_the_mode_is_flown_on_request(runs):
         (["fly", "--policy", "runs/z"], "there is no policy runs/z; name a .safetensors file"),
         (["fly", "--policy", "runs"], "runs holds policies; name one of them: runs/x/policy.saf"),
         (["fly", "--policy", "runs/y", "--probability", "0.1"], "takes no transmission probab"),
-        (["fly", "--policy", "mst", "--deterministic"], "mst draws from no network"),
+        (
+            ["fly", "--policy", "mst", "--deterministic"],
+            "--deterministic applies to learned policies only, not to mst",
+        ),
         (["evaluate", "--policy", "mst", "--deterministic"], "none is among mst; leave it out"),
         (["evaluate", "--policy", "mst", "runs/z"], "there is no policy runs/z"),
         (["evaluate", "--policy", "runs/y", "--probability", "0.1"], "takes no transmission prob"),

@@ -30,6 +30,14 @@ def test_the_baseline_is_the_first_policy_unless_named():
     assert study(baseline="round-robin").compared_to == "round-robin"
 
 
+def test_one_behaviour_has_one_name_in_each_regime():
+    """Without a payload, teams that move fly spatial-tdma: it is shown once, also as baseline."""
+    regimes = (SMALL, paper("stationary", num_robots=6))
+    names = ("planner --payload none", "spatial-tdma", "tdma")
+    flown = [name for _, name in study(policies=names, regimes=regimes).pairs]
+    assert flown == ["spatial-tdma", "tdma", *names]
+
+
 def test_the_header_tells_what_costs_depend_on():
     header = study(policies=("mst",), probability=0.2, episodes=3, seed=9).header()
     assert header == json.loads(json.dumps(header))

@@ -18,6 +18,7 @@ from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.registry import (
     POLICIES,
+    flown_name,
     is_learned,
     is_stored,
     make_policy,
@@ -113,8 +114,8 @@ def test_only_a_learned_policy_is_made_deterministic():
         assert policy.parameters["is_deterministic"] is True
     for name in POLICIES:
         if name != "gnn":
-            with pytest.raises(ValueError, match=f"{name} draws from no network"):
-                make_policy(name, MISSION, is_deterministic=True)
+            with pytest.raises(ValueError, match=f"learned policies only, not to {name}"):
+                make_policy(name, REST, is_deterministic=True)
 
 
 @here
@@ -153,13 +154,20 @@ def test_ii_b_the_planner_can_go_without_payload():
         ("spatial-tdma", SpatialTdma, None),
         ("sotdma", SelfOrganisedTdma, None),
         ("planner", Planner, None),
-        ("planner --payload none", RestingPlanner, None),
         ("greedy-oracle", GreedyOracle, None),
     ],
 )
 def test_policies_by_name(name, kind, probability):
     assert type(make_policy(name, MISSION)) is kind
     assert type(make_policy(name, MISSION, probability)) is kind
+
+
+def test_without_payload_the_planner_of_moving_teams_is_spatial_tdma_by_name():
+    name = "planner --payload none"
+    assert (flown_name(name, MISSION), flown_name(name, REST)) == ("spatial-tdma", name)
+    assert type(make_policy(name, MISSION)) is SpatialTdma
+    assert type(make_policy(name, REST)) is RestingPlanner
+    assert [flown_name(other, MISSION) for other in ("planner", "mst")] == ["planner", "mst"]
 
 
 def test_the_planner_of_a_team_at_rest_learns_links_if_slots_hold_them():
@@ -230,6 +238,6 @@ def test_probability_is_tuned_by_default_and_named(name, preset):
 
 @pytest.mark.parametrize("name", SCHEDULES)
 def test_a_schedule_has_no_probability(name):
-    assert make_policy(name, MISSION).parameters == {}
+    assert make_policy(name, REST).parameters == {}
     with pytest.raises(ValueError, match=f"{name} takes no transmission probability"):
-        make_policy(name, MISSION, 0.5)
+        make_policy(name, REST, 0.5)

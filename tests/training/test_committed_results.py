@@ -11,7 +11,7 @@ from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.mission import Mission
 
 FILE = Path(__file__).parents[2] / "training" / "results" / "paper-random-walk.csv"
-CHEAP = ("tdma", "round-robin", "spatial-tdma", "planner", "planner --payload none")
+CHEAP = ("tdma", "round-robin", "spatial-tdma", "planner")
 
 
 def read(path):

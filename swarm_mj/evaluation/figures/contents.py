@@ -7,7 +7,7 @@ from typing import Literal
 
 from swarm_mj.evaluation.published import SWEEPS, points
 from swarm_mj.mission import PAPERS, Mission, Task
-from swarm_mj.policies.registry import WITHOUT_PAYLOAD
+from swarm_mj.policies.registry import WITHOUT_PAYLOAD, flown_name
 
 FLOCK = "fig2"  # a mission's start and end, drawn by `flock`; the others are below
 FORMATS = ("svg", "png", "pdf")
@@ -91,7 +91,8 @@ class ResultFigure:
     def arguments(self, preset: str) -> Sequence[str]:
         """What `swarm-mj` is called with to make the figure's results, but for the file."""
         drawn = [policy for policy in DRAWN if preset == "paper" or policy not in PAPER_ONLY]
-        command = ["evaluate", "--policy", *drawn, "--task", self.task, "--preset", preset]
+        flown = dict.fromkeys(flown_name(policy, self.mission(preset)) for policy in drawn)
+        command = ["evaluate", "--policy", *flown, "--task", self.task, "--preset", preset]
         if self.sweeps_missions:
             command += [OPTIONS[self.x_name], *(f"{x:g}" for x in self.xs)]
         return command
