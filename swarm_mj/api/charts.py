@@ -1,7 +1,6 @@
-"""Charts of what Python flew: one mission over time, and policies beside each other."""
+"""Charts of flights and evaluations: one mission over time, and policies below each other."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -14,39 +13,52 @@ from swarm_mj.evaluation.figures.style import FAINT, as_it_is, look_of, styled
 from swarm_mj.evaluation.results import Result
 from swarm_mj.mission.components import components_in
 
-if TYPE_CHECKING:
-    from swarm_mj.api.run import Run
-
 Course = Float[np.ndarray, "T"]
 
 WIDTH_IN, PANEL_IN, ROW_IN, HEAD_IN = 7.5, 2.1, 0.32, 1.1
 TITLE_PT = 10.0
-LEAST_SHARE = 1e-6  # of the largest velocity variance; below it a flock flies as one
+MIN_SHARE = 1e-6  # of the largest velocity variance that is drawn
 LABELS = {
     "aoi": "age of information\n[windows]",
     "velocity_variance": "velocity variance\n[m²/s²]",
 }
 
 
-def draw_run(run: "Run") -> Figure:
-    """Return a mission's costs over its windows, one above the other."""
-    columns, colour = run.columns(), look_of(run.config["policy"]).colour
-    has_own_cost = run.task_cost is not None and run.task_cost[0] != Flocking.cost_name
+def draw_flight(
+    columns: Mapping[str, Course],
+    title: str,
+    policy: str,
+    window_s: float,
+    task_cost: tuple[str, str] | None,
+) -> Figure:
+    """Return a mission's costs over its windows, one above the other.
+
+    Args:
+        columns: As `Run.columns` gives them.
+        title: Of the figure.
+        policy: Its name, which decides the colour.
+        window_s: A window's length [s].
+        task_cost: Name and unit of the task's cost, if it has one.
+    """
+    colour = look_of(policy).colour
+    own_cost = None if task_cost is None or task_cost[0] == Flocking.cost_name else task_cost
     moves = bool(np.any(columns["velocity_variance"]))
     with styled():
-        figure, axes = _panels(2 if has_own_cost or moves else 1)
-        figure.suptitle(as_it_is(run.title), x=0.01, ha="left", fontsize=TITLE_PT)
+        figure, axes = _panels(2 if own_cost or moves else 1)
+        figure.suptitle(as_it_is(title), x=0.01, ha="left", fontsize=TITLE_PT)
         _draw_age(axes[0], columns, colour)
-        if has_own_cost:
-            _draw_task(axes[1], columns, colour, run.task_cost)
+        if own_cost:
+            axes[1].plot(columns["window"], columns["task_cost"], color=colour)
+            axes[1].set_ylabel("{}\n[{}]".format(*own_cost))
+            axes[1].set_ylim(bottom=0.0)
         elif moves:
             _draw_variance(axes[1], columns, colour)
-        axes[-1].set_xlabel(f"window of {run.mission.window_s:g} s")
+        axes[-1].set_xlabel(f"window of {window_s:g} s")
     return _kept(figure)
 
 
 def draw_evaluation(results: Sequence[Result]) -> Figure:
-    """Policies below each other, the lowest age first; of flocks, the velocity variance beside."""
+    """Return a chart of policies, the lowest age first; of flocks, with velocity variances."""
     shown = sorted(results, key=lambda result: result.aoi_mean)
     flocks, first = shown[0].task == "flocking", shown[0]
     costs = ["aoi", "velocity_variance"] if flocks else ["aoi"]
@@ -83,19 +95,11 @@ def _draw_age(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
 
 
 def _draw_variance(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
-    """Down to what nobody would call a difference any more."""
+    # Below a millionth of its largest value the variance of a converged flock is rounding noise.
     variance = columns["velocity_variance"]
     axes.semilogy(columns["window"], variance, color=colour)
     axes.set_ylabel(LABELS["velocity_variance"])
-    axes.set_ylim(bottom=max(float(np.min(variance)), LEAST_SHARE * float(np.max(variance))) / 2.0)
-
-
-def _draw_task(
-    axes: Axes, columns: Mapping[str, Course], colour: str, cost: tuple[str, str] | None
-) -> None:
-    axes.plot(columns["window"], columns["task_cost"], color=colour)
-    axes.set_ylabel("{}\n[{}]".format(*cost or ("task cost", "")))
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(bottom=max(float(np.min(variance)), MIN_SHARE * float(np.max(variance))) / 2.0)
 
 
 def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:

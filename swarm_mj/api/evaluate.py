@@ -5,10 +5,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarm_mj.api.bars import AFTER_S, quiet_console
 from swarm_mj.api.estimates import study_needs
-from swarm_mj.api.fly import SHARED, mission_of, names_of
-from swarm_mj.api.numbers import Numbers
+from swarm_mj.api.fly import mission_of, names_of
+from swarm_mj.api.metrics import Metrics
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.results import COLUMNS, write_csv
 from swarm_mj.evaluation.run_study import (
@@ -28,6 +27,7 @@ from swarm_mj.system.machine import memory_errors
 from swarm_mj.system.needs import check_fits
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
+from swarm_mj.system.progress import AFTER_S, quiet_console
 
 if TYPE_CHECKING:  # each takes its time to import
     from matplotlib.figure import Figure
@@ -36,7 +36,6 @@ if TYPE_CHECKING:  # each takes its time to import
 # pandas prints the ends of a wide table, so there stands what one looks for.
 FIRST = ("policy", "num_robots", "aoi_mean", "aoi_sem")
 LAST = ("aoi_ci_low", "aoi_ci_high", "packets_per_window")
-KEYWORDS = ("policies", "num_missions", "baseline", "num_jobs", *SHARED)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -61,13 +60,13 @@ class Evaluation:
         return self.to_dataframe().set_index("policy")[shown].to_html()
 
     @property
-    def summary(self) -> Numbers:
+    def summary(self) -> Metrics:
         """What each policy cost, by its name: `summary["tdma"].aoi_mean` [windows].
 
         The names are the columns of `swarm-mj evaluate --csv`.
         """
         rows = (asdict(each.result) for each in self.results)
-        return Numbers({row["policy"]: Numbers(row) for row in rows})
+        return Metrics({row["policy"]: Metrics(row) for row in rows})
 
     def to_dataframe(self, *, by_mission: bool = False) -> "DataFrame":
         """One row per policy, with the columns of `swarm-mj evaluate --csv`.
@@ -182,7 +181,7 @@ def evaluate(
         KeyboardInterrupt: Ctrl-C was pressed; nothing is kept.
     """
     need("scipy", "an evaluation")
-    mission = mission_of("swarm_mj.evaluate", task, mission_fields, KEYWORDS)
+    mission = mission_of(evaluate, task, mission_fields)
     components = Components(channel=channel, controller=controller, scene=scene)
     for kind, name in components.given.items():
         _check_named(kind, name)

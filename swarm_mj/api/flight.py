@@ -1,57 +1,55 @@
 """The flight itself, of `swarm-mj fly` and of `swarm_mj.fly` alike: it ends early without loss.
 
 Ctrl-C ends it after a whole window, and so does a lack of memory while there is enough to write
-what was flown.
+the windows flown.
 """
 
 import gc
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
-from swarm_mj.api.flight_table import flight_numbers
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import is_own_policy, is_stored, make_policy
 from swarm_mj.replay.estimates import replay_memory
 from swarm_mj.replay.recorder import Recorder
-from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
+from swarm_mj.simulation.rollout import WindowRecord, rollout
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.machine import free_memory, memory_errors
 from swarm_mj.system.needs import in_gb
 from swarm_mj.system.progress import WorkBar
-from swarm_mj.system.provenance import commit, version
 
-WINDOWS_BETWEEN_LOOKS = 50  # at the memory that is left
-COMPILING_WINDOWS = 10  # in which three robots do all that a flight does, schedules included
-SECOND_LOOK_S = 0.5  # later, as what others have just freed may still be counted
+WINDOWS_BETWEEN_LOOKS = 50  # at the free memory
+COMPILING_WINDOWS = 10  # in which three robots use all that a flight does, schedules included
+SECOND_LOOK_S = 0.5  # memory that others have just freed may still be counted for so long
 
 
 class Flown(NamedTuple):
-    """What was flown, and how it ended."""
+    """The windows flown, and how the flight ended."""
 
     windows: list[WindowRecord]
     code: int  # an exit code
     ending: str  # why it ended early; empty if it did not
-    wall_s: float  # that it took
+    wall_s: float
 
 
 def fly_swarm(
     swarm: Swarm, policy: Policy, recorder: Recorder | None, bar: WorkBar, *, way_on: str | None
 ) -> Flown:
-    """Flies a swarm's missions.
+    """Fly a swarm's missions.
 
     Args:
         swarm: At the start of its missions.
         policy: Who addresses whom.
         recorder: Takes each window, if there is one.
-        bar: Shows how far it is.
-        way_on: Said to who would fly on when memory runs short; None does so without a look.
+        bar: Shows the progress.
+        way_on: How to fly on when memory runs short, for the message; None flies on regardless.
 
     Raises:
         ValueError: As `rollout` does.
@@ -82,14 +80,9 @@ def fly_swarm(
 
 
 def compile_ahead(
-    mission: Mission,
-    policy_name: str,
-    on_window: Callable[[], object] = lambda: None,
-    **how: Any,
+    mission: Mission, policy_name: str, on_window: Callable[[], object] = lambda: None, **how: Any
 ) -> None:
-    """Flies a small mission of this kind, beyond half-way, so that compiling is not timed.
-
-    Parts of users' own are spared: they may be made for this mission only.
+    """Fly a small mission of this kind, beyond half-way, so that compiling is not timed.
 
     Args:
         mission: The one that is to be flown.
@@ -105,36 +98,14 @@ def compile_ahead(
         range_ratio=10.0,
         num_windows=COMPILING_WINDOWS,
     )
-    if is_own_policy(policy_name):
+    if is_own_policy(policy_name):  # which may be made for one mission only
         policy_name, how = "tdma", {}
     for _ in rollout(Swarm(smallest, [0]), make_policy(policy_name, smallest, **how)):
         on_window()
 
 
-def flight_summary(mission: Mission, policy: Policy, flown: Flown) -> dict[str, Any]:
-    """What a flight cost, how long it took, and whether it ended early for whatever reason."""
-    took = {"wall_seconds": flown.wall_s, "interrupted": flown.code != DONE}
-    return flight_numbers(mission, policy, summarise(flown.windows)) | took
-
-
-def flight_config(
-    mission: Mission, policy_name: str, policy: Policy, *, seed: int, observer: int
-) -> dict[str, Any]:
-    """Everything that makes a flight again."""
-    return {
-        **asdict(mission),
-        "policy": policy_name,
-        **policy.parameters,
-        "packet_bytes": policy.packet(mission).num_bytes,
-        "seed": seed,
-        "observer": observer,
-        "version": version(),
-        "commit": commit(),
-    }
-
-
 def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | None:
-    """What to say if memory does not suffice to write what was flown, at a second look either."""
+    """Return a message if memory does not suffice to write the replay, at a second look either."""
     needed = replay_memory(mission, num_windows) - recorder.num_bytes
     if free_memory() >= needed:
         return None

@@ -1,33 +1,42 @@
-"""What `swarm_mj.fly` gives back: numbers, a table, a chart, files, a video."""
+"""The result of `swarm_mj.fly`: numbers, a table, a chart, files, a video."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
+from rich.table import Table
 
-from swarm_mj.api.bars import is_notebook
-from swarm_mj.api.flight_table import flight_rows, flight_title
-from swarm_mj.api.numbers import Numbers
+from swarm_mj.api.flight import Flown
+from swarm_mj.api.flight_table import flight_numbers, flight_rows, flight_title
+from swarm_mj.api.metrics import Metrics
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import components_in
+from swarm_mj.mission.components import Components, components_in
+from swarm_mj.policies.policy import Policy
 from swarm_mj.protocol.costs import PACKETS
 from swarm_mj.replay.recorder import Log
-from swarm_mj.simulation.rollout import WindowRecord
+from swarm_mj.simulation.rollout import WindowRecord, summarise
 from swarm_mj.system.atomic import write_bytes, write_csv, write_json
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import as_typed
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
+from swarm_mj.system.progress import is_notebook
+from swarm_mj.system.provenance import commit, version
+from swarm_mj.system.terminal import named_values
 
 if TYPE_CHECKING:  # each takes its time to import, and flights do without
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
     from swarm_mj.replay.footage import Footage
+
+AGE = "age of information: how old a robot's news of another is, over all pairs; less is better"
+ENDINGS = ".rrd|.mp4|.gif|.json|.csv"  # of files that hold a run
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -37,15 +46,15 @@ class Run:
     Attributes:
         mission: Its numbers.
         config: Everything that makes this flight again: mission, policy, seed, version and commit.
-        summary: What it cost, by the names that `swarm-mj fly --json` uses: `summary.aoi_mean` is
-            the age of information [windows].
-        windows: What each window cost.
-        log: What a replay shows; None if nothing was recorded.
+        summary: Its costs, by the names that `swarm-mj fly --json` uses: `summary.aoi_mean` is the
+            age of information [windows].
+        windows: The costs of each window.
+        log: The record that a replay shows; None if nothing was recorded.
     """
 
     mission: Mission
     config: Mapping[str, Any]
-    summary: Numbers
+    summary: Metrics
     windows: Sequence[WindowRecord]
     log: Log | None
 
@@ -58,58 +67,68 @@ class Run:
 
     def _repr_html_(self) -> str:
         """Return the numbers as a table, for notebooks."""
-        rows = flight_rows(self.mission, self.summary, self.summary.wall_seconds)
+        left = "style='text-align:left'"
         lines = "".join(
-            f"<tr><th style='text-align:left'>{escape(name)}</th>"
-            f"<td style='text-align:left'>{escape(value)}</td></tr>"
-            for name, value in rows.items()
+            f"<tr><th {left}>{escape(name)}</th><td {left}>{escape(value)}</td></tr>"
+            for name, value in self._rows.items()
         )
         return f"<table><caption>{escape(self.title)}</caption>{lines}</table>"
 
+    def table(self) -> Table:
+        """Return the numbers as a table, for terminals."""
+        return named_values(self.title, self._rows, caption=AGE)
+
+    @property
+    def _rows(self) -> dict[str, str]:
+        return flight_rows(self.mission, self.summary, self.summary.wall_seconds)
+
     @property
     def title(self) -> str:
-        """What was flown, in a line."""
+        """Mission, policy, seed and components in a line."""
         title = flight_title(self.mission, self.config["policy"], self.config["seed"])
         return title + components_in(self.config).title
 
     @property
     def task_cost(self) -> tuple[str, str] | None:
-        """What the robots' task costs, such as a formation error, and its unit; None if nothing."""
+        """The name of the task's cost, such as a formation error, and its unit; None without."""
         cost = self.windows[0].costs.task_cost
         return None if cost is None else (cost.name, cost.unit)
 
     def columns(self) -> dict[str, Float[np.ndarray, "T"]]:
         """Return the flight window by window, column by column: all that `to_dataframe` has."""
+        costs = [each.costs for each in self.windows]
         window = np.arange(1.0, len(self.windows) + 1.0)
-        worst = {"aoi_worst": self.log.age_max} if self.log else {}
-        task = {} if self.task_cost is None else {"task_cost": self._course(_task_cost)}
-        packets = {
-            f"packets_{name}": self._course(
-                lambda each, name=name: getattr(each.costs.packets, name)
-            )
-            for name in PACKETS
-        }
-        return {
+
+        def column(values: Callable[[WindowRecord], Any]) -> Float[np.ndarray, "T"]:
+            return np.array([float(values(each)[0]) for each in self.windows])
+
+        columns = {
             "window": window,
             "seconds": np.round(window * self.mission.window_s, 9),
-            "aoi": self._course(lambda each: each.costs.age_windows),
-            **worst,
-            "velocity_variance": self._course(lambda each: each.costs.velocity_variance_m2ps2),
-            **task,
-            "hops": self._course(lambda each: each.hops),
-            "is_complete": self._course(lambda each: each.costs.is_complete),
-            **packets,
+            "aoi": column(lambda each: each.costs.age_windows),
         }
+        if self.log:
+            columns["aoi_worst"] = self.log.age_max
+        columns["velocity_variance"] = column(lambda each: each.costs.velocity_variance_m2ps2)
+        if self.task_cost is not None:
+            values = [cost.value[0] for each in costs if (cost := each.task_cost)]
+            columns["task_cost"] = np.array(values, dtype=float)
+        columns["hops"] = column(lambda each: each.hops)
+        columns["is_complete"] = column(lambda each: each.costs.is_complete)
+        for name in PACKETS:
+            counts = [float(getattr(each.packets, name)[0]) for each in costs]
+            columns[f"packets_{name}"] = np.array(counts)
+        return columns
 
     def to_dataframe(self) -> "DataFrame":
-        """One row per window, at its end; what does not apply to the policy's packets is nan.
+        """Return one row per window, at its end; what is not defined for the policy is nan.
 
         Returns:
             A pandas table with the columns `window` (1 is the first), `seconds`, `aoi` (age of
             information, mean over pairs of robots [windows]), `aoi_worst` (the worst pair's, if the
             flight was recorded), `velocity_variance` [m²/s²], `task_cost` (where the task has one;
-            `summary.task_cost_name` says which), `hops` (mean over the news known), `is_complete`
-            (everyone has heard of everyone) and `packets_...` in that window.
+            `summary.task_cost_name` names it), `hops` (mean over all known teammates),
+            `is_complete` (every robot knows every other) and `packets_...` in that window.
 
         Raises:
             ModuleNotFoundError: pandas is not installed.
@@ -117,11 +136,10 @@ class Run:
         need("pandas", "a table")
         from pandas import DataFrame
 
-        whole = {"window": int, "is_complete": bool}
-        return DataFrame(self.columns()).astype(whole)
+        return DataFrame(self.columns()).astype({"window": int, "is_complete": bool})
 
     def plot(self) -> "Figure":
-        """Draws the age of information over time and, below, what the task costs.
+        """Draw the age of information over time and, below, the task's cost.
 
         Of flocks and random walks that is the velocity variance.
 
@@ -133,12 +151,13 @@ class Run:
             ModuleNotFoundError: matplotlib is not installed.
         """
         need("matplotlib", "a chart")
-        from swarm_mj.api.charts import draw_run
+        from swarm_mj.api.charts import draw_flight
 
-        return draw_run(self)
+        window_s, policy = self.mission.window_s, self.config["policy"]
+        return draw_flight(self.columns(), self.title, policy, window_s, self.task_cost)
 
     def show(self) -> None:
-        """Plays the flight as a video, in a notebook; elsewhere, says how to see it.
+        """Play the flight as a video, in a notebook; elsewhere, say how to see it.
 
         Raises:
             ValueError: Nothing was recorded that a video shows.
@@ -153,7 +172,7 @@ class Run:
             video.tell_where()
 
     def footage(self) -> "Footage":
-        """What a video shows of the flight; `rendering.video.make_video` puts two side by side.
+        """Return the pictures' data; `rendering.video.make_video` puts two side by side.
 
         Raises:
             ValueError: Nothing was recorded.
@@ -163,6 +182,11 @@ class Run:
         policy, seed = self.config["policy"], self.config["seed"]
         components = components_in(self.config)
         return footage_of(self._recorded(), self.mission, policy, seed, components)
+
+    def report(self, replay: Path | None = None) -> dict[str, Any]:
+        """Return config and summary, as `swarm-mj fly --json` writes them."""
+        written = None if replay is None else str(replay)
+        return {"config": dict(self.config), **self.summary, "replay": written}
 
     def save(self, path: str | Path) -> Path:
         """Write the flight, replacing the file if it exists.
@@ -180,8 +204,18 @@ class Run:
             ModuleNotFoundError: A package that writes such files is not installed.
         """
         path = Path(path)
-        check_outputs(Output("the file", path, "|".join(WRITERS)))
-        WRITERS[path.suffix.lower()](self, path)
+        check_outputs(Output("the file", path, ENDINGS))
+        match path.suffix.lower():
+            case ".rrd":
+                self._write_replay(path)
+            case ".json":
+                write_json(path, self.report())
+            case ".csv":
+                self._write_columns(path)
+            case ending:
+                from swarm_mj.api.video import film
+
+                write_bytes(path, film(self.footage(), ending))
         return path
 
     def _recorded(self) -> Log:
@@ -189,48 +223,59 @@ class Run:
             raise ValueError("nothing was recorded that could be shown; fly with record=True")
         return self.log
 
-    def _course(
-        self, of: Callable[[WindowRecord], Float[np.ndarray, "B"]]
-    ) -> Float[np.ndarray, "T"]:
-        """Return a cost of the mission, window by window."""
-        return np.array([float(of(window)[0]) for window in self.windows])
+    def _write_replay(self, path: Path) -> None:
+        log = self._recorded()
+        need("rerun", "a replay")
+        from swarm_mj.replay.write import write_replay  # rerun takes its time to import
+
+        config = {name: value for name, value in self.config.items() if value is not None}
+        write_replay(log, self.mission, config, path)
+
+    def _write_columns(self, path: Path) -> None:
+        columns = {name: values.tolist() for name, values in self.columns().items()}
+        rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
+        texts = (
+            {name: None if math.isnan(value) else as_typed(value) for name, value in row.items()}
+            for row in rows
+        )
+        write_csv(path, list(columns), texts)
 
 
-def _task_cost(window: WindowRecord) -> Float[np.ndarray, "B"]:
-    cost = window.costs.task_cost
-    return np.array([np.nan]) if cost is None else cost.value
+def run_of(
+    mission: Mission,
+    policy: Policy,
+    flown: Flown,
+    *,
+    name: str,
+    seed: int,
+    observer: int,
+    components: Components,
+    log: Log | None = None,
+) -> Run:
+    """Return a mission flown as a `Run`.
 
-
-def _write_replay(run: Run, path: Path) -> None:
-    log = run._recorded()
-    need("rerun", "a replay")
-    from swarm_mj.replay.write import write_replay  # rerun takes its time to import
-
-    config = {name: value for name, value in run.config.items() if value is not None}
-    write_replay(log, run.mission, config, path)
-
-
-def _write_video(run: Run, path: Path) -> None:
-    from swarm_mj.api.video import film
-
-    write_bytes(path, film(run.footage(), path.suffix.lower()))
-
-
-def _write_summary(run: Run, path: Path) -> None:
-    write_json(path, {"config": dict(run.config)} | dict(run.summary) | {"replay": None})
-
-
-def _write_windows(run: Run, path: Path) -> None:
-    columns = run.columns()
-    rows = np.stack(list(columns.values()), axis=1).tolist()
-    texts = ([None if math.isnan(value) else as_typed(value) for value in row] for row in rows)
-    write_csv(path, list(columns), (dict(zip(columns, row, strict=True)) for row in texts))
-
-
-WRITERS = {
-    ".rrd": _write_replay,
-    ".mp4": _write_video,
-    ".gif": _write_video,
-    ".json": _write_summary,
-    ".csv": _write_windows,
-}
+    Args:
+        mission: Its numbers.
+        policy: The one that flew.
+        flown: The windows, at least one.
+        name: The policy's.
+        seed: The mission's.
+        observer: The robot whose knowledge a replay shows.
+        components: Those that replace the mission's own.
+        log: The record, if there is one.
+    """
+    config = {
+        **asdict(mission),
+        "policy": name,
+        **policy.parameters,
+        "packet_bytes": policy.packet(mission).num_bytes,
+        "seed": seed,
+        "observer": observer,
+        "version": version(),
+        "commit": commit(),
+        **components.names,
+    }
+    numbers = flight_numbers(mission, policy, summarise(flown.windows))
+    numbers |= {"wall_seconds": flown.wall_s, "interrupted": flown.code != DONE}
+    windows = tuple(flown.windows)
+    return Run(mission=mission, config=config, summary=Metrics(numbers), windows=windows, log=log)

@@ -1,11 +1,11 @@
-"""Videos of what Python flew: as a file's content, and within a notebook."""
+"""Videos of flights: as a file's content, and within a notebook."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from swarm_mj.api.bars import quiet_bar
 from swarm_mj.replay.rendering.style import USUAL, fitted, usual_seconds
 from swarm_mj.system.packages import need
+from swarm_mj.system.progress import quiet_bar
 from swarm_mj.system.terminal import plain_console
 
 if TYPE_CHECKING:  # they load what draws
@@ -18,11 +18,7 @@ ELSEWHERE = (
 
 
 def film(footage: "Footage", suffix: str) -> bytes:
-    """Return the content of a video file, as `swarm-mj replay --video` makes it.
-
-    Args:
-        footage: What was flown.
-        suffix: `.mp4` or `.gif`.
+    """Return the content of a video file of this ending, as `swarm-mj replay --video` makes it.
 
     Raises:
         OSError: No OpenGL works here; it says what to install.
@@ -45,5 +41,5 @@ def play(content: bytes) -> None:
 
 
 def tell_where() -> None:
-    """Says what to do where no notebook is."""
+    """Say what to do outside notebooks."""
     plain_console().print(ELSEWHERE)

@@ -6,17 +6,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from rich.console import Console
 
 from swarm_mj.api.estimates import flight_needs
-from swarm_mj.api.flight import compile_ahead, flight_config, flight_summary, fly_swarm
-from swarm_mj.api.flight_table import flight_table, flight_title
+from swarm_mj.api.flight import Flown, compile_ahead, fly_swarm
+from swarm_mj.api.run import Run, run_of
 from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, one_mission
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import notes_on
-from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.policy_config import SUFFIX
 from swarm_mj.policies.registry import (
     check_used,
@@ -75,55 +74,67 @@ class FlyOptions(PolicyOptions):
 
 
 def run(options: FlyOptions) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command; return its exit code."""
     mission = options.mission
     (asked,) = with_payload([options.policy], options.payload)
-    options = replace(options, policy=flown_name(asked, mission))
+    name = flown_name(asked, mission)
+    options = replace(options, policy=name)
     path = _replay_path(options)
     if path:
         need("rerun", "a replay", "fly without one: --no-record")
-    needs = flight_needs(mission, options.policy, is_recorded=path is not None)
+    needs = flight_needs(mission, name, is_recorded=path is not None)
     way_out = "choose fewer --robots or --windows" + (", or --no-record" if path else "")
     check_fits(needs, path, way_out, is_forced=options.yes)
-    policy = make_policy(options.policy, mission, **options.how)
+    policy = make_policy(name, mission, **options.how)
     components = options.components.made(mission)
     check_used(options.features, [policy])
-    console = Console(stderr=True, highlight=False)
+    console, ego = Console(stderr=True, highlight=False), options.observer
     preparing = console.status("Preparing the swarm (compiles once, then it is cached) ...")
     with preparing:
-        compile_ahead(mission, options.policy, **options.how)
+        compile_ahead(mission, name, **options.how)
         swarm = Swarm(mission, [options.seed], **components.given)
-        recorder = _recorder(options, swarm, policy) if path else None
+        is_broadcast = policy.window(mission).is_broadcast
+        recorder = Recorder(swarm, ego=ego, is_broadcast=is_broadcast) if path else None
     for note in notes_on(mission):
         console.print(note)
     bar = WorkBar("Flying", mission.num_windows, "windows", console=console)
     way_on = None if options.yes else "; --yes flies on all the same"
     flown = fly_swarm(swarm, policy, recorder, bar, way_on=way_on)
-    out, title = plain_console(), flight_title(mission, options.policy, options.seed)
+    given = {"seed": options.seed, "observer": ego, "components": options.components}
     with deferred_interrupt():
-        config = flight_config(
-            mission, options.policy, policy, seed=options.seed, observer=options.observer
-        )
-        config |= options.names
-        numbers = flight_summary(mission, policy, flown)
-        summary = {"config": config} | numbers | {"replay": str(path) if path else None}
-        try:  # either may fail
+        run = run_of(mission, policy, flown, name=name, **given)
+        try:  # a file may fail; the table is printed all the same
             with console.status("Writing ..."):
-                _write(options, summary, path, recorder)
+                _write(run, options.json, path, recorder)
         finally:
-            out.print(flight_table(title + options.title, mission, numbers, flown.wall_s))
+            plain_console().print(run.table())
+    return _ended(options, path, flown, console)
+
+
+def _write(run: Run, summary: Path | None, path: Path | None, recorder: Recorder | None) -> None:
+    """Write both files, the replay even if the summary fails."""
+    try:
+        if summary:
+            write_json(summary, run.report(path))
+    finally:
+        if path and recorder:
+            replace(run, log=recorder.log()).save(path)
+
+
+def _ended(options: FlyOptions, path: Path | None, flown: Flown, console: Console) -> int:
+    """Print what to do next, and open the viewer if it was asked for; return the exit code."""
     for label, line in _next_commands(options, path):
-        out.print(f"{label:18}{line}")
+        plain_console().print(f"{label:18}{line}")
     if flown.code != DONE:
-        flown_of = f"{len(flown.windows)} of {mission.num_windows}"
-        told = f"{flown.ending} after {flown_of} window{'s' * (mission.num_windows != 1)}."
-        console.print(told)
+        number = options.mission.num_windows
+        windows = f"{len(flown.windows)} of {number} window{'s' * (number != 1)}"
+        console.print(f"{flown.ending} after {windows}.")
         return flown.code
     return run_viewer(view_command(path)) if options.view and path else DONE
 
 
 def _next_commands(options: FlyOptions, path: Path | None) -> Iterator[tuple[str, str]]:
-    """What to do next, and the commands that do it."""
+    """Yield what to do next, and the commands that do it."""
     name, way = this_command(), "" if has_display() else "--web "
     if path:
         yield "Open the replay:", f"{name} replay {way}{shlex.quote(str(path))}"
@@ -135,7 +146,7 @@ def _next_commands(options: FlyOptions, path: Path | None) -> Iterator[tuple[str
 
 
 def _replay_path(options: FlyOptions) -> Path | None:
-    """Return the replay's path, or None; raises ValueError for what could not be written later."""
+    """Return the replay's path, or None; raise ValueError if it could not be written later."""
     if options.no_record and options.record:
         raise ValueError("--no-record is not allowed with --record; leave one out")
     if options.no_record and options.view:
@@ -166,23 +177,3 @@ def _short(policy: str) -> str:
         return policy.replace(" --", "-").replace(" ", "-").replace(":", "-")
     path = Path(policy.removesuffix(SUFFIX)).resolve()
     return path.parent.name if path.name == "policy" else path.name
-
-
-def _recorder(options: FlyOptions, swarm: Swarm, policy: Policy) -> Recorder:
-    is_broadcast = policy.window(swarm.mission).is_broadcast
-    return Recorder(swarm, ego=options.observer, is_broadcast=is_broadcast)
-
-
-def _write(
-    options: FlyOptions, summary: dict[str, Any], path: Path | None, recorder: Recorder | None
-) -> None:
-    """Write both files, the replay even if the summary fails."""
-    try:
-        if options.json:
-            write_json(options.json, summary)
-    finally:
-        if path and recorder:
-            from swarm_mj.replay.write import write_replay  # rerun takes its time to import
-
-            config = {key: value for key, value in summary["config"].items() if value is not None}
-            write_replay(recorder.log(), options.mission, config, path)

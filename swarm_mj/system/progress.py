@@ -1,13 +1,16 @@
 """The one bar of all long work: what is under way, how far it is, how long it will take."""
 
+import sys
 from collections.abc import Callable
 from threading import Timer
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TimeRemainingColumn
 from rich.text import Text
 
 BAR_WIDTH = 20
+AFTER_S = 2.0  # shorter work from Python shows no bar
 
 
 class WorkBar:
@@ -84,3 +87,21 @@ class _Told(ProgressColumn):
 
     def render(self, task: Task) -> Text:
         return Text(self._tell(task))
+
+
+def is_notebook() -> bool:
+    """Return whether this Python is the kernel of a notebook."""
+    ipython = sys.modules.get("IPython")
+    shell: Any = ipython.get_ipython() if ipython else None
+    return hasattr(shell, "kernel")
+
+
+def quiet_console() -> Console:
+    """Return a terminal, if there is one: notebooks claim to be one, but keep every redrawing."""
+    forced = False if is_notebook() else None
+    return Console(stderr=True, highlight=False, force_jupyter=False, force_terminal=forced)
+
+
+def quiet_bar(what: str, total: int, unit: str) -> WorkBar:
+    """Return a bar for Python: on a terminal, once the work takes its time."""
+    return WorkBar(what, total, unit, console=quiet_console(), after_s=AFTER_S)

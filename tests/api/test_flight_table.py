@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from swarm_mj.api.flight_table import flight_numbers, flight_table, flight_title
+from swarm_mj.api.flight_table import flight_numbers, flight_rows, flight_title
+from swarm_mj.api.run import AGE
 from swarm_mj.mission import PRESETS, paper
 from swarm_mj.policies.registry import WITHOUT_PAYLOAD, make_policy
 from swarm_mj.simulation.rollout import Summary
+from swarm_mj.system.terminal import named_values
 
 NAN = np.array([np.nan])
 BROADCAST = {
@@ -53,7 +55,8 @@ def shown(policy_name, task, its):
     """The table's rows as a mapping, and all its text."""
     mission = paper(task, num_robots=6)
     policy = make_policy(policy_name, mission)
-    table = flight_table("a title", mission, flight_numbers(mission, policy, its), 1.5)
+    rows = flight_rows(mission, flight_numbers(mission, policy, its), 1.5)
+    table = named_values("a title", rows, caption=AGE)
     console = Console(width=80, highlight=False)
     with console.capture() as printed:
         console.print(table)

@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 import swarm_mj
+from swarm_mj.api.flight import Flown
+from swarm_mj.api.run import run_of
+from swarm_mj.mission import paper
+from swarm_mj.mission.components import Components
+from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay.read import windows
+from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 
 SHORT = {"num_robots": 6, "num_windows": 20, "range_ratio": 0.5}
 
@@ -85,3 +91,14 @@ def test_it_shows_itself_in_a_line_and_as_a_table(run):
     html = run._repr_html_()
     assert html.count("<tr>") >= 8
     assert f"{run.summary.aoi_mean:.2f} windows" in html
+
+
+@pytest.mark.parametrize("code", [DONE, FAILED, INTERRUPTED])
+def test_a_flight_that_ended_early_is_called_interrupted(unrecorded, code):
+    mission = paper("stationary", **SHORT)
+    flown = Flown(list(unrecorded.windows), code, "", 2.5)
+    how = {"name": "mst", "seed": 3, "observer": 0, "components": Components()}
+    run = run_of(mission, make_policy("mst", mission), flown, **how)
+    assert (run.summary.num_windows, run.summary.wall_seconds) == (20, 2.5)
+    assert run.summary.interrupted == (code != DONE)
+    assert run.report()["config"] == unrecorded.config
