@@ -26,8 +26,7 @@ from swarm_mj.replay.read import check_replay, windows
 from swarm_mj.replay.view import LOOPBACK, VIEWER, free_ports, quiet_environment
 from swarm_mj.system.atomic import write_bytes
 from swarm_mj.system.fields import setting
-from swarm_mj.system.outputs import Output, check_outputs
-from swarm_mj.system.owned import owned
+from swarm_mj.system.outputs import Output, check_outputs, owned
 from swarm_mj.system.processes import running
 
 START_TIMEOUT_S = 60.0

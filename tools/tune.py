@@ -24,8 +24,7 @@ from swarm_mj.policies.tuning import TABLE, Tuned, read_table
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.atomic import write_csv
 from swarm_mj.system.fields import same_as, setting
-from swarm_mj.system.outputs import Output, check_outputs
-from swarm_mj.system.owned import owned
+from swarm_mj.system.outputs import Output, check_outputs, owned
 from swarm_mj.system.progress import WorkBar
 from swarm_mj.system.provenance import commit, version
 from swarm_mj.system.terminal import plain_console

@@ -31,8 +31,7 @@ from swarm_mj.system.fields import same_as, setting
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.machine import YES, memory_errors
 from swarm_mj.system.needs import check_fits
-from swarm_mj.system.outputs import Output, check_outputs
-from swarm_mj.system.owned import owned
+from swarm_mj.system.outputs import Output, check_outputs, owned
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import tell_cores
 

@@ -109,7 +109,6 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
     for module in ("av", "PIL", "rerun"):
         need(module, "a video")
     from swarm_mj.replay.rendering.video import (  # MuJoCo takes its time to import
-        check_video,
         make_video,
     )
 
@@ -118,7 +117,7 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
     style = replace(style, seconds=options.seconds or usual_seconds(footages))
     with WorkBar("Rendering", style.num_frames, "pictures") as bar:
         content = make_video(footages, suffix, style, bar.advance)
-    write_bytes(video, content, check=lambda part: check_video(part, suffix, style))
+    write_bytes(video, content)
     number, name = style.num_frames, shlex.quote(str(video))
     plain_console().print(
         f"Wrote {name}: {number / style.fps:.3g} s, {number} pictures of {style.width} by "

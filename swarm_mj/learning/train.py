@@ -40,7 +40,7 @@ from swarm_mj.learning.settings import PpoSettings, Training
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.policy_config import GnnConfig
 from swarm_mj.policies.stored import read_policy, save_policy
-from swarm_mj.system.owned import owned
+from swarm_mj.system.outputs import owned
 
 NO_BUDGET = 10**15  # team decisions
 

@@ -19,7 +19,7 @@ from swarm_mj.learning import checkpoint
 from swarm_mj.learning.run_folder import CHECKPOINT, SETTINGS, read_run
 from swarm_mj.learning.train import make_model
 from swarm_mj.mission import paper
-from swarm_mj.system.owned import owned
+from swarm_mj.system.outputs import owned
 
 EVALUATE = ["evaluate", "--policy", "tdma", "--robots", "3", "--windows", "2", "--episodes", "30"]
 

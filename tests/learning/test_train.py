@@ -19,7 +19,7 @@ from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import make_model
 from swarm_mj.mission import PRESETS
 from swarm_mj.policies.stored import read_policy
-from swarm_mj.system.owned import owned
+from swarm_mj.system.outputs import owned
 
 # III-C, and the authors' code for what the text leaves open. Their minibatches are of 32, which
 # takes a misspelt key to, and their value loss has an extra 1/2.

@@ -1,12 +1,16 @@
-"""Files are checked before the work, and nothing is left by the check."""
+"""Files are checked before the work and owned by one process; nothing is left by either."""
 
 import errno
+import fcntl
 import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from swarm_mj.system.outputs import Output, check_outputs
+from swarm_mj.system.outputs import Output, check_outputs, owned
 
 
 def test_a_file_in_missing_folders_can_be_written(tmp_path):
@@ -79,3 +83,91 @@ def test_a_full_or_read_only_disk_is_the_machines_fault(tmp_path, monkeypatch, n
     monkeypatch.setattr("swarm_mj.system.outputs.check_writable", full)
     with pytest.raises(OSError, match=rf"summary .* cannot be written: {os.strerror(number)}"):
         check_outputs(Output("summary", tmp_path / "a"))
+
+
+OWN_ON_AND_ON = """
+import sys, time
+from pathlib import Path
+from swarm_mj.system.outputs import owned
+with owned(Path(sys.argv[1])):
+    print(flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.fixture
+def owner(tmp_path):
+    """A process that owns an output."""
+    command = [sys.executable, "-c", OWN_ON_AND_ON, str(tmp_path / "o.csv")]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE)
+    process.stdout.readline()
+    yield process
+    process.kill()
+    process.communicate()
+
+
+def test_a_second_process_is_told_the_first_one_s_id(owner, tmp_path):
+    (tmp_path / "alias").symlink_to(tmp_path)
+    for name in ("o.csv", "alias/o.csv"):
+        with pytest.raises(ValueError, match=f"o.csv is being written by process {owner.pid};"):
+            owned(tmp_path / name).__enter__()
+    with owned(tmp_path / "other.csv"):
+        pass
+
+
+def test_a_killed_owner_keeps_nobody_out(owner, tmp_path):
+    owner.send_signal(signal.SIGKILL)
+    owner.wait()
+    with owned(tmp_path / "o.csv"):
+        assert (tmp_path / ".o.csv.lock").read_text() == str(os.getpid())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_it_can_be_owned_again(tmp_path):
+    for _ in range(2):
+        with owned(tmp_path / "new" / "o.csv"), pytest.raises(ValueError, match=str(os.getpid())):
+            owned(tmp_path / "new" / "o.csv").__enter__()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_folders_that_it_made_are_left_if_something_is_in_them(tmp_path):
+    with owned(tmp_path / "kept" / "new" / "o.csv"):
+        (tmp_path / "kept" / "a").touch()
+    assert [path.name for path in tmp_path.rglob("*")] == ["kept", "a"]
+
+
+def test_a_lock_of_another_user_is_told(tmp_path, monkeypatch):
+    def refuse(path, *_):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)
+
+    (tmp_path / ".o.csv.lock").touch()
+    monkeypatch.setattr(os, "open", refuse)
+    with pytest.raises(PermissionError):  # nothing is in the way
+        owned(tmp_path / "other.csv").__enter__()
+    with pytest.raises(ValueError, match=r"o.csv cannot be locked: Permission denied; unless"):
+        owned(tmp_path / "o.csv").__enter__()
+
+
+def num_open():
+    return len(os.listdir("/proc/self/fd"))
+
+
+def test_a_lock_is_no_link(tmp_path):
+    """The file that it leads to would be written to."""
+    (tmp_path / "precious").write_text("x")
+    (tmp_path / ".o.csv.lock").symlink_to("precious")
+    with pytest.raises(ValueError, match=r"o.csv cannot be locked: .*; unless .* remove .*lock$"):
+        owned(tmp_path / "o.csv").__enter__()
+    assert (tmp_path / "precious").read_text() == "x"
+
+
+def test_disks_without_locks_are_written_and_leave_nothing(tmp_path, monkeypatch):
+    def fail(*_):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", fail)
+    before = num_open()
+    with owned(tmp_path / "o.csv"):
+        pass
+    assert list(tmp_path.iterdir()) == []
+    assert num_open() == before

@@ -26,8 +26,7 @@ from residual_gnn.training_run import (
 from swarm_mj.cli import script
 from swarm_mj.mission import Mission, paper
 from swarm_mj.system.fields import as_typed, setting
-from swarm_mj.system.outputs import Output, check_outputs
-from swarm_mj.system.owned import owned
+from swarm_mj.system.outputs import Output, check_outputs, owned
 from swarm_mj.system.provenance import commit
 
 WINDOWS = 250  # of a mission that is learned from
