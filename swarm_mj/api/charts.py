@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from swarm_mj.control.motion import Flocking
-from swarm_mj.evaluation.figures.style import FAINT, as_it_is, look_of, styled
+from swarm_mj.evaluation.figures.style import FAINT, escape_mathtext, look_of, styled
 from swarm_mj.evaluation.results import Result
 from swarm_mj.mission.components import components_in
 
@@ -45,7 +45,7 @@ def draw_flight(
     moves = bool(np.any(columns["velocity_variance"]))
     with styled():
         figure, axes = _panels(2 if own_cost or moves else 1)
-        figure.suptitle(as_it_is(title), x=0.01, ha="left", fontsize=TITLE_PT)
+        figure.suptitle(escape_mathtext(title), x=0.01, ha="left", fontsize=TITLE_PT)
         _draw_age(axes[0], columns, colour)
         if own_cost:
             axes[1].plot(columns["window"], columns["task_cost"], color=colour)
@@ -72,7 +72,7 @@ def draw_evaluation(results: Sequence[Result]) -> Figure:
         )
         about = f"{first.task}, {first.num_robots} robots, {first.episodes} missions from seed "
         own = components_in(vars(first))
-        title = as_it_is(f"{about}{first.seed}{own.title}")
+        title = escape_mathtext(f"{about}{first.seed}{own.title}")
         figure.suptitle(title, x=0.01, ha="left", fontsize=TITLE_PT)
         for each, cost in zip(axes[0], costs, strict=True):
             for place, result in enumerate(shown):

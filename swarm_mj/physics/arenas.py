@@ -1,12 +1,12 @@
-"""Arenas: what stands in the area, at a size that grows with the team.
+"""Arenas: obstacles in the area, at a size that grows with the team.
 
-Their geoms are obstacles (`physics.solid_geoms`): packets lose power in them and, in `contact`
-physics, robots turn round at them.
+Obstacles (`physics.solid_geoms`) attenuate packets and, in `contact` physics, reflect robots.
 """
 
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -18,7 +18,7 @@ from swarm_mj.mission.specification import OPEN
 from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP, idle_obstacles, obstacles_of
 from swarm_mj.system.fields import did_you_mean
 
-Arena = Callable[[MjSpec, Mission], None]  # adds what stands in the area
+Arena = Callable[[MjSpec, Mission], None]  # adds the obstacles
 
 HALF_HEIGHT_M = 5.0  # of obstacles: well above the robots
 BLOCK_PITCH_M = 200.0  # from street to street
@@ -37,7 +37,7 @@ COLOURS = {
 
 
 def arena_of(mission: Mission) -> Arena | None:
-    """What stands in a mission's area; None for the paper's, which is empty.
+    """Return the arena of a mission; None for the paper's, which is empty.
 
     Raises:
         ValueError: There is no such arena, and no such file.
@@ -58,7 +58,7 @@ def arena_of(mission: Mission) -> Arena | None:
 
 
 def notes_on(mission: Mission) -> list[str]:
-    """What a user should know of the obstacles in a file: those that nothing can touch."""
+    """Return a note on each obstacle in a file that neither robots nor packets can meet."""
     if arena_of(mission) is not _from_file:
         return []
     names = idle_obstacles(_read(mission.arena).compile(), _reach_m(mission))
@@ -69,15 +69,16 @@ def notes_on(mission: Mission) -> list[str]:
 
 
 def blocks(spec: MjSpec, mission: Mission) -> None:
-    """Return a city: square blocks with streets between them and around them."""
+    """Add a city: square blocks with streets between them and around them."""
     num = max(1, round(mission.side_m / BLOCK_PITCH_M))
     pitch_m = mission.side_m / num
-    for x, y in _grid(num, pitch_m):
+    middles_m = [(n - (num - 1) / 2.0) * pitch_m for n in range(num)]
+    for x, y in product(middles_m, middles_m):
         _add(spec, "building", "box", (x, y), (BLOCK_M / 2.0, BLOCK_M / 2.0))
 
 
 def rooms(spec: MjSpec, mission: Mission) -> None:
-    """Return an office floor: square rooms, with a door in the middle of every wall between two."""
+    """Add an office floor: square rooms, with a door in the middle of every wall between two."""
     num = max(1, round(mission.side_m / ROOM_M))
     side_m = mission.side_m / num
     half_m = (side_m - DOOR_M) / 4.0  # of the wall on either side of a door
@@ -92,22 +93,17 @@ def rooms(spec: MjSpec, mission: Mission) -> None:
 
 
 def forest(spec: MjSpec, mission: Mission) -> None:
-    """Trees, spread evenly but in no rows: the points of Halton (1960) in bases 2 and 3."""
+    """Add trees, spread evenly but not in rows: the points of Halton (1960) in bases 2 and 3."""
     for n in range(1, round(TREES_PER_KM2 * mission.side_m**2 / 1e6) + 1):
         x, y = ((_halton(n, base) - 0.5) * mission.side_m for base in (2, 3))
         _add(spec, "tree", "cylinder", (x, y), (TREE_RADIUS_M, HALF_HEIGHT_M))
 
 
-ARENAS: dict[str, Arena | None] = {
-    OPEN: None,
-    "blocks": blocks,
-    "forest": forest,
-    "rooms": rooms,
-}
+ARENAS: dict[str, Arena | None] = {OPEN: None, "blocks": blocks, "forest": forest, "rooms": rooms}
 
 
 def _from_file(spec: MjSpec, mission: Mission) -> None:
-    """What an MJCF file of the user's holds.
+    """Add the contents of a user's MJCF file.
 
     Raises:
         ValueError: MuJoCo does not take it, something moves in it, or it has no obstacle.
@@ -134,7 +130,7 @@ def _from_file(spec: MjSpec, mission: Mission) -> None:
 
 
 def _read(file: str) -> MjSpec:
-    """An MJCF file; raises ValueError in our words, as MuJoCo's are of its parser, or of a log."""
+    """Read an MJCF file; raise ValueError in one line that names the file, as MuJoCo does not."""
     try:
         for element in ElementTree.parse(file).iter():
             for name, value in element.attrib.items():
@@ -155,12 +151,12 @@ def _refused(file: str, error: ValueError) -> ValueError:
 
 
 def _reach_m(mission: Mission) -> float:
-    """How far from the middle, per axis, robots can get [m]."""
+    """Return how far from the centre robots can get per axis [m]."""
     return mission.half_side_m if mission.has_walls else math.inf
 
 
 def _why_none(theirs: MjSpec) -> str:
-    """Why a file holds no obstacle, and what to do."""
+    """Explain why a file holds no obstacle, and what to do."""
     grouped = [geom for geom in theirs.geoms if geom.group == OBSTACLE_GROUP]
     if not theirs.geoms:
         why = "it has no geom; add walls"
@@ -169,12 +165,6 @@ def _why_none(theirs: MjSpec) -> str:
     else:
         why = f'none of its geoms is of group {OBSTACLE_GROUP}; give walls group="{OBSTACLE_GROUP}"'
     return f"{why}, or choose arena {OPEN}"
-
-
-def _grid(num: int, pitch_m: float) -> Iterator[tuple[float, float]]:
-    """Return the middles of num by num squares around the origin [m]."""
-    middles = [(n - (num - 1) / 2.0) * pitch_m for n in range(num)]
-    yield from ((x, y) for x in middles for y in middles)
 
 
 def _add(

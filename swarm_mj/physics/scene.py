@@ -53,11 +53,10 @@ def compose(
 
     Args:
         mission: Number of robots, area, bounds and physics.
-        start: Where the robots of the first mission stand and how fast they are when a viewer
-            opens the model, for a file that is to be looked at. Without it, all stand at the
-            origin until `Physics.place` puts them elsewhere.
-        scene: Changes the arena, which then holds the robots. What it adds stops robots in
-            `contact` physics only; `exact` physics knows no collisions, so there it is only seen.
+        start: Initial states of the first mission, for a file to look at in a viewer. Without it,
+            all robots stand at the origin until `Physics.place` moves them.
+        scene: Changes the arena with the robots in it. Its geoms stop robots in `contact` physics
+            only, because `exact` physics has no collisions.
 
     Returns:
         The editable model; with a start, also its keyframe `start`.
@@ -86,7 +85,7 @@ def compose(
 
 
 def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
-    """Lets a scene change the arena, but neither how the robots move nor how time is cut."""
+    """Let a scene change the arena, but neither the robots' joints nor the time step."""
     before = _movable(spec)
     scene(spec, mission)
     if _movable(spec) != before:
@@ -100,14 +99,14 @@ def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
         return
     spec.option.disableflags &= ~int(mjtDisableBit.mjDSBL_CONTACT)
     for i in range(mission.num_robots):
-        spec.geom(f"r{i}/hull").conaffinity |= 1  # it meets what the scene adds, but no robot
+        spec.geom(f"r{i}/hull").conaffinity |= 1  # meets the scene's geoms, no robot
     for geom in spec.geoms:
         if geom.group == OBSTACLE_GROUP:
-            _bounce(geom, mission, priority=1)  # as it says, whatever it meets
+            _bounce(geom, mission, priority=1)  # its own contact parameters count
 
 
 def _bounce(geom: MjsGeom, mission: Mission, priority: int = 0) -> None:
-    """What touches it keeps its speed, as at the boundary: no friction, the normal one reversed."""
+    """Make contacts elastic, as at the boundary: no friction, the normal velocity reversed."""
     geom.condim = 1
     geom.solref = [0.0, -2.0 / timestep_s(mission)]
     geom.solimp = ELASTIC_SOLIMP
@@ -115,7 +114,7 @@ def _bounce(geom: MjsGeom, mission: Mission, priority: int = 0) -> None:
 
 
 def _movable(spec: MjSpec) -> list[str]:
-    """What moves, in MuJoCo's order."""
+    """Return the names of joints and actuators, in MuJoCo's order."""
     return [part.name for part in (*spec.joints, *spec.actuators)]
 
 
@@ -129,7 +128,7 @@ def _place_robots(spec: MjSpec, mission: Mission, start: RobotStates) -> None:
         spec.body(f"r{i}/body").pos = [x, y, 0.0]
         spec.joint(f"r{i}/x").ref, spec.joint(f"r{i}/y").ref = x, y
     key = spec.add_key(name="start", qpos=position_m.ravel(), qvel=velocity_mps.ravel())
-    if mission.physics == "exact":  # whose servos are told velocities
+    if mission.physics == "exact":  # whose servos take velocities
         key.ctrl = velocity_mps.ravel()
 
 

@@ -1,8 +1,8 @@
 """The obstacles of a scene: geoms in one group, each with the power that it takes from a packet.
 
-A geom of group `OBSTACLE_GROUP` that stands still is an obstacle. Its penetration loss is its first
+A static geom of group `OBSTACLE_GROUP` is an obstacle. Its penetration loss is its first
 `user` number [dB]; without one, or with 0, that of its material's name (`LOSS_DB`), or
-`USUAL_LOSS_DB`.
+`DEFAULT_LOSS_DB`.
 """
 
 import numpy as np
@@ -10,15 +10,16 @@ from jaxtyping import Float
 from mujoco._functions import mj_kinematics
 from mujoco._structs import MjData, MjModel
 
-from swarm_mj.physics.obstacles import (
+from swarm_mj.physics.state import (
     BOX,
     CAPSULE,
     CYLINDER,
     ELLIPSOID,
+    ROBOT_HEIGHT_M,
+    ROBOT_RADIUS_M,
     SPHERE,
     Obstacles,
 )
-from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M
 
 OBSTACLE_GROUP = 1
 MESH = 7  # as MuJoCo numbers it
@@ -28,11 +29,11 @@ KINDS = (SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX)
 # outer walls of 7 dB and the rooms between them; a tree as 12 m of leaves at about 0.5 dB/m (ITU-R
 # P.833).
 LOSS_DB = {"light wall": 3.4, "heavy wall": 6.9, "building": 25.0, "tree": 6.0}
-USUAL_LOSS_DB = 10.0
+DEFAULT_LOSS_DB = 10.0
 
 
 def obstacles_of(model: MjModel) -> Obstacles:
-    """What stands in the way in a compiled scene; perhaps nothing.
+    """Return the obstacles of a compiled scene.
 
     Raises:
         ValueError: A loss is negative or not finite.
@@ -58,7 +59,7 @@ def obstacles_of(model: MjModel) -> Obstacles:
 
 
 def obstacle_geoms(model: MjModel) -> list[int]:
-    """Which geoms are obstacles."""
+    """Return the geoms that are obstacles."""
     stands_still = model.body_weldid[model.geom_bodyid] == 0
     is_solid = np.isin(model.geom_type, (*KINDS, MESH))
     is_obstacle = stands_still & is_solid & (model.geom_group == OBSTACLE_GROUP)
@@ -66,11 +67,9 @@ def obstacle_geoms(model: MjModel) -> list[int]:
 
 
 def idle_obstacles(model: MjModel, reach_m: float) -> dict[str, str]:
-    """Obstacles that neither robots nor their packets can meet, and where they stand.
+    """Return the obstacles that neither robots nor packets can meet, and where they stand.
 
-    Args:
-        model: Compiled.
-        reach_m: How far from the middle, per axis, robots can get [m].
+    Robots get as far from the centre as `reach_m` per axis [m].
     """
     found, idle = obstacles_of(model), {}
     for o, g in enumerate(obstacle_geoms(model)):
@@ -87,7 +86,7 @@ def idle_obstacles(model: MjModel, reach_m: float) -> dict[str, str]:
 
 
 def _half_sides_m(kind: int, size_m: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
-    """Of the box around an obstacle, in its own frame [m]."""
+    """Return half the sides of the box around an obstacle, in its own frame [m]."""
     radius_m, length_m = size_m[0], size_m[1]
     if kind == SPHERE:
         return np.full(3, radius_m)
@@ -106,7 +105,7 @@ def loss_db_of(model: MjModel, g: int) -> float:
     """
     material = int(model.geom_matid[g])
     named = model.mat(material).name if material >= 0 else ""
-    loss_db = LOSS_DB.get(named, USUAL_LOSS_DB)
+    loss_db = LOSS_DB.get(named, DEFAULT_LOSS_DB)
     if model.nuser_geom > 0 and model.geom_user[g, 0] != 0.0:  # 0 where a geom has none
         loss_db = float(model.geom_user[g, 0])
     if not (np.isfinite(loss_db) and loss_db >= 0.0):

@@ -1,12 +1,14 @@
-"""The robots' true states."""
+"""The true state of the world as plain arrays, for code without MuJoCo: robots and obstacles."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 ROBOT_RADIUS_M = 0.5  # assets/robot.xml
 ROBOT_HEIGHT_M = 1.0  # of its centre, and of its antenna, above the floor
+SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = 2, 3, 4, 5, 6  # as MuJoCo numbers them
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,7 +17,7 @@ class RobotStates:
 
     position_m: Float[np.ndarray, "B N 2"]  # p [m]
     velocity_mps: Float[np.ndarray, "B N 2"]  # v [m/s]
-    is_active: Bool[np.ndarray, "B N"] | None = None  # who observes and talks; None: everyone
+    is_active: Bool[np.ndarray, "B N"] | None = None  # who observes and transmits; None: all robots
 
     def copy(self) -> "RobotStates":
         """Return the same in arrays of its own."""
@@ -24,3 +26,14 @@ class RobotStates:
             velocity_mps=self.velocity_mps.copy(),
             is_active=None if self.is_active is None else self.is_active.copy(),
         )
+
+
+class Obstacles(NamedTuple):
+    """The obstacles of a scene; the same in all missions."""
+
+    kind: Int[np.ndarray, "O"]  # SPHERE, CAPSULE, ...; a mesh is the box around it
+    centre_m: Float[np.ndarray, "O 3"]
+    rotation: Float[np.ndarray, "O 3 3"]  # from the obstacle's frame to the scene's
+    size_m: Float[np.ndarray, "O 3"]  # as MuJoCo's: radius and half length, or half sides
+    reach_m: Float[np.ndarray, "O"]  # radius of the sphere around the centre that holds it
+    power_left: Float[np.ndarray, "O"]  # fraction of the power that passes through, linear [1]

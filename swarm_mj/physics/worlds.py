@@ -16,13 +16,12 @@ from mujoco import batch
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.geometry import overlaps_earlier
-from swarm_mj.physics.obstacles import Obstacles
 from swarm_mj.physics.scene import ROBOT_MASS_KG, Scene, compose, num_substeps, timestep_s
 from swarm_mj.physics.solid_geoms import obstacles_of
-from swarm_mj.physics.state import ROBOT_RADIUS_M, RobotStates
+from swarm_mj.physics.state import ROBOT_RADIUS_M, Obstacles, RobotStates
 from swarm_mj.system.compiled import compiled
 
-OPEN, MIRROR, CLIP = 0, 1, 2  # what happens at the boundary
+OPEN, MIRROR, CLIP = 0, 1, 2  # at the boundary
 
 
 class Physics:
@@ -36,16 +35,10 @@ class Physics:
         scene: Scene | None = None,
         num_threads: int = 1,
     ) -> None:
-        """Compiles the scene and makes the worlds.
-
-        Args:
-            mission: The scene, its bounds and the physics mode.
-            num_missions: B.
-            scene: What changes the arena, as in `compose`.
-            num_threads: MuJoCo's own; 1 is fastest when the other cores are busy.
+        """Compile the scene and make B worlds, stepped by MuJoCo's threads.
 
         Raises:
-            ValueError: The scene changed the robots, or MuJoCo does not take it.
+            ValueError: The scene changed the robots, or MuJoCo rejects it.
         """
         self._mission = mission
         try:
@@ -61,7 +54,7 @@ class Physics:
         self._qpos = self._batch.bind("qpos").reshape(shape)
         self._qvel = self._batch.bind("qvel").reshape(shape)
         self._ctrl = self._batch.bind("ctrl").reshape(shape)
-        self._rests = scene is None  # whoever stands stays; what a scene adds may push
+        self._rests = scene is None  # no scene can push robots at rest
         self._wall = OPEN
         if mission.has_walls and mission.physics == "exact":
             self._wall = MIRROR if mission.wall_hit == "mirror" else CLIP
@@ -69,26 +62,21 @@ class Physics:
 
     @property
     def obstacles(self) -> Obstacles:
-        """What stands in the way in the scene."""
+        """The obstacles of the scene."""
         return obstacles_of(self._model)
 
     @property
     def states(self) -> RobotStates:
-        """Where the robots are; arrays are not changed by later steps."""
+        """The true states; later steps do not change these arrays."""
         return self._states
 
     def place(
         self, position_m: Float[np.ndarray, "B N 2"], velocity_mps: Float[np.ndarray, "B N 2"]
     ) -> None:
-        """Start all worlds anew from these states.
-
-        Args:
-            position_m: p_0 [m].
-            velocity_mps: v_0 [m/s].
+        """Restart all worlds from p_0 [m] and v_0 [m/s].
 
         Raises:
-            ValueError: There is not one state per robot, one is not finite, or robots that collide
-                stand in each other.
+            ValueError: There is not one finite state per robot, or robots that collide overlap.
         """
         self._check_vectors("position", position_m)
         self._check_vectors("velocity", velocity_mps)
@@ -101,7 +89,7 @@ class Physics:
         self._states = RobotStates(position_m=position_m.copy(), velocity_mps=velocity_mps.copy())
 
     def deactivate(self, is_active: Bool[np.ndarray, "B N"]) -> None:
-        """From now on only these robots are active; the others stand or move as before."""
+        """Make these the active robots from now on; the others keep moving."""
         self._states = replace(self._states, is_active=is_active)
 
     def step(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> RobotStates:
@@ -110,11 +98,8 @@ class Physics:
         Args:
             acceleration_mps2: u, clipped to plus or minus A_max [m/s²].
 
-        Returns:
-            The states after the window.
-
         Raises:
-            ValueError: An acceleration is not finite, or there is not one per robot.
+            ValueError: There is not one finite acceleration per robot.
         """
         self._check_vectors("acceleration", acceleration_mps2)
         if self._mission.physics == "exact":
@@ -177,7 +162,7 @@ class Physics:
 
 
 def _check_apart(position_m: Float[np.ndarray, "B N 2"]) -> None:
-    """Raise ValueError if bodies overlap: such a start would fling them apart."""
+    """Raise ValueError if bodies overlap, because contacts would fling them apart."""
     for b, team_m in enumerate(position_m):
         overlaps = np.flatnonzero(overlaps_earlier(team_m, 2.0 * ROBOT_RADIUS_M))
         if len(overlaps) > 0:
@@ -211,7 +196,7 @@ def _kick(
     wall_m: float,
     wall: int,
 ) -> tuple[Float[np.ndarray, "B N 2"], Float[np.ndarray, "B N 2"]]:
-    """Accelerates, clips, reflects, and copies p and v out; qpos has already moved by v dt."""
+    """Accelerate, clip and reflect; qpos has already moved by v dt. Return p and v as copies."""
     num_missions, num_robots = acceleration.shape[:2]
     position, velocity = np.empty(qpos.shape), np.empty(qpos.shape)
     for b in range(num_missions):

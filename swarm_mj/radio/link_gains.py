@@ -9,8 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from swarm_mj.physics.obstacles import Obstacles
-from swarm_mj.physics.state import ROBOT_HEIGHT_M
+from swarm_mj.physics.state import ROBOT_HEIGHT_M, Obstacles
 from swarm_mj.radio.obstruction import obstruct
 from swarm_mj.radio.power_law import PowerLaw, write_path_loss
 from swarm_mj.radio.shadowing import (

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.mission import Mission
-from swarm_mj.physics.obstacles import Obstacles
+from swarm_mj.physics.state import Obstacles
 from swarm_mj.radio.composed import ComposedChannel, Reception
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT, Bursts
 from swarm_mj.radio.free_space import (

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.physics.obstacles import BOX, CYLINDER, ELLIPSOID, SPHERE, Obstacles
+from swarm_mj.physics.state import BOX, CYLINDER, ELLIPSOID, SPHERE, Obstacles
 from swarm_mj.system.compiled import compiled
 
 

@@ -9,8 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.mission.geometry import squared_distance
-from swarm_mj.physics.obstacles import Obstacles
-from swarm_mj.physics.state import ROBOT_HEIGHT_M
+from swarm_mj.physics.state import ROBOT_HEIGHT_M, Obstacles
 from swarm_mj.radio.obstruction import obstruct
 from swarm_mj.radio.path_loss import FREE_SPACE, PathLoss, power_after
 from swarm_mj.system.compiled import compiled

@@ -11,8 +11,7 @@ import rerun as rr
 from jaxtyping import Float
 from scipy.spatial import ConvexHull
 
-from swarm_mj.physics.obstacles import BOX, CAPSULE, CYLINDER, Obstacles
-from swarm_mj.physics.state import ROBOT_HEIGHT_M
+from swarm_mj.physics.state import BOX, CAPSULE, CYLINDER, ROBOT_HEIGHT_M, Obstacles
 from swarm_mj.replay import palette
 from swarm_mj.replay.mismatch import PIECES, LinkMismatch, mismatch_lines, shades
 from swarm_mj.replay.rerun_log import LAYERS, RerunLog, lifted

@@ -9,8 +9,8 @@ from mujoco._enums import mjtTextureRole
 from mujoco._functions import mj_kinematics, mju_mat2Quat
 from mujoco._structs import MjData, MjModel
 
-from swarm_mj.physics.obstacles import CAPSULE, CYLINDER, ELLIPSOID, SPHERE
 from swarm_mj.physics.solid_geoms import obstacle_geoms
+from swarm_mj.physics.state import CAPSULE, CYLINDER, ELLIPSOID, SPHERE
 
 PLANE = 0  # as MuJoCo numbers it
 FLOOR_M = 0.5  # half the thickness of a drawn plane: rerun has solids only

@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from swarm_mj.physics.obstacles import BOX, SPHERE
 from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP, USUAL_LOSS_DB, obstacles_of
+from swarm_mj.physics.state import BOX, SPHERE
 
 
 def compiled(body, *, head=""):

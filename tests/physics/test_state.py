@@ -1,9 +1,11 @@
 """True states: of one shape, and of robots that are all on unless it is said who is."""
 
+import mujoco
 import numpy as np
 import pytest
 from jaxtyping import TypeCheckError
 
+from swarm_mj.physics import state
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import empty_buffers, observe_self
 
@@ -37,3 +39,8 @@ def test_everyone_is_active_unless_it_is_said_who_is():
 def test_all_is_of_the_same_robots_in_the_plane(other):
     with pytest.raises(TypeCheckError):
         RobotStates(**({"position_m": PLACES, "velocity_mps": PLACES} | other))
+
+
+def test_kinds_of_obstacles_are_numbered_as_in_mujoco():
+    for name in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX"):
+        assert getattr(state, name) == getattr(mujoco.mjtGeom, f"mjGEOM_{name}").value

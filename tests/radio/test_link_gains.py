@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from swarm_mj.physics.obstacles import BOX, Obstacles
+from swarm_mj.physics.state import BOX, Obstacles
 from swarm_mj.radio import link_gains
 from swarm_mj.radio.link_gains import LinkGains
 from swarm_mj.radio.path_loss import FREE_SPACE, log_distance

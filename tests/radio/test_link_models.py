@@ -8,7 +8,7 @@ from scipy.stats import norm
 
 from swarm_mj.mission import paper
 from swarm_mj.mission.specification import KNOWABLE
-from swarm_mj.physics.obstacles import BOX, Obstacles
+from swarm_mj.physics.state import BOX, Obstacles
 from swarm_mj.radio.link_models import TrueLinks
 from swarm_mj.radio.links import links_between, lone_probabilities
 from swarm_mj.radio.mission_radio import belief_of, channel_of, radio_of

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from swarm_mj.physics.obstacles import BOX, CAPSULE, CYLINDER, ELLIPSOID, SPHERE, Obstacles
+from swarm_mj.physics.state import BOX, CAPSULE, CYLINDER, ELLIPSOID, SPHERE, Obstacles
 from swarm_mj.radio.obstruction import blocked, obstruct, power_through
 
 KINDS = {

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarm_mj.physics.obstacles import BOX, Obstacles
+from swarm_mj.physics.state import BOX, Obstacles
 from swarm_mj.radio.link_gains import LinkGains
 from swarm_mj.radio.path_loss import log_distance
 from swarm_mj.radio.power_law import power_law, powers_between

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from spatial_rule import agreed_senders, radio
 
 from swarm_mj.mission import paper
-from swarm_mj.physics.obstacles import BOX, Obstacles
+from swarm_mj.physics.state import BOX, Obstacles
 from swarm_mj.radio.mission_radio import belief_of, channel_of
 from swarm_mj.radio.spatial_reuse import believes_as_the_last, keep_joined, told_of, write_joined
 

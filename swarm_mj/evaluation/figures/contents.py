@@ -1,4 +1,4 @@
-"""What the paper's result figures show (V): which missions, swept over what, on which axes."""
+"""The paper's result figures (V): their missions, swept parameter and axes."""
 
 import shlex
 from collections.abc import Sequence
@@ -68,12 +68,12 @@ class ResultFigure:
 
     @property
     def sweeps_missions(self) -> bool:
-        """Whether x is a number of the mission, so that every policy has a curve over it."""
+        """True if x is a number of the mission, so that every policy has a curve over it."""
         return self.x_name in OPTIONS
 
     @property
     def fixed(self) -> tuple[str, ...]:
-        """The numbers of the mission that are the same all over the figure."""
+        """The numbers of the mission that are fixed in the figure."""
         return tuple(
             name
             for name in OPTIONS
@@ -89,7 +89,7 @@ class ResultFigure:
         return shlex.join(["swarm-mj", *self.arguments(preset), "--csv", "FILE"])
 
     def arguments(self, preset: str) -> Sequence[str]:
-        """What `swarm-mj` is called with to make the figure's results, but for the file."""
+        """Return the arguments of `swarm-mj` that make the figure's results, without the file."""
         drawn = [policy for policy in DRAWN if preset == "paper" or policy not in PAPER_ONLY]
         flown = dict.fromkeys(flown_name(policy, self.mission(preset)) for policy in drawn)
         command = ["evaluate", "--policy", *flown, "--task", self.task, "--preset", preset]

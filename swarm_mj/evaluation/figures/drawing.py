@@ -1,4 +1,4 @@
-"""Draws a figure by its name; result figures are curves with error bars, named at their ends."""
+"""Figures by name; result figures are curves with error bars, named at their ends."""
 
 from collections.abc import Sequence
 
@@ -8,11 +8,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
+from scipy.optimize import isotonic_regression
 
 from swarm_mj.evaluation.figures.contents import FLOCK, RESULT_FIGURES, Panel, ResultFigure, Scale
 from swarm_mj.evaluation.figures.curves import Curve, budgets, curves, preset_of, results_of
 from swarm_mj.evaluation.figures.flock import draw_flock
-from swarm_mj.evaluation.figures.labels import MORE, name_ends, name_of
 from swarm_mj.evaluation.figures.style import FAINT, INK, WIDTH_IN, look_of, styled, write_caption
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
 
@@ -27,19 +27,16 @@ RING = 1.6  # a published marker's size, of ours
 HEADROOM = 0.06  # of the axis, beyond the highest and the lowest curve
 PLAIN = "{x:g}"  # a number on an axis
 SHORT = 7  # of a commit's digits
+LINE_IN = 0.165  # from one name to the next
+MORE = "+"  # after the names of methods whose packets carry more than T, M and P
+PLACE = 1.045  # of the axes' width
 PAPERS_BUDGET = "team decisions each, the paper's on 2,000,000 (III-C)"
 
 
 def draw_figure(
     name: str, results: Sequence[Result], *, flock_policy: str, flock_seed: int
 ) -> Figure:
-    """Draws a figure.
-
-    Args:
-        name: One of `FIGURES`.
-        results: One or more, of one preset; other regimes are passed over.
-        flock_policy: Who talks to whom in the flock's mission.
-        flock_seed: That mission's.
+    """Draw one of `FIGURES` from results of one preset, or fly and draw a flock.
 
     Raises:
         ValueError: The results hold no point of it or cannot be compared, or no such flock flies.
@@ -50,7 +47,7 @@ def draw_figure(
 
 
 def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
-    """A result figure of the paper, ours and the published curves; otherwise as `draw_figure`."""
+    """Draw a result figure of the paper: our curves and the published ones."""
     found = results_of(figure, results)
     num_panels = len(figure.panels)
     height_in = TOP_IN + num_panels * PANEL_IN + (num_panels - 1) * GAP_IN + BOTTOM_IN
@@ -77,7 +74,7 @@ def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
 
 
 def caption(figure: ResultFigure, results: Sequence[Result]) -> str:
-    """Where the numbers come from, with all commits that made some."""
+    """Return the origin of the numbers, with all commits that made some."""
     result = results[0]
     last = result.seed + result.episodes - 1
     commits = list(dict.fromkeys(each.commit[:SHORT] for each in results if each.commit))
@@ -95,7 +92,7 @@ def caption(figure: ResultFigure, results: Sequence[Result]) -> str:
 
 
 def _draw_curve(axes: Axes, curve: Curve) -> None:
-    """A line with error bars, or a level with a band; a published marker is a ring around ours."""
+    """Draw a line with error bars, or a level with a band; published markers are rings."""
     look, is_published = look_of(curve.method), curve.is_published
     line = {
         "label": name_of(curve) + (", published" if is_published else ""),
@@ -119,7 +116,7 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
 
 
 def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, its: Sequence[Curve]) -> None:
-    """Scales, limits and ticks, before anything is placed by them."""
+    """Set scales, limits and ticks, which the names of curves depend on."""
     axes.set_xscale(figure.x_scale)
     axes.set_yscale(panel.scale)
     x = np.concatenate([curve.x for curve in its])
@@ -138,7 +135,7 @@ def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, its: Sequence[Curv
 
 
 def _widened(values: Float[np.ndarray, "V"], share: float, scale: Scale) -> tuple[float, float]:
-    """Limits that leave a share of the axis free at either end."""
+    """Return limits that leave a share of the axis free at either end."""
     low, high = float(np.min(values)), float(np.max(values))
     if scale == "log":
         factor = (high / low) ** share
@@ -149,7 +146,7 @@ def _widened(values: Float[np.ndarray, "V"], share: float, scale: Scale) -> tupl
 def _head(
     drawing: Figure, figure: ResultFigure, results: Sequence[Result], height_in: float
 ) -> None:
-    """Return the title, what is the same all over the figure, and what lines and marks mean."""
+    """Write the title, the fixed numbers of the missions, and the legend."""
     fixed = [FIXED[name].format(getattr(results[0], name)) for name in figure.fixed]
     regime = ", ".join([figure.task.replace("-", " "), *fixed])
     line = 1.0 - 0.28 / height_in
@@ -174,3 +171,55 @@ def _head(
         borderaxespad=0.0,
         handlelength=2.8,
     )
+
+
+def name_ends(axes: Axes, its: Sequence[Curve]) -> None:
+    """Write each method's name next to the axes, as close to the end of its curve as possible.
+
+    Names of methods that only the paper has are slanted. The limits of the axes must be set.
+    """
+    named = {curve.method: curve for curve in its}  # ours come last
+    ends = [(curve.x[-1], curve.mean[-1]) for curve in named.values()]
+    fraction = axes.transAxes.inverted().transform(axes.transData.transform(ends))
+    places = spread(fraction[:, 1], LINE_IN / (axes.bbox.height / axes.figure.dpi))
+    for curve, end, place in zip(named.values(), ends, places, strict=True):
+        look = look_of(curve.method)
+        axes.annotate(
+            name_of(curve),
+            xy=end,
+            xytext=(PLACE, place),
+            textcoords="axes fraction",
+            color=look.ink,
+            fontsize=8,
+            fontstyle="italic" if curve.is_published else "normal",
+            va="center",
+            annotation_clip=False,
+            arrowprops={
+                "arrowstyle": "-",
+                "color": look.colour,
+                "linestyle": "--" if curve.is_published else "-",
+                "linewidth": 0.6,
+                "shrinkA": 1.0,
+                "shrinkB": 4.0,
+                "relpos": (0.0, 0.5),
+            },
+        )
+
+
+def name_of(curve: Curve) -> str:
+    """Return a method's name, marked where its packets carry more than T, M and P."""
+    label = look_of(curve.method).label
+    return f"{label} {MORE}" if curve.carries_more else label
+
+
+def spread(wanted: Float[np.ndarray, "L"], gap: float) -> Float[np.ndarray, "L"]:
+    """Return the places nearest to those wanted, in least squares, that keep their order and a gap.
+
+    They stand from 0 to 1, if there is room for all.
+    """
+    order = np.argsort(wanted, kind="stable")
+    steps = gap * np.arange(len(wanted))
+    base = isotonic_regression(wanted[order] - steps).x
+    places = np.empty(len(wanted))
+    places[order] = np.clip(base, 0.0, max(0.0, 1.0 - steps[-1])) + steps
+    return places

@@ -36,7 +36,7 @@ class Snapshot:
 
     @property
     def disagreement_mps(self) -> Float[np.ndarray, "N"]:
-        """How far each robot's velocity is from the team's mean."""
+        """The distance of each robot's velocity from the team's mean."""
         return np.linalg.norm(self.velocity_mps - np.mean(self.velocity_mps, axis=0), axis=1)
 
     @property
@@ -46,7 +46,7 @@ class Snapshot:
 
 
 def fly_flock(mission: Mission, policy_name: str, seed: int) -> tuple[Snapshot, Snapshot]:
-    """Flies a mission; the team before its first window and after its last.
+    """Fly a mission; return the team before its first window and after its last.
 
     Raises:
         ValueError: The policy is none of `POLICIES`, or the seed out of range.
@@ -60,9 +60,9 @@ def fly_flock(mission: Mission, policy_name: str, seed: int) -> tuple[Snapshot, 
 
 
 def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
-    """Flies the preset's flock and draws its start and its end, an arrow per robot.
+    """Fly the preset's flock and draw its start and its end, an arrow per robot.
 
-    An arrow's colour is how far the robot's velocity is from the team's mean. Raises ValueError as
+    The colour is the distance of a robot's velocity from the team's mean. Raises ValueError as
     `fly_flock` does.
     """
     mission = PAPERS[preset]("flocking")
@@ -89,7 +89,7 @@ def _snapshot(swarm: Swarm) -> Snapshot:
 
 
 def _draw(axes: Axes, mission: Mission, team: Snapshot, colours: ScalarMappable) -> None:
-    """One moment: arrows as long as the panel's own scale makes them, which its key tells."""
+    """Draw one moment; each panel has its own scale of arrows, shown by its key."""
     fastest_mps = float(np.max(np.linalg.norm(team.velocity_mps, axis=1)))
     corner, side = -mission.half_side_m / KM, mission.side_m / KM
     area = Rectangle((corner, corner), side, side, fill=False, color=FAINT, linewidth=0.6)
@@ -122,7 +122,7 @@ def _power(value: float) -> str:
 
 
 def _frame(panels: tuple[Axes, Axes], position_m: Float[np.ndarray, "P 2"]) -> None:
-    """Return the same square in both panels, around all robots."""
+    """Show the same square in both panels, around all robots."""
     low = (np.min(position_m, axis=0) - MARGIN_M) / KM
     high = (np.max(position_m, axis=0) + MARGIN_M) / KM
     centre, half = (low + high) / 2.0, float(np.max(high - low)) / 2.0

@@ -1,8 +1,8 @@
-"""One style for all figures: each method's colour and marker, type, and what files say of it.
+"""One style for all figures: each method's colour and marker, type, and captions in files.
 
-Hues are Okabe and Ito's and Tol's, which stay apart for colour-blind eyes; markers differ too. Ours
-is solid and filled, what the paper published dashed and hollow, in the same colour. The oracle,
-which no team could fly, is black and thin.
+Hues are Okabe and Ito's and Tol's, which remain distinct for colour-blind readers; markers differ
+too. Our curves are solid and filled, published ones dashed and hollow, in the same colour. The
+oracle, which no team could fly, is black and thin.
 """
 
 import io
@@ -84,9 +84,7 @@ LOOKS = {
     "planner": Look(label="planner", colour="#80391e", marker="d"),
     WITHOUT_PAYLOAD: Look(label="planner, no payload", colour="#a6d854", marker="<"),
     "gnn": Look(label="gnn (T, M, P only)", colour="#d55e00", marker="*", size=8.0),
-    "greedy-oracle": Look(
-        label="oracle (knows all)", colour="#000000", marker=".", size=5.0, width=0.8
-    ),
+    "greedy-oracle": Look(label="greedy oracle", colour="#000000", marker=".", size=5.0, width=0.8),
     "GNN": Look(label="GNN", colour="#cc79a7", marker="X"),
     "linear GNN": Look(label="GNN, linear", colour="#b3589a", marker="p"),
     "GNN generalized from 0.25": Look(label="GNN, from 0.25", colour="#b3589a", marker="p"),
@@ -102,31 +100,27 @@ LOOKS = {
 
 
 def look_of(method: str) -> Look:
-    """A policy's or a published method's look; one that has none yet is grey, under its name."""
-    return LOOKS.get(method, Look(label=as_it_is(method), colour=FAINT, marker="d"))
+    """Return the look of a policy or a published method; one without a look is grey."""
+    return LOOKS.get(method, Look(label=escape_mathtext(method), colour=FAINT, marker="d"))
 
 
-def as_it_is(text: str) -> str:
-    """Return a text of others as matplotlib draws it as it is: dollars do not begin a formula."""
+def escape_mathtext(text: str) -> str:
+    """Escape a text for matplotlib, in which dollars begin a formula."""
     return text.replace("$", r"\$")
 
 
 def styled() -> AbstractContextManager[None]:
-    """Within it, everything is drawn in this style, whatever the user's own settings."""
+    """Apply this style within a context, regardless of the user's settings."""
     return matplotlib.style.context(["default", RC])
 
 
 def write_caption(figure: Figure, x: float, y: float, text: str) -> None:
-    """Write where a figure's numbers come from, small, from a place on the figure on."""
-    figure.text(x, y, as_it_is(text), fontsize=7, color=FAINT, gid=CAPTION)
+    """Write the origin of a figure's numbers, in small type."""
+    figure.text(x, y, escape_mathtext(text), fontsize=7, color=FAINT, gid=CAPTION)
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure, its caption among the file's own data; the same figure gives the same bytes.
-
-    Args:
-        figure: Drawn in this style, with a caption.
-        path: The file, replaced if it exists; its ending is one of `FORMATS`.
+    """Write a figure, with its caption in the metadata; the same figure gives the same bytes.
 
     Raises:
         OSError: The file cannot be written.

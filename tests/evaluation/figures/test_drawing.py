@@ -2,13 +2,16 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.text import Text
+from scipy.optimize import minimize
 from synthetic import everything, result, sweep
 
 from swarm_mj.evaluation.figures.contents import FIGURES, RESULT_FIGURES
-from swarm_mj.evaluation.figures.drawing import draw, draw_figure
+from swarm_mj.evaluation.figures.drawing import draw, draw_figure, spread
 from swarm_mj.evaluation.figures.style import LOOKS
 
 FIG3, FIG4, FIG5, FIG6 = RESULT_FIGURES.values()
@@ -180,11 +183,11 @@ def test_nothing_that_is_written_overlaps_or_leaves_the_page():
 
 def test_the_oracle_is_a_thin_black_line():
     (axes,) = draw(FIG4, sweep("greedy-oracle", "range_ratio", {0.2: (20.0, 0.5)})).axes
-    line, _, _ = bars(axes)["oracle (knows all)"]
+    line, _, _ = bars(axes)["greedy oracle"]
     others = [
         other.get_linewidth()
         for name, (other, _, _) in bars(axes).items()
-        if name != "oracle (knows all)"
+        if name != "greedy oracle"
     ]
     assert line.get_color() == "#000000"
     assert line.get_linewidth() < min(others)
@@ -196,3 +199,48 @@ def test_every_name_draws_its_figure_under_the_results_preset(name):
     caption = drawing.texts[-1].get_text()
     assert caption.startswith(f"{name}, preset paper: ")
     assert ("policy round-robin, seed 2" in caption) == (name == "fig2")
+
+
+WANTED = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12).map(np.array)
+
+
+def test_names_with_room_stay_where_they_are():
+    np.testing.assert_allclose(spread(np.array([0.9, 0.1, 0.5]), 0.1), [0.9, 0.1, 0.5])
+
+
+def test_two_in_one_place_part_by_half_a_gap_each():
+    np.testing.assert_allclose(spread(np.array([0.5, 0.5]), 0.2), [0.4, 0.6])
+
+
+def test_at_the_ends_they_stay_inside():
+    np.testing.assert_allclose(spread(np.array([1.0, 1.0, 0.0]), 0.2), [0.8, 1.0, 0.0])
+
+
+@given(WANTED)
+def test_they_keep_their_order_and_distance(wanted):
+    gap = 0.05
+    places = spread(wanted, gap)
+    order = np.argsort(wanted, kind="stable")
+    assert np.all(np.diff(places[order]) >= gap - 1e-12)
+    assert np.all((places >= -1e-12) & (places <= 1.0 + 1e-12))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_they_are_as_near_as_can_be(seed):
+    """Against a general solver of the same least squares."""
+    rng, gap = np.random.default_rng(seed), 0.11
+    wanted = np.sort(rng.uniform(0.0, 1.0, size=7))
+    apart = {"type": "ineq", "fun": lambda places: np.diff(places) - gap}
+    solved = minimize(
+        lambda places: np.sum((places - wanted) ** 2),
+        np.linspace(0.0, 1.0, 7),
+        bounds=[(0.0, 1.0)] * 7,
+        constraints=apart,
+        method="SLSQP",
+        options={"ftol": 1e-14, "maxiter": 500},
+    )
+    np.testing.assert_allclose(spread(wanted, gap), solved.x, atol=1e-5)
+
+
+def test_more_than_fit_keep_their_distance():
+    np.testing.assert_allclose(spread(np.array([0.0, 0.5, 1.0]), 1.0), [0.0, 1.0, 2.0])

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from standing_teams import Team, after_windows, flooded_team, knowledge_after, single_pairs
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.physics.obstacles import BOX, Obstacles
-from swarm_mj.physics.state import RobotStates
+from swarm_mj.physics.state import BOX, Obstacles, RobotStates
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle
 from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy
 from swarm_mj.policies.registry import POLICIES, make_policy
