@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP, USUAL_LOSS_DB, obstacles_of
+from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP, DEFAULT_LOSS_DB, obstacles_of
 from swarm_mj.physics.state import BOX, SPHERE
 
 
@@ -38,9 +38,9 @@ def test_losses_come_from_the_geom_or_its_material_or_are_usual():
     geom = f'<geom type="box" size="1 1 1" group="{OBSTACLE_GROUP}"'
     material = '<asset><material name="heavy wall"/><material name="paper"/></asset>'
     body = f'{geom} material="heavy wall"/>{geom} material="paper"/>{geom}/>'
-    assert losses_db(body, head=material) == [6.9, USUAL_LOSS_DB, USUAL_LOSS_DB]
+    assert losses_db(body, head=material) == [6.9, DEFAULT_LOSS_DB, DEFAULT_LOSS_DB]
     both = f'{geom} user="3.5"/>{geom}/>'
-    assert losses_db(both, head='<size nuser_geom="1"/>') == [3.5, USUAL_LOSS_DB]
+    assert losses_db(both, head='<size nuser_geom="1"/>') == [3.5, DEFAULT_LOSS_DB]
 
 
 @pytest.mark.parametrize("loss", ["-1", "inf"])
