@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP, DEFAULT_LOSS_DB, obstacles_of
+from swarm_mj.physics.solid_geoms import DEFAULT_LOSS_DB, OBSTACLE_GROUP, obstacles_of
 from swarm_mj.physics.state import BOX, SPHERE
 
 
