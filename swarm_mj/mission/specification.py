@@ -132,7 +132,7 @@ class Mission:
         label="arena",
     )
 
-    # The channel beyond the paper's free space (`radio.mission_radio.channel_of`).
+    # The channel beyond the paper's free space (`radio.mission_radio`).
     path_loss: PathLossLaw = _radio_choice(
         "free-space", "path loss", "Eq. 1", PathLossLaw, "how power falls with distance"
     )

@@ -13,7 +13,7 @@ from swarm_mj.policies.tdma import draw_order, slot_of
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.link_models import Belief
 from swarm_mj.radio.power_law import PowerLaw
-from swarm_mj.radio.spatial_reuse import keep_joined, told_of
+from swarm_mj.radio.spatial_reuse import keep_joined, known_powers
 
 
 class SpatialTdma(BroadcastPolicy):
@@ -41,14 +41,14 @@ class SpatialTdma(BroadcastPolicy):
         self._law: PowerLaw | None = None
 
     def inform(self, belief: Belief) -> None:
-        """Take the powers that robots believe in; they are reckoned in units of the noise."""
+        """Take the powers that robots believe in; they are in units of the noise."""
         law, noise_mw = belief.law, belief.radio.noise_mw
         self._law = None if law is None else law._replace(at_1_m=law.at_1_m / noise_mw)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draws every mission's order; arguments as in `Policy.start`."""
         self._order = draw_order(num_robots, rngs)
-        self._told = None if self._law is None else told_of(self._law, len(rngs))
+        self._known = None if self._law is None else known_powers(self._law, len(rngs))
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Each robot whose turn it is or that may join."""
@@ -61,6 +61,6 @@ class SpatialTdma(BroadcastPolicy):
             self._range_m,
             self._threshold,
             is_sending,
-            self._told,
+            self._known,
         )
         return is_sending

@@ -1,4 +1,4 @@
-"""How probably a packet decodes when its power is not known exactly: by margin and by doubt.
+"""Probabilities that packets decode whose power is not known exactly: by margin and by doubt.
 
 The margin is the SINR of the mean powers over the threshold, in dB. A fade, an error of the belief
 in these powers, or both make of the rule of Eq. 4 a probability that rises with the margin.
@@ -17,7 +17,6 @@ MAX_MARGIN_DB = 80.0  # up to which a fade's own distribution is worked out
 FINE_STEP_DB = 0.01  # and how finely
 STD_STEP_DB = 0.5
 MAX_STD_DB = 12.0
-DB_PER_NEPER = 20.0 / math.log(10.0)  # of an amplitude, or of a distance in free space
 MANY = 100.0  # the K from which a Rician amplitude is normal, to a good approximation
 SIGMAS, SIGMA_STEP = 4.0, 0.05  # how far a normal distribution is followed, and how finely
 LEAST_PROBABILITY = 0.02  # what is less counts as 0, which spares schedulers hopeless links
@@ -63,7 +62,7 @@ def row_of(std_db: Float[np.ndarray, "N N"]) -> Int[np.ndarray, "N N"]:
 
 @compiled()
 def probability_at(curves: Curves, row: int, ratio: float) -> float:
-    """How probably a packet decodes; the ratio is of its SINR to the threshold, linear [1]."""
+    """Return the probability that a packet decodes; the ratio is SINR to threshold, linear [1]."""
     return curves[row, int(ratio / (1.0 + ratio) * NUM_RATIOS + 0.5)]
 
 

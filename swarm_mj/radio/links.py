@@ -1,4 +1,4 @@
-"""Links as a scheduler believes in them, and what robots hear over them (Eqs. 3-4).
+"""Links as a scheduler believes in them, and the receptions it predicts over them (Eqs. 3-4).
 
 Index order: `i` sends, `j` receives.
 """
@@ -8,14 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.radio.decode_curves import (
-    DB_PER_NEPER,
-    KNOWN,
-    Curves,
-    probability_at,
-    row_of,
-)
-from swarm_mj.radio.free_space import FreeSpaceRadio
+from swarm_mj.radio.decode_curves import KNOWN, Curves, probability_at, row_of
+from swarm_mj.radio.free_space import DB_PER_NEPER, FreeSpaceRadio
 from swarm_mj.radio.reception import (
     MIN_DISTANCE_M,
     NOBODY,
@@ -63,9 +57,6 @@ def links_between(
         spread_m: Standard deviation of that belief; None: the positions are true [m].
         is_known: Who is believed to be anywhere; None: everyone. The others hear nothing and are
             not heard.
-
-    Returns:
-        The links.
     """
     apart_m = position_m[:, None] - position_m[None, :]
     distance_m = np.maximum(np.sqrt(np.sum(apart_m**2, axis=2)), MIN_DISTANCE_M)
@@ -87,17 +78,17 @@ def doubtful(links: Links, curves: Curves, std_db: Float[np.ndarray, "N N"]) -> 
 
     Args:
         links: Between robots whose positions are true, or only believed.
-        curves: How probably packets decode.
+        curves: Of `decode_curves`.
         std_db: Standard deviation of that error; what positions add to it is added here [dB].
     """
     return links._replace(
-        curves=curves, row=row_of(np.hypot(std_db, DB_PER_NEPER / links.distance_over_std))
+        curves=curves, row=row_of(np.hypot(std_db, 2.0 * DB_PER_NEPER / links.distance_over_std))
     )
 
 
 @compiled()
 def chance(links: Links, ratio: float, i: int, j: int) -> float:
-    """How probably j decodes i at this SINR, linear [1]."""
+    """Return the probability that j decodes i at this SINR, linear [1]."""
     if links.curves.shape[0] == 0:
         return decode_probability(ratio, links.threshold, links.distance_over_std[i, j])
     return probability_at(links.curves, links.row[i, j], ratio / links.threshold)
@@ -107,7 +98,7 @@ def chance(links: Links, ratio: float, i: int, j: int) -> float:
 def _received_powers(
     at_1_m_mw: float, distance_m: Float[np.ndarray, "N N"]
 ) -> Float[np.ndarray, "N N"]:
-    """Power of i at j [mW]; nobody receives itself."""
+    """Return the power of i at j [mW]; nobody receives itself."""
     received_mw = np.zeros_like(distance_m)
     for i in range(len(distance_m)):
         for j in range(len(distance_m)):
@@ -178,7 +169,7 @@ def listen(
 
 @compiled()
 def lone_probabilities(links: Links) -> Float[np.ndarray, "N N"]:
-    """How probably j decodes i when nobody else transmits."""
+    """Return the probability that j decodes i when nobody else transmits."""
     received_mw = links.received_mw
     probability = np.zeros_like(received_mw)
     for i in range(len(probability)):

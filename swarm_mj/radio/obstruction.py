@@ -13,6 +13,11 @@ from jaxtyping import Bool, Float
 from swarm_mj.physics.state import BOX, CYLINDER, ELLIPSOID, SPHERE, Obstacles
 from swarm_mj.system.compiled import compiled
 
+Vector = tuple[float, float, float]
+Interval = tuple[float, float]  # of the share of a line's way; empty if it ends before it begins
+
+NOTHING = (1.0, 0.0)
+
 
 @compiled()
 def obstruct(
@@ -22,7 +27,7 @@ def obstruct(
     obstacles: Obstacles,
     power: Float[np.ndarray, "N"],
 ) -> None:
-    """Multiplies the power of i's packets, at every other robot, by what obstacles leave of it.
+    """Multiply the power of i's packets at every other robot by what obstacles leave of it.
 
     Args:
         i: The sender.
@@ -47,7 +52,7 @@ def obstruct(
 def blocked(
     position_m: Float[np.ndarray, "N 2"], height_m: float, radius_m: float, obstacles: Obstacles
 ) -> Bool[np.ndarray, "N"]:
-    """Which robots touch an obstacle, by four lines across each.
+    """Return which robots touch an obstacle, by four lines across each.
 
     Args:
         position_m: Where they are [m].
@@ -64,21 +69,8 @@ def blocked(
             along[0], along[1] = 2.0 * radius_m * x, 2.0 * radius_m * y
             start[0] = position_m[i, 0] - radius_m * x
             start[1] = position_m[i, 1] - radius_m * y
-            touches[i] |= num_crossed(start, along, obstacles) > 0
+            touches[i] |= _next_crossed(start, along, 0, obstacles) < obstacles.kind.shape[0]
     return touches
-
-
-@compiled()
-def num_crossed(
-    start_m: Float[np.ndarray, "3"], along_m: Float[np.ndarray, "3"], obstacles: Obstacles
-) -> int:
-    """How many obstacles a line crosses."""
-    crossed = 0
-    o = _next_crossed(start_m, along_m, 0, obstacles)
-    while o < obstacles.kind.shape[0]:
-        crossed += 1
-        o = _next_crossed(start_m, along_m, o + 1, obstacles)
-    return crossed
 
 
 @compiled()
@@ -101,11 +93,9 @@ def _next_crossed(
     first: int,
     obstacles: Obstacles,
 ) -> int:
-    """Return the next obstacle that a line crosses, from this one on; as many as there are if none.
-
-    Most are too far off, which is seen in plain numbers: a view of an array would cost as much as
-    all of the arithmetic.
-    """
+    """Return the next obstacle that a line crosses, from this one on; their number if none."""
+    # Most obstacles are too far off. Plain numbers show that: views of arrays would cost as much as
+    # all of the arithmetic.
     start_x, start_y, start_z = start_m[0], start_m[1], start_m[2]
     along_x, along_y, along_z = along_m[0], along_m[1], along_m[2]
     length_m2 = along_x * along_x + along_y * along_y + along_z * along_z
@@ -117,9 +107,8 @@ def _next_crossed(
         z = obstacles.centre_m[o, 2] - start_z
         share = min(max((x * along_x + y * along_y + z * along_z) * per_m2, 0.0), 1.0)
         x, y, z = x - share * along_x, y - share * along_y, z - share * along_z
-        if x * x + y * y + z * z <= obstacles.reach_m[o] ** 2 and _crosses(
-            start_m, along_m, o, obstacles
-        ):
+        is_near = x * x + y * y + z * z <= obstacles.reach_m[o] ** 2
+        if is_near and _crosses(start_m, along_m, o, obstacles):
             return o
     return num_obstacles
 
@@ -131,87 +120,77 @@ def _crosses(
     o: int,
     obstacles: Obstacles,
 ) -> bool:
-    """Whether a line has a point in common with an obstacle."""
-    kind, centre_m, size_m = obstacles.kind[o], obstacles.centre_m, obstacles.size_m
-    x, y, z = _turned(
-        start_m[0] - centre_m[o, 0],
-        start_m[1] - centre_m[o, 1],
-        start_m[2] - centre_m[o, 2],
-        o,
-        obstacles,
+    """Return whether a line has a point in common with an obstacle."""
+    kind, centre_m, size_m = obstacles.kind[o], obstacles.centre_m[o], obstacles.size_m[o]
+    frame = obstacles.rotation[o]
+    from_centre_m = (
+        start_m[0] - centre_m[0],
+        start_m[1] - centre_m[1],
+        start_m[2] - centre_m[2],
     )
-    u, v, w = _turned(along_m[0], along_m[1], along_m[2], o, obstacles)
+    x, y, z = _turned(from_centre_m, frame)
+    u, v, w = _turned((along_m[0], along_m[1], along_m[2]), frame)
     if kind == BOX:
-        low, high = _within(x, u, size_m[o, 0], 0.0, 1.0)
-        low, high = _within(y, v, size_m[o, 1], low, high)
-        low, high = _within(z, w, size_m[o, 2], low, high)
-        return low <= high
-    if kind == ELLIPSOID:
-        x, y, z = x / size_m[o, 0], y / size_m[o, 1], z / size_m[o, 2]
-        u, v, w = u / size_m[o, 0], v / size_m[o, 1], w / size_m[o, 2]
-        return _meets_ball(x, y, z, u, v, w, 1.0)
-    radius_m, half_m = size_m[o, 0], size_m[o, 1]
+        part = _within(x, u, size_m[0], (0.0, 1.0))
+        part = _within(y, v, size_m[1], part)
+        part = _within(z, w, size_m[2], part)
+        return part[0] <= part[1]
+    if kind == ELLIPSOID:  # a ball, once every axis is counted in its own half length
+        place = (x / size_m[0], y / size_m[1], z / size_m[2])
+        return _meets_ball(place, (u / size_m[0], v / size_m[1], w / size_m[2]), 1.0)
+    radius_m, half_m = size_m[0], size_m[1]
     if kind == SPHERE:
-        return _meets_ball(x, y, z, u, v, w, radius_m)
-    low, high = _within(z, w, half_m, 0.0, 1.0)
-    low, high = _within_ball(x, y, 0.0, u, v, 0.0, radius_m, low, high)
-    if kind == CYLINDER or low <= high:
-        return low <= high
-    is_met = _meets_ball(x, y, z - half_m, u, v, w, radius_m)  # a capsule's ends
-    return is_met or _meets_ball(x, y, z + half_m, u, v, w, radius_m)
+        return _meets_ball((x, y, z), (u, v, w), radius_m)
+    part = _within(z, w, half_m, (0.0, 1.0))
+    part = _within_ball((x, y, 0.0), (u, v, 0.0), radius_m, part)
+    if kind == CYLINDER or part[0] <= part[1]:
+        return part[0] <= part[1]
+    is_met = _meets_ball((x, y, z - half_m), (u, v, w), radius_m)  # a capsule's ends
+    return is_met or _meets_ball((x, y, z + half_m), (u, v, w), radius_m)
 
 
 @compiled()
-def _turned(
-    a: float, b: float, c: float, o: int, obstacles: Obstacles
-) -> tuple[float, float, float]:
-    """Return a vector of the scene as an obstacle sees it."""
-    frame = obstacles.rotation
+def _turned(vector: Vector, frame: Float[np.ndarray, "3 3"]) -> Vector:
+    """Return a vector of the scene in the frame of an obstacle."""
+    a, b, c = vector
     return (
-        frame[o, 0, 0] * a + frame[o, 1, 0] * b + frame[o, 2, 0] * c,
-        frame[o, 0, 1] * a + frame[o, 1, 1] * b + frame[o, 2, 1] * c,
-        frame[o, 0, 2] * a + frame[o, 1, 2] * b + frame[o, 2, 2] * c,
+        frame[0, 0] * a + frame[1, 0] * b + frame[2, 0] * c,
+        frame[0, 1] * a + frame[1, 1] * b + frame[2, 1] * c,
+        frame[0, 2] * a + frame[1, 2] * b + frame[2, 2] * c,
     )
 
 
 @compiled()
-def _within(p: float, v: float, half: float, low: float, high: float) -> tuple[float, float]:
-    """Return the part of [low, high] in which p + s v lies within plus or minus half."""
+def _within(p: float, v: float, half: float, part: Interval) -> Interval:
+    """Return the part of an interval of s in which p + s v lies within plus or minus half."""
     if v == 0.0:
-        return (low, high) if abs(p) <= half else (1.0, 0.0)
+        return part if abs(p) <= half else NOTHING
     near, far = (-half - p) / v, (half - p) / v
     if near > far:
         near, far = far, near
-    return max(low, near), min(high, far)
+    return max(part[0], near), min(part[1], far)
 
 
 @compiled()
-def _meets_ball(x: float, y: float, z: float, u: float, v: float, w: float, radius: float) -> bool:
-    """Whether a line from (x, y, z) along (u, v, w) meets a ball around the origin."""
-    low, high = _within_ball(x, y, z, u, v, w, radius, 0.0, 1.0)
+def _meets_ball(place: Vector, along: Vector, radius: float) -> bool:
+    """Return whether a line meets a ball around the origin."""
+    low, high = _within_ball(place, along, radius, (0.0, 1.0))
     return low <= high
 
 
 @compiled()
-def _within_ball(
-    x: float,
-    y: float,
-    z: float,
-    u: float,
-    v: float,
-    w: float,
-    radius: float,
-    low: float,
-    high: float,
-) -> tuple[float, float]:
-    """The part of [low, high] in which the line from (x, y, z) along (u, v, w) is in a ball."""
+def _within_ball(place: Vector, along: Vector, radius: float, part: Interval) -> Interval:
+    """Return the part of an interval of s in which place + s along lies in a ball."""
+    x, y, z = place
+    u, v, w = along
+    # The line's points in the ball are those between the roots of a s² + 2 b s + c.
     a = u * u + v * v + w * w
     b = x * u + y * v + z * w
     c = x * x + y * y + z * z - radius * radius
     if a == 0.0:
-        return (low, high) if c <= 0.0 else (1.0, 0.0)
+        return part if c <= 0.0 else NOTHING
     square = b * b - a * c
     if square < 0.0:
-        return 1.0, 0.0
+        return NOTHING
     root = math.sqrt(square)
-    return max(low, (-b - root) / a), min(high, (-b + root) / a)
+    return max(part[0], (-b - root) / a), min(part[1], (-b + root) / a)

@@ -1,8 +1,11 @@
-"""Mean powers from positions alone: path loss, transmit powers and obstacles, for compiled loops.
+"""Mean powers from positions alone: transmit powers, path loss and obstacles, for compiled loops.
 
-Index order: `i` sends, `j` receives.
+The paper's radio is free space everywhere (Eq. 1). The other laws agree with it up to a breakpoint,
+so a mission's transmit power means the same under each of them; beyond it, tenfold distance costs
+10 n dB. Index order: `i` sends, `j` receives.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -11,9 +14,14 @@ from jaxtyping import Float
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, Obstacles
 from swarm_mj.radio.obstruction import obstruct
-from swarm_mj.radio.path_loss import FREE_SPACE, PathLoss, power_after
+from swarm_mj.radio.reception import received_power
 from swarm_mj.system.compiled import compiled
 
+SPEED_OF_LIGHT_MPS = 299_792_458.0
+FREE_SPACE_EXPONENT = 2.0
+TWO_RAY_EXPONENT = 4.0
+
+# An empty table, not None: compiled loops then have one type, and end at once.
 NO_OBSTACLES = Obstacles(
     kind=np.zeros(0, dtype=np.int64),
     centre_m=np.zeros((0, 3)),
@@ -25,22 +33,34 @@ NO_OBSTACLES = Obstacles(
 
 
 class PowerLaw(NamedTuple):
-    """What mean powers follow from, where no shadowing is known."""
+    """What mean powers follow from, where no shadowing is known; free space unless given."""
 
     at_1_m: Float[np.ndarray, "N"]  # power of each robot's packets after one metre, in any unit
-    breakpoint_m: float  # up to which free space holds
-    exponent: float  # beyond it
-    obstacles: Obstacles  # that are known of; perhaps none
+    breakpoint_m: float = math.inf  # up to which free space holds
+    exponent: float = FREE_SPACE_EXPONENT  # n, beyond it
+    obstacles: Obstacles = NO_OBSTACLES
 
 
-def power_law(
-    at_1_m: Float[np.ndarray, "N"],
-    path_loss: PathLoss = FREE_SPACE,
-    obstacles: Obstacles | None = None,
-) -> PowerLaw:
-    """Return the law of these parts; free space unless they are given."""
-    known = NO_OBSTACLES if obstacles is None else obstacles
-    return PowerLaw(at_1_m, path_loss.breakpoint_m, path_loss.exponent, known)
+def two_ray_breakpoint_m(height_m: float, frequency_hz: float) -> float:
+    """Return the crossover distance of two-ray ground reflection (Rappaport 2002, Eq. 4.52).
+
+    Free space holds up to 4 pi h^2 / lambda, for antennas at height h. From there on the reflection
+    from the ground nearly cancels the direct ray, and the loss is d^4 / h^4.
+    """
+    return 4.0 * math.pi * height_m**2 / (SPEED_OF_LIGHT_MPS / frequency_hz)
+
+
+@compiled()
+def power_after(
+    at_1_m: float, squared_distance_m2: float, breakpoint_m: float, exponent: float
+) -> float:
+    """Return the power over a distance, in the unit of that which free space leaves over 1 m."""
+    power = received_power(at_1_m, squared_distance_m2)
+    squared_breakpoint_m2 = breakpoint_m * breakpoint_m
+    if squared_distance_m2 <= squared_breakpoint_m2:
+        return power
+    beyond = squared_breakpoint_m2 / squared_distance_m2
+    return power * beyond ** (0.5 * exponent - 1.0)
 
 
 @compiled()
@@ -56,7 +76,7 @@ def write_powers(
 def write_path_loss(
     i: int, position_m: Float[np.ndarray, "N 2"], law: PowerLaw, power: Float[np.ndarray, "N"]
 ) -> None:
-    """Fill `power` as in an area where nothing stands."""
+    """Fill `power` as in an area without obstacles."""
     for j in range(position_m.shape[0]):
         apart_m2 = squared_distance(position_m, i, j)
         power[j] = power_after(law.at_1_m[i], apart_m2, law.breakpoint_m, law.exponent)

@@ -15,11 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Float32
 
+from swarm_mj.radio.free_space import DB_PER_NEPER
 from swarm_mj.system.compiled import compiled
 
 NUM_WAVES = 64
 STEPS_PER_CORRELATION = 10.0  # places within that share of d_corr count as one
-DB_PER_NEPER = 10.0 / math.log(10.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,25 +31,22 @@ class Shadowing:
 
 
 class Waves(NamedTuple):
-    """The sinusoids of every mission; `cos` and `sin` at the ends [b, i], of both ends' waves."""
+    """The sinusoids of every mission, and their values where its robots are."""
 
     first_end: Float[np.ndarray, "B W 2"]  # angular wave numbers [rad/m]
     other_end: Float[np.ndarray, "B W 2"]  # [rad/m]
-    phase: Float[np.ndarray, "B W"]  # [rad]
+    phase: Float[np.ndarray, "B W"]  # counted to the other end [rad]
+    place: Float[np.ndarray, "B N 2"]  # of each robot, in steps; nan before it has one
+    ends: Float32[np.ndarray, "B N 4 W"]  # cosine and sine at the first end, and at the other
+    step_m: float  # places are rounded to multiples of this
+    std_db: float
 
 
-def draw_waves(shadowing: Shadowing, rngs: Sequence[np.random.Generator]) -> Waves:
-    """Every mission's own shadowing.
+def draw_waves(shadowing: Shadowing, num_robots: int, rngs: Sequence[np.random.Generator]) -> Waves:
+    """Draw every mission's own shadowing, from one generator each.
 
     The spectrum of exp(-d / d_corr) in the plane has wave numbers k with the distribution
     1 - 1 / sqrt(1 + (k d_corr)^2), in all directions alike.
-
-    Args:
-        shadowing: Its correlation distance.
-        rngs: One generator per mission.
-
-    Returns:
-        The waves.
     """
 
     def wave_numbers(rng: np.random.Generator) -> Float[np.ndarray, "W 2"]:
@@ -61,41 +58,52 @@ def draw_waves(shadowing: Shadowing, rngs: Sequence[np.random.Generator]) -> Wav
         (wave_numbers(rng), wave_numbers(rng), rng.uniform(0.0, 2.0 * np.pi, NUM_WAVES))
         for rng in rngs
     ]
-    return Waves(*(np.stack(each) for each in zip(*drawn, strict=True)))
+    return Waves(
+        *(np.stack(each) for each in zip(*drawn, strict=True)),
+        place=np.full((len(rngs), num_robots, 2), np.nan),
+        ends=np.empty((len(rngs), num_robots, 4, NUM_WAVES), dtype=np.float32),
+        step_m=shadowing.correlation_m / STEPS_PER_CORRELATION,
+        std_db=shadowing.std_db,
+    )
 
 
 @compiled()
-def set_ends(
-    position_m: Float[np.ndarray, "2"],
-    step_m: float,
-    first_end: Float[np.ndarray, "W 2"],
-    other_end: Float[np.ndarray, "W 2"],
-    phase: Float[np.ndarray, "W"],
-    ends: Float32[np.ndarray, "4 W"],
-) -> None:
-    """Fill `ends` with the cosines and sines of the waves where a robot is.
+def follow_robots(waves: Waves, b: int, position_m: Float[np.ndarray, "N 2"]) -> None:
+    """Bring the ends of mission b's waves to where its robots are.
 
-    Args:
-        position_m: Where it is [m].
-        step_m: Places are rounded to multiples of this [m].
-        first_end: Wave numbers of the first end [rad/m].
-        other_end: Wave numbers of the other end [rad/m].
-        phase: Counted to the other end [rad].
-        ends: Cosine and sine at the first end, cosine and sine at the other.
+    Cosines and sines cost more than all else here, so they are computed once for each place.
     """
-    x = math.floor(position_m[0] / step_m + 0.5) * step_m
-    y = math.floor(position_m[1] / step_m + 0.5) * step_m
+    for i in range(position_m.shape[0]):
+        x = np.floor(position_m[i, 0] / waves.step_m + 0.5)
+        y = np.floor(position_m[i, 1] / waves.step_m + 0.5)
+        if x != waves.place[b, i, 0] or y != waves.place[b, i, 1]:
+            waves.place[b, i, 0], waves.place[b, i, 1] = x, y
+            _set_ends(x * waves.step_m, y * waves.step_m, waves, b, waves.ends[b, i])
+
+
+@compiled()
+def _set_ends(
+    x_m: float, y_m: float, waves: Waves, b: int, ends: Float32[np.ndarray, "4 W"]
+) -> None:
+    """Fill `ends` with the cosines and sines of mission b's waves in this place."""
+    first_end, other_end, phase = waves.first_end[b], waves.other_end[b], waves.phase[b]
     for w in range(phase.shape[0]):
-        first = first_end[w, 0] * x + first_end[w, 1] * y
-        other = other_end[w, 0] * x + other_end[w, 1] * y + phase[w]
+        first = first_end[w, 0] * x_m + first_end[w, 1] * y_m
+        other = other_end[w, 0] * x_m + other_end[w, 1] * y_m + phase[w]
         ends[0, w], ends[1, w] = math.cos(first), math.sin(first)
         ends[2, w], ends[3, w] = math.cos(other), math.sin(other)
 
 
+@compiled()
+def shadow(waves: Waves, b: int, i: int, power: Float[np.ndarray, "N"]) -> None:
+    """Multiply the power of i's packets at every robot of mission b by what shadowing leaves."""
+    for j in range(power.shape[0]):
+        power[j] *= np.exp(_neper(waves.ends[b, i], waves.ends[b, j], waves.std_db))
+
+
+# Adding in any order lets the compiler use its vectors; shadowing is random in the last digit, too.
 @compiled(fastmath={"reassoc", "nnan", "nsz"})
-def shadowing_neper(
-    a: Float32[np.ndarray, "4 W"], b: Float32[np.ndarray, "4 W"], std_db: float
-) -> float:
+def _neper(a: Float32[np.ndarray, "4 W"], b: Float32[np.ndarray, "4 W"], std_db: float) -> float:
     """Return the loss between two ends as an exponent of e of the power [1]; its sign is either."""
     total = np.float32(0.0)
     for w in range(a.shape[1]):

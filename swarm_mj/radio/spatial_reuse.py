@@ -3,7 +3,7 @@
 The common rule: in each slot the owner of the turn broadcasts. Beginning half a round away in the
 order, one robot after the other joins if by Eqs. 1-4 nobody who decodes a packet so far would lose
 it, the robot itself included, and somebody would gain one. Noise is the unit of power, and powers
-are mean ones: those of free space, or by a law. Without a law, code for one is not even compiled.
+are mean ones: those of free space, or by a law.
 """
 
 from typing import NamedTuple
@@ -17,26 +17,27 @@ from swarm_mj.radio.reception import is_received, received_power, sinr
 from swarm_mj.system.compiled import compiled
 
 NOISE = 1.0
+FREE_SPACE = np.zeros((0, 0))  # in place of powers
 
 
-class Told(NamedTuple):
-    """Powers that robots were told of, as far as they were asked for and while beliefs stand."""
+class KnownPowers(NamedTuple):
+    """Powers by the law that robots believe in, as far as they were needed, for one belief.
+
+    Robots that believe the same share them, and so do all slots of a team at rest.
+    """
 
     law: PowerLaw  # [noise]
     believed_m: Float[np.ndarray, "B N 2"]  # where the robot asked last believes all to be [m]
-    is_done: Bool[np.ndarray, "B N"]  # whose powers are worked out for that
+    is_done: Bool[np.ndarray, "B N"]  # whose powers are computed for that
     power: Float[np.ndarray, "B N N"]  # [noise]
 
 
-def told_of(law: PowerLaw, num_missions: int) -> Told:
-    """No powers so far, by this law."""
-    num_robots = len(law.at_1_m)
-    return Told(
-        law,
-        np.full((num_missions, num_robots, 2), np.nan),
-        np.zeros((num_missions, num_robots), dtype=np.bool_),
-        np.empty((num_missions, num_robots, num_robots)),
-    )
+class _Belief(NamedTuple):
+    """The powers in which one robot believes."""
+
+    believed_m: Float[np.ndarray, "N 2"]
+    at_1_m: float  # in free space, where nearly all pairs are judged by few of them: no table then
+    power: Float[np.ndarray, "N N"]  # by a law, rows as far as they are computed
 
 
 class _Slot(NamedTuple):
@@ -49,6 +50,17 @@ class _Slot(NamedTuple):
     is_sender: Bool[np.ndarray, "N"]
     signal: Float[np.ndarray, "N"]  # of the packet that each robot decodes; 0 is none
     total: Float[np.ndarray, "N"]  # of all packets in the air
+
+
+def known_powers(law: PowerLaw, num_missions: int) -> KnownPowers:
+    """Return no powers so far, by this law."""
+    num_robots = len(law.at_1_m)
+    return KnownPowers(
+        law,
+        np.full((num_missions, num_robots, 2), np.nan),
+        np.zeros((num_missions, num_robots), dtype=np.bool_),
+        np.empty((num_missions, num_robots, num_robots)),
+    )
 
 
 @compiled()
@@ -79,44 +91,38 @@ def write_joined(
                 for k in range(num_robots):
                     has_joined[b, i, k] = has_joined[b, i - 1, k]
             else:
-                its, known = believed_m[b, i], is_known[b, i]
-                _join_in_turn(its, known, int(turn[b]), at_1_m, threshold, has_joined[b, i])
+                belief = _Belief(believed_m[b, i], at_1_m, FREE_SPACE)
+                _join_in_turn(belief, is_known[b, i], int(turn[b]), threshold, has_joined[b, i])
 
 
 @compiled()
 def _join_in_turn(
-    believed_m: Float[np.ndarray, "N 2"],
+    belief: _Belief,
     is_known: Bool[np.ndarray, "N"],
     turn: int,
-    at_1_m: float,
     threshold: float,
     has_joined: Float32[np.ndarray, "N"],
 ) -> None:
     """Mark who sends by one robot's beliefs."""
     num_robots = is_known.shape[0]
-    owner, half_round = turn % num_robots, (turn + num_robots // 2) % num_robots
-    if not is_known[owner]:
-        return
     slot = _silent_slot(num_robots)
-    has_joined[owner] = 1.0
-    _join(owner, believed_m, at_1_m, None, threshold, slot)
-    for place in range(num_robots):
-        k = half_round + place
-        k -= num_robots if k >= num_robots else 0
+    half_round = turn + num_robots // 2
+    for place in range(-1, num_robots):
+        k = (turn if place < 0 else half_round + place) % num_robots  # first the owner of the turn
         if not is_known[k]:
             break
-        if _may_join(k, believed_m, at_1_m, None, threshold, slot):
+        if place < 0 or _may_join(k, belief, threshold, slot):
             has_joined[k] = 1.0
-            _join(k, believed_m, at_1_m, None, threshold, slot)
+            _join(k, belief, threshold, slot)
 
 
 @compiled()
 def believes_as_the_last(
     believed_m: Float[np.ndarray, "N N 2"], is_known: Bool[np.ndarray, "N N"], i: int
 ) -> bool:
-    """Whether robot i knows whom the robot before it knows, in the same places.
+    """Return whether robot i knows whom the robot before it knows, in the same places.
 
-    What follows from that alone is then the same: robots at rest that know everyone need it once.
+    All that follows from beliefs alone is then the same: robots at rest need it once.
     """
     for k in range(is_known.shape[0] if i > 0 else 0):
         x_is_same = believed_m[i, k, 0] == believed_m[i - 1, k, 0]
@@ -134,9 +140,9 @@ def keep_joined(
     range_m: float,
     threshold: float,
     is_sending: Bool[np.ndarray, "B N"],
-    told: Told | None = None,
+    known: KnownPowers | None = None,
 ) -> None:
-    """Leaves those among the senders who send by the rule and their own beliefs.
+    """Leave those among the senders who send by the rule and their own beliefs.
 
     Args:
         believed_m: Where robot i believes the others to be [m].
@@ -145,7 +151,7 @@ def keep_joined(
         range_m: Distance at which a lone transmission just decodes [m].
         threshold: Least SINR that decodes, linear [1].
         is_sending: Who may send; overwritten by who does. The owner of the turn always does.
-        told: What robots believe of the powers; None is free space.
+        known: Powers by the law that all believe in, written in place; None is free space.
     """
     num_missions, num_robots = order.shape
     at_1_m = threshold * range_m * range_m
@@ -156,10 +162,11 @@ def keep_joined(
         for place in range(num_robots):
             asked[place] = order[b, (half_round + place) % num_robots]
         for i in range(num_robots):
-            is_sending[b, i] = i == owner or (
-                is_sending[b, i]
-                and _joins(i, owner, asked, believed_m[b, i], at_1_m, told, b, threshold)
-            )
+            if i != owner and is_sending[b, i]:
+                power = FREE_SPACE if known is None else _powers_for(believed_m[b, i], known, b)
+                belief = _Belief(believed_m[b, i], at_1_m, power)
+                is_sending[b, i] = _joins(i, owner, asked, belief, known, b, threshold)
+        is_sending[b, owner] = True
 
 
 @compiled()
@@ -167,48 +174,48 @@ def _joins(
     i: int,
     owner: int,
     asked: Int[np.ndarray, "N"],
-    believed_m: Float[np.ndarray, "N 2"],
-    at_1_m: float,
-    told: Told | None,
+    belief: _Belief,
+    known: KnownPowers | None,
     b: int,
     threshold: float,
 ) -> bool:
-    """Whether robot i joins the owner of the turn, by the rule and its own beliefs."""
+    """Return whether robot i joins the owner of the turn, by the rule and its own beliefs."""
     slot = _silent_slot(asked.shape[0])
-    power = None if told is None else told.power[b]
-    if told is not None:
-        _forget_unless_equal(believed_m, told, b)
-        _work_out(owner, told, b)
-        _work_out(i, told, b)
-    _join(owner, believed_m, at_1_m, power, threshold, slot)
+    if known is not None:
+        _compute(owner, known, b)
+        _compute(i, known, b)
+    _join(owner, belief, threshold, slot)
     # A robot that may not join the owner alone may not join it with others either.
-    if not _may_join(i, believed_m, at_1_m, power, threshold, slot):
+    if not _may_join(i, belief, threshold, slot):
         return False
     # A sender that is asked again may not join either: nobody would gain by it.
     for k in asked:
-        if told is not None and slot.signal[k] == 0.0:
-            _work_out(k, told, b)
-        if _may_join(k, believed_m, at_1_m, power, threshold, slot):
-            _join(k, believed_m, at_1_m, power, threshold, slot)
+        if known is not None and slot.signal[k] == 0.0:
+            _compute(k, known, b)
+        if _may_join(k, belief, threshold, slot):
+            _join(k, belief, threshold, slot)
         if k == i:
             break
     return slot.is_sender[i]
 
 
 @compiled()
-def _forget_unless_equal(believed_m: Float[np.ndarray, "N 2"], told: Told, b: int) -> None:
-    """Forgets the powers in mission b if they were worked out for other beliefs."""
-    if np.any(told.believed_m[b] != believed_m):
-        told.believed_m[b] = believed_m
-        told.is_done[b] = False
+def _powers_for(
+    believed_m: Float[np.ndarray, "N 2"], known: KnownPowers, b: int
+) -> Float[np.ndarray, "N N"]:
+    """Return the powers in mission b, none of them computed if they were for other beliefs."""
+    if np.any(known.believed_m[b] != believed_m):
+        known.believed_m[b] = believed_m
+        known.is_done[b] = False
+    return known.power[b]
 
 
 @compiled()
-def _work_out(k: int, told: Told, b: int) -> None:
+def _compute(k: int, known: KnownPowers, b: int) -> None:
     """Make sure of the powers of k's packets in mission b."""
-    if not told.is_done[b, k]:
-        write_powers(k, told.believed_m[b], told.law, told.power[b, k])
-        told.is_done[b, k] = True
+    if not known.is_done[b, k]:
+        write_powers(k, known.believed_m[b], known.law, known.power[b, k])
+        known.is_done[b, k] = True
 
 
 @compiled()
@@ -217,63 +224,43 @@ def _silent_slot(num_robots: int) -> _Slot:
 
 
 @compiled()
-def _may_join(
-    k: int,
-    believed_m: Float[np.ndarray, "N 2"],
-    at_1_m: float,
-    power: Float[np.ndarray, "N N"] | None,
-    threshold: float,
-    slot: _Slot,
-) -> bool:
-    """Whether nobody would lose a packet and somebody would gain one if k were a sender too."""
+def _may_join(k: int, belief: _Belief, threshold: float, slot: _Slot) -> bool:
+    """Return whether nobody would lose a packet and somebody would gain one if k sent, too."""
     is_sender, signal, total = slot
     if signal[k] > 0.0:
         return False
     is_of_use = False
     for j in range(signal.shape[0]):
         if j != k and not is_sender[j]:
-            received = _power(k, j, believed_m, at_1_m, power)
+            power = _power(k, j, belief)
             if signal[j] > 0.0:
-                if received > signal[j]:
+                if power > signal[j]:
                     return False
-                interference = total[j] - signal[j] + received
+                interference = total[j] - signal[j] + power
                 if not is_received(sinr(signal[j], interference, NOISE), threshold):
                     return False
-            elif is_received(sinr(received, total[j], NOISE), threshold):
+            elif is_received(sinr(power, total[j], NOISE), threshold):
                 is_of_use = True
     return is_of_use
 
 
 @compiled()
-def _join(
-    k: int,
-    believed_m: Float[np.ndarray, "N 2"],
-    at_1_m: float,
-    power: Float[np.ndarray, "N N"] | None,
-    threshold: float,
-    slot: _Slot,
-) -> None:
-    """Make k a sender: whom everyone decodes, and what is in the air."""
+def _join(k: int, belief: _Belief, threshold: float, slot: _Slot) -> None:
+    """Make k a sender: mark whom it reaches, and add its packet to the air."""
     is_sender, signal, total = slot
     is_sender[k] = True
     for j in range(signal.shape[0]):
         if j != k:
-            received = _power(k, j, believed_m, at_1_m, power)
+            power = _power(k, j, belief)
             is_free = not is_sender[j] and signal[j] == 0.0
-            if is_free and is_received(sinr(received, total[j], NOISE), threshold):
-                signal[j] = received
-            total[j] += received
+            if is_free and is_received(sinr(power, total[j], NOISE), threshold):
+                signal[j] = power
+            total[j] += power
 
 
 @compiled()
-def _power(
-    k: int,
-    j: int,
-    believed_m: Float[np.ndarray, "N 2"],
-    at_1_m: float,
-    power: Float[np.ndarray, "N N"] | None,
-) -> float:
-    """Return the power of k's packets at j: that of free space, or as it was worked out."""
-    if power is None:
-        return received_power(at_1_m, squared_distance(believed_m, k, j))
-    return power[k, j]
+def _power(k: int, j: int, belief: _Belief) -> float:
+    """Return the power of k's packets at j."""
+    if belief.power.shape[0] == 0:
+        return received_power(belief.at_1_m, squared_distance(belief.believed_m, k, j))
+    return belief.power[k, j]

@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Int16, UInt8
-from scipy.sparse.csgraph import connected_components
 
-from swarm_mj.radio.composed import ComposedChannel
+from swarm_mj.radio.composed import ComposedChannel, strong_groups
 from swarm_mj.radio.mission_radio import by_robot, radio_of
 from swarm_mj.replay import palette
 from swarm_mj.simulation.swarm import Swarm
@@ -110,18 +109,11 @@ def radio_snapshot(swarm: Swarm, index: int = 0) -> RadioSnapshot | None:
     is_true, is_believed = (pairs & (power >= min_mw) for power in (true_mw, believed_mw))
     sent_mw = by_robot(mission, radio_of(mission).power_mw)
     return RadioSnapshot(
-        group=groups(is_true),
+        group=strong_groups(is_true).astype(np.int16),
         mismatch=_mismatch(is_true, is_believed, true_mw, sent_mw, min_mw),
         num_believed=_num_links(is_believed),
         num_working=_num_links(is_true),
     )
-
-
-def groups(is_linked: Bool[np.ndarray, "N N"]) -> Int16[np.ndarray, "N"]:
-    """Return the first of the robots that each reaches and is reached from, row to column."""
-    _, label = connected_components(is_linked, directed=True, connection="strong")
-    _, first = np.unique(label, return_index=True)
-    return first[label].astype(np.int16)
 
 
 def joined(each: Sequence[LinkMismatch], window: Int[np.ndarray, "C"]) -> LinkMismatch:

@@ -33,7 +33,7 @@ from swarm_mj.protocol.partial_packets import with_room
 from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, RequestResponse, WindowProtocol
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import Channel, VaryingChannel
-from swarm_mj.radio.mission_radio import belief_of, channel_of, truth_of
+from swarm_mj.radio.mission_radio import mission_radio
 from swarm_mj.radio.obstruction import blocked
 from swarm_mj.system.fields import check_kind
 
@@ -86,9 +86,8 @@ class Swarm:
         self.scene = own.scene
         self._physics = Physics(mission, len(seeds), scene=own.scene, num_threads=num_threads)
         self._obstacles = self._physics.obstacles
-        self.channel = channel_of(mission, self._obstacles) if own.channel is None else own.channel
-        self.belief = belief_of(mission, self._obstacles)
-        self._truth = truth_of(mission, self.channel)
+        radio = mission_radio(mission, self._obstacles, own.channel)
+        self.channel, self.belief, self._truth = radio
         self._num_missions = len(seeds)
         self.restart(seeds)
 

@@ -7,10 +7,9 @@ import pytest
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.radio.composed import ComposedChannel, Reception
-from swarm_mj.radio.fading import Bursts
 from swarm_mj.radio.link_gains import LinkGains
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.radio.power_law import power_law
+from swarm_mj.radio.power_law import PowerLaw
 from swarm_mj.radio.shadowing import Shadowing
 
 NUM_ROBOTS = 12
@@ -20,7 +19,7 @@ def channel(seeds, *, mission=None, shadowing=None, **reception):
     radio = radio_of(mission or paper("stationary"))
     at_1_m_mw = np.full(NUM_ROBOTS, radio.received_at_1_m_mw)
     made = ComposedChannel(
-        LinkGains(power_law(at_1_m_mw), shadowing),
+        LinkGains(PowerLaw(at_1_m_mw), shadowing),
         Reception(
             noise_mw=radio.noise_mw,
             threshold=radio.threshold,
@@ -77,7 +76,7 @@ def test_erasures_lose_their_share_and_nothing_else():
 
 
 def test_a_receiver_in_a_burst_decodes_nobody():
-    made, plain = channel([4], bursts=Bursts(begin=0.05, end=0.1)), channel([4])
+    made, plain = channel([4], burst_begin=0.05, burst_end=0.1), channel([4])
     position_m = np.zeros((1, NUM_ROBOTS, 2))
     position_m[0, :, 0] = np.arange(NUM_ROBOTS)
     recipient = np.arange(NUM_ROBOTS)[None].copy()
@@ -97,7 +96,8 @@ def test_a_receiver_in_a_burst_decodes_nobody():
 HARD = {
     "rician_k": 2.0,
     "erasure": 0.2,
-    "bursts": Bursts(begin=0.05, end=0.2),
+    "burst_begin": 0.05,
+    "burst_end": 0.2,
     "shadowing": Shadowing(std_db=6.0, correlation_m=20.0),
 }
 
@@ -167,7 +167,7 @@ def test_being_heard_is_not_enough_to_be_connected():
     at_1_m_mw = np.full(NUM_ROBOTS, radio.received_at_1_m_mw)
     at_1_m_mw[0] *= 100.0
     made = ComposedChannel(
-        LinkGains(power_law(at_1_m_mw), None),
+        LinkGains(PowerLaw(at_1_m_mw), None),
         Reception(noise_mw=radio.noise_mw, threshold=radio.threshold),
     )
     made.start(NUM_ROBOTS, [np.random.default_rng(0)])

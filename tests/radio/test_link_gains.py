@@ -5,16 +5,15 @@ import numpy as np
 from swarm_mj.physics.state import BOX, Obstacles
 from swarm_mj.radio import link_gains
 from swarm_mj.radio.link_gains import LinkGains
-from swarm_mj.radio.path_loss import FREE_SPACE, log_distance
-from swarm_mj.radio.power_law import power_law
+from swarm_mj.radio.power_law import NO_OBSTACLES, PowerLaw
 from swarm_mj.radio.shadowing import Shadowing
 
 EVERYONE = np.ones((2, 4), dtype=bool)
 SENT = np.array([1.0, 1.0, 4.0, 1.0])  # after one metre
 
 
-def gains(*, law=FREE_SPACE, shadowing=None, obstacles=None):
-    made = LinkGains(power_law(SENT, law, obstacles), shadowing)
+def gains(*, slope=(np.inf, 2.0), shadowing=None, obstacles=NO_OBSTACLES):
+    made = LinkGains(PowerLaw(SENT, *slope, obstacles), shadowing)
     made.start([np.random.default_rng(seed) for seed in (1, 2)])
     return made
 
@@ -25,7 +24,7 @@ def places(seed=0):
 
 def test_powers_are_each_robots_own_after_the_path_loss():
     position_m = places()
-    received_mw = gains(law=log_distance(3.0, 10.0)).received_mw(position_m, np.arange(2), EVERYONE)
+    received_mw = gains(slope=(10.0, 3.0)).received_mw(position_m, np.arange(2), EVERYONE)
     for b in range(2):
         for i in range(4):
             for j in range(4):
@@ -37,7 +36,9 @@ def test_powers_are_each_robots_own_after_the_path_loss():
 
 def test_powers_are_worked_out_once_for_each_sender_and_place(monkeypatch):
     asked = []
-    monkeypatch.setattr(link_gains, "_lose", lambda _p, is_asked, *_: asked.append(is_asked.sum()))
+    monkeypatch.setattr(
+        link_gains, "_compute", lambda _p, is_asked, *_: asked.append(is_asked.sum())
+    )
     made, position_m, first_only = gains(), places(), np.zeros((2, 4), dtype=bool)
     first_only[:, 0] = True
     for is_sender in (first_only, first_only, EVERYONE, EVERYONE):
@@ -76,7 +77,7 @@ def test_rows_may_be_any_missions_and_repeat_them():
 def test_a_missions_shadowing_does_not_depend_on_those_beside_it():
     shadowing, position_m = Shadowing(std_db=6.0, correlation_m=20.0), places()
     both = gains(shadowing=shadowing).received_mw(position_m, np.arange(2), EVERYONE)
-    alone = LinkGains(power_law(SENT), shadowing)
+    alone = LinkGains(PowerLaw(SENT), shadowing)
     alone.start([np.random.default_rng(2)])
     one = alone.received_mw(position_m[1:], np.arange(1), EVERYONE[:1])
     np.testing.assert_array_equal(one[0], both[1])

@@ -11,7 +11,8 @@ from swarm_mj.mission.specification import KNOWABLE
 from swarm_mj.physics.state import BOX, Obstacles
 from swarm_mj.radio.link_models import TrueLinks
 from swarm_mj.radio.links import links_between, lone_probabilities
-from swarm_mj.radio.mission_radio import belief_of, channel_of, radio_of
+from swarm_mj.radio.mission_radio import mission_radio, radio_of
+from swarm_mj.radio.power_law import NO_OBSTACLES
 
 WALL = Obstacles(  # of 10 dB, between x < 0 and x > 0
     kind=np.array([BOX]),
@@ -24,9 +25,9 @@ WALL = Obstacles(  # of 10 dB, between x < 0 and x > 0
 ON_A_LINE_M = np.array([[-100.0, 0.0], [-20.0, 0.0], [100.0, 0.0]])
 
 
-def chances(position_m=ON_A_LINE_M, *, obstacles=None, **fields):
+def chances(position_m=ON_A_LINE_M, *, obstacles=NO_OBSTACLES, **fields):
     """What the robots of such a mission believe that lone packets decode with."""
-    belief = belief_of(paper(num_robots=len(position_m), **fields), obstacles)
+    belief = mission_radio(paper(num_robots=len(position_m), **fields), obstacles).belief
     return lone_probabilities(belief.links(position_m))
 
 
@@ -42,7 +43,7 @@ def chances(position_m=ON_A_LINE_M, *, obstacles=None, **fields):
 def test_without_knowledge_belief_is_free_space_to_the_last_digit(fields):
     position_m, spread_m = ON_A_LINE_M, np.array([0.0, 10.0, 20.0])
     is_known = np.array([True, True, False])
-    belief = belief_of(paper(num_robots=3, **fields))
+    belief = mission_radio(paper(num_robots=3, **fields)).belief
     expected = links_between(radio_of(paper()), position_m, spread_m, is_known)
     for mine, its in zip(belief.links(position_m, spread_m, is_known), expected, strict=True):
         np.testing.assert_array_equal(mine, its)
@@ -90,7 +91,9 @@ def test_strong_radios_are_known_by_their_statistics():
 
 
 def test_who_is_unknown_is_not_counted_on_by_any_law():
-    belief = belief_of(paper(num_robots=3, path_loss="two-ray", prior_knowledge="statistics"))
+    belief = mission_radio(
+        paper(num_robots=3, path_loss="two-ray", prior_knowledge="statistics")
+    ).belief
     links = belief.links(ON_A_LINE_M, np.zeros(3), np.array([True, True, False]))
     assert links.received_mw[0, 1] > 0.0
     assert not np.any(links.received_mw[2])
@@ -100,7 +103,7 @@ def test_who_is_unknown_is_not_counted_on_by_any_law():
 def test_an_error_of_distance_weighs_more_where_power_falls_more_steeply():
     """At 100 m, known to sqrt(2) 5 m: with d⁻⁴ beyond 20 m that counts twice."""
     fields = {"path_loss": "log-distance", "loss_exponent": 4.0, "reference_m": 20.0}
-    belief = belief_of(paper(num_robots=3, prior_knowledge="statistics", **fields))
+    belief = mission_radio(paper(num_robots=3, prior_knowledge="statistics", **fields)).belief
     position_m = np.array([[0.0, 0.0], [10.0, 0.0], [100.0, 0.0]])
     over_std = belief.links(position_m, np.full(3, 5.0)).distance_over_std
     assert over_std[0, 1] == pytest.approx(10.0 / (5.0 * math.sqrt(2.0)))
@@ -120,7 +123,7 @@ LOSSES = {
 def test_true_links_decode_as_often_as_the_channel_lets_them(fields):
     """Each robot in turn sends alone in every slot of so many; behind the wall, too."""
     mission, num_slots = paper(num_robots=4, **fields), 4000
-    channel = channel_of(mission, WALL)
+    channel = mission_radio(mission, WALL).channel
     channel.start(4, [np.random.default_rng(seed) for seed in (1, 2)])
     position_m = np.array([[-90.0, 0.0], [-20.0, 60.0], [60.0, 0.0], [90.0, 30.0]])
     links = TrueLinks(radio=radio_of(mission), channel=channel).links(position_m, 1)

@@ -5,9 +5,8 @@ import pytest
 
 from swarm_mj.mission import Mission, paper, reference
 from swarm_mj.radio.composed import ComposedChannel
-from swarm_mj.radio.fading import Bursts
 from swarm_mj.radio.free_space import FreeSpaceRadio
-from swarm_mj.radio.mission_radio import channel_of, radio_of
+from swarm_mj.radio.mission_radio import mission_radio, radio_of
 
 
 def test_radio_is_the_missions():
@@ -53,33 +52,33 @@ BEYOND_FREE_SPACE = (
 
 
 def test_the_papers_missions_have_the_papers_channel():
-    assert channel_of(paper()) == radio_of(paper())
+    assert mission_radio(paper()).channel == radio_of(paper())
     for unused in (
         {"rician_k": 1.0},
         {"burst_end": 0.5},
         {"high_power_fraction": 0.5, "high_power_db": 0.0},
     ):
-        assert isinstance(channel_of(paper(**unused)), FreeSpaceRadio)
+        assert isinstance(mission_radio(paper(**unused)).channel, FreeSpaceRadio)
 
 
 @pytest.mark.parametrize("fields", BEYOND_FREE_SPACE)
 def test_anything_more_is_a_composed_channel(fields):
-    assert isinstance(channel_of(paper(**fields)), ComposedChannel)
+    assert isinstance(mission_radio(paper(**fields)).channel, ComposedChannel)
 
 
 def test_reception_is_as_the_mission_says():
     fields = {"fading": "rician", "rician_k": 7.0, "erasure": 0.2, "burst_begin": 0.03}
-    channel = channel_of(reference(**fields, burst_end=0.4))
+    channel = mission_radio(reference(**fields, burst_end=0.4)).channel
     assert isinstance(channel, ComposedChannel)
     assert channel.reception.rician_k == 7.0
     assert channel.reception.erasure == 0.2
-    assert channel.reception.bursts == Bursts(begin=0.03, end=0.4)
+    assert (channel.reception.burst_begin, channel.reception.burst_end) == (0.03, 0.4)
     assert channel.reception.recipient_hears_while_sending
 
 
 def received_mw(mission: Mission, apart_m: float, seed: int = 0):
     """Between robots 0 and 1, which are so far apart, in both directions."""
-    channel = channel_of(mission)
+    channel = mission_radio(mission).channel
     assert isinstance(channel, ComposedChannel)
     channel.start(mission.num_robots, [np.random.default_rng(seed)])
     position_m = np.zeros((1, mission.num_robots, 2))

@@ -8,8 +8,13 @@ from spatial_rule import agreed_senders, radio
 
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import BOX, Obstacles
-from swarm_mj.radio.mission_radio import belief_of, channel_of
-from swarm_mj.radio.spatial_reuse import believes_as_the_last, keep_joined, told_of, write_joined
+from swarm_mj.radio.mission_radio import mission_radio
+from swarm_mj.radio.spatial_reuse import (
+    believes_as_the_last,
+    keep_joined,
+    known_powers,
+    write_joined,
+)
 
 seeds = st.integers(0, 2**32 - 1)
 thresholds = st.sampled_from([0.3, 1.25, 4.0])
@@ -68,7 +73,7 @@ WALLS = Obstacles(  # of 15 dB each, along both axes
 
 
 @given(seed=seeds, num_robots=st.integers(2, 12), stands_still=st.booleans())
-def test_eq3_by_what_was_told_of_the_channel_its_own_rule_is_the_judge(
+def test_eq3_by_what_was_known_powers_the_channel_its_own_rule_is_the_judge(
     seed, num_robots, stands_still
 ):
     """Steeper path loss, strong radios and walls, all of them known; slot after slot."""
@@ -77,10 +82,10 @@ def test_eq3_by_what_was_told_of_the_channel_its_own_rule_is_the_judge(
         "stationary", num_robots=num_robots, prior_knowledge="map,statistics",
         path_loss="log-distance", loss_exponent=2.5, high_power_fraction=0.4,
     )  # fmt: skip
-    channel, belief = channel_of(mission, WALLS), belief_of(mission, WALLS)
+    channel, belief, _ = mission_radio(mission, WALLS)
     channel.start(num_robots, [rng])
-    law = belief.law._replace(at_1_m=belief.law.at_1_m / belief.radio.noise_mw)
-    told, order = told_of(law, 1), rng.permutation(num_robots)
+    law = belief.law_over_noise(num_robots)
+    known, order = known_powers(law, 1), rng.permutation(num_robots)
     position_m = rng.uniform(-400, 400, (num_robots, 2))
     for turn in range(4):
         if not stands_still:
@@ -88,7 +93,7 @@ def test_eq3_by_what_was_told_of_the_channel_its_own_rule_is_the_judge(
         is_sending = np.ones((1, num_robots), dtype=bool)
         believed_m = np.tile(position_m, (1, num_robots, 1, 1))
         args = (believed_m, order[None], np.array([turn]), 250.0, belief.radio.threshold)
-        keep_joined(*args, is_sending, told)
+        keep_joined(*args, is_sending, known)
         judge = channel.at(np.array([turn]), np.array([0]))
         expected = agreed_senders(order, turn, position_m, judge)
         assert set(np.flatnonzero(is_sending[0]).tolist()) == expected
@@ -97,14 +102,13 @@ def test_eq3_by_what_was_told_of_the_channel_its_own_rule_is_the_judge(
 def test_each_robot_reckons_with_its_own_beliefs_of_what_it_was_told():
     """Robot 2 takes itself to be far from the owner of the turn, and joins; the others know it."""
     mission = paper("stationary", num_robots=4, prior_knowledge="statistics", path_loss="two-ray")
-    belief = belief_of(mission)
-    law = belief.law._replace(at_1_m=belief.law.at_1_m / belief.radio.noise_mw)
+    belief = mission_radio(mission).belief
     position_m = np.array([[0.0, 0.0], [30.0, 0.0], [60.0, 0.0], [61.0, 0.0]])
     believed_m = np.tile(position_m, (1, 4, 1, 1))
     believed_m[0, 2, 2:] += 5000.0
     is_sending = np.ones((1, 4), dtype=bool)
     args = (believed_m, np.arange(4)[None], np.array([0]), 250.0, belief.radio.threshold)
-    keep_joined(*args, is_sending, told_of(law, 1))
+    keep_joined(*args, is_sending, known_powers(belief.law_over_noise(4), 1))
     assert is_sending[0].tolist() == [True, False, True, False]
 
 

@@ -120,7 +120,7 @@ def test_losses_behind_a_wall_by_hand():
 
 
 def test_a_strong_radio_surprises_in_its_own_direction_only():
-    mission = paper("stationary", num_robots=12, high_power_fraction=0.5, strong_db=3.0)
+    mission = paper("stationary", num_robots=12, high_power_fraction=0.5, high_power_db=3.0)
     found = radio_snapshot(Swarm(mission, [2])).mismatch
     assert not np.any(found.is_too_weak)
     assert np.all(found.sender < 6)

@@ -14,7 +14,7 @@ from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.link_models import TrueLinks
-from swarm_mj.radio.mission_radio import channel_of, radio_of
+from swarm_mj.radio.mission_radio import mission_radio, radio_of
 from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 
@@ -130,7 +130,7 @@ def test_the_oracle_addresses_nobody_behind_a_wall_of_the_true_channel():
         power_left=np.array([1e-4]),
     )
     mission = paper("stationary", num_robots=2)
-    channel, policy = channel_of(mission, wall), make_policy("greedy-oracle", mission)
+    channel, policy = mission_radio(mission, wall).channel, make_policy("greedy-oracle", mission)
     channel.start(2, [np.random.default_rng(0)])
     position_m, timestamp = np.array([[0.0, 0.0], [100.0, 0.0]]), np.diag([9.0, 9.0])
     team = Team(radio=radio_of(mission), position_m=position_m, timestamp=timestamp, now=9.0)
