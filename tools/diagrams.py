@@ -127,7 +127,7 @@ def _canvas(width: float, height: float) -> tuple[Figure, Axes]:
 
 
 def draw_loop() -> Figure:
-    """What happens in a window, and which parts can be replaced."""
+    """Draw a window's loop, and the parts that can be replaced."""
     figure, axes = _canvas(8.0, 3.1)
     policy, radio, buffers = (1.35, 2.3), (4.0, 2.3), (6.65, 2.3)
     scene, controller = (4.0, 0.75), (6.65, 0.75)
@@ -231,7 +231,7 @@ def draw_age() -> Figure:
 
 
 def _ages() -> tuple[Float[np.ndarray, "W N"], Int[np.ndarray, "N"]]:
-    """The ages of r0's news of everyone, window by window, and over how many hops it came last."""
+    """Return the ages of r0's entries, window by window, and the hops of the last packets."""
     mission = paper("stationary", num_robots=20, num_windows=100)
     swarm = Swarm(mission, seeds=[1])
     ages = [

@@ -129,7 +129,7 @@ def site_links(text: str, source: str, page: str) -> tuple[str, set[str]]:
 
 
 def paper_map() -> str:
-    """The page that leads from the paper's equations to the code, made from the package's map."""
+    """Return the page that maps the paper's equations to the code, made from the package's map."""
     entries = MAP_LINE.findall(swarm_mj.__doc__ or "")
     rows = [
         f"| {section} | {item} | {what} | [`{target}`][swarm_mj.{target}] |"

@@ -98,7 +98,7 @@ def _plus_minus(result: Result, name: str, digits: int) -> str:
 
 
 def _kind(result: Result, *, is_by_rate: bool) -> tuple[str, ...]:
-    """What makes tables of their own, in words."""
+    """Return what distinguishes tables, in words."""
     fate = (
         [f"{result.failure_fraction:.0%} of the robots off half-way"]
         if result.failure_fraction

@@ -192,7 +192,7 @@ def _tune_all(work: Sequence[Search], seeds: range, console: Console) -> list[Tu
 
 
 def _guess(grid: tuple[float, ...], rows: Sequence[Tuned]) -> float:
-    """What was best in the regime before, if it is one of this grid; else the grid's middle."""
+    """Return the previous best if it is in this grid, else the middle of the grid."""
     is_apt = rows and rows[-1].probability in grid
     return rows[-1].probability if is_apt else grid[len(grid) // 2]
 

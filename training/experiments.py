@@ -43,7 +43,7 @@ def read_experiment(path: Path) -> Experiment:
 
 
 def typed(shared: str, own: str) -> list[str]:
-    """The words of options; a training's own, or a flight's, take the place of those shared."""
+    """Return options as words; those of a training or a flight override the shared ones."""
     groups: dict[str, list[str]] = {}
     for options in (shared, own):
         its: dict[str, list[str]] = {}

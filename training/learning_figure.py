@@ -63,7 +63,7 @@ class LearningFigure:
         return 0
 
     def _levels(self) -> dict[str, float]:
-        """What the schedules cost, the mean over the same sizes of the team [windows]."""
+        """Return the schedules' ages, means over the same team sizes [windows]."""
         results = read_results(self.results / "candidates-rest.csv")
         return {
             name: mean(result.aoi_mean for result in results if result.policy == name)
@@ -88,7 +88,7 @@ def read_curve(path: Path) -> dict[str, np.ndarray]:
 
 
 def draw(curve: Mapping[str, np.ndarray], levels: Mapping[str, float]) -> Figure:
-    """The curve over the minutes of training, and the levels of policies that do not learn."""
+    """Draw the curve over the minutes of training, and the levels of other policies."""
     with styled():
         drawing = Figure(figsize=(WIDTH_IN, HEIGHT_IN), layout="constrained")
         axes = drawing.subplots()

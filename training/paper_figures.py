@@ -66,7 +66,7 @@ class Part:
         return f"{self.preset}-{self.figure.task}.csv"
 
     def command(self, settings: Settings, jobs: int) -> list[str]:
-        """What `swarm-mj` is called with."""
+        """Return the arguments of `swarm-mj`."""
         return [
             *self.figure.arguments(self.preset),
             *("--episodes", f"{settings.episodes}", "--seed", f"{settings.first_seed}"),

@@ -25,7 +25,7 @@ SHARED = "robot"  # the one network that all robots have
 
 
 def make_mission(reward: str) -> SwarmParallelEnv:
-    """A team that stands still; `credit` pays every robot for what its own packet changed."""
+    """Make a stationary team; `credit` rewards each robot for its own packet."""
     return parallel_env("stationary", num_robots=NUM_ROBOTS, num_windows=NUM_WINDOWS, reward=reward)
 
 
@@ -50,7 +50,7 @@ class FlatEnv(ParallelPettingZooEnv):
 
 
 def flat_space(mission: SwarmParallelEnv, agent: str) -> spaces.Space:
-    """What a robot knows of its teammates, in one row."""
+    """Flatten what a robot knows of its teammates."""
     return spaces.flatten_space(mission.observation_space(agent)["observation"])
 
 

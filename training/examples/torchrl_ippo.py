@@ -28,7 +28,7 @@ SEEN, MASK, LOGITS, ACTION, LOG_PROB, VALUE, REWARD, DONE, TERMINATED = (
 
 
 def make_env(reward: str) -> EnvBase:
-    """A team that stands still; `credit` pays every robot for what its own packet changed."""
+    """Make a stationary team; `credit` rewards each robot for its own packet."""
     mission = parallel_env(
         "stationary", num_robots=NUM_ROBOTS, num_windows=NUM_WINDOWS, reward=reward
     )

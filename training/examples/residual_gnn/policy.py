@@ -102,7 +102,7 @@ class ResidualPolicy(BroadcastPolicy):
         return self.decide(views).transmits
 
     def decide(self, views: LocalViews) -> Decision:
-        """What is decided of the slot that begins, and on what."""
+        """Decide on the slot that begins, and return the decision with its inputs."""
         buffers, tick = views.buffers, 1 + slot_of(views.now)
         observed = ticks(buffers.timestamp)
         is_known, threshold = buffers.is_known, self._radio.threshold

@@ -96,7 +96,7 @@ class Residual:
         return 0
 
     def _command(self) -> str:
-        """What was typed, with all that is not as usual."""
+        """Return the command line, with all options that differ from the defaults."""
         words = ["python -m residual_gnn.train"]
         for spec in fields(self):
             value = getattr(self, spec.name)
@@ -106,7 +106,7 @@ class Residual:
         return " ".join(words)
 
     def training(self) -> ResidualTraining:
-        """What is trained, on what."""
+        """Return the settings of the training."""
         return ResidualTraining(
             missions={name: self._mission(**channel) for name, channel in KINDS.items()},
             ppo=PpoSettings(learning_rate=self.learning_rate, epochs=self.epochs),
@@ -121,7 +121,7 @@ class Residual:
         return paper("stationary", num_robots=self.robots, num_windows=self.windows, **channel)
 
     def _card(self, progress: Progress, at: int, ratios: dict[int, float]) -> str:
-        """What made the policy, and how it was chosen."""
+        """Return the model card: training, settings and selection."""
         training = asdict(self.training())
         training.pop("missions")
         settings = training.pop("ppo") | training
