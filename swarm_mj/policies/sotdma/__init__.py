@@ -1,1 +1,1 @@
-"""Self-organised TDMA: robots choose their own slots, and tell each other by speaking in them."""
+"""Self-organised TDMA: robots choose their own slots, announced implicitly by transmitting."""

@@ -8,7 +8,7 @@ own. So robots agree on who transmits when, however wrong they are about positio
 The mission begins with spatial TDMA. After three rounds everyone works out first slots for all,
 from positions that hardly differ by then. From then on one robot after the other chooses anew: it
 simulates the whole frame, from the positions and slots that it believes in, with itself in each
-slot, and takes the one in which the team's news stays youngest. Neighbours' packets say whether
+slot, and takes the one that keeps the team's information freshest. Neighbours' packets say whether
 they decoded its own; a slot that is missed too often for chance counts as one that they cannot
 hear it in. One slot in sixteen is left to robots that have lost a neighbour.
 """
@@ -20,8 +20,7 @@ from jaxtyping import Bool
 
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.policy import BroadcastPolicy
-from swarm_mj.policies.sotdma.settings import SotdmaSettings
-from swarm_mj.policies.sotdma.team import Team
+from swarm_mj.policies.sotdma.team import SotdmaSettings, SotdmaTeam
 from swarm_mj.policies.spatial_tdma import SpatialTdma
 from swarm_mj.policies.tdma import draw_order, slot_of
 from swarm_mj.protocol.local_views import LocalViews
@@ -30,7 +29,7 @@ from swarm_mj.radio.link_models import Belief
 
 
 class SelfOrganisedTdma(BroadcastPolicy):
-    """TDMA whose slots robots choose themselves, and announce by speaking in them.
+    """TDMA whose slots robots choose themselves, announced implicitly by transmitting.
 
     Uses the robot's own buffer, T and P in packets that it decoded, its identity, the team's
     size, the order, the clock and the radio's range and threshold. Of what the mission grants of
@@ -47,22 +46,14 @@ class SelfOrganisedTdma(BroadcastPolicy):
         self,
         radio: FreeSpaceRadio,
         turns: SpatialTdma,
-        settings: SotdmaSettings | None = None,
         *,
         reads_packets: bool = True,
     ) -> None:
-        """Prepare the policy.
+        """Prepare the policy, whose robots follow turns at first.
 
-        Args:
-            radio: What robots believe in unless the policy is informed otherwise.
-            turns: What they follow at first.
-            settings: What was tuned.
-            reads_packets: Whether packets hold all of T and P as they were before the slot, so that
-                they tell who was heard.
+        They read packets that hold all of T and P as before the slot, and so say who was heard.
         """
-        self._radio, self._turns = radio, turns
-        self._settings = SotdmaSettings() if settings is None else settings
-        self._reads_packets = reads_packets
+        self._turns, self._reads_packets = turns, reads_packets
         self._belief = Belief(radio=radio)
 
     def inform(self, belief: Belief) -> None:
@@ -71,22 +62,22 @@ class SelfOrganisedTdma(BroadcastPolicy):
         self._turns.inform(belief)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Draws every mission's order; arguments as in `Policy.start`."""
+        """Draw every mission's order; arguments as in `Policy.start`."""
         self._turns.start(num_robots, rngs)
         orders = draw_order(num_robots, rngs)
-        self._teams = [Team(order, self._belief, self._settings) for order in orders]
+        self._teams = [SotdmaTeam(order, self._belief, SotdmaSettings()) for order in orders]
         self._uniform = Stream(rngs, uniform, (num_robots,))
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
-        """Whoever owns the slot, or is in need where nobody does; at first, by turns."""
+        """Return who owns the slot, or is in need where nobody does; at first, whose turn it is."""
         slot, transmits = slot_of(views.now), np.zeros(views.silence.shape, dtype=bool)
         if any(team.takes_turns for team in self._teams):
             transmits = self._turns.transmits(views)
         heard = views.phases[-1].heard if views.phases else views.silence
         draw = self._uniform.next()
         for b, team in enumerate(self._teams):
-            told = heard[b] if self._reads_packets else views.silence[b]
+            read = heard[b] if self._reads_packets else views.silence[b]
             transmits[b] = team.transmits(
-                int(slot[b]), transmits[b], views.buffers, b, told, draw[b]
+                int(slot[b]), transmits[b], views.buffers, b, read, draw[b]
             )
         return transmits

@@ -6,7 +6,7 @@ import pytest
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.policies.sotdma.hearsay import LONG_AGO, OF_NO_FRAME, place_of
+from swarm_mj.policies.sotdma.slot_table import LONG_AGO, NO_PLACE, place_of
 from swarm_mj.simulation.swarm import Swarm
 
 REST = paper("stationary", num_robots=12, range_ratio=0.2)
@@ -83,14 +83,14 @@ def test_everyone_transmits_once_in_every_frame_in_the_slot_it_owns():
     assert frames.first_slot == FIRST
     places = np.array([place_of(slot, frames) for slot in range(FIRST, 200)])
     sent = flown[FIRST:, 0]
-    frame = np.cumsum(places == 0)[places != OF_NO_FRAME]
-    counts = [np.sum(sent[places != OF_NO_FRAME][frame == n], axis=0) for n in range(1, 13)]
+    frame = np.cumsum(places == 0)[places != NO_PLACE]
+    counts = [np.sum(sent[places != NO_PLACE][frame == n], axis=0) for n in range(1, 13)]
     # Whoever moves to a later slot of the frame in which it chooses transmits twice in it, or not
     # at all if to an earlier one.
     assert np.mean(np.array(counts) == 1) > 0.9
     assert np.all(np.sum(counts, axis=0) >= 10)
-    own = np.diagonal(policy._teams[0]._hearsay.slots)
-    last = [np.flatnonzero(sent[:, i] & (places != OF_NO_FRAME))[-1] for i in range(12)]
+    own = np.diagonal(policy._teams[0]._table.slots)
+    last = [np.flatnonzero(sent[:, i] & (places != NO_PLACE))[-1] for i in range(12)]
     np.testing.assert_array_equal(places[last], own)
 
 
@@ -98,18 +98,8 @@ def test_robots_agree_on_slots():
     """Within a frame of the last choice almost everyone knows everyone's slot."""
     _, policy = transmitters(REST, "sotdma", [3, 4, 5], 150)
     for team in policy._teams:
-        slots = team._hearsay.slots
+        slots = team._table.slots
         assert np.mean(slots == np.diagonal(slots)) > 0.9
-
-
-def test_everyone_chooses_once_in_four_frames_but_not_in_the_first():
-    _, policy = transmitters(REST, "sotdma", [3], 20)
-    team = policy._teams[0]
-    assert [team._choosers(slot, team._frames) for slot in range(FIRST, FIRST + 11)] == [[]] * 11
-    choosers = [
-        i for slot in range(FIRST + 44, FIRST + 88) for i in team._choosers(slot, team._frames)
-    ]
-    assert choosers == team._order.tolist()
 
 
 @pytest.mark.parametrize("task", ["stationary", "flocking"])
@@ -133,4 +123,4 @@ def test_packets_that_hold_a_part_of_t_tell_nothing_of_who_was_heard():
     mission = paper("stationary", num_robots=12, range_ratio=0.2, bit_rate=10_000.0)
     for each, tells in ((mission, False), (REST, True)):
         _, policy = transmitters(each, "sotdma", [1], 60)
-        assert np.any(policy._teams[0]._hearsay.decoded > LONG_AGO) == tells
+        assert np.any(policy._teams[0]._table.decoded > LONG_AGO) == tells

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from swarm_mj.policies.sotdma.hearsay import (
+from swarm_mj.policies.sotdma.slot_table import (
     LONG_AGO,
-    OF_NO_FRAME,
+    NO_PLACE,
     Frames,
     is_in_need,
-    nothing_heard,
+    marks,
     place_of,
     read_packets,
     read_slots,
-    write_marks,
+    slot_table,
 )
 
 FRAMES = Frames(first_slot=10, num_slots=3, contention_every=4)
@@ -20,11 +20,11 @@ FRAMES = Frames(first_slot=10, num_slots=3, contention_every=4)
 
 def memory():
     """Of three robots that believe that robot k transmits in slot k."""
-    return nothing_heard(np.tile(np.arange(3), (3, 1)), 3)
+    return slot_table(np.tile(np.arange(3), (3, 1)), 3)
 
 
 def test_every_fourth_slot_is_of_no_frame_and_the_others_count_on():
-    no = OF_NO_FRAME
+    no = NO_PLACE
     places = [place_of(slot, FRAMES) for slot in range(10, 22)]
     assert places == [0, 1, 2, no, 0, 1, 2, no, 0, 1, 2, no]
     frames = Frames(first_slot=0, num_slots=5, contention_every=3)
@@ -35,63 +35,63 @@ def test_t_tells_a_teammates_slot():
     """Robot 2 transmitted in slot 15, the second of a frame; robot 1 before there were frames;
     slot 17 is of no frame, so it tells nothing; older news changes nothing, nor does one's own T.
     """
-    hearsay = memory()
+    table = memory()
     timestamp = np.zeros((3, 3))
     timestamp[0] = 8.5, 5.0, 8.0  # ends of slots 16, 9 and 15
-    read_slots(hearsay, timestamp, FRAMES)
-    assert hearsay.slots[0].tolist() == [0, 1, 1]
-    assert hearsay.announced[0].tolist() == [LONG_AGO, LONG_AGO, 15]
+    read_slots(table, timestamp, FRAMES)
+    assert table.slots[0].tolist() == [0, 1, 1]
+    assert table.announced[0].tolist() == [LONG_AGO, LONG_AGO, 15]
     for end in (7.0, 9.0):
         timestamp[0, 2] = end
-        read_slots(hearsay, timestamp, FRAMES)
-        assert hearsay.slots[0, 2] == 1
-        assert hearsay.announced[0, 2] == 15
+        read_slots(table, timestamp, FRAMES)
+        assert table.slots[0, 2] == 1
+        assert table.announced[0, 2] == 15
 
 
-def hear(hearsay, slot, sender, known_until, passed_by):
+def hear(table, slot, sender, known_until, passed_by):
     """Robot 0 decodes a packet that says what its sender knows of it: T, and P."""
     timestamp, parent = np.zeros((3, 3)), np.full((3, 3), -1)
     timestamp[sender, 0], parent[sender, 0] = (known_until + 1) / 2, passed_by
-    read_packets(hearsay, np.array([sender, 1, 2]), timestamp, parent, slot, FRAMES)
+    read_packets(table, np.array([sender, 1, 2]), timestamp, parent, slot, FRAMES)
 
 
 def test_a_packet_tells_whether_its_sender_decoded_ones_own():
     """Robot 0 transmitted in slot 14, place 0. Robot 1 decoded it; robot 2 knows of slot 10 only,
     and says so twice; then again, of what was sent in slot 18, it was told by robot 1."""
-    hearsay = memory()
-    hearsay.sent[0], hearsay.sent_place[0] = 14, 0
-    hear(hearsay, 15, 1, 14, 1)
-    hear(hearsay, 16, 2, 10, 2)
-    hear(hearsay, 17, 2, 10, 2)
-    assert hearsay.missed[0, 0].tolist() == [0, 0, 1]
-    assert hearsay.missed_at[0].tolist() == [16, LONG_AGO, LONG_AGO]
-    assert hearsay.decoded[0].tolist() == [LONG_AGO, 15, 17]
-    assert hearsay.got_through[0].tolist() == [LONG_AGO, 14, 10]
-    assert hearsay.share[0] == pytest.approx(0.9)
-    hearsay.sent[0] = 18
-    hear(hearsay, 19, 2, 18, 1)
-    assert hearsay.missed[0, 0].tolist() == [0, 0, 2]
-    hearsay.sent[0] = 22
-    hear(hearsay, 23, 2, 22, 2)
-    assert hearsay.missed[0, 0].tolist() == [0, 0, 0]
-    assert np.all(hearsay.missed[0, 1:] == 0)
+    table = memory()
+    table.sent[0], table.sent_place[0] = 14, 0
+    hear(table, 15, 1, 14, 1)
+    hear(table, 16, 2, 10, 2)
+    hear(table, 17, 2, 10, 2)
+    assert table.missed[0, 0].tolist() == [0, 0, 1]
+    assert table.missed_at[0].tolist() == [16, LONG_AGO, LONG_AGO]
+    assert table.decoded[0].tolist() == [LONG_AGO, 15, 17]
+    assert table.got_through[0].tolist() == [LONG_AGO, 14, 10]
+    assert table.outbound_delivery_ratio[0] == pytest.approx(0.9)
+    table.sent[0] = 18
+    hear(table, 19, 2, 18, 1)
+    assert table.missed[0, 0].tolist() == [0, 0, 2]
+    table.sent[0] = 22
+    hear(table, 23, 2, 22, 2)
+    assert table.missed[0, 0].tolist() == [0, 0, 0]
+    assert np.all(table.missed[0, 1:] == 0)
 
 
 def test_misses_are_counted_up_to_a_hundred():
-    hearsay = memory()
+    table = memory()
     for n in range(150):
-        hearsay.sent[0], hearsay.sent_place[0] = 10 + 4 * n, 0
-        hear(hearsay, 12 + 4 * n, 1, 5, 1)
-    assert hearsay.missed[0, 0, 1] == 100
+        table.sent[0], table.sent_place[0] = 10 + 4 * n, 0
+        hear(table, 12 + 4 * n, 1, 5, 1)
+    assert table.missed[0, 0, 1] == 100
 
 
-@pytest.mark.parametrize(("sent", "place"), [(9, 0), (14, OF_NO_FRAME), (15, 0)])
+@pytest.mark.parametrize(("sent", "place"), [(9, 0), (14, NO_PLACE), (15, 0)])
 def test_a_packet_says_nothing_of_what_was_sent_in_no_frame_or_just_now(sent, place):
-    hearsay = memory()
-    hearsay.sent[0], hearsay.sent_place[0] = sent, place
-    hear(hearsay, 15, 1, 5, 1)
-    assert not np.any(hearsay.missed)
-    assert hearsay.share[0] == 1.0
+    table = memory()
+    table.sent[0], table.sent_place[0] = sent, place
+    hear(table, 15, 1, 5, 1)
+    assert not np.any(table.missed)
+    assert table.outbound_delivery_ratio[0] == 1.0
 
 
 @pytest.mark.parametrize(
@@ -99,26 +99,27 @@ def test_a_packet_says_nothing_of_what_was_sent_in_no_frame_or_just_now(sent, pl
     [(1.0, 1), (0.95, 1), (0.7, 2), (0.5, 4), (0.0, 22)],  # 0.3² < 0.1 < 0.3; 0.5⁴ < 0.1; 0.9²²
 )
 def test_a_slot_is_marked_that_was_missed_more_often_than_by_chance(share, enough):
-    missed = np.array([[enough - 1, enough], [enough, enough]], dtype=np.int8)
-    is_marked = np.zeros((2, 2), dtype=bool)
-    write_marks(missed, np.array([50, 29], dtype=np.int32), share, 0.1, 30, is_marked)
-    assert is_marked.tolist() == [[False, True], [False, False]]
+    table = memory()
+    table.missed[0, :2, 1:] = [[enough - 1, enough], [enough, enough]]
+    table.missed_at[0, :2], table.outbound_delivery_ratio[0] = [50, 29], share
+    is_marked = marks(table, 0, 0.1, 30)
+    assert is_marked[:2, 1:].tolist() == [[False, True], [False, False]]
 
 
 def test_a_robot_is_in_need_that_lost_a_neighbour_or_is_lost_to_one():
     """At slot 40, with a patience of 6 slots: robot 1 is the neighbour of robot 0."""
-    hearsay, near = memory(), np.array([False, True, False])
+    table, near = memory(), np.array([False, True, False])
 
     def needs(heard_of_slot, is_near=near):
         timestamp = np.array([20.0, (heard_of_slot + 1) / 2, 0.0])
-        return is_in_need(hearsay, 0, timestamp, is_near, 40, 6.0, 12.0)
+        return is_in_need(table, 0, timestamp, is_near, 40, 6.0, 12.0)
 
     assert needs(33)
     assert needs(28)
     assert not needs(27)  # it is gone
     assert not needs(34)
     assert not needs(33, np.zeros(3, dtype=bool))
-    hearsay.decoded[0, 1], hearsay.got_through[0, 1] = 38, 31
+    table.decoded[0, 1], table.got_through[0, 1] = 38, 31
     assert needs(38)
-    hearsay.got_through[0, 1] = 32
+    table.got_through[0, 1] = 32
     assert not needs(38)

@@ -1,0 +1,175 @@
+"""A frame against the radio itself, and against loops that follow one timestamp at a time.
+
+Choices are held against the same ones in frames that are put together anew each time.
+"""
+
+import numpy as np
+import pytest
+
+from swarm_mj.mission import paper
+from swarm_mj.policies.sotdma.frame import (
+    Rule,
+    best_slot,
+    chosen,
+    empty_frame,
+    first_slots,
+    mean_age,
+    switch,
+)
+from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.radio.power_law import power_law, powers_between
+
+RADIO = radio_of(paper("stationary"))
+NUM_ROBOTS, NUM_SLOTS, FRAMES = 9, 5, 3
+NOWHERE = -1  # no slot of the frame
+
+
+def team(seed):
+    """Positions [m], and powers between them [noise]."""
+    position_m = np.random.default_rng(seed).uniform(-400.0, 400.0, (NUM_ROBOTS, 2))
+    at_1_m = np.full(NUM_ROBOTS, RADIO.received_at_1_m_mw / RADIO.noise_mw)
+    return position_m, powers_between(position_m, power_law(at_1_m))
+
+
+def frame_of(power, slots, interference=1.0):
+    """A frame in which robot k transmits in `slots[k]`, unless that is `NOWHERE`."""
+    frame = empty_frame(power, Rule(RADIO.threshold, interference, NUM_SLOTS, FRAMES, 10.0, 0.0))
+    for k, slot in enumerate(slots):
+        if slot != NOWHERE:
+            switch(frame, slot, k, True)
+    return frame
+
+
+def aged(heard):
+    """Mean age in the last frame [slots]: every robot is told, one after the other."""
+    known = np.full((NUM_ROBOTS, NUM_ROBOTS), -10.0)
+    ages = []
+    for now in range(1, FRAMES * NUM_SLOTS + 1):
+        np.fill_diagonal(known, now)
+        said = known.copy()
+        for j, sender in enumerate(heard[(now - 1) % NUM_SLOTS]):
+            known[j] = np.maximum(known[j], said[sender])
+        ages.append(np.mean(now - known))
+    return np.mean(ages[-NUM_SLOTS:])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_eqs_3_4_robots_hear_in_a_frame_whom_the_radio_lets_them_hear(seed):
+    position_m, power = team(seed)
+    slots = np.random.default_rng(seed).integers(0, 3, NUM_ROBOTS)
+    frame = frame_of(power, slots)
+    everyone = np.arange(NUM_ROBOTS)
+    for s in range(NUM_SLOTS):
+        recipient = np.where(slots == s, -1, everyone)
+        heard = RADIO(position_m[None], recipient[None])[0]
+        np.testing.assert_array_equal(frame.heard[s], heard)
+
+
+def test_more_interference_than_believed_can_only_silence():
+    _, power = team(3)
+    slots = np.random.default_rng(3).integers(0, 2, NUM_ROBOTS)
+    plain, cautious = frame_of(power, slots), frame_of(power, slots, interference=3.0)
+    is_heard = cautious.heard != np.arange(NUM_ROBOTS)
+    np.testing.assert_array_equal(cautious.heard[is_heard], plain.heard[is_heard])
+    assert np.sum(is_heard) < np.sum(plain.heard != np.arange(NUM_ROBOTS))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_eq10_the_mean_age_is_that_of_robots_told_one_by_one(seed):
+    _, power = team(seed)
+    frame = frame_of(power, np.random.default_rng(seed).integers(0, NUM_SLOTS, NUM_ROBOTS))
+    assert mean_age(frame) == pytest.approx(aged(frame.heard), rel=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_best_slot_is_the_youngest_of_all_that_were_tried(seed):
+    """The frame is as before; a marked listener is deaf; the least gain keeps the present slot."""
+    _, power = team(seed)
+    rng = np.random.default_rng(seed)
+    slots = rng.integers(0, NUM_SLOTS, NUM_ROBOTS)
+    slots[4] = NOWHERE
+    frame = frame_of(power, slots)
+    before = frame.heard.copy(), frame.transmits.copy()
+    is_marked = rng.random((NUM_SLOTS, NUM_ROBOTS)) < 0.3
+    ages = []
+    for s in range(NUM_SLOTS):
+        heard = frame_of(power, [*slots[:4], s, *slots[5:]]).heard
+        deaf = (heard[s] == 4) & is_marked[s]
+        heard[s] = np.where(deaf & (np.arange(NUM_ROBOTS) != 4), np.arange(NUM_ROBOTS), heard[s])
+        ages.append(aged(heard))
+    worst, apart = int(np.argmax(ages)), max(ages) - min(ages)
+    for own, min_gain in ((0, 0.0), (worst, 0.5 * apart)):
+        chosen = best_slot(frame, 4, own, min_gain, is_marked)
+        assert ages[chosen] == pytest.approx(min(ages), rel=1e-5)
+    assert best_slot(frame, 4, worst, 1.5 * apart, is_marked) == worst
+    np.testing.assert_array_equal(frame.heard, before[0])
+    np.testing.assert_array_equal(frame.transmits, before[1])
+
+
+RULE = Rule(threshold=1.25, interference=1.2, num_slots=4, frames=3, start_age=20.0, min_gain=0.2)
+NO_MARKS = np.zeros((4, 7), dtype=bool)
+EVERYONE = np.ones(7, dtype=bool)
+NO_CHOICES = np.zeros((0, 2), dtype=np.int64)
+
+
+def powers(seed, is_known=EVERYONE):
+    """Powers of robots in a field of three ranges [noise]."""
+    position = np.random.default_rng(seed).uniform(0.0, 3.0, (7, 2))
+    squared = np.sum((position[:, None] - position) ** 2, axis=2)
+    np.fill_diagonal(squared, np.inf)
+    return 1.25 / squared * is_known * is_known[:, None]
+
+
+def best(power, slots, k, own, min_gain=0.2, is_marked=NO_MARKS):
+    """The best slot of k beside those who have one."""
+    frame = empty_frame(power, RULE)
+    for j, slot in enumerate(slots):
+        if j != k and slot != NOWHERE:
+            switch(frame, slot, j, True)
+    return best_slot(frame, k, own, min_gain, is_marked)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_first_of_the_order_have_a_slot_each_and_the_others_choose_in_turn(seed):
+    order, power = np.random.default_rng(seed).permutation(7), powers(seed)
+    slots = first_slots(order, EVERYONE, power, RULE)
+    assert slots[order[:4]].tolist() == [0, 1, 2, 3]
+    for place in range(4, 7):
+        so_far = np.full(7, NOWHERE)
+        so_far[order[:place]] = slots[order[:place]]
+        assert slots[order[place]] == best(power, so_far, order[place], 0, 0.0)
+
+
+def test_robots_that_are_not_known_have_no_part_in_it():
+    """But they count as in the slots of their places in the order."""
+    order, is_known = np.arange(7), ~np.isin(np.arange(7), [2, 5])
+    slots = first_slots(order, is_known, powers(1, is_known), RULE)
+    assert slots[[0, 1, 2, 3, 5]].tolist() == [0, 1, 2, 3, 1]
+    apart = powers(1)
+    apart[[2, 5]] = apart[:, [2, 5]] = 0.0
+    for k in (4, 6):
+        so_far = [slots[j] if j < k and is_known[j] else NOWHERE for j in range(7)]
+        assert slots[k] == best(apart, so_far, k, 0, 0.0)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_robot_takes_the_best_slot_beside_where_it_believes_the_others(seed):
+    power, rng = powers(seed), np.random.default_rng(seed)
+    slots, is_marked = rng.integers(0, 4, 7), rng.random((4, 7)) < 0.3
+    never = np.full(7, -100)
+    choice = chosen(3, slots, never, EVERYONE, is_marked, NO_CHOICES, power, RULE)
+    assert choice == best(power, slots, 3, slots[3], is_marked=is_marked)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_choices_not_heard_of_are_predicted_in_their_order(seed):
+    """Robots 5 and 1 chose in slots 50 and 52; 6 too, but was heard since; 3 is oneself."""
+    power = powers(seed)
+    slots = np.random.default_rng(seed).integers(0, 4, 7)
+    announced = np.array([0, 51, 0, 0, 0, 49, 54])
+    chose = np.array([(5, 50), (1, 52), (6, 53), (3, 53)])
+    expected = slots.copy()
+    for k in (5, 1):
+        expected[k] = best(power, expected, k, expected[k])
+    choice = chosen(3, slots, announced, EVERYONE, NO_MARKS, chose, power, RULE)
+    assert choice == best(power, expected, 3, slots[3])
