@@ -66,7 +66,7 @@ class StabilityFigure:
 
 
 def read_curves(path: Path) -> Curves:
-    """The learning curves of each kind of training, one a seed, by the names of their columns.
+    """Return the learning curves of each kind of training, one per seed, by column.
 
     Trainings of other kinds are passed over.
 
