@@ -23,8 +23,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components
 from swarm_mj.policies.registry import listed, normalised
 from swarm_mj.system.fields import check_value, name_of
-from swarm_mj.system.machine import memory_errors
-from swarm_mj.system.needs import check_fits
+from swarm_mj.system.needs import check_fits, memory_errors
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
 from swarm_mj.system.progress import AFTER_S, quiet_console

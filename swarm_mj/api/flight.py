@@ -21,8 +21,7 @@ from swarm_mj.simulation.rollout import WindowRecord, rollout
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.interrupt import deferred_interrupt
-from swarm_mj.system.machine import free_memory, memory_errors
-from swarm_mj.system.needs import in_gb
+from swarm_mj.system.needs import free_memory, in_gb, memory_errors
 from swarm_mj.system.progress import WorkBar
 
 WINDOWS_BETWEEN_LOOKS = 50  # at the free memory

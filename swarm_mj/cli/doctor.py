@@ -1,27 +1,106 @@
 """`swarm-mj doctor`: what is installed, what works on this machine, how to mend what does not."""
 
 import json
+import os
+import platform
 import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from importlib import metadata
 from itertools import groupby
-from typing import ClassVar
+from pathlib import Path
+from subprocess import TimeoutExpired
+from textwrap import shorten
+from typing import Any, ClassVar, Literal, NamedTuple
 
+from packaging.requirements import Requirement
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.cli.health.finding import Finding
-from swarm_mj.cli.health.machine import machine
-from swarm_mj.cli.health.packages import about, packages
-from swarm_mj.cli.health.trials import tried
+from swarm_mj.radio import reception
+from swarm_mj.system.atomic import check_writable
 from swarm_mj.system.exit_codes import DONE, FAILED
 from swarm_mj.system.fields import setting
-from swarm_mj.system.terminal import plain_console
+from swarm_mj.system.needs import free_memory, free_room, in_gb
+from swarm_mj.system.packages import CORE
+from swarm_mj.system.processes import PYTHON, running
+from swarm_mj.system.provenance import commit, version
+from swarm_mj.system.terminal import num_cores, plain_console
 
 MARKS = {"ok": "ok", "absent": "-", "broken": "BROKEN"}
-VERDICTS = {
-    True: "swarm_mj works here.",
-    False: "swarm_mj does not work here until what is BROKEN is mended.",
+PACKAGE = "swarm_mj"
+PURPOSES = {  # of packages that flying itself does without
+    "av": "videos of replays",
+    "dm-control": "the dm_control environment",
+    "dm-env": "the dm_control environment",
+    "gymnasium": "Gymnasium environments, training",
+    "matplotlib": "figures",
+    "pandas": "data frames of results",
+    "pillow": "pictures of replays",
+    "pyarrow": "replays",
+    "rerun-sdk": "replays and their viewer",
+    "safetensors": "learned policies",
+    "scipy": "intervals of evaluations",
+    "stable-baselines3": "training",
+    "tensorboard": "curves of trainings",
+    "torch": "learned policies, training",
+    "pettingzoo": "PettingZoo environments",
+    "docs": "building the documentation",
+    "dev": "tests, formatter, type checker",
 }
+LITTLE_MEMORY = 2 * 10**9  # a flight with its replay takes half a gigabyte, a training two
+LITTLE_DISK = 10**9
+LONGEST_S = 120.0  # of a trial; the first flight of an installation compiles for half a minute
+MAX_LETTERS = 400  # of what a trial complains, cut between words
+
+RENDER = """
+import mujoco
+with mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 32, 32) as renderer:
+    renderer.render()
+print("works")
+"""
+TORCH = """
+import torch
+print(f"threads: {torch.get_num_threads()}, CUDA devices: {torch.cuda.device_count()}")
+"""
+FLIGHT = """
+from swarm_mj.cli import main
+assert main("fly --task stationary --policy tdma --robots 3 --windows 5 --range-ratio 10 "
+            "--no-record".split()) == 0
+print("yes")
+"""
+
+
+class Finding(NamedTuple):
+    """One thing that was looked at."""
+
+    group: str  # the heading it stands under
+    name: str
+    state: Literal["ok", "absent", "broken"]  # absent: flying does without; broken: nothing flies
+    found: str
+    mend: str = ""  # what to do, if it is not ok
+
+
+class Trial(NamedTuple):
+    """A program that ends with 0 if the thing works, and last prints what to say of it."""
+
+    group: str
+    name: str  # if it is VARIABLE=VALUE, the program runs with that
+    program: str
+    mend: str
+    state: Literal["absent", "broken"] = "absent"  # if it fails
+
+
+RENDERING = "rendering without a display"
+TRIALS = (
+    Trial("flying", "three robots fly", FLIGHT, "see what `swarm-mj fly` says", "broken"),
+    Trial(RENDERING, "MUJOCO_GL=egl", RENDER, "needs a graphics driver with EGL; or use osmesa"),
+    Trial(RENDERING, "MUJOCO_GL=osmesa", RENDER, "Debian and Ubuntu: apt-get install libosmesa6"),
+    Trial(RENDERING, "MUJOCO_GL=glfw", RENDER, "needs a display; else use egl or osmesa"),
+    Trial("speed", "torch", TORCH, "learned policies and training need it"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,25 +112,124 @@ class DoctorOptions:
 
 
 def run(options: DoctorOptions) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command; return its exit code."""
     with Console(stderr=True).status("Trying things out ..."):
-        found = [*about(), *packages(), *tried(), *machine()]
-    is_sound = all(each.state != "broken" for each in found)
+        found = [*packages(), *tried(), *machine()]
+    works = all(each.state != "broken" for each in found)
     if options.json:
-        findings = [each._asdict() for each in found]
-        document = {"works": is_sound, "findings": findings}
+        document = {"works": works, "findings": [each._asdict() for each in found]}
         sys.stdout.write(json.dumps(document, indent=2) + "\n")
     else:
-        _print(found, VERDICTS[is_sound])
-    return DONE if is_sound else FAILED
+        _print(found, works=works)
+    return DONE if works else FAILED
 
 
-def _print(found: list[Finding], verdict: str) -> None:
-    """Return a table by groups, then what to do, then whether it works."""
+def packages() -> Iterator[Finding]:
+    """Find this version, each package that an installation brings, then each extra as a whole."""
+    at = f", commit {commit()}" if commit() else ""
+    yield Finding("swarm_mj", "version", "ok", version() + at)
+    on = f"{platform.python_version()} on {platform.platform()}"
+    yield Finding("swarm_mj", "Python", "ok", on)
+    asked = [Requirement(text) for text in metadata.requires(PACKAGE) or ()]
+    brought = [each for each in asked if each.marker is None or each.marker.evaluate({"extra": ""})]
+    for each in brought:
+        purpose = "flying" if each.name in CORE else PURPOSES.get(each.name, "parts of swarm_mj")
+        problem = _problem(each)
+        if problem is None:
+            yield Finding("packages", each.name, "ok", metadata.version(each.name))
+        else:
+            state = "broken" if each.name in CORE else "absent"
+            mend = f"pip install '{each.name}{each.specifier}'"
+            yield Finding("packages", each.name, state, f"{problem}; for {purpose}", mend)
+    for extra in metadata.metadata(PACKAGE).get_all("Provides-Extra") or ():
+        own = [each for each in asked if each.marker and each.marker.evaluate({"extra": extra})]
+        own = [each for each in own if each not in brought and each.name != PACKAGE]
+        missing = ", ".join(each.name for each in own if _problem(each))
+        found = f"lacks {missing}" if missing else "installed"
+        found, state = f"{found}; for {PURPOSES.get(extra, 'more')}", "absent" if missing else "ok"
+        mend = f"pip install '{PACKAGE}[{extra}]'" if missing else ""
+        yield Finding("packages", f"extra {extra}", state, found, mend)
+
+
+def _problem(requirement: Requirement) -> str | None:
+    """Return what is wrong with a package as it is installed, if anything is."""
+    try:
+        found = metadata.version(requirement.name)
+    except metadata.PackageNotFoundError:
+        return "not installed"
+    fits = requirement.specifier.contains(found, prereleases=True)
+    return None if fits else f"{found}, which is not {requirement.specifier}"
+
+
+def tried() -> Iterator[Finding]:
+    """Run the trials side by side.
+
+    Each has its own process: it may crash, and MuJoCo settles on a back end for good.
+    """
+    with ExitStack() as stack:
+        under_way = []
+        for trial in TRIALS:
+            said = stack.enter_context(tempfile.TemporaryFile("w+"))
+            variable, _, value = trial.name.partition("=")
+            environment = {**os.environ, **({variable: value} if value else {})}
+            environment.pop("PYOPENGL_PLATFORM", None)  # it may bind all to one back end
+            process = running([*PYTHON, "-c", trial.program], environment=environment, output=said)
+            under_way.append((trial, stack.enter_context(process), said))
+        for trial, process, said in under_way:
+            code, found = None, f"not within {LONGEST_S:g} s"
+            with suppress(TimeoutExpired):
+                code = process.wait(LONGEST_S)
+                said.seek(0)
+                last = (said.read().strip().splitlines() or ["it said nothing"])[-1]
+                found = shorten(last, MAX_LETTERS, placeholder=" ...")
+            if code == 0:
+                yield Finding(trial.group, trial.name, "ok", found)
+            else:
+                yield Finding(trial.group, trial.name, trial.state, found, trial.mend)
+
+
+def machine() -> Iterator[Finding]:
+    """Find cores, memory, disk, a place for compiled code and a display."""
+    threads = os.environ.get("OMP_NUM_THREADS")
+    set_to = f", OMP_NUM_THREADS={threads}" if threads else ""
+    yield Finding("speed", "cores", "ok", f"{num_cores()} may be used{set_to}")
+    yield _compiled_code()
+    yield _room("memory free", free_memory(), LITTLE_MEMORY, "end other programs")
+    yield _room("disk free here", free_room(Path.cwd()), LITTLE_DISK, "name another folder")
+    group, names = "rerun's viewer", ("DISPLAY", "WAYLAND_DISPLAY")
+    found = [f"{name}={os.environ[name]}" for name in names if os.environ.get(name)]
+    if found or not sys.platform.startswith("linux"):
+        yield Finding(group, "display", "ok", ", ".join(found) or sys.platform)
+    else:
+        yield Finding(group, "display", "absent", "none", "`swarm-mj replay --web FILE` needs none")
+
+
+def _compiled_code() -> Finding:
+    """Find where numba keeps what it compiled; without a place every start compiles."""
+    compiled: Any = reception.sinr
+    folder, name = compiled.stats.cache_path, "compiled code"
+    mend = "set NUMBA_CACHE_DIR to a folder that you can write"
+    if folder is None:
+        return Finding("speed", name, "absent", "not kept: every start compiles anew", mend)
+    try:
+        check_writable(Path(folder) / "kernels")
+    except OSError as error:
+        return Finding("speed", name, "absent", f"{folder} cannot be written ({error})", mend)
+    return Finding("speed", name, "ok", f"kept in {folder}")
+
+
+def _room(name: str, free: int, little: int, mend: str) -> Finding:
+    state = "ok" if free >= little else "absent"
+    found = in_gb(free) + ("" if free >= little else f", less than {in_gb(little)}")
+    return Finding("room", name, state, found, mend)
+
+
+def _print(found: list[Finding], *, works: bool) -> None:
+    """Print a table by groups, then what to do, then whether flying works."""
     groups = list(dict.fromkeys(each.group for each in found))
     in_groups = sorted(found, key=lambda each: groups.index(each.group))
     table = Table(show_header=False)
-    for _ in Finding._fields[1:4]:
+    for _ in range(3):
         table.add_column(overflow="fold")
     for group, findings in groupby(in_groups, lambda each: each.group):
         table.add_row(f"[bold]{group}[/bold]")
@@ -59,10 +237,7 @@ def _print(found: list[Finding], verdict: str) -> None:
             table.add_row(f"  {each.name}", MARKS[each.state], each.found)
         table.add_section()
     Console(highlight=False, markup=True).print(table)
-    console = plain_console()
-    lacking = [each for each in in_groups if each.state != "ok"]
-    if lacking:
-        console.print("What to do, if you need it:")
-    for each in lacking:
-        console.print(f"  {each.name}: {each.mend}")
-    console.print(verdict)
+    lacking = [f"  {each.name}: {each.mend}" for each in in_groups if each.state != "ok"]
+    verdict = "works here." if works else "does not work here until what is BROKEN is mended."
+    advice = ["What to do, if you need it:", *lacking] if lacking else []
+    plain_console().print("\n".join([*advice, f"swarm_mj {verdict}"]))

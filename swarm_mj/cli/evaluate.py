@@ -29,8 +29,7 @@ from swarm_mj.policies.registry import listed, normalised, stored_policies, with
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import same_as, setting
 from swarm_mj.system.interrupt import deferred_interrupt
-from swarm_mj.system.machine import YES, memory_errors
-from swarm_mj.system.needs import check_fits
+from swarm_mj.system.needs import YES, check_fits, memory_errors
 from swarm_mj.system.outputs import Output, check_outputs, owned
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import tell_cores

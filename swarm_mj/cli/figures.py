@@ -13,8 +13,7 @@ from swarm_mj.mission.components import components_in
 from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.policies.registry import stored_policies
 from swarm_mj.system.fields import setting
-from swarm_mj.system.machine import YES
-from swarm_mj.system.needs import check_fits
+from swarm_mj.system.needs import YES, check_fits
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.terminal import plain_console
 

@@ -34,8 +34,7 @@ from swarm_mj.system.atomic import write_json
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.interrupt import deferred_interrupt
-from swarm_mj.system.machine import YES
-from swarm_mj.system.needs import check_fits
+from swarm_mj.system.needs import YES, check_fits
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
 from swarm_mj.system.progress import WorkBar

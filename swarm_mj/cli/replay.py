@@ -14,7 +14,7 @@ from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
 from swarm_mj.system.atomic import write_bytes
 from swarm_mj.system.fields import setting
-from swarm_mj.system.machine import YES
+from swarm_mj.system.needs import YES
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
 from swarm_mj.system.progress import WorkBar

@@ -37,8 +37,7 @@ from swarm_mj.policies.stored import POLICY, read_policy
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import same_as, setting
 from swarm_mj.system.interrupt import deferred_interrupt
-from swarm_mj.system.machine import YES, memory_errors
-from swarm_mj.system.needs import check_fits
+from swarm_mj.system.needs import YES, check_fits, memory_errors
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.terminal import named_values, plain_console, tell_cores, this_command
 

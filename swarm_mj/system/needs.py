@@ -1,13 +1,27 @@
-"""Memory and disk that a command needs, and whether this machine has them.
+"""Memory and disk that a command needs, and what this machine has left of them.
 
 The constants are peaks measured on Linux, with all tasks and policies, of 2 to 1000 robots. A test
 compares estimates with peaks; they should be right within a factor of 2, and rather too high.
 """
 
+import os
+import resource
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from swarm_mj.system.machine import free_addresses, free_memory, free_room, largest_file
+import psutil
+
+YES = "start even though memory or disk may not suffice"  # the help of --yes
+CONTROL_GROUPS = Path("/sys/fs/cgroup")
+# Of both versions of control groups: folder, limit, use, and how names in memory.stat begin.
+GROUPS = {
+    "": ("", "memory.max", "memory.current", ""),
+    "memory": ("memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_"),
+}
+FILES = ("inactive_file", "active_file", "slab_reclaimable")  # memory that a group can give back
 
 GB = 1e9
 LIBRARIES, TORCH = 0.15 * GB, 0.4 * GB  # compiling included; torch with the code that trains
@@ -76,3 +90,64 @@ def missions_memory(num_robots: int, num_missions: int, *, is_learned: bool) -> 
 def in_gb(size: int | float) -> str:
     """Return a size as messages name it."""
     return f"{float(f'{size / GB:.3g}'):,g} GB"
+
+
+@contextmanager
+def memory_errors() -> Iterator[None]:
+    """Turn torch's and MuJoCo's words for a lack of memory into Python's MemoryError."""
+    try:
+        yield
+    except (RuntimeError, ValueError) as error:
+        if not any(words in str(error) for words in ("allocate memory", "CUDA out of memory")):
+            raise
+        raise MemoryError from error
+
+
+def free_memory() -> int:
+    """Return what this process and its children may still fill: the machine's, or a limit's."""
+    return min([psutil.virtual_memory().available, *_left_by_groups()])
+
+
+def free_addresses() -> int | None:
+    """Return what this process may still ask for under `ulimit -v`; None without one.
+
+    Libraries ask for much that they never fill.
+    """
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    used = psutil.Process().memory_info().vms
+    return None if limit == resource.RLIM_INFINITY else limit - used
+
+
+def free_room(path: Path) -> int:
+    """Return what the disk has left for files there, whose folder may not be made yet."""
+    target = Path(os.path.realpath(path))
+    folder = next(each for each in (target, *target.parents) if each.is_dir())
+    return shutil.disk_usage(folder).free
+
+
+def largest_file() -> int | None:
+    """Return how large a file may get under `ulimit -f`; None without a limit."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
+    return None if limit == resource.RLIM_INFINITY else limit
+
+
+def _left_by_groups() -> Iterator[int]:
+    """Yield what this process's control groups leave it, such as a container's.
+
+    A limit may be a parent's. Where there is none, the file says `max`, or there is no file.
+    """
+    groups = Path("/proc/self/cgroup")
+    for line in groups.read_text().splitlines() if groups.exists() else ():
+        _, kind, path = line.split(":", 2)
+        if kind not in GROUPS:
+            continue
+        root, limit, usage, prefix = GROUPS[kind]
+        group = CONTROL_GROUPS / root / path.removeprefix("/")
+        for folder in (group, *group.parents):
+            try:
+                left = int((folder / limit).read_text()) - int((folder / usage).read_text())
+                stat = (folder / "memory.stat").read_text().splitlines()
+            except (OSError, ValueError):
+                continue
+            kept = dict(line.split() for line in stat)
+            yield left + sum(int(kept.get(prefix + name, 0)) for name in FILES)

@@ -156,7 +156,7 @@ def test_a_memory_error_keeps_what_was_flown(monkeypatch, tmp_path, capsys, erro
 LIMITED = """
 import resource, sys
 from swarm_mj.cli import main
-from swarm_mj.system.machine import psutil
+from swarm_mj.system.needs import psutil
 most = psutil.Process().memory_info().vms + int(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_AS, (most, most))
 sys.exit(main(sys.argv[2:]))

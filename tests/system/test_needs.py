@@ -1,5 +1,11 @@
 """Refusals of what does not fit; faults/test_fit.py compares estimates with measured peaks."""
 
+import resource
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import psutil
 import pytest
 
 from swarm_mj.system import needs
@@ -46,3 +52,88 @@ def test_a_refusal_names_need_limit_and_way_out(machine, tmp_path):
     machine(addresses=1.5e9)
     line = refusal(Needs(memory=1e9, addresses=3e9))
     assert "about 4 GB of address space, and 1.5 GB are left by ulimit -v" in line
+
+
+NO_LIMIT = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+
+
+@pytest.fixture
+def limits(monkeypatch):
+    """Limits of this process, by their numbers; none unless set."""
+    found = {}
+    monkeypatch.setattr(needs.resource, "getrlimit", lambda which: found.get(which, NO_LIMIT))
+    return found
+
+
+def test_free_memory_is_the_machines(monkeypatch, tmp_path):
+    monkeypatch.setattr(needs, "CONTROL_GROUPS", tmp_path)  # where there are none
+    assert 0 < needs.free_memory() <= psutil.virtual_memory().total
+
+
+@pytest.mark.parametrize(
+    ("line", "folder", "limit", "usage", "stat"),
+    [
+        ("0::/a/b", "a", "max", "current", "inactive_file 7\nanon 9"),
+        ("4:memory:/a/b", "memory/a", "limit_in_bytes", "usage_in_bytes", "total_active_file 7"),
+    ],
+)
+def test_control_groups_leave_their_limits_less_what_they_cannot_give_back(
+    tmp_path, monkeypatch, line, folder, limit, usage, stat
+):
+    """Of this process's and its parents; a group without a limit leaves all."""
+    monkeypatch.setattr(needs, "CONTROL_GROUPS", tmp_path)
+    monkeypatch.setattr(Path, "exists", lambda _: True)
+    read = Path.read_text
+    groups = Path("/proc/self/cgroup")
+    monkeypatch.setattr(
+        Path, "read_text", lambda path: f"9:pids:/x\n{line}\n" if path == groups else read(path)
+    )
+    group = tmp_path / folder
+    group.mkdir(parents=True)
+    (group / f"memory.{usage}").write_text("3000\n")
+    (group / "memory.stat").write_text(stat)
+    (group / f"memory.{limit}").write_text("max\n")
+    assert list(needs._left_by_groups()) == []
+    (group / f"memory.{limit}").write_text("5000\n")
+    assert needs.free_memory() == 5000 - 3000 + 7
+
+
+def test_addresses_are_what_ulimit_leaves(limits):
+    assert needs.free_addresses() is None
+    limits[resource.RLIMIT_AS] = (10**15, 10**15)
+    used = psutil.Process().memory_info().vms
+    assert needs.free_addresses() == pytest.approx(10**15 - used, abs=1e8)
+
+
+def test_files_may_take_what_the_disk_has_and_one_what_the_limit_allows(limits, tmp_path):
+    file = tmp_path / "not" / "yet" / "made.rrd"
+    assert needs.free_room(file) == pytest.approx(shutil.disk_usage(tmp_path).free, rel=0.1)
+    assert needs.largest_file() is None
+    limits[resource.RLIMIT_FSIZE] = (4096, 4096)
+    assert needs.largest_file() == 4096
+
+
+def test_the_disk_is_the_one_where_a_link_leads(tmp_path, monkeypatch):
+    (tmp_path / "far").mkdir()
+    (tmp_path / "link.rrd").symlink_to(tmp_path / "far" / "there.rrd")
+    free = {tmp_path: 1, tmp_path / "far": 2}
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=free[folder]))
+    assert needs.free_room(tmp_path / "link.rrd") == 2
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        RuntimeError("can't allocate memory: you tried"),
+        RuntimeError("CUDA out of memory"),
+        ValueError("Error: engine error: Could not allocate memory"),  # MuJoCo's
+    ],
+)
+def test_a_librarys_lack_of_memory_is_a_memory_error(error):
+    with pytest.raises(MemoryError), needs.memory_errors():
+        raise error
+
+
+def test_other_errors_stay_what_they_are():
+    with pytest.raises(RuntimeError, match="other"), needs.memory_errors():
+        raise RuntimeError("other")

@@ -1,1 +1,0 @@
-"""What `swarm-mj doctor` looks at: packages, rendering, the machine."""
