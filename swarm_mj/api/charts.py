@@ -18,10 +18,7 @@ Course = Float[np.ndarray, "T"]
 WIDTH_IN, PANEL_IN, ROW_IN, HEAD_IN = 7.5, 2.1, 0.32, 1.1
 TITLE_PT = 10.0
 MIN_SHARE = 1e-6  # of the largest velocity variance that is drawn
-LABELS = {
-    "aoi": "age of information\n[windows]",
-    "velocity_variance": "velocity variance\n[m²/s²]",
-}
+LABELS = {"aoi": "age of information\n[windows]", "velocity_variance": "velocity variance\n[m²/s²]"}
 
 
 def draw_flight(

@@ -7,14 +7,7 @@ from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import is_learned
 from swarm_mj.replay.estimates import replay_file, replay_memory
-from swarm_mj.system.needs import (
-    ADDRESSES,
-    LIBRARIES,
-    OF_RERUN,
-    OF_TORCH,
-    Needs,
-    missions_memory,
-)
+from swarm_mj.system.needs import ADDRESSES, LIBRARIES, OF_RERUN, OF_TORCH, Needs, missions_memory
 
 
 def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:

@@ -46,9 +46,7 @@ class EvaluateOptions(PolicyOptions):
         "--csv, --resume continues)."
     )
     policy: tuple[str, ...] = setting(
-        DEFAULT_POLICIES,
-        f"{NAMES}, all of these, {OTHERS}",
-        convert=normalised,
+        DEFAULT_POLICIES, f"{NAMES}, all of these, {OTHERS}", convert=normalised
     )
     episodes: int = same_as(Study, "episodes")
     seed: int = same_as(Study, "seed")

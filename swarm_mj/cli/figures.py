@@ -35,10 +35,7 @@ class FiguresOptions:
     force: bool = setting(False, "replace existing figures")
     yes: bool = setting(False, YES)
     flock_policy: str = setting(
-        "mst",
-        "who talks to whom in it",
-        metavar="POLICY",
-        group=f"the mission flown for {FLOCK}",
+        "mst", "who talks to whom in it", metavar="POLICY", group=f"the mission flown for {FLOCK}"
     )
     flock_seed: int = setting(1, "its seed", group=f"the mission flown for {FLOCK}")
 

@@ -24,10 +24,7 @@ WINDOWS = {
     "broadcasts": "two broadcasts, which nobody answers",
     "request": "a request to one robot, and its answer",
 }
-HEADINGS = {
-    False: "each robot decides by itself; it uses",
-    True: "a centre decides; it uses",
-}
+HEADINGS = {False: "each robot decides by itself; it uses", True: "a centre decides; it uses"}
 LEGEND = """\
 broadcasts: robots may transmit in both halves of a window, to all who hear; nobody answers.
 request: a robot addresses a teammate in the first half, which answers in the second.

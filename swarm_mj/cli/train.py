@@ -9,8 +9,7 @@ from rich.console import Console
 
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
-from swarm_mj.cli.train_progress import Watch
-from swarm_mj.cli.train_report import has_stopped_early, report, verdicts
+from swarm_mj.cli.train_report import Watch, has_stopped_early, report, verdicts
 from swarm_mj.cli.train_settings import (
     asked_settings,
     given_settings,
@@ -65,7 +64,7 @@ class TrainOptions:
 
 
 def run(options: TrainOptions) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command; return its exit code."""
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     with console.status("Preparing ..."):
         asked = _asked_run(options)
@@ -76,8 +75,7 @@ def run(options: TrainOptions) -> int:
             watch = Watch(console, asked, is_interrupted)
             with watch:
                 progress = train(asked, options.out, listener=watch, is_resumed=options.resume)
-            is_over = not watch.has_stopped
-            _print(options.out, asked, progress, is_over=is_over)
+            _print(options.out, asked, progress, is_over=not watch.has_stopped)
     except (KeyboardInterrupt, MemoryError) as error:
         is_memory = isinstance(error, MemoryError)
         go_on = _resume_command(options.out, asked.training)
@@ -89,13 +87,14 @@ def run(options: TrainOptions) -> int:
             "Nothing was left to train: raise --budget or --minutes, which count in all, or give "
             "--patience 0 if the run stopped early."
         )
-    if not is_over:
+    if watch.has_stopped:
         console.print(f"Interrupted after {progress.decisions:,} decisions; all is kept.")
-    return DONE if is_over else INTERRUPTED
+        return INTERRUPTED
+    return DONE
 
 
 def _asked_run(options: TrainOptions) -> Run:
-    """What the options ask for; raises ValueError before anything is written."""
+    """Return the run that the options ask for; raise ValueError before anything is written."""
     run = _begun_run(options) if options.resume else _new_run(options)
     run = replace(run, limits=asked_limits(run.limits, options))
     written = (Output("run", options.out / name) for name in (SETTINGS, CHECKPOINT, CURVE, POLICY))
@@ -106,8 +105,7 @@ def _asked_run(options: TrainOptions) -> Run:
 
 
 def _begun_run(options: TrainOptions) -> Run:
-    named = own_names(options.settings)
-    run = read_run(options.out, named)
+    run = read_run(options.out, own_names(options.settings))
     if options.init is not None:
         raise ValueError(f"{options.out} has begun, so --init {options.init} is too late")
     refuse_others(options.settings, run.training, f"the run in {options.out}")
@@ -120,65 +118,51 @@ def _new_run(options: TrainOptions) -> Run:
     init = options.init
     training = asked_settings(options.settings, read_policy(init)[1] if init else None, init)
     credit = training.credit_assignment
-    return Run(
-        training=training,
-        limits=Limits(decisions=BUDGETS[credit], patience=PATIENCE[credit]),
-        command=shlex.join(["swarm-mj", "train", *options.typed]),
-        init=init,
-    )
+    limits = Limits(decisions=BUDGETS[credit], patience=PATIENCE[credit])
+    command = shlex.join(["swarm-mj", "train", *options.typed])
+    return Run(training=training, limits=limits, command=command, init=init)
 
 
 def asked_limits(limits: Limits, options: TrainOptions) -> Limits:
-    """When a run stops: as before, or usual, unless the options say otherwise."""
-    if options.budget is not None or options.minutes is not None:
+    """Return a run's limits, changed by the options that were given."""
+    if options.budget is not None or options.minutes is not None:  # either replaces both
         limits = replace(limits, decisions=options.budget, minutes=options.minutes)
     others = {"patience": options.patience, "replay_every": options.replay_every}
     return replace(limits, **{name: x for name, x in others.items() if x is not None})
 
 
 def _print(out: Path, asked: Run, progress: Progress, *, is_over: bool) -> None:
-    """Print what the run came to, and what to do with it."""
+    """Print the run's report, and the commands that use its policy."""
     training, console = asked.training, plain_console()
-    sizes = ", ".join(map(str, training.robots))
-    title = (
-        f"{out}: credit per {training.credit_assignment}, {training.mission.task}, {sizes} robots"
-    )
+    credit, sizes = training.credit_assignment, ", ".join(map(str, training.robots))
     rows = {
         **report(asked, progress),
         "decisions": f"{progress.decisions:,}",
         "minutes": f"{progress.minutes:.1f}",
         "its policy": str(out / POLICY) if progress.best else "none yet",
     }
+    title = f"{out}: credit per {credit}, {training.mission.task}, {sizes} robots"
     console.print(named_values(title, rows))
     for line in verdicts(asked, progress):
         console.print(line)
-    for label, line in _next_commands(out, asked, progress, is_over=is_over):
-        console.print(f"{label:10}{line}")
-
-
-def _next_commands(
-    out: Path, asked: Run, progress: Progress, *, is_over: bool
-) -> list[tuple[str, str]]:
-    """What to do next, and the commands that do it."""
-    name, policy = this_command(), shlex.quote(str(out / POLICY))
-    training, more = asked.training, ""
+    more = f" --budget {2 * progress.decisions}" if is_over else ""
     if has_stopped_early(asked, progress) and progress.has_chosen:
         more = " --patience 0"
-    elif is_over:
-        more = f" --budget {2 * progress.decisions}"
-    mission = mission_flags(replace(training.mission, num_robots=training.robots[0]))
-    mission += f" {training.own_options}" if training.own else ""
-    lines = [
-        ("Watch:", f"{this_command('tensorboard')} --logdir {shlex.quote(str(out))}"),
-        ("Go on:", _resume_command(out, training, more)),
-    ]
-    if progress.best is None:
-        return lines
-    return [
-        ("Fly:", f"{name} fly --policy {policy} {mission}"),
-        ("Evaluate:", f"{name} evaluate --policy {policy} tdma {mission}"),
-        *lines,
-    ]
+    commands = {
+        "Watch:": f"{this_command('tensorboard')} --logdir {shlex.quote(str(out))}",
+        "Go on:": _resume_command(out, training, more),
+    }
+    if progress.best is not None:
+        name, policy = this_command(), shlex.quote(str(out / POLICY))
+        flags = mission_flags(replace(training.mission, num_robots=training.robots[0]))
+        flags += f" {training.own_options}" if training.own else ""
+        fly = {
+            "Fly:": f"{name} fly --policy {policy} {flags}",
+            "Evaluate:": f"{name} evaluate --policy {policy} tdma {flags}",
+        }
+        commands = fly | commands
+    for label, line in commands.items():
+        console.print(f"{label:10}{line}")
 
 
 def _resume_command(out: Path, training: Training, more: str = "") -> str:

@@ -1,103 +1,196 @@
-"""What `swarm-mj train` says of the policy it kept: its age beside others', and where it loses."""
+"""The bar of a training run, and its report: the policy kept, beside others."""
 
-from swarm_mj.cli.train_progress import age_of, oracle_missions, reference_ages
+import math
+from collections.abc import Callable, Iterator
+from datetime import timedelta
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import Task
+
 from swarm_mj.learning.choice import (
     ORACLE,
     ORACLE_ROBOTS,
     REFERENCES,
-    Cost,
+    column,
     has_stalled,
+    reference_missions,
 )
-from swarm_mj.learning.run_folder import Progress, Run
+from swarm_mj.learning.run_folder import Limits, Progress, Run
+from swarm_mj.system.progress import WorkBar
 
-CLEAR = 2.0  # standard errors, of a difference that is not for chance
+if TYPE_CHECKING:  # stable-baselines3 takes its time to import
+    from swarm_mj.learning.callback import Status
+
+FINISHING = "finishing this rollout, then all is kept; Ctrl-C again breaks off at once"
+CLEAR = 2.0  # standard errors of a difference that is not due to chance
 NAMES = {"first": "the policy it began with"}
 
 
+class Watch(WorkBar):
+    """The listener of a run: a bar, and a line for every evaluation; it passes Ctrl-C on."""
+
+    def __init__(self, console: Console, run: Run, is_interrupted: Callable[[], bool]) -> None:
+        """Prepare the bar; `is_interrupted` says whether Ctrl-C was pressed."""
+        super().__init__("Training", 1.0, console=console, shows_time_left=False)
+        self._console, self._run, self._is_interrupted = console, run, is_interrupted
+        self._start: Status | None = None  # of this session
+        self._num_rows = 0
+        self.has_stopped = False  # whether the run was asked to stop
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether there was anything to do."""
+        return self._start is not None
+
+    def __call__(self, status: "Status") -> bool:
+        """Show a status; return whether to go on."""
+        if self._start is None:
+            self._start, self._num_rows = status, len(status.progress.curve)
+        self._print_new_row(status)
+        self.what = status.what
+        self.text = _text(status, self._start, self._run.limits)
+        self.move_to(share_done(status, self._run.limits))
+        if self._is_interrupted() and not self.has_stopped:
+            self.has_stopped = True
+            self._console.print(f"Interrupted: {FINISHING}.")
+        return not self.has_stopped
+
+    def _shown_what(self, _task: Task) -> str:
+        # Asked at every redrawing, so Ctrl-C shows before the run reports again.
+        return "Finishing" if self._is_interrupted() else self.what
+
+    def _print_new_row(self, status: "Status") -> None:
+        curve = status.progress.curve
+        if len(curve) == self._num_rows:
+            return
+        self._num_rows, row = len(curve), curve[-1]
+        note = "  best so far" if row is status.progress.best else ""
+        notes = {ORACLE: f" ({_oracle_missions(self._run)})"}
+        ages = reference_ages(row).items()
+        others = "".join(f"  {name} {age:.2f}{notes.get(name, '')}" for name, age in ages)
+        self._console.print(
+            f"{row['decisions']:>11,.0f} decisions {row['minutes']:7.1f} min   "
+            f"held-out age {age_of(row)}{note:13}{others}"
+        )
+
+
+def share_done(status: "Status", limits: Limits) -> float:
+    """Return the share of a run that is done, by the limit that it is nearest to."""
+    pairs = ((status.decisions, limits.decisions), (status.minutes, limits.minutes))
+    return min(1.0, max((done / limit for done, limit in pairs if limit), default=0.0))
+
+
+def minutes_left(status: "Status", start: "Status", limits: Limits) -> float | None:
+    """Return the minutes until the first limit, at the speed since `start`; None if unknown."""
+    left = [limits.minutes - status.minutes] if limits.minutes else []
+    made = status.decisions - start.decisions
+    if limits.decisions and made:
+        minutes_each = (status.minutes - start.minutes) / made
+        left.append(minutes_each * (limits.decisions - status.decisions))
+    return max(0.0, min(left)) if left else None
+
+
+def age_of(row: dict[str, float]) -> str:
+    """Return a held-out age of information, with its standard error if it has one [windows]."""
+    return f"{row['aoi']:.2f}" + (f" ± {row['aoi_sem']:.2f}" if "aoi_sem" in row else "")
+
+
+def reference_ages(row: dict[str, float]) -> dict[str, float]:
+    """Return the ages of reference policies that were flown on the same missions [windows]."""
+    ages = {name: row.get(column("aoi", name)) for name in REFERENCES}
+    return {name: age for name, age in ages.items() if age is not None}
+
+
 def report(run: Run, progress: Progress) -> dict[str, str]:
-    """Rows for the closing table: what was kept, and what others cost on the same missions."""
-    if progress.best is None:
+    """Return rows for the closing table: the policy kept, and others on the same missions."""
+    best, choice = progress.best, progress.choice
+    if best is None:
         return {}
-    if progress.choice is None:
-        return _of_evaluations(run, progress)
-    choice = progress.choice
-    rows = {"missions": f"{choice.num_missions} of each team size, which chose nothing"}
-    rows["policy kept"] = f"{_cost(run, choice.kept)}, after {choice.decisions:,} decisions"
-    for name, cost in choice.others.items():
+    first = progress.curve[0]
+    if choice is None:
+        decisions = "untrained" if best is first else f"after {best['decisions']:,.0f} decisions"
+        rows = {
+            "missions": f"{run.training.held_out} of each team size, which chose the policy",
+            "policy kept": f"{age_of(best)} windows, {decisions}",
+            NAMES["first"]: f"{age_of(first)} windows",
+        }
+        others = {name: f"{age:.2f} windows" for name, age in reference_ages(best).items()}
+    else:
+        kept = _amount(run, choice.kept.mean, choice.kept.sem)
+        rows = {
+            "missions": f"{choice.num_missions} of each team size, which chose nothing",
+            "policy kept": f"{kept}, after {choice.decisions:,} decisions",
+        }
+        others = {name: _amount(run, x.mean, x.sem) for name, x in choice.others.items()}
+    for name, cost in others.items():
         known = f"; {REFERENCES[name]}" if name in REFERENCES else ""
-        rows[NAMES.get(name, name)] = f"{_cost(run, cost)}{known}"
-    return rows | _oracle(run, progress)
+        rows[NAMES.get(name, name)] = cost + known
+    # The oracle flies few missions, those of evaluations only.
+    if (age := reference_ages(first).get(ORACLE)) is not None:
+        missions = f"on {_oracle_missions(run)} of the evaluations"
+        rows[ORACLE] = f"{age:.2f} windows, {missions}; {REFERENCES[ORACLE]}"
+    elif max(run.training.robots) > ORACLE_ROBOTS:
+        rows[ORACLE] = f"not flown: it would take long with more than {ORACLE_ROBOTS} robots"
+    return rows
 
 
-def verdicts(run: Run, progress: Progress) -> list[str]:
-    """What a reader should know beyond the numbers: losses, and how far the choice is fair."""
-    said, patience = [], run.limits.patience
+def verdicts(run: Run, progress: Progress) -> Iterator[str]:
+    """Yield what a reader should know beyond the numbers: losses, and how fair the choice is."""
+    choice = progress.choice
     if has_stopped_early(run, progress):
         way_on = " --resume --patience 0 trains on." if progress.has_chosen else ""
-        said.append(f"Stopped early: the last {patience} evaluations brought no gain.{way_on}")
-    choice = progress.choice
+        yield f"Stopped early: the last {run.limits.patience} evaluations brought no gain.{way_on}"
     if choice is None:
         if progress.best is not None:
-            said.append(
+            yield (
                 "The policy kept is the best of the evaluations, on the same missions: its age "
                 "flatters. A run that ends chooses on others."
             )
-        return said
+        return
     if choice.decisions == 0:
         begun = "the policy given by --init" if run.init else "the untrained policy"
-        said.append(f"Training did not help: {begun} did best, and is the one kept.")
-    return said + [
-        f"The policy kept {_stands(run, name, cost)} on the same missions."
-        for name, cost in choice.others.items()
-        if cost.behind > 0.0
-    ]
+        yield f"Training did not help: {begun} did best, and is the one kept."
+    for name, cost in choice.others.items():
+        if cost.behind > 0.0:
+            other, behind = NAMES.get(name, name), _amount(run, cost.behind, cost.behind_sem)
+            is_clear = cost.behind_sem is not None and cost.behind > CLEAR * cost.behind_sem
+            lost, level = f"loses to {other} by", f"is no better than {other}, which is ahead by"
+            yield f"The policy kept {lost if is_clear else level} {behind} on the same missions."
 
 
 def has_stopped_early(run: Run, progress: Progress) -> bool:
-    """Whether a run stopped because it no longer learned, and not at its budget."""
+    """Return whether a run stopped because it no longer learned, and not at its budget."""
     limits = run.limits
     is_left = limits.decisions is None or progress.decisions < limits.decisions
     return is_left and has_stalled(progress.curve, limits.patience)
 
 
-def _of_evaluations(run: Run, progress: Progress) -> dict[str, str]:
-    """Of a run that has not chosen."""
-    best, first = progress.best, progress.curve[0]
-    assert best is not None
-    decisions = "untrained" if best is first else f"after {best['decisions']:,.0f} decisions"
-    rows = {"missions": f"{run.training.held_out} of each team size, which chose the policy"}
-    rows["policy kept"] = f"{age_of(best)} windows, {decisions}"
-    rows[NAMES["first"]] = f"{age_of(first)} windows"
-    for name, age in reference_ages(best).items():
-        rows[name] = f"{age:.2f} windows; {REFERENCES[name]}"
-    return rows | _oracle(run, progress)
+def _text(status: "Status", start: "Status", limits: Limits) -> str:
+    parts = [f"{status.decisions:,} decisions"]
+    if status.evaluated is not None:
+        parts.append(f"missions {status.evaluated:.0%}")
+    elif not math.isnan(status.aoi):
+        parts.append(f"age {status.aoi:.1f}")
+    if status.progress.curve:
+        parts.append(f"held out {status.progress.curve[-1]['aoi']:.1f}")
+    made, minutes = status.decisions - start.decisions, status.minutes - start.minutes
+    if made and minutes:
+        parts.append(f"{made / minutes / 60.0:.0f}/s")
+    if (left := minutes_left(status, start, limits)) is not None:
+        parts.append(f"{timedelta(seconds=round(60.0 * left))} left")
+    return ", ".join(parts)
 
 
-def _oracle(run: Run, progress: Progress) -> dict[str, str]:
-    """Return the oracle flies missions of the evaluations only, and few of them."""
-    age, its_missions = reference_ages(progress.curve[0]).get(ORACLE), oracle_missions(run.training)
-    if age is not None:
-        told = f"{age:.2f} windows, on {its_missions} of the evaluations; {REFERENCES[ORACLE]}"
-        return {ORACLE: told}
-    if max(run.training.robots) > ORACLE_ROBOTS:
-        return {ORACLE: f"not flown: it would take long with more than {ORACLE_ROBOTS} robots"}
-    return {}
+def _oracle_missions(run: Run) -> str:
+    """Return how many of the evaluations' missions of each team size the oracle has flown."""
+    held_out = run.training.held_out
+    number = reference_missions(run.training).get(ORACLE, held_out)  # an old run flew all
+    return f"{number} of {held_out} missions"
 
 
-def _cost(run: Run, cost: Cost) -> str:
-    return _with_error(run, cost.mean, cost.sem)
-
-
-def _stands(run: Run, name: str, cost: Cost) -> str:
-    """How it stands beside another, which costs less."""
-    behind = _with_error(run, cost.behind, cost.behind_sem)
-    if cost.behind_sem is not None and cost.behind > CLEAR * cost.behind_sem:
-        return f"loses to {NAMES.get(name, name)} by {behind}"
-    return f"is no better than {NAMES.get(name, name)}, which is ahead by {behind}"
-
-
-def _with_error(run: Run, value: float, error: float | None) -> str:
-    """In the unit of what the run lowers."""
+def _amount(run: Run, value: float, error: float | None) -> str:
+    """Return a value with its error, in the unit of the cost that the run lowers."""
     unit, digits = ("windows", 2) if run.training.cost == "aoi" else ("m²/s²", 4)
     spread = "" if error is None else f" ± {error:.{digits}f}"
     return f"{value:.{digits}f}{spread} {unit}"

@@ -6,7 +6,7 @@ usual one of the credit assignment, or in a resumed run the run's own.
 
 from collections.abc import Iterator
 from dataclasses import Field, fields, replace
-from functools import reduce
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -53,12 +53,12 @@ def given_settings(given: dict[str, Any]) -> dict[str, Any]:
 def asked_settings(
     given: dict[str, Any], init: GnnConfig | None = None, init_path: Path | None = None
 ) -> Training:
-    """The settings of a new run: the usual ones of the credit assignment, changed by those given.
+    """Return the settings of a new run: the usual ones of its credit, changed by those given.
 
     Args:
         given: The settings that were given, by their places.
-        init: Of the policy that it begins with.
-        init_path: Where that policy is.
+        init: The configuration of the policy that the run begins with.
+        init_path: The file of that policy.
 
     Raises:
         ValueError: A value is unknown or outside its range, or contradicts another.
@@ -70,76 +70,73 @@ def asked_settings(
     check_in_use(asked, [mission])
     training = usual_settings(own.get("credit_assignment", "robot"), mission, sizes)
     if init is not None:
-        training = replace(
-            training, network=init.network, features=init.features, silence_logit=init.silence_logit
-        )
-        shape = {
-            place: given[place] for place in given if place.startswith(("features", "network"))
-        }
+        same = {name: getattr(init, name) for name in ("network", "features", "silence_logit")}
+        training = replace(training, **same)
+        shape = {p: x for p, x in given.items() if p.startswith(("features", "network"))}
         refuse_others(shape, training, f"the policy {init_path}")
         check_named(init.features, own_names(given), f"policy {init_path}")
     missions = _missions(own.get("missions"), training.missions, len(sizes))
-    training = replace(training, missions=missions)  # first, for its errors
+    training = replace(training, missions=missions)  # before the rest, for its errors
     training = replace(training, components=Components(**_part("components.", given)))
     load_own(own.get("features", training.features), training)
     if "features" in own:
         network["num_features"] = num_features(own["features"])
+    # As near to the usual number of groups as an equal share of each team size allows.
+    able = [n for n in range(len(sizes), missions + 1, len(sizes)) if missions % n == 0]
     training = replace(
         training,
-        groups=_groups(missions, len(sizes)),
+        groups=min(able, key=lambda n: (abs(n - Training.groups), -n), default=1),
         network=replace(training.network, **network),
         ppo=replace(training.ppo, **_part("ppo.", given)),
         **own,
     )
-    _check(training)
+    for size in training.robots:
+        check_whole("training", replace(mission, num_robots=size))
+    if training.reward == "velocity-variance" and mission.task != "flocking":
+        raise ValueError(
+            "reward velocity-variance depends on who talks only if the robots flock; add --task "
+            "flocking"
+        )
     return training
 
 
 def own_names(given: dict[str, Any]) -> list[str]:
-    """Names of parts of the user's own among settings that were given."""
-    places = ("features", *(place for place in SPECS if place.startswith("components.")))
-    return [given[place] for place in places if place in given and is_own(given[place])]
+    """Return the names of custom components and features among settings that were given."""
+    return [
+        value
+        for place, value in given.items()
+        if place.startswith(("features", "components.")) and is_own(value)
+    ]
 
 
 def load_own(features: str, training: Training) -> None:
-    """Load features, and the parts of a run, that are the user's own and were all named here.
-
-    Raises:
-        ValueError: One cannot be made.
-    """
+    """Load a run's custom features and components; raise ValueError if one cannot be made."""
     if is_own_set(features):
         load_features(features)
     training.components.made(training.mission)
 
 
 def refuse_others(given: dict[str, Any], training: Training, whose: str) -> None:
-    """Pass if given settings are those of a run, or of the policy that it begins with.
-
-    Raises:
-        ValueError: One contradicts.
-    """
+    """Raise ValueError if a setting contradicts a run, or the policy that it begins with."""
     for place, value in given.items():
-        stored = _stored(training, place)
+        stored = _at(training, place)
         if value != stored:
             typed = f"{flag_of(SPECS[place])} {as_typed(value)}"
             raise ValueError(f"{typed} is not what {whose} has, {as_typed(stored)}; leave it out")
 
 
 def _part(part: str, given: dict[str, Any]) -> dict[str, Any]:
-    """Those that were given of one part of the settings, by their names."""
-    return {
-        spec.name: given[place]
-        for place, spec in SPECS.items()
-        if place == part + spec.name and place in given
-    }
+    """Return the given settings of one part, by their names."""
+    places = (place for place in given if place.rpartition(".")[0] == part.rstrip("."))
+    return {place.rpartition(".")[2]: given[place] for place in places}
 
 
-def _stored(settings: object, place: str) -> object:
-    return reduce(getattr, place.split("."), settings)
+def _at(settings: object, place: str) -> object:
+    return attrgetter(place)(settings)
 
 
 def _missions(asked: int | None, usual: int, num_sizes: int) -> int:
-    """How many missions fly side by side: every team size has as many as the others."""
+    """Return the number of missions side by side: as many of every team size."""
     if asked is None:
         return -(-usual // num_sizes) * num_sizes
     if asked % num_sizes:
@@ -152,38 +149,19 @@ def _missions(asked: int | None, usual: int, num_sizes: int) -> int:
     return asked
 
 
-def _groups(missions: int, num_sizes: int) -> int:
-    """Into how many groups the missions are shared out evenly, sizes in turn."""
-    able = [n for n in range(num_sizes, missions + 1, num_sizes) if missions % n == 0]
-    return min(able, key=lambda n: (abs(n - Training.groups), -n), default=1)
-
-
-def _check(training: Training) -> None:
-    """Raise ValueError for settings that are sound one by one, but not together."""
-    for size in training.robots:
-        check_whole("training", replace(training.mission, num_robots=size))
-    if training.reward == "velocity-variance" and training.mission.task != "flocking":
-        raise ValueError(
-            "reward velocity-variance depends on who talks only if the robots flock; add --task "
-            "flocking"
-        )
-
-
 def _usual(place: str) -> str:
     """Return the default as text: per robot and, where it differs, per team."""
     if "shown" in SPECS[place].metadata:
         return SPECS[place].metadata["shown"]
-    robot, team = (_usual_of(credit, place) for credit in ("robot", "team"))
+    shown = []
+    for credit in ("robot", "team"):
+        missions = (PRESETS["paper"]("stationary"), PRESETS["reference"]("flocking"))
+        usual, other = (
+            _at(usual_settings(credit, each, (each.num_robots,)), place) for each in missions
+        )
+        depends = usual != other and place not in ("mission.preset", "mission.task")
+        shown.append("the preset's own" if depends else as_typed(usual))
+    robot, team = shown
     if robot == "False":
         return ""
     return robot if place == "credit_assignment" or robot == team else f"{robot}, team: {team}"
-
-
-def _usual_of(credit: str, place: str) -> str:
-    """Return the default as text, if it does not depend on preset or task."""
-    missions = (PRESETS["paper"]("stationary"), PRESETS["reference"]("flocking"))
-    usual, other = (
-        _stored(usual_settings(credit, each, (each.num_robots,)), place) for each in missions
-    )
-    depends = usual != other and place not in ("mission.preset", "mission.task")
-    return "the preset's own" if depends else as_typed(usual)

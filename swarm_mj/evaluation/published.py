@@ -27,10 +27,7 @@ METHODS = {
     "minimum spanning tree": "mst",
 }
 BASELINES = tuple(METHODS.values())  # the paper's three, as `POLICIES` names them
-COSTS = {
-    "age of information [windows]": "aoi",
-    "velocity variance [m^2/s^2]": "velocity_variance",
-}
+COSTS = {"age of information [windows]": "aoi", "velocity variance [m^2/s^2]": "velocity_variance"}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -129,12 +129,7 @@ def test_ages_are_told_in_windows_and_seconds_and_explained():
 
 
 @pytest.mark.parametrize(
-    ("last", "verdict"),
-    [
-        (0.002, "yes, under 0.1%"),
-        (0.02, "yes, 0.5%"),
-        (1.0, "no, 25.0%"),
-    ],
+    ("last", "verdict"), [(0.002, "yes, under 0.1%"), (0.02, "yes, 0.5%"), (1.0, "no, 25.0%")]
 )
 def test_whether_a_flock_agreed(last, verdict):
     rows, _ = shown("tdma", "flocking", summary(**BROADCAST, velocity_variance_last=last))

@@ -110,21 +110,12 @@ def test_contact_physics_flies(swarm_mj, tmp_path, boundary):
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        (
-            ["--robots", "0"],
-            "a whole number from 2 to 1000 [robots], not 0",
-        ),
-        (
-            ["--robots", "1"],
-            "a whole number from 2 to 1000 [robots], not 1",
-        ),
+        (["--robots", "0"], "a whole number from 2 to 1000 [robots], not 0"),
+        (["--robots", "1"], "a whole number from 2 to 1000 [robots], not 1"),
         (["--robots", "-4"], "not -4"),
         (["--robots", "123456789"], "from 2 to 1000"),
         (["--robots", "many"], "argument --robots: invalid int value: 'many'"),
-        (
-            ["--windows", "0"],
-            "a whole number from 1 to 100000 [windows], not 0",
-        ),
+        (["--windows", "0"], "a whole number from 1 to 100000 [windows], not 0"),
         (["--windows", "-1"], "not -1"),
         (["--range-ratio", "0"], "range ratio must be a number from 0.01 to 10 [of 1 km], not 0"),
         (["--range-ratio", "nan"], "not nan"),

@@ -112,10 +112,7 @@ REFUSED = [
     ((*DONE, "--budget", "-1"), "budget must be a whole number from 1"),
     (("--out", "cut-settings", "--resume"), "settings.json are damaged, no run's, or"),
     (("--out", "new-settings", "--resume"), "format_version is 3, and this swarm_mj reads 2"),
-    (
-        ("--out", "text-seed", "--resume"),
-        "Expected `int`, got `str` - at `$.training.seed`",
-    ),
+    (("--out", "text-seed", "--resume"), "Expected `int`, got `str` - at `$.training.seed`"),
     (("--out", "cut-checkpoint", "--resume"), "checkpoint.pt is damaged, or none; begin a new"),
     (("--out", "strange", "--resume"), "run strange/policy.safetensors is a folder; name a file"),
     (("--out", "mixed-up", "--resume"), "it was made with other settings than the run's"),

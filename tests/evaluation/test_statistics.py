@@ -59,8 +59,7 @@ def test_the_interval_is_the_same_each_time():
 
 
 @pytest.mark.parametrize(
-    "samples",
-    [[7.0], [0.0, 0.0], [3.0] * 50, [0.1 + 0.2, 0.3, 0.3], [-5.0, -5.0]],
+    "samples", [[7.0], [0.0, 0.0], [3.0] * 50, [0.1 + 0.2, 0.3, 0.3], [-5.0, -5.0]]
 )
 def test_samples_that_do_not_vary_have_no_interval(samples):
     assert bootstrap_interval(np.array(samples)) == NO_INTERVAL
