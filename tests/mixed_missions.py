@@ -30,7 +30,7 @@ def flown(seed):
     swarm = Swarm(MISSION, SEEDS)
     views = [copy.deepcopy(swarm.views)]
     for recipient in random_recipients(seed):
-        swarm.exchange(recipient)
+        swarm.step_with_recipients(recipient)
         views.append(copy.deepcopy(swarm.views))
     return views
 

@@ -41,7 +41,7 @@ def test_eq16_perfect_knowledge_shrinks_the_spread_by_a_tenth_a_window(preset, p
     start_mps, mean_mps = spread_mps(swarm), np.mean(swarm.states.velocity_mps, axis=1)
     for k in range(1, NUM_WINDOWS + 1):
         tell_everyone_the_truth(swarm)
-        costs = swarm.exchange(stay_silent(swarm))
+        costs = swarm.step_with_recipients(stay_silent(swarm))
         np.testing.assert_allclose(spread_mps(swarm), 0.9**k * start_mps, rtol=1e-9)
         variance = np.sum(start_mps**2, axis=1) * 0.81**k
         np.testing.assert_allclose(costs.velocity_variance_m2ps2, variance, rtol=1e-9)

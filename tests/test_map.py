@@ -82,7 +82,7 @@ def imports(path):
         ("mission/specification", {"system.fields"}),
         ("mission/batched_rng", set()),
         ("mission/geometry", {"system.compiled"}),
-        ("mission/placement", {"system.compiled", "mission.geometry"}),
+        ("mission/placement", {"system.compiled", "mission.geometry", "mission.specification"}),
         ("radio/reception", {"system.compiled"}),
         ("radio/free_space", {"system.compiled", "mission.geometry", "radio.reception"}),
         ("physics/state", set()),

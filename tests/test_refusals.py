@@ -27,7 +27,7 @@ def test_recipients_of_another_shape_are_refused_before_anyone_moves(shape):
     swarm = Swarm(small(), [1, 2])
     before = swarm.states.position_m.copy()
     with pytest.raises(ValueError, match=r"recipient must have shape \(2, 5\)"):
-        swarm.exchange(np.zeros(shape, dtype=np.int64))
+        swarm.step_with_recipients(np.zeros(shape, dtype=np.int64))
     np.testing.assert_array_equal(swarm.states.position_m, before)
 
 
@@ -37,7 +37,7 @@ def test_robots_that_do_not_exist_are_refused(robot):
     recipient = np.array([[0, 1, 2, 3, 4], [0, 1, robot, 3, 4]])
     complaint = f"of robot 2 in mission 1 must be from 0 to 4, not {robot}"
     with pytest.raises(ValueError, match=complaint):
-        swarm.exchange(recipient)
+        swarm.step_with_recipients(recipient)
     with pytest.raises(ValueError, match=complaint):
         merge(empty_buffers(2, 5), recipient)
 
@@ -54,7 +54,7 @@ def test_addressees_that_do_not_exist_are_refused(robot):
 def test_a_channel_of_another_shape_is_refused():
     swarm = Swarm(small(), [1], channel=lambda _position_m, _recipient: np.zeros((1, 9), int))
     with pytest.raises(ValueError, match=r"sender heard must have shape \(1, 5\)"):
-        swarm.exchange(np.array([[0, 0, 0, 0, 0]]))
+        swarm.step_with_recipients(np.array([[0, 0, 0, 0, 0]]))
 
 
 @pytest.mark.parametrize("physics", ["exact", "contact"])
@@ -118,7 +118,7 @@ def test_a_policy_may_reuse_its_array():
     """The record of a phase is a copy of what the policy returned."""
     swarm = Swarm(small(), [1])
     recipient = np.array([[1, 1, 2, 3, 4]])
-    swarm.exchange(recipient)
+    swarm.step_with_recipients(recipient)
     recipient[:] = 0
     np.testing.assert_array_equal(swarm.phases[0].recipient, [[1, 1, 2, 3, 4]])
 

@@ -176,9 +176,10 @@ def evaluate(
     """
     need("scipy", "an evaluation")
     mission = mission_of(evaluate, task, mission_fields)
+    for kind, name in {"channel": channel, "controller": controller, "scene": scene}.items():
+        if name is not None:
+            _check_named(kind, name)
     components = Components(channel=channel, controller=controller, scene=scene)
-    for kind, name in components.given.items():
-        _check_named(kind, name)
     check_value(Processes.__dataclass_fields__["jobs"], num_jobs, "num_jobs")
     check_value(Study.__dataclass_fields__["episodes"], num_missions, "num_missions")
     study = Study(

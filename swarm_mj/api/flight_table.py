@@ -8,7 +8,6 @@ from typing import Any
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
 from swarm_mj.mission.presets import where_flown
-from swarm_mj.mission.robot_failures import num_failures
 from swarm_mj.mission.specification import NOTHING
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
 from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
@@ -52,7 +51,7 @@ def flight_title(mission: Mission, policy: str, seed: int) -> str:
 
 def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> dict[str, str]:
     """Return the rows of a flight's table, at most 16, from its `flight_numbers`."""
-    hops, num_off = numbers["hops_mean"], num_failures(mission)
+    hops, num_off = numbers["hops_mean"], mission.num_failures
     payload, rate = numbers["payload"], BITS_PER_BYTE * numbers["bytes_per_second"]
     rows = {
         f"windows of {mission.window_s:g} s flown": f"{numbers['num_windows']} in {wall_s:.2f} s",

@@ -74,7 +74,7 @@ class SwarmPhysics(mujoco.Physics):
     def step(self, nstep: int = 1) -> None:
         """Flies so many windows of Alg. 1 with the recipients that stand in `recipient`."""
         for _ in range(nstep):
-            self.swarm.exchange(self.recipient)
+            self.swarm.step_with_recipients(self.recipient)
         self._show()
 
     def timestep(self) -> float:

@@ -107,7 +107,7 @@ class MissionBatch:
         if self.is_over:
             windows = f"its {self.last_window} windows"
             raise ValueError(f"the mission is over after {windows}; call reset()")
-        self.costs = self.flown.exchange(recipient)
+        self.costs = self.flown.step_with_recipients(recipient)
         self._see()
         return self.costs
 

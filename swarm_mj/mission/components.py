@@ -1,7 +1,7 @@
-"""Users' own parts of a swarm, each by the name `module:Name` of what makes it.
+"""Components of a mission from users: objects, or code named `module:Name`.
 
-To load a part is to run its code. So only what a user named is loaded, here and now: a name that
-stands in a file, such as a stored policy's or a run's, never is, unless its user gives it again.
+To load code is to run it. So only what a user named is loaded, here and now: a name that stands in
+a file, such as a stored policy's or a run's, never is, unless its user gives it again.
 """
 
 import hashlib
@@ -12,7 +12,7 @@ import re
 import sys
 import sysconfig
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -31,70 +31,8 @@ CALLED_WITH = {  # the kinds of components, and the arguments of each
     "controller": ("buffers", "states"),
     "scene": ("spec", "mission"),
 }
-OF_FUNCTIONS = 2  # a channel, controller or scene that is a plain function takes two arguments
-_loaded: dict[str, str] = {}  # modules that hold parts, and how a message calls the part
-
-
-def is_own(name: str) -> bool:
-    """Whether a name is meant as that of a user's own part."""
-    return ":" in name
-
-
-def is_ours(part: object) -> bool:
-    """Whether a part is this package's: what it does is known, so it may be handed live arrays."""
-    home = getattr(part, "__module__", None) or type(part).__module__
-    return home.partition(".")[0] == __package__
-
-
-def load(kind: str, name: str) -> Any:  # noqa: ANN401 - whatever has that name
-    """What a user's `module:Name` names; the module is looked for in the current folder first.
-
-    Args:
-        kind: What it is to be, such as "channel", for messages.
-        name: As typed.
-
-    Raises:
-        ValueError: The name has another form, leads nowhere, or the module cannot be imported.
-    """
-    _check_form(kind, name)
-    module_name, _, attribute = name.partition(":")
-    module = _import(kind, name, module_name)
-    if not hasattr(module, attribute):
-        hint = did_you_mean(attribute, vars(module))
-        raise ValueError(f"{kind} {name}: {_place(module)} has no {attribute}{hint}")
-    found = getattr(module, attribute)
-    for home in (module_name, getattr(_whole(found), "__module__", None) or module_name):
-        if home.partition(".")[0] != __package__ and (home == module_name or _is_users(home)):
-            _loaded[home] = f"{kind} {name}"
-    return found
-
-
-def make(kind: str, name: str, mission: Mission) -> Any:  # noqa: ANN401 - any kind of part
-    """Return a user's own part for a mission.
-
-    What `name` names is called with the mission, or with nothing if it needs no argument. A
-    function of two arguments, or an object like one, is the part itself. Either may be a
-    `functools.partial`, which is how one file holds a part with several values of its numbers.
-
-    Raises:
-        ValueError: As for `load`, or what it names cannot be called so, or raises.
-    """
-    found = load(kind, name)
-    is_class = isinstance(_whole(found), type)
-    if not callable(found) or (not is_class and _num_needed(found) >= OF_FUNCTIONS):
-        return found
-    try:
-        return _called(found, mission)
-    except Exception as error:
-        raise ValueError(
-            f"{kind} {name} raised {_said(error, [name.partition(':')[0]])}"
-        ) from error
-
-
-def digest(name: str) -> str:
-    """Return a hash of the file that holds a part which was loaded; empty if there is none."""
-    file = getattr(sys.modules.get(name.partition(":")[0]), "__file__", None)
-    return hashlib.sha256(Path(file).read_bytes()).hexdigest()[:12] if file else ""
+PACKAGE = __name__.partition(".")[0]
+_loaded: dict[str, str] = {}  # modules of users' code, and what a message calls it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,9 +85,10 @@ class Components:
         found = {kind: make(kind, name, mission) for kind, name in named.items()}
         for kind, each in found.items():
             if isinstance(each, type) or not callable(each):
+                shown = f"the class {each.__name__}" if isinstance(each, type) else f"{each!r:.80}"
                 raise ValueError(
                     f"{kind} {named[kind]} must be a function of two arguments, or make an "
-                    f"object like one, not {_shown(each)}"
+                    f"object like one, not {shown}"
                 )
         return replace(self, **found)
 
@@ -159,17 +98,94 @@ def components_in(config: Mapping[str, Any]) -> Components:
     return Components(**{kind: config[kind] for kind in CALLED_WITH if config.get(kind)})
 
 
+def is_own(name: str) -> bool:
+    """Return whether a name is meant as that of a user's own code."""
+    return ":" in name
+
+
+def is_ours(component: object) -> bool:
+    """Return whether it is this package's, and so may be handed live arrays: it writes none."""
+    home = getattr(component, "__module__", None) or type(component).__module__
+    return home.partition(".")[0] == PACKAGE
+
+
+def load(kind: str, name: str) -> Any:  # noqa: ANN401 - whatever has that name
+    """Return what a user's `module:Name` names; the current folder is searched first.
+
+    Args:
+        kind: What it is to be, such as "channel", for messages.
+        name: As typed.
+
+    Raises:
+        ValueError: The name has another form, leads nowhere, or the module cannot be imported.
+    """
+    _check_form(kind, name)
+    module_name, _, attribute = name.partition(":")
+    module = _import(kind, name, module_name)
+    if not hasattr(module, attribute):
+        file = getattr(module, "__file__", None)
+        place = os.path.relpath(file) if file else module_name
+        hint = did_you_mean(attribute, vars(module))
+        raise ValueError(f"{kind} {name}: {place} has no {attribute}{hint}")
+    found = getattr(module, attribute)
+    # Errors are blamed on the module named, and on that which it took the code from.
+    home = getattr(_unwrapped(found), "__module__", None) or module_name
+    for each in (module_name, *([home] if _is_users(home) else [])):
+        if each.partition(".")[0] != PACKAGE:
+            _loaded[each] = f"{kind} {name}"
+    return found
+
+
+def make(kind: str, name: str, mission: Mission) -> Any:  # noqa: ANN401 - any kind of component
+    """Return a user's own component for a mission.
+
+    What `name` names is called with the mission, or with nothing if it needs no argument. A
+    function of two arguments, or an object like one, is the component itself. Either may be a
+    `functools.partial`, by which one file holds a component with several values of its numbers.
+
+    Raises:
+        ValueError: As for `load`, or what it names cannot be called so, or raises.
+    """
+    found = load(kind, name)
+    if not callable(found):
+        return found
+    try:
+        takes = inspect.signature(found).parameters
+    except (TypeError, ValueError):  # of what is not Python's own
+        takes = {}
+    by_place = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    is_needed = [p.kind in by_place and p.default is p.empty for p in takes.values()]
+    if sum(is_needed) > 1 and not isinstance(_unwrapped(found), type):
+        return found
+    try:
+        if any(is_needed):
+            return found(mission)
+        return found(mission=mission) if "mission" in takes else found()
+    except Exception as error:
+        said = _in_a_line(error, name.partition(":")[0])
+        raise ValueError(f"{kind} {name} raised {said}") from error
+
+
+def digest(name: str) -> str:
+    """Return a hash of the file that holds code which was loaded; empty if there is none."""
+    file = getattr(sys.modules.get(name.partition(":")[0]), "__file__", None)
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()[:12] if file else ""
+
+
 @contextmanager
 def one_line_each() -> Iterator[None]:
-    """Within it, what a user's part raises is a ValueError of one line that names the part."""
+    """Turn what users' code raises within it into a ValueError of one line that names the code."""
     try:
         yield
     except (KeyboardInterrupt, MemoryError):
         raise
     except Exception as error:
-        for module in _modules_within(error):
-            said = f"{_loaded[module]} raised {_said(error, [module])}"
-            raise ValueError(said) from error
+        frames = [f for f, _ in traceback.walk_tb(error.__traceback__)]
+        for frame in reversed(frames):  # the innermost first, as it raised
+            module = frame.f_globals.get("__name__")
+            if module in _loaded:
+                said = f"{_loaded[module]} raised {_in_a_line(error, module)}"
+                raise ValueError(said) from error
         raise
 
 
@@ -191,37 +207,33 @@ def _check_form(kind: str, name: str) -> None:
 
 
 def _import(kind: str, name: str, module_name: str) -> ModuleType:
-    """Import a part's module; the current folder comes first from now on, as for `python -m`."""
+    """Import a module; the current folder comes first from now on, as for `python -m`."""
     here = os.getcwd()
     if here not in sys.path:
         sys.path.insert(0, here)
-    importlib.invalidate_caches()
+    importlib.invalidate_caches()  # or a file that was just written would not be found
     try:
         return importlib.import_module(module_name)
-    except ModuleNotFoundError as error:
-        if error.name is None or not f"{module_name}.".startswith(f"{error.name}."):
-            raise _broken(kind, name, error, module_name) from error
+    except (Exception, SystemExit) as error:
+        missing = error.name if isinstance(error, ModuleNotFoundError) else None
+        if missing is None or not f"{module_name}.".startswith(f"{missing}."):
+            said = _in_a_line(error, module_name)
+            raise ValueError(f"{kind} {name}: importing it raised {said}") from error
         near = (path.stem for path in Path(here).glob("*.py"))
         raise ValueError(
-            f"{kind} {name}: there is no module {error.name} in {here}, nor among those installed"
+            f"{kind} {name}: there is no module {missing} in {here}, nor among those installed"
             f"{did_you_mean(module_name, near)}"
         ) from error
-    except (Exception, SystemExit) as error:
-        raise _broken(kind, name, error, module_name) from error
 
 
-def _broken(kind: str, name: str, error: BaseException, module_name: str) -> ValueError:
-    return ValueError(f"{kind} {name}: importing it raised {_said(error, [module_name])}")
-
-
-def _said(error: BaseException, modules: list[str]) -> str:
-    """An exception in one line, with the last place of these modules that it came through."""
+def _in_a_line(error: BaseException, module: str) -> str:
+    """Return an exception in one line, with the last place in a module that it came through."""
     text = " ".join(str(error).split())[:300]
     said = f"{type(error).__name__}: {text}" if text else type(error).__name__
     frames = [
         (frame.f_code.co_filename, line)
         for frame, line in traceback.walk_tb(error.__traceback__)
-        if frame.f_globals.get("__name__") in modules
+        if frame.f_globals.get("__name__") == module
     ]
     if isinstance(error, SyntaxError) or not frames:  # which says where it is itself
         return said
@@ -229,63 +241,21 @@ def _said(error: BaseException, modules: list[str]) -> str:
     return f"{said} ({os.path.relpath(file)}, line {line})"
 
 
-def _modules_within(error: BaseException) -> list[str]:
-    """Return the modules of parts that an exception came through, the innermost first."""
-    names = [f.f_globals.get("__name__") for f, _ in traceback.walk_tb(error.__traceback__)]
-    return [name for name in reversed(names) if name in _loaded]
-
-
 def _is_users(home: str) -> bool:
-    """Whether a module is a file that neither Python nor an installed package brought."""
+    """Return whether a module is a file that neither Python nor an installed package brought."""
     file = getattr(sys.modules.get(home), "__file__", None)
     places = [sysconfig.get_path(kind) for kind in ("stdlib", "platstdlib", "purelib", "platlib")]
     return file is not None and not any(Path(file).is_relative_to(place) for place in places)
 
 
-def _place(module: ModuleType) -> str:
-    file = getattr(module, "__file__", None)
-    return os.path.relpath(file) if file else module.__name__
-
-
-def _name(component: object) -> str:
-    if isinstance(component, str):
-        return component
-    return getattr(component, "__qualname__", type(component).__qualname__)
-
-
-def _shown(part: object) -> str:
-    return f"the class {part.__name__}" if isinstance(part, type) else f"{part!r:.80}"
-
-
-def _parameters(found: Callable[..., Any]) -> list[inspect.Parameter]:
-    """What can be given; nothing if Python cannot tell."""
-    try:
-        return list(inspect.signature(found).parameters.values())
-    except (TypeError, ValueError):
-        return []
-
-
-def _positional(found: Callable[..., Any]) -> list[inspect.Parameter]:
-    """What can be given by place."""
-    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    return [each for each in _parameters(found) if each.kind in kinds]
-
-
-def _num_needed(found: Callable[..., Any]) -> int:
-    return sum(each.default is inspect.Parameter.empty for each in _positional(found))
-
-
-def _whole(found: object) -> object:
+def _unwrapped(found: object) -> object:
     """Return the function or class that a partial one is made of."""
     while isinstance(found, partial):
         found = found.func
     return found
 
 
-def _called(found: Callable[..., Any], mission: Mission) -> object:
-    """What it makes, given the mission if an argument is needed, or may be the mission."""
-    by_place = _positional(found)
-    if any(each.default is inspect.Parameter.empty for each in by_place):
-        return found(mission)
-    takes_mission = any(each.name == "mission" for each in _parameters(found))
-    return found(mission=mission) if takes_mission else found()
+def _name(component: object) -> str:
+    if isinstance(component, str):
+        return component
+    return getattr(component, "__qualname__", type(component).__qualname__)

@@ -1,30 +1,31 @@
-"""Initial positions (IV-B): uniform in the area, redrawn until the team is connected."""
+"""Draws of a mission: connected initial positions (IV-B), and robots that fail half-way.
 
-from collections.abc import Callable
+Failures are a test of robustness, not the paper's. From then on these robots neither transmit nor
+decode, and observe nothing, while they stand or move as before. No robot knows who has failed.
+"""
+
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from swarm_mj.mission.geometry import gather_connected
+from swarm_mj.mission.specification import Mission
 from swarm_mj.system.compiled import compiled
 
 MAX_DRAWS = 20_000  # the sparsest of the paper's teams (range ratio 0.2) connects in a few hundred
 MAX_FREE_DRAWS = 1000  # of a robot; of an area that is half free, a robot needs two
 MAX_ROBOTS_DRAWN = 2_000_000  # bounds the draws of large teams, whose test takes longer
 
+# Says something of each robot, were the team at these positions [m].
+Test = Callable[[Float[np.ndarray, "N 2"]], Bool[np.ndarray, "N"]]
+
 
 @compiled()
 def is_connected(position_m: Float[np.ndarray, "N 2"], range_m: float) -> bool:
-    """Whether the disk graph is connected.
+    """Return whether the disk graph is connected.
 
     Equivalent to a positive algebraic connectivity (Fiedler 1973), which the paper tests (IV-B).
-
-    Args:
-        position_m: Positions [m].
-        range_m: Two robots at most this far apart are neighbours [m].
-
-    Returns:
-        Whether every robot reaches every other over neighbours.
     """
     num_robots = len(position_m)
     is_met, members = np.zeros(num_robots, dtype=np.bool_), np.empty(num_robots, dtype=np.int64)
@@ -36,26 +37,23 @@ def connected_positions(
     half_side_m: float,
     range_m: float,
     rng: np.random.Generator,
-    largest_part_at: Callable[[Float[np.ndarray, "N 2"]], Bool[np.ndarray, "N"]] | None = None,
-    is_blocked_at: Callable[[Float[np.ndarray, "N 2"]], Bool[np.ndarray, "N"]] | None = None,
+    largest_part_at: Test | None = None,
+    is_blocked_at: Test | None = None,
     *,
     keeps_largest: bool = False,
 ) -> Float[np.ndarray, "N 2"]:
-    """Positions uniform in the area at which the team is connected (IV-B).
+    """Return positions uniform in the area at which the team is connected [m] (IV-B).
 
     Args:
         num_robots: N.
         half_side_m: Positions lie within plus or minus this [m].
         range_m: Range of the disk graph [m].
         rng: Where the positions are drawn from.
-        largest_part_at: The largest connected part of a team at these positions [m] in its own
+        largest_part_at: Which robots are in the largest connected part under the team's own
             channel; None asks whether the disk graph is connected.
-        is_blocked_at: Which robots cannot be at these positions [m]; those are drawn anew.
+        is_blocked_at: Which robots cannot be there; those are drawn anew.
         keeps_largest: Whether only robots outside the largest part are drawn anew, not the whole
             team: between obstacles hardly any team is connected that is drawn at once.
-
-    Returns:
-        Positions [m].
 
     Raises:
         ValueError: All draws were disconnected, or the area has hardly any free space.
@@ -76,9 +74,8 @@ def connected_positions(
     if largest_part_at is not None:
         reach += " in free space, and less in their channel,"
     raise ValueError(
-        f"no connected team in {num_draws} draws: {num_robots} robots with {reach} "
-        f"are too sparse for an area of {2 * half_side_m:.0f} m by "
-        f"{2 * half_side_m:.0f} m; raise the range ratio or the density"
+        f"no connected team in {num_draws} draws: {num_robots} robots with {reach} are too sparse "
+        f"for {_area(half_side_m)}; raise the range ratio or the density"
     )
 
 
@@ -87,9 +84,9 @@ def _draw_free(
     is_kept: Bool[np.ndarray, "N"],
     half_side_m: float,
     rng: np.random.Generator,
-    is_blocked_at: Callable[[Float[np.ndarray, "N 2"]], Bool[np.ndarray, "N"]] | None,
+    is_blocked_at: Test | None,
 ) -> None:
-    """Draws where all others stand, and those anew that cannot be there, until all can."""
+    """Draw where all others stand, and those anew that cannot be there, until all can."""
     is_due = ~is_kept
     for _ in range(MAX_FREE_DRAWS):
         fresh = rng.uniform(-half_side_m, half_side_m, size=(int(np.sum(is_due)), 2))
@@ -101,6 +98,26 @@ def _draw_free(
             return
     raise ValueError(
         f"{int(np.sum(is_due))} of {len(position_m)} robots found no free space in "
-        f"{MAX_FREE_DRAWS} draws over {2 * half_side_m:.0f} m by {2 * half_side_m:.0f} m; choose "
-        "an arena that leaves more room, or fewer robots"
+        f"{MAX_FREE_DRAWS} draws over {_area(half_side_m)}; choose an arena that leaves more room, "
+        "or fewer robots"
     )
+
+
+def _area(half_side_m: float) -> str:
+    return f"an area of {2 * half_side_m:.0f} m by {2 * half_side_m:.0f} m"
+
+
+def draw_survivors(
+    mission: Mission, rngs: Sequence[np.random.Generator]
+) -> Bool[np.ndarray, "B N"] | None:
+    """Return who is active in the second half of the missions; None if nobody fails.
+
+    As many robots fail in every mission; `rngs` has one generator per mission.
+    """
+    if mission.num_failures == 0:
+        return None
+    is_active = np.ones((len(rngs), mission.num_robots), dtype=np.bool_)
+    for b, rng in enumerate(rngs):
+        failing = rng.choice(mission.num_robots, size=mission.num_failures, replace=False)
+        is_active[b, failing] = False
+    return is_active

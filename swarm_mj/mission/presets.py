@@ -1,15 +1,11 @@
-"""Missions whose numbers go together: the paper's text, its authors' code, and whole worlds.
-
-Where the paper's text and its authors' code differ, each difference is a field of `Mission`:
-`paper()` follows the text, `reference()` the code.
-"""
+"""Missions whose numbers go together: the paper's text, its authors' code, and whole worlds."""
 
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from swarm_mj.mission.specification import OPEN, Boundary, Mission, PhysicsMode, Task
+from swarm_mj.mission.specification import OPEN, Mission, Task
 
 
 def paper(task: Task = "flocking", **overrides: Any) -> Mission:
@@ -21,35 +17,23 @@ def paper(task: Task = "flocking", **overrides: Any) -> Mission:
             flocks have a boundary, unless they say otherwise; where robots collide, physics are
             `contact`, too.
 
-    Returns:
-        The mission.
-
     Raises:
         ValueError: A value is outside its range.
         TypeError: An override is no field of `Mission`.
     """
     is_open = overrides.get("arena", OPEN) == OPEN
-    boundary: Boundary = "none" if task == "flocking" and is_open else "reflect"
     is_touching = not is_open or overrides.get("collide", False)
-    physics: PhysicsMode = "contact" if is_touching else "exact"
-    usual = Mission(task=task, boundary=boundary, physics=physics)
+    usual = Mission(
+        task=task,
+        # The paper's flocks fly off freely; obstacles only make sense where robots stay.
+        boundary="none" if task == "flocking" and is_open else "reflect",
+        physics="contact" if is_touching else "exact",
+    )
     return replace(usual, **overrides)
 
 
 def reference(task: Task = "flocking", **overrides: Any) -> Mission:
-    """What the authors' published code does; the setting of the published numbers.
-
-    Args:
-        task: What the robots do; a flock has no boundary unless `overrides` give it one.
-        **overrides: Any field of `Mission`.
-
-    Returns:
-        The mission.
-
-    Raises:
-        ValueError: A value is outside its range.
-        TypeError: An override is no field of `Mission`.
-    """
+    """Return the setting of the authors' published code and numbers; arguments as of `paper`."""
     code: dict[str, Any] = {
         "preset": "reference",
         "max_acceleration_mps2": 10.0,
@@ -65,19 +49,10 @@ def reference(task: Task = "flocking", **overrides: Any) -> Mission:
 
 
 def world(preset: str, task: Task = "random-walk", **overrides: Any) -> Mission:
-    """Return a mission of the paper's text in an arena, with the channel that goes with it.
+    """Return a mission of the paper's text in an arena of `WORLDS`, with the channel of that arena.
 
-    Args:
-        preset: One of `WORLDS`.
-        task: What the robots do. They walk unless told otherwise, as robots at rest lose nobody.
-        **overrides: Any field of `Mission`.
-
-    Returns:
-        The mission.
-
-    Raises:
-        ValueError: A value is outside its range.
-        TypeError: An override is no field of `Mission`.
+    Other arguments as of `paper`. Robots walk unless told otherwise, as a stationary team stays
+    connected.
     """
     return paper(task, **({"preset": preset} | WORLDS[preset] | overrides))
 
@@ -119,7 +94,7 @@ PRESETS = PAPERS | {name: partial(world, name) for name in WORLDS}
 
 
 def where_flown(mission: Mission) -> list[str]:
-    """Where it was flown: a world's arena and channel by the preset, all others by themselves."""
+    """Return arena and channel in words: a world by its preset, and what differs from it."""
     arena, radio = f"arena {mission.arena}", mission.beyond_free_space
     if mission.preset not in WORLDS:
         return [*([arena] if mission.arena != OPEN else []), *([radio] if radio else [])]
@@ -132,7 +107,8 @@ def where_flown(mission: Mission) -> list[str]:
 
 
 def make_mission(**given: Any) -> Mission:
-    """A mission of the preset and task that are given, or usual, changed by the other fields."""
+    """Return a mission of the preset and task given, or the defaults, with the other fields."""
     preset = given.pop("preset", Mission().preset)
-    replace(Mission(), preset=preset, task=given.get("task", Mission().task))  # refuses the unknown
+    # Refuses an unknown preset or task by the field's own message, before it is looked up.
+    replace(Mission(), preset=preset, task=given.get("task", Mission().task))
     return PRESETS[preset](**given)

@@ -21,16 +21,18 @@ HalfDuplex = Literal["strict", "eavesdroppers"]
 FlockingSet = Literal["heard", "moving"]
 PathLossLaw = Literal["free-space", "log-distance", "two-ray"]
 FadingLaw = Literal["none", "rayleigh", "rician"]
-Grant = Literal["map", "statistics", "start"]  # what robots may be told beforehand
+Grant = Literal["map", "statistics", "start"]  # what robots may know before the mission
 
 # Ratios are fractions of this distance, whatever the team's size (IV-B).
 MISSION_DISTANCE_M = 1000.0
 MISSION_DURATION_S = 50.0  # 500 windows of 100 ms: the duration that velocity ratios mean (IV-B)
 SQUARE_METRES_PER_KM2 = 1e6
+MIN_SURVIVORS = 2  # whatever the fraction that fails, so that there is an age of information
 OPEN = "open"  # the arena of the paper's missions: nothing stands in it
 CHANNEL = "channel"  # a heading of the help
-NOTHING = "nothing"  # is told beforehand, beyond free space
+NOTHING = "nothing"  # is known beforehand, beyond free space
 KNOWABLE = (NOTHING, *get_args(Grant))
+NEW = "not the paper's"  # the source of what the paper has not
 
 
 def _quantity(
@@ -46,30 +48,25 @@ def _quantity(
     return setting(default, help, label=label, unit=unit, source=source, low=low, high=high)
 
 
-def _choice(default: str, label: str, source: str, choices: object, help: str = "") -> FieldOf:
-    """One of several names, given as a `Literal`."""
-    return setting(default, help, label=label, source=source, choices=get_args(choices))
-
-
 def _radio(default: float, label: str, unit: str, low: float, high: float, help: str) -> FieldOf:
     """Return a number of the channel beyond free space, an option under its own heading."""
-    spec = {"label": label, "unit": unit, "source": "not the paper's", "low": low, "high": high}
-    return setting(default, help, group=CHANNEL, **spec)
+    limits = {"unit": unit, "low": low, "high": high}
+    return setting(default, help, group=CHANNEL, label=label, source=NEW, **limits)
 
 
-def _radio_choice(default: str, label: str, source: str, choices: object, help: str) -> FieldOf:
-    """One of several laws of the channel."""
-    allowed = get_args(choices)
-    return setting(default, help, group=CHANNEL, label=label, source=source, choices=allowed)
+def _choice(
+    default: str, label: str, source: str, choices: object, help: str = "", group: str | None = None
+) -> FieldOf:
+    """Return one of several names, given as a `Literal`."""
+    about = {"label": label, "source": source, "choices": get_args(choices)}
+    return setting(default, help, **about, **({"group": group} if group else {}))
 
 
 def in_order(prior_knowledge: str) -> str:
-    """Grants as they are kept: each once, in one order, joined by commas; what is none stays."""
+    """Return grants as they are kept: each once, in one order, joined by commas."""
     grants = dict.fromkeys(name.strip() for name in prior_knowledge.split(","))
-    if NOTHING in grants and len(grants) > 1:
-        return prior_knowledge
-    named = [name for name in KNOWABLE if name in grants]
-    return ",".join([*named, *(name for name in grants if name not in KNOWABLE)])
+    order = [*KNOWABLE, *grants]  # unknown names stay, for the message that refuses them
+    return ",".join(sorted(grants, key=order.index))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,11 +79,7 @@ class Mission:
     """
 
     preset: str = _choice(
-        "paper",
-        "preset",
-        "text, code, or a world",
-        Preset,
-        "the paper's text, what its authors' code does, or an arena with its channel",
+        "paper", "preset", "IV-B", Preset, "the paper's text or code, or an arena with its channel"
     )
     task: Task = _choice("flocking", "task", "IV", Task, "what the robots do")
     num_robots: int = _quantity(
@@ -97,13 +90,7 @@ class Mission:
         0.25, "range ratio", "of 1 km", "IV-B", 0.01, 10.0, "range of a packet in silence"
     )
     velocity_ratio: float = _quantity(
-        0.15,
-        "velocity ratio",
-        "of 1 km in 50 s",
-        "IV-B",
-        0.001,
-        5.0,
-        "largest velocity per axis (0.15: 3 m/s)",
+        0.15, "velocity ratio", "of 1 km in 50 s", "IV-B", 0.001, 5.0, "per axis; 0.15 is 3 m/s"
     )
     max_acceleration_mps2: float = _quantity(20.0, "A_max", "m/s²", "IV-B", 0.01, 1000.0)
     window_s: float = _quantity(0.1, "window", "s", "IV-B", 0.01, 10.0)
@@ -114,17 +101,9 @@ class Mission:
     sinr_threshold_db: float = _quantity(1.0, "SINR threshold", "dB", "IV-B", -30.0, 60.0)
     noise_dbm: float = _quantity(-50.0, "noise power", "dBm", "IV-B", -200.0, 50.0)
     frequency_hz: float = _quantity(2.4e9, "centre frequency", "Hz", "IV-B", 1e6, 1e12)
-    # `robot_failures.num_failures` says how many robots that is.
     failure_fraction: float = _quantity(
-        0.0,
-        "fraction of the robots that fail",
-        "of the team",
-        "not the paper's",
-        0.0,
-        0.9,
-        "robots that fail half-way, unannounced",
+        0.0, "failure fraction", "of the team", NEW, 0.0, 0.9, "robots that fail half-way"
     )
-
     arena: str = setting(
         OPEN,
         "what stands in the area: open, blocks, forest, rooms, or an MJCF file",
@@ -133,8 +112,8 @@ class Mission:
     )
 
     # The channel beyond the paper's free space (`radio.mission_radio`).
-    path_loss: PathLossLaw = _radio_choice(
-        "free-space", "path loss", "Eq. 1", PathLossLaw, "how power falls with distance"
+    path_loss: PathLossLaw = _choice(
+        "free-space", "path loss", "Eq. 1", PathLossLaw, "how power falls with distance", CHANNEL
     )
     loss_exponent: float = _radio(
         3.0, "path loss exponent", "1", 1.0, 10.0, "slope of log-distance: 2 is free space's"
@@ -151,8 +130,8 @@ class Mission:
     shadowing_distance_m: float = _radio(
         20.0, "shadowing distance", "m", 0.1, 10_000.0, "over which its correlation falls to 1/e"
     )
-    fading: FadingLaw = _radio_choice(
-        "none", "fading", "not the paper's", FadingLaw, "of every link, anew in each slot"
+    fading: FadingLaw = _choice(
+        "none", "fading", NEW, FadingLaw, "of every link, anew in each slot", CHANNEL
     )
     rician_k: float = _radio(
         4.0, "Rician K", "1", 0.0, 10_000.0, "power in line of sight over scattered; 0: Rayleigh"
@@ -167,12 +146,7 @@ class Mission:
         0.05, "burst end", "per slot", 0.001, 0.5, "probability that it hears again"
     )
     high_power_fraction: float = _radio(
-        0.0,
-        "fraction of high-power radios",
-        "of the team",
-        0.0,
-        1.0,
-        "robots with more transmit power",
+        0.0, "high-power fraction", "of the team", 0.0, 1.0, "robots with more transmit power"
     )
     high_power_db: float = _radio(6.0, "extra power", "dB", 0.0, 60.0, "how much more that is")
     prior_knowledge: str = setting(
@@ -180,30 +154,25 @@ class Mission:
         "what robots know before the mission, several joined by commas",
         group=CHANNEL,
         label="prior knowledge",
-        source="not the paper's",
+        source=NEW,
         choices=KNOWABLE,
         is_joined=True,
         convert=in_order,
     )
-
     bit_rate: float | None = setting(
         None,
         "in bit/s, as 250k or 6M; what does not fit into a slot of 50 ms is not sent",
         group=CHANNEL,
         label="bit rate",
         unit="bit/s",
-        source="not the paper's",
+        source=NEW,
         low=1.0,
         high=1e12,
         metavar="RATE",
     )
 
     physics: PhysicsMode = _choice(
-        "exact",
-        "physics",
-        "Eq. 15 or forces",
-        PhysicsMode,
-        "Eq. 15 to rounding error, or forces and bounces, as obstacles need",
+        "exact", "physics", "Eq. 15", PhysicsMode, "Eq. 15, or forces, as obstacles need"
     )
     collide: bool = setting(
         False, "robots bounce off each other, too, in contact physics", label="robots collide"
@@ -220,24 +189,24 @@ class Mission:
     tree_root_transmits: bool = False  # IV-C; the code's root addresses the last robot
 
     def __new__(cls, **given: Any) -> "Mission":
-        """Refuses unknown fields in our words; else as any class."""
+        """Refuse unknown fields by a message that names the likely one."""
         check_names("Mission", given, cls.__dataclass_fields__)
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
         check(self)
         object.__setattr__(self, "prior_knowledge", in_order(self.prior_knowledge))
-        if NOTHING in self.prior_knowledge.split(",") and self.prior_knowledge != NOTHING:
+        if self.grants(NOTHING) and self.prior_knowledge != NOTHING:
             some = ", ".join(get_args(Grant))
             raise ValueError(
                 f"prior knowledge must be nothing or some of {some}, not {self.prior_knowledge}"
             )
-        if self.arena != OPEN and self.physics == "exact":
+        if self.physics == "exact" and self.arena != OPEN:
             raise ValueError(
                 f"exact physics knows no collisions, and arena {self.arena} has obstacles; choose "
                 "physics contact, or arena open"
             )
-        if self.collide and self.physics == "exact":
+        if self.physics == "exact" and self.collide:
             raise ValueError(
                 "exact physics knows no collisions, so robots cannot collide in it; choose physics "
                 "contact, or let them pass through each other"
@@ -267,33 +236,47 @@ class Mission:
         return self.velocity_ratio * MISSION_DISTANCE_M / MISSION_DURATION_S
 
     @property
-    def beyond_free_space(self) -> str:
-        """What the channel has that the paper's has not, in words; empty if it is free space."""
-        usual = {spec.name: spec.default for spec in fields(self)}
-        parts = {  # each with the fields that it takes, the one that switches it on first
-            "path_loss": ("loss_exponent", "reference_m")
-            if self.path_loss == "log-distance"
-            else ("antenna_height_m",),
-            "shadowing_db": ("shadowing_distance_m",),
-            "fading": ("rician_k",) if self.fading == "rician" else (),
-            "erasure": (),
-            "burst_begin": ("burst_end",),
-            "num_high_power": ("high_power_db",),
-        }
-        on = [name for name in parts if getattr(self, name) not in (usual.get(name), 0)]
-        named = [name for part in on for name in (part, *parts[part])]
-        return ", ".join(f"{name} {as_typed(getattr(self, name))}" for name in named)
-
-    def grants(self, what: Grant) -> bool:
-        """Whether robots are told this beforehand."""
-        return what in self.prior_knowledge.split(",")
-
-    @property
-    def num_high_power(self) -> int:
-        """How many robots transmit with more power: the first ones, to the nearest."""
-        return round(self.high_power_fraction * self.num_robots) if self.high_power_db > 0.0 else 0
-
-    @property
     def has_walls(self) -> bool:
         """Whether robots are reflected at the boundary of the area."""
         return self.boundary == "reflect"
+
+    @property
+    def num_failures(self) -> int:
+        """Number of robots that fail: to the nearest, at least 1, but at least 2 survive."""
+        if self.failure_fraction == 0.0:
+            return 0
+        nearest = max(1, round(self.failure_fraction * self.num_robots))
+        return min(nearest, self.num_robots - MIN_SURVIVORS)
+
+    @property
+    def failure_window(self) -> int:
+        """The window at whose start they fail, counted from 0 [windows]."""
+        return self.num_windows // 2
+
+    @property
+    def num_high_power(self) -> int:
+        """Number of robots with more transmit power: the first ones, to the nearest."""
+        if self.high_power_db == 0.0:
+            return 0
+        return round(self.high_power_fraction * self.num_robots)
+
+    def grants(self, what: str) -> bool:
+        """Return whether robots know this before the mission."""
+        return what in self.prior_knowledge.split(",")
+
+    @property
+    def beyond_free_space(self) -> str:
+        """The channel's differences from the paper's, in words; empty for free space."""
+        default = {spec.name: spec.default for spec in fields(self)} | {"num_high_power": 0}
+        laws = {"log-distance": ["loss_exponent", "reference_m"], "two-ray": ["antenna_height_m"]}
+        numbers = {  # of each effect, by the field that switches it on
+            "path_loss": laws.get(self.path_loss, []),
+            "shadowing_db": ["shadowing_distance_m"],
+            "fading": ["rician_k"] if self.fading == "rician" else [],
+            "erasure": [],
+            "burst_begin": ["burst_end"],
+            "num_high_power": ["high_power_db"],
+        }
+        on = [name for name in numbers if getattr(self, name) != default[name]]
+        named = [name for effect in on for name in (effect, *numbers[effect])]
+        return ", ".join(f"{name} {as_typed(getattr(self, name))}" for name in named)

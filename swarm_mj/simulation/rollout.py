@@ -23,10 +23,10 @@ class WindowRecord:
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
-    """What B missions cost over the windows flown; packets are totals.
+    """Costs of B missions over the windows flown; packets are totals.
 
-    Packets of policies that address are delivered or lost, broadcasts are heard or not; what does
-    not apply is nan.
+    Packets of policies that address are delivered or lost, broadcasts are heard or not; counts of
+    the other kind are nan.
     """
 
     num_windows: int
@@ -53,14 +53,10 @@ class Summary:
 
 
 def rollout(swarm: Swarm, policy: Policy) -> Iterator[WindowRecord]:
-    """Flies the mission, one window at a time, for the caller to watch, record or break off.
-
-    Args:
-        swarm: At the start of its missions.
-        policy: Who addresses whom.
+    """Fly the missions, one window at a time, for the caller to watch, record or break off.
 
     Yields:
-        What each window cost; the swarm stands at the end of that window.
+        The costs of each window; the swarm stands at the end of that window.
 
     Raises:
         ValueError: The swarm has flown already.
@@ -71,7 +67,7 @@ def rollout(swarm: Swarm, policy: Policy) -> Iterator[WindowRecord]:
         raise ValueError(f"the swarm has flown {swarm.now[0]:g} windows already; restart it first")
     swarm.start(policy)
     for _ in range(swarm.mission.num_windows):
-        costs = swarm.step(policy)
+        costs = swarm.step()
         yield WindowRecord(costs=costs, hops=mean_hops(swarm.buffers, swarm.states.is_active))
 
 
@@ -80,9 +76,6 @@ def summarise(flown: Iterable[WindowRecord]) -> Summary:
 
     Args:
         flown: One or more windows, in order; `rollout` itself will do.
-
-    Returns:
-        Means and totals, per mission.
 
     Raises:
         ValueError: No window was flown.
@@ -114,7 +107,7 @@ def summarise(flown: Iterable[WindowRecord]) -> Summary:
 
 
 def _task_costs(windows: Sequence[TaskCost | None]) -> dict[str, Any]:
-    """What the task cost over windows; nothing if it has no cost."""
+    """Return the task's costs over windows; nothing if it has none."""
     costs = [cost for cost in windows if cost is not None]
     if not costs:
         return {}
@@ -128,5 +121,6 @@ def _task_costs(windows: Sequence[TaskCost | None]) -> dict[str, Any]:
 
 
 def _mean(windows: Sequence[Float[np.ndarray, "B"]]) -> Float[np.ndarray, "B"]:
-    """Over windows, each mission's in one row: NumPy adds rows alike, however many there are."""
+    """Return each mission's mean over windows."""
+    # Contiguous rows, as NumPy adds those in an order that does not depend on their number.
     return np.mean(np.ascontiguousarray(np.stack(windows, axis=1)), axis=1)

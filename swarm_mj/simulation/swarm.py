@@ -13,8 +13,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.mission.components import Components, is_ours
 from swarm_mj.mission.geometry import overlaps_earlier
-from swarm_mj.mission.placement import connected_positions
-from swarm_mj.mission.robot_failures import draw_survivors, failure_window
+from swarm_mj.mission.placement import connected_positions, draw_survivors
 from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
 from swarm_mj.physics.worlds import Physics
@@ -44,7 +43,7 @@ MAX_SEED = 2**63 - 1  # the largest that a replay's properties keep
 class Swarm:
     """B missions that differ in their seed only.
 
-    A mission's course depends on its own seed, not on the missions beside it.
+    A mission's course depends on its own seed, not on the missions next to it.
     """
 
     def __init__(
@@ -57,7 +56,7 @@ class Swarm:
         scene: str | Scene | None = None,
         num_threads: int = 1,
     ) -> None:
-        """Places the robots and starts all missions.
+        """Place the robots and start all missions.
 
         Args:
             mission: The numbers of every mission.
@@ -65,8 +64,7 @@ class Swarm:
             channel: Who decodes whom, as an object or `module:Name`, like the next two; the
                 mission's own unless given.
             controller: What drives the robots; that of the mission's task unless given.
-            scene: What changes the arena before it is compiled; nothing unless given. All missions
-                stand in the same arena.
+            scene: Adds obstacles to the arena, which all missions share; none unless given.
             num_threads: MuJoCo's own.
 
         Raises:
@@ -81,18 +79,20 @@ class Swarm:
             limits = f"from 1 to {MAX_THREADS}"
             raise ValueError(f"num_threads must be a whole number {limits}, not {num_threads!r}")
         self.mission = mission
-        self.controller = controller_of(mission) if own.controller is None else own.controller
-        self._costed = costed(self.controller)
         self.scene = own.scene
         self._physics = Physics(mission, len(seeds), scene=own.scene, num_threads=num_threads)
         self._obstacles = self._physics.obstacles
         radio = mission_radio(mission, self._obstacles, own.channel)
         self.channel, self.belief, self._truth = radio
+        self.controller: Controller = (
+            controller_of(mission) if own.controller is None else own.controller
+        )
+        self._costed = costed(self.controller)
         self._num_missions = len(seeds)
         self.restart(seeds)
 
     def restart(self, seeds: Sequence[int]) -> None:
-        """Start all missions anew.
+        """Start all missions anew; a policy must then be started, too.
 
         Args:
             seeds: One per mission, as many as before.
@@ -102,16 +102,16 @@ class Swarm:
         """
         _check_seeds(seeds, self._num_missions)
         streams = zip(*(_streams(seed) for seed in seeds), strict=True)
-        placement, motion, policy, outage, channel = streams
+        placement, motion, self._policy_rngs, failures, channel = streams
         mission = self.mission
-        for part, rngs in ((self.controller, motion), (self.channel, channel)):
-            if isinstance(part, Started):
-                part.start(mission.num_robots, rngs)
+        # Before the robots are placed, as a channel is asked which teams it connects.
+        for component, rngs in ((self.controller, motion), (self.channel, channel)):
+            if isinstance(component, Started):
+                component.start(mission.num_robots, rngs)
         position_m = [self._place(b, rng) for b, rng in enumerate(placement)]
         velocity_mps = [initial_velocity(mission, rng) for rng in placement]
         self._physics.place(np.stack(position_m), np.stack(velocity_mps))
-        self._policy_rngs = policy
-        self._survivors = draw_survivors(mission, outage)
+        self._survivors = draw_survivors(mission, failures)
         self.now = np.zeros(len(seeds))  # t [windows]
         room = fitting(packet_of(mission), mission, "T, M and P").num_entries
         self.buffers: Buffers = with_room(empty_buffers(len(seeds), mission.num_robots), room)
@@ -120,25 +120,25 @@ class Swarm:
             grant_start(self.buffers, self.states)
         self.phases: tuple[Phase, ...] = ()
         self._read_only = self.buffers.read_only()
-        self._started: Policy | None = None
+        self._policy: CentralisedPolicy | DecentralisedPolicy | None = None
 
     def _place(self, b: int, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
-        """Where mission b's robots begin: connected in its own channel, if that can be asked."""
+        """Draw where mission b's robots begin, connected under their channel where it can say."""
         mission, channel = self.mission, self.channel
-        asks = isinstance(channel, ComposedChannel)
-        stands = len(self._obstacles.kind) > 0
+        has_obstacles = len(self._obstacles.kind) > 0
+        is_asked = isinstance(channel, ComposedChannel)
         return connected_positions(
             mission.num_robots,
             mission.half_side_m,
             mission.range_m,
             rng,
-            partial(channel.largest_part, mission=b) if asks else None,
-            self._is_blocked if stands or mission.collide else None,
-            keeps_largest=stands,
+            partial(channel.largest_part, mission=b) if is_asked else None,
+            self._is_blocked if has_obstacles or mission.collide else None,
+            keeps_largest=has_obstacles,
         )
 
     def _is_blocked(self, position_m: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
-        """Which robots would touch an obstacle there, or another robot if they collide."""
+        """Return which robots would touch an obstacle there, or another robot if they collide."""
         is_blocked = blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, self._obstacles)
         if self.mission.collide:
             is_blocked |= overlaps_earlier(position_m, 2.0 * ROBOT_RADIUS_M)
@@ -151,66 +151,68 @@ class Swarm:
 
     @property
     def views(self) -> LocalViews:
-        """What every robot knows."""
+        """The robots' own views: all that they know."""
         return LocalViews(buffers=self._read_only, now=self.now, phases=self.phases)
 
+    @property
+    def policy(self) -> CentralisedPolicy | DecentralisedPolicy:
+        """The policy that flies; raises ValueError before one was started."""
+        if self._policy is None:
+            raise ValueError("no policy flies yet; start one: swarm.start(policy)")
+        return self._policy
+
     def start(self, policy: Policy) -> None:
-        """Tells a policy what it may know, gives it random streams and lets it forget all else.
+        """Fly a policy from now on, with new random streams and all else forgotten.
 
         Raises:
-            TypeError: It is no policy.
+            ValueError: Its packets never fit into a slot.
+            TypeError: It is no policy, or neither decentralised nor centralised.
         """
         check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
         room = policy.packet(self.mission).num_entries
+        # A policy's type says what it may know: a centre the truth, robots what they believe.
         if isinstance(policy, CentralisedPolicy):
             policy.inform(self._truth)
         elif isinstance(policy, DecentralisedPolicy):
             policy.inform(self.belief)
+        else:
+            raise TypeError("a policy must be a DecentralisedPolicy or a CentralisedPolicy")
         policy.start(self.mission.num_robots, self._policy_rngs)
         self.buffers = with_room(self.buffers, room)
-        self._started = policy
+        self._policy = policy
 
-    def decide(self, policy: Policy) -> Int[np.ndarray, "B N"]:
-        """Whom each robot addresses next, from no more than the policy's type allows it to know.
-
-        A policy that is new to these missions is started first.
-
-        Raises:
-            TypeError: The policy is neither decentralised nor centralised.
-        """
-        if policy is not self._started:
-            self.start(policy)
+    def decide(self) -> Int[np.ndarray, "B N"]:
+        """Return whom each robot addresses next, by the policy that was started."""
+        policy = self.policy
         views = self.views if is_ours(policy) else self.views.copy()
         if isinstance(policy, CentralisedPolicy):
             return policy.recipients(views, self._states_for(policy))
-        if isinstance(policy, DecentralisedPolicy):
-            return policy.recipients(views)
-        raise TypeError("a policy must be a DecentralisedPolicy or a CentralisedPolicy")
+        return policy.recipients(views)
 
     def move(self) -> RobotStates:
         """Move the robots through one window, by their controller and the physics."""
         wanted_mps2 = self.controller(self._read_only, self._states_for(self.controller))
         return self._physics.step(np.asarray(wanted_mps2, dtype=np.float64))
 
-    def step(self, policy: Policy) -> WindowCosts:
-        """One window: the policy decides, the robots move, then they talk.
+    def step(self, policy: Policy | None = None) -> WindowCosts:
+        """Fly one window: the policy decides, the robots move, then they talk.
+
+        Args:
+            policy: Is started if it is new to these missions; None is the one that was started.
 
         Raises:
+            ValueError: No policy was started.
             TypeError: It is no policy.
         """
-        check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
-        if policy is not self._started:
+        if policy is not None and policy is not self._policy:
             self.start(policy)
-        return self._play(policy.window(self.mission), lambda: self.decide(policy))
+        return self._play(self.policy.window(self.mission), self.decide)
 
-    def exchange(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
-        """One window of Alg. 1 with these recipients, after the robots have moved.
+    def step_with_recipients(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
+        """Fly one window of Alg. 1 with these recipients.
 
         Args:
             recipient: Whom each robot addresses; itself is silence.
-
-        Returns:
-            What the window cost.
 
         Raises:
             ValueError: A recipient is no robot, or there is not one per robot; nothing has moved.
@@ -218,17 +220,27 @@ class Swarm:
         request_response = RequestResponse(silence_is_attempt=self.mission.silence_is_attempt)
         return self._play(request_response, lambda: recipient)
 
-    def _states_for(self, part: object) -> RobotStates:
-        """Where the robots truly are; a user's own part gets copies, so it can move nothing."""
-        return self.states if is_ours(part) else self.states.copy()
+    def _states_for(self, component: object) -> RobotStates:
+        """Return the true states; a user's own component gets copies, so it can move nothing."""
+        return self.states if is_ours(component) else self.states.copy()
 
     def _play(
         self, window: WindowProtocol, decide: Callable[[], Int[np.ndarray, "B N"]]
     ) -> WindowCosts:
-        """One window of this protocol."""
+        """Fly one window of this protocol."""
         start = self.now
-        decide_after = partial(self._decide_after, start, decide, window.is_broadcast)
-        self._fail()
+
+        def decide_after(phases: tuple[Phase, ...]) -> Int[np.ndarray, "B N"]:
+            if phases:  # a later slot is decided by its own clock, and knows the earlier one
+                self.phases, self.now = phases, start + len(phases) * SLOT_WINDOWS
+            recipient = np.asarray(decide())
+            shape = self.buffers.shape
+            check_robots("recipient", recipient, shape, may_broadcast=window.is_broadcast)
+            return recipient
+
+        survivors, is_due = self._survivors, start[0] >= self.mission.failure_window
+        if survivors is not None and is_due and self.states.is_active is None:
+            self._physics.deactivate(survivors)
         self.phases = window(self.buffers, decide_after, self.move, self.channel, start)
         self.now = start + 1.0
         return window_costs(
@@ -241,7 +253,7 @@ class Swarm:
         )
 
     def _task_cost(self) -> TaskCost | None:
-        """What the task costs now, if the controller says so."""
+        """Return what the task costs now, where the controller has a cost."""
         controller = self._costed
         if controller is None:
             return None
@@ -252,26 +264,6 @@ class Swarm:
                 f"for each mission, not {np.array2string(value, threshold=8)}"
             )
         return TaskCost(name=controller.cost_name, unit=controller.cost_unit, value=value)
-
-    def _decide_after(
-        self,
-        start: Float[np.ndarray, "B"],
-        decide: Callable[[], Int[np.ndarray, "B N"]],
-        may_broadcast: bool,
-        phases: tuple[Phase, ...],
-    ) -> Int[np.ndarray, "B N"]:
-        """Whom each robot addresses, after these phases of the window that began at `start`."""
-        if phases:
-            self.phases, self.now = phases, start + len(phases) * SLOT_WINDOWS
-        recipient = np.asarray(decide())
-        check_robots("recipient", recipient, self.buffers.shape, may_broadcast=may_broadcast)
-        return recipient
-
-    def _fail(self) -> None:
-        """Half-way through the mission, the robots that are to fail do."""
-        is_half_way = self.now[0] >= failure_window(self.mission)
-        if is_half_way and self._survivors is not None and self.states.is_active is None:
-            self._physics.deactivate(self._survivors)
 
 
 def _check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
@@ -285,8 +277,9 @@ def _check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
 
 
 def _streams(seed: int) -> list[np.random.Generator]:
-    """Placement, motion, policy, outages and channel draw apart, so policies meet equal missions.
+    """Return a stream each for placement, motion, policy, failures and channel.
 
-    Only add to the end: a stream's place is what it draws from.
+    Apart, so that all policies meet equal missions. Only add to the end: a stream's place is what
+    it draws from.
     """
     return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(5)]

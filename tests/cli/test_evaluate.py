@@ -233,7 +233,7 @@ def test_one_mission_of_one_window_has_results(swarm_mj, tmp_path):
         (["--robots", "10", "1"], "a whole number from 2 to 1000 [robots], not 1"),
         (
             ["--failure-fraction", "0.95"],
-            "robots that fail must be a number from 0 to 0.9 [of the team], not 0.95",
+            "failure fraction must be a number from 0 to 0.9 [of the team], not 0.95",
         ),
         (
             ["--preset", "mine"],

@@ -125,7 +125,7 @@ def test_contact_physics_flies(swarm_mj, tmp_path, boundary):
         (["--velocity-ratio", "-0.15"], "not -0.15"),
         (
             ["--failure-fraction", "1"],
-            "robots that fail must be a number from 0 to 0.9 [of the team], not 1",
+            "failure fraction must be a number from 0 to 0.9 [of the team], not 1",
         ),
         (["--failure-fraction", "-0.1"], "not -0.1"),
         (

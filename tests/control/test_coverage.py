@@ -90,7 +90,7 @@ def costs_along(tells_the_truth):
     for _ in range(300):
         if tells_the_truth:
             tell_everyone_the_truth(swarm)
-        costs.append(swarm.exchange(silence(swarm)).task_cost.value)
+        costs.append(swarm.step_with_recipients(silence(swarm)).task_cost.value)
     return np.array(costs)
 
 

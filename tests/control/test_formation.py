@@ -84,7 +84,7 @@ def errors_along(tells_the_truth, shift_m=0.0, num_windows=600):
     for _ in range(num_windows):
         if tells_the_truth:
             tell_everyone_the_truth(swarm)
-        errors.append(swarm.exchange(swarm.views.silence.copy()).task_cost.value)
+        errors.append(swarm.step_with_recipients(swarm.views.silence.copy()).task_cost.value)
     return np.array(errors)
 
 

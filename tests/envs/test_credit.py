@@ -56,7 +56,7 @@ def test_credits_are_those_of_a_replay_without_each_robot(seed, preset, task, sh
     for _ in range(rng.integers(1, 12)):
         buffers, now = copy.deepcopy(swarm.buffers), swarm.now
         recipient = random_recipients(rng, shape, share)
-        swarm.exchange(recipient)
+        swarm.step_with_recipients(recipient)
     found = credits_of(buffers.timestamp, swarm.states.position_m, recipient, swarm.channel, now)
     expected = credits_by_replay(swarm, buffers, recipient, now)
     np.testing.assert_allclose(found, expected, atol=1e-9)
@@ -71,7 +71,7 @@ def test_a_window_replayed_for_credit_meets_the_same_fades_and_losses():
     for _ in range(12):
         buffers, now = copy.deepcopy(swarm.buffers), swarm.now
         recipient = random_recipients(rng, (2, 8), 0.3)
-        swarm.exchange(recipient)
+        swarm.step_with_recipients(recipient)
         position_m = swarm.states.position_m
         found = credits_of(buffers.timestamp, position_m, recipient, swarm.channel, now)
         expected = credits_by_replay(swarm, buffers, recipient, now)
@@ -119,7 +119,7 @@ def test_missions_side_by_side_do_not_mix():
     for _ in range(6):
         before, now = swarm.buffers.timestamp.copy(), swarm.now
         recipient = random_recipients(rng, (3, 6), 0.4)
-        swarm.exchange(recipient)
+        swarm.step_with_recipients(recipient)
     position_m = swarm.states.position_m
     together = credits_of(before, position_m, recipient, swarm.channel, now)
     for b in range(3):
@@ -166,7 +166,7 @@ def test_a_channel_that_draws_replays_a_window_with_its_own_numbers():
             snapshot_channel(swarm.channel),
         )
         recipient = random_recipients(rng, (3, 6), 0.4)
-        swarm.exchange(recipient)
+        swarm.step_with_recipients(recipient)
         found = credits_of(buffers.timestamp, swarm.states.position_m, recipient, before, now)
         replays = SimpleNamespace(states=swarm.states, channel=None)
         total = {}
@@ -193,7 +193,7 @@ def test_credits_are_those_of_a_replay_without_each_robot_also_after_robots_have
     for _ in range(16):
         buffers, now = copy.deepcopy(swarm.buffers), swarm.now
         recipient = random_recipients(rng, (2, 8), 0.3)
-        swarm.exchange(recipient)
+        swarm.step_with_recipients(recipient)
         states = swarm.states
         if states.is_active is None:
             continue

@@ -46,7 +46,7 @@ def test_equals_the_swarm_flown_by_hand(task, physics):
     assert (step.reward, step.discount) == (None, None)
     num_parents = 0
     for recipient in random_recipients(30):
-        costs = swarm.exchange(recipient[None])
+        costs = swarm.step_with_recipients(recipient[None])
         step = environment.step(recipient)
         for name in BUFFERS:
             np.testing.assert_array_equal(step.observation[name], getattr(swarm.buffers, name)[0])
@@ -134,7 +134,7 @@ def test_every_episode_has_the_next_seed():
                 np.testing.assert_array_equal(
                     step.observation["position_m"], swarm.buffers.position_m[0]
                 )
-            swarm.exchange(recipient[None])
+            swarm.step_with_recipients(recipient[None])
             steps = [environment.step(recipient), twin.step(recipient)]
 
 

@@ -49,7 +49,7 @@ def test_info_is_what_the_window_cost():
     assert not any(start.values())  # no age, no packets
     for recipient in np.random.default_rng(1).integers(0, 5, (8, 5)):
         *_, info = env.step(recipient)
-        costs = swarm.exchange(recipient[None])
+        costs = swarm.step_with_recipients(recipient[None])
         assert info == {
             "seed": 4,
             "age_windows": costs.age_windows[0],

@@ -54,7 +54,7 @@ def test_task_cost_is_what_the_controller_says(task):
     start = batch.infos()["task_cost"]
     np.testing.assert_array_equal(start, swarm.controller.cost(swarm.states))
     for recipient in recipients(5):
-        reward, costs = batch.step(recipient), swarm.exchange(recipient)
+        reward, costs = batch.step(recipient), swarm.step_with_recipients(recipient)
         np.testing.assert_array_equal(reward, np.tile(-costs.task_cost.value[:, None], 5))
         np.testing.assert_array_equal(batch.infos()["task_cost"], costs.task_cost.value)
     assert not np.array_equal(batch.infos()["task_cost"], start)
@@ -71,10 +71,12 @@ def test_credit_is_the_age_that_a_window_without_the_robot_would_have_left():
         for i in range(5):
             twin = Swarm(batch.mission, [3])
             for each in past:
-                twin.exchange(each)
+                twin.step_with_recipients(each)
             silent = recipient.copy()
             silent[0, i] = i
-            assert reward[0, i] == pytest.approx(twin.exchange(silent).age_windows[0] - ages)
+            assert reward[0, i] == pytest.approx(
+                twin.step_with_recipients(silent).age_windows[0] - ages
+            )
         past.append(recipient)
 
 

@@ -145,7 +145,7 @@ def test_every_face_flies_the_same_missions(face, numbers):
     shape = (NUM_WINDOWS, 2, NUM_ROBOTS)
     for recipient in np.random.default_rng(2).integers(0, NUM_ROBOTS, shape):
         reward = flown.step(recipient)
-        costs = swarm.exchange(recipient)
+        costs = swarm.step_with_recipients(recipient)
         exact = np.float32 if isinstance(flown, Sb3Robots) else np.float64
         np.testing.assert_array_equal(reward, -costs.age_windows.astype(exact))
         for b, (other, row) in enumerate(flown.swarms()):

@@ -46,7 +46,7 @@ def test_robots_that_fail_drop_out():
     for window in range(12):
         before = list(env.agents)
         seen, rewards, ended, cut, infos = env.step({agent: 0 for agent in env.agents})
-        swarm.exchange(np.zeros((1, 6), dtype=int))
+        swarm.step_with_recipients(np.zeros((1, 6), dtype=int))
         for answer in (seen, rewards, ended, cut, infos):
             assert list(answer) == before
         fails = [agent for agent in before if ended[agent]]

@@ -32,7 +32,7 @@ def pictures():
     with SceneRenderer(MISSION, WIDTH, HEIGHT) as renderer:
         drawn = [[renderer.frame(contents_of(swarm, b)) for b in (0, 1)]]
         for recipient in recipients(5):
-            swarm.exchange(recipient)
+            swarm.step_with_recipients(recipient)
             drawn.append([renderer.frame(contents_of(swarm, b)) for b in (0, 1)])
     return drawn
 

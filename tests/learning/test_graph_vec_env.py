@@ -142,7 +142,7 @@ def test_a_robots_reward_is_its_credit_per_pair():
         def known(last_recipient, batch=batch, history=history):
             swarm = Swarm(batch.mission, history.seeds)
             for each in [*history.recipients, last_recipient]:
-                swarm.exchange(each.astype(int))
+                swarm.step_with_recipients(each.astype(int))
             return swarm.buffers.timestamp.sum(axis=(1, 2))
 
         without = [np.where(np.arange(size) == i, i, recipient) for i in range(size)]

@@ -7,7 +7,14 @@ import textwrap
 import pytest
 
 from swarm_mj.mission import paper
-from swarm_mj.mission.components import Components, digest, load, make, one_line_each
+from swarm_mj.mission.components import (
+    Components,
+    digest,
+    is_ours,
+    load,
+    make,
+    one_line_each,
+)
 
 MISSION = paper(num_robots=3)
 PARTS = '''
@@ -212,3 +219,10 @@ def test_a_partial_class_is_made_and_a_partial_function_of_two_arguments_is_the_
 def test_other_forms_that_one_would_try_are_told_the_right_one(name, way_out):
     with pytest.raises(ValueError, match=way_out):
         load("channel", name)
+
+
+def test_only_the_packages_own_components_get_live_arrays(parts):  # noqa: ARG001
+    from swarm_mj.policies.tdma import Tdma
+
+    assert is_ours(Tdma())
+    assert not is_ours(load("channel", "own_parts:plain"))

@@ -227,7 +227,7 @@ def test_what_is_known_has_one_order(given, kept):
         ("mapp", "not 'mapp'; did you mean map?"),
         ("map,", "or several joined by commas, not ''"),
         ("map statistics", "not 'map statistics'"),
-        ("map,nothing", "nothing or some of map, statistics, start, not map,nothing"),
+        ("map,nothing", "nothing or some of map, statistics, start, not nothing,map"),
         (3, "not 3"),
     ],
 )

@@ -58,9 +58,10 @@ def test_logits_are_those_of_the_network_written_out(hidden, activation, obeys_m
 
 def recipients(policy, seeds, num_windows=20):
     swarm, chosen = Swarm(MISSION, seeds), []
+    swarm.start(policy)
     for _ in range(num_windows):
-        chosen.append(swarm.decide(policy))
-        swarm.exchange(chosen[-1])
+        chosen.append(swarm.decide())
+        swarm.step_with_recipients(chosen[-1])
     return np.stack(chosen, axis=1)
 
 
@@ -71,7 +72,8 @@ def test_missions_beside_it_change_nothing():
 
 def test_masks_are_obeyed_and_draws_follow_the_logits():
     policy, swarm = policy_of(shape_of()), Swarm(MISSION, range(200))
-    chosen = swarm.decide(policy)
+    swarm.start(policy)
+    chosen = swarm.decide()
     graphs = make_extractor("extended", MISSION)
     graphs.start(200, 4)
     seen = graphs.graphs(swarm.views)
@@ -80,8 +82,8 @@ def test_masks_are_obeyed_and_draws_follow_the_logits():
     expected = (odds / odds.sum(axis=2, keepdims=True)).mean(axis=0)
     found = np.stack([(chosen == k).mean(axis=0) for k in range(4)], axis=1)
     np.testing.assert_allclose(found, expected, atol=0.12)  # 3 standard errors of a half
-    best = swarm.decide(policy_of(shape_of(), is_deterministic=True))
-    np.testing.assert_array_equal(best, logits.argmax(axis=2))
+    swarm.start(policy_of(shape_of(), is_deterministic=True))
+    np.testing.assert_array_equal(swarm.decide(), logits.argmax(axis=2))
 
 
 def test_a_digest_tells_networks_apart():

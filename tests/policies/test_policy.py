@@ -105,7 +105,7 @@ def test_eq9_a_decentralised_policy_is_not_told_the_truth(name):
         swarm = Swarm(MISSION, [1, 2])
         swarm._physics.place(scale * swarm.states.position_m, scale * swarm.states.velocity_mps)
         swarm.start(policy)
-        decisions.append(swarm.decide(policy))
+        decisions.append(swarm.decide())
     np.testing.assert_array_equal(*decisions)
 
 

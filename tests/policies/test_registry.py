@@ -186,10 +186,10 @@ def test_probability_reaches_the_policy(name):
     for probability in (0.0, 1.0):
         swarm = Swarm(MISSION, [1])
         policy = make_policy(name, MISSION, probability)
-        swarm.exchange(swarm.views.silence)
+        swarm.step_with_recipients(swarm.views.silence)
         swarm.buffers.timestamp[:] = 1.0
         swarm.start(policy)
-        num_sending.append(np.sum(swarm.decide(policy) != swarm.views.silence))
+        num_sending.append(np.sum(swarm.decide() != swarm.views.silence))
     assert num_sending[0] == 0
     assert num_sending[1] >= 5
 
@@ -207,12 +207,13 @@ def test_iv_c_tree_is_the_presets(mission, is_recomputed, root_transmits):
     named = make_policy("mst", mission, 1.0)
     by_hand = MinimumSpanningTree(1.0, is_recomputed=is_recomputed, root_transmits=root_transmits)
     for seed in range(5):
-        swarm = Swarm(mission, [seed])
-        for policy in (named, by_hand):
-            policy.start(8, [np.random.default_rng(9)])
+        swarms = Swarm(mission, [seed]), Swarm(mission, [seed])
+        for swarm, policy in zip(swarms, (named, by_hand), strict=True):
+            swarm.start(policy)
         for _ in range(2):
-            np.testing.assert_array_equal(swarm.decide(named), swarm.decide(by_hand))
-            swarm._physics.place(swarm.states.position_m[:, ::-1], swarm.states.velocity_mps)
+            np.testing.assert_array_equal(*(swarm.decide() for swarm in swarms))
+            for swarm in swarms:
+                swarm._physics.place(swarm.states.position_m[:, ::-1], swarm.states.velocity_mps)
 
 
 def test_unknown_policy_is_a_clear_error():

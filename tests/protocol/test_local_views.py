@@ -31,7 +31,7 @@ def test_silence_cannot_be_written():
 def test_a_swarms_view_changes_with_the_next_window_and_not_by_hand():
     swarm = Swarm(paper("stationary", num_robots=3), [1])
     views = swarm.views
-    swarm.exchange(views.silence)
+    swarm.step_with_recipients(views.silence)
     np.testing.assert_array_equal(np.diagonal(views.buffers.timestamp[0]), [1.0, 1.0, 1.0])
     with pytest.raises(ValueError, match="read-only"):
         views.buffers.timestamp[0, 0, 1] = 9.0

@@ -153,7 +153,7 @@ def test_a_snapshot_changes_nothing():
         swarm = Swarm(paper("random-walk", **CITY, fading="rayleigh"), [3, 4])
         rng = np.random.default_rng(0)
         for _ in range(6):
-            swarm.exchange(rng.integers(0, 14, (2, 14)))
+            swarm.step_with_recipients(rng.integers(0, 14, (2, 14)))
             heard.append([phase.heard.copy() for phase in swarm.phases])
             if is_looked_at:
                 radio_snapshot(swarm)

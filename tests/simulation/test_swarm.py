@@ -249,7 +249,7 @@ def test_exchange_is_a_window_of_a_policy_that_chose_these_recipients(preset):
     given, chosen = Swarm(mission, [1, 2]), Swarm(mission, [1, 2])
     script = Script(recipients)
     for recipient in recipients:
-        by_hand, by_policy = given.exchange(recipient), chosen.step(script)
+        by_hand, by_policy = given.step_with_recipients(recipient), chosen.step(script)
         np.testing.assert_array_equal(by_hand.age_windows, by_policy.age_windows)
         np.testing.assert_array_equal(given.phases[0].recipient, recipient)
         assert_same(vars(given.buffers).values(), vars(chosen.buffers).values())
@@ -286,7 +286,7 @@ def test_alg1_exchange_by_hand():
     swarm = Swarm(mission, [1])
     recipient = silence_of(1, 8)
     recipient[0, 0] = 1
-    costs = swarm.exchange(recipient)
+    costs = swarm.step_with_recipients(recipient)
     timestamp = np.diag(np.full(8, 1.0))
     timestamp[1:, 0] = 0.5  # everyone decoded robot 0's packet,
     timestamp[[0, *range(2, 8)], 1] = 1.0  # and robot 1's answer
@@ -316,7 +316,7 @@ def test_iv_c_flooding_by_hand():
 @pytest.mark.parametrize(("preset", "own_attempt"), [(paper, 0.0), (reference, 0.5)])
 def test_eq7_silence_is_an_attempt_in_the_reference_preset_only(preset, own_attempt):
     swarm = Swarm(small(preset=preset), [1])
-    swarm.exchange(silence_of(1, 8))
+    swarm.step_with_recipients(silence_of(1, 8))
     np.testing.assert_array_equal(swarm.buffers.last_attempt[0], np.eye(8) * own_attempt)
     swarm.step(SilentTwice())
     expected = np.eye(8) * (2.0 if own_attempt else 0.0)
@@ -331,7 +331,7 @@ def test_eq6_channel_is_exchangeable():
         return np.where(recipient[:, 5:6] != 5, 5, np.arange(8))
 
     swarm = Swarm(small(), [1, 2], channel=only_robot_5)
-    swarm.exchange(np.roll(silence_of(2, 8), 1, axis=1))
+    swarm.step_with_recipients(np.roll(silence_of(2, 8), 1, axis=1))
     assert np.all(swarm.buffers.timestamp[:, np.arange(8) != 5, 5] == 0.5)
     is_own_or_5 = np.eye(8, dtype=bool) | (np.arange(8) == 5)
     np.testing.assert_array_equal(swarm.buffers.is_known, np.stack([is_own_or_5] * 2))
@@ -371,7 +371,7 @@ def test_eq16_a_robot_does_not_react_to_one_it_has_not_heard(preset, monkeypatch
         for _ in range(NUM_WINDOWS):
             recipient = silence_of(2, 8).copy()
             recipient[:, 0] = 1
-            swarm.exchange(recipient)
+            swarm.step_with_recipients(recipient)
         ends.append(swarm.states.velocity_mps)
     assert np.all(start_mps[:, 1:7] != ends[0][:, 1:7])  # they did react to robot 0
     np.testing.assert_array_equal(ends[0][:, :7], ends[1][:, :7])

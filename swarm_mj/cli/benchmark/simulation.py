@@ -68,12 +68,12 @@ def simulation_rows(
     swarm = Swarm(MISSION, range(num_missions), num_threads=num_threads)
     policy = RoundRobin()
     swarm.start(policy)
-    recipient = swarm.decide(policy)
-    swarm.exchange(recipient)
+    recipient = swarm.decide()
+    swarm.step_with_recipients(recipient)
     request, response = swarm.phases
     phases, channel = (request, response), channel_at(swarm.channel, swarm.now)
     parts = {
-        "  the policy decides": lambda: swarm.decide(policy),
+        "  the policy decides": lambda: swarm.decide(),
         "  MuJoCo moves the robots": swarm.move,
         "  the radio delivers, buffers merge": talking(swarm, recipient),
         "  costs are measured": lambda: window_costs(

@@ -57,7 +57,8 @@ def test_an_evaluations_timing_is_consistent():
 def test_what_is_timed_leaves_no_entries_from_the_future():
     """Parents of known robots lead back to the owner, however often each part was repeated."""
     swarm, policy = Swarm(paper("random-walk", num_robots=12), [0, 1]), RoundRobin()
-    talk = talking(swarm, swarm.decide(policy))
+    swarm.start(policy)
+    talk = talking(swarm, swarm.decide())
     for _ in range(60):
         swarm.step(policy)
     for _ in range(20):

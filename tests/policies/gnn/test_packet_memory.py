@@ -73,7 +73,7 @@ def test_alg1_memory_is_what_was_sent_and_decoded(make, task):
     diaries = [[Diary(NUM_ROBOTS) for _ in range(NUM_ROBOTS)] for _ in SEEDS]
     remember(memory, wire.swarm.views)
     for now, recipient in enumerate(random_recipients(seed=0)):
-        wire.swarm.exchange(recipient)
+        wire.swarm.step_with_recipients(recipient)
         remember(memory, wire.swarm.views)
         read_packets(diaries, wire.packets[-2:], float(now))
         for name in ARRAYS:

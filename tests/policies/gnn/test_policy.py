@@ -51,8 +51,8 @@ def decisions(policy, seeds, mission=MISSION):
     swarm, decided, num_heard = Swarm(mission, seeds), [], 0
     swarm.start(policy)
     for _ in range(mission.num_windows):
-        decided.append(swarm.decide(policy))
-        num_heard += np.sum(swarm.exchange(decided[-1]).packets.delivered)
+        decided.append(swarm.decide())
+        num_heard += np.sum(swarm.step_with_recipients(decided[-1]).packets.delivered)
     assert num_heard > 0
     return np.array(decided)
 
@@ -81,7 +81,7 @@ def test_robots_draw_from_the_networks_logits(features, outputs):
         expected = sample(logits, dice[:, window].ravel()).reshape(2, 7)
         recipient = policy.recipients(swarm.views)
         np.testing.assert_array_equal(recipient, expected)
-        swarm.exchange(recipient)
+        swarm.step_with_recipients(recipient)
 
 
 @pytest.mark.parametrize("features", FEATURES)
@@ -97,7 +97,9 @@ def test_the_mode_is_taken_on_request(features):
         recipient = policy.recipients(swarm.views)
         chosen = logits[np.arange(14), recipient.ravel()]
         np.testing.assert_allclose(chosen, logits.max(axis=1), atol=1e-5)
-        swarm.exchange(np.where(rng.random((2, 7)) < 0.2, rng.integers(0, 7, (2, 7)), range(7)))
+        swarm.step_with_recipients(
+            np.where(rng.random((2, 7)) < 0.2, rng.integers(0, 7, (2, 7)), range(7))
+        )
 
 
 @pytest.mark.parametrize("features", FEATURES)
@@ -195,11 +197,11 @@ def test_the_network_is_live():
     policy = learned("paper")
     swarm = Swarm(MISSION, [1])
     swarm.start(policy)
-    assert np.any(swarm.decide(policy) != swarm.views.silence)
+    assert np.any(swarm.decide() != swarm.views.silence)
     with torch.no_grad():
         policy._network.output.weight.zero_()
     policy._silence_logit = 100.0
-    np.testing.assert_array_equal(swarm.decide(policy), swarm.views.silence)
+    np.testing.assert_array_equal(swarm.decide(), swarm.views.silence)
 
 
 def test_threads_and_gradients_are_left_as_they_were():

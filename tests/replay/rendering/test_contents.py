@@ -30,7 +30,7 @@ def test_packets_are_those_of_the_last_window(swarm):
     """Robot 0 asks 1, which answers, if they decode each other; whoever else hears overhears."""
     recipient = np.tile(np.arange(8), (2, 1))
     recipient[:, 0] = 1
-    swarm.exchange(recipient)
+    swarm.step_with_recipients(recipient)
     contents = contents_of(swarm, 0)
     request, response = swarm.phases
     where = swarm.states.position_m[0]

@@ -8,7 +8,7 @@ from channels import unreliable
 
 from swarm_mj.envs.dm import make_environment
 from swarm_mj.mission import paper, reference
-from swarm_mj.mission.robot_failures import draw_survivors, failure_window, num_failures
+from swarm_mj.mission.placement import draw_survivors
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.buffers import Buffers, empty_buffers
@@ -57,7 +57,7 @@ def copies(buffers):
 )
 def test_how_many(fraction, num_robots, num_off):
     mission = paper(failure_fraction=fraction, num_robots=num_robots)
-    assert num_failures(mission) == num_off
+    assert mission.num_failures == num_off
     is_active = draw_survivors(mission, [np.random.default_rng(seed) for seed in range(5)])
     if num_off == 0:
         assert is_active is None
@@ -77,7 +77,7 @@ def test_any_robot_may_be_it_and_the_stream_says_who():
 
 @pytest.mark.parametrize(("num_windows", "first"), [(500, 250), (21, 10), (2, 1), (1, 0)])
 def test_when(num_windows, first):
-    assert failure_window(paper(num_windows=num_windows)) == first
+    assert paper(num_windows=num_windows).failure_window == first
 
 
 @pytest.mark.parametrize("seed", [0, 7, 2**62])
@@ -191,7 +191,7 @@ def test_the_reward_of_an_environment_is_of_who_is_active():
     environment.reset()
     rewards = [environment.step([1, 1, 2, 3, 4]).reward for _ in range(4)]
     swarm = Swarm(mission, [1])
-    costs = [swarm.exchange(np.array([[1, 1, 2, 3, 4]])) for _ in range(4)]
+    costs = [swarm.step_with_recipients(np.array([[1, 1, 2, 3, 4]])) for _ in range(4)]
     assert rewards == [-cost.age_windows[0] for cost in costs]
 
 
