@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from swarm_mj.replay.rendering.style import USUAL, fitted, usual_seconds
+from swarm_mj.replay.rendering.style import DEFAULTS, default_seconds, fitted
 from swarm_mj.system.packages import need
 from swarm_mj.system.progress import quiet_bar
 from swarm_mj.system.terminal import plain_console
@@ -28,7 +28,7 @@ def film(footage: "Footage", suffix: str) -> bytes:
         need(module, "a video")
     from swarm_mj.replay.rendering.video import make_video
 
-    style = fitted(replace(USUAL[suffix], seconds=usual_seconds([footage])), suffix)
+    style = fitted(replace(DEFAULTS[suffix], seconds=default_seconds([footage])), suffix)
     with quiet_bar("Drawing", style.num_frames, "pictures") as bar:
         return make_video([footage], suffix, style, bar.advance)
 

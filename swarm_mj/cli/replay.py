@@ -9,12 +9,19 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from swarm_mj.mission.components import SHOWN_AS, Components, is_own
-from swarm_mj.replay.rendering.style import LONGEST_S, USUAL, Style, fitted, usual_seconds
+from swarm_mj.replay.rendering.style import (
+    DEFAULTS,
+    LONGEST_S,
+    MAX_MISSIONS,
+    VideoStyle,
+    default_seconds,
+    fitted,
+)
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
 from swarm_mj.system.atomic import write_bytes
 from swarm_mj.system.fields import setting
-from swarm_mj.system.needs import YES
+from swarm_mj.system.needs import YES, check_fits
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
 from swarm_mj.system.progress import WorkBar
@@ -75,7 +82,7 @@ class ReplayOptions:
 
 
 def run(options: ReplayOptions) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command; return its exit code."""
     if options.video is not None:
         return _make_video(options, options.video)
     if options.size or options.seconds or options.fps or options.force or options.scene:
@@ -94,11 +101,12 @@ def run(options: ReplayOptions) -> int:
 
 
 def _make_video(options: ReplayOptions, video: Path) -> int:
-    from swarm_mj.replay.estimates import video_needs  # with all that flies
-    from swarm_mj.system.needs import check_fits
+    from swarm_mj.replay.estimates import video_needs
 
     if options.web:
         raise ValueError("--web is not allowed with --video; leave one out")
+    if len(options.file) > MAX_MISSIONS:
+        raise ValueError(f"a video shows 1 or {MAX_MISSIONS} replays, not {len(options.file)}")
     check_outputs(
         Output("video", video, SUFFIXES), inputs=options.file, must_be_new=not options.force
     )
@@ -108,13 +116,12 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
     check_fits(needs, video, "choose a smaller --size or fewer --seconds", is_forced=options.yes)
     for module in ("av", "PIL", "rerun"):
         need(module, "a video")
-    from swarm_mj.replay.rendering.video import (  # MuJoCo takes its time to import
-        make_video,
-    )
+    from swarm_mj.replay.read import read_footage
+    from swarm_mj.replay.rendering.video import make_video  # MuJoCo takes its time to import
 
     with Console(stderr=True, highlight=False).status("Reading ..."):
-        footages = _read(options)
-    style = replace(style, seconds=options.seconds or usual_seconds(footages))
+        footages = [_in_scene(read_footage(file), options.scene) for file in options.file]
+    style = replace(style, seconds=options.seconds or default_seconds(footages))
     with WorkBar("Rendering", style.num_frames, "pictures") as bar:
         content = make_video(footages, suffix, style, bar.advance)
     write_bytes(video, content)
@@ -126,26 +133,25 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
     return 0
 
 
-def _style(options: ReplayOptions, suffix: str) -> Style:
-    """What is asked for, or usual; raises ValueError for what the kind of file cannot have."""
-    usual = USUAL[suffix]
-    width, height = _size(options.size, suffix) if options.size else (usual.width, usual.height)
-    seconds, fps = options.seconds or usual.seconds, options.fps or usual.fps
-    return fitted(Style(width=width, height=height, seconds=seconds, fps=fps), suffix)
-
-
-def _read(options: ReplayOptions) -> list["Footage"]:
-    """What is to be seen."""
-    from swarm_mj.replay.read import read_footage
-    from swarm_mj.replay.rendering.movie import MOST_MISSIONS
-
-    if len(options.file) > MOST_MISSIONS:
-        raise ValueError(f"a video shows 1 or {MOST_MISSIONS} replays, not {len(options.file)}")
-    return [_in_scene(read_footage(file), options.scene) for file in options.file]
+def _style(options: ReplayOptions, suffix: str) -> VideoStyle:
+    """Return the style asked for; raise ValueError for what the kind of file cannot have."""
+    style = DEFAULTS[suffix]
+    if options.size:
+        match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", options.size)
+        width, height = (int(number) for number in match.groups()) if match else (0, 0)
+        low, high = PIXELS
+        if not (low <= width <= high and low <= height <= high):
+            allowed = f"WIDTHxHEIGHT from {low}x{low} to {high}x{high}"
+            raise ValueError(f"size must be {allowed}, not {options.size}")
+        if suffix == ".mp4" and (width % 2 or height % 2):  # H.264 halves the colours' resolution
+            raise ValueError(f"size of an MP4 must be even numbers, not {options.size}")
+        style = replace(style, width=width, height=height)
+    seconds, fps = options.seconds or style.seconds, options.fps or style.fps
+    return fitted(replace(style, seconds=seconds, fps=fps), suffix)
 
 
 def _in_scene(footage: "Footage", scene: str | None) -> "Footage":
-    """With the scene named here: the name in a file is somebody else's, and is never loaded."""
+    """Add the scene named here: the name in a file is somebody else's, and is never loaded."""
     flown_in = footage.facts.scene
     if scene is not None:
         return replace(footage, **Components(scene=scene).made(footage.facts.mission).given)
@@ -154,15 +160,3 @@ def _in_scene(footage: "Footage", scene: str | None) -> "Footage":
         told = f"The video shows the bare arena. The mission was flown in the scene {flown_in!r}"
         plain_console(is_error=True).print(told + hint)
     return footage
-
-
-def _size(text: str, suffix: str) -> tuple[int, int]:
-    """Width and height, as typed."""
-    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)
-    width, height = (int(number) for number in match.groups()) if match else (0, 0)
-    low, high = PIXELS
-    if not (low <= width <= high and low <= height <= high):
-        raise ValueError(f"size must be WIDTHxHEIGHT from {low}x{low} to {high}x{high}, not {text}")
-    if suffix == ".mp4" and (width % 2 or height % 2):
-        raise ValueError(f"size of an MP4 must be even numbers, not {text}")
-    return width, height

@@ -1,6 +1,7 @@
-"""What a video shows of a mission, window by window; a replay's file holds it."""
+"""What pictures and videos show of a mission, window by window; a replay's file holds it."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Int16, UInt8
@@ -9,7 +10,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components, components_in
 from swarm_mj.physics.scene import Scene
 from swarm_mj.replay import palette
-from swarm_mj.replay.mismatch import LinkMismatch
+from swarm_mj.replay.mismatch import LinkMismatch, coloured_lines
 from swarm_mj.replay.packets import PacketSegments, packet_segments
 from swarm_mj.replay.recorder import Log
 
@@ -63,6 +64,24 @@ class Facts:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Contents:
+    """One moment's N robots, L packets, S lines of mismatched links, and the ground shown."""
+
+    position_m: Float[np.ndarray, "N 2"]  # p [m]
+    velocity_mps: Float[np.ndarray, "N 2"]  # v; only its direction is drawn
+    colour: UInt8[np.ndarray, "N 3"]
+    observer: int  # the robot that is drawn larger
+    start_m: Float[np.ndarray, "L 2"]  # where packets begin and end [m]
+    end_m: Float[np.ndarray, "L 2"]
+    packet_colour: UInt8[np.ndarray, "L 3"]
+    lines_m: Float[np.ndarray, "S 2 2"]  # mismatched links, from start to end [m]
+    line_colour: UInt8[np.ndarray, "S 3"]
+    is_cut_off: Bool[np.ndarray, "N"]  # whether it can exchange no packets with the observer
+    centre_m: Float[np.ndarray, "2"]  # of the square [m]
+    reach_m: float  # half its side [m]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Footage:
     """T windows of N robots."""
 
@@ -78,7 +97,7 @@ class Footage:
     mismatch: LinkMismatch | None = None  # None in free space
     scene: Scene | None = None  # what changed the arena; files have its name only
 
-    @property
+    @cached_property
     def frame(self) -> Frame:
         """The part of the ground that is shown: of an open area, only where robots ever are."""
         mission = self.facts.mission
@@ -88,6 +107,36 @@ class Footage:
         low_m, high_m = (end(self.position_m, axis=(0, 1)) for end in (np.min, np.max))
         centre_m = np.tile((low_m + high_m) / 2.0, (len(self.window), 1))
         return Frame(centre_m=centre_m, reach_m=max(1.0, float(np.max(high_m - low_m)) / 2.0))
+
+    def contents(self, row: int, full_scale: float | None = None) -> Contents:
+        """Return a moment's picture: the window, from 0, by a scale of ages [windows]."""
+        position_m, age, facts = self.position_m[row], self.age[row], self.facts
+        starts, ends = [np.zeros((0, 2))], [np.zeros((0, 2))]
+        colours = [np.zeros((0, 3), dtype=np.uint8)]
+        for fate, drawn in self.segments.items():
+            first, last = np.searchsorted(drawn.row, [row, row + 1])
+            starts.append(drawn.start_m[first:last])
+            ends.append(drawn.end_m[first:last])
+            colour = np.array(palette.PACKETS[fate][0], dtype=np.uint8)
+            colours.append(np.tile(colour, (last - first, 1)))
+        lines_m, line_colour = coloured_lines(self.mismatch_at(row), position_m, facts.observer)
+        scale = facts.full_scale if full_scale is None else full_scale
+        return Contents(
+            position_m=position_m,
+            velocity_mps=self.velocity_mps[row],
+            colour=palette.robot_colours(
+                np.nan_to_num(age), scale, ~np.isnan(age), self.is_on[row], facts.observer
+            ),
+            observer=facts.observer,
+            start_m=np.concatenate(starts),
+            end_m=np.concatenate(ends),
+            packet_colour=np.concatenate(colours),
+            lines_m=lines_m,
+            line_colour=line_colour,
+            is_cut_off=self.is_cut_off[row],
+            centre_m=self.frame.centre_m[row],
+            reach_m=self.frame.reach_m,
+        )
 
     def mismatch_at(self, row: int) -> LinkMismatch | None:
         """Return the links that differ from the belief in one window, counted from 0."""
@@ -101,16 +150,12 @@ class Footage:
         links = links.chosen(links.is_too_weak & links.of_robot(own))
         return np.where(links.sender == own, links.receiver, links.sender), links.margin_db
 
-    def colours(self, full_scale: float | None = None) -> UInt8[np.ndarray, "T N 3"]:
-        """Return the robots' colours, by the replay's own scale of ages unless given [windows]."""
-        scale = self.facts.full_scale if full_scale is None else full_scale
-        is_known, age = ~np.isnan(self.age), np.nan_to_num(self.age)
-        return palette.robot_colours(age, scale, is_known, self.is_on, self.facts.observer)
 
-
-def facts_of(log: Log, mission: Mission, policy: str, seed: int, own: Components) -> Facts:
-    """Return what does not change in a recorded mission; arguments as of `footage_of`."""
-    return Facts(
+def footage_of(
+    log: Log, mission: Mission, policy: str, seed: int, own: Components = Components()
+) -> Footage:
+    """Return what a video shows of a recorded mission; `own` are the user's components."""
+    facts = Facts(
         mission=mission,
         policy=policy,
         seed=seed,
@@ -119,22 +164,8 @@ def facts_of(log: Log, mission: Mission, policy: str, seed: int, own: Components
         full_scale=palette.nice_scale(log.age),
         **own.names,
     )
-
-
-def footage_of(
-    log: Log, mission: Mission, policy: str, seed: int, own: Components = Components()
-) -> Footage:
-    """Return what a video shows of a recorded mission.
-
-    Args:
-        log: The record.
-        mission: Its numbers.
-        policy: The policy's name, for the title.
-        seed: The mission's.
-        own: The user's own components.
-    """
     return Footage(
-        facts=facts_of(log, mission, policy, seed, own),
+        facts=facts,
         window=log.window,
         position_m=log.position_m,
         velocity_mps=log.velocity_mps,

@@ -9,7 +9,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import compose
 from swarm_mj.physics.solid_geoms import loss_db_of, obstacle_geoms
 from swarm_mj.replay.arena import RING_SHARE, grid, heading_m
-from swarm_mj.replay.packets import PacketLinks, arcs, packet_segments
+from swarm_mj.replay.packets import PacketSegments, arcs
 from swarm_mj.replay.rerun_log import RerunLog, lifted
 from swarm_mj.replay.static_geoms import name_of, static_geoms
 
@@ -34,17 +34,10 @@ def stage(out: RerunLog, mission: Mission) -> MjModel:
 def draw_space(
     out: RerunLog,
     model: MjModel,
-    packets: dict[str, PacketLinks],
+    segments: dict[str, PacketSegments],
     colours: UInt8[np.ndarray, "T N 3"],
 ) -> None:
-    """Draw it: what stands still once, the rest window by window.
-
-    Args:
-        out: The recording.
-        model: MuJoCo's, of `stage`.
-        packets: By their fate.
-        colours: The robots'.
-    """
+    """Draw the model once, and robots and packets, by their fate, window by window."""
     if out.frame.moves:
         away = lifted(-out.frame.centre_m, 0.0)
         out.timed("scene", rr.Transform3D.columns(translation=away))
@@ -61,7 +54,7 @@ def draw_space(
         start, end = log.position_m, log.position_m + heading_m(out)
         ends = (lifted(at.reshape(-1, 2), height_m) for at in (start, end))
         out.lines("scene/heading", *ends)
-    for fate, drawn in packet_segments(packets, log.position_m).items():
+    for fate, drawn in segments.items():
         strips = arcs(drawn.start_m, drawn.end_m, height_m)
         out.layer(f"scene/packets/{fate}", drawn.row, strips=strips)
 

@@ -17,7 +17,7 @@ from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 from swarm_mj.replay import charts, palette
 from swarm_mj.replay.arena import draw_map
 from swarm_mj.replay.environment import draw_mismatch, draw_obstacles
-from swarm_mj.replay.footage import facts_of, frame
+from swarm_mj.replay.footage import Footage, footage_of, frame
 from swarm_mj.replay.layout import layout
 from swarm_mj.replay.legend import draw_legend
 from swarm_mj.replay.packets import PacketLinks, is_other
@@ -51,7 +51,9 @@ def write_replay(log: Log, mission: Mission, config: Mapping[str, Any], path: Pa
 
 def _recorded(log: Log, mission: Mission, config: Mapping[str, Any], name: str) -> bytes:
     rr.set_strict_mode(True)  # bad data raises; otherwise a column is silently missing
-    packets = log.packets
+    packets, own = log.packets, components_in(config)
+    policy, seed = config.get("policy") or "", config.get("seed", 0)
+    footage = footage_of(log, mission, policy, seed, own)
     shown, plotted = frame(log.position_m, mission.half_side_m), plots(log, packets)
     with rr.RecordingStream(APPLICATION, send_properties=False) as recording:
         stream = recording.binary_stream()
@@ -62,10 +64,8 @@ def _recorded(log: Log, mission: Mission, config: Mapping[str, Any], name: str) 
         recording.set_log_time_enabled(False)
         recording.send_recording_name(name)
         recording.send_property("mission", rr.AnyValues(drop_untyped_nones=True, **config))
-        policy, seed = config.get("policy") or "", config.get("seed", 0)
-        facts = facts_of(log, mission, policy, seed, components_in(config))
-        recording.send_property(FACTS, rr.AnyValues(json=json.dumps(asdict(facts))))
-        draw(RerunLog(recording, log, shown, mission.window_s), mission, packets, plotted)
+        recording.send_property(FACTS, rr.AnyValues(json=json.dumps(asdict(footage.facts))))
+        draw(RerunLog(recording, log, shown, mission.window_s), footage, packets, plotted)
         said = {**config, **_sent(log, mission, config)}
         lines = [f"- **{key}**: {value}" for key, value in said.items()]
         about = "\n".join([f"# {name}", *lines])
@@ -82,18 +82,17 @@ def _sent(log: Log, mission: Mission, config: Mapping[str, Any]) -> dict[str, st
 
 
 def draw(
-    out: RerunLog, mission: Mission, packets: dict[str, PacketLinks], plotted: list[Plot]
+    out: RerunLog, footage: Footage, packets: dict[str, PacketLinks], plotted: list[Plot]
 ) -> None:
     """Draw every layer of a replay; `packets` by their fate."""
-    log = out.log
-    full_scale = palette.nice_scale(log.age)
+    log, mission, full_scale = out.log, footage.facts.mission, footage.facts.full_scale
     colours, known = (  # the tree shows what is known, whoever is on
         palette.robot_colours(log.ego_age, full_scale, log.is_known, is_on, log.ego)
         for is_on in (log.is_on, np.ones_like(log.is_on))
     )
     draw_map(out, mission, packets, colours)
     model = stage(out, mission)
-    draw_space(out, model, packets, colours)
+    draw_space(out, model, footage.segments, colours)
     draw_obstacles(out, obstacles_of(model))
     if log.mismatch is not None:
         draw_mismatch(out, log.mismatch)

@@ -74,9 +74,17 @@ def test_shortfalls_are_those_of_robots_that_the_observer_misses(blocked):
 def test_colours_are_by_age_white_for_the_observer_and_dark_for_the_fallen(failing):
     log = failing.log
     footage = footage_of(log, failing.mission, "mst", 5)
-    is_dark = np.all(footage.colours() == palette.SWITCHED_OFF, axis=2)
-    np.testing.assert_array_equal(is_dark, ~log.is_on)
-    np.testing.assert_array_equal(footage.colours()[:, log.ego][log.is_on[:, log.ego]], 255)
+    shown = np.stack([footage.contents(row).colour for row in range(30)])
+    np.testing.assert_array_equal(np.all(shown == palette.SWITCHED_OFF, axis=2), ~log.is_on)
+    np.testing.assert_array_equal(shown[:, log.ego][log.is_on[:, log.ego]], 255)
+
+
+def test_a_moment_has_the_packets_of_its_window(two_way):
+    footage = footage_of(two_way.log, two_way.mission, "mst", 5)
+    for row in (0, 7, 29):
+        colours = [tuple(colour) for colour in footage.contents(row).packet_colour.tolist()]
+        for fate in ("delivered", "lost", "answered"):
+            assert colours.count(palette.PACKETS[fate][0]) == two_way.counted(fate)[row]
 
 
 def test_an_open_area_is_shown_where_robots_ever_are(two_way):

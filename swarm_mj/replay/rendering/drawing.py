@@ -1,12 +1,13 @@
-"""What stands around the scene in a video: titles, a legend, and the course of the age."""
+"""What stands around the scene in a video: titles, a legend, and the mean age over time."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int, Int16
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageFont
+from PIL.ImageDraw import ImageDraw
 
 from swarm_mj.mission.presets import where_flown
 from swarm_mj.replay import palette
@@ -18,14 +19,13 @@ CURVES: tuple[Colour, ...] = (palette.MEAN_AGE, palette.VARIANCE)  # of one flig
 FAINT = 0.45  # what is still to come, and texts that matter less
 SHADE = 0.35  # of columns behind a curve
 NUM_SHADES = 48
-SHORTFALL = "missing to decode"  # what the numbers beside robots say
+SHORTFALL = "missing to decode"  # the meaning of the numbers next to robots
 TAG = 2  # of dark ground around a number [pixels]
 LABELS_FIRST = 1000  # a number had rather cover so many robots than another number
 ROOM, STEP = 3.7, 1.1  # for a legend's samples, and from one to the next [of the text's size]
 
 
-@dataclass(frozen=True)
-class Box:
+class Box(NamedTuple):
     """A part of the picture [pixels]."""
 
     left: int
@@ -45,67 +45,58 @@ class Box:
 
 
 @cache
-def font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    """Pillow's own font, in pixels."""
-    return ImageFont.load_default(size)
+def font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    """Return Pillow's own font, in pixels."""
+    return ImageFont.load_default(round(size))
+
+
+def blank(width: int, height: int) -> Image.Image:
+    """Return an empty picture."""
+    return Image.new("RGB", (width, height), palette.BACKGROUND)
 
 
 def draw_title(
-    draw: ImageDraw.ImageDraw, footage: Footage, row: int, box: Box, size: int, curve: Colour
+    draw: ImageDraw, footage: Footage, row: int, box: Box, size: int, curve: Colour
 ) -> None:
-    """Policy, mission, own parts, time above a scene, and its mean age in its curve's colour."""
-    facts = footage.facts
-    mission = facts.mission
-    left, top, pad = box.left, box.top, size // 2
-    draw.text((left + pad, top + pad), facts.policy, palette.TEXT, font(round(1.3 * size)))
+    """Draw policy, mission, own parts and time above a scene, and its age in its curve's colour."""
+    facts, now = footage.facts, footage.window[row]
+    mission, pad, small = facts.mission, size // 2, font(0.8 * size)
+    left, right, top = box.left + pad, box.right - pad, box.top + pad
+    draw.text((left, top), facts.policy, palette.TEXT, font(1.3 * size))
+    age = f"age {footage.age_mean[row]:.1f}"
+    draw.text((right, top), age, curve, font(1.3 * size), anchor="ra")
     about = f"{mission.task}, {mission.num_robots} robots, seed {facts.seed}"
     where = ", ".join(where_flown(mission)).split(", ")
     about = "\n".join([about, *filter(None, where), *facts.own_parts])
-    draw.text((left + pad, top + pad + 1.7 * size), about, palette.SENT, font(round(0.8 * size)))
-    now = footage.window[row]
+    below = top + 1.7 * size
+    draw.text((left, below), about, palette.SENT, small)
     time = f"{now * mission.window_s:.1f} s, window {now}"
-    age = f"age {footage.age_mean[row]:.1f}"
-    right = box.right - pad
-    draw.text((right, top + pad), age, curve, font(round(1.3 * size)), anchor="ra")
-    small, below = font(round(0.8 * size)), top + pad + 1.7 * size
     draw.text((right, below), time, palette.SENT, small, anchor="ra")
     if (num := int(np.sum(footage.is_cut_off[row]))) > 0:
-        told = f"{num} cut off from r{facts.observer}"
-        draw.text((right, below + size), told, palette.TOO_WEAK, small, anchor="ra")
+        text = f"{num} cut off from r{facts.observer}"
+        draw.text((right, below + size), text, palette.TOO_WEAK, small, anchor="ra")
 
 
 def draw_legend(
-    draw: ImageDraw.ImageDraw, footages: Sequence[Footage], full_scale: float, box: Box, size: int
+    draw: ImageDraw, footages: Sequence[Footage], full_scale: float, box: Box, size: int
 ) -> None:
-    """Return the ramp of ages, and what the colours of packets mean."""
-    small = font(round(0.8 * size))
-    who = f"colour: age of what {_observers(footages)} (white) knows"
-    draw.text((box.left, box.top), who, palette.TEXT, small)
+    """Draw the ramp of ages, and the meaning of the packets' colours."""
+    small, observers = font(0.8 * size), _observers(footages)
+    text = f"colour: age of what {observers} (white) knows"
+    draw.text((box.left, box.top), text, palette.TEXT, small)
     y, high = box.top + 1.25 * size, 0.55 * size
     edges = np.linspace(box.left, box.right, NUM_SHADES + 1)
-    shades = palette.age_colours(
-        np.linspace(0.0, full_scale, NUM_SHADES), full_scale, np.ones(NUM_SHADES, dtype=bool)
-    )
-    for k, colour in enumerate(shades.tolist()):
+    for k, colour in enumerate(palette.ramp(full_scale, NUM_SHADES).tolist()):
         draw.rectangle((edges[k], y, edges[k + 1], y + high), tuple(colour))
     y += 1.3 * high
     draw.text((box.left, y), "0", palette.SENT, small)
     draw.text((box.right, y), f"{full_scale:g} windows or more", palette.SENT, small, anchor="ra")
-    samples = {"never heard of": palette.UNKNOWN}
-    if any(np.any(each.velocity_mps) for each in footages):
-        samples["heading"] = palette.HEADING
-    samples |= _packet_colours(footages) | _surprise_colours(footages)
-    _draw_samples(draw, samples, Box(box.left, round(y + 1.3 * size), box.right, box.bottom), size)
-
-
-def _draw_samples(
-    draw: ImageDraw.ImageDraw, samples: dict[str, Colour], box: Box, size: int
-) -> None:
-    """Sample in two columns; the more there are, the closer."""
+    samples = _samples(footages, observers)
+    # Two columns; the more samples there are, the closer they stand.
     step = min(STEP, ROOM / ((len(samples) + 1) // 2)) * size
-    small = font(round(min(0.8 * size, 0.9 * step)))
+    small = font(min(0.8 * size, 0.9 * step))
     for k, (text, colour) in enumerate(samples.items()):
-        x, line = box.left + (k % 2) * box.width / 2, box.top + step * (k // 2)
+        x, line = box.left + (k % 2) * box.width / 2, round(y + 1.3 * size) + step * (k // 2)
         if text == SHORTFALL:
             _draw_tag(draw, "dB", x, line, small)
         else:
@@ -113,14 +104,37 @@ def _draw_samples(
         draw.text((x + 1.5 * size, line), text, palette.SENT, small)
 
 
-def _draw_sample(
-    draw: ImageDraw.ImageDraw, colour: Colour, x: float, middle: float, size: int
-) -> None:
-    """A disc for robots, and a line for packets and links; of those too weak, a dashed one."""
+def _observers(footages: Sequence[Footage]) -> str:
+    return " and ".join(dict.fromkeys(f"r{each.facts.observer}" for each in footages))
+
+
+def _samples(footages: Sequence[Footage], observers: str) -> dict[str, Colour]:
+    """Return the texts of what is seen in any of the missions, with its colours."""
+    samples = {"never heard of": palette.UNKNOWN}
+    if any(np.any(each.velocity_mps) for each in footages):
+        samples["heading"] = palette.HEADING
+    if any(each.facts.is_broadcast for each in footages):
+        samples["packet heard"] = palette.BROADCAST
+    if not all(each.facts.is_broadcast for each in footages):
+        samples |= {"delivered": palette.DELIVERED, "lost": palette.LOST}
+        samples |= {"answered": palette.ANSWERED, "overheard": palette.OVERHEARD}
+    links = [each.mismatch.is_too_weak for each in footages if each.mismatch is not None]
+    is_too_weak = np.concatenate([np.zeros(0, dtype=bool), *links])
+    if np.any(is_too_weak):
+        samples[f"{observers}'s link, too weak"] = palette.MISMATCH["too_weak"]
+    if not np.all(is_too_weak):
+        samples["works, unbelieved"] = palette.MISMATCH["unbelieved"]
+    if np.any(is_too_weak):
+        samples[SHORTFALL] = palette.TOO_WEAK
+    if any(np.any(each.is_cut_off) for each in footages):
+        samples[f"halo: cut off from {observers} now"] = palette.CUT_OFF
+    return samples
+
+
+def _draw_sample(draw: ImageDraw, colour: Colour, x: float, middle: float, size: int) -> None:
+    """Draw a disc for robots, a line for packets and links, and a dashed one for weak links."""
     if colour in (palette.UNKNOWN, palette.CUT_OFF):
-        centre, radius = x + 0.6 * size, 0.3 * size
-        disc = (centre - radius, middle - radius, centre + radius, middle + radius)
-        draw.ellipse(disc, colour)
+        draw.circle((x + 0.6 * size, middle), 0.3 * size, colour)
         return
     pieces = DASHES if colour == palette.MISMATCH["too_weak"] else WHOLE
     for a, b in (x + 1.2 * size * pieces).round().tolist():
@@ -128,22 +142,23 @@ def _draw_sample(
 
 
 def draw_shortfalls(
-    draw: ImageDraw.ImageDraw,
+    draw: ImageDraw,
     robots: Float[np.ndarray, "N 2"],
     others: Int16[np.ndarray, "K"],
     margin_db: Int16[np.ndarray, "K"],
     size: int,
 ) -> None:
-    """By how much links are too weak, each beside the robot at its far end.
+    """Write by how much links are too weak, each next to the robot at its far end.
 
     Args:
-        draw: Where.
-        robots: Where all robots are in the picture [pixels].
+        draw: The picture.
+        robots: All robots' places in it [pixels].
         others: The robots at the far ends.
         margin_db: Of their links [dB].
         size: Of the text [pixels].
     """
-    small, shown = font(round(0.75 * size)), np.zeros((0, 4))
+    small, shown = font(0.75 * size), np.zeros((0, 4))
+    on_robots = np.hstack([robots - 0.4 * size, robots + 0.4 * size])
     for robot, margin in zip(others.tolist(), margin_db.tolist(), strict=True):
         text = f"{margin} dB"
         width, high = draw.textlength(text, small) + 2 * TAG, 0.95 * size
@@ -152,8 +167,7 @@ def draw_shortfalls(
         sides = sides * size + [[0.0, 0.0], [-width, 0.0], [0.0, 0.0], [0.0, 0.0]]
         low = robots[robot] + sides
         boxes = np.hstack([low, low + np.array([width, high])])
-        on_robots = np.hstack([robots - 0.4 * size, robots + 0.4 * size])
-        covered = LABELS_FIRST * _num_met(boxes, shown) + _num_met(boxes, on_robots)
+        covered = LABELS_FIRST * _num_overlaps(boxes, shown) + _num_overlaps(boxes, on_robots)
         best = int(np.argmin(covered))
         if covered[best] < LABELS_FIRST:
             x, y = low[best].tolist()
@@ -161,78 +175,51 @@ def draw_shortfalls(
             shown = np.vstack([shown, boxes[best]])
 
 
-def _num_met(
+def _num_overlaps(
     boxes: Float[np.ndarray, "S 4"], others: Float[np.ndarray, "O 4"]
 ) -> Int[np.ndarray, "S"]:
-    """How many of the others each box overlaps."""
     one, other = boxes[:, None], others[None]
-    is_met = (one[..., :2] < other[..., 2:]) & (other[..., :2] < one[..., 2:])
-    return np.sum(np.all(is_met, axis=2), axis=1)
+    overlaps = (one[..., :2] < other[..., 2:]) & (other[..., :2] < one[..., 2:])
+    return np.sum(np.all(overlaps, axis=2), axis=1)
 
 
 def _draw_tag(
-    draw: ImageDraw.ImageDraw,
+    draw: ImageDraw,
     text: str,
     x: float,
     y: float,
     small: ImageFont.FreeTypeFont | ImageFont.ImageFont,
 ) -> None:
-    """Return a text on a dark ground, so that it is read before anything."""
+    """Draw a text on a dark ground, so that it is read before anything."""
     left, top, right, bottom = draw.textbbox((x, y), text, small)
     draw.rectangle((left - TAG, top - TAG, right + TAG, bottom + TAG), palette.BACKGROUND)
     draw.text((x, y), text, palette.TOO_WEAK, small)
-
-
-def _packet_colours(footages: Sequence[Footage]) -> dict[str, Colour]:
-    """What packets of these missions may look like."""
-    colours: dict[str, Colour] = {}
-    if any(each.facts.is_broadcast for each in footages):
-        colours["packet heard"] = palette.BROADCAST
-    if not all(each.facts.is_broadcast for each in footages):
-        colours |= {"delivered": palette.DELIVERED, "lost": palette.LOST}
-        colours |= {"answered": palette.ANSWERED, "overheard": palette.OVERHEARD}
-    return colours
-
-
-def _surprise_colours(footages: Sequence[Footage]) -> dict[str, Colour]:
-    """What links that surprise look like, if there are any, and robots that are cut off."""
-    found = [each.mismatch.by_kind for each in footages if each.mismatch is not None]
-    texts = {
-        "too_weak": f"{_observers(footages)}'s link, too weak",
-        "unbelieved": "works, unbelieved",
-    }
-    shown = [kind for kind in texts if any(len(of[kind].row) for of in found)]
-    colours = {texts[kind]: palette.MISMATCH[kind] for kind in shown}
-    if "too_weak" in shown:
-        colours[SHORTFALL] = palette.TOO_WEAK
-    if any(np.any(each.is_cut_off) for each in footages):
-        colours[f"halo: cut off from {_observers(footages)} now"] = palette.CUT_OFF
-    return colours
-
-
-def _observers(footages: Sequence[Footage]) -> str:
-    return " and ".join(dict.fromkeys(f"r{each.facts.observer}" for each in footages))
 
 
 class AgePlot:
     """The mean age over the mission, of one flight or two, on a common axis."""
 
     def __init__(self, footages: Sequence[Footage], box: Box, size: int) -> None:
-        """Prepare the curves."""
+        """Prepare the curves, as points of the picture."""
         self._box, self._size = box, size
-        self._inner = Box(
+        self._inner = inner = Box(
             box.left + 2 * size, round(box.top + 1.4 * size), box.right, box.bottom - size
         )
-        self._end_s = max(each.window[-1] * each.facts.mission.window_s for each in footages)
+        seconds = [each.window * each.facts.mission.window_s for each in footages]
+        self._end_s = max(float(each[-1]) for each in seconds)
         self._top = palette.nice_top(max(float(np.max(each.age_mean)) for each in footages))
-        self._curves = [self._curve(each) for each in footages]
+        xs = [inner.left + inner.width * each / self._end_s for each in seconds]
+        ys = [inner.bottom - inner.height * each.age_mean / self._top for each in footages]
+        pairs = zip(xs, ys, strict=True)
+        self._curves = [list(zip(x.tolist(), y.tolist(), strict=True)) for x, y in pairs]
+        # Two missions' columns could not be told apart.
         self._cut_off = footages[0] if len(footages) == 1 else None
 
-    def draw_axes(self, draw: ImageDraw.ImageDraw) -> None:
-        """What does not change: title, numbers, and the whole curves, faintly."""
-        small, inner = font(round(0.8 * self._size)), self._inner
+    def draw_axes(self, draw: ImageDraw) -> None:
+        """Draw what does not change: title, numbers, and the whole curves, faintly."""
+        small, inner = font(0.8 * self._size), self._inner
         title = "mean age of information [windows]"
-        draw.rectangle((inner.left, inner.top, inner.right, inner.bottom), palette.GRID)
+        draw.rectangle(inner, palette.GRID)
         if self._cut_off is not None and np.any(self._cut_off.is_cut_off):
             title += f"; red: robots cut off from {_observers([self._cut_off])}, full height 100 %"
             self._draw_cut_off(draw, self._cut_off)
@@ -243,35 +230,22 @@ class AgePlot:
         draw.text((inner.left, below), "0", palette.SENT, small)
         draw.text((inner.right, below), f"{self._end_s:g} s", palette.SENT, small, anchor="ra")
         for curve, colour in zip(self._curves, CURVES, strict=False):
-            draw.line([tuple(point) for point in curve.tolist()], dim(colour, FAINT), 1)
+            draw.line(curve, dim(colour, FAINT), 1)
 
-    def draw_until(self, draw: ImageDraw.ImageDraw, rows: Sequence[int]) -> None:
-        """Return the curves so far, and where they are now."""
+    def draw_until(self, draw: ImageDraw, rows: Sequence[int]) -> None:
+        """Draw the curves so far, and where they are now."""
         radius, width = max(2.0, self._size / 5), max(2, self._size // 8)
         for curve, colour, row in zip(self._curves, CURVES, rows, strict=False):
-            points = [tuple(point) for point in curve[: row + 1].tolist()]
             if row > 0:
-                draw.line(points, colour, width, joint="curve")
-            x, y = points[-1]
-            draw.ellipse((x - radius, y - radius, x + radius, y + radius), colour)
+                draw.line(curve[: row + 1], colour, width, joint="curve")
+            draw.circle(curve[row], radius, colour)
 
-    def _draw_cut_off(self, draw: ImageDraw.ImageDraw, footage: Footage) -> None:
-        """The share of the others cut off from the observer, as columns; full height is all."""
-        num_others = footage.facts.mission.num_robots - 1
-        inner, share = self._inner, np.sum(footage.is_cut_off, axis=1) / num_others
-        x = inner.left + inner.width * footage.window * footage.facts.mission.window_s / self._end_s
-        for left, right, part in zip([inner.left, *x[:-1]], x, share, strict=True):
+    def _draw_cut_off(self, draw: ImageDraw, footage: Footage) -> None:
+        """Draw columns: the share of the others that is cut off from the observer."""
+        share = np.sum(footage.is_cut_off, axis=1) / (footage.facts.mission.num_robots - 1)
+        left, inner = float(self._inner.left), self._inner
+        for (right, _), part in zip(self._curves[0], share.tolist(), strict=True):
             if part > 0.0:
                 top = inner.bottom - part * inner.height
                 draw.rectangle((left, top, right, inner.bottom), dim(palette.CUT_OFF, SHADE))
-
-    def _curve(self, footage: Footage) -> Float[np.ndarray, "T 2"]:
-        """Return a flight's ages as points of the picture."""
-        inner, seconds = self._inner, footage.window * footage.facts.mission.window_s
-        x = inner.left + inner.width * seconds / self._end_s
-        return np.stack([x, inner.bottom - inner.height * footage.age_mean / self._top], axis=1)
-
-
-def blank(width: int, height: int) -> Image.Image:
-    """Return an empty picture."""
-    return Image.new("RGB", (width, height), palette.BACKGROUND)
+            left = right

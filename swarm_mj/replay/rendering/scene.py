@@ -1,12 +1,11 @@
 """Pictures of a mission's scene: MuJoCo draws floor, walls and robots, and packets between them."""
 
 import atexit
-from contextlib import ExitStack
 from weakref import ref
 
 import numpy as np
 from jaxtyping import UInt8
-from mujoco._enums import mjtCamera, mjtCatBit, mjtFontScale, mjtFramebuffer, mjtObj
+from mujoco._enums import mjtCatBit, mjtFontScale, mjtFramebuffer, mjtObj
 from mujoco._errors import FatalError
 from mujoco._functions import (
     mj_camlight,
@@ -16,15 +15,14 @@ from mujoco._functions import (
     mjv_updateScene,
 )
 from mujoco._render import MjrContext, mjr_readPixels, mjr_render, mjr_setBuffer
-from mujoco._specs import MjSpec
 from mujoco._structs import MjData, MjModel, MjrRect, MjvCamera, MjvOption, MjvScene
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.physics.solid_geoms import obstacle_geoms
-from swarm_mj.replay.rendering.camera import ELEVATION_DEG, FOV_Y_DEG, Camera, look_at
-from swarm_mj.replay.rendering.contents import Contents
-from swarm_mj.replay.rendering.markers import GEOMS_PER_ROBOT, Markers
+from swarm_mj.replay.footage import Contents
+from swarm_mj.replay.rendering.camera import FOV_Y_DEG, Camera, look_at
+from swarm_mj.replay.rendering.markers import GEOMS_PER_ROBOT, draw_markers
 from swarm_mj.replay.rendering.opengl import make_context, unusable
 
 MAX_PIXELS = 4096  # of a picture's side
@@ -38,15 +36,19 @@ SLICES, STACKS = 14, 5  # of round things
 
 
 class SceneRenderer:
-    """Draws pictures of one mission's scene, all of one size."""
+    """Draws pictures of one mission's scene, all of one size.
+
+    MuJoCo's own `Renderer` takes the back end that was chosen when MuJoCo was imported, and frees
+    its memory in whichever context is current; with two renderers that is the wrong one.
+    """
 
     def __init__(
         self, mission: Mission, width: int = 1280, height: int = 720, *, scene: Scene | None = None
     ) -> None:
-        """Compiles the scene and starts OpenGL.
+        """Compile the scene and start OpenGL.
 
         Args:
-            mission: Whose scene it is.
+            mission: Its scene is drawn.
             width: Of the pictures [pixels].
             height: Of the pictures [pixels].
             scene: What changes the arena, if anything does: `swarm.scene`.
@@ -60,34 +62,23 @@ class SceneRenderer:
                 raise ValueError(f"{what} must be from 16 to {MAX_PIXELS} pixels, not {pixels}")
         self._width, self._height = width, height
         self._mission = mission
-        spec = compose(mission, scene=scene)
-        prepare(spec, mission)
-        self._model = spec.compile()
+        self._model = pictured(mission, scene, width, height)
         self._data = MjData(self._model)
         self._floor = mj_name2id(self._model, mjtObj.mjOBJ_GEOM.value, "floor")
-        light(self._model, width, height)
         num_geoms = self._model.ngeom + mission.num_robots * GEOMS_PER_ROBOT
         self._scene = MjvScene(self._model, num_geoms)
-        self._markers = Markers(self._scene, height)
         self._options = MjvOption()
         self._options.geomgroup[BEACONS] = 0
-        with ExitStack() as stack:
-            self._opengl = make_context(width, height)
-            stack.callback(self._opengl.free)
-            self._context = self._start()
-            stack.pop_all()
+        self._opengl = make_context(width, height)
+        try:
+            self._opengl.make_current()
+            self._context = MjrContext(self._model, mjtFontScale.mjFONTSCALE_100.value)
+        except FatalError as error:  # GLFW without a screen says nothing before
+            self._opengl.free()
+            raise unusable(error) from error
+        mjr_setBuffer(mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._is_open = True
         atexit.register(_close, ref(self))  # before the back end ends, which registered earlier
-
-    def _start(self) -> MjrContext:
-        """MuJoCo's own part of OpenGL."""
-        self._opengl.make_current()
-        try:
-            context = MjrContext(self._model, mjtFontScale.mjFONTSCALE_100.value)
-        except FatalError as error:  # GLFW without a screen says nothing before
-            raise unusable(error) from error
-        mjr_setBuffer(mjtFramebuffer.mjFB_OFFSCREEN.value, context)
-        return context
 
     def camera(self, contents: Contents) -> Camera:
         """Return the camera by which a picture of these contents is seen."""
@@ -104,30 +95,26 @@ class SceneRenderer:
                 f"contents must have {self._mission.num_robots} robots, "
                 f"not {len(contents.position_m)}"
             )
-        camera = self.camera(contents)
         self._place(contents)
-        free = MjvCamera()
-        aim(free, camera)
-        mjv_updateScene(
-            self._model,
-            self._data,
-            self._options,
-            None,
-            free,
-            mjtCatBit.mjCAT_ALL.value,
-            self._scene,
-        )
-        self._markers.draw(contents, camera)
-        return self._pixels()
+        camera, free = self.camera(contents), MjvCamera()
+        camera.aim(free)
+        everything = mjtCatBit.mjCAT_ALL.value
+        mjv_updateScene(self._model, self._data, self._options, None, free, everything, self._scene)
+        draw_markers(self._scene, contents, camera)
+        picture = np.empty((self._height, self._width, 3), dtype=np.uint8)
+        whole = MjrRect(0, 0, self._width, self._height)
+        self._opengl.make_current()  # there may be other renderers
+        mjr_render(whole, self._scene, self._context)
+        mjr_readPixels(picture, None, whole, self._context)
+        return picture[::-1].copy()
 
     def close(self) -> None:
         """Give OpenGL's memory back; nothing can be drawn any more."""
-        if not self._is_open:
-            return
-        self._is_open = False
-        self._opengl.make_current()
-        self._context.free()
-        self._opengl.free()
+        if self._is_open:
+            self._is_open = False
+            self._opengl.make_current()
+            self._context.free()
+            self._opengl.free()
 
     def __enter__(self) -> "SceneRenderer":
         return self
@@ -142,16 +129,9 @@ class SceneRenderer:
         mj_comPos(self._model, self._data)
         mj_camlight(self._model, self._data)
         if not self._mission.has_walls and self._floor >= 0:
+            # By whole tiles, so that the pattern stands still under a team that flies on.
             whole_tiles_m = np.round(contents.centre_m / TILE_M) * TILE_M
             self._data.geom_xpos[self._floor, :2] = whole_tiles_m
-
-    def _pixels(self) -> UInt8[np.ndarray, "H W 3"]:
-        picture = np.empty((self._height, self._width, 3), dtype=np.uint8)
-        whole = MjrRect(0, 0, self._width, self._height)
-        self._opengl.make_current()  # there may be other renderers
-        mjr_render(whole, self._scene, self._context)
-        mjr_readPixels(picture, None, whole, self._context)
-        return picture[::-1].copy()
 
 
 def _close(renderer: "ref[SceneRenderer]") -> None:
@@ -160,8 +140,29 @@ def _close(renderer: "ref[SceneRenderer]") -> None:
         left.close()
 
 
-def light(model: MjModel, width: int, height: int) -> None:
-    """Light from above, obstacles of glass, and the size of the pictures."""
+def pictured(mission: Mission, scene: Scene | None, width: int, height: int) -> MjModel:
+    """Compile a mission's scene for pictures of this size [pixels].
+
+    Light comes from above, walls and obstacles are of glass, and an open area's floor is as wide
+    as a camera sees.
+    """
+    spec = compose(mission, scene=scene)
+    half_m = float(np.ceil(GROUND * mission.half_side_m / TILE_M) * TILE_M)
+    # By name, if they are there: a user's scene may have neither.
+    for material in spec.materials:
+        if material.name == "wall":
+            material.rgba[3] = WALL_OPACITY
+        elif material.name == "floor" and not mission.has_walls:
+            material.texrepeat = [2.0 * half_m / TILE_M] * 2
+    for geom in spec.geoms:
+        if geom.name == "floor" and not mission.has_walls:
+            geom.size = [half_m, half_m, half_m / 10.0]  # drawn in 20 by 20 pieces
+    model = spec.compile()
+    _light(model, width, height)
+    return model
+
+
+def _light(model: MjModel, width: int, height: int) -> None:
     visual = model.vis
     visual.global_.offwidth, visual.global_.offheight = width, height
     visual.global_.fovy = FOV_Y_DEG
@@ -173,26 +174,3 @@ def light(model: MjModel, width: int, height: int) -> None:
         material = model.geom_matid[g]
         colour = model.geom_rgba[g] if material < 0 else model.mat_rgba[material]
         colour[3] = min(colour[3], OBSTACLE_OPACITY)
-
-
-def prepare(spec: MjSpec, mission: Mission) -> None:
-    """Make walls translucent, and an open area's floor as wide as a camera sees.
-
-    A scene of one's own may have neither.
-    """
-    half_m = float(np.ceil(GROUND * mission.half_side_m / TILE_M) * TILE_M)
-    for material in spec.materials:
-        if material.name == "wall":
-            material.rgba[3] = WALL_OPACITY
-        elif material.name == "floor" and not mission.has_walls:
-            material.texrepeat = [2.0 * half_m / TILE_M] * 2
-    for geom in spec.geoms:
-        if geom.name == "floor" and not mission.has_walls:
-            geom.size = [half_m, half_m, half_m / 10.0]  # drawn in 20 by 20 pieces
-
-
-def aim(free: MjvCamera, camera: Camera) -> None:
-    """Lets a camera of MuJoCo's see what this one does."""
-    free.type = mjtCamera.mjCAMERA_FREE.value
-    free.lookat[:] = (*camera.target_m, 0.0)
-    free.distance, free.azimuth, free.elevation = camera.distance_m, 90.0, -ELEVATION_DEG

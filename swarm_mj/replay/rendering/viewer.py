@@ -9,11 +9,11 @@ from mujoco._functions import mj_forward
 from mujoco._structs import MjData
 
 from swarm_mj.mission import Mission
-from swarm_mj.physics.scene import Scene, compose
+from swarm_mj.physics.scene import Scene
+from swarm_mj.replay.footage import Contents
 from swarm_mj.replay.rendering.camera import look_at
-from swarm_mj.replay.rendering.contents import Contents
-from swarm_mj.replay.rendering.markers import Markers
-from swarm_mj.replay.rendering.scene import BEACONS, aim, light, prepare
+from swarm_mj.replay.rendering.markers import draw_markers
+from swarm_mj.replay.rendering.scene import BEACONS, pictured
 
 SIZE = 1280, 720  # that sizes on the window are meant for [pixels]
 WAY_OUT = 'the window needs a display; without one, render_mode="rgb_array" draws pictures'
@@ -21,23 +21,23 @@ CLOSING_S = 5.0  # what the window may take to close
 
 
 class SceneViewer:
-    """MuJoCo's passive viewer; who closes the window sees no more, and nothing else ends."""
+    """MuJoCo's passive viewer; closing the window ends the view, and nothing else."""
 
     def __init__(self, mission: Mission, *, scene: Scene | None = None) -> None:
         """Open the window.
 
         Args:
-            mission: Whose scene it is.
+            mission: Its scene is shown.
             scene: What changes the arena, if anything does: `swarm.scene`.
 
         Raises:
             OSError: There is no display, or the window is closed already.
         """
-        _check_display()
-        spec = compose(mission, scene=scene)
-        prepare(spec, mission)
-        self._model = spec.compile()
-        light(self._model, *SIZE)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            if not glfw.init():  # MuJoCo's viewer would wait forever
+                raise OSError(WAY_OUT)
+        self._model = pictured(mission, scene, *SIZE)
         self._data = MjData(self._model)
         others = set(threading.enumerate())
         try:
@@ -60,26 +60,17 @@ class SceneViewer:
         camera = look_at(contents.centre_m, contents.reach_m, *SIZE)
         with self._window.lock():
             if not self._is_aimed:  # from then on it is the user's
-                aim(self._window.cam, camera)
+                camera.aim(self._window.cam)
                 self._window.opt.geomgroup[BEACONS] = 0
                 self._is_aimed = True
             self._data.qpos[:] = contents.position_m.ravel()
             mj_forward(self._model, self._data)
             self._markers.ngeom = 0
-            Markers(self._markers, SIZE[1]).draw(contents, camera)
+            draw_markers(self._markers, contents, camera)
         self._window.sync()
 
     def close(self) -> None:
-        """Close the window, and waits until it is: a process that ends earlier may crash."""
+        """Close the window and wait for its threads: a process that ends earlier may crash."""
         self._window.close()
         for thread in self._threads:
             thread.join(CLOSING_S)
-
-
-def _check_display() -> None:
-    """Raise OSError if no window can be opened: MuJoCo's viewer would wait forever."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        has_display = glfw.init()
-    if not has_display:
-        raise OSError(WAY_OUT)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from swarm_mj.replay.rendering.contents import Contents
+from swarm_mj.replay.footage import Contents
 
 GREEN = (0, 205, 145)
 

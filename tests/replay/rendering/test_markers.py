@@ -9,14 +9,14 @@ from moments import moment
 from swarm_mj.replay import palette
 from swarm_mj.replay.packets import SEGMENTS
 from swarm_mj.replay.rendering.camera import look_at
-from swarm_mj.replay.rendering.markers import Markers
+from swarm_mj.replay.rendering.markers import draw_markers
 
 
 def drawn(contents):
     scene = mujoco.MjvScene(mujoco.MjModel.from_xml_string("<mujoco/>"), 100)
     scene.ngeom = 0
     camera = look_at(contents.centre_m, contents.reach_m, 640, 480)
-    Markers(scene, 480).draw(contents, camera)
+    draw_markers(scene, contents, camera)
     return [scene.geoms[k] for k in range(scene.ngeom)]
 
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from swarm_mj.replay.rendering.style import Style, fitted, usual_seconds
+from swarm_mj.replay.rendering.style import VideoStyle, default_seconds, fitted
 
 
 @pytest.mark.parametrize(
@@ -13,7 +13,7 @@ from swarm_mj.replay.rendering.style import Style, fitted, usual_seconds
 )
 def test_a_gif_counts_in_hundredths_of_a_second(fps, lasts_ms, num_frames):
     """Ten seconds of pictures that last so long each."""
-    style = fitted(Style(seconds=10.0, fps=fps), ".gif")
+    style = fitted(VideoStyle(seconds=10.0, fps=fps), ".gif")
     assert 1000 / style.fps == pytest.approx(lasts_ms)
     assert style.num_frames == num_frames
     assert fitted(style, ".gif") == style
@@ -21,17 +21,17 @@ def test_a_gif_counts_in_hundredths_of_a_second(fps, lasts_ms, num_frames):
 
 
 def test_an_mp4_has_what_is_asked_for():
-    assert fitted(Style(seconds=10.0, fps=15), ".mp4").num_frames == 150
+    assert fitted(VideoStyle(seconds=10.0, fps=15), ".mp4").num_frames == 150
 
 
 def test_a_gif_cannot_be_as_fast_as_an_mp4():
     with pytest.raises(ValueError, match="at most 50, not 60; or make an MP4"):
-        fitted(Style(fps=60), ".gif")
-    assert fitted(Style(fps=60), ".mp4").fps == 60
+        fitted(VideoStyle(fps=60), ".gif")
+    assert fitted(VideoStyle(fps=60), ".mp4").fps == 60
 
 
 @pytest.mark.parametrize(("num_windows", "seconds"), [([3], 1.0), ([40, 25], 4.0), ([500], 10.0)])
 def test_missions_are_shown_in_their_own_time_within_reason(num_windows, seconds):
     facts = SimpleNamespace(mission=SimpleNamespace(window_s=0.1))
     footages = [SimpleNamespace(window=range(number), facts=facts) for number in num_windows]
-    assert usual_seconds(footages) == pytest.approx(seconds)
+    assert default_seconds(footages) == pytest.approx(seconds)

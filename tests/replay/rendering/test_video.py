@@ -5,13 +5,13 @@ import io
 import av
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.rendering.style import Style
-from swarm_mj.replay.rendering.video import check_video, encode_gif, encode_mp4, make_video
+from swarm_mj.replay.rendering.style import VideoStyle
+from swarm_mj.replay.rendering.video import encode_gif, encode_mp4, make_video
 
-STYLE = Style(width=320, height=240, seconds=1.0, fps=10)
+STYLE = VideoStyle(width=320, height=240, seconds=1.0, fps=10)
 COLOURS = [palette.LOST, palette.DELIVERED, palette.BROADCAST, palette.EGO]
 
 
@@ -58,6 +58,14 @@ def test_a_gif_keeps_colours_that_fill_little_of_it():
             np.testing.assert_allclose(picture[30 + 50 * row, 20 + 8 * k], colour, atol=8)
 
 
+def test_a_gif_lasts_as_long_as_it_should_even_if_pictures_repeat():
+    """Equal pictures that follow each other are kept as one that lasts longer."""
+    still = [next(moving())] * 4 + list(moving())[4:]
+    with Image.open(io.BytesIO(encode_gif(still, STYLE, still))) as image:
+        lasts_ms = [frame.info["duration"] for frame in ImageSequence.Iterator(image)]
+    assert sum(lasts_ms) == 1000
+
+
 def test_browsers_can_play_an_mp4():
     with av.open(io.BytesIO(made(".mp4"))) as container:
         stream = container.streams.video[0]
@@ -66,39 +74,6 @@ def test_browsers_can_play_an_mp4():
         assert float(stream.duration * stream.time_base) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
-def test_a_video_that_lacks_pictures_is_found_out(suffix, tmp_path):
-    path = tmp_path / f"a{suffix}"
-    path.write_bytes(made(suffix))
-    check_video(path, suffix, STYLE)
-    for wrong in (Style(width=320, height=240, seconds=1.2, fps=10), Style(seconds=1.0, fps=10)):
-        with pytest.raises(ValueError, match="pictures of"):
-            check_video(path, suffix, wrong)
-
-
-def test_a_gif_s_equal_pictures_count(tmp_path):
-    still = [next(moving())] * 4 + list(moving())[4:]
-    (tmp_path / "a.gif").write_bytes(encode_gif(still, STYLE, still))
-    check_video(tmp_path / "a.gif", ".gif", STYLE)
-
-
 def test_other_kinds_of_files_are_refused():
     with pytest.raises(ValueError, match=r"a video is \.mp4 or \.gif, not \.avi"):
         make_video([], ".avi")
-
-
-def test_a_gif_that_lasts_longer_than_asked_is_found_out(tmp_path):
-    """As many pictures as 15 in a second, each shown for 70 ms, which is what GIFs can do."""
-    pictures = [np.full((24, 32, 3), k, dtype=np.uint8) for k in range(0, 150, 5)]
-    (tmp_path / "a.gif").write_bytes(
-        encode_gif(pictures, Style(width=32, height=24, fps=100 / 7), pictures[:2])
-    )
-    with pytest.raises(ValueError, match=r"30 pictures of \(32, 24\) were found, not 29"):
-        check_video(tmp_path / "a.gif", ".gif", Style(width=32, height=24, seconds=2.0, fps=15))
-
-
-def test_an_mp4_of_another_rate_is_found_out(tmp_path):
-    (tmp_path / "a.mp4").write_bytes(made(".mp4"))
-    slower = Style(width=320, height=240, seconds=2.0, fps=5)
-    with pytest.raises(ValueError, match="1 s were found, not 2 s"):
-        check_video(tmp_path / "a.mp4", ".mp4", slower)
