@@ -3,12 +3,11 @@
 import os
 import signal
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
-from itertools import islice
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from multiprocessing import get_context, resource_tracker
-from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnContext
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from swarm_mj.system.interrupt import INTERRUPTS, deferred_interrupt
 from swarm_mj.system.processes import guard
@@ -39,93 +38,37 @@ def run_jobs(
         A piece's index and its product, in the order in which they are done.
 
     Raises:
-        ValueError: There is no process to do it.
         OSError: A process ended before its work did.
         Exception: What `work` raised of the first piece that failed.
     """
-    if num_jobs < 1:
-        raise ValueError(f"work needs 1 process or more, not {num_jobs}")
-    if min(num_jobs, len(pieces)) <= 1:
+    num_jobs = min(num_jobs, len(pieces))
+    if num_jobs <= 1:
         yield from ((index, work(piece)) for index, piece in enumerate(pieces))
         return
-    waiting = iter(enumerate(pieces))
-    under_way: dict[Connection, int] = {}
-    context = get_context("spawn")
-    with ExitStack() as stack:
-        watch = stack.enter_context(guard())
+    # Forked processes would inherit locks that MuJoCo's threads hold.
+    with guard() as watch, ProcessPoolExecutor(num_jobs, get_context("spawn")) as pool:
         with _surrounded():
             resource_tracker.ensure_running()  # multiprocessing's; to start it lifts all shields
         with deferred_interrupt() as is_interrupted, _shielded(), _surrounded():
-            each = (_worker(work, context, watch) for _ in range(min(num_jobs, len(pieces))))
-            workers = [stack.enter_context(worker) for worker in each]
-        if is_interrupted():
-            raise KeyboardInterrupt
-        for worker in workers:
-            _hand_out(waiting, worker, under_way)
-        while under_way:
-            for worker in _ready(under_way):
-                index, product = under_way.pop(worker), _receive(worker)
-                _hand_out(waiting, worker, under_way)
-                yield index, product
-
-
-def _hand_out(
-    waiting: Iterator[tuple[int, Any]], worker: Connection, under_way: dict[Connection, int]
-) -> None:
-    """Give a worker the next piece, if there is one."""
-    for index, piece in islice(waiting, 1):
-        worker.send(piece)
-        under_way[worker] = index
-
-
-def _ready(under_way: dict[Connection, int]) -> list[Connection]:
-    """Return the workers that have something to say, waiting for the first."""
-    return [worker for worker in wait(list(under_way)) if isinstance(worker, Connection)]
-
-
-def _receive(worker: Connection) -> Any:  # noqa: ANN401 - any product
-    """Return a worker's product; raises what its work raised."""
-    try:
-        product, error = worker.recv()
-    except (EOFError, ConnectionError):
-        raise OSError("a job was ended from outside, perhaps for want of memory") from None
-    if error is not None:
-        raise error
-    return product
-
-
-@contextmanager
-def _worker(
-    work: Callable[[Any], Any], context: SpawnContext, watch: Callable[[int], None]
-) -> Iterator[Any]:
-    """Return a process that works until the block ends; yields the connection to it."""
-    ours, theirs = context.Pipe()
-    process = context.Process(target=_serve, args=(work, theirs), daemon=True)
-    process.start()
-    theirs.close()  # so that the process's end is heard
-    try:
-        watch(process.ident or 0)
-        yield ours
-    finally:
-        process.kill()
-        process.join()
-
-
-def _serve(work: Callable[[Any], Any], connection: Connection) -> None:
-    """Return a process's life: works until nobody wants it any more."""
-    with suppress(EOFError, ConnectionError):
-        while True:
-            piece = connection.recv()
-            try:
-                reply = work(piece), None
-            except Exception as error:
-                reply = None, error
-            connection.send(reply)
+            futures = {pool.submit(work, piece): index for index, piece in enumerate(pieces)}
+            # The pool itself leaves its processes waiting for work for ever if this one is killed.
+            for process in pool._processes.values():
+                watch(process.pid or 0)
+        try:
+            if is_interrupted():
+                raise KeyboardInterrupt
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except BrokenProcessPool:
+            raise OSError("a job was ended from outside, perhaps for want of memory") from None
+        finally:
+            for process in list(pool._processes.values()):
+                process.kill()  # without waiting for the pieces under way
 
 
 @contextmanager
 def _shielded() -> Iterator[None]:
-    """Process started within it hear no Ctrl-C, even as they load."""
+    """Keep Ctrl-C from processes that are started meanwhile, even as they load."""
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
     try:
         yield
@@ -135,7 +78,7 @@ def _shielded() -> Iterator[None]:
 
 @contextmanager
 def _surrounded() -> Iterator[None]:
-    """Process started within it start no more threads, draw nothing, load nothing from here."""
+    """Let processes that are started meanwhile inherit SURROUNDINGS."""
     before = dict(os.environ)
     os.environ.update(SURROUNDINGS)
     try:

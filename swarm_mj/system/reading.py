@@ -1,17 +1,15 @@
-"""The one way of reading what others wrote: nothing is believed that was not checked.
+"""Strict reading of files that others wrote: nothing is believed that was not checked.
 
 Files are regular, and no larger than expected. The rows of a table have as many cells as it has
-columns. JSON has the keys of a dataclass, all of them and no others, its numbers are finite, and it
-is not nested without end. Ranges are the dataclass's own.
+columns. JSON has the keys of a dataclass, all of them and no others, and its numbers are finite.
+Ranges are the dataclass's own.
 """
 
 import csv
 import io
 import os
 import stat
-from collections.abc import Iterable
 from dataclasses import fields, is_dataclass
-from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, BinaryIO, TypeVar
 
@@ -23,8 +21,7 @@ Kind = TypeVar("Kind")
 
 Row = tuple[int, dict[str, str]]
 
-MOST_LEVELS = 20  # lists and objects within each other
-MOST_WORDS = 160  # characters of what msgspec says
+MAX_LETTERS = 160  # of what msgspec says
 
 
 def open_file(path: Path, what: str, *, folder: Path | None = None) -> BinaryIO:
@@ -54,12 +51,7 @@ def open_file(path: Path, what: str, *, folder: Path | None = None) -> BinaryIO:
 
 
 def read_file(path: Path, what: str, most_bytes: int, *, folder: Path | None = None) -> bytes:
-    """All that a file holds; see `open_file`.
-
-    Raises:
-        ValueError: It cannot be read, or holds more than that.
-        OSError: The disk fails.
-    """
+    """Return all that a file holds; raise ValueError, as `open_file` does, or if that is more."""
     with open_file(path, what, folder=folder) as file:
         size = os.fstat(file.fileno()).st_size
         content = b"" if size > most_bytes else file.read(most_bytes + 1)
@@ -93,7 +85,7 @@ def read_rows(path: Path, what: str, most_bytes: int) -> tuple[list[str], list[R
 
 
 def read_json(text: bytes | str, kind: type[Kind]) -> Kind:
-    """What a text of JSON says, as a dataclass or another type that msgspec knows.
+    """Return a text of JSON as a dataclass or another type that msgspec knows.
 
     Raises:
         ValueError: It is no JSON, is nested too deep, or is not of the kind.
@@ -102,12 +94,12 @@ def read_json(text: bytes | str, kind: type[Kind]) -> Kind:
 
 
 def read_document(text: bytes | str, name: str, version: int, kind: type[Kind]) -> Kind:
-    """As `read_json`, of a JSON object that begins with its `format` and `format_version`.
+    """Read JSON as `read_json` does, of an object with a `format` and a `format_version`.
 
     Raises:
         ValueError: It has another format, or a newer version of it; else as `read_json`.
     """
-    document = _plain(text)
+    document: Any = _plain(text)
     header = read_plain(document, _Header)
     if header.format != name:
         raise ValueError(f'its format must be "{name}", not {header.format!r:.40}')
@@ -116,91 +108,69 @@ def read_document(text: bytes | str, name: str, version: int, kind: type[Kind]) 
             f"its format_version is {header.format_version}, and this swarm_mj reads {version}; "
             "update it"
         )
-    return read_plain(document, kind, bases=(_Header,))
+    names = _Header.__struct_fields__
+    return read_plain({key: document[key] for key in document if key not in names}, kind)
 
 
-def format_of(text: bytes | str) -> str:
-    """Return the `format` that a JSON object begins with; raises ValueError if it has none."""
-    return read_plain(_plain(text), _Header).format
-
-
-def read_plain(value: object, kind: type[Kind], bases: tuple[type, ...] = ()) -> Kind:
-    """Numbers, texts, lists and dicts as a dataclass, or another type that msgspec knows.
+def read_plain(value: object, kind: type[Kind]) -> Kind:
+    """Return numbers, texts, lists and dicts as a dataclass, or another type that msgspec knows.
 
     Raises:
         ValueError: They are not of the kind.
     """
     try:
-        found = msgspec.convert(_by_new_names(value, kind), _strict(kind, bases), dec_hook=_made)
-        return msgspec.convert(found, kind, from_attributes=True, dec_hook=_made)
+        return msgspec.convert(_with_all_keys(value, kind), kind, dec_hook=_made)
     except msgspec.ValidationError as error:
         raise ValueError(_in_a_line(error)) from error
 
 
 class _Header(msgspec.Struct):
-    """What documents of any version begin with."""
+    """The beginning of documents of any version."""
 
     format: str
     format_version: Annotated[int, msgspec.Meta(ge=1)]
 
 
 def _plain(text: bytes | str) -> object:
-    """What is in a text of JSON, which is not nested without end."""
     try:
-        value = msgspec.json.decode(text)
-        _check_levels([value])
+        return msgspec.json.decode(text)
     except RecursionError as error:
         raise ValueError("it is nested too deep") from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise ValueError(_in_a_line(error)) from error
-    return value
 
 
 def _in_a_line(error: Exception) -> str:
-    return " ".join(str(error)[:MOST_WORDS].split())
+    return " ".join(str(error)[:MAX_LETTERS].split())
 
 
 def _made(kind: type[Any], value: object) -> object:
-    """A value of a type that msgspec does not know, such as a path; TypeError unless of a text."""
+    """Make a value of a type that msgspec does not know, such as a path, of a text."""
     if not isinstance(value, str | kind):
         raise TypeError(f"Expected `{kind.__name__}`, not {type(value).__name__}")
     return kind(value)
 
 
-@cache
-def _strict(kind: Any, bases: tuple[type, ...] = ()) -> Any:  # noqa: ANN401 - any type
-    """Like a dataclass, but all keys are needed and no others known; other types are themselves.
+def _with_all_keys(value: Any, kind: object, at: str = "$") -> Any:  # noqa: ANN401 - any plain value
+    """Return a dataclass's plain values by the present names of its fields, nested ones included.
 
-    Fields that say `may_lack` are newer than some files: there they have their default.
+    msgspec itself would fill in what lacks and drop what is unknown: a damaged or newer file would
+    pass. Fields that say `may_lack` are newer than some files: there they have their default.
+
+    Raises:
+        ValueError: A field lacks, or a key is no field.
     """
-    if not (isinstance(kind, type) and is_dataclass(kind)):
-        return kind
-    keys = [
-        (spec.name, _strict(spec.type), spec.default)
-        if spec.metadata.get("may_lack")
-        else (spec.name, _strict(spec.type))
-        for spec in fields(kind)
-    ]
-    return msgspec.defstruct(
-        f"_{kind.__name__}", keys, bases=bases or None, forbid_unknown_fields=True, kw_only=True
-    )
-
-
-def _by_new_names(value: Any, kind: object) -> Any:  # noqa: ANN401 - any plain value
-    """Return plain values with the present names of a dataclass's fields, nested ones included."""
     if not (isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict)):
         return value
-    kinds: dict[Any, Any] = {spec.name: spec.type for spec in fields(kind)}
-    missing = kinds.keys() - value.keys()
-    new = {old: name for old, name in FORMER_NAMES.items() if name in missing}
+    known = {spec.name: spec for spec in fields(kind)}
+    lacking = known.keys() - value.keys()
+    new = {old: name for old, name in FORMER_NAMES.items() if name in lacking}
     named = {new.get(key, key): each for key, each in value.items()}
-    return {key: _by_new_names(each, kinds.get(key)) for key, each in named.items()}
-
-
-def _check_levels(values: Iterable[Any], num_levels: int = 0) -> None:
-    """Raise RecursionError if lists and objects are nested too deep."""
-    if num_levels > MOST_LEVELS:
-        raise RecursionError
-    for value in values:
-        if isinstance(value, list | dict):
-            _check_levels(value.values() if isinstance(value, dict) else value, num_levels + 1)
+    for key in named.keys() - known.keys():
+        raise ValueError(f"Object contains unknown field `{key:.40}` - at `{at}`")
+    for name in known.keys() - named.keys():
+        if not known[name].metadata.get("may_lack"):
+            raise ValueError(f"Object missing required field `{name}` - at `{at}`")
+    return {
+        key: _with_all_keys(each, known[key].type, f"{at}.{key}") for key, each in named.items()
+    }

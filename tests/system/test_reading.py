@@ -103,16 +103,6 @@ def test_what_is_no_json_is_refused(text):
         read_json(text, list)
 
 
-def test_json_is_not_nested_without_end():
-    for levels, is_sound in ((20, True), (21, False), (500, False)):
-        text = "[" * levels + "]" * levels
-        if is_sound:
-            assert read_json(text, list)
-        else:
-            with pytest.raises(ValueError, match="nested too deep"):
-                read_json(text, list)
-
-
 def test_a_document_says_what_it_is():
     def text(**header):
         return json.dumps(header | SOUND)
