@@ -8,8 +8,8 @@ same files.
 
 import hashlib
 import json
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,27 +18,26 @@ from swarm_mj.system.atomic import append_bytes, write_bytes
 from swarm_mj.system.reading import read_file, read_json
 
 DIGEST_DIGITS = 16
-NUMBER_BYTES = 32  # that a number takes, at most
-SPARE_BYTES = 1_000_000  # that a file of another evaluation may have more, to be told so
+MAX_BYTES = 2**32  # four times what 100 000 missions of 40 policies take
 
 
 def progress_path(output: Path) -> Path:
-    """Where the progress towards an output is kept: beside it."""
+    """Return where the progress towards an output is kept: beside it."""
     return output.with_name(f"{output.name}.progress")
 
 
 def start(path: Path, header: dict[str, Any]) -> None:
-    """Begins a progress file, in place of any other; raises OSError if that cannot be."""
+    """Begin a progress file, in place of any other; raise OSError if that cannot be."""
     write_bytes(path, _line(b"", header))
 
 
 def append(path: Path, header: dict[str, Any], index: int, costs: BatchCosts) -> None:
-    """Add what a batch cost, by its index among the study's; raises OSError if that cannot be."""
+    """Add what a batch cost, by its index among the study's; raise OSError if that cannot be."""
     append_bytes(path, _line(_json(header), {"batch": index, "costs": asdict(costs)}))
 
 
 def resume(path: Path, header: dict[str, Any], batches: Sequence[Batch]) -> dict[int, BatchCosts]:
-    """What an interrupted evaluation of these batches has flown, by their indices.
+    """Return what an interrupted evaluation of these batches has flown, by their indices.
 
     A line that was cut off is dropped from the file; it is begun anew if not even its header, what
     the batches depend on, was written.
@@ -48,7 +47,7 @@ def resume(path: Path, header: dict[str, Any], batches: Sequence[Batch]) -> dict
             kind.
         OSError: The file cannot be read or written.
     """
-    content = read_file(path, "progress", _most_bytes(header, batches))
+    content = read_file(path, "progress", MAX_BYTES)
     whole, _, cut_off = content.rpartition(b"\n")
     if not whole and _line(b"", header).startswith(cut_off):
         start(path, header)
@@ -64,7 +63,7 @@ def resume(path: Path, header: dict[str, Any], batches: Sequence[Batch]) -> dict
         flown = [read_json(_checked(first, line), _Flown) for line in rest]
     except ValueError as error:
         raise ValueError(damage) from error
-    if difference := _difference("", before, header):
+    if difference := next(_differences("", before, header), ""):
         raise ValueError(
             f"progress {path} is of another evaluation: {difference}; repeat that one, or start "
             "over with --force instead of --resume"
@@ -98,7 +97,7 @@ def _line(first: bytes, content: dict[str, Any]) -> bytes:
 
 
 def _checked(first: bytes, line: bytes) -> bytes:
-    """Return the JSON of a line; raises ValueError if its digest does not say so."""
+    """Return the JSON of a line; raise ValueError if it does not have its digest."""
     digest, _, text = line.partition(b" ")
     if digest != _digest(first + text):
         raise ValueError("a line does not have its digest")
@@ -113,22 +112,15 @@ def _json(content: dict[str, Any]) -> bytes:
     return json.dumps(content, allow_nan=False).encode()
 
 
-def _most_bytes(header: dict[str, Any], batches: Sequence[Batch]) -> int:
-    """What the progress of these batches takes, and more."""
-    kinds = len(fields(BatchCosts))
-    numbers = sum(kinds * (1 + len(each.seeds)) + num_ages(each.mission) for each in batches)
-    return 2 * (len(_json(header)) + NUMBER_BYTES * numbers + SPARE_BYTES)
-
-
-def _difference(name: str, before: object, now: object) -> str:
-    """Where two pieces of JSON first differ, in words; empty if nowhere."""
+def _differences(name: str, before: object, now: object) -> Iterator[str]:
+    """Say in words where two pieces of JSON differ."""
     if isinstance(before, dict) and isinstance(now, dict):
-        keys = dict.fromkeys([*now, *before])
-        found = (_difference(key, before.get(key), now.get(key)) for key in keys)
-        return next(filter(None, found), "")
-    if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
-        found = (_difference(name, *pair) for pair in zip(before, now, strict=True))
-        return next(filter(None, found), "")
-    if isinstance(before, list) and isinstance(now, list):
-        return f"it has {len(before)} {name}, not {len(now)}"
-    return "" if before == now else f"its {name} is {before!r:.80}, not {now!r:.80}"
+        for key in dict.fromkeys([*now, *before]):
+            yield from _differences(key, before.get(key), now.get(key))
+    elif isinstance(before, list) and isinstance(now, list):
+        if len(before) != len(now):
+            yield f"it has {len(before)} {name}, not {len(now)}"
+        for pair in zip(before, now, strict=False):
+            yield from _differences(name, *pair)
+    elif before != now:
+        yield f"its {name} is {before!r:.80}, not {now!r:.80}"
