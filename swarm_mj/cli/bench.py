@@ -46,7 +46,7 @@ class BenchOptions:
 
 
 def run(options: BenchOptions) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command; return its exit code."""
     tell_cores(options.jobs if options.episodes else 1)
     tell_cores(options.threads, "threads")
     with Console(stderr=True).status("Measuring ...") as status:

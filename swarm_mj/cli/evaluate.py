@@ -1,6 +1,6 @@
 """`swarm-mj evaluate`: policies over the same missions, with error bars."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -22,7 +22,7 @@ from swarm_mj.evaluation.run_study import (
     study_bar,
 )
 from swarm_mj.evaluation.study import Study
-from swarm_mj.evaluation.summary import Evaluated, summarise, write_evaluated
+from swarm_mj.evaluation.summary import summarise, write_evaluated
 from swarm_mj.evaluation.table import print_results
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import listed, normalised, stored_policies, with_payload
@@ -82,30 +82,25 @@ class EvaluateOptions(PolicyOptions):
 
 
 def run(options: EvaluateOptions) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command; return its exit code."""
     need("scipy", "an evaluation")
     study = options.study
-    check_outputs(
-        Output("--json", options.json, ".json"),
-        Output("--csv", options.csv, ".csv"),
-        inputs=stored_policies(options.policy),
-        must_be_new=not options.force,
-    )
+    outputs = Output("--json", options.json, ".json"), Output("--csv", options.csv, ".csv")
+    inputs = stored_policies(options.policy)
+    check_outputs(*outputs, inputs=inputs, must_be_new=not options.force)
     way_out = "choose fewer --jobs, --robots, --windows or --episodes"
     needs, output = study_needs(study, options.jobs), options.json or options.csv
     check_fits(needs, output, way_out, is_forced=options.yes)
     with ExitStack() as stack:
         for path in filter(None, (options.json, options.csv)):
             stack.enter_context(owned(path))
-        return _evaluate(options, study)
+        return _evaluate(options, study, _progress_file(options, outputs))
 
 
-def _evaluate(options: EvaluateOptions, study: Study) -> int:
-    """Flies what is left of a study, and writes what it came to."""
-    kept = _progress_file(options)
+def _evaluate(options: EvaluateOptions, study: Study, kept: Path | None) -> int:
+    """Fly the rest of a study, and write its results; `kept` is the progress file."""
     tell_cores(options.jobs)
-    console = Console(stderr=True, highlight=False)
-    header = study.header()
+    console, header = Console(stderr=True, highlight=False), study.header()
     costs: dict[int, BatchCosts] = {}
     if kept and options.resume and kept.exists():
         costs = progress.resume(kept, header, study.batches)
@@ -124,22 +119,25 @@ def _evaluate(options: EvaluateOptions, study: Study) -> int:
         return FAILED if is_memory else INTERRUPTED
     with deferred_interrupt():
         evaluated = summarise(study, costs, header)
-        _write(options, evaluated)
+        results = [each.result for each in evaluated]
+        if options.json:
+            write_evaluated(options.json, evaluated)
+        if options.csv:
+            write_csv(options.csv, results)
         if kept:
             kept.unlink()
-    print_results([each.result for each in evaluated])
+    print_results(results)
     return DONE
 
 
-def _progress_file(options: EvaluateOptions) -> Path | None:
-    """The progress file, or None without outputs; raises ValueError if it may not be replaced."""
+def _progress_file(options: EvaluateOptions, outputs: Iterable[Output]) -> Path | None:
+    """Return the progress file, or None without outputs; raise ValueError if it is in the way."""
     output = options.json or options.csv
     if output is None:
         if options.resume:
             raise ValueError("--resume needs the --json or --csv of the run that was interrupted")
         return None
     kept = progress.progress_path(output)
-    outputs = Output("--json", options.json), Output("--csv", options.csv)
     check_outputs(Output("progress", kept), *outputs)  # also against a link to the progress
     if kept.exists() and not (options.resume or options.force):
         raise ValueError(
@@ -147,10 +145,3 @@ def _progress_file(options: EvaluateOptions) -> Path | None:
             "over with --force"
         )
     return kept
-
-
-def _write(options: EvaluateOptions, evaluated: Sequence[Evaluated]) -> None:
-    if options.json:
-        write_evaluated(options.json, evaluated)
-    if options.csv:
-        write_csv(options.csv, [each.result for each in evaluated])

@@ -41,13 +41,14 @@ class FiguresOptions:
 
 
 def run(options: FiguresOptions) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command; return its exit code."""
     paths = _paths(options)
     needs = figures_needs(options.results, sum(map(len, paths.values())))
     check_fits(needs, options.out, "draw fewer results at once", is_forced=options.yes)
     results = [result for path in options.results for result in _papers(path)]
+    console = plain_console()
     with Console(stderr=True).status("Drawing ...") as status:
-        # matplotlib takes its time to import; a cache that it cannot keep is no news
+        # matplotlib takes its time to import; it would warn of a cache that it cannot write.
         logging.getLogger("matplotlib").setLevel(logging.ERROR)
         from swarm_mj.evaluation.figures.curves import NoPointsError
         from swarm_mj.evaluation.figures.drawing import draw_figure
@@ -63,43 +64,40 @@ def run(options: FiguresOptions) -> int:
                 is_last_hope = name == FIGURES[-1] and set(drawn) <= {FLOCK}
                 if options.figure != FIGURES or is_last_hope:
                     raise
-        for name in drawn:
-            status.update(f"Writing {name} ...")
-            for path in paths[name]:
-                save(drawn[name], path)
-    written = " ".join(str(path) for name in drawn for path in paths[name])
-    plain_console().print(f"Wrote {written}")
+        written = [(drawn[name], path) for name in drawn for path in paths[name]]
+        for figure, path in written:  # once all are drawn, so that a failure writes none
+            status.update(f"Writing {path.name} ...")
+            save(figure, path)
+    console.print(f"Wrote {' '.join(str(path) for _, path in written)}")
     if left_out := ", ".join(name for name in paths if name not in drawn):
-        plain_console().print(f"Left out {left_out}: the results hold no point of them")
+        console.print(f"Left out {left_out}: the results hold no point of them")
     return 0
 
 
 def _papers(path: Path) -> list[Result]:
-    """A file's results; raises ValueError for those that the paper's values cannot stand beside."""
+    """Return a file's results; raise ValueError for those not comparable with the paper's."""
     results = read_results(path)
     for row, result in enumerate(results, start=1):
-        added = components_in(vars(result)).names | (
-            {"radio": result.radio} if result.radio else {}
-        )
-        added |= {"arena": result.arena} if result.arena != OPEN else {}
-        added |= (
-            {"prior knowledge": result.prior_knowledge} if result.prior_knowledge != NOTHING else {}
-        )
+        known = result.prior_knowledge
+        added = components_in(vars(result)).names | {
+            "radio": result.radio,
+            "arena": None if result.arena == OPEN else result.arena,
+            "prior knowledge": None if known == NOTHING else known,
+        }
         for kind, name in added.items():
-            raise ValueError(
-                f"figures compare with the paper's values, but row {row} of {path} was flown with "
-                f"the {kind} {name}; leave such rows out, or chart them with "
-                f"`swarm_mj.evaluate(...).plot()` in Python"
-            )
+            if name:
+                raise ValueError(
+                    f"figures compare with the paper's values, but row {row} of {path} was flown "
+                    f"with the {kind} {name}; leave such rows out, or chart them with "
+                    f"`swarm_mj.evaluate(...).plot()` in Python"
+                )
     return results
 
 
 def _paths(options: FiguresOptions) -> dict[str, list[Path]]:
-    """Return the files of each figure; raises ValueError for those that cannot be written."""
+    """Return the files of each figure; raise ValueError for those that cannot be written."""
     endings = dict.fromkeys(options.format)
-    paths = {
-        name: [options.out / f"{name}.{ending}" for ending in endings] for name in options.figure
-    }
+    paths = {name: [options.out / f"{name}.{end}" for end in endings] for name in options.figure}
     check_outputs(
         *(Output("figure", path) for own in paths.values() for path in own),
         inputs=(*options.results, *stored_policies([options.flock_policy])),

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from swarm_mj.cli.mission_options import mission_flags, one_mission
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
 from swarm_mj.policies.registry import POLICIES, SHIPPED, flown_name, make_policy, normalised
-from swarm_mj.protocol.packets import Packet, times
+from swarm_mj.protocol.packets import times
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import as_typed, setting
 from swarm_mj.system.packages import is_installed, missing
@@ -52,36 +52,40 @@ class PoliciesOptions:
 
 
 def run(options: PoliciesOptions) -> int:
-    """Run the command; returns its exit code."""
+    """Run the command; return its exit code."""
+    mission, names = options.mission, [options.name]
     if options.name is None:
-        flown = dict.fromkeys(flown_name(name, options.mission) for name in POLICIES)
-        names = [name for name in flown if _can_be_made(name)]
-    else:
-        names = [options.name]
+        flown = dict.fromkeys(flown_name(name, mission) for name in POLICIES)
+        names = [name for name in flown if name != SHIPPED or is_installed("torch")]
+        if len(names) < len(flown):
+            plain_console(is_error=True).print(missing("torch", f"{SHIPPED} is left out: it"))
     with Console(stderr=True).status("Loading ..."):
-        made = {name: make_policy(name, options.mission) for name in names}
-    facts = [facts_of(name, policy, options.mission) for name, policy in made.items()]
+        facts = [facts_of(name, make_policy(name, mission), mission) for name in names if name]
     if options.json:
         sys.stdout.write(json.dumps(facts if options.name is None else facts[0], indent=2) + "\n")
     elif options.name is None:
-        _print_all(facts, options.mission)
+        _print_all(facts, mission)
     else:
-        _print_one(facts[0], options.mission)
+        _print_one(facts[0], mission)
     return DONE
 
 
 def facts_of(name: str, policy: Policy, mission: Mission) -> dict[str, Any]:
-    """What a policy says of itself, as `--json` has it."""
-    kind = type(policy)
-    is_broadcast = policy.window(mission).is_broadcast
+    """Return a policy's description of itself, as `--json` has it."""
+    kind, packet = type(policy), policy.packet(mission)
+    entries = [times(field, packet.num_entries) for field in packet.entry]
     return {
         "name": name,
         "is_centralised": isinstance(policy, CentralisedPolicy),
-        "window": "broadcasts" if is_broadcast else "request",
+        "window": "broadcasts" if policy.window(mission).is_broadcast else "request",
         "uses": policy.uses,
         "payload": policy.payload,
-        "packet_bytes": policy.packet(mission).num_bytes,
-        "packet_fields": _fields(policy.packet(mission)),
+        "packet_bytes": packet.num_bytes,
+        "packet_fields": [
+            {"name": field.name, "bits": field.bits, "count": field.count}
+            | ({"step": field.step, "unit": field.unit} if field.unit else {})
+            for field in (*packet.header, *entries, *packet.payload)
+        ],
         "probability": policy.parameters.get("probability"),
         "parameters": dict(policy.parameters),
         "class": f"{kind.__module__}.{kind.__qualname__}",
@@ -90,81 +94,49 @@ def facts_of(name: str, policy: Policy, mission: Mission) -> dict[str, Any]:
 
 
 def _print_all(facts: list[dict[str, Any]], mission: Mission) -> None:
+    """Print a table of the policies that decide alike, then what its words mean."""
     console = Console(highlight=False)
     for is_centralised, heading in HEADINGS.items():
-        table = Table(show_lines=True)
-        for column in ("policy", heading, "packets\ncarry", "window"):
-            table.add_column(column)
+        table = Table("policy", heading, "packets\ncarry", "window", show_lines=True)
         for each in facts:
             if each["is_centralised"] == is_centralised:
-                table.add_row(*_cells(each))
+                name, p = each["name"].replace(" --", "\n  --"), each["probability"]
+                name += "" if p is None else f"\n  p = {as_typed(p)}"
+                carried = "\n".join((*_carried(each), f"{each['packet_bytes']:,} bytes"))
+                table.add_row(name, each["uses"], carried, each["window"])
         console.print(table)
     plain = plain_console()
     plain.print(f"{LEGEND} {_described(mission)}.")
     plain.print(f"\nMore of one:  {this_command()} policies NAME")
 
 
-def _cells(each: dict[str, Any]) -> tuple[str, ...]:
-    probability = each["probability"]
-    name = each["name"].replace(" --", "\n  --")
-    name += "" if probability is None else f"\n  p = {as_typed(probability)}"
-    carried = [*_carried(each["payload"]), f"{each['packet_bytes']:,} bytes"]
-    return name, each["uses"], "\n".join(carried), each["window"]
-
-
-def _fields(packet: Packet) -> list[dict[str, Any]]:
-    """Return a packet's table of fields: how wide, how many, and how far apart two numbers are."""
-    entries = [times(field, packet.num_entries) for field in packet.entry]
-    return [
-        {"name": field.name, "bits": field.bits, "count": field.count}
-        | ({"step": field.step, "unit": field.unit} if field.unit else {})
-        for field in (*packet.header, *entries, *packet.payload)
-    ]
-
-
-def _packet_table(fields: list[dict[str, Any]]) -> Table:
-    table = Table(title="a packet", title_justify="left")
-    table.add_column("field")
-    for column in ("bits", "numbers", "step"):
-        table.add_column(column, justify="right")
-    for each in fields:
-        step = f"{each['step']:.3g} {each['unit']}" if "step" in each else ""
-        table.add_row(each["name"], str(each["bits"]), f"{each['count']:,}", step)
-    return table
-
-
-def _can_be_made(name: str) -> bool:
-    """Whether a policy's library is installed; says so if it is not."""
-    if name != SHIPPED or is_installed("torch"):
-        return True
-    plain_console(is_error=True).print(missing("torch", f"{name} is left out: it"))
-    return False
-
-
-def _carried(payload: str) -> tuple[str, ...]:
-    return ("T, M, P",) if payload == "none" else ("T, M, P", payload)
-
-
 def _print_one(each: dict[str, Any], mission: Mission) -> None:
-    """All of one policy, and how to fly it."""
+    """Print all of one policy, and how to fly it."""
     rows = {
         "who decides": "a centre" if each["is_centralised"] else "each robot by itself",
         "what it uses": each["uses"] or "it does not say: give its class a text `uses`",
         "in a window": WINDOWS[each["window"]],
-        "packets carry": ", ".join(_carried(each["payload"])),
+        "packets carry": ", ".join(_carried(each)),
         "packet": f"{each['packet_bytes']:,} bytes",
         **{name: as_typed(value) for name, value in each["parameters"].items()},
         "source": each["class"],
     }
     if each["probability"] is not None:
         rows["probability"] += f", tuned for {_described(mission)}"
-    shown = Console(highlight=False)
-    shown.print(named_values(each["name"], rows))
-    shown.print(_packet_table(each["packet_fields"]))
+    right = [Column(name, justify="right") for name in ("bits", "numbers", "step")]
+    packet = Table("field", *right, title="a packet", title_justify="left")
+    for field in each["packet_fields"]:
+        step = f"{field['step']:.3g} {field['unit']}" if "step" in field else ""
+        packet.add_row(field["name"], str(field["bits"]), f"{field['count']:,}", step)
+    Console(highlight=False).print(named_values(each["name"], rows), packet)
     console = plain_console()
     console.print(each["description"])
     policy = each["name"] if each["name"] in POLICIES else shlex.quote(each["name"])
     console.print(f"\nFly it:  {this_command()} fly --policy {policy} {mission_flags(mission)}")
+
+
+def _carried(each: dict[str, Any]) -> tuple[str, ...]:
+    return ("T, M, P",) if each["payload"] == "none" else ("T, M, P", each["payload"])
 
 
 def _described(mission: Mission) -> str:

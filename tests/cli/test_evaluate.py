@@ -245,7 +245,7 @@ def test_one_mission_of_one_window_has_results(swarm_mj, tmp_path):
         (["--resume"], "--resume needs the --json or --csv"),
         (["--csv", "r.json", "--json", "./r.json"], "same file"),
         (["--json", "o.json", "--csv", "o.json.progress"], "--csv must be named *.csv, not o.json"),
-        (["--csv", "."], "is a folder"),
+        (["--csv", "."], "--csv must be named *.csv, not ."),
     ],
 )
 def test_bad_input_is_one_clear_line(capsys, monkeypatch, tmp_path, options, complaint):

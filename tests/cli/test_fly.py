@@ -149,7 +149,7 @@ def test_contact_physics_flies(swarm_mj, tmp_path, boundary):
         (["--observer", "40"], "observer must be from 0 to 39, not 40"),
         (["--range-ratio", "0.02"], "too sparse"),
         (["--record", "replay.txt"], "must be named *.rrd"),
-        (["--json", "."], "is a folder"),
+        (["--json", "."], "--json must be named *.json, not ."),
         (["--json", "summary"], "--json must be named *.json, not summary"),
         (["--no-record", "--view"], "--view needs a replay"),
         (["--no-record", "--record", "a.rrd"], "not allowed with"),
