@@ -6,7 +6,6 @@ from datetime import timedelta
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import Task
 
 from swarm_mj.learning.choice import (
     ORACLE,
@@ -56,7 +55,9 @@ class Watch(WorkBar):
             self._console.print(f"Interrupted: {FINISHING}.")
         return not self.has_stopped
 
-    def _shown_what(self, _task: Task) -> str:
+    @property
+    def shown_what(self) -> str:
+        """The words before the bar, as they are drawn now."""
         # Asked at every redrawing, so Ctrl-C shows before the run reports again.
         return "Finishing" if self._is_interrupted() else self.what
 

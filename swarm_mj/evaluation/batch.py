@@ -148,7 +148,7 @@ class Tally:
         count_ages(swarm.buffers.timestamp, swarm.now, self._ages, is_active)
 
     def costs(self) -> BatchCosts:
-        """What the missions cost, all windows of them flown."""
+        """Return what the missions cost, all windows of them flown."""
         sums, num_windows = self._sums, self._swarm.mission.num_windows
         packets: dict[str, Any] = {name: _whole(sums[name]) for name in TOTALS}
         return BatchCosts(

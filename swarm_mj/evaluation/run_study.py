@@ -25,14 +25,14 @@ class Processes:
 
 
 def num_flown(study: Study, costs: Mapping[int, BatchCosts]) -> int:
-    """How many of a study's missions have been flown."""
+    """Return how many of a study's missions have been flown."""
     return sum(len(study.batches[index].seeds) for index in costs)
 
 
 def study_bar(
     study: Study, costs: Mapping[int, BatchCosts], console: Console, *, after_s: float = 0.0
 ) -> WorkBar:
-    """A bar of the missions of a study, as far as they are flown; arguments as of `WorkBar`."""
+    """Return a bar of a study's missions, as far as they are flown."""
     total, done = study.episodes * len(study.pairs), num_flown(study, costs)
     return WorkBar("Flying", total, "missions", completed=done, console=console, after_s=after_s)
 

@@ -118,7 +118,7 @@ class Study:
         return {pair: self.make_policy(pair[1], pair[0]).parameters for pair in self.pairs}
 
     def make_policy(self, policy: str, regime: Mission) -> Policy:
-        """A policy as it is evaluated in a regime; raises ValueError if its packets never fit."""
+        """Make a policy as it is evaluated in a regime; refuse one whose packets never fit."""
         is_deterministic = self.is_deterministic and is_learned(policy)
         made = make_policy(
             policy,
@@ -131,7 +131,7 @@ class Study:
         return made
 
     def task_cost(self, regime: Mission) -> tuple[str, str] | None:
-        """What a regime's controller calls its task's cost, and the unit; None if it has none."""
+        """Return the name and the unit of a regime's task cost; None if its controller has none."""
         controller = self.components.made(regime).controller or controller_of(regime)
         if not isinstance(controller, Costed):
             return None

@@ -29,14 +29,10 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def compiled(*, fastmath: bool | set[str] = False) -> Callable[[Function], Function]:
-    """Compiles a function when it is first called with arguments of new types.
+    """Compile a function when it is first called with arguments of new types.
 
-    Args:
-        fastmath: What LLVM may assume of floats. numba compiles a function with its first caller's
-            assumptions unless they are said, so here they always are.
-
-    Returns:
-        The decorator; type checkers see the function as it was.
+    numba compiles a function with its first caller's assumptions on floats, `fastmath`, unless they
+    are said, so here they always are. Type checkers see the function as it was.
     """
     # Checks for divisions by zero would keep loops that divide from being as fast as they can be.
     options: Any = {"fastmath": fastmath, "error_model": "numpy"}
@@ -63,27 +59,20 @@ def _whole(compile: Function) -> Function:
     LLVM calls back into Python meanwhile. There an exception is lost, a function is left half
     made, and the process fails later, or crashes when it ends.
     """
-
-    @functools.wraps(compile)
-    def compile_whole(*arguments: object) -> object:
-        with held_interrupts():
-            return compile(*arguments)
-
-    return cast(Function, compile_whole)
+    return cast(Function, lambda *arguments: held_interrupts()(compile)(*arguments))
 
 
-def _stamped(dispatcher: Any) -> Any:  # noqa: ANN401
+def _stamped(dispatcher: Any) -> Any:  # noqa: ANN401 - numba's
     """Let numba compare the digest before it unpickles the rest of an index.
 
     An index of other code may name classes that no longer exist, which would end the program.
     numba compares its own version first, so the digest joins it.
     """
-    index = dispatcher._cache._cache_file
-    index._version += index._source_stamp.hex()
+    dispatcher._cache._cache_file._version += digest(Path(dispatcher.py_func.__code__.co_filename))
     return dispatcher
 
 
-def digest(file: Path) -> bytes:
+def digest(file: Path) -> str:
     """Return a hash of a file and of all files that it imports, directly or through others.
 
     Those are files of this package, and of the file's own: users compile loops across files, too.
@@ -95,7 +84,7 @@ def digest(file: Path) -> bytes:
             found.add(path)
             waiting += _read(path)[1]
     hashes = [_read(path)[0] for path in sorted(found)]
-    return hashlib.sha256(b"".join(hashes)).digest()
+    return hashlib.sha256(b"".join(hashes)).hexdigest()
 
 
 @functools.cache
@@ -113,34 +102,17 @@ def _read(path: Path) -> tuple[bytes, list[Path]]:
     return hashlib.sha256(source).digest(), files
 
 
-class _WatchesImports:
-    """What a place for caches compares to tell whether a cached function is out of date."""
-
-    _py_file: str
-
-    def get_source_stamp(self) -> bytes:
-        """Return the digest of the function's file; numba asks by this name."""
-        return digest(Path(self._py_file))
-
-
-class InFolderGiven(_WatchesImports, caching.UserProvidedCacheLocator):
-    """In `NUMBA_CACHE_DIR`, if it is set."""
-
-
-class BesideFile(_WatchesImports, caching.InTreeCacheLocator):
-    """In the `__pycache__` of the function's file, if it can be written."""
-
-
-class InUsersFolder(_WatchesImports, caching.UserWideCacheLocator):
+class InUsersFolder(caching.UserWideCacheLocator):
     """In the user's cache folder, if there is one that can be written."""
 
     def ensure_cache_path(self) -> None:
-        """The name is numba's. A user without a home has `~/.cache`, in whatever folder this is."""
+        """Refuse the relative `~/.cache` of a user without a home; numba asks by this name."""
         if not Path(self.get_cache_path()).is_absolute():
             raise FileNotFoundError(self.get_cache_path())
         super().ensure_cache_path()
 
 
 LOCATORS = ",".join(
-    f"{place.__module__}.{place.__name__}" for place in (InFolderGiven, BesideFile, InUsersFolder)
+    f"{place.__module__}.{place.__name__}"
+    for place in (caching.UserProvidedCacheLocator, caching.InTreeCacheLocator, InUsersFolder)
 )

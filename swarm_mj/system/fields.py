@@ -68,7 +68,7 @@ def check(settings: Any) -> None:  # noqa: ANN401 - any dataclass
 
 
 def kind_of(spec: Field[Any]) -> Any:  # noqa: ANN401 - a type
-    """The type of a field's single value: `int` of `int`, `int | None` and `tuple[int, ...]`."""
+    """Return the type of a single value: `int` of `int`, `int | None` and `tuple[int, ...]`."""
     if get_origin(spec.type) is Literal:
         return str
     kinds = [kind for kind in get_args(spec.type) if kind not in (NoneType, Ellipsis)]
@@ -91,7 +91,7 @@ def as_typed(value: object) -> str:
 
 
 def did_you_mean(typed: object, known: Iterable[str]) -> str:
-    """The end of a complaint about an unknown name: the known one most like it, or nothing."""
+    """End a complaint about an unknown name: the known one most like it, or nothing."""
     names = {name.lstrip("-"): name for name in known}  # flags are not alike for their dashes
     bare = str(typed).lstrip("-")
     likely = [new for new in names if new == FORMER_NAMES.get(bare)]
@@ -101,7 +101,7 @@ def did_you_mean(typed: object, known: Iterable[str]) -> str:
 
 
 def check_names(what: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Pass if all keywords given are known; raises TypeError, as Python does, if one is not."""
+    """Pass if all keywords given are known; raise TypeError, as Python does, if one is not."""
     known = list(known)
     for name in given:
         if name not in known:
@@ -112,7 +112,7 @@ def check_names(what: str, given: Iterable[str], known: Iterable[str]) -> None:
 def check_kind(
     what: str, value: object, kinds: type[Any] | tuple[type[Any], ...], such_as: str
 ) -> None:
-    """Pass if an argument is of a kind; raises TypeError, naming one that is, if not."""
+    """Pass if an argument is of a kind; raise TypeError, naming one that is, if not."""
     if not isinstance(value, kinds):
         allowed = kinds if isinstance(kinds, tuple) else (kinds,)
         names = " or ".join(kind.__name__ for kind in allowed)
@@ -122,18 +122,14 @@ def check_kind(
 
 
 def name_of(part: Any) -> str:  # noqa: ANN401 - any function or object
-    """What a function, a class or an object is called: an object by its class, for messages."""
+    """Return the name of a function or a class, or of an object's class, for messages."""
     while isinstance(part, partial):
         part = part.func
     return getattr(part, "__name__", type(part).__name__)
 
 
 def check_callable(what: str, value: object, takes: tuple[str, ...]) -> None:
-    """Pass if an argument is None, or can be called with so many others.
-
-    Raises:
-        TypeError: It cannot, or it is a class.
-    """
+    """Raise TypeError unless an argument is None or callable with these arguments."""
     if value is None:
         return
     if isinstance(value, type) or not callable(value):
@@ -158,7 +154,7 @@ def _shown(value: object) -> str:
 
 
 def check_value(spec: Field[Any], value: Any, called: str = "") -> None:  # noqa: ANN401 - any field's value
-    """As `check`, for one value of a field, which may be `called` otherwise where it was given."""
+    """Check one value of a field, which may be `called` otherwise where it was given."""
     allowed = spec.metadata
     label = called or allowed.get("label", spec.name)
     kind, described = KINDS.get(kind_of(spec), (object, ""))

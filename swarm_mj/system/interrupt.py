@@ -2,7 +2,7 @@
 
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any
@@ -23,15 +23,8 @@ def interruptible() -> Iterator[Callable[[], bool]]:
         was_interrupted = True
         signal.default_int_handler(number, frame)
 
-    usual = (signal.SIG_DFL, signal.default_int_handler)
-    before = {number: handler for number, handler in _handlers().items() if handler in usual}
-    for number in before:
-        signal.signal(number, interrupt)
-    try:
+    with _heard_by(interrupt, in_place_of=(signal.SIG_DFL, signal.default_int_handler)):
         yield lambda: was_interrupted
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager
@@ -66,9 +59,21 @@ def held_interrupts() -> Iterator[None]:
 
 
 @contextmanager
-def _heard_by(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
-    # A job that its shell shields from Ctrl-C, or `nohup` from hang-ups, stays so.
-    before = {number: each for number, each in _handlers().items() if each != signal.SIG_IGN}
+def _heard_by(
+    handler: Callable[[int, FrameType | None], object], in_place_of: Container[Any] | None = None
+) -> Iterator[None]:
+    """Replace the handlers of interrupts, as far as they can be put back.
+
+    Only the main thread may do so, and a handler that is not Python's cannot be put back. One that
+    ignores a signal stays: a shell shields its job from Ctrl-C, `nohup` from hang-ups.
+    """
+    is_main = threading.current_thread() is threading.main_thread()
+    found = {number: signal.getsignal(number) for number in INTERRUPTS} if is_main else {}
+    before = {
+        number: each
+        for number, each in found.items()
+        if each not in (None, signal.SIG_IGN) and (in_place_of is None or each in in_place_of)
+    }
     for number in before:
         signal.signal(number, handler)
     try:
@@ -76,14 +81,3 @@ def _heard_by(handler: Callable[[int, FrameType | None], object]) -> Iterator[No
     finally:
         for number, each in before.items():
             signal.signal(number, each)
-
-
-def _handlers() -> dict[signal.Signals, Any]:
-    """Return the handlers of interrupts, as far as this thread may replace them and put them back.
-
-    Only the main thread may, and a handler that is not Python's cannot be put back.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        return {}
-    handlers = {number: signal.getsignal(number) for number in INTERRUPTS}
-    return {number: handler for number, handler in handlers.items() if handler is not None}

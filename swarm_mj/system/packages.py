@@ -13,22 +13,13 @@ BROUGHT_BY = {"PIL": "pillow", "dm_control": "dm-control", "rerun": "rerun-sdk"}
 
 
 def need(module: str, what: str, way_out: str = "") -> None:
-    """Pass if a module can be imported.
-
-    Args:
-        module: Its name, as it is imported.
-        what: What needs it.
-        way_out: How to do without it, if one can.
-
-    Raises:
-        ModuleNotFoundError: It is not installed; the message says how to install it.
-    """
+    """Raise ModuleNotFoundError unless a module can be imported; arguments as of `missing`."""
     if not is_installed(module):
         raise ModuleNotFoundError(missing(module, what, way_out), name=module)
 
 
 def missing(module: str, what: str, way_out: str = "") -> str:
-    """What to say of a module that is not installed; arguments as of `need`."""
+    """Return how to install a module that `what` needs, or how to do without it: the way out."""
     package = BROUGHT_BY.get(module, module.replace("_", "-"))
     instead = f", or {way_out}" if way_out else ""
     return (
@@ -37,7 +28,7 @@ def missing(module: str, what: str, way_out: str = "") -> str:
 
 
 def is_installed(module: str) -> bool:
-    """Whether a module, by its name as it is imported, can be."""
+    """Return whether a module, by its name as it is imported, can be."""
     return find_spec(module) is not None
 
 

@@ -6,7 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from typing import IO
+from typing import IO, Any
 
 # A Python that runs nothing out of the folder one stands in, where a numpy.py may lie.
 PYTHON = (sys.executable, "-P")
@@ -25,21 +25,19 @@ GATE = 'read -r go && exec "$@"'
 
 @contextmanager
 def guard() -> Iterator[Callable[[int], None]]:
-    """Return a process that kills others, computing or not, if this one ends within the block.
+    """Start a process that kills others, computing or not, if this one ends within the block.
 
-    Yields:
-        Takes the number of a process to be guarded, or minus that of a group. Processes that the
-        block is left with are its own to end.
+    It yields a function that takes the number of a process to be guarded, or minus that of a group.
+    Processes that the block is left with are its own to end.
     """
     command = [sys.executable, "-I", "-S", "-c", GUARD]
     # A session of its own: what ends a terminal's processes does not end it.
     with subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True) as process:
-        assert process.stdin is not None
+        pipe: Any = process.stdin
 
         def watch(number: int) -> None:
-            assert process.stdin is not None
-            process.stdin.write(b"%d\n" % number)
-            process.stdin.flush()
+            pipe.write(b"%d\n" % number)
+            pipe.flush()
 
         try:
             yield watch
@@ -54,12 +52,9 @@ def running(
     environment: Mapping[str, str] | None = None,
     output: IO[str] | None = None,
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """Return a program that ends, with all that it started, when the block or this process does.
+    """Start a program that ends, with all that it started, when the block or this process does.
 
-    Args:
-        command: The program and its arguments.
-        environment: Its variables; None is this process's.
-        output: Where all that it says goes; None is where this process's goes.
+    Its environment and the place of its output are this process's unless given.
     """
     with (
         guard() as watch,
@@ -72,11 +67,11 @@ def running(
             start_new_session=True,
         ) as process,
     ):
-        assert process.stdin is not None
+        pipe: Any = process.stdin
         try:
             watch(-process.pid)
-            process.stdin.write(b"go\n")
-            process.stdin.close()
+            pipe.write(b"go\n")
+            pipe.close()
             yield process
         finally:
             with suppress(ProcessLookupError):

@@ -1,13 +1,11 @@
 """The one bar of all long work: what is under way, how far it is, how long it will take."""
 
 import sys
-from collections.abc import Callable
 from threading import Timer
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, ProgressColumn, Task, TimeRemainingColumn
-from rich.text import Text
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 BAR_WIDTH = 20
 AFTER_S = 2.0  # shorter work from Python shows no bar
@@ -17,8 +15,8 @@ class WorkBar:
     """A bar on the terminal while a `with` statement lasts; it leaves nothing behind.
 
     Attributes:
-        what: What is under way.
-        text: What stands behind the bar.
+        what: The work under way.
+        text: Words behind the bar.
     """
 
     def __init__(
@@ -37,56 +35,53 @@ class WorkBar:
         Without a unit, it shows no numbers; the time left is by the speed so far. Work that is done
         in less than `after_s` shows no bar [s].
         """
-        self.what, self.text = what, ""
-        self._unit = unit
-        columns = [_Told(self._shown_what), BarColumn(BAR_WIDTH), _Told(self._shown_text)]
-        times = [TimeRemainingColumn()] if shows_time_left else []
+        self.what, self.text, self._unit = what, "", unit
         console = console or Console(stderr=True, highlight=False)
         self._bar = Progress(
-            *columns, *times, console=console, transient=True, disable=not console.is_terminal
+            TextColumn("{task.fields[bar].shown_what}", markup=False),
+            BarColumn(BAR_WIDTH),
+            TextColumn("{task.fields[bar].shown_text}", markup=False),
+            *([TimeRemainingColumn()] if shows_time_left else []),
+            console=console,
+            transient=True,
+            disable=not console.is_terminal,
         )
-        self._timer = Timer(after_s, self._bar.start) if after_s > 0.0 else None
-        self._id = self._bar.add_task("", total=total, completed=int(completed))
+        self._timer = Timer(after_s, self._bar.start)
+        self._timer.daemon = True
+        self._id = self._bar.add_task("", total=total, completed=int(completed), bar=self)
 
     def __enter__(self) -> "WorkBar":
-        if self._timer is None or self._bar.disable:
-            self._bar.start()
-        else:
-            self._timer.daemon = True
+        if self._timer.interval > 0.0 and not self._bar.disable:
             self._timer.start()
+        else:
+            self._bar.start()
         return self
 
     def __exit__(self, *error: object) -> None:
-        if self._timer is not None and self._timer.is_alive():
-            self._timer.cancel()
+        self._timer.cancel()
+        if self._timer.is_alive():
             self._timer.join()
         self._bar.stop()
 
     def advance(self, done: int = 1) -> None:
-        """So much more is done."""
+        """Count more work as done."""
         self._bar.advance(self._id, done)
 
     def move_to(self, completed: float | int) -> None:
-        """So much is done in all."""
+        """Set how much work is done in all."""
         self._bar.update(self._id, completed=completed)
 
-    def _shown_what(self, _task: Task) -> str:
+    @property
+    def shown_what(self) -> str:
+        """The words before the bar, as they are drawn now."""
         return self.what
 
-    def _shown_text(self, task: Task) -> str:
+    @property
+    def shown_text(self) -> str:
+        """The count and the words behind the bar, as they are drawn now."""
+        task = self._bar.tasks[0]
         count = f"{task.completed:.0f}/{task.total:.0f} {self._unit}" if self._unit else ""
         return ", ".join(filter(None, (count, self.text)))
-
-
-class _Told(ProgressColumn):
-    """A column of text that is asked for whenever it is drawn."""
-
-    def __init__(self, tell: Callable[[Task], str]) -> None:
-        super().__init__()
-        self._tell = tell
-
-    def render(self, task: Task) -> Text:
-        return Text(self._tell(task))
 
 
 def is_notebook() -> bool:

@@ -24,7 +24,7 @@ def code_digest() -> str:
 
 
 def commit() -> str | None:
-    """The checkout's commit, with `+` when the package differs from it; None outside a checkout."""
+    """Return the checkout's commit, with `+` if the package differs; None outside a checkout."""
     checkout = Path(__file__).resolve().parents[2]
     if not (checkout / ".git").exists():
         return None

@@ -162,12 +162,12 @@ def _with_all_keys(value: Any, kind: object, at: str = "$") -> Any:  # noqa: ANN
     """
     if not (isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict)):
         return value
-    known = {spec.name: spec for spec in fields(kind)}
+    known: dict[Any, Any] = {spec.name: spec for spec in fields(kind)}
     lacking = known.keys() - value.keys()
     new = {old: name for old, name in FORMER_NAMES.items() if name in lacking}
     named = {new.get(key, key): each for key, each in value.items()}
     for key in named.keys() - known.keys():
-        raise ValueError(f"Object contains unknown field `{key:.40}` - at `{at}`")
+        raise ValueError(f"Object contains unknown field `{key!s:.40}` - at `{at}`")
     for name in known.keys() - named.keys():
         if not known[name].metadata.get("may_lack"):
             raise ValueError(f"Object missing required field `{name}` - at `{at}`")

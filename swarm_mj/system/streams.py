@@ -42,7 +42,7 @@ def lasting_streams() -> Iterator[Callable[[], OSError | None]]:
 
 
 def _lasting(stream: Any, failures: list[OSError]) -> Any:  # noqa: ANN401 - of any kind
-    """A stream to the same file; the stream itself if it leads to none, or not only there."""
+    """Return a stream to the same file, or the stream itself if it leads elsewhere, too."""
     if not isinstance(stream, io.TextIOWrapper):  # a notebook's has its server's file number
         return stream
     with suppress(OSError):

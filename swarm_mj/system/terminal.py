@@ -10,17 +10,17 @@ from rich.table import Table
 
 
 def plain_console(*, is_error: bool = False) -> Console:
-    """A terminal that shows text as it is: no colours of its own, no broken lines, no markup."""
+    """Return a terminal that shows text as it is: no colours, no broken lines, no markup."""
     return Console(stderr=is_error, highlight=False, soft_wrap=True, markup=False)
 
 
 def num_cores() -> int:
-    """How many cores this process may use."""
+    """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 def tell_cores(number: int, what: str = "jobs") -> None:
-    """Says, in one line, if there are more jobs than cores to run them, or more threads."""
+    """Say in one line if there are more jobs than cores to run them, or more threads."""
     cores = num_cores()
     if number > cores:
         plain_console(is_error=True).print(
@@ -38,7 +38,7 @@ def named_values(title: str, rows: dict[str, str], caption: str | None = None) -
 
 
 def this_command(name: str = "swarm-mj") -> str:
-    """How the reader can call a program beside this Python: by name, or by path if it must be."""
+    """Return how to call a program beside this Python: by name, or by path if it must be."""
     program = Path(sys.executable).with_name(name)
     found = shutil.which(name)
     if (found and Path(found) == program) or not program.exists():
