@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from swarm_mj.learning.choice import (
+from swarm_mj.learning.run_folder import Limits, Progress, Run
+from swarm_mj.learning.selection import (
     ORACLE,
     ORACLE_ROBOTS,
     REFERENCES,
@@ -15,7 +16,6 @@ from swarm_mj.learning.choice import (
     has_stalled,
     reference_missions,
 )
-from swarm_mj.learning.run_folder import Limits, Progress, Run
 from swarm_mj.system.progress import WorkBar
 
 if TYPE_CHECKING:  # stable-baselines3 takes its time to import

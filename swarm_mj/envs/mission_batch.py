@@ -53,6 +53,7 @@ class MissionBatch:
     ) -> None:
         """Take the missions, which `restart` begins; arguments as in `options.make_batch`."""
         self.mission, self.num_missions = mission, num_missions
+        self.shape = (num_missions, mission.num_robots)  # B N
         self.features, self.reward, self.with_parents = features, reward, with_parents
         self.swarm: Swarm | None = None  # made when it begins
         self._components = components
@@ -136,14 +137,13 @@ class MissionBatch:
     def is_active(self) -> Bool[np.ndarray, "B N"]:
         """Robots that have not been switched off."""
         is_active = self.flown.states.is_active
-        shape = (self.num_missions, self.mission.num_robots)
-        return np.ones(shape, dtype=np.bool_) if is_active is None else is_active
+        return np.ones(self.shape, dtype=np.bool_) if is_active is None else is_active
 
     @property
     def observation(self) -> Observation:
         """The robots' present view, new arrays of shape [B, N, ...]; see `spaces.robot_spaces`."""
         num_robots = self.mission.num_robots
-        shape = (self.num_missions, num_robots, num_robots)
+        shape = (*self.shape, num_robots)
         # Silence is always allowed: a user's own features may forget it, and samplers need one way.
         may_address = self.graphs.may_address.reshape(shape) | np.eye(num_robots, dtype=np.bool_)
         seen = {

@@ -13,9 +13,16 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_mj.learning import checkpoint
-from swarm_mj.learning.choice import Row, candidates, has_stalled, reserved_minutes
 from swarm_mj.learning.graph_vec_env import env_of
-from swarm_mj.learning.held_out import HeldOut, evaluate, record_replay
+from swarm_mj.learning.held_out import (
+    HeldOut,
+    choose,
+    evaluate,
+    notes_of_choice,
+    notes_of_evaluation,
+    record_replay,
+    reference_columns,
+)
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
     CURVE,
@@ -26,11 +33,13 @@ from swarm_mj.learning.run_folder import (
     write_curve,
 )
 from swarm_mj.learning.selection import (
-    REFERENCE_COLUMNS,
-    choose,
-    reference_columns,
-    told_of_choice,
-    told_of_evaluation,
+    JUDGED,
+    REFERENCES,
+    Row,
+    candidates,
+    column,
+    has_stalled,
+    reserved_minutes,
 )
 from swarm_mj.policies.policy_config import GnnConfig
 from swarm_mj.policies.stored import POLICY, save_policy
@@ -40,15 +49,16 @@ OPTIMISER = tuple(
     f"train/{name}"
     for name in ("entropy", "explained_variance", "approx_kl", "clip_fraction", "value_loss")
 )
+REFERENCE_COLUMNS = [column(cost, name) for cost in JUDGED for name in REFERENCES]
 
 
 class Stopped(Exception):  # noqa: N818 - nothing went wrong
-    """The run has reached a limit, or its listener has had enough; all is kept."""
+    """Stopped by a limit or the caller; state saved."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Status:
-    """What a listener is told after every window, and during evaluations."""
+    """A run's state after a window of training or of an evaluation, for listeners."""
 
     decisions: int
     minutes: float
@@ -63,7 +73,7 @@ Listener = Callable[[Status], bool]
 
 
 class TrainingCallback(BaseCallback):
-    """One sitting of a run; PPO calls it, and waits for it between rollouts."""
+    """One session of a run; PPO calls it, and waits for it between rollouts."""
 
     def __init__(
         self,
@@ -76,16 +86,10 @@ class TrainingCallback(BaseCallback):
         listener: Listener,
     ) -> None:
         super().__init__()
-        self._ppo = model
-        self._run = run
-        self._training = run.training
-        self._limits = run.limits
-        self._folder = folder
-        self._progress = progress
-        self._networks = networks
-        self._rng = rng
-        self._listener = listener
-        self._env = env_of(model)
+        self._ppo, self._env = model, env_of(model)
+        self._run, self._training, self._limits = run, run.training, run.limits
+        self._folder, self._progress, self._networks = folder, progress, networks
+        self._rng, self._listener = rng, listener
         self._counted_s = time.monotonic()  # up to here, time is in the progress
         self._saved_s = -np.inf
         self._aoi = float("nan")
@@ -98,20 +102,20 @@ class TrainingCallback(BaseCallback):
 
     @property
     def minutes(self) -> float:
-        """Of all sessions so far."""
+        """Minutes of all sessions so far."""
         return self._progress.minutes + (time.monotonic() - self._counted_s) / 60.0
-
-    def _on_rollout_start(self) -> None:
-        is_last = self._is_time() or not self._goes_on
-        # Fewer --patience may end a run between evaluations: what it learned last is judged first.
-        self.between_rollouts(is_last=is_last or self.has_stalled)
-        if is_last or not self._goes_on or self.has_stalled:
-            raise Stopped
 
     @property
     def has_stalled(self) -> bool:
         """Whether the run no longer learns."""
         return has_stalled(self._progress.curve, self._limits.patience)
+
+    def _on_rollout_start(self) -> None:
+        is_last = self._is_time() or not self._goes_on
+        # Less --patience may end a run between evaluations: the last weights are judged first.
+        self.between_rollouts(is_last=is_last or self.has_stalled)
+        if is_last or not self._goes_on or self.has_stalled:
+            raise Stopped
 
     def _is_time(self) -> bool:
         """Whether the minutes are over, but for those that the choice of a policy will take."""
@@ -146,7 +150,7 @@ class TrainingCallback(BaseCallback):
         self._goes_on = self._listener(status) and self._goes_on
 
     def between_rollouts(self, *, is_last: bool) -> None:
-        """Evaluate, records a replay and keeps a checkpoint, each if it is due."""
+        """Evaluate, record a replay and keep a checkpoint, each if it is due."""
         progress, decisions, logged = self._progress, self.decisions, self.logger.name_to_value
         _check_finite(self._ppo, decisions)
         progress.decisions = decisions
@@ -169,9 +173,8 @@ class TrainingCallback(BaseCallback):
 
     def _save(self) -> None:
         self._count_time()
-        kept = self._folder / CHECKPOINT
         state = (self._ppo, self._rng, self._progress, self._networks)
-        checkpoint.save(kept, self._training, *state)
+        checkpoint.save(self._folder / CHECKPOINT, self._training, *state)
         self._saved_s = time.monotonic()
 
     def _count_time(self) -> None:
@@ -182,7 +185,7 @@ class TrainingCallback(BaseCallback):
         self._counted_s = now_s
 
     def _evaluate(self, decisions: int) -> None:
-        """Flies the held-out missions, logs, and keeps the policy if it is the best."""
+        """Fly the held-out missions, log, and keep the policy if it is the best."""
         progress, every = self._progress, self._training.evaluate_every
         network = checkpoint.acting_network(self._ppo)
         try:
@@ -210,18 +213,18 @@ class TrainingCallback(BaseCallback):
             del self._networks[dropped]
         if held_out.objective < progress.best_objective:
             progress.best_objective, progress.choice = held_out.objective, None
-            self._keep(progress.curve[-1], held_out, told_of_evaluation(self._training))
+            self._keep(progress.curve[-1], held_out, notes_of_evaluation(self._training))
         self._tell()
 
     def _references(self) -> Row:
-        """What hand-written policies cost on the held-out missions: flown once in a run."""
+        """Return the costs of hand-written policies on the held-out missions, flown once a run."""
         if self._progress.curve:
             first = self._progress.curve[0]
             return {name: first[name] for name in first if name in REFERENCE_COLUMNS}
         return reference_columns(self._training, partial(self._on_window, "Flying others"))
 
     def choose(self) -> None:
-        """Chooses the policy that is kept, once nothing is left to train and if none is chosen."""
+        """Choose the policy that is kept, once nothing is left to train and if none is chosen."""
         progress = self._progress
         if not (self._goes_on and progress.curve) or progress.has_chosen:
             return
@@ -231,7 +234,7 @@ class TrainingCallback(BaseCallback):
         except Stopped:
             return
         (row,) = (each for each in progress.curve if each["decisions"] == choice.decisions)
-        self._keep(row, costs, told_of_choice(self._training, choice))
+        self._keep(row, costs, notes_of_choice(self._training, choice))
         progress.choice = choice
         self._save()
 
@@ -240,20 +243,16 @@ class TrainingCallback(BaseCallback):
         if not self._goes_on:
             raise Stopped
 
-    def _keep(self, row: Row, costs: HeldOut, how: dict[str, Any]) -> None:
-        """Store the policy of an evaluation, with what it costs, and where."""
+    def _keep(self, row: Row, costs: HeldOut, notes: dict[str, Any]) -> None:
+        """Store the policy of an evaluation, with its costs."""
         training, decisions = self._training, int(row["decisions"])
+        made = {"command": self._run.command, "decisions": decisions, "minutes": row["minutes"]}
         config = GnnConfig(
             network=training.network,
             features=training.features,
             silence_logit=training.silence_logit,
-            training={
-                **asdict(training),
-                "command": self._run.command,
-                "decisions": decisions,
-                "minutes": row["minutes"],
-            },
-            evaluation={**asdict(costs), **how},
+            training=asdict(training) | made,
+            evaluation=asdict(costs) | notes,
             commit=commit(),
             version=version(),
         )

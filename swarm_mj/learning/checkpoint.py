@@ -1,36 +1,69 @@
 """Checkpoints: all that a run needs to go on as if it had never stopped.
 
 One file of tensors, numbers and strings. It is read without running code from it, and it is whole
-or not there.
+or not there. Nothing of a run changes before every shape, kind and range in it has been checked.
 """
 
 import io
 import json
-from dataclasses import asdict
+import math
+import zipfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import torch
+from msgspec import Meta
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
+from torch import Tensor
 
 from swarm_mj.learning.actor_critic import GnnActorCritic
-from swarm_mj.learning.checkpoint_state import check_state
-from swarm_mj.learning.choice import NUM_BEST
 from swarm_mj.learning.graph_vec_env import ActionHistory, env_of
+from swarm_mj.learning.held_out import HeldOut
 from swarm_mj.learning.run_folder import Progress
+from swarm_mj.learning.selection import NUM_BEST, Amount, Count, candidates
 from swarm_mj.learning.settings import Training
-from swarm_mj.learning.torch_file import read_torch
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.system.atomic import write_bytes
-from swarm_mj.system.reading import read_json
+from swarm_mj.system.reading import read_file, read_json, read_plain
 
-CHECKPOINT_VERSION = 3
+CHECKPOINT_VERSION = 4
 SPARE_BYTES = 100_000_000  # the curve's, and what else does not depend on the settings
-
+IN_A_ROW = {"decisions", "minutes", *(spec.name for spec in fields(HeldOut))} - {"aoi_sem"}
 
 Networks = dict[int, AggregationGnn]  # of policies that may be kept, by their decisions
+Word = Annotated[int, Meta(ge=0, lt=2**32)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Moments:
+    """The running moments of `VecNormalize`."""
+
+    mean: Annotated[float, Meta(ge=-1e30, le=1e30)]
+    var: Amount
+    count: Amount
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Counters:
+    """The part of a checkpoint that is neither tensors nor a library's own state."""
+
+    num_timesteps: Count
+    num_updates: Count
+    seeds: list[list[int]]  # of the missions under way, by batch; replaying checks their range
+    last_windows: list[int]  # when they end, by batch
+    reward_moments: _Moments | None
+    numpy_rng: tuple[
+        Literal["MT19937"],
+        Annotated[list[Word], Meta(min_length=624, max_length=624)],
+        Annotated[int, Meta(ge=0, le=624)],  # NumPy reads the word there unchecked
+        Annotated[int, Meta(ge=0, le=1)],
+        float,
+    ]
+    progress: Progress
 
 
 def save(
@@ -47,21 +80,28 @@ def save(
         OSError: The file cannot be written.
     """
     name, keys, *rest = np.random.get_state()  # noqa: NPY002 - PPO shuffles minibatches with it
+    env, batches, histories = model.get_env(), env_of(model).batches, env_of(model).histories
+    is_normalised = isinstance(env, VecNormalize)
+    moments = vars(env.ret_rms).items() if is_normalised else ()
+    is_cuda = model.device.type == "cuda"
     state: dict[str, Any] = {
         "version": CHECKPOINT_VERSION,
         "training": json.dumps(asdict(training)),
-        "parameters": model.get_parameters(),  # of the networks and the optimiser
+        "weights": model.policy.state_dict(),
+        "adam": model.policy.optimizer.state_dict()["state"],  # its settings are the training's
         "num_timesteps": model.num_timesteps,
         "num_updates": model._n_updates,
         "episode_starts": torch.tensor(model._last_episode_starts),
-        "histories": [
-            vars(history)
-            | {"recipients": torch.tensor(np.array(history.recipients, dtype=np.int16))}
-            for history in env_of(model).histories
-        ],
-        "reward_normaliser": _normaliser_state(model),
+        "seeds": [each.seeds for each in histories],
+        "last_windows": [each.last_window for each in histories],
+        "recipients": {
+            n: torch.tensor(np.array(each.recipients, np.int16).reshape(-1, *batch.shape))
+            for n, (batch, each) in enumerate(zip(batches, histories, strict=True))
+        },
+        "reward_moments": {name: float(x) for name, x in moments} if is_normalised else None,
+        "returns": torch.tensor(env.returns) if is_normalised else torch.zeros(0),
         "torch_rng": torch.get_rng_state(),
-        "cuda_rng": torch.cuda.get_rng_state(model.device) if model.device.type == "cuda" else None,
+        "cuda_rng": torch.cuda.get_rng_state(model.device) if is_cuda else None,
         "numpy_rng": [name, np.asarray(keys).tolist(), *rest],
         "seeds_rng": rng.bit_generator.state,
         "progress": asdict(progress),
@@ -80,23 +120,26 @@ def load(
     Returns where the run stands, and the networks of its candidates.
 
     Raises:
-        ValueError: The file is damaged, foreign, of a newer version or of other settings.
+        ValueError: The file is damaged, foreign, of another version or of other settings.
         OSError: The file cannot be read.
     """
-    state = _read(path, _most_bytes(model))
+    state = _read(path, _max_bytes(model))
     try:
         if read_json(state["training"], Training) != training:
             raise ValueError("it was made with other settings than the run's")
-        progress = check_state(state, model)
-        networks = _networks(state, model)
-        _restore(state, model, rng)
+        counters = check_state(state, model)
+        networks = {}
+        for at, weights in state["candidates"].items():
+            networks[at] = acting_network(model)
+            networks[at].load_state_dict(weights)
+        _restore(state, counters, model, rng)
     except Exception as error:  # generators of random numbers take states as they please
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ValueError(
             f"checkpoint {path} is damaged, or another run's ({reason:.200}); begin a new run with "
             "another --out"
         ) from error
-    return progress, networks
+    return counters.progress, networks
 
 
 def acting_network(model: PPO) -> AggregationGnn:
@@ -105,27 +148,88 @@ def acting_network(model: PPO) -> AggregationGnn:
     return model.policy.acting_network()
 
 
-def _networks(state: dict[str, Any], model: PPO) -> Networks:
-    """Return the candidates'."""
-    networks = {}
-    for at, weights in state["candidates"].items():
-        networks[at] = acting_network(model)
-        networks[at].load_state_dict(weights)
-    return networks
+def check_state(state: Mapping[str, Any], model: PPO) -> _Counters:
+    """Return the counters of a state of a model's run.
+
+    Raises:
+        ValueError: The state is of other shapes, kinds or ranges.
+        Exception: A part is missing, or of quite another kind.
+    """
+    counters = read_plain({spec.name: state[spec.name] for spec in fields(_Counters)}, _Counters)
+    curve, env, batches = counters.progress.curve, model.get_env(), env_of(model).batches
+    if not all(math.isfinite(row[name]) for row in curve for name in IN_A_ROW):
+        raise ValueError("its curve has numbers that are not finite")
+    if (counters.reward_moments is not None) != isinstance(env, VecNormalize):
+        raise ValueError("it normalises rewards, or does not, unlike the run")
+    recipients = {}
+    for n, (batch, last) in enumerate(zip(batches, counters.last_windows, strict=True)):
+        num_flown, num_windows = len(state["recipients"][n]), batch.mission.num_windows
+        if not num_flown < last <= num_windows:
+            raise ValueError(f"its missions end at window {last}, not within {num_windows}")
+        recipients[n] = torch.zeros((num_flown, *batch.shape), dtype=torch.int16)
+    adam = {
+        n: {"step": torch.zeros(()), "exp_avg": weight, "exp_avg_sq": weight}
+        for n, weight in enumerate(model.policy.parameters())
+    }
+    acting = acting_network(model).state_dict()
+    expected = {
+        "weights": model.policy.state_dict(),
+        "adam": adam if state["adam"] else {},  # which has nothing before its first step
+        "candidates": {int(row["decisions"]): acting for row in candidates(curve)},
+        "episode_starts": torch.zeros(model.n_envs, dtype=torch.bool),
+        "recipients": recipients,
+        "returns": torch.tensor(env.returns if isinstance(env, VecNormalize) else []),
+        "torch_rng": torch.get_rng_state(),
+    }
+    _check_like({name: state[name] for name in expected}, expected, "it")
+    if any(moments["step"] < 0 for moments in state["adam"].values()):
+        raise ValueError("its optimiser's step count is negative")
+    return counters
 
 
-def _most_bytes(model: PPO) -> int:
-    """What a checkpoint of a model takes, and much more for its curve."""
+def _check_like(given: Any, like: Mapping[Any, Any] | Tensor, name: str) -> None:  # noqa: ANN401
+    """Raise ValueError unless all is plain, finite tensors of the same names, shapes and kinds."""
+    if isinstance(like, Mapping):
+        if not isinstance(given, Mapping) or given.keys() != like.keys():
+            raise ValueError(f"{name} must have {', '.join(map(str, like)) or 'nothing'}")
+        for key, each in like.items():
+            _check_like(given[key], each, str(key))
+        return
+    is_plain = type(given) is Tensor and given.layout == torch.strided
+    if not is_plain or (given.shape, given.dtype) != (like.shape, like.dtype):
+        raise ValueError(f"{name} must be {list(like.shape)} of {like.dtype}")
+    if not torch.isfinite(given).all():
+        raise ValueError(f"{name} has numbers that are not finite")
+
+
+def _max_bytes(model: PPO) -> int:
+    """Return the size of a model's checkpoint, with much room for its curve."""
     weights = sum(weight.nbytes for weight in model.policy.parameters())
     weights *= 3 + NUM_BEST + 1  # and Adam's two, and the candidates'
     batches = env_of(model).batches
-    decisions = sum(b.mission.num_windows * b.num_missions * b.mission.num_robots for b in batches)
+    decisions = sum(batch.mission.num_windows * math.prod(batch.shape) for batch in batches)
     return 2 * (weights + np.dtype(np.int16).itemsize * decisions) + SPARE_BYTES
 
 
-def _read(path: Path, most_bytes: int) -> dict[str, Any]:
-    """Raise ValueError for what is no whole checkpoint of this version."""
-    state: Any = read_torch(path, most_bytes)
+def _read(path: Path, max_bytes: int) -> dict[str, Any]:
+    """Return what a file of torch holds, without running code from it.
+
+    Raises:
+        ValueError: It is no whole checkpoint of this version.
+    """
+    content = io.BytesIO(read_file(path, "checkpoint", max_bytes, folder=path.parent))
+    try:
+        # Torch checks no sums itself; what is compressed could grow beyond the memory.
+        with zipfile.ZipFile(content) as archive:
+            is_plain = all(entry.compress_type == zipfile.ZIP_STORED for entry in archive.filelist)
+            if not is_plain or archive.testzip() is not None:
+                raise zipfile.BadZipFile
+        content.seek(0)
+        state = torch.load(content, map_location="cpu", weights_only=True)
+    except Exception as error:  # torch names no exception of its own for damaged files
+        raise ValueError(
+            f"checkpoint {path} is damaged, or none; begin a new run with another --out"
+        ) from error
     version = state.get("version") if isinstance(state, dict) else None
     if not isinstance(version, int):
         raise ValueError(f"{path} is no checkpoint of swarm-mj train")
@@ -137,38 +241,26 @@ def _read(path: Path, most_bytes: int) -> dict[str, Any]:
     return state
 
 
-def _restore(state: dict[str, Any], model: PPO, rng: np.random.Generator) -> None:
-    model.set_parameters(state["parameters"], device=model.device)
-    model.num_timesteps = state["num_timesteps"]
-    model._n_updates = state["num_updates"]
-    env = env_of(model)
-    model._last_obs = env.replay(
-        [
-            ActionHistory(**history | {"recipients": [*history["recipients"].numpy()]})
-            for history in state["histories"]
-        ]
-    )
+def _restore(
+    state: dict[str, Any], counters: _Counters, model: PPO, rng: np.random.Generator
+) -> None:
+    policy, env = model.policy, model.get_env()
+    policy.load_state_dict(state["weights"])
+    policy.optimizer.load_state_dict(policy.optimizer.state_dict() | {"state": state["adam"]})
+    model.num_timesteps, model._n_updates = counters.num_timesteps, counters.num_updates
+    spans = zip(counters.seeds, counters.last_windows, strict=True)
+    histories = [
+        ActionHistory(seeds=seeds, last_window=last, recipients=[*state["recipients"][n].numpy()])
+        for n, (seeds, last) in enumerate(spans)
+    ]
+    model._last_obs = env_of(model).replay(histories)
     model._last_episode_starts = state["episode_starts"].numpy()
-    _restore_normaliser(model, state["reward_normaliser"])
+    if isinstance(env, VecNormalize) and counters.reward_moments is not None:
+        vars(env.ret_rms).update(asdict(counters.reward_moments))
+        env.returns = state["returns"].numpy()
+    # Last, as making networks and replaying missions may draw.
     torch.set_rng_state(state["torch_rng"])
     if state["cuda_rng"] is not None and model.device.type == "cuda":
         torch.cuda.set_rng_state(state["cuda_rng"], model.device)
     np.random.set_state(tuple(state["numpy_rng"]))  # noqa: NPY002 - as in `save`
     rng.bit_generator.state = state["seeds_rng"]
-
-
-def _normaliser_state(model: PPO) -> dict[str, Any] | None:
-    """Return the running variance of returns, if rewards are normalised."""
-    env = model.get_env()
-    if not isinstance(env, VecNormalize):
-        return None
-    running = {name: float(value) for name, value in vars(env.ret_rms).items()}
-    return {"running": running, "returns": torch.tensor(env.returns)}
-
-
-def _restore_normaliser(model: PPO, state: dict[str, Any] | None) -> None:
-    env = model.get_env()
-    if isinstance(env, VecNormalize) and state is not None:
-        for name, value in state["running"].items():
-            setattr(env.ret_rms, name, value)
-        env.returns = state["returns"].numpy()

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from swarm_mj.learning.choice import MANY_DECISIONS, OTHER_FLIGHTS, num_missions
-from swarm_mj.learning.run_folder import Limits
+from swarm_mj.learning.run_folder import MAX_DECISIONS, Limits
+from swarm_mj.learning.selection import OTHER_FLIGHTS, num_missions
 from swarm_mj.learning.settings import Training
 from swarm_mj.replay.estimates import replay_file, replay_memory
 from swarm_mj.system.needs import (
@@ -22,7 +22,7 @@ def training_needs(training: Training, limits: Limits) -> Needs:
     """Of `train`: a rollout and the passes over it, held-out missions, checkpoints, replays."""
     missions = [replace(training.mission, num_robots=size) for size in training.robots]
     largest, rollout = max(missions, key=lambda each: each.num_robots), rollout_bytes(training)
-    decisions = limits.decisions or MANY_DECISIONS
+    decisions = limits.decisions or MAX_DECISIONS
     num_flown = num_missions(training, decisions, 1 + OTHER_FLIGHTS)  # at most, to choose
     held_out = missions_memory(largest.num_robots, num_flown, is_learned=True)
     under_way = (

@@ -1,28 +1,50 @@
-"""Held-out missions: what the policy under training costs where it never trained."""
+"""Flights on missions without training: evaluations, the choice of the policy that is kept.
+
+Nothing here draws from the generators of the training: the same weights cost and choose the same.
+Functions that fly call `on_window` after every window with the share flown; what it raises ends
+the flight.
+"""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.evaluation.statistics import standard_error
-from swarm_mj.learning.settings import HELD_OUT_SEED, Training
+from swarm_mj.learning.selection import (
+    COMPARED,
+    JUDGED,
+    NEAR,
+    OTHER_FLIGHTS,
+    Choice,
+    Cost,
+    Row,
+    column,
+    finalists,
+    num_missions,
+    reference_missions,
+)
+from swarm_mj.learning.settings import CHOICE_SEED, HELD_OUT_SEED, TEST_SEED, Training
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.gnn.policy import LearnedPolicy
 from swarm_mj.policies.policy import Policy
+from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import WindowCosts
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
 
 Flown = list[list[WindowCosts]]  # by team size, window by window
+Samples = list[Float[np.ndarray, "B"]]  # by team size
 MakePolicy = Callable[[Mission], Policy]
+OnWindow = Callable[[float], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +57,7 @@ class HeldOut:
     velocity_variance: float  # Eq. 17 [m²/s²]
     packets_per_window: float
     delivery_ratio: float
-    objective: float  # what the best policy has least of: the reward's cost, each size alike
+    objective: float  # the reward's cost, each size alike; the best policy has least of it
 
 
 def held_out_policy(training: Training, network: AggregationGnn, mission: Mission) -> LearnedPolicy:
@@ -44,32 +66,132 @@ def held_out_policy(training: Training, network: AggregationGnn, mission: Missio
     return LearnedPolicy(network, extractor, silence_logit=training.silence_logit)
 
 
-def held_out_missions(training: Training) -> list[Mission]:
-    """One for each team size."""
-    return [replace(training.mission, num_robots=size) for size in training.robots]
-
-
 def evaluate(
-    training: Training,
-    network: AggregationGnn,
-    on_window: Callable[[float], None] = lambda _share: None,
+    training: Training, network: AggregationGnn, on_window: OnWindow = lambda _share: None
 ) -> HeldOut:
-    """What the held-out missions cost; draws nothing from the generators of the training.
-
-    `on_window` is told after every window what share is flown; what it raises ends the evaluation.
-    """
-    seeds = seeds_from(HELD_OUT_SEED, training.held_out)
+    """Fly the held-out missions; return what they cost."""
     flies = partial(held_out_policy, training, network)
-    return means(training, fly(training, flies, seeds, on_window))
+    return _means(training, fly(training, flies, HELD_OUT_SEED, training.held_out, on_window))
 
 
-def seeds_from(first: int, size: int) -> range:
-    """Of so many missions of each team size."""
-    return range(first, first + size)
+def reference_columns(training: Training, on_window: OnWindow) -> Row:
+    """Fly `REFERENCES` on held-out missions; return their costs by the learning curve's columns."""
+    columns, sizes = {}, reference_missions(training)
+    shares = _shares_of(on_window, len(sizes))
+    for name, size in sizes.items():
+        flown = fly(training, partial(make_policy, name), HELD_OUT_SEED, size, next(shares))
+        for cost in JUDGED:
+            columns[column(cost, name)] = _mean(_own_costs(flown, cost))
+    return columns
 
 
-def means(training: Training, costs: Flown) -> HeldOut:
-    """What missions flown cost, all team sizes together."""
+def choose(
+    training: Training,
+    curve: Sequence[Row],
+    networks: Mapping[int, AggregationGnn],  # the candidates', by the decisions behind them
+    on_window: OnWindow,
+) -> tuple[Choice, HeldOut]:
+    """Choose among the finalists of a whole run on fresh missions; return its cost on others."""
+    rows, run_decisions = finalists(curve), int(curve[-1]["decisions"])
+    num_flights = len(rows) + OTHER_FLIGHTS  # at most
+    size = num_missions(training, run_decisions, num_flights)
+    shares = _shares_of(on_window, num_flights)
+
+    def flies(row: Row) -> MakePolicy:
+        return partial(held_out_policy, training, networks[int(row["decisions"])])
+
+    kept = rows[0]
+    if len(rows) > 1:
+        flown = [fly(training, flies(row), CHOICE_SEED, size, next(shares)) for row in rows]
+        kept = rows[int(np.argmin([_means(training, costs).objective for costs in flown]))]
+    costs = fly(training, flies(kept), TEST_SEED, size, next(shares))
+    own = _own_costs(costs, training.cost)
+    compared: dict[str, MakePolicy] = {name: partial(make_policy, name) for name in COMPARED}
+    if kept is not curve[0]:
+        compared["first"] = flies(curve[0])
+    others = {
+        name: _own_costs(fly(training, policy_of, TEST_SEED, size, next(shares)), training.cost)
+        for name, policy_of in compared.items()
+    }
+    choice = Choice(
+        decisions=int(kept["decisions"]),
+        run_decisions=run_decisions,
+        num_finalists=len(rows),
+        num_missions=size,
+        kept=Cost(mean=_mean(own), sem=_standard_error(own)),
+        others={name: _compared(own, each) for name, each in others.items()},
+    )
+    return choice, _means(training, costs)
+
+
+def notes_of_evaluation(training: Training) -> dict[str, Any]:
+    """Return the card's notes on the policy that is the best of the evaluations."""
+    return {
+        "missions": training.held_out * len(training.robots),
+        "first_seed": HELD_OUT_SEED,
+        "chosen_by": "the least objective of all evaluations on these same missions",
+    }
+
+
+def notes_of_choice(training: Training, choice: Choice) -> dict[str, Any]:
+    """Return the card's notes on a policy that was chosen at the end."""
+    how = f"the least objective of all evaluations; no other was within {NEAR - 1.0:.0%} of it"
+    if choice.num_finalists > 1:
+        how = (
+            f"the least objective of {choice.num_finalists} of the best policies on as many other "
+            f"missions, from seed {CHOICE_SEED}"
+        )
+    return {
+        "missions": choice.num_missions * len(training.robots),
+        "first_seed": TEST_SEED,
+        "chosen_by": how,
+        "others_on_these_missions": {name: asdict(cost) for name, cost in choice.others.items()},
+    }
+
+
+def record_replay(
+    training: Training, network: AggregationGnn, decisions: int, folder: Path
+) -> None:
+    """Record the first held-out mission, as the network flies it after so many team decisions."""
+    from swarm_mj.replay.write import write_replay  # rerun takes its time to import
+
+    mission = replace(training.mission, num_robots=training.robots[0])
+    swarm = Swarm(mission, [HELD_OUT_SEED], **training.components.given)
+    recorder = Recorder(swarm)
+    for window in rollout(swarm, held_out_policy(training, network, mission)):
+        recorder.add(window)
+    write_replay(
+        recorder.log(),
+        mission,
+        {"decisions": decisions, "seed": HELD_OUT_SEED, "training seed": training.seed},
+        folder / f"decisions-{decisions:09d}.rrd",
+    )
+
+
+def fly(
+    training: Training, policy_of: MakePolicy, first_seed: int, size: int, on_window: OnWindow
+) -> Flown:
+    """Fly `size` missions of each team size, from a seed on; return their costs."""
+    sizes: Flown = []
+    for num_robots in training.robots:
+        mission = replace(training.mission, num_robots=num_robots)
+        swarm = Swarm(mission, range(first_seed, first_seed + size), **training.components.given)
+        policy = policy_of(mission)
+        sizes.append([])
+        for window in range(1, mission.num_windows + 1):
+            sizes[-1].append(swarm.step(policy))
+            on_window((len(sizes) - 1 + window / mission.num_windows) / len(training.robots))
+    return sizes
+
+
+def _shares_of(on_window: OnWindow, total: int) -> Iterator[OnWindow]:
+    """Yield, for one of so many flights after the other, what tells the share of all of them."""
+    for n in range(total):
+        yield lambda share, n=n: on_window((n + share) / total)
+
+
+def _means(training: Training, costs: Flown) -> HeldOut:
+    """Return what missions flown cost, all team sizes together."""
     age = [np.array([window.age_windows for window in windows]) for windows in costs]
     variance = [np.array([w.velocity_variance_m2ps2 for w in windows]) for windows in costs]
     objective = [each / size for each, size in zip(age, training.robots, strict=True)]
@@ -88,60 +210,28 @@ def means(training: Training, costs: Flown) -> HeldOut:
     )
 
 
-def record_replay(
-    training: Training, network: AggregationGnn, decisions: int, folder: Path
-) -> None:
-    """Record the first held-out mission, as the network flies it after so many team decisions."""
-    from swarm_mj.replay.write import write_replay  # rerun takes its time to import
-
-    mission = held_out_missions(training)[0]
-    swarm = Swarm(mission, [HELD_OUT_SEED], **training.components.given)
-    recorder = Recorder(swarm)
-    for window in rollout(swarm, held_out_policy(training, network, mission)):
-        recorder.add(window)
-    write_replay(
-        recorder.log(),
-        mission,
-        {"decisions": decisions, "seed": HELD_OUT_SEED, "training seed": training.seed},
-        folder / f"decisions-{decisions:09d}.rrd",
-    )
-
-
-def fly(
-    training: Training,
-    policy_of: MakePolicy,
-    seeds: range,
-    on_window: Callable[[float], None] = lambda _share: None,
-) -> Flown:
-    """What missions of each team size cost with a policy; `on_window` as in `evaluate`."""
-    missions = held_out_missions(training)
-    sizes = []
-    for mission in missions:
-        swarm = Swarm(mission, seeds, **training.components.given)
-        policy = policy_of(mission)
-        sizes.append([])
-        for window in range(1, mission.num_windows + 1):
-            sizes[-1].append(swarm.step(policy))
-            on_window((len(sizes) - 1 + window / mission.num_windows) / len(missions))
-    return sizes
-
-
-def own_costs(costs: Flown, cost: str) -> list[Float[np.ndarray, "B"]]:
-    """What every mission flown costs, by team size: its `aoi`, or its `velocity_variance`."""
+def _own_costs(costs: Flown, cost: str) -> Samples:
+    """Return the cost of every mission flown: its `aoi`, or its `velocity_variance`."""
     name = "age_windows" if cost == "aoi" else "velocity_variance_m2ps2"
     return [np.mean([getattr(each, name) for each in windows], axis=0) for windows in costs]
 
 
-def mean_and_error(by_size: Sequence[Float[np.ndarray, "B"]]) -> tuple[float, float | None]:
-    """Over missions and team sizes: the mean, and its standard error if there is one."""
-    return float(np.mean([each.mean() for each in by_size])), _standard_error(by_size)
+def _compared(own: Samples, other: Samples) -> Cost:
+    """Return another policy's cost, and how far the kept policy is behind it, pair by pair."""
+    behind = [a - b for a, b in zip(own, other, strict=True)]
+    return Cost(
+        mean=_mean(other),
+        sem=_standard_error(other),
+        behind=_mean(behind),
+        behind_sem=_standard_error(behind),
+    )
 
 
-def _mean(by_size: Sequence[Float[np.ndarray, "windows B"]]) -> float:
+def _mean(by_size: Sequence[Float[np.ndarray, "..."]]) -> float:
     return float(np.mean([each.mean() for each in by_size]))
 
 
-def _standard_error(by_size: Sequence[Float[np.ndarray, "B"]]) -> float | None:
+def _standard_error(by_size: Samples) -> float | None:
     """Return the standard error of the mean over sizes; sizes differ, but they are not drawn."""
     errors = [standard_error(each) for each in by_size]
     known = [error for error in errors if error is not None]

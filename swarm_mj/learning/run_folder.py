@@ -1,4 +1,4 @@
-"""A run's folder: what is where, what was asked for, and how far the run has come."""
+"""A run's folder: its files, what was asked for, and how far the run has come."""
 
 import math
 import os
@@ -9,7 +9,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from swarm_mj.learning.choice import MANY_DECISIONS, Amount, Choice, Count
+from swarm_mj.learning.selection import Amount, Choice, Count, Row
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.stored import POLICY
 from swarm_mj.protocol.costs import WindowCosts
@@ -21,10 +21,10 @@ SETTINGS, CHECKPOINT, CURVE = "settings.json", "checkpoint.pt", "curve.csv"
 INIT, REPLAYS, TENSORBOARD = "init.safetensors", "replays", "tensorboard"
 FORMAT = "swarm_mj training run"
 FORMAT_VERSION = 2  # 1 called the kind of credit `arm`
-MOST_BYTES = 1_000_000  # of the settings
+MAX_BYTES = 1_000_000  # of the settings
 BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's way
 PATIENCE = {"robot": 8, "team": 40}  # evaluations
-MOST_EVALUATIONS = 1_000_000
+MAX_DECISIONS, MAX_EVALUATIONS = 10**12, 1_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +40,7 @@ class Limits:
         "stop after so many decisions of teams, in all",
         label="budget",
         low=1,
-        high=MANY_DECISIONS,
+        high=MAX_DECISIONS,
         shown=f"{BUDGETS['robot']}, team: {BUDGETS['team']}; none with --minutes",
     )
     minutes: float | None = setting(
@@ -51,18 +51,16 @@ class Limits:
         "record the first held-out mission in OUT/replays whenever so many decisions are made",
         label="replay-every",
         low=1,
-        high=MANY_DECISIONS,
+        high=MAX_DECISIONS,
     )
     patience: int | None = setting(
         None,
         "stop after so many evaluations in a row without gain; 0: never",
         low=0,
-        high=MOST_EVALUATIONS,
+        high=MAX_EVALUATIONS,
         shown=f"{PATIENCE['robot']}, team: {PATIENCE['team']}",
-        may_lack=True,
     )
-    # The least time between two checkpoints.
-    checkpoint_every_s: float = setting(10.0, low=0.0, high=1e6)
+    checkpoint_every_s: float = setting(10.0, low=0.0, high=1e6)  # at least, between two
 
     def __post_init__(self) -> None:
         check(self)
@@ -70,7 +68,7 @@ class Limits:
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """What a run was asked for."""
+    """A request for a training run."""
 
     training: Training
     limits: Limits
@@ -80,7 +78,10 @@ class Run:
 
 @dataclass(kw_only=True)
 class Accumulator:
-    """What the missions in training cost since the last evaluation."""
+    """Costs of the missions in training since the last evaluation.
+
+    The logger's own means would not survive an interruption: these are in the checkpoint.
+    """
 
     seconds: Amount = 0.0
     decisions: Count = 0  # of teams
@@ -96,8 +97,8 @@ class Accumulator:
             self.attempted += int(costs.packets.attempted.sum())
             self.delivered += int(costs.packets.delivered.sum())
 
-    def means(self) -> dict[str, float]:
-        """Per mission and window; empty before the first."""
+    def means(self) -> Row:
+        """Return means per mission and window; none before the first."""
         if not self.decisions:
             return {}
         return {
@@ -110,18 +111,18 @@ class Accumulator:
 
 @dataclass(kw_only=True)
 class Progress:
-    """Where a run stands."""
+    """The state of a run, but for its weights and missions."""
 
     decisions: Count = 0  # of teams, in all sessions
     minutes: Amount = 0.0  # in all sessions, evaluations included
     next_evaluation: Count = 0  # team decisions
     next_replay: Count = 0  # team decisions
     best_objective: Annotated[float, Meta(ge=0.0)] = math.inf
-    curve: list[dict[str, float]] = field(default_factory=list)  # one row an evaluation
+    curve: list[Row] = field(default_factory=list)  # one row an evaluation
     since_evaluation: Accumulator = field(default_factory=Accumulator)
-    optimiser: dict[str, float] = field(default_factory=dict)  # what PPO last logged of itself
+    optimiser: Row = field(default_factory=dict)  # what PPO last logged of itself
     choice: Choice | None = None  # of the policy that is kept; None: it is of the best evaluation
-    evaluation_minutes: Amount = setting(0.0, may_lack=True)  # that the last one took
+    evaluation_minutes: Amount = 0.0  # that the last one took
 
     @property
     def has_chosen(self) -> bool:
@@ -129,43 +130,35 @@ class Progress:
         return self.choice is not None and self.choice.run_decisions == self.decisions
 
     @property
-    def best(self) -> dict[str, float] | None:
+    def best(self) -> Row | None:
         """The best evaluation."""
         return min(self.curve, key=lambda row: row["objective"], default=None)
 
 
 def write_run(folder: Path, run: Run) -> None:
-    """Write a run's `settings.json`.
-
-    Raises:
-        OSError: The folder cannot be written.
-    """
-    document = {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
-        **asdict(run),
-        "init": None if run.init is None else str(run.init.resolve()),
-    }
-    write_json(folder / SETTINGS, document)
+    """Write a run's `settings.json`; raises OSError if the folder cannot be written."""
+    init = None if run.init is None else str(run.init.resolve())
+    header = {"format": FORMAT, "format_version": FORMAT_VERSION}
+    write_json(folder / SETTINGS, header | asdict(run) | {"init": init})
 
 
 def read_run(folder: Path, named: Collection[str] = ()) -> Run:
-    """What a run was asked for when it began, or last went on.
+    """Return what a run was asked for when it began, or last went on.
 
     Args:
         folder: The run's.
-        named: The parts of users' own that it may have, as `module:Name`: to go on runs their
+        named: The user's own components that it may have, as `module:Name`: to go on runs their
             code, and a folder may come from anyone.
 
     Raises:
-        ValueError: There is no run, its settings are damaged, foreign or of a newer version, or it
-            has parts that were not named.
+        ValueError: There is no run, its settings are damaged, foreign or of another version, or it
+            has components that were not named.
         OSError: The settings cannot be read.
     """
     path = folder / SETTINGS
     if not os.path.lexists(path):
         raise ValueError(f"{folder} holds no run to go on with; to begin one, leave out --resume")
-    text = read_file(path, "settings", MOST_BYTES, folder=folder)
+    text = read_file(path, "settings", MAX_BYTES, folder=folder)
     try:
         run = read_document(text, FORMAT, FORMAT_VERSION, Run)
     except ValueError as error:
@@ -182,11 +175,7 @@ def read_run(folder: Path, named: Collection[str] = ()) -> Run:
 
 
 def check_new(folder: Path) -> None:
-    """Pass if a run can begin in a folder.
-
-    Raises:
-        ValueError: It holds a run, or anything else.
-    """
+    """Raise ValueError if a folder holds a run, or anything else, so that none can begin there."""
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"run {folder} is a file; name a folder")
     if (folder / SETTINGS).exists():
@@ -200,26 +189,22 @@ def check_new(folder: Path) -> None:
 
 
 def check_begun(folder: Path) -> None:
-    """Pass if a run that has begun can go on in a folder.
+    """Raise ValueError if the run in a folder cannot go on: it lost its checkpoint, or has links.
 
-    Raises:
-        ValueError: Its checkpoint is lost, or it has links that lead out of the folder, through
-            which others' files would be replaced.
+    Links that lead out of the folder would have the run replace other files there.
     """
-    linked = (path for path in folder.rglob("*") if path.is_symlink())
-    for path in linked:
-        if not Path(os.path.realpath(path)).is_relative_to(folder.resolve()):
+    for path in folder.rglob("*"):
+        if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
             raise ValueError(f"{path} is a link that leads out of the run; copy what it leads to")
-    kept = folder / CHECKPOINT
     has_begun = (folder / CURVE).exists() or (folder / POLICY).exists()
-    if has_begun and not kept.exists():
+    if has_begun and not (folder / CHECKPOINT).exists():
         raise ValueError(
             f"{folder} has lost its {CHECKPOINT}, so its run cannot go on; put it back, or begin "
             "another run in another folder, by --out without --resume"
         )
 
 
-def write_curve(path: Path, curve: list[dict[str, float]]) -> None:
+def write_curve(path: Path, curve: list[Row]) -> None:
     """Write a learning curve, one row an evaluation; later rows may have more columns.
 
     Raises:

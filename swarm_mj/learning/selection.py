@@ -1,147 +1,119 @@
-"""Flights that compare: the hand-written policies on held-out missions, and the choice at the end.
+"""Which policy of a run is kept, and when a run no longer learns: decided from its curve alone.
 
-Nothing here draws from the generators of the training, and the same weights choose the same.
+The best of many noisy evaluations is biased. So the best few are flown again, on missions that
+none of them was judged on, and the reported age is from a third set. `held_out` flies them.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
-from functools import partial
-from typing import Any
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
 
-import numpy as np
-from jaxtyping import Float
+from msgspec import Meta
 
-from swarm_mj.learning.choice import (
-    CHOICE_SEED,
-    COMPARED,
-    JUDGED,
-    NEAR,
-    OTHER_FLIGHTS,
-    REFERENCES,
-    TEST_SEED,
-    Choice,
-    Cost,
-    Row,
-    column,
-    finalists,
-    num_missions,
-    reference_missions,
-)
-from swarm_mj.learning.held_out import (
-    HeldOut,
-    MakePolicy,
-    fly,
-    held_out_policy,
-    mean_and_error,
-    means,
-    own_costs,
-    seeds_from,
-)
-from swarm_mj.learning.settings import HELD_OUT_SEED, Training
-from swarm_mj.policies.gnn.network import AggregationGnn
-from swarm_mj.policies.registry import make_policy
+from swarm_mj.learning.settings import Training
 
-REFERENCE_COLUMNS = [column(cost, name) for cost in JUDGED for name in REFERENCES]
-OnWindow = Callable[[float], None]
-Samples = list[Float[np.ndarray, "B"]]  # by team size
+ORACLE = "greedy-oracle"
+# Policies without a payload or training, and what each knows.
+REFERENCES = {
+    "tdma": "robots take turns that were agreed beforehand",
+    "spatial-tdma": "robots that believe themselves far apart share a turn",
+    ORACLE: "knows where all robots are and what they know",
+}
+COMPARED = ("tdma", "spatial-tdma")  # at the end, too: the oracle takes longer than the network
+JUDGED = ("aoi", "velocity_variance")  # costs that a run can lower
+ORACLE_MISSIONS = 4  # of each team size: a window takes it 12 ms at 40 robots, 36 ms at 80 ...
+ORACLE_ROBOTS = 100  # ... and 472 ms at 200: larger teams it does not fly
+NUM_BEST = 3  # evaluations whose policies are flown again
+OTHER_FLIGHTS = 2 + len(COMPARED)  # at the end: the one that is kept, again, and the first
+NEAR = 1.25  # times the least objective: worse policies have lost already
+MAX_MISSIONS = 40  # of each team size, to choose
+FLOWN_SHARE = 0.5  # of a run's decisions, for its choice; they cost less than learning
+RESERVED_SHARE = 0.5  # of a run's minutes, at most, kept back for its choice
+MIN_GAIN = 0.005  # of the objective, that counts as learning
+
+# Ranges of a run's progress, where it is read back.
+Count = Annotated[int, Meta(ge=0, le=2**62)]
+Amount = Annotated[float, Meta(ge=0.0, le=1e30)]
+Row = dict[str, float]
 
 
-def reference_columns(training: Training, on_window: OnWindow) -> Row:
-    """What `REFERENCES` cost on held-out missions, by the learning curve's columns."""
-    columns, its_missions = {}, reference_missions(training)
-    for n, (name, size) in enumerate(its_missions.items()):
-        share = partial(_share_of, on_window, n, len(its_missions))
-        seeds = seeds_from(HELD_OUT_SEED, size)
-        flown = fly(training, partial(make_policy, name), seeds, share)
-        for cost in JUDGED:
-            columns[column(cost, name)] = mean_and_error(own_costs(flown, cost))[0]
-    return columns
+@dataclass(frozen=True, kw_only=True)
+class Cost:
+    """What a policy costs: its age of information [windows], or its velocity variance [m²/s²]."""
+
+    mean: Amount
+    sem: Amount | None  # None of one mission
+    behind: float = 0.0  # how much more the policy that is kept costs on the same missions
+    behind_sem: Amount | None = None
 
 
-def told_of_evaluation(training: Training) -> dict[str, Any]:
-    """For the card of a policy that is the best of the evaluations."""
-    return {
-        "missions": training.held_out * len(training.robots),
-        "first_seed": HELD_OUT_SEED,
-        "chosen_by": "the least objective of all evaluations on these same missions",
-    }
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """The policy that is kept, and its cost on missions that did not choose it."""
+
+    decisions: Count  # of teams, that it learned from
+    run_decisions: Count  # that the run had made when it was chosen
+    num_finalists: Count
+    num_missions: Count  # of each team size that chose it, and as many others that tell its cost
+    kept: Cost
+    others: dict[str, Cost]  # on the same missions: `COMPARED`, and `first`
 
 
-def told_of_choice(training: Training, choice: Choice) -> dict[str, Any]:
-    """For the card of a policy that was chosen at the end."""
-    how = f"the least objective of all evaluations; no other was within {NEAR - 1.0:.0%} of it"
-    if choice.num_finalists > 1:
-        how = (
-            f"the least objective of {choice.num_finalists} of the best policies on as many other "
-            f"missions, from seed {CHOICE_SEED}"
-        )
-    return {
-        "missions": choice.num_missions * len(training.robots),
-        "first_seed": TEST_SEED,
-        "chosen_by": how,
-        "others_on_these_missions": {name: asdict(cost) for name, cost in choice.others.items()},
-    }
+def column(cost: str, name: str) -> str:
+    """Return the learning curve's column for a cost of a policy of `REFERENCES`."""
+    return f"{cost}_{name.replace('-', '_')}"
 
 
-def choose(
-    training: Training,
-    curve: Sequence[Row],
-    networks: Mapping[int, AggregationGnn],
-    on_window: OnWindow,
-) -> tuple[Choice, HeldOut]:
-    """Chooses among the finalists on fresh missions, and tells the cost on others.
+def reference_missions(training: Training) -> dict[str, int]:
+    """Return how many held-out missions of each team size each of `REFERENCES` flies, if any."""
+    flown = dict.fromkeys(REFERENCES, training.held_out)
+    flown[ORACLE] = min(training.held_out, ORACLE_MISSIONS)
+    if max(training.robots) > ORACLE_ROBOTS:
+        del flown[ORACLE]
+    return flown
 
-    Args:
-        training: The settings.
-        curve: Of the whole run.
-        networks: The candidates', by the decisions that they learned from.
-        on_window: Told after every window what share is flown; what it raises ends the choice.
 
-    Returns:
-        The choice, and all that it costs.
+def candidates(curve: Sequence[Row]) -> list[Row]:
+    """Return evaluations whose policies may be chosen: the best few, and the first, the start."""
+    best = sorted(curve, key=lambda row: row["objective"])[:NUM_BEST]
+    return [row for row in curve if row in best or row is curve[0]]
+
+
+def finalists(curve: Sequence[Row]) -> list[Row]:
+    """Return candidates that may be the best in truth, though not on the held-out missions."""
+    rows = candidates(curve)
+    near = NEAR * min(row["objective"] for row in rows)
+    return [row for row in rows if row["objective"] <= near]
+
+
+def num_missions(training: Training, decisions: int, num_flights: int) -> int:
+    """Return how many missions of each team size each of so many flights has at the end.
+
+    All flights together take up to a share of the run, but each has at least the missions of an
+    evaluation: fewer would tell less than is known already.
     """
-    rows, run_decisions = finalists(curve), int(curve[-1]["decisions"])
-    num_flights = len(rows) + OTHER_FLIGHTS  # at most
-    size = num_missions(training, run_decisions, num_flights)
-    told = (partial(_share_of, on_window, n, num_flights) for n in range(num_flights))
+    windows = num_flights * len(training.robots) * training.mission.num_windows
+    within = int(FLOWN_SHARE * decisions / windows)
+    return max(training.held_out, min(MAX_MISSIONS, within))
 
-    def flies(row: Row) -> MakePolicy:
-        return partial(held_out_policy, training, networks[int(row["decisions"])])
 
-    kept, seeds = rows[0], seeds_from(CHOICE_SEED, size)
-    if len(rows) > 1:
-        flown = [fly(training, flies(row), seeds, next(told)) for row in rows]
-        objectives = [means(training, costs).objective for costs in flown]
-        kept = rows[int(np.argmin(objectives))]
-    seeds = seeds_from(TEST_SEED, size)
-    costs = fly(training, flies(kept), seeds, next(told))
-    own = own_costs(costs, training.cost)
-    compared: dict[str, MakePolicy] = {name: partial(make_policy, name) for name in COMPARED}
-    if kept is not curve[0]:
-        compared["first"] = flies(curve[0])
-    others = {
-        name: own_costs(fly(training, policy_of, seeds, next(told)), training.cost)
-        for name, policy_of in compared.items()
-    }
-    mean, sem = mean_and_error(own)
-    choice = Choice(
-        decisions=int(kept["decisions"]),
-        run_decisions=run_decisions,
-        num_finalists=len(rows),
-        num_missions=size,
-        kept=Cost(mean=mean, sem=sem),
-        others={name: _compared(own, each) for name, each in others.items()},
+def reserved_minutes(
+    training: Training, decisions: int, evaluation_minutes: float, limit: float
+) -> float:
+    """Return the part of a run's minutes that its last evaluation and its choice will take."""
+    num_flights = NUM_BEST + 1 + OTHER_FLIGHTS
+    missions = num_flights * num_missions(training, decisions, num_flights)
+    needed = evaluation_minutes * (1 + missions / training.held_out)
+    return min(needed, RESERVED_SHARE * limit)
+
+
+def has_stalled(curve: Sequence[Row], patience: int | None) -> bool:
+    """Whether the last `patience` evaluations brought nothing better; never with None or 0."""
+    if not patience or len(curve) <= patience:
+        return False
+    before, since = (
+        min((row["objective"] for row in rows), default=math.inf)
+        for rows in (curve[:-patience], curve[-patience:])
     )
-    return choice, means(training, costs)
-
-
-def _compared(own: Samples, other: Samples) -> Cost:
-    """Another policy's cost, and how far the policy that is kept is behind it, pair by pair."""
-    mean, sem = mean_and_error(other)
-    behind, behind_sem = mean_and_error([a - b for a, b in zip(own, other, strict=True)])
-    return Cost(mean=mean, sem=sem, behind=behind, behind_sem=behind_sem)
-
-
-def _share_of(on_window: OnWindow, n: int, total: int, share: float) -> None:
-    """Tells the share of all flights, in the n-th of them."""
-    on_window((n + share) / total)
+    return since > (1.0 - MIN_GAIN) * before

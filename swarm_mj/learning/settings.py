@@ -13,9 +13,11 @@ from swarm_mj.system.fields import FieldOf, check, check_value, setting
 
 CreditAssignment = Literal["robot", "team"]  # per robot, per team
 Reward = Literal["aoi", "velocity-variance"]  # the cost whose negative a team is paid
-HELD_OUT_SEED = 500_000  # of the first held-out mission; training draws from 2^40 on
+# First seeds of the missions of evaluations, of those that choose a policy, and of those that tell
+# its cost. Training and environments draw from 2^40 on.
+HELD_OUT_SEED, CHOICE_SEED, TEST_SEED = 500_000, 510_000, 520_000
 EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as speech
-MOST_ROBOTS = 200  # a team decision takes robots² nodes
+MAX_ROBOTS = 200  # a team decision takes robots² nodes
 
 
 def _share(default: float) -> FieldOf:
@@ -102,7 +104,7 @@ class Training:
     )
     mission: Mission
     robots: tuple[int, ...] = setting(
-        help="size of the team; several are trained on together", low=2, high=MOST_ROBOTS
+        help="size of the team; several are trained on together", low=2, high=MAX_ROBOTS
     )
     features: str = setting(
         "extended",
@@ -135,7 +137,7 @@ class Training:
         low=1,
         high=10_000,
     )
-    components: Components = setting(Components(), may_lack=True)
+    components: Components = Components()
     threads: int = setting(1, "torch's threads", low=1, high=256)
 
     def __post_init__(self) -> None:

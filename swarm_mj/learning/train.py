@@ -37,8 +37,6 @@ from swarm_mj.learning.run_folder import (
     write_run,
 )
 from swarm_mj.learning.settings import PpoSettings, Training
-from swarm_mj.policies.gnn.network import AggregationGnn
-from swarm_mj.policies.policy_config import GnnConfig
 from swarm_mj.policies.stored import read_policy, save_policy
 from swarm_mj.system.outputs import owned
 
@@ -46,18 +44,31 @@ NO_BUDGET = 10**15  # team decisions
 
 
 def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
-    """PPO over fresh missions (III-C), and the generator that draws their seeds.
+    """Make PPO over fresh missions (III-C), and the generator that draws their seeds.
 
     Raises:
         ValueError: The missions or the minibatches cannot be made of these settings.
     """
     torch.set_num_threads(training.threads)
-    rng = np.random.default_rng(training.seed)
-    env, ppo = _make_env(training, rng), training.ppo
+    rng, ppo = np.random.default_rng(training.seed), training.ppo
+    inner = GraphVecEnv(training, rng)
+    env: VecEnv = inner
+    if training.reward == "velocity-variance":  # as in the authors' code
+        env = VecNormalize(inner, norm_obs=False, norm_reward=True, gamma=ppo.discount)
+    policy_settings: dict[str, Any] = {
+        "shape": training.network,
+        "shares_trunk": training.shares_trunk,
+        "silence_logit": training.silence_logit,
+        "optimizer_kwargs": {"eps": ppo.adam_epsilon},
+    }
+    is_team = training.credit_assignment == "team"
+    if is_team:
+        policy_settings["sums_nodes"] = training.sums_nodes
+    drops = training.drops_silence
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "You have specified a mini-batch size")  # one is smaller
         model = PPO(
-            GnnActorCritic if training.credit_assignment == "robot" else TeamActorCritic,
+            TeamActorCritic if is_team else GnnActorCritic,
             env,
             learning_rate=ppo.learning_rate,
             n_steps=ppo.num_steps,
@@ -71,26 +82,17 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
             vf_coef=ppo.value,
             max_grad_norm=ppo.max_gradient_norm,
             seed=training.seed % 2**32,
-            normalize_advantage=not training.drops_silence,
-            rollout_buffer_class=(
-                ActiveRolloutBuffer if training.drops_silence else DictRolloutBuffer
-            ),
-            policy_kwargs=_policy_settings(training),
+            normalize_advantage=not drops,  # a credit's zero means something
+            rollout_buffer_class=ActiveRolloutBuffer if drops else DictRolloutBuffer,
+            policy_kwargs=policy_settings,
         )
-    model.lr_schedule = lambda _: decayed_rate(ppo, model._n_updates)  # passes so far
+    # By optimiser steps, not by PPO's share of a budget, which a resumed run may raise.
+    model.lr_schedule = lambda _: decayed_rate(ppo, model._n_updates)
     return model, rng
 
 
-def _make_env(training: Training, rng: np.random.Generator) -> VecEnv:
-    """Fresh missions, with rewards as PPO gets them; the generator draws their seeds."""
-    env = GraphVecEnv(training, rng)
-    if training.reward == "velocity-variance":  # as in the authors' code
-        return VecNormalize(env, norm_obs=False, norm_reward=True, gamma=training.ppo.discount)
-    return env
-
-
 def _batch_size(training: Training, num_envs: int) -> int:
-    """Rows of a minibatch; raises ValueError for less than 2: advantages would have no spread."""
+    """Return the rows of a minibatch, at least 2: of one row, advantages have no spread."""
     num_rows, num_minibatches = num_envs * training.ppo.num_steps, training.ppo.num_minibatches
     if num_rows < 2 * num_minibatches:
         raise ValueError(
@@ -100,20 +102,6 @@ def _batch_size(training: Training, num_envs: int) -> int:
     return -(-num_rows // num_minibatches)
 
 
-def _policy_settings(training: Training) -> dict[str, Any]:
-    settings: dict[str, Any] = {
-        "shape": training.network,
-        "shares_trunk": training.shares_trunk,
-        "silence_logit": training.silence_logit,
-        "optimizer_kwargs": {"eps": training.ppo.adam_epsilon},
-    }
-    return (
-        settings
-        if training.credit_assignment == "robot"
-        else settings | {"sums_nodes": training.sums_nodes}
-    )
-
-
 def decayed_rate(ppo: PpoSettings, num_epochs: int) -> float:
     """Return the learning rate after so many passes: it falls in steps of the optimiser (III-C)."""
     share = ppo.decay ** (num_epochs * ppo.num_minibatches // ppo.decay_steps)
@@ -121,12 +109,12 @@ def decayed_rate(ppo: PpoSettings, num_epochs: int) -> float:
 
 
 def train(run: Run, folder: Path, *, listener: Listener, is_resumed: bool = False) -> Progress:
-    """Trains until a limit, or until the listener has had enough; returns where the run stands.
+    """Train until a limit, or until the listener returns False; return where the run stands.
 
     Args:
-        run: What is asked for; the policy that it begins with has the settings' network.
+        run: The request; the policy that it begins with has the settings' network.
         folder: The run's; made if it is not there.
-        listener: Told how it goes.
+        listener: Called with a status after every window.
         is_resumed: Go on from the folder's checkpoint, or start over if it did not get that far.
 
     Raises:
@@ -177,21 +165,16 @@ def _begun(
     if kept.exists():
         progress, networks = checkpoint.load(kept, run.training, model, rng)
     elif run.init is not None:
-        init = _read_init(own if own.exists() else run.init, run.training)
+        path = own if own.exists() else run.init
+        init = read_policy(path)
+        if init[1].network != run.training.network:
+            raise ValueError(f"policy {path} has another network than the run that begins with it")
     write_run(folder, run)
     if progress.curve:
-        write_curve(folder / CURVE, progress.curve)
+        write_curve(folder / CURVE, progress.curve)  # it may be ahead of the checkpoint
     if init is not None:
         assert isinstance(model.policy, GnnActorCritic)
         model.policy.take_acting_network(init[0])
         if not own.exists():
             save_policy(own, *init)
     return progress, networks
-
-
-def _read_init(path: Path, training: Training) -> tuple[AggregationGnn, GnnConfig]:
-    """The policy that a run begins with; raises ValueError if its network is not the run's."""
-    network, config = read_policy(path)
-    if config.network != training.network:
-        raise ValueError(f"policy {path} has another network than the run that begins with it")
-    return network, config

@@ -18,8 +18,8 @@ from swarm_mj.cli.train_report import (
     verdicts,
 )
 from swarm_mj.learning.callback import Status
-from swarm_mj.learning.choice import Choice, Cost
 from swarm_mj.learning.run_folder import Limits, Progress, Run
+from swarm_mj.learning.selection import Choice, Cost
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import paper
 

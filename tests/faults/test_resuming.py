@@ -232,7 +232,7 @@ LIMITS = [
     {"checkpoint_every_s": -1.0},
     {"replay_every": 0},
 ]
-WHOLE = [{"init": 5}, {"init": "\0"}, {"command": []}, {"format_version": 2}, {"training": []}]
+WHOLE = [{"init": 5}, {"init": "\0"}, {"command": []}, {"format_version": 3}, {"training": []}]
 
 
 @pytest.mark.fault("crafted files are refused")
@@ -272,29 +272,28 @@ def test_a_pipe_is_not_waited_for(begun, capsys, name):
 
 
 def _step(state):
-    state["parameters"]["policy.optimizer"]["state"][0]["step"].fill_(-1.0)
+    state["adam"][0]["step"].fill_(-1.0)
 
 
 def _weights(state):
-    next(iter(state["parameters"]["policy"].values())).fill_(float("nan"))
+    next(iter(state["weights"].values())).fill_(float("nan"))
 
 
 CRAFTED_STATES = [
     _step,
     _weights,
     lambda s: s.clear(),
-    lambda s: s.update(parameters={"policy": {}, "policy.optimizer": {}}),
-    lambda s: s["parameters"]["policy.optimizer"]["state"][0].update(exp_avg=torch.zeros(3)),
-    lambda s: s["parameters"]["policy.optimizer"]["param_groups"][0].update(betas=1),
+    lambda s: s.update(weights={}, adam={}),
+    lambda s: s["adam"][0].update(exp_avg=torch.zeros(3)),
     lambda s: s.update(num_timesteps="many"),
     lambda s: s.update(num_timesteps=float("nan")),
     lambda s: s.update(num_updates=-(10**30)),
     lambda s: s.update(episode_starts=torch.zeros(3)),
-    lambda s: s["histories"][0].update(last_window=10**9),
-    lambda s: s["histories"][0].update(seeds=[-1]),
-    lambda s: s["histories"][0].update(seeds=None),
-    lambda s: s["histories"][-1]["recipients"].fill_(99),
-    lambda s: s["histories"][-1].update(recipients=torch.zeros(1).expand(10**9)),
+    lambda s: s["last_windows"].__setitem__(0, 10**9),
+    lambda s: s["seeds"].__setitem__(0, [-1]),
+    lambda s: s.update(seeds=None),
+    lambda s: s["recipients"][3].fill_(99),
+    lambda s: s["recipients"].update({3: torch.zeros(1).expand(10**9)}),
     lambda s: s.update(torch_rng=torch.zeros(5056, dtype=torch.uint8)),
     lambda s: s["numpy_rng"].__setitem__(2, 10**6),
     lambda s: s["seeds_rng"]["state"].update(state=-1),

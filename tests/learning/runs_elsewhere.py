@@ -20,8 +20,8 @@ from small_runs import StopAfter, difference, end_of, go_on, run, small_training
 from swarm_mj.cli import main
 from swarm_mj.learning import callback
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
+from swarm_mj.learning.held_out import reference_columns
 from swarm_mj.learning.run_folder import Limits, Progress, Run
-from swarm_mj.learning.selection import reference_columns
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import train
 from swarm_mj.mission import paper

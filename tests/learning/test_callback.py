@@ -10,9 +10,8 @@ from small_runs import StopAfter, go_on, run, small_training
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from swarm_mj.learning import callback
-from swarm_mj.learning.choice import TEST_SEED
 from swarm_mj.learning.run_folder import CURVE, REPLAYS, TENSORBOARD, Limits, Run
-from swarm_mj.learning.settings import HELD_OUT_SEED
+from swarm_mj.learning.settings import HELD_OUT_SEED, TEST_SEED
 from swarm_mj.learning.train import train
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.stored import POLICY, read_policy

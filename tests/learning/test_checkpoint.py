@@ -1,7 +1,9 @@
-"""Checkpoints that are damaged, foreign, of another version or of other settings."""
+"""Checkpoints: sound ones come back to the last bit; all others are refused and run nothing."""
 
+import copy
 import math
 import pickle
+import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +11,7 @@ import pytest
 import torch
 from small_runs import run, small_training
 
-from swarm_mj.learning.checkpoint import acting_network, load, save
-from swarm_mj.learning.checkpoint_state import IN_A_ROW
+from swarm_mj.learning.checkpoint import IN_A_ROW, acting_network, check_state, load, save
 from swarm_mj.learning.run_folder import CHECKPOINT, Accumulator, Progress
 from swarm_mj.learning.train import make_model
 
@@ -64,19 +65,9 @@ def test_foreign_files_are_refused(tmp_path):
             load_bytes(tmp_path, content)
 
 
-def test_a_file_that_would_run_code_does_not(tmp_path):
-    class Trap:
-        def __reduce__(self):
-            return (open, (str(tmp_path / "sprung"), "w"))
-
-    with pytest.raises(ValueError, match=r"c.pt is damaged, or none"):
-        load_bytes(tmp_path, pickle.dumps({"version": 1, "policy": Trap()}))
-    assert not (tmp_path / "sprung").exists()
-
-
 def test_another_version_is_refused(kept, tmp_path):
     content = changed(kept, tmp_path, lambda state: state.update(version=99))
-    with pytest.raises(ValueError, match=r"version 99, and this swarm_mj reads 3; resume with"):
+    with pytest.raises(ValueError, match=r"version 99, and this swarm_mj reads 4; resume with"):
         load_bytes(tmp_path, content)
 
 
@@ -89,9 +80,9 @@ def test_other_settings_are_refused(kept, tmp_path):
 @pytest.mark.parametrize(
     "change",
     [
-        lambda state: state.pop("parameters"),
-        lambda state: state.update(parameters={}),
-        lambda state: state.update(histories=[]),
+        lambda state: state.pop("weights"),
+        lambda state: state.update(weights={}),
+        lambda state: state.update(seeds=[]),
         lambda state: state.update(torch_rng=torch.zeros(3)),
         lambda state: state.update(seeds_rng={}),
         lambda state: state.update(progress={"wings": 2}),
@@ -137,3 +128,138 @@ def test_a_run_does_not_begin_over_another(tmp_path):
     (tmp_path / CHECKPOINT).touch()
     with pytest.raises(ValueError, match=r"holds checkpoint.pt"):
         run(TRAINING, tmp_path, 1)
+
+
+def test_one_that_would_grow_when_it_is_read_is_refused(kept, tmp_path):
+    (tmp_path / "c.pt").write_bytes(kept)
+    with zipfile.ZipFile(tmp_path / "c.pt") as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(tmp_path / "c.pt", "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, part in parts.items():
+            archive.writestr(name, part)
+    with pytest.raises(ValueError, match="is damaged, or none"):
+        load_bytes(tmp_path, (tmp_path / "c.pt").read_bytes())
+
+
+def test_one_that_would_run_code_does_not(tmp_path):
+    class Trap:
+        def __reduce__(self):
+            return (open, (str(tmp_path / "sprung"), "w"))
+
+    torch.save({"policy": Trap()}, tmp_path / "zipped")
+    for content in ((tmp_path / "zipped").read_bytes(), pickle.dumps(Trap())):
+        with pytest.raises(ValueError, match="is damaged, or none; begin a new run with another"):
+            load_bytes(tmp_path, content)
+    assert not (tmp_path / "sprung").exists()
+
+
+def test_one_that_is_too_large_missing_or_elsewhere_is_refused(kept, tmp_path):
+    run_of = make_model(TRAINING)
+    with pytest.raises(ValueError, match="there is no checkpoint"):
+        load(tmp_path / "none.pt", TRAINING, *run_of)
+    (tmp_path / "run").mkdir()
+    (tmp_path / "kept.pt").write_bytes(kept)
+    (tmp_path / "run" / "c.pt").symlink_to(tmp_path / "kept.pt")
+    with pytest.raises(ValueError, match="is a link that leads out of"):
+        load(tmp_path / "run" / "c.pt", TRAINING, *run_of)
+    with (tmp_path / "large.pt").open("wb") as file:
+        file.truncate(10**9)
+    with pytest.raises(ValueError, match=r"large.pt may have up to \d+ bytes, not 1000000000"):
+        load(tmp_path / "large.pt", TRAINING, *run_of)
+
+
+# Shapes, kinds and ranges.
+
+MOMENTS = {"mean": 0.0, "var": 1.0, "count": 1.0}
+
+
+def state_of(folder, **changes):
+    """The state of a run's checkpoint, and a model like the run's."""
+    training = small_training(**changes)
+    run(training, folder, 64)
+    return torch.load(folder / CHECKPOINT, weights_only=True), make_model(training)[0]
+
+
+@pytest.fixture(scope="module")
+def robots(tmp_path_factory):
+    return state_of(tmp_path_factory.mktemp("robots"))
+
+
+@pytest.fixture(scope="module")
+def team(tmp_path_factory):
+    """A team that is paid for agreeing, so that rewards are normalised."""
+    folder = tmp_path_factory.mktemp("team")
+    return state_of(folder, credit="team", task="flocking", reward="velocity-variance")
+
+
+def first(state):
+    return state["adam"][0]
+
+
+def refused(run_kept, change, complaint):
+    sound, model = run_kept
+    state = copy.deepcopy(sound)
+    change(state)
+    with pytest.raises((ValueError, KeyError, TypeError), match=complaint):
+        check_state(state, model)
+
+
+def test_a_run_s_own_is_taken(robots, team):
+    for state, model in (robots, team):
+        assert check_state(state, model).progress.decisions == 64
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (lambda s: s.update(num_timesteps=-1), "Expected `int` >= 0"),
+        (lambda s: s.update(num_updates=1.5), "Expected `int`, got `float`"),
+        (lambda s: s.pop("num_updates"), "num_updates"),
+        (lambda s: s["numpy_rng"].__setitem__(2, -5), "Expected `int` >= 0"),
+        (lambda s: s["numpy_rng"].__setitem__(2, 10**6), "Expected `int` <= 624"),
+        (lambda s: s["numpy_rng"][1].pop(), "length >= 624"),
+        (lambda s: s["progress"].update(minutes=math.nan), "Expected `float` >= 0.0"),
+        (lambda s: s["progress"].update(wings=2), "unknown field `wings`"),
+        (lambda s: s["progress"]["curve"][0].pop("aoi"), "aoi"),
+        (lambda s: s["progress"]["curve"][0].update(aoi=math.inf), "not finite"),
+        (lambda s: s["progress"]["curve"][0].update(aoi="1"), "Expected `float`, got `str`"),
+        (lambda s: s["progress"]["since_evaluation"].update(delivered=-1), "Expected `int` >= 0"),
+        (lambda s: s.update(episode_starts=torch.zeros(20)), "must be .20. of torch.bool"),
+        (lambda s: s.update(episode_starts=[True] * 20), "must be .20. of torch.bool"),
+        (lambda s: s.update(torch_rng=torch.zeros(3)), "torch_rng must be"),
+        (lambda s: s["weights"].popitem(), "must have"),
+        (lambda s: next(iter(s["weights"].values())).fill_(math.nan), "not finite"),
+        (lambda s: s["adam"].pop(3), "adam must have 0, 1, 2"),
+        (lambda s: s["candidates"].popitem(), "candidates must have"),
+        (lambda s: s["candidates"][0].popitem(), "must have"),
+        (lambda s: next(iter(s["candidates"][64].values())).fill_(math.inf), "not finite"),
+        (lambda s: s["progress"]["choice"].update(num_missions=-1), "Expected `int` >= 0"),
+        (lambda s: first(s).pop("exp_avg"), "0 must have step, exp_avg"),
+        (lambda s: first(s).update(exp_avg=torch.zeros(7)), "exp_avg must be"),
+        (lambda s: first(s)["step"].fill_(-1.0), "step count is negative"),
+        (lambda s: s["last_windows"].__setitem__(0, 10**9), "not within 20"),
+        (lambda s: s["last_windows"].__setitem__(3, 1), "not within 20"),
+        (lambda s: s["recipients"].update({3: torch.zeros(1, 1, 5)}), "3 must be .1, 1, 5. of"),
+        (lambda s: s["last_windows"].pop(), "zip"),
+        (lambda s: s.update(reward_moments=MOMENTS), "unlike the run"),
+        (
+            lambda s: first(s).update(exp_avg=torch.zeros(6, 18).to_sparse()),
+            "exp_avg must be .6, 18. of torch.float32",
+        ),
+    ],
+)
+def test_what_is_not_the_run_s_is_refused(robots, change, complaint):
+    refused(robots, change, complaint)
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (lambda s: s.update(reward_moments=None), "unlike the run"),
+        (lambda s: s["reward_moments"].update(var=-1.0), "Expected `float` >= 0.0"),
+        (lambda s: s["reward_moments"].update(mean=math.nan), "Expected `float` >= -1e"),
+        (lambda s: s["returns"].fill_(math.inf), "returns has numbers"),
+    ],
+)
+def test_rewards_are_normalised_as_the_run_s_are(team, change, complaint):
+    refused(team, change, complaint)

@@ -285,7 +285,7 @@ def test_a_mission_of_one_window_starts_anew_every_window():
     assert not set(before) & set(env.batches[0].seeds)
 
 
-def test_robots_that_were_failure_fraction_may_only_be_silent():
+def test_robots_that_failed_may_only_be_silent():
     mission = paper(
         "stationary", num_robots=5, range_ratio=1.0, num_windows=8, failure_fraction=0.4
     )

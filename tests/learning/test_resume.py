@@ -39,7 +39,7 @@ def test_killed_at_any_moment_it_resumes_and_ends_as_if_it_had_not_been(results)
     killed = results["killed"]
     assert killed["exit codes"] == [0, 0]
     placed = " ".join(killed["moments"])
-    for name in ("0 settings.json", "1 init", "curve.csv", "checkpoint.pt", ".policy.old"):
+    for name in ("0 settings.json", "1 init", "curve.csv", "checkpoint.pt", "policy.safetensors"):
         assert name in placed
     for moment, found in killed["moments"].items():
         assert found == {"exit codes": [-9, 0], "difference": "", "left over": []}, moment

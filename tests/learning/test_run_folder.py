@@ -175,19 +175,6 @@ def test_a_curve_is_a_table_even_if_later_rows_have_more_columns(tmp_path):
     assert float(second["train/entropy"]) == 0.5
 
 
-def test_a_run_from_before_there_were_parts_of_ones_own_is_read(tmp_path):
-    assert (
-        read_run(changed(tmp_path, lambda document: document["training"].pop("components"))) == RUN
-    )
-
-
-def test_a_runs_components_are_read_by_their_former_name(tmp_path):
-    def rename(document):
-        document["training"]["parts"] = document["training"].pop("components")
-
-    assert read_run(changed(tmp_path, rename)) == RUN
-
-
 def test_a_runs_own_parts_must_be_named(tmp_path):
     components = Components(channel="my_parts:Lossy", scene="my_parts:walls")
     run = replace(RUN, training=replace(RUN.training, components=components))

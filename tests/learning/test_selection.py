@@ -1,114 +1,101 @@
-"""The choice at the end: on missions of its own, told on others, against hand-written policies."""
+"""What is chosen from a curve, by arithmetic in view."""
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
-import torch
 from small_runs import small_training
-from tiny_policies import tiny_network
 
-from swarm_mj.learning.choice import CHOICE_SEED, TEST_SEED
-from swarm_mj.learning.held_out import fly, held_out_policy
-from swarm_mj.learning.selection import choose, reference_columns, told_of_choice
-from swarm_mj.learning.settings import HELD_OUT_SEED
-from swarm_mj.policies.registry import make_policy
-from swarm_mj.simulation.rollout import rollout, summarise
-from swarm_mj.simulation.swarm import Swarm
-
-TRAINING = replace(small_training(held_out=3), silence_logit=1.0)
-
-
-def network(seed):
-    """One of its own for every seed."""
-    made = tiny_network("extended")
-    torch.manual_seed(seed)
-    for weight in made.parameters():
-        weight.data += 0.5 * torch.randn_like(weight)
-    return made
+from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED
+from swarm_mj.learning.selection import (
+    candidates,
+    finalists,
+    has_stalled,
+    num_missions,
+    reserved_minutes,
+)
+from swarm_mj.learning.settings import CHOICE_SEED, HELD_OUT_SEED, TEST_SEED
 
 
-NETWORKS = {0: network(1), 64: network(2), 128: network(3)}
-CURVE = [{"decisions": float(at), "objective": 1.0} for at in NETWORKS]
+def curve(*objectives):
+    return [{"decisions": 10.0 * n, "objective": x} for n, x in enumerate(objectives)]
 
 
-def ages(policy, first):
-    """Of 3 missions, by the library's flights, one by one."""
-    swarms = [Swarm(TRAINING.mission, [seed]) for seed in range(first, first + 3)]
-    return np.array([summarise(rollout(swarm, policy)).aoi_mean[0] for swarm in swarms])
+def at(rows):
+    return [row["decisions"] for row in rows]
 
 
-def flies(made):
-    return held_out_policy(TRAINING, made, TRAINING.mission)
+def test_the_first_and_the_best_three_are_candidates_in_their_order():
+    assert at(candidates(curve(9.0, 5.0, 3.0, 6.0, 4.0))) == [0.0, 10.0, 20.0, 40.0]
+    assert at(candidates(curve(1.0, 5.0, 3.0, 6.0, 4.0))) == [0.0, 20.0, 40.0]
+    assert at(candidates(curve(2.0))) == [0.0]
+    assert candidates([]) == []
 
 
-def test_the_least_cost_on_fresh_missions_is_chosen_and_told_on_others():
-    choice, costs = choose(TRAINING, CURVE, NETWORKS, lambda _share: None)
-    judged = {at: ages(flies(made), CHOICE_SEED).mean() for at, made in NETWORKS.items()}
-    assert len(set(judged.values())) == 3
-    assert choice.decisions == min(judged, key=judged.__getitem__)
-    told = ages(flies(NETWORKS[choice.decisions]), TEST_SEED)
-    assert choice.kept.mean == pytest.approx(told.mean()) == pytest.approx(costs.aoi)
-    assert choice.kept.sem == pytest.approx(told.std(ddof=1) / np.sqrt(3))
-    assert (choice.num_finalists, choice.num_missions, choice.run_decisions) == (3, 3, 128)
-    for name in ("tdma", "spatial-tdma"):
-        other = ages(make_policy(name, TRAINING.mission), TEST_SEED)
-        behind = told - other
-        cost = choice.others[name]
-        assert cost.mean == pytest.approx(other.mean())
-        assert cost.behind == pytest.approx(behind.mean())
-        assert cost.behind_sem == pytest.approx(behind.std(ddof=1) / np.sqrt(3))
+def test_an_evaluation_that_is_no_longer_a_candidate_never_becomes_one_again():
+    """So its weights need not be kept."""
+    objectives = (5.0, 3.0, 4.0, 3.5, 2.0, 6.0, 3.2)
+    kept = set()
+    for n in range(len(objectives)):
+        now = set(at(candidates(curve(*objectives[: n + 1]))))
+        assert now <= kept | {10.0 * n}
+        kept = now
 
 
-def test_the_first_flies_beside_what_was_chosen_if_it_is_another():
-    worse = [CURVE[0] | {"objective": 9.0}, CURVE[1], CURVE[2] | {"objective": 9.0}]
-    choice, _ = choose(TRAINING, worse, NETWORKS, lambda _share: None)
-    assert (choice.decisions, choice.num_finalists) == (64, 1)
-    first = ages(flies(NETWORKS[0]), TEST_SEED)
-    assert choice.others["first"].mean == pytest.approx(first.mean())
-    only, _ = choose(TRAINING, CURVE[:1], NETWORKS, lambda _share: None)
-    assert set(only.others) == {"tdma", "spatial-tdma"}
-    assert only.kept.mean == pytest.approx(first.mean())
+def test_only_what_is_near_the_best_flies_again():
+    """1.25 times the best is near."""
+    assert at(finalists(curve(9.0, 5.0, 4.0, 5.1))) == [10.0, 20.0]
+    assert at(finalists(curve(4.5, 5.0, 4.0))) == [0.0, 10.0, 20.0]
 
 
-def test_the_card_says_on_which_missions_it_was_chosen():
-    choice, _ = choose(TRAINING, CURVE, NETWORKS, lambda _share: None)
-    how = told_of_choice(TRAINING, choice)["chosen_by"]
-    assert how.endswith("3 of the best policies on as many other missions, from seed 510000")
-    how = told_of_choice(TRAINING, replace(choice, num_finalists=1))["chosen_by"]
-    assert how == "the least objective of all evaluations; no other was within 25% of it"
+@pytest.mark.parametrize(
+    ("decisions", "size"),
+    [
+        # Half of the decisions, over 5 flights, 2 sizes and 20 windows; 2 are held out.
+        (0, 2),
+        (1000, 2),
+        (4000, 10),
+        (4399, 10),
+        (4400, 11),
+        (10**9, 40),
+    ],
+)
+def test_missions_that_choose_are_a_share_of_the_run(decisions, size):
+    training = small_training(sizes=(3, 6))
+    assert num_missions(training, decisions, 5) == size
+    assert num_missions(replace(training, held_out=50), decisions, 5) == 50
 
 
-def test_the_oracle_flies_few_of_the_held_out_missions_and_no_large_teams(monkeypatch):
-    """They are the first 4 of 6; of teams of 101 there are none."""
-    flown = []
-
-    def noted(training, policy_of, seeds, _on_window):
-        flown.append((policy_of.args[0], seeds))
-        return fly(replace(training, robots=(4,)), policy_of, seeds)
-
-    monkeypatch.setattr("swarm_mj.learning.selection.fly", noted)
-    training = replace(TRAINING, held_out=6)
-    columns = reference_columns(training, lambda _share: None)
-    six, four = range(HELD_OUT_SEED, HELD_OUT_SEED + 6), range(HELD_OUT_SEED, HELD_OUT_SEED + 4)
-    assert flown == [("tdma", six), ("spatial-tdma", six), ("greedy-oracle", four)]
-    assert "aoi_greedy_oracle" in columns
-    columns = reference_columns(replace(training, robots=(4, 101)), lambda _share: None)
-    assert flown[3:] == [("tdma", six), ("spatial-tdma", six)]
-    assert "aoi_greedy_oracle" not in columns
+def test_minutes_are_reserved_for_every_flight_of_the_end_but_never_most_of_them():
+    """The last evaluation, 4 finalists, 4 others: of 2 missions at first, as an evaluation has."""
+    training = small_training()
+    assert reserved_minutes(training, 0, 0.5, 60.0) == pytest.approx(0.5 + 8 * 0.5)
+    # Half of 3200 decisions over 8 flights of 20 windows are 10 missions, 5 times as many.
+    assert reserved_minutes(training, 3200, 0.5, 60.0) == pytest.approx(0.5 + 8 * 2.5)
+    assert reserved_minutes(training, 3200, 0.5, 2.0) == 1.0
+    assert reserved_minutes(training, 0, 0.0, 2.0) == 0.0
 
 
-def test_whoever_watches_may_break_off():
-    shares = []
-    choice, _ = choose(TRAINING, CURVE, NETWORKS, shares.append)
-    assert shares == sorted(shares)
-    assert 0.0 < shares[0] < 0.05
-    assert shares[-1] <= 1.0
-    kept_is_first = choice.decisions == 0
-    assert len(shares) == (3 + 1 + 2 + (not kept_is_first)) * TRAINING.mission.num_windows
+@pytest.mark.parametrize(
+    ("objectives", "patience", "stalled"),
+    [
+        ((3.0, 2.0, 1.0), 2, False),
+        ((3.0, 1.0, 2.0), 2, False),
+        ((1.0, 1.0, 1.0), 2, True),
+        ((1.0, 0.996, 2.0), 2, True),
+        ((1.0, 0.994, 2.0), 2, False),
+        ((1.0, 0.994, 2.0, 1.5), 2, True),
+        ((1.0, 2.0), 2, False),
+        ((1.0, 2.0, 2.0), 0, False),
+        ((1.0, 2.0, 2.0), None, False),
+        ((), 2, False),
+    ],
+)
+def test_a_run_has_stalled_if_the_last_evaluations_gain_less_than_half_a_percent(
+    objectives, patience, stalled
+):
+    assert has_stalled(curve(*objectives), patience) is stalled
 
-    def enough(_share):
-        raise InterruptedError
 
-    with pytest.raises(InterruptedError):
-        choose(TRAINING, CURVE, NETWORKS, enough)
+def test_missions_that_choose_tell_or_train_are_others():
+    assert HELD_OUT_SEED + 10_000 <= CHOICE_SEED
+    assert CHOICE_SEED + 10_000 <= TEST_SEED < TEST_SEED + 10_000 < FIRST_TRAINING_SEED
