@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission.batched_rng import Started
-from swarm_mj.protocol.own_channel import decoded
+from swarm_mj.protocol.checks import checked_decode
 from swarm_mj.protocol.timestamps import merge_timestamps, observe_own
 from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, channel_at, of_active, respondents
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
@@ -91,7 +91,7 @@ class _Rows:
             rows = np.flatnonzero(self._turn == turn)
             sent_to = np.tile(np.arange(recipient.shape[1]), (num_missions, 1))
             sent_to[self._mission[rows]] = recipient[rows]
-            answered = decoded(channel, position_m[:num_missions], sent_to)
+            answered = checked_decode(channel, position_m[:num_missions], sent_to)
             heard[rows] = answered[self._mission[rows]]
         return heard
 

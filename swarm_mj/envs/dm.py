@@ -18,7 +18,7 @@ from jaxtyping import Int
 from swarm_mj.control.controller import Controller
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene, compose
-from swarm_mj.protocol.buffers import check_robots
+from swarm_mj.protocol.checks import check_robots
 from swarm_mj.protocol.costs import age_of_information
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.simulation.swarm import Swarm

@@ -12,7 +12,7 @@ from swarm_mj.envs.options import make_batch
 from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.envs.spaces import robot_spaces
 from swarm_mj.mission import Mission
-from swarm_mj.protocol.buffers import check_robots
+from swarm_mj.protocol.checks import check_robots
 
 try:
     from pettingzoo import ParallelEnv

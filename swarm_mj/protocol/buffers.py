@@ -31,7 +31,7 @@ class Buffers:
 
     @property
     def is_known(self) -> Bool[np.ndarray, "B N N"]:
-        """Whether i has observed j, or heard of it, since the start (T > T_0)."""
+        """Whether i has observed j, or received an entry of it, since the start (T > T_0)."""
         return self.timestamp > NEVER
 
     @property
@@ -49,7 +49,7 @@ class Buffers:
 
 
 def empty_buffers(num_missions: int, num_robots: int) -> Buffers:
-    """Buffers before the first observation: everything unknown."""
+    """Return buffers before the first observation: everything unknown."""
     shape = (num_missions, num_robots, num_robots)
     return Buffers(
         timestamp=np.full(shape, NEVER),
@@ -61,25 +61,14 @@ def empty_buffers(num_missions: int, num_robots: int) -> Buffers:
 
 
 def grant_start(buffers: Buffers, states: RobotStates) -> None:
-    """Everyone is told how everyone starts; nobody passed it on, so it has no parent.
-
-    Args:
-        buffers: Empty ones, written in place.
-        states: True states at the start.
-    """
+    """Write everyone's true state at the start into empty buffers; without parents, as granted."""
     buffers.timestamp[:] = AT_START
     buffers.position_m[:] = states.position_m[:, None]
     buffers.velocity_mps[:] = states.velocity_mps[:, None]
 
 
 def observe_self(buffers: Buffers, states: RobotStates, now: Float[np.ndarray, "B"]) -> None:
-    """Write every active robot's own state and the time into its own buffer (Eq. 5).
-
-    Args:
-        buffers: Written in place.
-        states: True states.
-        now: t [windows].
-    """
+    """Write every active robot's own state and the time t into its own buffer (Eq. 5)."""
     _write_own(
         buffers.timestamp,
         buffers.position_m,
@@ -107,11 +96,7 @@ def record_attempt(
         now: t [windows].
         is_active: Who notes anything; None is everyone.
         silence_is_attempt: Whether a silent robot notes having addressed itself.
-
-    Raises:
-        ValueError: A recipient is no robot, or there is not one per robot.
     """
-    check_robots("recipient", recipient, buffers.shape, may_broadcast=True)
     _write_attempt(buffers.last_attempt, recipient, now, silence_is_attempt, is_active)
 
 
@@ -120,7 +105,7 @@ def merge(
     heard: Int[np.ndarray, "B N"],
     is_sent: Bool[np.ndarray, "B N N"] | None = None,
 ) -> None:
-    """Take over whatever is strictly newer in the packet each robot decoded (Eq. 8).
+    """Take over all entries that are strictly newer in the packet each robot decoded (Eq. 8).
 
     A packet holds its sender's buffer as it was before the phase. Information that comes straight
     from its subject gets the receiver as parent (II-B: P^{i,k} = i).
@@ -129,52 +114,10 @@ def merge(
         buffers: Written in place.
         heard: The sender that each robot decoded; itself is nobody.
         is_sent: `[b, i, k]`: whether i's packet has an entry of k; None: packets are whole.
-
-    Raises:
-        ValueError: A sender is no robot, or there is not one per robot.
     """
-    check_robots("sender heard", heard, buffers.shape)
     _merge_newer(
         buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent, heard, is_sent
     )
-
-
-def check_robots(
-    what: str, robots: np.ndarray, shape: tuple[int, int], *, may_broadcast: bool = False
-) -> None:
-    """Pass if there is one robot chosen per robot: the compiled loops here trust that.
-
-    Args:
-        what: What was chosen, for the message.
-        robots: The choices.
-        shape: B missions of N robots.
-        may_broadcast: Whether `BROADCAST` is a choice too.
-
-    Raises:
-        ValueError: There are more or fewer choices, or one is no integer from 0 to N - 1.
-    """
-    if np.shape(robots) != shape:
-        given = np.shape(robots)
-        raise ValueError(f"{what} must have shape {shape}, missions by robots, not {given}")
-    if robots.dtype.kind not in "iu":
-        raise ValueError(f"{what} must be integers from 0 to {shape[1] - 1}, not {robots.dtype}")
-    first = _first_out_of_range(robots, BROADCAST if may_broadcast else 0)
-    if first >= 0:
-        b, i = divmod(first, shape[1])
-        raise ValueError(
-            f"{what} of robot {i} in mission {b} must be from 0 to {shape[1] - 1}, "
-            f"not {robots[b, i]}"
-        )
-
-
-@compiled()
-def _first_out_of_range(robots: Int[np.ndarray, "B N"], lowest: int) -> int:
-    num_missions, num_robots = robots.shape
-    for b in range(num_missions):
-        for i in range(num_robots):
-            if not lowest <= robots[b, i] < num_robots:
-                return b * num_robots + i
-    return -1
 
 
 @compiled()
@@ -222,7 +165,7 @@ def _write_attempt(
 def _is_taken(
     sent: float, held: float, is_sent: Bool[np.ndarray, "B N N"] | None, b: int, j: int, k: int
 ) -> bool:
-    """Whether j's packet has an entry of k, and that is newer than what its receiver holds."""
+    """Return whether j's packet has an entry of k that is newer than what its receiver holds."""
     if is_sent is not None and not is_sent[b, j, k]:
         return False
     return is_newer(sent, held)
@@ -232,7 +175,7 @@ def _is_taken(
 def _new_parent(
     sent: int, is_sent: Bool[np.ndarray, "B N N"] | None, b: int, i: int, j: int, k: int
 ) -> int:
-    """The parent of k for i, which decoded j; the sender, if the parent's own entry is left out."""
+    """Return the parent of k for i, which decoded j; the sender if that one's entry is absent."""
     if k == j:
         return i
     if is_sent is not None and not is_sent[b, j, sent]:

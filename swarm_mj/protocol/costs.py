@@ -1,6 +1,6 @@
 """The costs (II-C, IV-A): age of information (Eq. 10), velocity variance (Eq. 17), packets."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from swarm_mj.system.compiled import compiled
 
 @dataclass(frozen=True, kw_only=True)
 class Packets:
-    """What became of one window's packets in every mission [packets].
+    """The fates of one window's packets in every mission [packets].
 
     Addressed packets (Alg. 1) are delivered or lost. A broadcast (IV-C) has no addressee: it is
     heard or not. Counts of the other kind are nan.
@@ -48,7 +48,7 @@ def age_of_information(
     now: Float[np.ndarray, "B"],
     is_active: Bool[np.ndarray, "B N"] | None = None,
 ) -> tuple[Float[np.ndarray, "B"], Bool[np.ndarray, "B"]]:
-    """Mean over all pairs i, j of t - T^{i,j}, own age included (Eq. 10).
+    """Return the mean over all pairs i, j of t - T^{i,j}, own age included (Eq. 10).
 
     Args:
         buffers: What everyone knows.
@@ -56,7 +56,7 @@ def age_of_information(
         is_active: Whose pairs count, at least one robot's in each mission; None is everyone's.
 
     Returns:
-        The age [windows], and whether everyone of these has heard of everyone of these.
+        The age [windows], and whether all of these know all of these.
     """
     return _mean_age(buffers.timestamp, now, is_active)
 
@@ -65,15 +65,7 @@ def age_of_information(
 def velocity_variance(
     velocity_mps: Float[np.ndarray, "B N 2"], is_active: Bool[np.ndarray, "B N"] | None = None
 ) -> Float[np.ndarray, "B"]:
-    """Mean squared distance of a robot's velocity from the team's mean [m²/s²] (Eq. 17).
-
-    Args:
-        velocity_mps: Every robot's [m/s].
-        is_active: Who makes up the team; None is everyone.
-
-    Returns:
-        The variance, per mission.
-    """
+    """Return the velocity variance of the active team, per mission [m²/s²] (Eq. 17)."""
     num_missions, num_robots = velocity_mps.shape[:2]
     variance = np.empty(num_missions)
     for b in range(num_missions):
@@ -92,51 +84,34 @@ def velocity_variance(
 
 
 def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets:
-    """Count what became of one window's packets.
+    """Count the fates of one window's packets, per mission.
 
     Args:
         phases: The window's two phases.
         is_broadcast: Whether both are broadcasts (IV-C), or the second answers the first (Alg. 1).
-
-    Returns:
-        The counts, per mission.
     """
     first, second = (_count(phase.recipient, phase.heard) for phase in phases)
-    none = np.full(len(first.sent), np.nan)
+    none = np.full_like(first.sent, np.nan)
+    counts = dict.fromkeys((spec.name for spec in fields(Packets)), none)
+    both = first.sent + second.sent
     if is_broadcast:
-        return Packets(
-            sent=first.sent + second.sent,
-            transmitted=first.sent + second.sent,
-            attempted=none,
-            delivered=none,
-            overheard=none,
-            answered=none,
-            heard=first.heard + second.heard,
-            receptions=first.receptions + second.receptions,
-        )
-    return Packets(
-        sent=first.sent,
-        transmitted=first.sent + second.sent,
-        attempted=first.sent,
-        delivered=first.delivered,
-        overheard=first.overheard + second.overheard,
-        answered=second.delivered,
-        heard=none,
-        receptions=none,
-    )
+        heard, receptions = first.heard + second.heard, first.receptions + second.receptions
+        counts |= {"sent": both, "heard": heard, "receptions": receptions}
+    else:
+        overheard = first.overheard + second.overheard
+        counts |= {"sent": first.sent, "attempted": first.sent, "delivered": first.delivered}
+        counts |= {"overheard": overheard, "answered": second.delivered}
+    return Packets(**counts | {"transmitted": both})
 
 
 def mean_hops(
     buffers: Buffers, is_active: Bool[np.ndarray, "B N"] | None = None
 ) -> Float[np.ndarray, "B"]:
-    """Mean depth of teammates in the parent trees (II-B), 0 before anyone was heard of [hops].
+    """Return the mean depth of teammates in the parent trees (II-B), 0 without teammates [hops].
 
     Args:
         buffers: What everyone knows.
-        is_active: Whose depths in whose trees count, whoever is on the way; None is everyone.
-
-    Returns:
-        The depth, per mission.
+        is_active: Whose depths in whose trees count, through any robot; None is everyone.
 
     Raises:
         ValueError: Some parents lead nowhere, or in a circle.
@@ -150,7 +125,7 @@ def mean_hops(
 
 @dataclass(frozen=True, kw_only=True)
 class TaskCost:
-    """What the robots' task costs, as their controller measures it."""
+    """The cost of the robots' task, as their controller measures it."""
 
     name: str  # such as "formation error"
     unit: str  # such as "m"
@@ -159,10 +134,10 @@ class TaskCost:
 
 @dataclass(frozen=True, kw_only=True)
 class WindowCosts:
-    """What one window cost, in every mission."""
+    """The costs of one window, in every mission."""
 
     age_windows: Float[np.ndarray, "B"]  # age of information after the window (Eq. 10)
-    is_complete: Bool[np.ndarray, "B"]  # whether everyone has heard of everyone
+    is_complete: Bool[np.ndarray, "B"]  # whether everyone knows everyone
     velocity_variance_m2ps2: Float[np.ndarray, "B"]  # Eq. 17
     packets: Packets
     task_cost: TaskCost | None = None  # after the window; None if the controller has none
@@ -177,7 +152,7 @@ def window_costs(
     is_broadcast: bool,
     task_cost: TaskCost | None = None,
 ) -> WindowCosts:
-    """Everything one window cost the active robots; arguments as in the functions above."""
+    """Return all costs of one window for the active robots; arguments as above."""
     age, is_complete = age_of_information(buffers, now, states.is_active)
     return WindowCosts(
         age_windows=age,
@@ -226,7 +201,6 @@ class _Counts(NamedTuple):
 
 
 def _count(recipient: Int[np.ndarray, "B N"], heard: Int[np.ndarray, "B N"]) -> _Counts:
-    """Count one phase's packets; whoever addresses itself sends nothing."""
     counts = _Counts(*np.zeros((5, len(recipient))))
     _add_counts(recipient, heard, counts)
     return counts

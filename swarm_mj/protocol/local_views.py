@@ -1,4 +1,4 @@
-"""What a robot may know (II-C, Eq. 9's argument): its own view, and nothing else."""
+"""The knowledge of each robot (II-C, Eq. 9's argument): its own view, and nothing else."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -12,7 +12,7 @@ from swarm_mj.protocol.window import Phase
 
 @dataclass(frozen=True, kw_only=True)
 class LocalViews:
-    """What the robots know, one view a robot: `[b, i]` in every array belongs to robot i alone.
+    """The robots' knowledge, one view a robot: `[b, i]` in every array belongs to robot i alone.
 
     Identities are the index i, the team's size is N; both are granted before the mission (II-C).
     The buffers are live: they cannot be written, and change with the next window.
@@ -23,7 +23,7 @@ class LocalViews:
     phases: tuple[Phase, ...]  # of this window, or else the last: whom robot i addressed and heard
 
     def copy(self) -> "LocalViews":
-        """The same for whoever may write: arrays of its own, and the buffers, which none can."""
+        """Return the same for code that may write: new arrays, and the buffers, which none can."""
         phases = tuple(phase.copy() for phase in self.phases)
         return LocalViews(buffers=self.buffers, now=self.now.copy(), phases=phases)
 
@@ -40,5 +40,5 @@ class LocalViews:
 
 @cache
 def _oneself(shape: tuple[int, int]) -> Int[np.ndarray, "B N"]:
-    """Every robot's own identity."""
+    """Return every robot's own identity."""
     return np.broadcast_to(np.arange(shape[1]), shape)

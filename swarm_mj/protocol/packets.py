@@ -1,4 +1,4 @@
-"""What a packet weighs: its fields, how wide each is, and how many entries fit into a slot.
+"""Sizes of packets: the fields, their widths, and the entries that fit into a slot.
 
 The paper's packets hold the sender's buffer: T, M and P of every robot (II-B). The simulation hands
 these numbers over as they are. The widths here are what they would take on the air, and a test
@@ -45,26 +45,18 @@ class PacketField:
 
     @property
     def num_bits(self) -> int:
-        """Of all its numbers."""
+        """Bits of all its numbers."""
         return self.bits * self.count
 
     def codes(self, values: Float[np.ndarray, "*shape"]) -> Int[np.ndarray, "*shape"]:
-        """What is sent for numbers: the nearest code, or the last one for what is beyond it."""
+        """Return the nearest codes; numbers beyond the last code are sent as the last."""
         codes = np.rint((values - self.low) / self.step)
         return np.clip(codes, 0, 2**self.bits - 1).astype(np.int64)
-
-    def values(self, codes: Int[np.ndarray, "*shape"]) -> Float[np.ndarray, "*shape"]:
-        """What is understood: within half a step of what was meant."""
-        return self.low + self.step * codes
-
-    def rounded(self, values: Float[np.ndarray, "*shape"]) -> Float[np.ndarray, "*shape"]:
-        """Numbers as they arrive."""
-        return self.values(self.codes(values))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Packet:
-    """A policy's packet: a header, an entry of T, M and P for each robot told of, a payload.
+    """A policy's packet: a header, entries of T, M and P, a payload.
 
     The header has a bit for every robot, which says whether its entry follows.
     """
@@ -76,7 +68,7 @@ class Packet:
 
     @property
     def num_bytes(self) -> int:
-        """Of a packet with all these entries."""
+        """Bytes of a packet with all these entries."""
         entries = self.num_entries * _num_bits(self.entry)
         bits = _num_bits(self.header) + entries + _num_bits(self.payload)
         return -(-bits // BITS_PER_BYTE)
@@ -105,39 +97,37 @@ def identity(name: str, mission: Mission) -> PacketField:
 
 
 def age(name: str) -> PacketField:
-    """How long ago something was observed; observations are half a window apart, so it is exact."""
+    """Return an age; observations are half a window apart, so it is exact."""
     return PacketField(name=name, bits=AGE_BITS, step=SLOT_WINDOWS, unit="windows")
 
 
 def position(name: str, mission: Mission, bits: int) -> PacketField:
-    """Where robots can get to; with 16 bits it steps by 1.5 cm for 40 robots within walls.
-
-    Teams without walls leave their area, at most with their largest velocity.
-    """
+    """Return a place that robots can reach; 16 bits step by 1.5 cm for 40 robots within walls."""
+    # Teams without walls leave their area, at most with their largest velocity.
     duration_s = mission.num_windows * mission.window_s
     outside_m = 0.0 if mission.has_walls else mission.max_velocity_mps * duration_s
     return _symmetric(name, bits, mission.half_side_m + outside_m, "m")
 
 
 def bits_for(count: int) -> int:
-    """How many bits tell so many things apart."""
+    """Return the bits of a number below a count."""
     return max(1, (count - 1).bit_length())
 
 
 def times(field: PacketField, count: int) -> PacketField:
-    """Return a field, so many times."""
+    """Return a field repeated."""
     return replace(field, count=field.count * count)
 
 
 def _symmetric(name: str, bits: int, most: float, unit: str) -> PacketField:
-    """Two axes from -most to most; 0 is among the codes, so what rests is seen to rest."""
+    """Return two axes from -most to most; 0 is a code, so that robots at rest are seen to rest."""
     step = most / (2 ** (bits - 1) - 1)
     low = -step * 2 ** (bits - 1)
     return PacketField(name=name, bits=bits, count=2, low=low, step=step, unit=unit)
 
 
 def slot_bytes(mission: Mission) -> int | None:
-    """What a slot holds at the mission's bit rate; None if it holds any packet."""
+    """Return the bytes of a slot at the mission's bit rate; None if it holds any packet."""
     if mission.bit_rate is None:
         return None
     bits = mission.bit_rate * mission.window_s * SLOT_WINDOWS
@@ -145,7 +135,7 @@ def slot_bytes(mission: Mission) -> int | None:
 
 
 def least_bit_rate(num_bytes: int, mission: Mission) -> float:
-    """At which a slot holds so many bytes [bit/s]."""
+    """Return the bit rate at which a slot holds these bytes [bit/s]."""
     return num_bytes * BITS_PER_BYTE / (mission.window_s * SLOT_WINDOWS)
 
 
@@ -158,7 +148,7 @@ def bits_per_second(rate: float) -> str:
 
 
 def fits(packet: Packet, mission: Mission) -> bool:
-    """Whether a slot of the mission holds a packet."""
+    """Return whether a slot of the mission holds a packet."""
     capacity = slot_bytes(mission)
     return capacity is None or packet.num_bytes <= capacity
 
@@ -194,7 +184,7 @@ def check_whole(what: str, mission: Mission) -> None:
     packet = packet_of(mission)
     if fitting(packet, mission, "T, M and P").num_entries < mission.num_robots:
         raise ValueError(
-            f"{what} reckons with whole packets, here of {packet.num_bytes} bytes, but a slot "
+            f"{what} requires unfragmented packets of {packet.num_bytes} bytes, but a slot "
             f"holds {slot_bytes(mission)} bytes; choose a higher bit rate, or fewer robots"
         )
 

@@ -1,6 +1,6 @@
-"""Packets that do not hold the whole buffer: which entries are sent (II-B, with a bit rate).
+"""Packets that do not hold the whole buffer: the choice of entries (II-B, with a bit rate).
 
-A robot always sends its own entry, and beside it those whose T has risen most since it last sent
+A robot always sends its own entry, and then those whose T has risen most since it last sent
 them, of equals the freshest. So every entry gets its turn. An entry names its parent as it is if
 the parent's own entry is in the packet, and otherwise the sender: so what a receiver holds remains
 a tree, although some robots on the way are left out.
@@ -19,31 +19,27 @@ TIE_BREAK = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class PartialBuffers(Buffers):
-    """Buffers of which so many entries fit into a packet."""
+    """Buffers of which only some entries fit into a packet."""
 
     num_entries: int
-    told: Float[np.ndarray, "B N N"]  # T^{i,j} as i last sent it [windows], or NEVER
+    last_sent: Float[np.ndarray, "B N N"]  # T^{i,j} as i last sent it [windows], or NEVER
 
 
 def with_room(buffers: Buffers, num_entries: int) -> Buffers:
-    """Return the same buffers, of which so many entries fit into a packet."""
+    """Return the same buffers with packets of at most this many entries."""
     if isinstance(buffers, PartialBuffers):
         return replace(buffers, num_entries=min(num_entries, buffers.shape[1]))
     if num_entries >= buffers.shape[1]:
         return buffers
     arrays = {spec.name: getattr(buffers, spec.name) for spec in fields(Buffers)}
-    told = np.full(buffers.timestamp.shape, NEVER)
-    return PartialBuffers(**arrays, num_entries=num_entries, told=told)
+    last_sent = np.full(buffers.timestamp.shape, NEVER)
+    return PartialBuffers(**arrays, num_entries=num_entries, last_sent=last_sent)
 
 
 def entries_sent(
     buffers: Buffers, recipient: Int[np.ndarray, "B N"]
 ) -> Bool[np.ndarray, "B N N"] | None:
-    """Which entries everyone sends in this slot, and notes that it has; None is all of them.
-
-    Args:
-        buffers: Whose `told` is written, if packets are partial.
-        recipient: Whom each robot addresses; itself is silence.
+    """Choose the entries that everyone sends in this slot, and note them; None is all.
 
     Returns:
         `[b, i, k]`: whether i's packet has an entry of k.
@@ -51,7 +47,7 @@ def entries_sent(
     if not isinstance(buffers, PartialBuffers):
         return None
     is_sent = np.zeros(buffers.timestamp.shape, dtype=np.bool_)
-    _choose(buffers.timestamp, recipient, buffers.num_entries, buffers.told, is_sent)
+    _choose(buffers.timestamp, recipient, buffers.num_entries, buffers.last_sent, is_sent)
     return is_sent
 
 
@@ -60,7 +56,7 @@ def _choose(
     timestamp: Float[np.ndarray, "B N N"],
     recipient: Int[np.ndarray, "B N"],
     num_entries: int,
-    told: Float[np.ndarray, "B N N"],
+    last_sent: Float[np.ndarray, "B N N"],
     is_sent: Bool[np.ndarray, "B N N"],
 ) -> None:
     num_missions, num_robots = recipient.shape
@@ -68,10 +64,10 @@ def _choose(
         for i in range(num_robots):
             if recipient[b, i] == i:
                 continue
-            # Rises are halves of a window: what is added decides between equal ones only.
-            urgency = timestamp[b, i] - told[b, i] + TIE_BREAK * timestamp[b, i]
+            # Rises are halves of a window: the added term decides between equal ones only.
+            urgency = timestamp[b, i] - last_sent[b, i] + TIE_BREAK * timestamp[b, i]
             urgency[i] = np.inf
             for k in np.argsort(-urgency)[:num_entries]:
                 if timestamp[b, i, k] > NEVER:
                     is_sent[b, i, k] = True
-                    told[b, i, k] = timestamp[b, i, k]
+                    last_sent[b, i, k] = timestamp[b, i, k]

@@ -1,4 +1,4 @@
-"""Timestamps T alone (II-B): Eqs. 5 and 8 for whoever plans, replays or remembers windows.
+"""Timestamps T alone (II-B): Eqs. 5 and 8 for planning, replaying and remembering windows.
 
 Index order: `[i, k]` is when robot `k` observed what robot `i` knows of it.
 """
@@ -11,19 +11,19 @@ from swarm_mj.system.compiled import compiled
 
 @compiled()
 def is_newer(sent: float, held: float) -> bool:
-    """Whether what a packet says replaces what its receiver holds: the condition of Eq. 8."""
+    """Return whether a packet's entry replaces what its receiver holds: the condition of Eq. 8."""
     return held < sent
 
 
 @compiled(fastmath={"nnan", "nsz"})
 def rise(sent: np.floating, held: np.floating) -> np.floating:
-    """By how much a receiver's timestamp rises when it decodes a packet."""
+    """Return the rise of a receiver's timestamp when it decodes a packet."""
     return max(sent - held, np.float32(0.0))
 
 
 @compiled()
 def observe_own(timestamp: Float[np.ndarray, "N N"], now: float) -> None:
-    """Everyone observes itself, as Eq. 5 has it."""
+    """Let everyone observe itself, as in Eq. 5."""
     for i in range(timestamp.shape[0]):
         timestamp[i, i] = now
 
@@ -34,7 +34,7 @@ def merge_timestamps(
     heard: Int[np.ndarray, "N"],
     timestamp: Float[np.ndarray, "N N"],
 ) -> float:
-    """Merge what everyone decoded, as Eq. 8 has it; returns by how much T rises in sum.
+    """Merge what everyone decoded, as in Eq. 8, and return the sum of the rises of T.
 
     Args:
         packet: T of every sender before the slot.
@@ -59,7 +59,7 @@ def merge_expected(
     probability: Float[np.ndarray, "N"],
     merged: Float[np.ndarray, "N N"],
 ) -> None:
-    """Fill `merged`: T as Eq. 8 leaves it on average.
+    """Fill `merged`: the mean of T after Eq. 8.
 
     Args:
         timestamp: T before the slot.

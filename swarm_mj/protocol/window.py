@@ -6,14 +6,14 @@ are broadcasts that nobody answers. Index order: `[b, i]` is robot `i` of missio
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST, Buffers, merge, observe_self, record_attempt
-from swarm_mj.protocol.own_channel import decoded
+from swarm_mj.protocol.checks import checked_decode
 from swarm_mj.protocol.partial_packets import entries_sent
 from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.system.compiled import compiled
@@ -24,48 +24,19 @@ SLOT_WINDOWS = 1.0 / SLOTS_PER_WINDOW  # Delta t: what a slot lasts [windows]
 
 @dataclass(frozen=True, kw_only=True)
 class Phase:
-    """Who addressed whom in one slot, and whose packet everyone decoded."""
+    """The recipients of one slot, and the senders decoded."""
 
     recipient: Int[np.ndarray, "B N"]  # S^i: whom i addressed, or BROADCAST; itself: it was silent
     heard: Int[np.ndarray, "B N"]  # i with j in R^i: whom robot j decoded; itself: nobody
 
     def copy(self) -> "Phase":
-        """Return the same in arrays of its own."""
+        """Return the same in new arrays."""
         return Phase(recipient=self.recipient.copy(), heard=self.heard.copy())
 
 
 # Whom each robot addresses next, given the phases of this window so far.
 Decide = Callable[[tuple[Phase, ...]], Int[np.ndarray, "B N"]]
 Move = Callable[[], RobotStates]  # through one window; returns where the robots then are
-
-
-@runtime_checkable
-class WindowProtocol(Protocol):
-    """What the robots do in a window; a policy chooses one."""
-
-    is_broadcast: ClassVar[bool]  # whether packets are for everyone who hears them
-
-    def __call__(
-        self,
-        buffers: Buffers,
-        decide: Decide,
-        move: Move,
-        channel: Channel | VaryingChannel,
-        now: Float[np.ndarray, "B"],
-    ) -> tuple[Phase, Phase]:
-        """Plays one window.
-
-        Args:
-            buffers: Written in place.
-            decide: Whom each robot addresses in the next slot; itself is silence.
-            move: Moves the robots.
-            channel: Who decodes whom (Eq. 6).
-            now: t at the start of the window [windows].
-
-        Returns:
-            The phases of the window's two slots.
-        """
-        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +47,7 @@ class RequestResponse:
     it decides before the robots move, as in the authors' code.
     """
 
-    is_broadcast: ClassVar[bool] = False
+    is_broadcast: ClassVar[bool] = False  # whether packets are for everyone who hears them
     silence_is_attempt: bool = False  # whether a silent robot notes having addressed itself (Eq. 7)
 
     def __call__(
@@ -87,7 +58,21 @@ class RequestResponse:
         channel: Channel | VaryingChannel,
         now: Float[np.ndarray, "B"],
     ) -> tuple[Phase, Phase]:
-        """Plays one window; arguments as in `WindowProtocol`."""
+        """Play one window.
+
+        Args:
+            buffers: Written in place.
+            decide: Whom each robot addresses in the next slot; itself is silence. It is trusted.
+            move: Moves the robots.
+            channel: Who decodes whom (Eq. 6).
+            now: t at the start of the window [windows].
+
+        Returns:
+            The phases of the window's two slots.
+
+        Raises:
+            ValueError: A sender that a user's own channel names is no robot, or silent.
+        """
         recipient = decide(())
         return window(
             buffers, move(), recipient, channel, now, silence_is_attempt=self.silence_is_attempt
@@ -98,8 +83,8 @@ class RequestResponse:
 class DoubleBroadcast:
     """A window of two broadcasts that nobody answers, each decided on what is known (IV-C).
 
-    By the authors' half-duplex rule whoever is addressed hears while it sends, so there a broadcast
-    needs an addressee: the next identity, unless the policy names one.
+    By the authors' half-duplex rule a robot that is addressed hears while it sends, so there a
+    broadcast needs an addressee: the next identity, unless the policy names one.
     """
 
     is_broadcast: ClassVar[bool] = True
@@ -115,32 +100,28 @@ class DoubleBroadcast:
         channel: Channel | VaryingChannel,
         now: Float[np.ndarray, "B"],
     ) -> tuple[Phase, Phase]:
-        """Plays one window; arguments as in `WindowProtocol`."""
+        """Play one window; arguments as in `RequestResponse`."""
+
+        def broadcast(states: RobotStates, recipient: np.ndarray, slot: int) -> Phase:
+            if self.needs_addressees:
+                next_identity = (np.arange(recipient.shape[1]) + 1) % recipient.shape[1]
+                recipient = np.where(recipient == BROADCAST, next_identity, recipient)
+            t, silence_is_attempt = now + slot * SLOT_WINDOWS, self.silence_is_attempt
+            return transmit(
+                buffers, states, recipient, channel, t, silence_is_attempt=silence_is_attempt
+            )
+
         recipient = decide(())
         states = move()
-        first = self._transmit(buffers, states, recipient, channel, now + SLOT_WINDOWS)
+        first = broadcast(states, recipient, 1)
 
         recipient = decide((first,))
         if self.moves_each_slot:
             states = move()
-        second = self._transmit(buffers, states, recipient, channel, now + 2 * SLOT_WINDOWS)
-        return first, second
+        return first, broadcast(states, recipient, 2)
 
-    def _transmit(
-        self,
-        buffers: Buffers,
-        states: RobotStates,
-        recipient: Int[np.ndarray, "B N"],
-        channel: Channel | VaryingChannel,
-        now: Float[np.ndarray, "B"],
-    ) -> Phase:
-        if self.needs_addressees:
-            num_robots = recipient.shape[1]
-            next_identity = (np.arange(num_robots) + 1) % num_robots
-            recipient = np.where(recipient == BROADCAST, next_identity, recipient)
-        return transmit(
-            buffers, states, recipient, channel, now, silence_is_attempt=self.silence_is_attempt
-        )
+
+WindowProtocol = RequestResponse | DoubleBroadcast  # a policy chooses one
 
 
 def window(
@@ -152,7 +133,7 @@ def window(
     *,
     silence_is_attempt: bool = False,
 ) -> tuple[Phase, Phase]:
-    """One communication window: a transmission phase, then a response phase (Alg. 1).
+    """Play one communication window: a transmission phase, then a response phase (Alg. 1).
 
     Args:
         buffers: Written in place.
@@ -161,17 +142,11 @@ def window(
         channel: Who decodes whom (Eq. 6).
         now: t at the start of the window [windows].
         silence_is_attempt: Whether silence counts as addressing oneself (Eq. 7).
-
-    Returns:
-        The transmission and the response phase.
-
-    Raises:
-        ValueError: A recipient, or a sender that the channel names, is no robot.
     """
     now = now + SLOT_WINDOWS
-    observe_self(buffers, states, now)
-    record_attempt(buffers, recipient, now, states.is_active, silence_is_attempt=silence_is_attempt)
-    transmission = _send(buffers, states, recipient, channel, now)
+    transmission = transmit(
+        buffers, states, recipient, channel, now, silence_is_attempt=silence_is_attempt
+    )
 
     now = now + SLOT_WINDOWS
     observe_self(buffers, states, now)
@@ -188,21 +163,9 @@ def transmit(
     *,
     silence_is_attempt: bool = False,
 ) -> Phase:
-    """One slot of transmissions that nobody answers (IV-C).
+    """Play one slot of transmissions (III-B, IV-C); arguments as in `window`, t of this slot.
 
-    Args:
-        buffers: Written in place.
-        states: True states; inactive robots take no part.
-        recipient: BROADCAST for whoever transmits, or whom it addresses; itself is silence.
-        channel: Who decodes whom (Eq. 6).
-        now: t of this slot [windows].
-        silence_is_attempt: Whether silence counts as addressing oneself (Eq. 7).
-
-    Returns:
-        The phase.
-
-    Raises:
-        ValueError: A recipient, or a sender that the channel names, is no robot.
+    Robots that transmit address a teammate or, with BROADCAST, everyone.
     """
     observe_self(buffers, states, now)
     record_attempt(buffers, recipient, now, states.is_active, silence_is_attempt=silence_is_attempt)
@@ -210,7 +173,7 @@ def transmit(
 
 
 def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
-    """Whom each robot answers: the sender it decoded, if that packet was meant for it."""
+    """Return whom each robot answers: the sender it decoded, if that packet was meant for it."""
     answered = np.empty_like(transmission.recipient)
     _answer_senders(transmission.recipient, transmission.heard, answered)
     return answered
@@ -227,9 +190,6 @@ def channel_at(
         channel: One that stays as it is, or one that is another in every slot.
         now: t at the end of the slot, row by row [windows].
         mission: Whose row each is; None is all missions in order.
-
-    Returns:
-        The channel for these rows.
     """
     if not isinstance(channel, VaryingChannel):
         return channel
@@ -244,10 +204,10 @@ def _send(
     channel: Channel | VaryingChannel,
     now: Float[np.ndarray, "B"],
 ) -> Phase:
-    """Send everyone's packet through the channel (Eq. 6) and merges what was decoded."""
+    """Send everyone's packet through the channel (Eq. 6) and merge what was decoded."""
     sent_to = of_active(states.is_active, recipient)
     at_once = channel_at(channel, now)
-    heard = of_active(states.is_active, decoded(at_once, states.position_m, sent_to))
+    heard = of_active(states.is_active, checked_decode(at_once, states.position_m, sent_to))
     merge(buffers, heard, entries_sent(buffers, sent_to))
     return Phase(recipient=sent_to.copy(), heard=heard)
 
@@ -255,7 +215,7 @@ def _send(
 def of_active(
     is_active: Bool[np.ndarray, "B N"] | None, robots: Int[np.ndarray, "B N"]
 ) -> Int[np.ndarray, "B N"]:
-    """One robot per robot, but inactive ones get themselves: silence, or nobody heard."""
+    """Return these choices, but of inactive robots themselves: silence, or nobody heard."""
     if is_active is None:
         return robots
     return np.where(is_active, robots, np.arange(is_active.shape[1], dtype=robots.dtype))

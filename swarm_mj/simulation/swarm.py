@@ -20,11 +20,11 @@ from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.protocol.buffers import (
     Buffers,
-    check_robots,
     empty_buffers,
     grant_start,
     observe_self,
 )
+from swarm_mj.protocol.checks import check_robots
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.packets import fitting, packet_of

@@ -167,7 +167,7 @@ def test_drawn_seeds_are_none_of_an_evaluations():
             "reward must be one of aoi, velocity-variance, task-cost, credit, not 'age'",
         ),
         ({"reward": "credit", "failure_fraction": 0.2}, "failure_fraction is 0.2; set it to 0"),
-        ({"reward": "credit", "bit_rate": 5000.0}, "reward credit reckons with whole packets"),
+        ({"reward": "credit", "bit_rate": 5000.0}, "reward credit requires unfragmented packets"),
         ({"mission": "stationary", "reward": "task-cost"}, "stationary has none; choose"),
         ({"features": "mine"}, "features must be one of"),
         ({"preset": "mine"}, "preset must be one of"),

@@ -44,13 +44,13 @@ def test_who_was_never_heard_of_has_no_entry():
 def test_whoever_is_silent_tells_nothing():
     buffers = five_robots(num_entries=3)
     assert sent_by_0(buffers, [0, -1, -1, -1, -1]) == []
-    assert np.all(buffers.told[0, 0] == NEVER)
+    assert np.all(buffers.last_sent[0, 0] == NEVER)
 
 
 def test_a_receiver_learns_what_is_in_the_packet_and_its_parents_form_a_tree():
     """Robot 3's parent, 2, is in the packet of four entries; robot 2's, 1, is left out."""
     buffers = five_robots(num_entries=4)
-    buffers.told[0, 0, 1] = 8.0  # all of it
+    buffers.last_sent[0, 0, 1] = 8.0  # all of it
     heard = np.array([[0, 1, 2, 3, 0]])
     merge(buffers, heard, entries_sent(buffers, np.array([ALL])))
     assert buffers.timestamp[0, 4].tolist() == [9.0, NEVER, 7.0, 6.0, 5.0]

@@ -1,4 +1,4 @@
-"""What a user's own channel may answer, and that it cannot move what it is shown."""
+"""Choices and answers that are refused, and that a user's channel cannot move what it is shown."""
 
 from functools import partial
 
@@ -6,11 +6,34 @@ import numpy as np
 import pytest
 
 from swarm_mj.mission import paper
-from swarm_mj.protocol.own_channel import decoded
+from swarm_mj.protocol.checks import check_robots, checked_decode
 from swarm_mj.radio.mission_radio import radio_of
 
 POSITION_M = np.zeros((1, 4, 2))
 RECIPIENT = np.array([[1, 1, -1, 3]])  # 0 addresses 1, 2 broadcasts; 1 and 3 are silent
+
+
+@pytest.mark.parametrize("nobody", [-2, 3])
+@pytest.mark.parametrize(("b", "i"), [(0, 0), (0, 2), (1, 1)])
+def test_choices_that_are_no_robots_are_refused(b, i, nobody):
+    recipient = np.array([[0, 1, 2], [2, 1, 0]])
+    check_robots("recipient", recipient, (2, 3))
+    recipient[b, i] = nobody
+    said = f"recipient of robot {i} in mission {b} must be from 0 to 2, not {nobody}"
+    with pytest.raises(ValueError, match=said):
+        check_robots("recipient", recipient, (2, 3), may_broadcast=True)
+
+
+def test_everyone_is_a_choice_only_where_robots_may_broadcast():
+    check_robots("recipient", np.array([[-1, 1]]), (1, 2), may_broadcast=True)
+    with pytest.raises(ValueError, match="from 0 to 1, not -1"):
+        check_robots("recipient", np.array([[-1, 1]]), (1, 2))
+
+
+@pytest.mark.parametrize("kind", [float, bool])
+def test_robots_are_named_by_integers(kind):
+    with pytest.raises(ValueError, match=f"must be integers from 0 to 1, not {kind.__name__}"):
+        check_robots("recipient", np.array([[0, 1]], dtype=kind), (1, 2))
 
 
 def answering(*heard):
@@ -21,7 +44,7 @@ def answering(*heard):
 
 
 def test_a_robot_that_transmits_may_be_decoded_by_one_that_does_too():
-    heard = decoded(answering(2, 0, 0, 2), POSITION_M, RECIPIENT)
+    heard = checked_decode(answering(2, 0, 0, 2), POSITION_M, RECIPIENT)
     assert heard.tolist() == [[2, 0, 0, 2]]
 
 
@@ -37,7 +60,7 @@ def test_a_robot_that_transmits_may_be_decoded_by_one_that_does_too():
 )
 def test_what_no_radio_does_is_refused(heard, complaint):
     with pytest.raises(ValueError, match=complaint):
-        decoded(answering(*heard), POSITION_M, RECIPIENT)
+        checked_decode(answering(*heard), POSITION_M, RECIPIENT)
 
 
 def test_it_may_write_what_it_gets():
@@ -47,7 +70,7 @@ def test_it_may_write_what_it_gets():
         recipient[:] = 2
         return np.where(heard == -1, 2, np.arange(4))
 
-    assert decoded(writes, POSITION_M, RECIPIENT).tolist() == [[0, 1, 2, 3]]
+    assert checked_decode(writes, POSITION_M, RECIPIENT).tolist() == [[0, 1, 2, 3]]
     assert np.all(POSITION_M == 0.0)
     assert RECIPIENT.tolist() == [[1, 1, -1, 3]]
 
@@ -61,5 +84,5 @@ def test_the_papers_channel_gets_the_arrays_themselves(monkeypatch):
         return recipient
 
     monkeypatch.setattr(type(radio), "__call__", looks)
-    decoded(radio, POSITION_M, RECIPIENT)
+    checked_decode(radio, POSITION_M, RECIPIENT)
     assert seen[0] is POSITION_M

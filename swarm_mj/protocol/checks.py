@@ -1,0 +1,67 @@
+"""Checks where users' choices enter the window: the compiled loops behind them trust their input.
+
+Index order: `[b, i]` is robot `i` of mission `b`.
+"""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from swarm_mj.protocol.buffers import BROADCAST
+from swarm_mj.radio.composed import SlotChannel
+from swarm_mj.radio.free_space import Channel, FreeSpaceRadio
+from swarm_mj.system.fields import name_of
+
+
+def check_robots(
+    what: str, robots: np.ndarray, shape: tuple[int, int], *, may_broadcast: bool = False
+) -> None:
+    """Raise unless there is one robot chosen per robot.
+
+    Args:
+        what: The choice, for the message.
+        robots: The choices.
+        shape: B missions of N robots.
+        may_broadcast: Whether `BROADCAST` is a choice too.
+
+    Raises:
+        ValueError: There are more or fewer choices, or one is no integer from 0 to N - 1.
+    """
+    if np.shape(robots) != shape:
+        given = np.shape(robots)
+        raise ValueError(f"{what} must have shape {shape}, missions by robots, not {given}")
+    if robots.dtype.kind not in "iu":
+        raise ValueError(f"{what} must be integers from 0 to {shape[1] - 1}, not {robots.dtype}")
+    is_robot = (robots >= (BROADCAST if may_broadcast else 0)) & (robots < shape[1])
+    if not np.all(is_robot):
+        b, i = np.argwhere(~is_robot)[0]
+        raise ValueError(
+            f"{what} of robot {i} in mission {b} must be from 0 to {shape[1] - 1}, "
+            f"not {robots[b, i]}"
+        )
+
+
+def checked_decode(
+    channel: Channel, position_m: Float[np.ndarray, "B N 2"], recipient: Int[np.ndarray, "B N"]
+) -> Int[np.ndarray, "B N"]:
+    """Return whose packet each robot decodes; arguments as in `Channel`.
+
+    The package's channels are trusted, and so fast. A user's own gets copies, which it may write.
+
+    Raises:
+        ValueError: A user's own channel answered what is no robot, or a robot that is silent.
+    """
+    if isinstance(channel, (FreeSpaceRadio, SlotChannel)):
+        return channel(position_m, recipient.copy())  # in the one layout it is compiled for
+    heard = np.asarray(channel(position_m.copy(), recipient.copy()))
+    name = name_of(channel)
+    check_robots(f"channel {name}: sender heard", heard, recipient.shape)
+    identity = np.arange(recipient.shape[1])
+    is_silent = recipient == identity
+    is_impossible = (heard != identity) & np.take_along_axis(is_silent, heard, axis=1)
+    if np.any(is_impossible):
+        b, j = np.argwhere(is_impossible)[0]
+        raise ValueError(
+            f"channel {name} let robot {j} in mission {b} decode robot {heard[b, j]}, which is "
+            "silent; it may answer a robot that transmits, or the listener's own index for nobody"
+        )
+    return heard
