@@ -10,7 +10,7 @@ ROOT = -1  # the parent of the root
 
 @compiled()
 def squared_distance(position_m: Float[np.ndarray, "N 2"], i: int, j: int) -> float:
-    """Return the square of how far two robots are apart [m²]."""
+    """Return the square of the distance of two robots [m²]."""
     dx = position_m[i, 0] - position_m[j, 0]
     dy = position_m[i, 1] - position_m[j, 1]
     return dx * dx + dy * dy
@@ -18,7 +18,7 @@ def squared_distance(position_m: Float[np.ndarray, "N 2"], i: int, j: int) -> fl
 
 @compiled()
 def overlaps_earlier(position_m: Float[np.ndarray, "N 2"], apart_m: float) -> Bool[np.ndarray, "N"]:
-    """Which robots are nearer than that [m] to one of a smaller index."""
+    """Return which robots are nearer than that [m] to one of a smaller index."""
     num_robots = position_m.shape[0]
     overlaps = np.zeros(num_robots, dtype=np.bool_)
     for j in range(num_robots):
@@ -35,17 +35,14 @@ def gather_connected(
     is_met: Bool[np.ndarray, "N"],
     members: Int[np.ndarray, "N"],
 ) -> int:
-    """Floods the disk graph from one robot.
+    """Flood the disk graph from one robot; return how many are reached, the first one included.
 
     Args:
         position_m: Positions [m].
         range_m: Two robots at most this far apart are neighbours [m].
         first: Where the flood begins.
-        is_met: Whom it need not reach; written in place, whoever it reaches is added.
-        members: Filled with everyone reached, the first one included.
-
-    Returns:
-        How many were reached.
+        is_met: Robots that it need not reach; those reached are added in place.
+        members: Filled with those reached.
     """
     members[0] = first
     is_met[first] = True
@@ -63,17 +60,7 @@ def gather_connected(
 
 
 def spanning_tree(position_m: Float[np.ndarray, "B N 2"]) -> Int[np.ndarray, "B N"]:
-    """Each robot's parent in the Euclidean minimum spanning tree, or `ROOT`.
-
-    Prim's algorithm gives the edges; peeling leaves off until one robot is left directs them, so
-    the root is a centre of the tree, and no robot is deeper than it must be.
-
-    Args:
-        position_m: Positions [m].
-
-    Returns:
-        The parents.
-    """
+    """Return each robot's parent in the Euclidean minimum spanning tree, or `ROOT`."""
     parent = np.empty(position_m.shape[:2], dtype=np.int64)
     _grow_and_peel(position_m, parent)
     return parent
@@ -90,11 +77,8 @@ def _grow_and_peel(position_m: Float[np.ndarray, "B N 2"], parent: Int[np.ndarra
 
 
 @compiled()
-def _grow(
-    position_m: Float[np.ndarray, "N 2"],
-    is_edge: Bool[np.ndarray, "N N"],
-) -> None:
-    """Prim's algorithm from robot 0."""
+def _grow(position_m: Float[np.ndarray, "N 2"], is_edge: Bool[np.ndarray, "N N"]) -> None:
+    """Mark the tree's edges: Prim's algorithm from robot 0."""
     num_robots = position_m.shape[0]
     nearest = np.zeros(num_robots, dtype=np.int64)
     squared_m2 = np.full(num_robots, np.inf)
@@ -104,33 +88,31 @@ def _grow(
         in_tree[added] = True
         closest = -1
         for j in range(num_robots):
-            if not in_tree[j]:
-                apart_m2 = squared_distance(position_m, added, j)
-                if apart_m2 < squared_m2[j]:
-                    squared_m2[j] = apart_m2
-                    nearest[j] = added
-                if closest < 0 or squared_m2[j] < squared_m2[closest]:
-                    closest = j
+            if in_tree[j]:
+                continue
+            apart_m2 = squared_distance(position_m, added, j)
+            if apart_m2 < squared_m2[j]:
+                squared_m2[j], nearest[j] = apart_m2, added
+            if closest < 0 or squared_m2[j] < squared_m2[closest]:
+                closest = j
         is_edge[closest, nearest[closest]] = is_edge[nearest[closest], closest] = True
         added = closest
 
 
 @compiled()
-def _peel(
-    is_edge: Bool[np.ndarray, "N N"],
-    parent: Int[np.ndarray, "N"],
-) -> None:
-    """Leaves point at their neighbour and go, round by round, until the root is left."""
-    num_robots = parent.shape[0]
-    degree = np.empty(num_robots, dtype=np.int64)
-    for i in range(num_robots):
+def _peel(is_edge: Bool[np.ndarray, "N N"], parent: Int[np.ndarray, "N"]) -> None:
+    """Direct the edges: leaves point at their neighbour and go, round by round.
+
+    The robot that is left is a centre of the tree, so no robot is deeper than it must be.
+    """
+    num_left = parent.shape[0]
+    degree = np.empty(num_left, dtype=np.int64)
+    for i in range(num_left):
         degree[i] = is_edge[i].sum()
     parent[:] = ROOT
-    num_left = num_robots
     while num_left > 1:
-        leaves = np.flatnonzero(degree == 1)
-        for leaf in leaves:
-            if num_left > 1:
+        for leaf in np.flatnonzero(degree == 1):
+            if num_left > 1:  # the last two are each other's leaves
                 neighbour = np.flatnonzero(is_edge[leaf])[0]
                 parent[leaf] = neighbour
                 is_edge[leaf, neighbour] = is_edge[neighbour, leaf] = False

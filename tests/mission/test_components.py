@@ -226,3 +226,19 @@ def test_only_the_packages_own_components_get_live_arrays(parts):  # noqa: ARG00
 
     assert is_ours(Tdma())
     assert not is_ours(load("channel", "own_parts:plain"))
+
+
+@pytest.mark.parametrize(
+    ("component", "said"),
+    [
+        ({"controller": lambda states: states}, r"a controller is called with \(buffers, states\)"),
+        (
+            {"channel": lambda: 0},
+            r"a channel is called with \(position_m, recipient\), but .* \(\)",
+        ),
+        ({"scene": lambda _spec: None}, r"a scene is called with \(spec, mission\)"),
+    ],
+)
+def test_components_that_take_other_arguments_are_refused(component, said):
+    with pytest.raises(TypeError, match=said):
+        Components(**component)
