@@ -48,6 +48,14 @@ class Lookahead(NamedTuple):
     depth: int  # how long each is followed, the slot in question included [slots]
 
 
+class _Task(NamedTuple):
+    """What a schedule is made for."""
+
+    links: Links
+    weights: Weights
+    lone: Float[np.ndarray, "N N"]  # probability that j decodes i when nobody else transmits
+
+
 @compiled()
 def schedule(
     timestamp: Float32[np.ndarray, "N N"],
@@ -69,7 +77,7 @@ def schedule(
         is_free: The slots that the schedule may fill; in the others nobody transmits.
         transmits: Who transmits in each.
     """
-    reach = lone_probabilities(links)
+    task = _Task(links, weights, lone_probabilities(links))
     after = np.empty_like(timestamp)
     for p in range(transmits.shape[0]):
         now += 1.0
@@ -77,8 +85,8 @@ def schedule(
         if is_free[p]:
             first = NOBODY
             if lookahead.width > 1:
-                first = _best_first(timestamp, now, links, reach, weights, lookahead, is_free[p:])
-            _choose(timestamp, links, reach, weights, first, transmits[p], after)
+                first = _best_first(timestamp, now, task, lookahead, is_free[p:])
+            _choose(timestamp, task, first, transmits[p], after)
             for i in range(timestamp.shape[0]):
                 for k in range(timestamp.shape[0]):
                     timestamp[i, k] = after[i, k]
@@ -91,22 +99,19 @@ def schedule(
 def _best_first(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
-    links: Links,
-    reach: Float[np.ndarray, "N N"],
-    weights: Weights,
+    task: _Task,
     lookahead: Lookahead,
     is_free: Bool[np.ndarray, "P"],
 ) -> int:
     """Return the first transmitter whose branch knows most, summed over its slots, or `NOBODY`."""
     num_robots = timestamp.shape[0]
     gain = np.zeros((num_robots, num_robots))
-    _fill_gains(timestamp, reach, weights, gain)
+    _fill_gains(timestamp, task, gain)
     air, nobody = silent_air(num_robots), np.zeros(num_robots, dtype=np.bool_)
     alone = np.empty(num_robots)
     for i in range(num_robots):
-        alone[i] = _value(links, gain, air, nobody, i)
+        alone[i] = _value(task.links, gain, air, nobody, i)
     best, most_known = NOBODY, -np.inf
-    num_ahead = min(lookahead.depth, is_free.shape[0])
     for _ in range(lookahead.width):
         first, first_value = NOBODY, 0.0
         for i in range(num_robots):
@@ -115,7 +120,7 @@ def _best_first(
         if first == NOBODY:
             return best
         alone[first] = 0.0
-        known = _follow(timestamp, now, links, reach, weights, first, is_free[:num_ahead])
+        known = _follow(timestamp, now, task, first, is_free[: lookahead.depth])
         if known > most_known:
             best, most_known = first, known
     return best
@@ -125,38 +130,29 @@ def _best_first(
 def _follow(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
-    links: Links,
-    reach: Float[np.ndarray, "N N"],
-    weights: Weights,
+    task: _Task,
     first: int,
     is_free: Bool[np.ndarray, "P"],
 ) -> float:
     """Return the sum of all timestamps after each of the slots that begin with this transmitter."""
-    num_robots = timestamp.shape[0]
     before, after = timestamp.copy(), np.empty_like(timestamp)
-    transmits = np.zeros(num_robots, dtype=np.bool_)
+    transmits = np.zeros(timestamp.shape[0], dtype=np.bool_)
     known = 0.0
     for p in range(is_free.shape[0]):
         if p > 0:
             now += 1.0
             observe_own(before, now)
         if is_free[p]:
-            _choose(before, links, reach, weights, first if p == 0 else NOBODY, transmits, after)
+            _choose(before, task, first if p == 0 else NOBODY, transmits, after)
             before, after = after, before
-        total = np.float32(0.0)
-        for i in range(num_robots):
-            for k in range(num_robots):
-                total += before[i, k]
-        known += float(total)
+        known += float(before.sum())
     return known
 
 
 @compiled()
 def _choose(
     timestamp: Float32[np.ndarray, "N N"],
-    links: Links,
-    reach: Float[np.ndarray, "N N"],
-    weights: Weights,
+    task: _Task,
     first: int,
     transmits: Bool[np.ndarray, "N"],
     after: Float32[np.ndarray, "N N"],
@@ -165,9 +161,9 @@ def _choose(
 
     Fill `after`, too: T as expected after the slot.
     """
-    num_robots = timestamp.shape[0]
+    num_robots, links = timestamp.shape[0], task.links
     gain = np.zeros((num_robots, num_robots))
-    has_news = _fill_gains(timestamp, reach, weights, gain)
+    has_news = _fill_gains(timestamp, task, gain)
     air = silent_air(num_robots)
     heard, probability = np.empty(num_robots, dtype=np.int64), np.empty(num_robots)
     listens = np.ones(num_robots, dtype=np.bool_)
@@ -179,7 +175,7 @@ def _choose(
         transmits[first], listens[first] = True, False
         broadcast(links, air, first)
     while True:
-        best, best_value = NOBODY, value * weights.min_share
+        best, best_value = NOBODY, value * task.weights.min_share
         for i in range(num_robots):
             if listens[i] and has_news[i]:
                 with_i = _value(links, gain, air, transmits, i)
@@ -216,21 +212,19 @@ def _value(
 
 @compiled()
 def _fill_gains(
-    timestamp: Float32[np.ndarray, "N N"],
-    reach: Float[np.ndarray, "N N"],
-    weights: Weights,
-    gain: Float[np.ndarray, "N N"],
+    timestamp: Float32[np.ndarray, "N N"], task: _Task, gain: Float[np.ndarray, "N N"]
 ) -> Bool[np.ndarray, "N"]:
-    """Fill in the value of j decoding i, where it can; return who has news for anyone.
+    """Fill in the value of j decoding i, where it can; return which robots have news for anyone.
 
-    A robot without news should listen.
+    The others should listen.
     """
     num_robots = timestamp.shape[0]
     has_news = np.zeros(num_robots, dtype=np.bool_)
     for i in range(num_robots):
         for j in range(num_robots):
-            if reach[i, j] > 0.0:
-                gain[i, j] = _gain(timestamp[i], timestamp[j], weights.squared_rise[j])
+            if task.lone[i, j] > 0.0:
+                weight = task.weights.squared_rise[j]
+                gain[i, j] = _gain(timestamp[i], timestamp[j], weight)
                 if gain[i, j] > 0.0:
                     has_news[i] = True
     return has_news

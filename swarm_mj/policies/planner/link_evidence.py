@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from swarm_mj.radio.links import Links
 from swarm_mj.radio.reception import NOBODY, Incoming, add_packet, sinr
 from swarm_mj.system.compiled import compiled
 
@@ -51,9 +52,7 @@ def observe(
     heard: Int[np.ndarray, "N"],
     transmitted: Bool[np.ndarray, "N"],
     believed_mw: Float[np.ndarray, "N N"],
-    prior_mw: Float[np.ndarray, "N N"],
-    noise_mw: float,
-    threshold: float,
+    prior: Links,
     observation: Observation,
 ) -> None:
     """Fill in what these robots learn from a slot in which they followed one plan.
@@ -64,9 +63,7 @@ def observe(
         heard: The sender that each robot decoded; itself: none.
         transmitted: The transmitters by the plan.
         believed_mw: Power of i at j by which the plan was made, [i, j] [mW].
-        prior_mw: The same before anything was learned; margins are counted from there [mW].
-        noise_mw: Of every receiver [mW].
-        threshold: Least SINR that decodes, linear [1].
+        prior: Links before anything was learned; margins are counted from there.
         observation: Written in place, for these robots.
     """
     num_robots = heard.shape[0]
@@ -82,7 +79,8 @@ def observe(
         for k in range(num_robots):
             if transmitted[k] and k != i and k != j:
                 others_mw += believed_mw[k, j]
-        margin_db = 10.0 * math.log10(sinr(prior_mw[i, j], others_mw, noise_mw) / threshold)
+        ratio = sinr(prior.received_mw[i, j], others_mw, prior.noise_mw)
+        margin_db = 10.0 * math.log10(ratio / prior.threshold)
         place = math.floor((margin_db - LEAST_MARGIN_DB) / BIN_DB + 0.5)
         if is_decoded or place >= 0:
             observation.sender[j] = i

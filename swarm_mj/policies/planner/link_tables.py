@@ -50,24 +50,15 @@ class Tables:
     def __init__(
         self, evidence: Evidence, known_until: Int[np.ndarray, "N N"], settings: LearningSettings
     ) -> None:
-        """Keep what every robot knew.
+        """Keep what every robot knew: [j, i] is the last slot of which j knows what i observed.
 
-        Args:
-            evidence: Observations of all robots, of which later slots do not count.
-            known_until: [j, i]: the last slot of which j knows what i observed.
-            settings: How much a hypothesis must be better.
+        The best table, of rank 0, is that of the robot whose knowledge is youngest.
         """
         self._evidence = evidence
         self._known_until = known_until
         self._settings = settings
-        self._rank = np.argsort(np.argsort(-np.sum(known_until, axis=1), kind="stable"))
+        self.rank = np.argsort(np.argsort(-np.sum(known_until, axis=1), kind="stable"))
         self._tables: dict[int, LinkTable] = {}
-
-    def better(
-        self, mine: Int[np.ndarray, "N"], theirs: Int[np.ndarray, "N"]
-    ) -> Int[np.ndarray, "N"]:
-        """Return the owner of the better of two tables, by the least age of what they know."""
-        return np.where(self._rank[theirs] < self._rank[mine], theirs, mine)
 
     def table(self, owner: int) -> LinkTable:
         """Return the table of one robot."""

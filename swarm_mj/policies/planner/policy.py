@@ -32,14 +32,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.planner.discovery import Discovery
 from swarm_mj.policies.planner.payloads import check_room, snapshot_fields
 from swarm_mj.policies.planner.plan import Plan, epoch_plan
 from swarm_mj.policies.planner.settings import EpochSettings, PlannerSettings
-from swarm_mj.policies.planner.snapshots import Snapshots, take_snapshots
+from swarm_mj.policies.planner.snapshots import Snapshots, better, take_snapshots
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.protocol.buffers import NEVER, Buffers
 from swarm_mj.protocol.local_views import LocalViews
@@ -141,7 +141,10 @@ class _Team:
         held = self._holds
         # Packets of the last slot carry snapshots of the epoch that may end now, so they are
         # adopted before the next one begins.
-        self._adopt(heard)
+        if self._current is not None:
+            self._holds = better(self._current.rank, self._holds, heard)
+        if self._upcoming is not None:
+            self._will_hold = better(self._upcoming.rank, self._will_hold, heard)
         if slot >= SLOTS_PER_WINDOW * self._start(self._epoch + 1):
             self._epoch += 1
             self._begin_epoch(views.buffers, b, now)
@@ -161,13 +164,6 @@ class _Team:
                 chosen = plan.transmits(slot - SLOTS_PER_WINDOW * self._start(self._epoch))
             transmits[holds] = chosen[holds]
         return transmits
-
-    def _adopt(self, heard: Int[np.ndarray, "N"]) -> None:
-        """Let each robot that decoded a teammate adopt its snapshots where they are better."""
-        if self._current is not None:
-            self._holds = _better(self._current, self._holds, self._holds[heard])
-        if self._upcoming is not None:
-            self._will_hold = _better(self._upcoming, self._will_hold, self._will_hold[heard])
 
     def _begin_epoch(self, buffers: Buffers, b: int, now: float) -> None:
         """Fly by the snapshots taken for this epoch, and take those for the next."""
@@ -253,10 +249,3 @@ def epoch_start(epoch: int, num_robots: int, settings: EpochSettings) -> int:
 def regular_length(num_robots: int, settings: EpochSettings) -> int:
     """Return how long an epoch is, except for the first ones [windows]."""
     return max(settings.min_regular_windows, round(settings.regular_rounds * num_robots))
-
-
-def _better(
-    snapshots: Snapshots, mine: Int[np.ndarray, "N"], theirs: Int[np.ndarray, "N"]
-) -> Int[np.ndarray, "N"]:
-    """Return the owner of the better of two snapshots, robot by robot."""
-    return np.where(snapshots.rank[theirs] < snapshots.rank[mine], theirs, mine)

@@ -28,7 +28,6 @@ from swarm_mj.policies.spatial_tdma import SpatialTdma
 from swarm_mj.policies.tdma import slot_of
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.packets import PacketField
-from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.link_models import Belief
 
@@ -50,14 +49,10 @@ class RestingPlanner(BroadcastPolicy):
         learns: bool,
         moving: Planner | None = None,
     ) -> None:
-        """Prepare the policy.
+        """Prepare the policy, whose packets carry what robots observed of links, if it learns.
 
-        Args:
-            radio: The robots believe in it unless the policy is informed otherwise.
-            settings: Of the planner.
-            turns: Followed by robots that cannot plan.
-            learns: Whether packets carry what robots observed of links.
-            moving: Followed by robots that hear of motion, in place of turns.
+        Robots that cannot plan follow the turns; if they hear of motion, the planner of moving
+        teams, if there is one.
         """
         self._belief = Belief(radio=radio)
         self._settings = settings
@@ -102,26 +97,15 @@ class RestingPlanner(BroadcastPolicy):
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return who transmits, by the schedule it knows or in its turn."""
-        buffers, slot = views.buffers, slot_of(views.now)
-        if self._first is None:
-            self._first = slot
-        knows_motion = np.any(buffers.velocity_mps, axis=(2, 3))
-        can_plan = np.all(buffers.is_known, axis=2) & ~knows_motion
+        slot = slot_of(views.now)
+        first = self._first = slot if self._first is None else self._first
         heard = views.phases[-1].heard if views.phases else views.silence
-        # A packet's news of its sender is from before the slot in which it was sent.
-        known_until = np.rint(buffers.timestamp * SLOTS_PER_WINDOW).astype(np.int64)
-        known_until -= 2 + self._first[:, None, None]
         transmits = self._turns.transmits(views)
         for b, team in enumerate(self._teams):
-            transmits[b] = team.transmits(
-                int(slot[b] - self._first[b]),
-                transmits[b],
-                can_plan[b],
-                heard[b],
-                buffers.position_m[b],
-                known_until[b],
-            )
+            since, begin = int(slot[b] - first[b]), int(first[b])
+            transmits[b] = team.transmits(since, begin, transmits[b], heard[b], views.buffers, b)
         if self._moving is not None:
+            knows_motion = np.any(views.buffers.velocity_mps, axis=(2, 3))
             self._has_moved |= np.any(knows_motion, axis=1)
             for b in np.flatnonzero(self._has_moved).tolist():
                 by_snapshot = self._moving.transmits_in(views, b)

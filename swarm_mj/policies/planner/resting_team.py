@@ -19,6 +19,8 @@ from swarm_mj.policies.planner.link_evidence import Evidence, no_observation, ob
 from swarm_mj.policies.planner.link_tables import Tables, corrected, expected_mw
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.settings import LearningSettings, PlannerSettings
+from swarm_mj.policies.planner.snapshots import better
+from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 from swarm_mj.radio.link_models import Belief
 from swarm_mj.radio.links import Links
@@ -60,37 +62,35 @@ class RestingTeam:
     def transmits(
         self,
         slot: int,
+        first_slot: int,
         in_turn: Bool[np.ndarray, "N"],
-        can_plan: Bool[np.ndarray, "N"],
         heard: Int[np.ndarray, "N"],
-        position_m: Float[np.ndarray, "N N 2"],
-        known_until: Int[np.ndarray, "N N"],
+        buffers: Buffers,
+        b: int,
     ) -> Bool[np.ndarray, "N"]:
-        """Return who transmits in a slot, by its plan or in its turn.
+        """Return who transmits in a slot of mission b: by its plan or, if it cannot plan, in turn.
 
-        Args:
-            slot: Counted from the beginning of the mission; every slot once, in order.
-            in_turn: Who transmits of those that cannot plan.
-            can_plan: Who knows where everyone rests.
-            heard: The sender that each robot decoded in the slot before; itself: none.
-            position_m: Of each robot (column), as each robot (row) believes [m].
-            known_until: [j, i]: the last slot of which j knows what i observed, or a negative one.
+        Slots count from the first in which a decision was asked for, every slot once, in order.
+        `heard` is the sender that each robot decoded in the slot before, itself: none.
         """
+        can_plan = np.all(buffers.is_known[b], axis=1) & ~np.any(
+            buffers.velocity_mps[b], axis=(1, 2)
+        )
         if self._times is not None and slot > 0:
-            # What the slot before taught counts before tables are fitted to it, and tables are
-            # adopted before they become current.
-            self._note(self._times, slot, heard, known_until)
-            self._adopt(heard)
-            self._keep_time(self._times, slot, known_until)
+            # [j, i]: the last slot of which j knows what i observed. A packet's news of its sender
+            # is from before the slot in which it was sent.
+            observed = np.rint(buffers.timestamp[b] * SLOTS_PER_WINDOW).astype(np.int64)
+            self._learn(self._times, slot, heard, observed - 2 - first_slot)
             self._joined[can_plan] = np.minimum(self._joined[can_plan], slot)
         members: dict[tuple[bytes, int | None], list[int]] = {}
         for i in np.flatnonzero(can_plan).tolist():
-            members.setdefault((position_m[i].tobytes(), self._owner(i)), []).append(i)
+            key = buffers.position_m[b, i].tobytes(), self._owner(i)
+            members.setdefault(key, []).append(i)
         self._followed = []
         transmits = in_turn.copy()
         for key, robots in members.items():
             if key not in self._flights:
-                self._flights[key] = self._flight(position_m[robots[0]], key[1], slot)
+                self._flights[key] = self._flight(buffers.position_m[b, robots[0]], key[1], slot)
             flight = self._flights[key]
             planned = flight.plan.transmits(slot - flight.begin)
             transmits[robots] = planned[robots]
@@ -98,42 +98,26 @@ class RestingTeam:
         self._transmitted = transmits
         return transmits
 
-    def _note(
+    def _learn(
         self,
         times: "CommonTimes",
         slot: int,
         heard: Int[np.ndarray, "N"],
         known_until: Int[np.ndarray, "N N"],
     ) -> None:
-        """Note what the slot before taught those who followed a plan in it."""
+        """Note what the slot before taught, adopt better tables, and fit or use them in time."""
         observation = no_observation(len(self._everyone))
         # A robot that has been silent for a round may be gone, and is not waited for.
         is_silent = known_until < slot - times.round_slots
         knows_all = np.all(is_silent | (self._joined[None, :] <= known_until), axis=1)
         for follows, flight, planned in self._followed:
-            observe(
-                follows & ~self._transmitted & knows_all,
-                heard,
-                planned,
-                flight.expected_mw,
-                flight.prior.received_mw,
-                flight.prior.noise_mw,
-                flight.prior.threshold,
-                observation,
-            )
+            is_witness = follows & ~self._transmitted & knows_all
+            observe(is_witness, heard, planned, flight.expected_mw, flight.prior, observation)
         self._evidence.add(observation)
-
-    def _adopt(self, heard: Int[np.ndarray, "N"]) -> None:
-        """Let each robot that decoded a teammate adopt its tables where they are better."""
         if self._current is not None:
-            self._holds = self._current.better(self._holds, self._holds[heard])
+            self._holds = better(self._current.rank, self._holds, heard)
         if self._next is not None:
-            self._will_hold = self._next.better(self._will_hold, self._will_hold[heard])
-
-    def _keep_time(
-        self, times: "CommonTimes", slot: int, known_until: Int[np.ndarray, "N N"]
-    ) -> None:
-        """Fit tables, and fly by them, when it is time."""
+            self._will_hold = better(self._next.rank, self._will_hold, heard)
         if times.are_made(slot):
             self._next = Tables(self._evidence, known_until, self._settings.learning)
             self._will_hold = self._everyone
@@ -173,7 +157,7 @@ class CommonTimes:
 
     def are_flown(self, slot: int) -> bool:
         """Whether everyone begins to fly by the tables made last."""
-        return slot >= self._first and (slot - self._first) % self._length == 0
+        return slot >= self._first and slot == self.begin(slot)
 
     def begin(self, slot: int) -> int:
         """Return when everyone began to fly by the tables that are current in this slot."""

@@ -40,21 +40,10 @@ def take_snapshots(
     windows_ahead: float,
     settings: SnapshotSettings,
 ) -> Snapshots:
-    """Return every robot's snapshot, row i from buffer i alone.
+    """Return every robot's snapshot, row i from buffer i alone: T^{i,k} [windows] and M^{i,k}.
 
-    Args:
-        position_m: M^{i,k}: positions [m].
-        velocity_mps: M^{i,k}: velocities [m/s].
-        timestamp: T^{i,k} [windows].
-        is_known: Whether i has heard of k.
-        now: t [windows].
-        window_s: Duration of a window [s].
-        windows_ahead: From now to the middle of the epoch that they are taken for [windows].
-        settings: How long robots stay fresh, and how far beliefs err.
-
-    Returns:
-        The snapshots. The best has most robots fresh, then the least mean age of these, then the
-        lowest identity.
+    They are taken for the middle of an epoch some windows ahead. The best has most robots fresh,
+    then the least mean age of these, then the lowest identity.
     """
     num_robots, num_known = len(is_known), np.sum(is_known, axis=1)
     age = np.where(is_known, now - timestamp, 0.0)
@@ -78,3 +67,14 @@ def take_snapshots(
         timestamp=timestamp.copy(),
         rank=np.argsort(np.lexsort((np.sum(age * is_fresh, axis=1) / num_fresh, -num_fresh))),
     )
+
+
+def better(
+    rank: Int[np.ndarray, "N"], owner: Int[np.ndarray, "N"], heard: Int[np.ndarray, "N"]
+) -> Int[np.ndarray, "N"]:
+    """Return the owner of the better of two objects, that i has and that it heard, by their rank.
+
+    Every robot makes such an object, adopts a better one that it decodes, and passes it on.
+    """
+    theirs = owner[heard]
+    return np.where(rank[theirs] < rank[owner], theirs, owner)

@@ -145,7 +145,7 @@ def first_slots(
         if is_known[k]:
             if place >= rule.num_slots:
                 slots[k] = best_slot(frame, k, 0, 0.0, no_marks)
-            switch(frame, slots[k], k, True)
+            switch(frame, int(slots[k]), k, True)
     return slots
 
 

@@ -16,6 +16,8 @@ from swarm_mj.policies.planner.link_evidence import (
     no_observation,
     observe,
 )
+from swarm_mj.radio.decode_curves import KNOWN
+from swarm_mj.radio.links import Links
 from swarm_mj.radio.reception import NOBODY
 
 NOISE_MW, THRESHOLD = 1.0, 10.0  # so a packet of 10 mW has a margin of 0 dB in silence
@@ -32,16 +34,11 @@ def powers(**of_link):
 def observed(heard, transmitted, believed_mw, *, prior_mw=None, listens=None):
     """Whom each robot notes, in which bin, and whether as decoded; None if nothing."""
     observation, transmitted = no_observation(4), np.array(transmitted, dtype=bool)
-    observe(
-        ~transmitted if listens is None else listens,
-        np.array(heard),
-        transmitted,
-        believed_mw,
-        believed_mw if prior_mw is None else prior_mw,
-        NOISE_MW,
-        THRESHOLD,
-        observation,
-    )
+    prior_mw = believed_mw if prior_mw is None else prior_mw
+    certain, row = np.full((4, 4), np.inf), np.zeros((4, 4), dtype=np.int64)
+    prior = Links(prior_mw, certain, NOISE_MW, THRESHOLD, KNOWN, row, prior_mw)
+    listens = ~transmitted if listens is None else listens
+    observe(listens, np.array(heard), transmitted, believed_mw, prior, observation)
     columns = zip(*(each.tolist() for each in observation), strict=True)
     return [None if sender == NOBODY else (sender, *rest) for sender, *rest in columns]
 

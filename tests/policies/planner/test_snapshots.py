@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm_mj.policies.planner.settings import SnapshotSettings
-from swarm_mj.policies.planner.snapshots import Snapshots, take_snapshots
+from swarm_mj.policies.planner.snapshots import Snapshots, better, take_snapshots
 
 seeds = st.integers(0, 2**32 - 1)
 NOW = 20.0
@@ -189,3 +189,10 @@ def test_a_snapshot_does_not_change_with_the_buffer():
         array[:] = 0
     for field in fields(Snapshots):
         np.testing.assert_array_equal(getattr(snapshots, field.name), getattr(before, field.name))
+
+
+def test_robots_adopt_the_better_of_what_they_have_and_decode():
+    """Object 2 is best, then 0, 1, 3: robot 0 decodes robot 3, who holds 2, robot 1 decodes 0."""
+    rank, owner = np.array([1, 2, 0, 3]), np.array([0, 1, 3, 2])
+    assert better(rank, owner, np.array([3, 0, 2, 1])).tolist() == [2, 0, 3, 2]
+    assert better(rank, owner, np.arange(4)).tolist() == owner.tolist()
