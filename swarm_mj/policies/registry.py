@@ -15,7 +15,7 @@ from swarm_mj.policies.aloha import Aloha
 from swarm_mj.policies.gossip import InnovationGossip
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle
 from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
-from swarm_mj.policies.planner.payloads import carries, link_fields, snapshot_fields
+from swarm_mj.policies.planner.payloads import carries, link_fields
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.planner.settings import PlannerSettings
@@ -52,18 +52,11 @@ def _sotdma(mission: Mission) -> SelfOrganisedTdma:
 def _planner(mission: Mission) -> Planner | RestingPlanner:
     if mission.task != "stationary":
         return Planner(mission)
-    if not carries(link_fields(mission), mission):
-        return _resting_planner(mission)
-    # Snapshots outgrow what is learned of links in large teams; then there is no plan for motion.
-    moving = Planner(mission) if carries(snapshot_fields(mission), mission) else None
-    return _resting_planner(mission, learns=True, moving=moving)
+    return _resting_planner(mission, learns=carries(link_fields(mission), mission))
 
 
-def _resting_planner(
-    mission: Mission, *, learns: bool = False, **moving: Planner
-) -> RestingPlanner:
-    turns = _spatial_tdma(mission)
-    return RestingPlanner(radio_of(mission), PlannerSettings(), turns, learns=learns, **moving)
+def _resting_planner(mission: Mission, *, learns: bool = False) -> RestingPlanner:
+    return RestingPlanner(mission, PlannerSettings(), _spatial_tdma(mission), learns=learns)
 
 
 # What makes each policy, given the mission and, for these four, a transmission probability.

@@ -42,7 +42,7 @@ SHORT = PlannerSettings(
 def learner(mission, settings=SHORT):
     """The planner that learns, by other numbers."""
     turns = make_policy("spatial-tdma", mission)
-    return RestingPlanner(radio_of(mission), settings, turns, learns=True)
+    return RestingPlanner(mission, settings, turns, learns=True)
 
 
 PLANNED = {}  # by exactly what plans follow from, which spares working them out for every robot

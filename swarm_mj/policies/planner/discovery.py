@@ -23,15 +23,7 @@ class Discovery:
         settings: PlannerSettings,
         rng: np.random.Generator,
     ) -> None:
-        """Draw the orders.
-
-        Args:
-            num_robots: N.
-            num_reaches: Area over that within which a lone packet decodes [1].
-            range_m: Distance up to which a lone packet decodes [m].
-            settings: Of the planner, for its discovery and its search.
-            rng: Of the mission.
-        """
+        """Draw the orders of a mission whose area is as large as this many circles of the range."""
         self.num_robots = num_robots
         self._range_m = range_m
         self._polite_ranges = settings.discovery.polite_ranges
@@ -75,16 +67,9 @@ class Discovery:
         """Return who transmits: one robot in a window's first slot, those that hear it in the next.
 
         A robot that has just heard a missing one answers, unless another robot near that one comes
-        first. Of the missing that hold this snapshot, one after the other transmits.
-
-        Args:
-            slot: The slot.
-            is_fresh: Who is fresh, in the snapshot that a robot flies by.
-            was_fresh: The same in the snapshot that robot i flew by before the last slot, since
-                the call itself may bring a snapshot in which the caller is fresh.
-            heard: The sender that each robot decoded in the slot before; itself: none.
-            buffers: All robots'.
-            b: The mission.
+        first. Of the missing that hold this snapshot, one after the other transmits. Row i of
+        `was_fresh` is from the snapshot that i flew by before the last slot, since the call itself
+        may bring a snapshot in which the caller is fresh.
         """
         transmits = np.zeros(self.num_robots, dtype=bool)
         turn = slot // SLOTS_PER_WINDOW // self._search.every_windows

@@ -24,32 +24,23 @@ from swarm_mj.protocol.packets import (
 )
 
 NUM_SENT = 2  # snapshots or tables in a packet: the current one, and the best of the next
-SPEED_BITS = 16
-EXPECTED_AGE_BITS, EXPECTED_AGE_STEP_WINDOWS = 16, 1 / 16  # of up to 4,096 windows
-RANK_BITS = 32
-LINK_BITS = 8  # of each number in a table of links
-LEAST_EXCESS_DB = -32.0
 
 
 def snapshot_fields(mission: Mission) -> tuple[PacketField, ...]:
     """Return the fields of two snapshots, as precise as T and M."""
     num_robots = mission.num_robots
-    max_relative_mps = 2.0 * mission.max_velocity_mps
+    step_mps = 2.0 * mission.max_velocity_mps / 2**16
     snapshot = (
         identity("owner of the snapshot", mission),
         PacketField(name="robots known to the owner", bits=1, count=num_robots),
         # The errors of positions follow from their ages and this number.
-        PacketField(
-            name="spread of velocities",
-            bits=SPEED_BITS,
-            step=max_relative_mps / 2**SPEED_BITS,
-            unit="m/s",
-        ),
+        PacketField(name="spread of velocities", bits=16, step=step_mps, unit="m/s"),
+        # 16 bits reach up to 4,096 windows.
         PacketField(
             name="expected age, of all pairs",
-            bits=EXPECTED_AGE_BITS,
+            bits=16,
             count=num_robots**2,
-            step=EXPECTED_AGE_STEP_WINDOWS,
+            step=1 / 16,
             unit="windows",
         ),
         times(age("age in the snapshot"), num_robots),
@@ -63,7 +54,7 @@ def link_fields(mission: Mission) -> tuple[PacketField, ...]:
     num_robots = mission.num_robots
     num_noted = num_robots * MAX_KINDS
     num_links = NUM_SENT * num_robots * (num_robots - 1) // 2
-    in_table = {"bits": LINK_BITS, "count": num_links, "step": STEP_DB, "unit": "dB"}
+    in_table = {"bits": 8, "count": num_links, "step": STEP_DB, "unit": "dB"}
     return (
         PacketField(name="slot since which each robot plans", bits=16, count=num_robots),
         times(identity("sender of a kind of packet", mission), num_noted),
@@ -71,9 +62,9 @@ def link_fields(mission: Mission) -> tuple[PacketField, ...]:
         PacketField(name="whether it was decoded", bits=1, count=num_noted),
         PacketField(name="how often", bits=bits_for(MAX_TIMES + 1), count=num_noted),
         times(identity("owner of the table", mission), NUM_SENT),
-        PacketField(name="how much its owner knew", bits=RANK_BITS, count=NUM_SENT),
+        PacketField(name="how much its owner knew", bits=32, count=NUM_SENT),
         PacketField(name="law of fades and losses", bits=bits_for(len(LAWS)), count=NUM_SENT),
-        PacketField(name="mean excess of a link, in the table", low=LEAST_EXCESS_DB, **in_table),
+        PacketField(name="mean excess of a link, in the table", low=-32.0, **in_table),
         PacketField(name="standard deviation of a link, in the table", **in_table),
     )
 

@@ -38,15 +38,10 @@ class Plan:
         now: float = 0.0,
         is_free: Bool[np.ndarray, "P"] | None = None,
     ) -> None:
-        """Prepare the plan.
+        """Prepare a plan that begins with T and t as given [windows].
 
-        Args:
-            links: Between the robots.
-            settings: Of the planner, for its schedules and weights.
-            is_certain: Whether to look ahead as far as on certain links; None: if links are.
-            timestamp: T as the plan begins [windows].
-            now: t as the plan begins [windows].
-            is_free: The slots that the plan may fill, of a plan that ends.
+        It ends with the slots that may be free or not, and looks as far ahead as on certain links
+        if that is said, or else if its links are certain.
         """
         num_robots = len(links.received_mw)
         self._links = links
@@ -113,16 +108,9 @@ def epoch_plan(
     now: float,
     is_free: Bool[np.ndarray, "P"],
 ) -> Plan:
-    """Return the plan of an epoch, which depends on one snapshot and on nothing else.
+    """Return the plan of an epoch, which depends on one robot's snapshot and on nothing else.
 
-    Args:
-        belief: The robots' belief about the channel.
-        settings: Of the planner.
-        snapshots: Those taken for this epoch.
-        owner: The robot whose snapshot counts.
-        timestamp: T as the epoch begins, as far as is known with that snapshot [windows].
-        now: t as the epoch begins [windows].
-        is_free: The slots of the epoch that the plan may fill.
+    T and t are those as the epoch begins, as far as they are known with that snapshot [windows].
     """
     is_fresh, observed = snapshots.is_fresh[owner], snapshots.timestamp[owner]
     round_windows = max(len(observed), settings.schedule.min_round_windows)

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.planner.payloads import link_fields
+from swarm_mj.policies.planner.payloads import carries, link_fields, snapshot_fields
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting_team import RestingTeam
 from swarm_mj.policies.planner.settings import PlannerSettings
@@ -28,8 +28,8 @@ from swarm_mj.policies.spatial_tdma import SpatialTdma
 from swarm_mj.policies.tdma import slot_of
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.packets import PacketField
-from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.link_models import Belief
+from swarm_mj.radio.mission_radio import radio_of
 
 
 class RestingPlanner(BroadcastPolicy):
@@ -41,24 +41,19 @@ class RestingPlanner(BroadcastPolicy):
     """
 
     def __init__(
-        self,
-        radio: FreeSpaceRadio,
-        settings: PlannerSettings,
-        turns: SpatialTdma,
-        *,
-        learns: bool,
-        moving: Planner | None = None,
+        self, mission: Mission, settings: PlannerSettings, turns: SpatialTdma, *, learns: bool
     ) -> None:
         """Prepare the policy, whose packets carry what robots observed of links, if it learns.
 
-        Robots that cannot plan follow the turns; if they hear of motion, the planner of moving
-        teams, if there is one.
+        Robots that cannot plan follow the turns. If it learns, those that hear of motion follow the
+        planner of moving teams, unless only links fit into packets, as in some large teams.
         """
-        self._belief = Belief(radio=radio)
+        self._belief = Belief(radio=radio_of(mission))
         self._settings = settings
         self._turns = turns
         self._learns = learns
-        self._moving = moving
+        is_ready = learns and carries(snapshot_fields(mission), mission)
+        self._moving = Planner(mission) if is_ready else None
         self.uses = (
             "its buffer, the clock, a common order, its prior knowledge of the radio; and all "
             "robots' observations of their links, in packets"

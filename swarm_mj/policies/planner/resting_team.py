@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.policies.planner.link_evidence import Evidence, no_observation, observe
+from swarm_mj.policies.planner.link_evidence import NOTHING, Evidence, observe
 from swarm_mj.policies.planner.link_tables import Tables, corrected, expected_mw
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.settings import LearningSettings, PlannerSettings
@@ -106,14 +106,14 @@ class RestingTeam:
         known_until: Int[np.ndarray, "N N"],
     ) -> None:
         """Note what the slot before taught, adopt better tables, and fit or use them in time."""
-        observation = no_observation(len(self._everyone))
+        kinds = np.full(len(self._everyone), NOTHING)
         # A robot that has been silent for a round may be gone, and is not waited for.
         is_silent = known_until < slot - times.round_slots
         knows_all = np.all(is_silent | (self._joined[None, :] <= known_until), axis=1)
         for follows, flight, planned in self._followed:
             is_witness = follows & ~self._transmitted & knows_all
-            observe(is_witness, heard, planned, flight.expected_mw, flight.prior, observation)
-        self._evidence.add(observation)
+            observe(is_witness, heard, planned, flight.expected_mw, flight.prior, kinds)
+        self._evidence.add(kinds)
         if self._current is not None:
             self._holds = better(self._current.rank, self._holds, heard)
         if self._next is not None:

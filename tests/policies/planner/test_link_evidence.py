@@ -9,17 +9,17 @@ from swarm_mj.policies.planner.link_evidence import (
     LEAST_MARGIN_DB,
     MAX_KINDS,
     MAX_TIMES,
+    NOTHING,
     NUM_BINS,
     Evidence,
-    Observation,
     bin_centres_db,
-    no_observation,
+    kind_of,
     observe,
 )
 from swarm_mj.radio.decode_curves import KNOWN
 from swarm_mj.radio.links import Links
-from swarm_mj.radio.reception import NOBODY
 
+KINDS = (2, 4, NUM_BINS)  # whether decoded, the sender of four, the bin
 NOISE_MW, THRESHOLD = 1.0, 10.0  # so a packet of 10 mW has a margin of 0 dB in silence
 
 
@@ -33,14 +33,14 @@ def powers(**of_link):
 
 def observed(heard, transmitted, believed_mw, *, prior_mw=None, listens=None):
     """Whom each robot notes, in which bin, and whether as decoded; None if nothing."""
-    observation, transmitted = no_observation(4), np.array(transmitted, dtype=bool)
+    noted, transmitted = np.full(4, NOTHING), np.array(transmitted, dtype=bool)
     prior_mw = believed_mw if prior_mw is None else prior_mw
     certain, row = np.full((4, 4), np.inf), np.zeros((4, 4), dtype=np.int64)
     prior = Links(prior_mw, certain, NOISE_MW, THRESHOLD, KNOWN, row, prior_mw)
     listens = ~transmitted if listens is None else listens
-    observe(listens, np.array(heard), transmitted, believed_mw, prior, observation)
-    columns = zip(*(each.tolist() for each in observation), strict=True)
-    return [None if sender == NOBODY else (sender, *rest) for sender, *rest in columns]
+    observe(listens, np.array(heard), transmitted, believed_mw, prior, noted)
+    kinds = [None if kind == NOTHING else np.unravel_index(kind, KINDS) for kind in noted]
+    return [kind and (kind[1], kind[2], bool(kind[0])) for kind in kinds]
 
 
 def test_bins_are_two_db_wide_around_their_centres():
@@ -111,31 +111,25 @@ def test_the_plan_s_own_belief_that_the_listener_transmits_does_not_count():
     assert observed([0, 1, 2, 3], [1, 1, 0, 0], power_mw, listens=listens)[1] == (0, 13, False)
 
 
-def of_one(sender, margin, is_decoded):
-    """Robot 0 of two observed this, and robot 1 nothing."""
-    return Observation(
-        np.array([sender, NOBODY]), np.array([margin, 0]), np.array([is_decoded, False])
-    )
+def of_one(i, margin, is_decoded, num_robots=2):
+    """Robot 0 observed this, and the others nothing."""
+    return np.array([kind_of(is_decoded, i, margin, num_robots), *[NOTHING] * (num_robots - 1)])
 
 
 def test_counts_are_a_plain_loop_up_to_each_robot_s_slot():
     rng = np.random.default_rng(3)
-    evidence, slots = Evidence(5), []
-    for _ in range(60):
-        sender, margin = rng.integers(-1, 5, 5), rng.integers(0, 4, 5)
-        is_decoded = rng.random(5) < 0.5
-        slots.append((sender.tolist(), margin.tolist(), is_decoded.tolist()))
-        evidence.add(Observation(sender, margin, is_decoded))
-    known_until = np.array([-2, 0, 20, 59, 80])
+    evidence, known_until = Evidence(5), np.array([-2, 0, 20, 59, 80])
     expected = np.zeros((2, 5, 5, NUM_BINS), dtype=int)
-    for slot, columns in enumerate(slots):
-        for j, (i, place, is_decoded) in enumerate(zip(*columns, strict=True)):
-            if slot <= known_until[j] and i != NOBODY:
-                expected[int(is_decoded), j, i, place] += 1
+    for slot in range(60):
+        kinds = np.full(5, NOTHING)
+        for j in np.flatnonzero(rng.random(5) < 0.8).tolist():
+            is_decoded, i, margin = bool(rng.random() < 0.5), rng.integers(5), rng.integers(4)
+            kinds[j] = kind_of(is_decoded, i, margin, 5)
+            expected[int(is_decoded), j, i, margin] += slot <= known_until[j]
+        evidence.add(kinds)
     decoded, missed = evidence.counts(known_until)
     np.testing.assert_array_equal(decoded, expected[1])
     np.testing.assert_array_equal(missed, expected[0])
-    assert expected.sum(axis=(0, 2, 3)).tolist()[:2] == [0, slots[0][0][1] != NOBODY]
 
 
 def test_who_observed_nothing_counts_nothing():
@@ -159,13 +153,8 @@ def test_full_notes_take_no_new_kind_but_count_on():
     """Of 24 bins and two fates with three senders, each noted once, the first 64 stay."""
     evidence = Evidence(4)
     kinds = [(i, k, fate) for i in (1, 2, 3) for k in range(NUM_BINS) for fate in (True, False)]
-    rest = np.full(3, NOBODY)
-    for i, k, fate in [*kinds, *kinds]:
-        evidence.add(
-            Observation(
-                np.array([i, *rest]), np.array([k, 0, 0, 0]), np.array([fate, False, False, False])
-            )
-        )
+    for kind in [*kinds, *kinds]:
+        evidence.add(of_one(*kind, num_robots=4))
     counts = dict(zip((True, False), evidence.counts(np.full(4, 1000)), strict=True))
     times = [int(counts[fate][0, i, k]) for i, k, fate in kinds]
     assert times == [2] * MAX_KINDS + [0] * (len(kinds) - MAX_KINDS)
