@@ -26,18 +26,12 @@ def draw_map(
     packets: dict[str, PacketLinks],
     colours: UInt8[np.ndarray, "T N 3"],
 ) -> None:
-    """Draw the map but for what a world beyond free space adds.
-
-    Args:
-        out: The recording.
-        mission: Its numbers.
-        packets: By their fate.
-        colours: The robots'.
-    """
+    """Draw the map, with packets by their fate, but for what the environment adds."""
     _draw_area(out, mission)
     _draw_robots(out, colours)
     if out.log.has_motion:
-        _draw_headings(out)
+        where = out.log.position_m.reshape(-1, 2)
+        out.lines("arena/heading", where, where + heading_m(out).reshape(-1, 2))
         _draw_trails(out)
         _draw_beliefs(out)
     log, (row, child) = out.log, np.nonzero(out.log.has_parent)
@@ -91,11 +85,6 @@ def _draw_robots(out: RerunLog, colours: UInt8[np.ndarray, "T N 3"]) -> None:
     name = rr.Points2D.from_fields(labels=[f"r{log.ego}"], show_labels=True)
     out.fixed("arena/ego/name", name)
     out.layer("arena/ego/name", row, positions=where - (0.0, 3.0 * radius_m))
-
-
-def _draw_headings(out: RerunLog) -> None:
-    where = out.log.position_m.reshape(-1, 2)
-    out.lines("arena/heading", where, where + heading_m(out).reshape(-1, 2))
 
 
 def heading_m(out: RerunLog) -> np.ndarray:

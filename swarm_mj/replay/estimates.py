@@ -6,7 +6,7 @@ from swarm_mj.system.needs import ADDRESSES, GB, LIBRARIES, OF_RERUN, Needs
 
 
 def replay_memory(mission: Mission, num_windows: int) -> float:
-    """What recording so many windows takes, at its peak: when they are written."""
+    """Return the memory that recording takes at its peak, when the replay is written."""
     matrices = min(MAX_AGE_MATRIX_BYTES, AGE_BYTES * num_windows * mission.num_robots**2)
     return 0.1 * GB + (15e3 + 1e3 * mission.num_robots) * num_windows + 2.2 * matrices
 
@@ -18,7 +18,7 @@ def replay_file(mission: Mission) -> float:
 
 
 def video_needs(width: int, height: int, num_pictures: int | float, suffix: str) -> Needs:
-    """Of `replay --video`: a GIF's pictures are kept until the last one is drawn."""
+    """Return what `replay --video` takes; a GIF's pictures are kept until the last is drawn."""
     pixels = width * height
     kept = num_pictures if suffix == ".gif" else 0.0
     return Needs(

@@ -88,13 +88,8 @@ def stride_of(swarm: Swarm, min_stride: int = 1) -> int:
 def radio_snapshot(swarm: Swarm, index: int = 0) -> RadioSnapshot | None:
     """Compare one mission's channel with the belief about it.
 
-    Args:
-        swarm: The missions.
-        index: The mission.
-
-    Returns:
-        The snapshot; None in free space, where the belief is right, and in a user's own channel,
-        whose mean powers are unknown.
+    There is nothing to compare in free space, where the belief is right, and in a user's own
+    channel, whose mean powers are unknown.
     """
     channel = swarm.channel
     if not isinstance(channel, ComposedChannel):
@@ -108,11 +103,24 @@ def radio_snapshot(swarm: Swarm, index: int = 0) -> RadioSnapshot | None:
     pairs = here[:, None] & here & ~np.eye(mission.num_robots, dtype=bool)
     is_true, is_believed = (pairs & (power >= min_mw) for power in (true_mw, believed_mw))
     sent_mw = by_robot(mission, radio_of(mission).power_mw)
+    differs = is_true != is_believed
+    differs &= ~np.tril(differs.T)  # the other direction stands for both
+    sender, receiver = np.nonzero(differs)
+    power_mw = np.maximum(true_mw[sender, receiver], np.finfo(float).tiny)
+    num_believed, num_working = (int(np.sum(np.triu(x | x.T))) for x in (is_believed, is_true))
+    mismatch = LinkMismatch(
+        window=np.array([1]),
+        row=np.zeros(len(sender), dtype=int),
+        sender=sender.astype(np.int16),
+        receiver=receiver.astype(np.int16),
+        is_too_weak=is_believed[sender, receiver],
+        loss_db=np.round(10.0 * np.log10(sent_mw[sender] / power_mw)).astype(np.int16),
+        # Rounded down: a packet that does not decode must not show a margin of 0 dB.
+        margin_db=np.floor(10.0 * np.log10(power_mw / min_mw)).astype(np.int16),
+    )
+    group = strong_groups(is_true).astype(np.int16)
     return RadioSnapshot(
-        group=strong_groups(is_true).astype(np.int16),
-        mismatch=_mismatch(is_true, is_believed, true_mw, sent_mw, min_mw),
-        num_believed=_num_links(is_believed),
-        num_working=_num_links(is_true),
+        group=group, mismatch=mismatch, num_believed=num_believed, num_working=num_working
     )
 
 
@@ -133,13 +141,7 @@ def mismatch_lines(
     position_m: Float[np.ndarray, "C N 2"],
     pieces: Float[np.ndarray, "P 2"] = WHOLE,
 ) -> tuple[Float[np.ndarray, "S 2 2"], Int[np.ndarray, "S"]]:
-    """Return lines from start to end [m], and the link of each.
-
-    Args:
-        links: The links to draw.
-        position_m: The robots' positions at each snapshot [m].
-        pieces: That each is drawn in, `WHOLE` or `DASHES`.
-    """
+    """Return lines from start to end [m], and the link of each, which is drawn in `pieces`."""
     start_m = position_m[links.row, links.sender]
     end_m = position_m[links.row, links.receiver]
     way_m = (end_m - start_m)[:, None, None]
@@ -174,33 +176,6 @@ def coloured_lines(
     return np.concatenate(lines), np.concatenate(colours)
 
 
-def _num_links(is_linked: Bool[np.ndarray, "N N"]) -> int:
-    return int(np.sum(np.triu(is_linked | is_linked.T)))
-
-
 def _together(parts: Sequence[LinkMismatch]) -> LinkMismatch:
     columns = {name: [getattr(part, name) for part in parts] for name in PER_LINK}
     return replace(parts[0], **{name: np.concatenate(each) for name, each in columns.items()})
-
-
-def _mismatch(
-    is_true: Bool[np.ndarray, "N N"],
-    is_believed: Bool[np.ndarray, "N N"],
-    true_mw: Float[np.ndarray, "N N"],
-    sent_mw: Float[np.ndarray, "N"],
-    min_mw: float,
-) -> LinkMismatch:
-    differs = is_true != is_believed
-    differs &= ~np.tril(differs.T)  # the other direction stands for both
-    sender, receiver = np.nonzero(differs)
-    power_mw = np.maximum(true_mw[sender, receiver], np.finfo(float).tiny)
-    return LinkMismatch(
-        window=np.array([1]),
-        row=np.zeros(len(sender), dtype=int),
-        sender=sender.astype(np.int16),
-        receiver=receiver.astype(np.int16),
-        is_too_weak=is_believed[sender, receiver],
-        loss_db=np.round(10.0 * np.log10(sent_mw[sender] / power_mw)).astype(np.int16),
-        # Rounded down: a packet that does not decode must not show a margin of 0 dB.
-        margin_db=np.floor(10.0 * np.log10(power_mw / min_mw)).astype(np.int16),
-    )

@@ -43,12 +43,8 @@ def fates(
     Addressed packets are delivered, lost, overheard, answered or unanswered. `lost` and
     `unanswered` ones end at the robot they were meant for, which did not decode them; a packet that
     k other robots overheard is k links. Broadcasts have no addressee: `heard` leads to each hearer.
-
-    Args:
-        recipient: S^i in both phases; a robot's own number is silence.
-        heard: The sender that each robot decoded in both phases; its own number is none.
-        is_broadcast: Whether packets have no addressee; otherwise the second phase answers the
-            first.
+    The second phase answers the first. `recipient` is S^i in both phases, `heard` the sender that
+    each robot decoded; a robot's own number is none.
     """
     row, phase, hearer = np.nonzero(is_other(heard))
     speaker = heard[row, phase, hearer]

@@ -107,7 +107,7 @@ def nice_scale(age_windows: Float[np.ndarray, "..."]) -> float:
 
 
 def nice_top(value: float) -> float:
-    """The next round number, 1 for nothing; axes that end there have numbers at both ends."""
+    """Return the next round number, or 1, for an axis that has numbers at both ends."""
     if value <= 0.0:
         return 1.0
     decade = 10.0 ** np.floor(np.log10(value))

@@ -82,20 +82,26 @@ def read_footage(path: Path) -> Footage:
     """
     check_replay(path)
     try:
-        facts, columns = _facts(path), _columns(path)
-        shape = (-1, facts.mission.num_robots)
-        position_m = _numbers(columns["/scene/robots Cylinders3D:centers"]).reshape(*shape, 3)
-        nobody = np.zeros(position_m.shape[:2], dtype=bool)
-        cut_off = columns.get("/scene/robots is_cut_off")  # absent in free space
+        chunks = RrdReader(path).stream().filter(content=f"/__properties/{FACTS}")
+        (text,) = (chunk.to_record_batch().column("json")[0].as_py()[0] for chunk in chunks)
+        facts, columns = read_json(text, Facts), _columns(path)
+        age = _numbers(columns["/scene/robots age"]).reshape(-1, facts.mission.num_robots)
+        position_m = _numbers(columns["/scene/robots Cylinders3D:centers"])
+        # Teams at rest have no headings, and in free space nobody is cut off.
+        ends, cut_off = np.zeros((*age.shape, 6)), np.zeros(age.shape)
+        if (lines := columns.get("/scene/heading LineStrips3D:strips")) is not None:
+            ends = _numbers(lines).reshape(ends.shape)
+        if (flags := columns.get("/scene/robots is_cut_off")) is not None:
+            cut_off = _numbers(flags).reshape(age.shape)
         return Footage(
             facts=facts,
             window=_windows(columns, "/scene/robots"),
-            position_m=position_m[..., :2],
-            velocity_mps=_headings(columns, nobody.shape),
-            age=_numbers(columns["/scene/robots age"]).reshape(shape),
-            is_cut_off=nobody if cut_off is None else _numbers(cut_off).reshape(shape) > 0.0,
+            position_m=position_m.reshape(*age.shape, 3)[..., :2],
+            velocity_mps=ends[..., 3:5] - ends[..., :2],
+            age=age,
+            is_cut_off=cut_off > 0.0,
             mismatch=_mismatch(columns),
-            is_on=_numbers(columns["/scene/robots is_on"]).reshape(shape) > 0.0,
+            is_on=_numbers(columns["/scene/robots is_on"]).reshape(age.shape) > 0.0,
             segments=_segments(columns),
             age_mean=_numbers(columns["/plots/age/mean Measurements:values"]),
         )
@@ -104,12 +110,6 @@ def read_footage(path: Path) -> Footage:
             f"{path} does not hold what a video shows, as replays of an earlier swarm-mj; record "
             "it again"
         ) from error
-
-
-def _facts(path: Path) -> Facts:
-    chunks = RrdReader(path).stream().filter(content=f"/__properties/{FACTS}")
-    (text,) = (chunk.to_record_batch().column("json")[0].as_py()[0] for chunk in chunks)
-    return read_json(text, Facts)
 
 
 def _columns(path: Path) -> Columns:
@@ -125,14 +125,6 @@ def _columns(path: Path) -> Columns:
         path: pa.concat_tables(tables).sort_by(TIMELINE).column(path.split()[-1]).combine_chunks()
         for path, tables in found.items()
     }
-
-
-def _headings(columns: Columns, shape: tuple[int, ...]) -> Float[np.ndarray, "T N 2"]:
-    """Return directions of flight; teams at rest have none."""
-    if (lines := columns.get("/scene/heading LineStrips3D:strips")) is None:
-        return np.zeros((*shape, 2))
-    ends = _numbers(lines).reshape(*shape, 6)
-    return ends[..., 3:5] - ends[..., :2]
 
 
 def _segments(columns: Columns) -> dict[str, PacketSegments]:

@@ -67,14 +67,14 @@ class Log:
         return np.where(self.is_known, self.ego_age, np.nan)
 
     @property
-    def has_parent(self) -> Bool[np.ndarray, "T N"]:
-        """Whether what the ego robot knows of j came over the radio."""
-        return self.is_other_known & (self.parent != NO_PARENT)
-
-    @property
     def is_other_known(self) -> Bool[np.ndarray, "T N"]:
         """Whether the ego robot has heard of j, which is not itself."""
         return self.is_known & (np.arange(self.is_known.shape[1]) != self.ego)
+
+    @property
+    def has_parent(self) -> Bool[np.ndarray, "T N"]:
+        """Whether what the ego robot knows of j came over the radio."""
+        return self.is_other_known & (self.parent != NO_PARENT)
 
     @property
     def is_cut_off(self) -> Bool[np.ndarray, "T N"]:
@@ -89,15 +89,9 @@ class Recorder:
     """Copies what a replay shows from the swarm's first mission, window by window."""
 
     def __init__(self, swarm: Swarm, *, ego: int = 0, is_broadcast: bool = False) -> None:
-        """Prepare the record.
+        """Prepare the record of the ego robot's knowledge; raise ValueError if it does not exist.
 
-        Args:
-            swarm: Its mission 0 is recorded.
-            ego: The robot whose knowledge is shown.
-            is_broadcast: Whether windows are two broadcasts (IV-C) instead of those of Alg. 1.
-
-        Raises:
-            ValueError: There is no such robot.
+        A window is two broadcasts (IV-C), or else a request and a response (Alg. 1).
         """
         num_robots = swarm.mission.num_robots
         if not isinstance(ego, Integral) or not 0 <= ego < num_robots:
@@ -124,8 +118,10 @@ class Recorder:
         own = self._ego
         if len(self._rows) % self._stride == 0:
             self._age.append(age.astype(np.float32))
-        if len(self._rows) % self._radio_stride == 0:
-            self._add_snapshot()
+        is_due = len(self._rows) % self._radio_stride == 0
+        if is_due and (seen := radio_snapshot(self._swarm)) is not None:
+            self._mismatches.append(seen.mismatch)
+            self._radio = {name: value for name, value in vars(seen).items() if name != "mismatch"}
         if flown.costs.task_cost is not None:
             self._task_costs.append(flown.costs.task_cost)
         shown = {
@@ -162,6 +158,7 @@ class Recorder:
         columns = {name: np.stack([row[name] for row in self._rows]) for name in self._rows[0]}
         window = np.arange(1, len(self._rows) + 1)
         age_window, seen = window[:: self._stride], window[:: self._radio_stride]
+        # An interrupt within `add` leaves one matrix, snapshot or cost too many.
         costs = self._task_costs[: len(window)]
         value = np.array([cost.value[0] for cost in costs])
         return Log(
@@ -170,18 +167,8 @@ class Recorder:
             is_broadcast=self._is_broadcast,
             scene=self._swarm.scene,
             age_window=age_window,
-            # An interrupt within `add` leaves one matrix, snapshot or cost too many.
             age=np.stack(self._age[: len(age_window)]),
             task_cost=replace(costs[0], value=value) if costs else None,
             mismatch=joined(self._mismatches[: len(seen)], seen) if self._mismatches else None,
             **columns,
         )
-
-    def _add_snapshot(self) -> None:
-        if (seen := radio_snapshot(self._swarm)) is not None:
-            self._mismatches.append(seen.mismatch)
-            self._radio = {
-                "group": seen.group,
-                "num_believed": seen.num_believed,
-                "num_working": seen.num_working,
-            }

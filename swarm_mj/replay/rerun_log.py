@@ -114,12 +114,9 @@ class RerunLog:
     def layer(
         self, path: str, row: Int[np.ndarray, "L"] | None = None, **columns: np.ndarray
     ) -> None:
-        """Write things of a layer that change.
+        """Write things of a layer that change, by the fields of the layer's archetype.
 
-        Args:
-            path: One of `LAYERS`.
-            row: The log's window of each thing, ascending; None: all windows have as many.
-            **columns: The fields of the layer's archetype, with a value for each thing.
+        `row` is the log's window of each thing, ascending; None: each window has all robots.
         """
         self.fixed_layer(path)
         self.timed(path, self.partitioned(LAYERS[path].kind.columns(**columns), row))

@@ -18,7 +18,7 @@ REPLACED = ("CI", "FORCE_RERUN_ANALYTICS", "ALL_PROXY", "HTTPS_PROXY", "HTTP_PRO
 
 
 def quiet_environment() -> dict[str, str]:
-    """This process's environment, in which rerun's viewer reaches this machine only."""
+    """Return this environment, changed so that rerun's viewer reaches this machine only."""
     kept = {name: value for name, value in os.environ.items() if name.upper() not in REPLACED}
     return kept | {"CI": "true", "ALL_PROXY": NOWHERE}
 
@@ -38,13 +38,13 @@ def view_command(*paths: Path) -> list[str]:
 
 
 def has_display() -> bool:
-    """Whether there is a screen for windows to open on, as far as the environment tells."""
-    is_told = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    return not sys.platform.startswith("linux") or bool(is_told)
+    """Tell whether the environment names a screen for windows."""
+    is_named = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return not sys.platform.startswith("linux") or bool(is_named)
 
 
 def serve_command(*paths: Path) -> tuple[list[str], str]:
-    """The command that serves replays to this machine's browsers only, and the address to open."""
+    """Return the command that serves replays to this machine's browsers, and the address."""
     data_port, page_port = free_ports(2)
     command = [
         *(*VIEWER, "--serve-web", "--bind", LOOPBACK),
@@ -56,7 +56,7 @@ def serve_command(*paths: Path) -> tuple[list[str], str]:
 
 
 def run(command: list[str]) -> int:
-    """Run a viewer until it is closed; returns 1 if it failed, 0 after Ctrl-C."""
+    """Run a viewer until it is closed; return 1 if it failed, 0 after Ctrl-C."""
     try:
         with running(command, environment=quiet_environment()) as viewer:
             return int(viewer.wait() != 0)  # its own codes, or a signal's, mean nothing here
@@ -65,7 +65,7 @@ def run(command: list[str]) -> int:
 
 
 def free_ports(number: int) -> list[int]:
-    """Ports of this machine that nobody listens on."""
+    """Return ports of this machine that no process listens on."""
     with ExitStack() as stack:
         sockets = [stack.enter_context(socket.socket()) for _ in range(number)]
         for each in sockets:

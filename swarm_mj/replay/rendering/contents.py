@@ -18,11 +18,11 @@ def contents_of(
     is_broadcast: bool = False,
     full_scale: float | None = None,
 ) -> Contents:
-    """Return what a swarm looks like now, with the packets of the window just flown.
+    """Return what one of a swarm's missions looks like now, with the window just flown.
 
     Args:
         swarm: The missions.
-        index: The mission that is shown.
+        index: The mission.
         observer: The robot by whose knowledge the others are coloured; it is white itself.
         is_broadcast: Whether windows are two broadcasts (IV-C) instead of those of Alg. 1.
         full_scale: The age from which robots are darkest [windows]; unless given, the number of

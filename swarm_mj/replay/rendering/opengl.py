@@ -10,7 +10,7 @@ import importlib
 import os
 import sys
 import tempfile
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from swarm_mj.system.processes import PYTHON, running
 
@@ -26,21 +26,8 @@ WAY_OUT = (
 )
 
 
-@runtime_checkable
-class Context(Protocol):
-    """What MuJoCo's back ends have in common."""
-
-    def make_current(self) -> None:
-        """Draws into this context from now on."""
-        ...
-
-    def free(self) -> None:
-        """Give its memory back."""
-        ...
-
-
-def make_context(width: int, height: int) -> Context:
-    """Return a context to draw pictures of this size in.
+def make_context(width: int, height: int) -> Any:  # noqa: ANN401 - each back end has its own
+    """Return MuJoCo's `GLContext` to draw pictures of this size in.
 
     Raises:
         OSError: No OpenGL works here, or not the one that MUJOCO_GL names.
