@@ -101,7 +101,7 @@ def save_policy(model: BaseAlgorithm, path: Path | str) -> Path:
         "algorithm": f"{type(model).__name__} of stable-baselines3 {stable_baselines3.__version__}",
         "timesteps": model.num_timesteps,
         "reward": batch.reward,
-        **{f"mission.{name}": value for name, value in asdict(batch.mission).items()},
+        "mission": asdict(batch.mission),
     }
     config = MlpConfig(
         network=network, training=training, evaluation={}, commit=commit(), version=version()

@@ -10,9 +10,9 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.type_aliases import PyTorchObs, Schedule
 from torch import Tensor
 
-from swarm_mj.policies.gnn.action_distribution import recipient_logits
 from swarm_mj.policies.gnn.fast import FastAggregationGnn
 from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.policies.gnn.policy import recipient_logits
 from swarm_mj.policies.gnn.shape import GnnShape
 
 

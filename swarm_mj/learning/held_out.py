@@ -33,7 +33,7 @@ from swarm_mj.learning.settings import CHOICE_SEED, HELD_OUT_SEED, TEST_SEED, Tr
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.network import AggregationGnn
-from swarm_mj.policies.gnn.policy import LearnedPolicy
+from swarm_mj.policies.gnn.policy import GnnPolicy
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import WindowCosts
@@ -60,10 +60,10 @@ class HeldOut:
     objective: float  # the reward's cost, each size alike; the best policy has least of it
 
 
-def held_out_policy(training: Training, network: AggregationGnn, mission: Mission) -> LearnedPolicy:
+def held_out_policy(training: Training, network: AggregationGnn, mission: Mission) -> GnnPolicy:
     """Return the policy under training, as it flies."""
     extractor = make_extractor(training.features, mission)
-    return LearnedPolicy(network, extractor, silence_logit=training.silence_logit)
+    return GnnPolicy(network, extractor, silence_logit=training.silence_logit)
 
 
 def evaluate(

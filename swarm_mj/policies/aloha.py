@@ -14,45 +14,30 @@ class Aloha(RandomTransmission, BroadcastPolicy):
 
     In slotted ALOHA what counts is the load that all n stations offer together, so each of them
     sends less the more there are. Here a neighbourhood's robots are its stations, and `probability`
-    is that anyone of them broadcasts in a slot: each does so with 1 - (1 - p)^(1/n). A robot takes
-    for n the size of the team times the share of the robots it knows that it believes in range; the
-    whole team, then, until it has heard of anyone.
-
-    The difference to random flooding is this n: flooding has one probability for everyone and
-    knows nothing. Uses the robot's own buffer, the team's size and the range.
+    is that anyone of them broadcasts in a slot: each does so with 1 - (1 - p)^(1/n). The difference
+    to random flooding is this n: flooding has one probability for everyone and knows nothing. Uses
+    the robot's own buffer, the team's size and the range.
     """
 
     uses = "how many neighbours its buffer shows"
 
     def __init__(self, probability: float, *, range_m: float) -> None:
-        """Prepare the policy.
-
-        Args:
-            probability: That anyone of a neighbourhood broadcasts in a slot.
-            range_m: Distance at which a lone transmission just decodes [m].
-
-        Raises:
-            ValueError: The probability is not in [0, 1].
-        """
+        """Take the probability and the distance at which a lone transmission just decodes [m]."""
         super().__init__(probability)
         self._range_m = range_m
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
-        """Each robot that draws a broadcast."""
+        """Return each robot that draws a broadcast."""
         everyone_silent = 1.0 - self._probability
         chance = 1.0 - everyone_silent ** (1.0 / num_contenders(views, self._range_m))
         return self._stream.next() < chance
 
 
 def num_contenders(views: LocalViews, range_m: float) -> Float[np.ndarray, "B N"]:
-    """How many robots contend for each robot's neighbourhood, as far as it can tell.
+    """Return how many robots contend for each robot's neighbourhood, as far as it can tell.
 
-    Args:
-        views: What every robot knows.
-        range_m: The range of a packet [m].
-
-    Returns:
-        The team's size times the share of the known robots, itself included, believed in range.
+    The team's size times the share of the known robots, itself included, believed in range: the
+    whole team, then, until it has heard of anyone.
     """
     return _count(views.buffers.is_known, views.buffers.position_m, range_m)
 

@@ -29,19 +29,15 @@ class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
             is_recomputed: Whether the tree is built anew in each window.
             root_transmits: Whether the root addresses robot N - 1, as in the authors' code (its
                 missing parent, -1, counts from the end there), or stays silent.
-
-        Raises:
-            ValueError: The probability is not in [0, 1].
         """
         super().__init__(probability)
         self._is_recomputed = is_recomputed
         self._root_transmits = root_transmits
-        self._parent: np.ndarray | None = None
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Forgets the last mission's tree; arguments as in `Policy.start`."""
+        """Forget the last mission's tree; arguments as in `Policy.start`."""
         super().start(num_robots, rngs)
-        self._parent = None
+        self._parent: np.ndarray | None = None
 
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """Return the parent, for each robot that draws a transmission."""

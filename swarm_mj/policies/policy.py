@@ -24,13 +24,13 @@ class Policy:
     """Chooses whom every robot addresses next, and what a window looks like.
 
     Attributes:
-        uses: What each robot decides by, or the centre, in a few words; empty if nobody said.
+        uses: The information that each robot decides by, or the centre, in a few words.
     """
 
     uses: str = ""
 
     def window(self, mission: Mission) -> WindowProtocol:
-        """What the robots do in a window: by Alg. 1 they request, and respond."""
+        """Return what the robots do in a window: by Alg. 1 they request, and respond."""
         return RequestResponse(silence_is_attempt=mission.silence_is_attempt)
 
     @property
@@ -39,15 +39,11 @@ class Policy:
         return "none"
 
     def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:  # noqa: ARG002
-        """What packets carry beyond T, M and P, field by field; nothing unless a policy says so.
-
-        Args:
-            mission: Its team's size, area and velocities say how wide fields must be.
-        """
+        """Return what packets carry beyond T, M and P; the mission says how wide fields must be."""
         return ()
 
     def packet(self, mission: Mission) -> Packet:
-        """What a packet holds: all of the sender's buffer, or as much of it as a slot has room for.
+        """Return what a packet holds: the sender's buffer, or as much of it as a slot has room for.
 
         Raises:
             ValueError: A slot does not even hold one entry and the payload.
@@ -56,37 +52,24 @@ class Policy:
 
     @property
     def parameters(self) -> Parameters:
-        """What the policy was made with, by name; kept beside what it costs."""
+        """What the policy was made with, by name; kept next to what it costs."""
         return {}
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Prepare for new missions; policies that draw or remember say more.
-
-        Args:
-            num_robots: N.
-            rngs: One generator per mission.
-        """
+        """Prepare for new missions: N robots in each, and one generator per mission."""
 
 
 class DecentralisedPolicy(Policy, ABC):
     """A policy that every robot evaluates on its own view (Eq. 9)."""
 
     def inform(self, belief: Belief) -> None:
-        """Is told, before `start`, what robots know of the channel; policies that reckon say more.
-
-        Args:
-            belief: The same for all robots of all missions.
-        """
+        """Receive, before `start`, what all robots know of the channel; ignored by default."""
 
     @abstractmethod
     def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """Whom each robot addresses; row [b, i] may depend on view [b, i] only.
+        """Return whom each robot addresses; itself is silence.
 
-        Args:
-            views: All robots' views, side by side.
-
-        Returns:
-            The recipients; itself is silence.
+        Row [b, i] may depend on view [b, i] only.
         """
 
 
@@ -94,7 +77,7 @@ class BroadcastPolicy(DecentralisedPolicy):
     """A decentralised policy whose packets are for everyone who hears them (IV-C)."""
 
     def window(self, mission: Mission) -> WindowProtocol:
-        """What the robots do in a window: they broadcast twice, unanswered."""
+        """Return what the robots do in a window: they broadcast twice, unanswered."""
         return DoubleBroadcast(
             silence_is_attempt=mission.silence_is_attempt,
             needs_addressees=mission.half_duplex == "eavesdroppers",
@@ -102,20 +85,13 @@ class BroadcastPolicy(DecentralisedPolicy):
 
     @abstractmethod
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
-        """Who broadcasts in the next slot; [b, i] may depend on view [b, i] only.
-
-        Args:
-            views: All robots' views, side by side.
-
-        Returns:
-            Whether each robot does.
-        """
+        """Return who broadcasts in the next slot; [b, i] may depend on view [b, i] only."""
 
     def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """`BROADCAST` for whoever transmits; the others address themselves, which is silence.
+        """Return `BROADCAST` for robots that transmit; the others address themselves.
 
         Raises:
-            ValueError: `transmits` did not say True or False for each robot.
+            ValueError: `transmits`, which may be a user's own, did not return a bool per robot.
         """
         transmits = np.asarray(self.transmits(views))
         shape = views.silence.shape
@@ -129,37 +105,21 @@ class BroadcastPolicy(DecentralisedPolicy):
 
 
 class CentralisedPolicy(Policy, ABC):
-    """A policy that is told the truth: everyone's buffer and everyone's true state."""
+    """A policy that knows the truth: everyone's buffer and everyone's true state."""
 
     def inform(self, truth: TrueLinks) -> None:
-        """Is told, before `start`, what there is to know of the channel before its fades.
-
-        Args:
-            truth: The true links of all missions.
-        """
+        """Receive, before `start`, the true links before their fades; ignored by default."""
 
     @abstractmethod
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
-        """Whom each robot addresses.
-
-        Args:
-            views: All robots' views.
-            states: All robots' true states.
-
-        Returns:
-            The recipients; itself is silence.
-        """
+        """Return whom each robot addresses, by all views and true states; itself is silence."""
 
 
 class RandomTransmission(Policy):
     """What policies share whose robots draw whether they transmit."""
 
     def __init__(self, probability: float) -> None:
-        """Take the probability, whose meaning is each policy's own.
-
-        Raises:
-            ValueError: The probability is not in [0, 1].
-        """
+        """Take the probability in [0, 1], whose meaning is each policy's own, or ValueError."""
         if not isinstance(probability, Real) or not 0.0 <= float(probability) <= 1.0:
             raise ValueError(f"transmission probability must be from 0 to 1, not {probability!r}")
         self._probability = probability

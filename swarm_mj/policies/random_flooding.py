@@ -17,27 +17,19 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
 
     As in the authors' code a robot that transmits draws an addressee from the whole team, and is
     silent if it draws itself: so it transmits with p (N - 1) / N. The addressee matters only under
-    their half-duplex rule, by which whoever is addressed hears while it sends: only there packets
-    name it. Uses no information but the team's size.
+    their half-duplex rule, by which an addressed robot hears while it sends: only there packets
+    name it, with `names_addressee`.
     """
 
     uses = "nothing: it transmits with probability p"
 
     def __init__(self, probability: float, *, names_addressee: bool = False) -> None:
-        """Prepare the policy.
-
-        Args:
-            probability: Of a draw, in each slot.
-            names_addressee: Whether packets say whom they are for, as in the authors' code.
-
-        Raises:
-            ValueError: The probability is not in [0, 1].
-        """
+        """Take the probability of a draw in each slot, and whether packets name an addressee."""
         super().__init__(probability)
         self._names_addressee = names_addressee
 
     def window(self, mission: Mission) -> WindowProtocol:
-        """What the robots do: they broadcast twice, and in the authors' code also move twice."""
+        """Return two broadcasts; in the authors' code robots also move twice."""
         return DoubleBroadcast(
             silence_is_attempt=mission.silence_is_attempt,
             moves_each_slot=mission.moves_each_transmission,
@@ -48,15 +40,15 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
         self._stream = Stream(rngs, uniform, (2, num_robots))
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
-        """Each robot that draws a transmission, to a teammate."""
+        """Return each robot that draws a transmission, to a teammate."""
         return self._drawn(views) != views.silence
 
     def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """As of any broadcast, or the addressees, where packets name them."""
+        """Return a broadcast's recipients, or the addressees, where packets name them."""
         return self._drawn(views) if self._names_addressee else super().recipients(views)
 
     def _drawn(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """Each robot's addressee; itself: it does not transmit."""
+        """Return each robot's addressee; itself: it does not transmit."""
         drawn = self._stream.next()
         anyone = (drawn[:, 1] * views.num_robots).astype(np.int64)
         return np.where(drawn[:, 0] < self._probability, anyone, views.silence)

@@ -17,14 +17,14 @@ from safetensors.numpy import save
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import is_own_set, trained_extractor
+from swarm_mj.policies.learned import LearnedPolicy
 from swarm_mj.policies.mlp import MlpPolicy, Weights
-from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.policy_config import SUFFIX, GnnConfig, MlpConfig, model_card
 from swarm_mj.system.atomic import write_bytes
 from swarm_mj.system.packages import need
 from swarm_mj.system.reading import check_size, open_file, read_document, read_file, read_plain
 
-if TYPE_CHECKING:  # a plain network flies without torch
+if TYPE_CHECKING:  # a plain network flies without torch, so functions import it
     from swarm_mj.policies.gnn.network import AggregationGnn
 
 POLICY = f"policy{SUFFIX}"  # the policy of a run, in its folder
@@ -46,12 +46,7 @@ class _Metadata:
 def save_policy(
     path: Path, network: "AggregationGnn", config: GnnConfig, card: str | None = None
 ) -> Path:
-    """Store a GNN with its weights; as `save_weights`.
-
-    Raises:
-        ValueError: The config is of another network; else as `save_weights`.
-        OSError: The file cannot be written.
-    """
+    """Store a GNN; as `save_weights`, and ValueError if the config is of another network."""
     if config.network != network.shape:
         raise ValueError(f"config describes {config.network}, but the network is {network.shape}")
     weights = {name: t.detach().cpu().numpy() for name, t in network.state_dict().items()}
@@ -78,10 +73,11 @@ def save_weights(
     """
     path = path if path.suffix == SUFFIX else Path(f"{path}{SUFFIX}")
     check_tensors(_shapes(config, path), weights)
+    header = {"format": FORMAT, "format_version": VERSION}
     kind = "gnn" if isinstance(config, GnnConfig) else "mlp"
-    said = {"kind": kind, "config": asdict(config), "card": card or model_card(config)}
     try:
-        text = json.dumps({"format": FORMAT, "format_version": VERSION, **said}, allow_nan=False)
+        said = {"kind": kind, "config": asdict(config), "card": card or model_card(config)}
+        text = json.dumps(header | said, allow_nan=False)
     except (TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"config must be JSON all through: {error}") from error
     _config_of(text)
@@ -93,12 +89,8 @@ def save_weights(
 
 
 def load_policy(
-    path: Path,
-    mission: Mission,
-    *,
-    is_deterministic: bool = False,
-    features: Sequence[str] = (),
-) -> Policy:
+    path: Path, mission: Mission, *, is_deterministic: bool = False, features: Sequence[str] = ()
+) -> LearnedPolicy:
     """Return a policy, ready to fly a mission, which may be of another kind than it was trained on.
 
     The mission's area, duration and range normalise what the robots see. A deterministic policy
@@ -106,28 +98,31 @@ def load_policy(
     if their names, as `module:Name`, are among `features`: a policy cannot make us run code.
 
     Raises:
-        ValueError: There is none, or it is damaged, foreign, oversized or of a newer version, or
-            its features are not those that may be imported, or it flies teams of another size.
+        ValueError: As `read_weights`, or its features are not those that may be imported, or it
+            flies teams of another size.
         OSError: It cannot be read.
     """
     weights, config = read_weights(path)
-    num_features, where = config.network.num_features, f"policy {path}"
-    if isinstance(config, MlpConfig):
-        _check_size_of_team(config.network.num_robots, mission, where)
-    extractor = trained_extractor(
-        config.features, num_features, mission, named=features, where=where
-    )
+    size = config.network.num_robots if isinstance(config, MlpConfig) else mission.num_robots
+    if mission.num_robots != size:
+        raise ValueError(
+            f"policy {path} flies teams of {size} robots, for which it was trained, not "
+            f"{mission.num_robots}; choose --robots {size}"
+        )
+    own, num_features = config.features, config.network.num_features
+    where = f"policy {path}"
+    extractor = trained_extractor(own, num_features, mission, named=features, where=where)
     if isinstance(config, MlpConfig):
         return MlpPolicy(config.network, weights, extractor, is_deterministic=is_deterministic)
     from swarm_mj.policies.gnn.fast import network_of
-    from swarm_mj.policies.gnn.policy import LearnedPolicy
+    from swarm_mj.policies.gnn.policy import GnnPolicy
 
-    return LearnedPolicy(
+    return GnnPolicy(
         network_of(config.network, weights),
         extractor,
         silence_logit=config.silence_logit,
         is_deterministic=is_deterministic,
-        own_features=config.features if is_own_set(config.features) else None,
+        own_features=own if is_own_set(own) else None,
     )
 
 
@@ -150,7 +145,15 @@ def read_weights(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
     """
     place = find_policy(path)
     try:
-        weights, config = _read_folder(place) if place.is_dir() else _read_file(place)
+        if place.is_dir():  # a GNN as swarm_mj 0.1 stored it
+            text = read_file(place / OLD_CONFIG, "config", MAX_BYTES)
+            weights, _ = read_tensors(place / OLD_WEIGHTS)
+            config = read_document(text, FORMAT, 1, GnnConfig)
+        else:
+            weights, metadata = read_tensors(place)
+            if FORMAT not in metadata:
+                raise ValueError("it has weights, but does not say of which policy")
+            config = _config_of(metadata[FORMAT])
         check_tensors(_shapes(config, path), weights)
     except ValueError as error:
         raise ValueError(f"policy {place}: {error}; {WAY_OUT}") from error
@@ -160,11 +163,8 @@ def read_weights(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
 def find_policy(path: Path) -> Path:
     """Return where a policy is: the file `path` or `path.safetensors`, or that in a run's folder.
 
-    Folders are those of swarm_mj 0.1; so `runs/mine` and `runs/mine/policy` name a run's policy,
-    whichever version trained it.
-
-    Raises:
-        ValueError: There is none.
+    `runs/mine` and `runs/mine/policy` name the policy of a run, also of one that swarm_mj 0.1
+    trained, whose policies are folders; ValueError if there is none.
     """
     for place in (path, Path(f"{path}{SUFFIX}"), path / POLICY, path / OLD_FOLDER):
         if os.path.isfile(place) or os.path.isfile(place / OLD_WEIGHTS):
@@ -181,16 +181,13 @@ def find_policy(path: Path) -> Path:
 
 
 def read_tensors(path: Path) -> tuple[Weights, dict[str, str]]:
-    """Return the tensors and the metadata of a `.safetensors` file.
-
-    Raises:
-        ValueError: It cannot be read, is oversized or damaged, or no such file.
-    """
+    """Return the tensors and the metadata of a `.safetensors` file; ValueError if it is none."""
     with open_file(path, "policy") as file:  # which refuses pipes; `safe_open` would wait for them
         check_size(f"policy {path}", os.fstat(file.fileno()).st_size, MAX_BYTES)
     try:
-        with safe_open(path, "numpy") as tensors:
-            return {n: tensors.get_tensor(n) for n in tensors.keys()}, tensors.metadata() or {}  # noqa: SIM118 - it cannot be iterated over
+        with safe_open(path, "numpy") as file:
+            names = file.keys()  # it is no mapping
+            return {name: file.get_tensor(name) for name in names}, file.metadata() or {}
     except (
         SafetensorError,
         AttributeError,
@@ -200,11 +197,7 @@ def read_tensors(path: Path) -> tuple[Weights, dict[str, str]]:
 
 
 def check_tensors(shapes: Mapping[str, tuple[int, ...]], tensors: Weights) -> None:
-    """Pass if these are tensors of these shapes, all numbers single and finite.
-
-    Raises:
-        ValueError: One is missing, unknown, of another shape or type, or not finite.
-    """
+    """Raise ValueError unless these are tensors of these shapes, single-precision and finite."""
     for name in sorted(shapes.keys() ^ tensors.keys()):
         known = "lacks the" if name in shapes else "has an unknown"
         raise ValueError(f"it {known} tensor {name:.80}")
@@ -216,30 +209,9 @@ def check_tensors(shapes: Mapping[str, tuple[int, ...]], tensors: Weights) -> No
             raise ValueError(f"tensor {name} has numbers that are not finite")
 
 
-def _read_file(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
-    weights, metadata = read_tensors(path)
-    if FORMAT not in metadata:
-        raise ValueError("it has weights, but does not say of which policy")
-    return weights, _config_of(metadata[FORMAT])
-
-
 def _config_of(text: str) -> GnnConfig | MlpConfig:
     said = read_document(text, FORMAT, VERSION, _Metadata)
     return read_plain(said.config, CONFIGS[said.kind])
-
-
-def _read_folder(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
-    """Return a GNN as swarm_mj 0.1 stored it."""
-    text = read_file(path / OLD_CONFIG, "config", MAX_BYTES)
-    return read_tensors(path / OLD_WEIGHTS)[0], read_document(text, FORMAT, 1, GnnConfig)
-
-
-def _check_size_of_team(num_robots: int, mission: Mission, where: str) -> None:
-    if mission.num_robots != num_robots:
-        raise ValueError(
-            f"{where} flies teams of {num_robots} robots, for which it was trained, not "
-            f"{mission.num_robots}; choose --robots {num_robots}"
-        )
 
 
 def _shapes(config: GnnConfig | MlpConfig, path: Path) -> Mapping[str, tuple[int, ...]]:

@@ -14,15 +14,15 @@ class Tdma(BroadcastPolicy):
     """In each slot one robot broadcasts, in a fixed random order of identities, unanswered.
 
     Time-division multiple access (Miao, Zander, Sung, Slimane: Fundamentals of Mobile Data
-    Networks, 2016). Nobody interferes, so whoever is in range decodes. Uses the robot's identity,
-    the team's size, the order and the clock. The order is drawn for each mission and the same for
-    all its robots: like the identities, it is granted before the mission (II-C).
+    Networks, 2016). Nobody interferes, so every robot in range decodes. The order is drawn for each
+    mission and the same for all its robots: like the identities, it is granted before the mission
+    (II-C).
     """
 
     uses = "its identity, a common random order and the clock: one robot transmits per slot"
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Draws every mission's order; arguments as in `Policy.start`."""
+        """Draw every mission's order; arguments as in `Policy.start`."""
         self._order = draw_order(num_robots, rngs)
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
@@ -33,15 +33,7 @@ class Tdma(BroadcastPolicy):
 
 
 def draw_order(num_robots: int, rngs: Sequence[np.random.Generator]) -> Int[np.ndarray, "B N"]:
-    """Return a random order of identities for each mission.
-
-    Args:
-        num_robots: N.
-        rngs: One generator per mission.
-
-    Returns:
-        The robot at each place of the order.
-    """
+    """Return a random order for each mission: the robot at each place of it."""
     return np.stack([rng.permutation(num_robots) for rng in rngs])
 
 

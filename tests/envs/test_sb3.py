@@ -109,8 +109,7 @@ def test_a_stored_actor_decides_as_the_trained_one(tmp_path, algorithm, net_arch
         with torch.no_grad():
             tensors = {name: torch.as_tensor(each) for name, each in seen.items()}
             expected = model.policy.get_distribution(tensors, **masks).distribution.probs.numpy()
-        team = env.batches[0].observation
-        logits = policy.logits(team["action_mask"].astype(bool), team["observation"])
+        logits = policy.logits(env.batches[0].graphs).reshape(2, 4, 4)
         odds = np.exp(logits - logits.max(axis=2, keepdims=True))
         found = (odds / odds.sum(axis=2, keepdims=True)).reshape(expected.shape)
         np.testing.assert_allclose(found, expected, atol=1e-5)

@@ -25,7 +25,7 @@ from swarm_mj.learning.run_folder import Limits, Progress, Run
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import train
 from swarm_mj.mission import paper
-from swarm_mj.policies.gnn.sampling import sample
+from swarm_mj.policies.learned import sample
 
 RESUMED = {
     "robot": {},

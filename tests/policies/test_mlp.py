@@ -5,6 +5,7 @@ import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.feature_sets import make_extractor, num_features
+from swarm_mj.policies.gnn.graphs import Graphs
 from swarm_mj.policies.mlp import MlpPolicy, MlpShape
 from swarm_mj.simulation.swarm import Swarm
 
@@ -34,6 +35,14 @@ def policy_of(shape, seed=1, **options):
     return MlpPolicy(shape, weights_of(shape, seed), extractor, **options)
 
 
+def graphs_of(may_address, node):
+    """Return graphs that only an MLP can take: it looks at no parents and no turns."""
+    rows = may_address.reshape(-1, 4)
+    parent, has_turn = np.full(rows.shape, -1), np.zeros(len(rows), dtype=bool)
+    node = node.reshape(*rows.shape, -1)
+    return Graphs(node=node, parent=parent, may_address=rows, has_turn=has_turn)
+
+
 @pytest.mark.parametrize("hidden", [(), (5,), (6, 3)])
 @pytest.mark.parametrize("activation", ["tanh", "relu"])
 @pytest.mark.parametrize("obeys_mask", [True, False])
@@ -42,7 +51,7 @@ def test_logits_are_those_of_the_network_written_out(hidden, activation, obeys_m
     weights, rng = weights_of(shape), np.random.default_rng(3)
     node = rng.standard_normal((2, 4, 4, num_features("extended"))).astype(np.float32)
     may_address = rng.random((2, 4, 4)) < 0.6
-    found = policy_of(shape).logits(may_address, node)
+    found = policy_of(shape).logits(graphs_of(may_address, node)).reshape(2, 4, 4)
     for b, i in np.ndindex(2, 4):
         values = [*map(float, may_address[b, i]), *map(float, node[b, i].ravel())]
         for n in range(len(hidden) + 1):
@@ -77,7 +86,7 @@ def test_masks_are_obeyed_and_draws_follow_the_logits():
     graphs = make_extractor("extended", MISSION)
     graphs.start(200, 4)
     seen = graphs.graphs(swarm.views)
-    logits = policy.logits(seen.may_address.reshape(200, 4, 4), seen.node.reshape(200, 4, 4, -1))
+    logits = policy.logits(seen).reshape(200, 4, 4)
     odds = np.exp(logits - logits.max(axis=2, keepdims=True))
     expected = (odds / odds.sum(axis=2, keepdims=True)).mean(axis=0)
     found = np.stack([(chosen == k).mean(axis=0) for k in range(4)], axis=1)

@@ -9,9 +9,9 @@ from tiny_policies import save_tiny
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.aloha import Aloha
-from swarm_mj.policies.gnn.policy import LearnedPolicy
 from swarm_mj.policies.gossip import InnovationGossip
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle
+from swarm_mj.policies.learned import LearnedPolicy
 from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner

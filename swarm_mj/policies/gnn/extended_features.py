@@ -13,14 +13,13 @@ from jaxtyping import Bool, Float, Float32, Shaped
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.gnn.packet_memory import Memory, empty_memory, remember
-from swarm_mj.policies.gnn.turns import write_turns
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import from_db
 from swarm_mj.radio.spatial_reuse import believes_as_the_last, write_joined
 from swarm_mj.system.compiled import compiled
 
-ADDRESS_RANGES = 1.2  # a teammate believed farther away is not worth addressing [ranges]
+ADDRESS_RANGES = 1.2  # a teammate believed farther away cannot be addressed [ranges]
 LONG_WINDOWS = 500.0  # ages count by their logarithm, up to 1 at this one [windows]
 FAR_RANGES = 4.0  # distances count up to here [ranges]
 CROWD = 10.0  # neighbours that count as 1
@@ -49,7 +48,6 @@ FEATURES = {
     "known_share": "share of the team known",
     "team_size": "size of the team",
 }
-TURN_RANGES = {"has_turn_1_5": 1.5, "has_turn_2": 2.0, "has_turn_3": 3.0}  # [ranges]
 NODE = np.dtype([(field, np.float32) for field in FEATURES])
 
 
@@ -63,31 +61,24 @@ class ExtendedFeatures(FeatureExtractor):
     )
 
     def start(self, num_missions: int, num_robots: int) -> None:
-        """Forgets the packets of earlier missions."""
+        """Forget the packets of earlier missions."""
         self._memory = empty_memory(num_missions, num_robots)
 
     def graphs(self, views: LocalViews) -> Graphs:
-        """What every robot's network sees now; must see every window."""
+        """Return what every robot's network sees now; must see every window."""
         remember(self._memory, views)
-        buffers = views.buffers
+        buffers, believed_m, range_m = (
+            views.buffers,
+            views.buffers.position_m,
+            self._mission.range_m,
+        )
         num_missions, num_robots = buffers.shape
-        believed_m, range_m = buffers.position_m, self._mission.range_m
         node = np.empty((num_missions, num_robots, num_robots), dtype=NODE)
         may_address = np.empty(node.shape, dtype=np.bool_)
-        _fill(
-            buffers.timestamp,
-            believed_m,
-            buffers.last_attempt,
-            views.now,
-            self._memory,
-            range_m,
-            node,
-            may_address,
-        )
+        times = buffers.timestamp, buffers.last_attempt, views.now
+        _fill(*times, believed_m, self._memory, range_m, node, may_address)
         is_known = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
-        _write_neighbours(believed_m, is_known, range_m, node["neighbours"])
-        for field, ranges in TURN_RANGES.items():
-            write_turns(believed_m, is_known, views.now, ranges * range_m, node[field])
+        _fill_by_position(believed_m, is_known, views.now, range_m, node)
         now, threshold = views.now.astype(np.int64), from_db(self._mission.sinr_threshold_db)
         write_joined(believed_m, is_known, now, range_m, threshold, node["has_joined"])
         rows = (num_missions * num_robots, num_robots)
@@ -108,7 +99,7 @@ class LocalFeatures(ExtendedFeatures):
     uses: ClassVar[str] = "its buffer, and the packets it sent and received"
 
     def graphs(self, views: LocalViews) -> Graphs:
-        """What every robot's network sees now; must see every window."""
+        """Return what every robot's network sees now; must see every window."""
         seen = super().graphs(views)
         is_kept = np.array([name in self.names for name in ExtendedFeatures.names])
         return replace(seen, node=seen.node[:, :, is_kept], has_turn=np.zeros_like(seen.has_turn))
@@ -116,11 +107,12 @@ class LocalFeatures(ExtendedFeatures):
 
 @compiled()
 def _logarithm(windows: float) -> float:
-    """Time on a logarithmic scale, up to 1 at `LONG_WINDOWS`."""
+    """Return a time on a logarithmic scale, up to 1 at `LONG_WINDOWS`."""
     return math.log1p(windows) / math.log1p(LONG_WINDOWS)
 
 
-# Ages are of whole and half windows, so almost all of them are looked up.
+# Ages are of whole and half windows, so almost all of them are looked up: logarithms were most of
+# the time that these features take.
 LOG_AGES = np.array([math.log1p(n / 2) / math.log1p(LONG_WINDOWS) for n in range(1000)])
 
 
@@ -152,15 +144,15 @@ def _news(
 @compiled()
 def _fill(
     timestamp: Float[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "B N N 2"],
     last_attempt: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
+    position_m: Float[np.ndarray, "B N N 2"],
     memory: Memory,
     range_m: float,
     node: Shaped[np.ndarray, "B N N"],
     may_address: Bool[np.ndarray, "B N N"],
 ) -> None:
-    """All features but neighbours and turns by distance or interference."""
+    """Write all features but neighbours and turns by distance or interference."""
     num_missions, num_robots = timestamp.shape[:2]
     rank, own = np.empty(num_robots), np.empty(num_robots, dtype=np.float32)
     for b in range(num_missions):
@@ -197,7 +189,7 @@ def _fill(
 
 @compiled()
 def _fill_oneself(i: int, spoken_log_age: float, node: Shaped[np.ndarray, "N"]) -> None:
-    """What concerns all neighbours together; the news of each then goes to its logarithm."""
+    """Write what concerns all neighbours together; the news of each goes to its logarithm."""
     news, unsaid_news = 0.0, 0.0
     for k in range(node.shape[0]):
         news += node[k].news
@@ -210,21 +202,27 @@ def _fill_oneself(i: int, spoken_log_age: float, node: Shaped[np.ndarray, "N"]) 
 
 
 @compiled()
-def _write_neighbours(
+def _fill_by_position(
     believed_m: Float[np.ndarray, "B N N 2"],
     is_known: Bool[np.ndarray, "B N N"],
+    now: Float[np.ndarray, "B"],
     range_m: float,
-    neighbours: Float32[np.ndarray, "B N N"],
+    node: Shaped[np.ndarray, "B N N"],
 ) -> None:
-    """How many known robots are within range of each, by belief; unknown robots have none."""
+    """Write neighbours and turns by distance, which follow from positions and the clock alone."""
     num_missions, num_robots = is_known.shape[:2]
-    # Columns of their own, with which the inner loop is compiled to vectors.
-    x_m, y_m, known = np.empty(num_robots), np.empty(num_robots), np.empty(num_robots, np.int64)
+    # Columns of their own, with which the inner loops are compiled to vectors.
+    x_m, y_m, is_close = np.empty(num_robots), np.empty(num_robots), np.empty(num_robots)
+    known = np.empty(num_robots, np.int64)
     for b in range(num_missions):
+        window = int(now[b])
         for i in range(num_robots):
+            its = node[b, i]
             if believes_as_the_last(believed_m[b], is_known[b], i):
                 for k in range(num_robots):
-                    neighbours[b, i, k] = neighbours[b, i - 1, k]
+                    last = node[b, i - 1, k]
+                    its[k].neighbours, its[k].has_turn_1_5 = last.neighbours, last.has_turn_1_5
+                    its[k].has_turn_2, its[k].has_turn_3 = last.has_turn_2, last.has_turn_3
                 continue
             for k in range(num_robots):
                 x_m[k], y_m[k] = believed_m[b, i, k, 0], believed_m[b, i, k, 1]
@@ -234,4 +232,43 @@ def _write_neighbours(
                 for j in range(num_robots):
                     dx, dy = x_m[j] - x_m[k], y_m[j] - y_m[k]
                     count += known[j] * (dx * dx + dy * dy <= range_m * range_m)
-                neighbours[b, i, k] = count * known[k] / CROWD
+                its[k].neighbours = count * known[k] / CROWD
+            at = (x_m, y_m, is_known[b, i], window, is_close)
+            write_turns(*at, 1.5 * range_m, its["has_turn_1_5"])
+            write_turns(*at, 2.0 * range_m, its["has_turn_2"])
+            write_turns(*at, 3.0 * range_m, its["has_turn_3"])
+
+
+@compiled()
+def write_turns(
+    x_m: Float[np.ndarray, "N"],
+    y_m: Float[np.ndarray, "N"],
+    is_known: Bool[np.ndarray, "N"],
+    window: int,
+    is_close: Float[np.ndarray, "N"],
+    radius_m: float,
+    has_turn: Float32[np.ndarray, "N"],
+) -> None:
+    """Write 1 for the robots that have a turn by one robot's beliefs, 0 for the others.
+
+    A common order of identities and the clock, thinned by distance: robot `t mod N` leads in window
+    t. After it the others join in the order of their identities, from half a round away on, so that
+    nobody's turns come close to each other, unless they are closer than the radius to a robot that
+    has joined (a maximal independent set). A robot of unknown position may be near anyone: nobody
+    joins after it. Robots that believe the same positions find the same sets, without a word.
+    `is_close` is overwritten: room to mark who is too close to one that has a turn.
+    """
+    num_robots = is_known.shape[0]
+    has_turn[:] = 0.0
+    is_close[:] = 0.0
+    half_round = (window + num_robots // 2) % num_robots
+    for place in range(num_robots + 1):
+        k = window % num_robots if place == 0 else half_round + place - 1
+        k -= num_robots if k >= num_robots else 0
+        if not is_known[k]:
+            break
+        if is_close[k] == 0.0 and has_turn[k] == 0.0:
+            has_turn[k] = 1.0
+            for j in range(num_robots):
+                dx, dy = x_m[j] - x_m[k], y_m[j] - y_m[k]
+                is_close[j] = 1.0 if dx * dx + dy * dy < radius_m * radius_m else is_close[j]

@@ -15,7 +15,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
-from swarm_mj.policies.gnn.edge_means import EdgeMeans
+from swarm_mj.policies.gnn.edge_sums import EdgeSums, as_array, edges_to
 from swarm_mj.policies.gnn.network import AggregationGnn, Core
 from swarm_mj.policies.gnn.shape import Edges, GnnShape
 
@@ -89,7 +89,7 @@ class Entries(NamedTuple):
     sender: Layer  # NN_e's part for the node where it starts
 
     def after(self, before: nn.Linear) -> "Entries":
-        """These, composed with the layer before."""
+        """Return these, composed with the layer before."""
         return Entries(*(layer.after(before) for layer in self))
 
 
@@ -97,7 +97,7 @@ class Composed:
     """A network's layers, cut at concatenations and composed across perceptrons."""
 
     def __init__(self, network: AggregationGnn) -> None:
-        """Composes the weights as they are now; gradients flow back to them."""
+        """Compose the weights as they are now; gradients flow back to them."""
         assert isinstance(network.core, Core)
         self._edges: Edges = network.shape.edges
         self._depth, self._num_blocks = network.shape.depth, network.shape.receptive_field
@@ -138,7 +138,7 @@ class Composed:
         if self._depth == 2 and self._num_blocks == 1 and node.device.type == "cpu":
             output = output + self._decode(1, self._only_block(v, own, parent, is_wanted))
         else:
-            links, e = Links(parent, self._edges, node), None
+            links, e = ParentLinks(parent, self._edges, node), None
             for stage in range(1, self._num_blocks + 1):
                 v, e = self._gn_block(self._stages[stage - 1], links, v, e)
                 output = output + self._decode(stage, picked(v, wanted))
@@ -160,20 +160,22 @@ class Composed:
     ) -> Float[Tensor, "w C"]:
         """As `_gn_block`, if no other follows and edges have one hidden layer."""
         entries = self._stages[0]
-        mean, share = EdgeMeans.apply(
+        asked = np.ones(parent.shape, np.bool_) if is_wanted is None else as_array(is_wanted)
+        edges = edges_to(as_array(parent), np.array(IS_UPWARD[self._edges]), asked)
+        total = EdgeSums.apply(
             entries.receiver(wanted),
-            (node @ entries.sender.weight.T).unflatten(0, parent.shape),
+            node @ entries.sender.weight.T,
             self._encoded_edges + entries.sender.bias,
-            parent,
-            torch.tensor(IS_UPWARD[self._edges]),
-            torch.ones_like(parent, dtype=torch.bool) if is_wanted is None else is_wanted,
+            edges,
         )
-        return self._update_nodes(entries.node(wanted), mean, share.sign())
+        degree = torch.from_numpy(np.bincount(edges.end, minlength=len(wanted))).to(node.dtype)
+        mean = total * degree.clamp(min=1).reciprocal()[:, None]
+        return self._update_nodes(entries.node(wanted), mean, degree.sign())
 
     def _gn_block(
         self,
         entries: Entries,
-        links: "Links",
+        links: "ParentLinks",
         node: Float[Tensor, "n C"],
         edge: list[Tensor] | None,
     ) -> tuple[Float[Tensor, "n C"], list[Tensor]]:
@@ -196,11 +198,11 @@ class Composed:
 
 
 def picked(x: Float[Tensor, "n *C"], rows: Int[Tensor, "w"] | None) -> Float[Tensor, "w *C"]:
-    """These rows; None is all of them."""
+    """Return these rows; None is all of them."""
     return x if rows is None else x.index_select(0, rows)
 
 
-class Links:
+class ParentLinks:
     """One edge per node and direction, between it and its parent.
 
     A node without a parent has an edge with itself that counts for nothing: so the edges of one

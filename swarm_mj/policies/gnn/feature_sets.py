@@ -1,4 +1,4 @@
-"""The one table of feature sets."""
+"""The one table of feature sets, and those that a user brings."""
 
 from collections.abc import Collection
 
@@ -15,9 +15,9 @@ FEATURE_SETS: dict[str, type[FeatureExtractor]] = {
     "local": LocalFeatures,
     "extended": ExtendedFeatures,
 }
-
-
-_own: dict[str, type[FeatureExtractor]] = {}  # those that the user of this process named
+# A name in a file must not make us import code, so a user's own sets are found here alone, where
+# `load_features` puts those that the user of this process named.
+_own: dict[str, type[FeatureExtractor]] = {}
 
 
 def make_extractor(features: str, mission: Mission) -> FeatureExtractor:
@@ -32,16 +32,20 @@ def make_extractor(features: str, mission: Mission) -> FeatureExtractor:
 
 
 def num_features(features: str) -> int:
-    """How many numbers a feature set has for each node; raises ValueError as `make_extractor`."""
+    """Return the count of a node's numbers in a feature set; raises as `make_extractor`."""
     return len(_feature_set(features).names)
 
 
 def _feature_set(features: str) -> type[FeatureExtractor]:
-    check_features(features)
-    if features in FEATURE_SETS:
-        return FEATURE_SETS[features]
-    check_named(features, _own, "it")
-    return _own[features]
+    if is_own_set(features):
+        check_named(features, _own, "it")
+        return _own[features]
+    if features not in FEATURE_SETS:
+        raise ValueError(
+            f"features must be one of {', '.join(FEATURE_SETS)}, or module:Name of your own, not "
+            f"{features!r:.80}{did_you_mean(features, FEATURE_SETS)}"
+        )
+    return FEATURE_SETS[features]
 
 
 def load_features(features: str) -> None:
@@ -65,27 +69,8 @@ def is_own_set(features: str) -> bool:
     return FORM.fullmatch(features) is not None
 
 
-def check_features(features: str) -> None:
-    """Pass if a name is that of a feature set, or could be that of a user's own.
-
-    It imports nothing, so the name may stand in a file.
-
-    Raises:
-        ValueError: It is neither.
-    """
-    if features not in FEATURE_SETS and not is_own_set(features):
-        raise ValueError(
-            f"features must be one of {', '.join(FEATURE_SETS)}, or module:Name of your own, not "
-            f"{features!r:.80}{did_you_mean(features, FEATURE_SETS)}"
-        )
-
-
 def check_named(features: str, named: Collection[str], where: str) -> None:
-    """Pass unless a file names a user's own feature set that its user has not named, too.
-
-    Raises:
-        ValueError: It does: to load it would run code that a file chose.
-    """
+    """Raise ValueError if a file names a user's own feature set that its user has not named too."""
     if is_own_set(features) and features not in named:
         raise ValueError(
             f"{where} sees by features of someone's own, {features:.200}; if you trust that code, "
@@ -96,12 +81,11 @@ def check_named(features: str, named: Collection[str], where: str) -> None:
 def trained_extractor(
     features: str, num_features: int, mission: Mission, *, named: Collection[str], where: str
 ) -> FeatureExtractor:
-    """Return an extractor of what a stored network, which `where` calls, was trained on.
-
-    A user's own set is imported, but only if it is among those that the user named.
+    """Return the extractor that a stored network, which `where` calls, was trained on.
 
     Raises:
-        ValueError: It is not, it cannot be loaded, or it now has another number of features.
+        ValueError: It is a user's own and not among those named, it cannot be loaded, or it now has
+            another number of features.
     """
     check_named(features, named, where)
     if is_own_set(features):
@@ -116,14 +100,10 @@ def trained_extractor(
 
 
 def check_num_features(given: int, features: str) -> None:
-    """Pass if a feature set has so many numbers for each node, or is a user's own.
+    """Raise ValueError unless a feature set has this count of numbers, or is a user's own.
 
     That is not imported, as the name may stand in a file: it may have any number.
-
-    Raises:
-        ValueError: It has not, or there is no such feature set.
     """
-    check_features(features)
     expected = given if is_own_set(features) else num_features(features)
     if given != expected:
         raise ValueError(
@@ -132,11 +112,7 @@ def check_num_features(given: int, features: str) -> None:
 
 
 def check_fit(network: GnnShape, features: str) -> None:
-    """Pass for a network that takes a feature set, and gives what decisions are made of.
-
-    Raises:
-        ValueError: It does not; as `check_num_features`.
-    """
+    """Raise ValueError unless a network takes a feature set, and gives what decisions need."""
     check_num_features(network.num_features, features)
     if network.num_outputs not in (1, 2):
         raise ValueError(f"network.num_outputs must be 1 or 2, not {network.num_outputs}")

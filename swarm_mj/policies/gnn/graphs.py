@@ -12,11 +12,15 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Shaped
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
-from swarm_mj.protocol.buffers import NEVER, Buffers
+from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.system.compiled import compiled
 
 REFERENCE_WINDOWS = 500.0  # what the authors' code divides times by, whatever the mission [windows]
+# The numbers of a node, in the order of the extractors' names.
+STATE = ("timestamp", "x", "y", "velocity_x", "velocity_y", "last_attempt")
+PAPER_NODE = np.dtype([(field, np.float32) for field in ("is_oneself", "is_known", *STATE)])
+REFERENCE_NODE = np.dtype([(field, np.float32) for field in (STATE[0], "zero", *STATE[1:])])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,7 +29,7 @@ class Graphs:
 
     node: Float32[np.ndarray, "R N F"]  # V: features, normalised
     parent: Int[np.ndarray, "R N"]  # P: the node that k's state came over first, or NO_PARENT
-    may_address: Bool[np.ndarray, "R N"]  # recipients worth a thought; oneself, silence, always is
+    may_address: Bool[np.ndarray, "R N"]  # recipients to choose among; oneself, silence, always is
     has_turn: Bool[np.ndarray, "R"]  # whether a common order lets the robot speak now
 
 
@@ -40,19 +44,15 @@ class FeatureExtractor(ABC):
         self._mission = mission
 
     def start(self, num_missions: int, num_robots: int) -> None:  # noqa: B027 - most remember none
-        """Forgets earlier missions, if it remembers any; now there are B of N robots."""
+        """Forget earlier missions, if it remembers any; now there are B of N robots."""
 
     @abstractmethod
     def graphs(self, views: LocalViews) -> Graphs:
-        """What every robot's network sees now, row [b N + i] from view [b, i] only."""
+        """Return what every robot's network sees now, row [b N + i] from view [b, i] only."""
 
 
 def check_width(features: str, extractor: FeatureExtractor, graphs: Graphs) -> None:
-    """Pass if an extractor, of the feature set of this name, names all numbers of its nodes.
-
-    Raises:
-        ValueError: It does not, as a user's own may.
-    """
+    """Raise ValueError unless an extractor names all numbers of its nodes; a user's own may not."""
     named, found = len(extractor.names), graphs.node.shape[-1]
     if named != found:
         raise ValueError(f"{features} names {named} features, but its node has {found}")
@@ -70,21 +70,14 @@ class PaperFeatures(FeatureExtractor):
     )  # fmt: skip
 
     def graphs(self, views: LocalViews) -> Graphs:
-        """The buffers as they are; positions from the area's middle, velocities per mission."""
-        buffers, mission = views.buffers, self._mission
-        duration_s = mission.num_windows * mission.window_s
-        node = np.empty((*buffers.shape, views.num_robots), dtype=PAPER_NODE)
-        _fill_paper(
-            buffers.timestamp,
-            buffers.position_m,
-            buffers.velocity_mps,
-            buffers.last_attempt,
-            1.0 / mission.num_windows,
-            1.0 / mission.side_m,
-            duration_s / mission.side_m,
-            node,
-        )
-        return _everyone_addressable(buffers, node)
+        """Return the buffers; positions from the area's middle, velocities per mission."""
+        mission = self._mission
+        node = np.empty((*views.buffers.shape, views.num_robots), dtype=PAPER_NODE)
+        is_oneself = np.eye(views.num_robots, dtype=np.bool_)
+        node["is_oneself"], node["is_known"] = is_oneself, views.buffers.is_known | is_oneself
+        per_mps = mission.num_windows * mission.window_s / mission.side_m
+        scales = 1.0 / mission.num_windows, 1.0 / mission.side_m, per_mps
+        return _with_state(views.buffers, np.zeros_like(views.now), False, *scales, node)
 
 
 class ReferenceFeatures(FeatureExtractor):
@@ -100,80 +93,27 @@ class ReferenceFeatures(FeatureExtractor):
 
     def graphs(self, views: LocalViews) -> Graphs:
         """Return the buffers as the authors' code shows them to its network."""
-        buffers = views.buffers
-        node = np.empty((*buffers.shape, views.num_robots), dtype=REFERENCE_NODE)
-        _fill_reference(
-            buffers.timestamp,
-            buffers.position_m,
-            buffers.velocity_mps,
-            buffers.last_attempt,
-            views.now,
-            node,
-        )
-        return _everyone_addressable(buffers, node)
+        node = np.empty((*views.buffers.shape, views.num_robots), dtype=REFERENCE_NODE)
+        node["zero"] = 0.0
+        per_m = 1.0 / MISSION_DISTANCE_M  # and per m/s: they divide velocities by a distance, too
+        scales = 1.0 / REFERENCE_WINDOWS, per_m, per_m
+        return _with_state(views.buffers, views.now, True, *scales, node)
 
 
-# The numbers of a node, in the order of the names.
-STATE = ("timestamp", "x", "y", "velocity_x", "velocity_y", "last_attempt")
-PAPER_NODE = np.dtype([(field, np.float32) for field in ("is_oneself", "is_known", *STATE)])
-REFERENCE_NODE = np.dtype([(field, np.float32) for field in (STATE[0], "zero", *STATE[1:])])
-
-
-@compiled()
-def _fill_paper(
-    timestamp: Float[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "B N N 2"],
-    velocity_mps: Float[np.ndarray, "B N N 2"],
-    last_attempt: Float[np.ndarray, "B N N"],
+def _with_state(
+    buffers: Buffers,
+    since: Float[np.ndarray, "B"],
+    is_relative: bool,
     per_window: float,
     per_m: float,
     per_mps: float,
     node: Shaped[np.ndarray, "B N N"],
-) -> None:
-    num_missions, num_robots = timestamp.shape[:2]
-    for b in range(num_missions):
-        for i in range(num_robots):
-            for k in range(num_robots):
-                of_k = node[b, i, k]
-                of_k.is_oneself = k == i
-                of_k.is_known = k == i or timestamp[b, i, k] > NEVER
-                of_k.timestamp = timestamp[b, i, k] * per_window
-                of_k.x = position_m[b, i, k, 0] * per_m
-                of_k.y = position_m[b, i, k, 1] * per_m
-                of_k.velocity_x = velocity_mps[b, i, k, 0] * per_mps
-                of_k.velocity_y = velocity_mps[b, i, k, 1] * per_mps
-                of_k.last_attempt = last_attempt[b, i, k] * per_window
-
-
-@compiled()
-def _fill_reference(
-    timestamp: Float[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "B N N 2"],
-    velocity_mps: Float[np.ndarray, "B N N 2"],
-    last_attempt: Float[np.ndarray, "B N N"],
-    now: Float[np.ndarray, "B"],
-    node: Shaped[np.ndarray, "B N N"],
-) -> None:
-    per_window, per_m = 1.0 / REFERENCE_WINDOWS, 1.0 / MISSION_DISTANCE_M
-    num_missions, num_robots = timestamp.shape[:2]
-    for b in range(num_missions):
-        for i in range(num_robots):
-            own_x_m, own_y_m = position_m[b, i, i, 0], position_m[b, i, i, 1]
-            own_x_mps, own_y_mps = velocity_mps[b, i, i, 0], velocity_mps[b, i, i, 1]
-            for k in range(num_robots):
-                of_k = node[b, i, k]
-                of_k.timestamp = (timestamp[b, i, k] - now[b]) * per_window
-                of_k.zero = 0.0
-                of_k.x = (position_m[b, i, k, 0] - own_x_m) * per_m
-                of_k.y = (position_m[b, i, k, 1] - own_y_m) * per_m
-                of_k.velocity_x = (velocity_mps[b, i, k, 0] - own_x_mps) * per_m
-                of_k.velocity_y = (velocity_mps[b, i, k, 1] - own_y_mps) * per_m
-                of_k.last_attempt = (last_attempt[b, i, k] - now[b]) * per_window
-
-
-def _everyone_addressable(buffers: Buffers, node: Shaped[np.ndarray, "B N N"]) -> Graphs:
-    """Graphs with these nodes, in which every robot may be addressed."""
+) -> Graphs:
+    """Write what the buffers hold into nodes; their graphs let every robot be addressed."""
     num_missions, num_robots = buffers.shape
+    scales = per_window, per_m, per_mps
+    times = buffers.timestamp, buffers.last_attempt
+    _write_state(*times, buffers.position_m, buffers.velocity_mps, since, is_relative, scales, node)
     rows = (num_missions * num_robots, num_robots)
     return Graphs(
         node=node.view(np.float32).reshape(*rows, -1),
@@ -181,3 +121,33 @@ def _everyone_addressable(buffers: Buffers, node: Shaped[np.ndarray, "B N N"]) -
         may_address=np.ones(rows, dtype=np.bool_),
         has_turn=np.zeros(rows[0], dtype=np.bool_),
     )
+
+
+@compiled()
+def _write_state(
+    timestamp: Float[np.ndarray, "B N N"],
+    last_attempt: Float[np.ndarray, "B N N"],
+    position_m: Float[np.ndarray, "B N N 2"],
+    velocity_mps: Float[np.ndarray, "B N N 2"],
+    since: Float[np.ndarray, "B"],
+    is_relative: bool,
+    scales: tuple[float, float, float],
+    node: Shaped[np.ndarray, "B N N"],
+) -> None:
+    """Write times since a moment, and states, relative to the robot's own or not, to scale."""
+    per_window, per_m, per_mps = scales
+    num_missions, num_robots = timestamp.shape[:2]
+    for b in range(num_missions):
+        for i in range(num_robots):
+            x_m = y_m = x_mps = y_mps = 0.0
+            if is_relative:
+                x_m, y_m = position_m[b, i, i, 0], position_m[b, i, i, 1]
+                x_mps, y_mps = velocity_mps[b, i, i, 0], velocity_mps[b, i, i, 1]
+            for k in range(num_robots):
+                of_k = node[b, i, k]
+                of_k.timestamp = (timestamp[b, i, k] - since[b]) * per_window
+                of_k.x = (position_m[b, i, k, 0] - x_m) * per_m
+                of_k.y = (position_m[b, i, k, 1] - y_m) * per_m
+                of_k.velocity_x = (velocity_mps[b, i, k, 0] - x_mps) * per_mps
+                of_k.velocity_y = (velocity_mps[b, i, k, 1] - y_mps) * per_mps
+                of_k.last_attempt = (last_attempt[b, i, k] - since[b]) * per_window

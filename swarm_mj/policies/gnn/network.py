@@ -128,16 +128,12 @@ class AggregationGnn(nn.Module):
     ) -> Float[Tensor, "R N O"]:
         """Map the features of the nodes of R graphs to numbers for each node.
 
-        Graphs do not hear of each other, nor nodes of those that no edges lead to: a smaller graph
-        may be padded with nodes that have no parent.
+        A smaller graph may be padded with nodes that have no parent: no edges lead to them.
 
         Args:
             node: Features.
             parent: Index of each node's parent in the same graph, or -1: no edge.
-            is_wanted: Whose numbers are asked for; None is everyone's.
-
-        Returns:
-            The numbers; 0 where nobody asked for them.
+            is_wanted: Nodes whose numbers are asked for, 0 elsewhere; None is all of them.
 
         Raises:
             ValueError: Features of another number than the network's, or a parent that is no node.

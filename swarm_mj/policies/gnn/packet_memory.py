@@ -1,8 +1,7 @@
-"""What a robot remembers of the packets that it sent and decoded, beside its buffer.
+"""What a robot remembers of the packets that it sent and decoded, next to its buffer.
 
-Every robot's memory is its own: row `[b, i]` is written from what robot `i` sent and decoded only.
-A packet's timestamps are its sender's at that time. They are followed from window to window here,
-by Alg. 1: who decoded a packet saw them.
+Row `[b, i]` is written from what robot `i` sent and decoded only. A packet's timestamps are its
+sender's at that time; they are followed from window to window here, by Alg. 1.
 """
 
 from typing import NamedTuple
@@ -29,7 +28,7 @@ class Memory(NamedTuple):
 
 
 def empty_memory(num_missions: int, num_robots: int) -> Memory:
-    """Nothing was ever heard or said."""
+    """Return the memory of robots that never heard or said anything."""
     robots = (num_missions, num_robots)
     pairs = (*robots, num_robots)
     shapes = (pairs, pairs, robots, (*pairs, num_robots), pairs, pairs)

@@ -1,30 +1,21 @@
-"""A learned policy: every robot's own network on its own buffer's graph (III-A to III-C)."""
+"""A GNN as a policy: every robot's own network on its own buffer's graph (III-A to III-C)."""
 
-import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
 
-from swarm_mj.mission.batched_rng import Stream, uniform
-from swarm_mj.policies.gnn.action_distribution import recipient_logits
-from swarm_mj.policies.gnn.graphs import FeatureExtractor
+from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.gnn.network import AggregationGnn
-from swarm_mj.policies.gnn.sampling import sample
-from swarm_mj.policies.policy import DecentralisedPolicy, Parameters
-from swarm_mj.protocol.local_views import LocalViews
-
-DIGITS = 12  # of a digest: enough to tell policies apart
+from swarm_mj.policies.learned import IMPOSSIBLE, LearnedPolicy
+from swarm_mj.policies.policy import Parameters
 
 
-class LearnedPolicy(DecentralisedPolicy):
-    """Addresses whom the network's Boltzmann distribution draws, or its mode.
-
-    The robots' networks are alike, so one batch evaluates all of them. It does so on one thread:
-    small batches are slower on several, and processes share the work of many missions better.
-    """
+class GnnPolicy(LearnedPolicy):
+    """The robots' networks are alike, so one batch evaluates all of them."""
 
     def __init__(
         self,
@@ -37,66 +28,77 @@ class LearnedPolicy(DecentralisedPolicy):
     ) -> None:
         """Take the network as it is, live, on any device: later changes of its weights count.
 
-        The extractor makes the graphs that it was trained on, and `own_features` is its name if it
-        is a user's own; the logit is added to silence, but in a robot's own turn.
+        The logit is added to silence, but in a robot's own turn.
         """
-        self._own_features = own_features
+        super().__init__(extractor, is_deterministic=is_deterministic, own_features=own_features)
         self._network = network
-        self._extractor = extractor
         self._silence_logit = silence_logit
-        self._is_deterministic = is_deterministic
         self.uses = f"{extractor.uses}, by a trained graph neural network"
 
     @property
     def parameters(self) -> Parameters:
-        """How it was made, and a digest that changes with its weights."""
-        return {
-            "receptive_field": self._network.shape.receptive_field,
-            "is_deterministic": self._is_deterministic,
-            "digest": self._digest(),
-            **({"features": self._own_features} if self._own_features else {}),
-        }
+        """The receptive field as well."""
+        return {"receptive_field": self._network.shape.receptive_field, **super().parameters}
 
-    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Forgets packets; takes each mission's generator. Arguments as in `Policy.start`."""
-        self._extractor.start(len(rngs), num_robots)
-        self._uniform = Stream(rngs, uniform, (num_robots,))
-        self._owner = torch.arange(num_robots).repeat(len(rngs))
-
-    def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """What each robot's own network draws from its own graph."""
-        logits = self._logits(views)
-        shape = views.silence.shape
-        if self._is_deterministic:
-            return logits.argmax(axis=1).reshape(shape)
-        return sample(logits, self._uniform.next().ravel()).reshape(shape)
-
-    def _logits(self, views: LocalViews) -> Float[np.ndarray, "R N"]:
-        """Over the recipients of all robots, mission by mission."""
-        graphs = self._extractor.graphs(views)
+    def logits(self, graphs: Graphs) -> Float[np.ndarray, "R N"]:
+        """Return each robot's logits over recipients, from its own graph."""
+        num_rows, num_robots = graphs.may_address.shape
         parent = torch.from_numpy(graphs.parent.astype(np.int64))  # a copy: buffers are read-only
         node, may_address, has_turn = map(
             torch.from_numpy, (graphs.node, graphs.may_address, graphs.has_turn)
         )
+        owner = torch.arange(num_rows) % num_robots
         device, silence_logit = next(self._network.parameters()).device, self._silence_logit
         with torch.inference_mode(), _one_thread():
             output = self._network(*(each.to(device) for each in (node, parent, may_address))).cpu()
-            return recipient_logits(
-                output, self._owner, may_address, silence_logit, has_turn
-            ).numpy()
+            return recipient_logits(output, owner, may_address, silence_logit, has_turn).numpy()
 
-    def _digest(self) -> str:
-        """Return a hash of all that its decisions follow from."""
-        said = (self._network.shape, self._extractor.names, self._silence_logit)
-        digest = hashlib.sha256(repr(said).encode())
-        for name, tensor in sorted(self._network.state_dict().items()):
-            digest.update(name.encode() + b"\0" + tensor.cpu().contiguous().numpy().tobytes())
-        return digest.hexdigest()[:DIGITS]
+    def identity(self) -> tuple[object, dict[str, np.ndarray]]:
+        """Return what the network is made of and sees, and its weights now."""
+        state = self._network.state_dict().items()
+        weights = {name: tensor.cpu().contiguous().numpy() for name, tensor in state}
+        return (self._network.shape, self._extractor.names, self._silence_logit), weights
+
+
+def recipient_logits(
+    output: Float[Tensor, "R N O"],
+    owner: Int[Tensor, "R"],
+    may_address: Bool[Tensor, "R N"],
+    silence_logit: float = 0.0,
+    has_turn: Bool[Tensor, "R"] | None = None,
+) -> Float[Tensor, "R N"]:
+    """Return each robot's logits over recipients; oneself is silence (III-C).
+
+    With one number per node it is the node's logit. With two, as in the authors' code, they are the
+    logits of addressing it at full and at zero power; all that send nothing count together.
+
+    Args:
+        output: The network's numbers, O is 1 or 2.
+        owner: The robot of each row.
+        may_address: Recipients to choose among, `IMPOSSIBLE` elsewhere; the owner always is one.
+        silence_logit: Added to silence.
+        has_turn: Robots whose turn it is: nothing is added to their silence; None is nobody.
+    """
+    own = owner[:, None]
+    logits = output[:, :, 0]
+    if output.shape[2] > 1:  # the authors' second number: of sending at no power, hence of silence
+        zero_power = output[:, :, 1].masked_fill(~may_address, IMPOSSIBLE)
+        unsent = torch.cat([zero_power, logits.gather(1, own)], dim=1)
+        logits = logits.scatter(1, own, torch.logsumexp(unsent, dim=1, keepdim=True))
+    if silence_logit:
+        bias = torch.full_like(own, silence_logit, dtype=logits.dtype)
+        if has_turn is not None:
+            bias = bias.masked_fill(has_turn[:, None], 0.0)
+        logits = logits.scatter_add(1, own, bias)
+    return logits.masked_fill(~may_address, IMPOSSIBLE)
 
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Within it, torch starts no threads; the setting is the process's, so it is put back."""
+    """Keep torch from starting threads: small batches are slower on several.
+
+    The setting is the process's, so it is put back.
+    """
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

@@ -1,5 +1,7 @@
 """A learned policy flies: reproducibly, locally, in teams of any size."""
 
+import math
+
 import numpy as np
 import pytest
 import torch
@@ -8,10 +10,9 @@ from mixed_missions import NUM_ROBOTS, SEEDS, mixed_views
 from tiny_policies import FEATURES, save_tiny, tiny_network
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies.gnn.action_distribution import recipient_logits
 from swarm_mj.policies.gnn.feature_sets import make_extractor
-from swarm_mj.policies.gnn.policy import LearnedPolicy
-from swarm_mj.policies.gnn.sampling import sample
+from swarm_mj.policies.gnn.policy import GnnPolicy, recipient_logits
+from swarm_mj.policies.learned import IMPOSSIBLE, sample
 from swarm_mj.policies.policy import DecentralisedPolicy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay.recorder import Recorder
@@ -41,7 +42,7 @@ def learned(
             if isinstance(layer, torch.nn.Linear):
                 layer.weight *= sharpness
     extractor = make_extractor(features, mission)
-    return LearnedPolicy(
+    return GnnPolicy(
         network, extractor, silence_logit=silence_logit, is_deterministic=is_deterministic
     )
 
@@ -186,7 +187,7 @@ def test_the_digest_tells_whatever_changes_decisions():
         policy._network.output.bias[0] += 1e-6
     assert policy.parameters["digest"] != before
     edges = [
-        LearnedPolicy(tiny_network(edges=edges), make_extractor("extended", MISSION))
+        GnnPolicy(tiny_network(edges=edges), make_extractor("extended", MISSION))
         for edges in ("paper", "reference")
     ]
     assert edges[0].parameters["digest"] != edges[1].parameters["digest"]
@@ -221,3 +222,79 @@ def test_a_flight_is_recorded():
     for window in rollout(swarm, policy):
         recorder.add(window)
     assert len(recorder.log().recipient) == MISSION.num_windows
+
+
+# Logits over recipients, by hand.
+
+ALL = torch.ones(2, 3, dtype=torch.bool)
+OWNER = torch.tensor([0, 2])  # row 0 is robot 0's, row 1 robot 2's
+# [row, node]: the logits of addressing a node at full power, and at none.
+FULL = torch.tensor([[0.5, 1.0, -2.0], [3.0, 0.0, 1.0]])
+ZERO = torch.tensor([[0.0, -1.0, 0.25], [1.0, 2.0, 4.0]])
+
+
+def logits(output, may_address=ALL, silence_logit=0.0, has_turn=None):
+    return recipient_logits(output, OWNER, may_address, silence_logit, has_turn).tolist()
+
+
+def test_eq9_one_number_per_node_is_its_logit_and_ones_own_is_silence():
+    assert logits(FULL[:, :, None]) == FULL.tolist()
+
+
+def test_the_silence_logit_is_added_to_ones_own():
+    assert logits(FULL[:, :, None], silence_logit=2.0) == [[2.5, 1.0, -2.0], [3.0, 0.0, 3.0]]
+
+
+@pytest.mark.parametrize(
+    ("has_turn", "own_0", "own_2"), [([True, False], 0.5, 3.0), ([False, False], 2.5, 3.0)]
+)
+def test_nothing_is_added_to_silence_in_ones_turn(has_turn, own_0, own_2):
+    found = logits(FULL[:, :, None], silence_logit=2.0, has_turn=torch.tensor(has_turn))
+    assert found == [[own_0, 1.0, -2.0], [3.0, 0.0, own_2]]
+
+
+@pytest.mark.parametrize("silence_logit", [0.0, -1.5])
+def test_of_two_numbers_all_that_sends_nothing_is_silence(silence_logit):
+    """Zero power to anyone, and full power to oneself."""
+    own_0 = math.log(math.exp(0.0) + math.exp(-1.0) + math.exp(0.25) + math.exp(0.5))
+    own_2 = math.log(math.exp(1.0) + math.exp(2.0) + math.exp(4.0) + math.exp(1.0))
+    found = logits(torch.stack([FULL, ZERO], dim=2), silence_logit=silence_logit)
+    expected = [[own_0 + silence_logit, 1.0, -2.0], [3.0, 0.0, own_2 + silence_logit]]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
+def test_two_numbers_make_the_probabilities_of_the_2_n_actions():
+    """Against the softmax over all six actions of a row, those that are silence added up."""
+    output = torch.stack([FULL, ZERO], dim=2)
+    found = torch.softmax(torch.tensor(logits(output)), dim=1)
+    for row, owner in enumerate(OWNER.tolist()):
+        actions = torch.exp(output[row]) / torch.exp(output[row]).sum()
+        full, zero = actions[:, 0].tolist(), actions[:, 1].tolist()
+        expected = [p if k != owner else p + sum(zero) for k, p in enumerate(full)]
+        np.testing.assert_allclose(found[row], expected, rtol=1e-6)
+
+
+MASKED = torch.tensor([[True, False, True], [False, True, True]])
+
+
+def test_masked_recipients_are_impossible_and_change_no_other():
+    masked, free = np.array(logits(FULL[:, :, None], MASKED)), np.array(logits(FULL[:, :, None]))
+    assert np.all(masked[~MASKED.numpy()] == IMPOSSIBLE)
+    np.testing.assert_array_equal(masked[MASKED.numpy()], free[MASKED.numpy()])
+
+
+def test_of_two_numbers_a_masked_recipient_counts_at_neither_power():
+    """As padding of a mixed team must not: zero power to it is no way to be silent."""
+    own_0 = math.log(math.exp(0.0) + math.exp(0.25) + math.exp(0.5))
+    own_2 = math.log(math.exp(2.0) + math.exp(4.0) + math.exp(1.0))
+    found = logits(torch.stack([FULL, ZERO], dim=2), MASKED)
+    expected = [[own_0, IMPOSSIBLE, -2.0], [IMPOSSIBLE, 0.0, own_2]]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("num_outputs", [1, 2])
+def test_gradients_reach_every_number_that_counts(num_outputs):
+    output = torch.stack([FULL, ZERO], dim=2)[:, :, :num_outputs].clone().requires_grad_()
+    torch.softmax(recipient_logits(output, OWNER, ALL, 1.0), dim=1)[:, 1].sum().backward()
+    assert output.grad is not None
+    assert torch.all(output.grad != 0.0)

@@ -4,26 +4,19 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_mj.policies.gnn.turns import write_turns
+from swarm_mj.policies.gnn.extended_features import write_turns
 
 RADII = np.array([100.0, 150.0, 300.0])
 
 
 def turns(believed_m, is_known, now, radius_m=RADII):
-    """Who has a turn by one robot's beliefs [radius, robot].
-
-    Another robot of the team, and another mission, believe in other things.
-    """
-    num_robots = len(is_known)
-    rng = np.random.default_rng(0)
-    its_m = rng.uniform(-250.0, 250.0, (2, num_robots, num_robots, 2))
-    its_known = rng.random((2, num_robots, num_robots)) < 0.9
-    its_m[1, -1], its_known[1, -1] = believed_m, is_known
-    has_turn = np.full((len(radius_m), 2, num_robots, num_robots), 7.0, dtype=np.float32)
+    """Who has a turn by one robot's beliefs [radius, robot]."""
+    x_m, y_m = np.array(believed_m, dtype=float).T.copy()
+    has_turn = np.full((len(radius_m), len(is_known)), 7.0, dtype=np.float32)
     for radius, its in zip(radius_m, has_turn, strict=True):
-        write_turns(its_m, its_known, np.array([now + 1.0, float(now)]), radius, its)
+        write_turns(x_m, y_m, np.array(is_known), now, np.full(len(its), 7.0), radius, its)
     assert np.all((has_turn == 0.0) | (has_turn == 1.0))
-    return has_turn[:, 1, -1] == 1.0
+    return has_turn == 1.0
 
 
 def order(num_robots, now):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from swarm_mj.policies.gnn.sampling import IMPOSSIBLE, sample
+from swarm_mj.policies.learned import IMPOSSIBLE, sample
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])

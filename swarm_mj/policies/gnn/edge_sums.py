@@ -1,0 +1,127 @@
+"""Sums over the edges that end at each node, in one compiled pass (Eqs. 11, 12)."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from swarm_mj.system.compiled import compiled
+
+ZERO = np.float32(0.0)  # of the least type, so that float32 stays that
+
+
+class WantedEdges(NamedTuple):
+    """Edges that end at nodes that are asked for, graph by graph."""
+
+    end: Int[np.ndarray, "e"]  # counted among those nodes
+    start: Int[np.ndarray, "e"]  # counted among all nodes
+    direction: Int[np.ndarray, "e"]
+
+
+@compiled()
+def edges_to(
+    parent: Int[np.ndarray, "R N"],
+    is_upward: Bool[np.ndarray, "D"],
+    is_wanted: Bool[np.ndarray, "R N"],
+) -> WantedEdges:
+    """Return the edges between nodes and parents, in each direction; a parent of -1 is none."""
+    num_graphs, num_nodes = parent.shape
+    most, num, num_wanted = parent.size * len(is_upward), 0, 0
+    end, start = np.empty(most, np.int64), np.empty(most, np.int64)
+    direction, place = np.empty(most, np.int64), np.empty(num_nodes, np.int64)
+    for r in range(num_graphs):
+        for k in range(num_nodes):
+            place[k] = num_wanted if is_wanted[r, k] else -1
+            num_wanted += is_wanted[r, k]
+        for child in range(num_nodes):
+            above = parent[r, child]
+            for d in range(len(is_upward) if above >= 0 else 0):
+                to, other = (above, child) if is_upward[d] else (child, above)
+                if place[to] >= 0:
+                    end[num], start[num] = place[to], r * num_nodes + other
+                    direction[num] = d
+                    num += 1
+    return WantedEdges(end[:num], start[:num], direction[:num])
+
+
+class EdgeSums(torch.autograd.Function):
+    """For each wanted node, the sum over its edges of relu(receiver + sender + direction).
+
+    In one pass: torch would go through memory once for every step of it, and again backwards.
+    """
+
+    @staticmethod
+    def forward(
+        ctx: Any,  # noqa: ANN401 - torch's own
+        receiver: Float[Tensor, "w C"],
+        sender: Float[Tensor, "n C"],
+        direction: Float[Tensor, "D C"],
+        edges: WantedEdges,
+    ) -> Float[Tensor, "w C"]:
+        """Return the sums; all tensors are on a CPU."""
+        total = torch.zeros_like(receiver)
+        _sum(as_array(receiver), as_array(sender), as_array(direction), edges, total.numpy())
+        ctx.save_for_backward(receiver, sender, direction)
+        ctx.edges = edges
+        return total
+
+    @staticmethod
+    def backward(
+        ctx: Any,  # noqa: ANN401 - torch's own
+        *gradients: Tensor,
+    ) -> tuple[Tensor | None, ...]:
+        """Return the gradients of the first three arguments, from that of the sums."""
+        given = tuple(map(as_array, ctx.saved_tensors))
+        back = tuple(map(np.zeros_like, given))
+        _spread(given, ctx.edges, as_array(gradients[0]), back)
+        return *map(torch.from_numpy, back), None
+
+
+def as_array(tensor: Tensor) -> np.ndarray:
+    """Return a tensor's numbers, which may be the tensor's own memory."""
+    return tensor.detach().contiguous().numpy()
+
+
+@compiled()
+def _sum(
+    receiver: Float[np.ndarray, "w C"],
+    sender: Float[np.ndarray, "n C"],
+    direction: Float[np.ndarray, "D C"],
+    edges: WantedEdges,
+    total: Float[np.ndarray, "w C"],
+) -> None:
+    """Add to `total`."""
+    for e in range(len(edges.end)):
+        to, start, d = edges.end[e], edges.start[e], edges.direction[e]
+        for c in range(total.shape[1]):
+            total[to, c] += max(receiver[to, c] + sender[start, c] + direction[d, c], ZERO)
+
+
+@compiled()
+def _spread(
+    given: tuple[np.ndarray, ...],
+    edges: WantedEdges,
+    gradient: Float[np.ndarray, "w C"],
+    gradients: tuple[np.ndarray, ...],
+) -> None:
+    """Add to `gradients` those of the receiver, sender and direction that `_sum` was given."""
+    receiver, sender, direction = given
+    of_receiver, of_sender, of_direction = gradients
+    back = np.empty_like(direction[0])
+    for e in range(len(edges.end)):
+        to, start, d = edges.end[e], edges.start[e], edges.direction[e]
+        for c in range(len(back)):
+            edge = receiver[to, c] + sender[start, c] + direction[d, c]
+            back[c] = gradient[to, c] if edge > 0 else ZERO
+        # One array at a time: loops over few arrays are compiled to vectors.
+        _add(of_receiver[to], back)
+        _add(of_sender[start], back)
+        _add(of_direction[d], back)
+
+
+@compiled()
+def _add(row: Float[np.ndarray, "C"], more: Float[np.ndarray, "C"]) -> None:
+    for c in range(len(row)):
+        row[c] += more[c]

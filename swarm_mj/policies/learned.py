@@ -1,0 +1,93 @@
+"""What policies share whose robots evaluate a trained network: draws and a digest (III-C)."""
+
+import hashlib
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from swarm_mj.mission.batched_rng import Stream, uniform
+from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
+from swarm_mj.policies.policy import DecentralisedPolicy, Parameters
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.system.compiled import compiled
+
+IMPOSSIBLE = -1e9  # the logit of a recipient that may not be addressed; finite, so that 0 p stays 0
+DIGITS = 12  # of a digest: enough to tell policies apart
+
+
+class LearnedPolicy(DecentralisedPolicy, ABC):
+    """Addresses the recipient that the network's Boltzmann distribution draws, or its mode."""
+
+    def __init__(
+        self,
+        extractor: FeatureExtractor,
+        *,
+        is_deterministic: bool = False,
+        own_features: str | None = None,
+    ) -> None:
+        """Take what makes the features that the network was trained on, and their name if own."""
+        self._extractor = extractor
+        self._is_deterministic = is_deterministic
+        self._own_features = own_features
+
+    @property
+    def parameters(self) -> Parameters:
+        """How it decides, and a digest that changes with its weights."""
+        made_of, weights = self.identity()
+        digest = hashlib.sha256(repr(made_of).encode())
+        for name, values in sorted(weights.items()):
+            digest.update(name.encode() + b"\0" + values.tobytes())
+        features = {"features": self._own_features} if self._own_features else {}
+        return {
+            "is_deterministic": self._is_deterministic,
+            "digest": digest.hexdigest()[:DIGITS],
+            **features,
+        }
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Forget packets; take each mission's generator. Arguments as in `Policy.start`."""
+        self._extractor.start(len(rngs), num_robots)
+        self._uniform = Stream(rngs, uniform, (num_robots,))
+
+    def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
+        """Return what each robot's own network draws from its own view."""
+        logits = self.logits(self._extractor.graphs(views))
+        if self._is_deterministic:
+            return logits.argmax(axis=1).reshape(views.silence.shape)
+        return sample(logits, self._uniform.next().ravel()).reshape(views.silence.shape)
+
+    @abstractmethod
+    def logits(self, graphs: Graphs) -> Float[np.ndarray, "R N"]:
+        """Return each robot's logits over recipients, mission by mission."""
+
+    @abstractmethod
+    def identity(self) -> tuple[object, Mapping[str, np.ndarray]]:
+        """Return all that decisions follow from: the settings, and the weights by name."""
+
+
+@compiled()
+def sample(
+    logits: Float[np.ndarray, "R N"], uniform: Float[np.ndarray, "R"]
+) -> Int[np.ndarray, "R"]:
+    """Return a recipient from each row's Boltzmann distribution, by its cumulated probabilities.
+
+    `uniform` is one number in [0, 1) a row; the same number is the same decision.
+    """
+    num_rows, num_nodes = logits.shape
+    chosen, weight = np.zeros(num_rows, dtype=np.int64), np.empty(num_nodes)
+    for r in range(num_rows):
+        highest = logits[r].max()  # taken off before exp, which would overflow
+        total = 0.0
+        for k in range(num_nodes):
+            weight[k] = np.exp(logits[r, k] - highest)
+            total += weight[k]
+        left = uniform[r] * total
+        for k in range(num_nodes):
+            if weight[k] > 0.0:
+                chosen[r] = k  # the last possible one, should rounding leave a rest
+                left -= weight[k]
+                if left < 0.0:
+                    break
+    return chosen
