@@ -6,11 +6,12 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 SCALE ?= quick
 
-.PHONY: help setup fly bench check test attack lock audit format figures reproduce picture video docs docs-serve clean
+.PHONY: help setup fly bench check test test-all attack lock audit format figures reproduce picture video docs docs-serve clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
-	@echo "make test    set up if needed and run the tests"
+	@echo "make test    set up if needed and run the tests, each law once"
+	@echo "make test-all  run the long tests, too: many seeds, a built wheel, the site"
 	@echo "make attack  run the fault tests for ten minutes and count what held"
 	@echo "make check   formatter, linter and type checker"
 	@echo "make format  let the formatter and the linter mend what they can"
@@ -50,8 +51,14 @@ check: setup
 	$(BIN)/ruff check .
 	$(BIN)/basedpyright
 
+# Tests of a module run in one process, which has its fixtures; both share numba's cache on disk.
+PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadscope --no-loadscope-reorder
+
 test: setup
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadscope --no-loadscope-reorder $(ARGS)
+	$(PYTEST) -m "not slow" $(ARGS)
+
+test-all: setup
+	$(PYTEST) $(ARGS)
 
 attack: setup
 	SWARM_MJ_TRIES=20 $(BIN)/python -m pytest --numprocesses 2 tests/faults $(ARGS)

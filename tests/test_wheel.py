@@ -16,6 +16,7 @@ from packaging.requirements import Requirement
 
 from swarm_mj.system.packages import CORE
 
+pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parent.parent
 
 

@@ -36,6 +36,7 @@ MEASURED = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.fault("memory: estimates")
 def test_estimates_are_near_the_peaks(forks, tmp_path, record_property):
     """Fault 8: nothing was estimated. The measured processes have loaded torch already."""
@@ -101,15 +102,8 @@ def test_yes_begins_all_the_same(monkeypatch, tmp_path):
 
 def flown_short(tmp_path, capsys, ending="Out of memory"):
     """How many windows a flight kept that ran out of memory."""
-    flight = [
-        "fly",
-        *SMALL,
-        "--record",
-        str(tmp_path / "a.rrd"),
-        "--json",
-        str(tmp_path / "a.json"),
-    ]
-    assert main(flight) == 1
+    outputs = ("--record", str(tmp_path / "a.rrd"), "--json", str(tmp_path / "a.json"))
+    assert main(["fly", *SMALL, *outputs]) == 1
     check_replay(tmp_path / "a.rrd")
     kept = json.loads((tmp_path / "a.json").read_text())["num_windows"]
     assert f"{ending} after {kept} of 120 windows." in " ".join(capsys.readouterr().err.split())
@@ -209,19 +203,3 @@ def test_an_evaluation_that_runs_out_of_memory_is_resumed(monkeypatch, capsys, t
     assert main([*study, "--csv", "a.csv", "--resume"]) == 0
     assert main([*study, "--csv", "b.csv"]) == 0
     assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
-
-
-@pytest.mark.fault("memory: nothing leaks")
-def test_replays_of_a_training_leave_no_threads(forks, tmp_path, record_property):
-    """Fault 10: each left 4 threads and 3.7 MB."""
-    num_replays = tries(8)
-    record_property("tries", num_replays)
-    run = ("train", "--out", "a", "--robots", "4", "--windows", "8", "--missions", "1")
-    often = ("--held-out", "1", "--replay-every", "1", "--budget", str(32 * (num_replays - 1)))
-    done = forks.run(tmp_path, Path(__file__).with_name("leaks.py"), *run, *often)
-    assert done.returncode == 0, done.stderr
-    held = json.loads((tmp_path / "held.json").read_text())
-    assert len(held) == num_replays
-    threads, resident = zip(*held[1:], strict=True)  # the first one loads the recorder
-    assert threads[-1] <= threads[0]
-    assert resident[-1] - resident[0] < 1e6 * len(held)

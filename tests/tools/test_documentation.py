@@ -48,6 +48,7 @@ class Loaded(HTMLParser):
             self.links.append(known["href"])
 
 
+@pytest.mark.slow
 def test_every_page_loads_files_of_the_site_only(built):
     pages = sorted(built.rglob("*.html"))
     assert len(pages) >= 10
@@ -62,6 +63,7 @@ def test_every_page_loads_files_of_the_site_only(built):
             assert path.exists(), f"{page.name}: {target}"
 
 
+@pytest.mark.slow
 def test_the_home_is_the_readme_and_pictures_come_along(built):
     home = (built / "index.html").read_text(encoding="utf-8")
     assert (ROOT / "README.md").read_text(encoding="utf-8").startswith("# swarm_mj")
@@ -69,6 +71,7 @@ def test_the_home_is_the_readme_and_pictures_come_along(built):
     assert (built / "repository/assets/figures/paper/fig5.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_the_tour_shows_what_its_cells_show(built):
     page = (built / "tour.html").read_text(encoding="utf-8")
     assert "<td style='text-align:left'>10.54 windows" in page  # of the default flight
@@ -78,6 +81,7 @@ def test_the_tour_shows_what_its_cells_show(built):
     assert not any(cell.get("outputs") for cell in notebook["cells"])  # they are made when shown
 
 
+@pytest.mark.slow
 def test_every_equation_leads_to_its_code(built):
     page = (built / "paper-map.html").read_text(encoding="utf-8")
     assert all(f"<td>Eq. {n}</td>" in page for n in range(1, 18))
