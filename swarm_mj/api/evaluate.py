@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 from swarm_mj.api.estimates import study_needs
@@ -142,7 +143,7 @@ def evaluate(
     num_jobs: int = 1,
     **mission_fields: Any,
 ) -> Evaluation:
-    """Flies each policy over the same missions, and says what each cost on average.
+    """Fly each policy over the same missions, and average the costs of each.
 
     The same arguments give the same numbers as `swarm-mj evaluate` does. On a terminal, a bar shows
     how far it is.
@@ -150,8 +151,8 @@ def evaluate(
     Args:
         policies: Names of `POLICIES`, folders of learned ones, or `module:Name` of your own;
             `__main__:Name` is a class of this script or notebook. "all" is all of `POLICIES`.
-        task: What the robots do, by name; or a mission of one's own. None is as in `fly`.
-        num_missions: So many for each policy.
+        task: The robots' task by name, or a `Mission`. None is as in `fly`.
+        num_missions: Of each policy.
         seed: Of the first mission; the others follow one by one.
         baseline: The policy that the others are compared to, mission by mission; the first unless
             given.
@@ -159,14 +160,11 @@ def evaluate(
         is_deterministic: Whether learned policies take their most probable recipient, not a draw.
         channel: Who decodes whom, by `module:Name`; the mission's radio unless given.
         controller: What drives the robots, likewise; that of the task unless given.
-        scene: What changes the arena, likewise; nothing unless given.
-        features: Names of your own feature extractors, that learned policies may see by.
+        scene: A function that adds obstacles to the arena, likewise; none unless given.
+        features: Names of your own feature extractors that learned policies were trained with.
         num_jobs: Processes. With more than one, a script must guard what it runs by
             `if __name__ == "__main__":`, as Python's multiprocessing says.
         **mission_fields: Any field of `Mission`, such as `num_robots=20`.
-
-    Returns:
-        What was found.
 
     Raises:
         ValueError: A value is unknown or out of range, or memory does not suffice.
@@ -176,9 +174,8 @@ def evaluate(
     """
     need("scipy", "an evaluation")
     mission = mission_of(evaluate, task, mission_fields)
-    for kind, name in {"channel": channel, "controller": controller, "scene": scene}.items():
-        if name is not None:
-            _check_named(kind, name)
+    for kind, name in (("channel", channel), ("controller", controller), ("scene", scene)):
+        _check_named(kind, name)
     components = Components(channel=channel, controller=controller, scene=scene)
     check_value(Processes.__dataclass_fields__["jobs"], num_jobs, "num_jobs")
     check_value(Study.__dataclass_fields__["episodes"], num_missions, "num_missions")
@@ -203,8 +200,8 @@ def evaluate(
 
 
 def _check_named(kind: str, part: object) -> None:
-    """Pass for a name; raises TypeError for anything else, with a name that leads to it."""
-    if isinstance(part, str) or (kind == "policy" and isinstance(part, Path)):
+    """Raise TypeError for what is given but no name; the message has a name that leads to it."""
+    if isinstance(part, (str, Path if kind == "policy" else NoneType)):
         return
     home = getattr(part, "__module__", "builtins")
     name = f"{home}:{name_of(part)}" if home not in ("builtins", "functools") else "my_file:Name"
@@ -215,7 +212,7 @@ def _check_named(kind: str, part: object) -> None:
 
 
 def _names(policies: str | Path | Sequence[str | Path]) -> tuple[str, ...]:
-    """Policies' names, one or several."""
+    """Return policies' names, one or several."""
     if not isinstance(policies, str | Path | Iterable):
         raise TypeError(f"policies must be a list of names, not {policies!r:.80}")
     named = [policies] if isinstance(policies, str | Path) else list(policies)

@@ -1,21 +1,25 @@
 """The numbers of one flight: for the terminal and for `--json`."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
+
+import numpy as np
+from jaxtyping import Float
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
 from swarm_mj.mission.presets import where_flown
 from swarm_mj.mission.specification import NOTHING
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
+from swarm_mj.protocol.costs import PACKETS
 from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
-from swarm_mj.simulation.rollout import Summary
+from swarm_mj.simulation.rollout import Summary, WindowRecord
 
 AGREED = 0.01  # of the first window's velocity variance: a flock with less has agreed
 CENTRE = "a centre that is told where all are"
-PACKETS = {  # rows of the table: a count among the numbers, and its share of the packets sent
+FATES = {  # rows of the table: a count among the numbers, and its share of the packets sent
     "  heard by at least one robot": "packets_heard",
     "  delivered": "packets_delivered",
     "  lost": "packets_lost",
@@ -69,6 +73,26 @@ def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> 
     return rows
 
 
+def window_columns(
+    windows: Sequence[WindowRecord], window_s: float, aoi_worst: Float[np.ndarray, "T"] | None
+) -> dict[str, Float[np.ndarray, "T"]]:
+    """Return a flight window by window, column by column; `aoi_worst` is None without a record."""
+    costs, window = [each.costs for each in windows], np.arange(1.0, len(windows) + 1.0)
+    task_costs = [each.task_cost for each in costs if each.task_cost is not None]
+    columns: dict[str, list[Any]] = {
+        "aoi": [each.age_windows for each in costs],
+        "velocity_variance": [each.velocity_variance_m2ps2 for each in costs],
+        **({"task_cost": [each.value for each in task_costs]} if task_costs else {}),
+        "hops": [each.hops for each in windows],
+        "is_complete": [each.is_complete for each in costs],
+        **{f"packets_{name}": [getattr(each.packets, name) for each in costs] for name in PACKETS},
+    }
+    flown = {name: np.concatenate(each).astype(np.float64) for name, each in columns.items()}
+    worst = {} if aoi_worst is None else {"aoi_worst": aoi_worst}
+    seconds = np.round(window * window_s, 9)
+    return {"window": window, "seconds": seconds, "aoi": flown.pop("aoi"), **worst, **flown}
+
+
 def _number(name: str, value: Any) -> Any:  # noqa: ANN401 - of a summary's field
     """Return a field for the one mission: counts whole, None where it is not defined."""
     if value is None or isinstance(value, str | int):
@@ -93,7 +117,7 @@ def _packets(numbers: Mapping[str, Any]) -> dict[str, str]:
     sent, is_broadcast = numbers["packets_sent"], numbers["packets_attempted"] is None
     title = "packets broadcast" if is_broadcast else "packets sent, each to one robot"
     rows = {title: f"{sent} ({sent / numbers['num_windows']:.1f} a window)"}
-    for name, count in ((name, numbers[key]) for name, key in PACKETS.items()):
+    for name, count in ((name, numbers[key]) for name, key in FATES.items()):
         if count is not None:
             rows[name] = f"{count} ({count / sent:.0%})" if sent else f"{count}"
     if is_broadcast:

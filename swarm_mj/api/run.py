@@ -1,8 +1,8 @@
 """The result of `swarm_mj.fly`: numbers, a table, a chart, files, a video."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,22 +12,22 @@ from jaxtyping import Float
 from rich.table import Table
 
 from swarm_mj.api.flight import Flown
-from swarm_mj.api.flight_table import flight_numbers, flight_rows, flight_title
+from swarm_mj.api.flight_table import flight_numbers, flight_rows, flight_title, window_columns
 from swarm_mj.api.metrics import Metrics
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components, components_in
 from swarm_mj.policies.policy import Policy
-from swarm_mj.protocol.costs import PACKETS
 from swarm_mj.replay.recorder import Log
+from swarm_mj.replay.rendering.style import DEFAULTS, default_seconds, fitted
 from swarm_mj.simulation.rollout import WindowRecord, summarise
 from swarm_mj.system.atomic import write_bytes, write_csv, write_json
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import as_typed
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
-from swarm_mj.system.progress import is_notebook
+from swarm_mj.system.progress import is_notebook, quiet_bar
 from swarm_mj.system.provenance import commit, version
-from swarm_mj.system.terminal import named_values
+from swarm_mj.system.terminal import named_values, plain_console
 
 if TYPE_CHECKING:  # each takes its time to import, and flights do without
     from matplotlib.figure import Figure
@@ -36,6 +36,10 @@ if TYPE_CHECKING:  # each takes its time to import, and flights do without
     from swarm_mj.replay.footage import Footage
 
 AGE = "age of information: how old a robot's news of another is, over all pairs; less is better"
+ELSEWHERE = (
+    "run.show() plays a video in a notebook. Here, run.save('flight.mp4') writes the video, and "
+    "run.save('flight.rrd') a replay that `swarm-mj replay flight.rrd` opens."
+)
 ENDINGS = ".rrd|.mp4|.gif|.json|.csv"  # of files that hold a run
 
 
@@ -96,29 +100,8 @@ class Run:
 
     def columns(self) -> dict[str, Float[np.ndarray, "T"]]:
         """Return the flight window by window, column by column: all that `to_dataframe` has."""
-        costs = [each.costs for each in self.windows]
-        window = np.arange(1.0, len(self.windows) + 1.0)
-
-        def column(values: Callable[[WindowRecord], Any]) -> Float[np.ndarray, "T"]:
-            return np.array([float(values(each)[0]) for each in self.windows])
-
-        columns = {
-            "window": window,
-            "seconds": np.round(window * self.mission.window_s, 9),
-            "aoi": column(lambda each: each.costs.age_windows),
-        }
-        if self.log:
-            columns["aoi_worst"] = self.log.age_max
-        columns["velocity_variance"] = column(lambda each: each.costs.velocity_variance_m2ps2)
-        if self.task_cost is not None:
-            values = [cost.value[0] for each in costs if (cost := each.task_cost)]
-            columns["task_cost"] = np.array(values, dtype=float)
-        columns["hops"] = column(lambda each: each.hops)
-        columns["is_complete"] = column(lambda each: each.costs.is_complete)
-        for name in PACKETS:
-            counts = [float(getattr(each.packets, name)[0]) for each in costs]
-            columns[f"packets_{name}"] = np.array(counts)
-        return columns
+        worst = None if self.log is None else self.log.age_max
+        return window_columns(self.windows, self.mission.window_s, worst)
 
     def to_dataframe(self) -> "DataFrame":
         """Return one row per window, at its end; what is not defined for the policy is nan.
@@ -164,12 +147,14 @@ class Run:
             OSError: No OpenGL works here; it says what to install.
             ModuleNotFoundError: A package that makes videos is not installed.
         """
-        from swarm_mj.api import video
+        if not is_notebook():
+            plain_console().print(ELSEWHERE)
+            return
+        content = self._film(".mp4")
+        from IPython.display import Video, display
 
-        if is_notebook():
-            video.play(video.film(self.footage(), ".mp4"))
-        else:
-            video.tell_where()
+        how = {"embed": True, "mimetype": "video/mp4", "html_attributes": "controls loop"}
+        display(Video(data=content, **how))
 
     def footage(self) -> "Footage":
         """Return the pictures' data; `rendering.video.make_video` puts two side by side.
@@ -213,15 +198,24 @@ class Run:
             case ".csv":
                 self._write_columns(path)
             case ending:
-                from swarm_mj.api.video import film
-
-                write_bytes(path, film(self.footage(), ending))
+                write_bytes(path, self._film(ending))
         return path
 
     def _recorded(self) -> Log:
         if self.log is None:
             raise ValueError("nothing was recorded that could be shown; fly with record=True")
         return self.log
+
+    def _film(self, ending: str) -> bytes:
+        """Return the content of a video file, as `swarm-mj replay --video` makes it."""
+        footage = self.footage()
+        for module in ("av", "PIL"):
+            need(module, "a video")
+        from swarm_mj.replay.rendering.video import make_video
+
+        style = fitted(replace(DEFAULTS[ending], seconds=default_seconds([footage])), ending)
+        with quiet_bar("Drawing", style.num_frames, "pictures") as bar:
+            return make_video([footage], ending, style, bar.advance)
 
     def _write_replay(self, path: Path) -> None:
         log = self._recorded()
@@ -252,18 +246,7 @@ def run_of(
     components: Components,
     log: Log | None = None,
 ) -> Run:
-    """Return a mission flown as a `Run`.
-
-    Args:
-        mission: Its numbers.
-        policy: The one that flew.
-        flown: The windows, at least one.
-        name: The policy's.
-        seed: The mission's.
-        observer: The robot whose knowledge a replay shows.
-        components: Those that replace the mission's own.
-        log: The record, if there is one.
-    """
+    """Return a mission flown as a `Run`; the config is everything that makes it again."""
     config = {
         **asdict(mission),
         "policy": name,

@@ -2,6 +2,8 @@
 
 import csv
 import json
+import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +15,8 @@ from swarm_mj.mission import paper
 from swarm_mj.mission.components import Components
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay.read import windows
+from swarm_mj.replay.rendering import style
+from swarm_mj.replay.rendering.style import VideoStyle
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 
 SHORT = {"num_robots": 6, "num_windows": 20, "range_ratio": 0.5}
@@ -102,3 +106,53 @@ def test_a_flight_that_ended_early_is_called_interrupted(unrecorded, code):
     assert (run.summary.num_windows, run.summary.wall_seconds) == (20, 2.5)
     assert run.summary.interrupted == (code != DONE)
     assert run.report()["config"] == unrecorded.config
+
+
+TINY = {"num_robots": 4, "num_windows": 3, "range_ratio": 2.0}
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Small pictures, of which there are few."""
+    for suffix in (".mp4", ".gif"):
+        monkeypatch.setitem(style.DEFAULTS, suffix, VideoStyle(width=320, height=200, fps=4))
+
+
+@pytest.mark.usefixtures("opengl", "small")
+@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
+def test_a_flight_is_saved_as_a_video(tmp_path, suffix):
+    run = swarm_mj.fly("stationary", policy="tdma", **TINY)
+    path = run.save(tmp_path / f"a{suffix}")
+    header = {".mp4": (4, b"ftyp"), ".gif": (0, b"GIF89a")}
+    at, magic = header[suffix]
+    assert path.read_bytes()[at:].startswith(magic)
+
+
+@pytest.mark.usefixtures("opengl", "small")
+def test_a_notebook_plays_it(monkeypatch):
+    shown = []
+    shell = SimpleNamespace(kernel=None)
+    display = SimpleNamespace(
+        Video=lambda **video: SimpleNamespace(**video), display=lambda video: shown.append(video)
+    )
+    ipython = SimpleNamespace(get_ipython=lambda: shell, display=display)
+    monkeypatch.setitem(sys.modules, "IPython", ipython)
+    monkeypatch.setitem(sys.modules, "IPython.display", display)
+    swarm_mj.fly("stationary", policy="tdma", **TINY).show()
+    (video,) = shown
+    assert video.data[4:8] == b"ftyp"  # as every MP4 begins
+    assert video.embed is True
+    assert video.mimetype == "video/mp4"
+
+
+def test_elsewhere_nothing_opens(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: None))
+    swarm_mj.fly("stationary", policy="tdma", record=False, **TINY).show()
+    assert "run.save('flight.mp4') writes the video" in capsys.readouterr().out
+
+
+def test_what_was_not_recorded_cannot_be_shown(monkeypatch):
+    monkeypatch.setattr("swarm_mj.api.run.is_notebook", lambda: True)
+    run = swarm_mj.fly("stationary", policy="tdma", record=False, **TINY)
+    with pytest.raises(ValueError, match="fly with record=True"):
+        run.show()
