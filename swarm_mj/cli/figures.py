@@ -75,22 +75,21 @@ def run(options: FiguresOptions) -> int:
 
 
 def _papers(path: Path) -> list[Result]:
-    """Return a file's results; raise ValueError for those not comparable with the paper's."""
+    """Read a file's results; raise ValueError for those that the paper's values do not fit."""
     results = read_results(path)
     for row, result in enumerate(results, start=1):
-        known = result.prior_knowledge
-        added = components_in(vars(result)).names | {
+        beyond = {
+            **components_in(vars(result)).names,
             "radio": result.radio,
-            "arena": None if result.arena == OPEN else result.arena,
-            "prior knowledge": None if known == NOTHING else known,
+            "arena": result.arena if result.arena != OPEN else "",
+            "prior knowledge": result.prior_knowledge if result.prior_knowledge != NOTHING else "",
         }
-        for kind, name in added.items():
-            if name:
-                raise ValueError(
-                    f"figures compare with the paper's values, but row {row} of {path} was flown "
-                    f"with the {kind} {name}; leave such rows out, or chart them with "
-                    f"`swarm_mj.evaluate(...).plot()` in Python"
-                )
+        for kind, name in ((kind, name) for kind, name in beyond.items() if name):
+            raise ValueError(
+                f"figures compare with the paper's values, but row {row} of {path} was flown with "
+                f"the {kind} {name}; leave such rows out, or chart them with "
+                f"`swarm_mj.evaluate(...).plot()` in Python"
+            )
     return results
 
 

@@ -77,29 +77,27 @@ def blocked():
     return record("random-flooding", 0.2, arena="blocks", shadowing_db=6.0, **walk)
 
 
+def written(recorded, folder, **config):
+    path = folder.mktemp("replays") / "mission.rrd"
+    write_replay(recorded.log, recorded.mission, {"seed": 5, **config}, path)
+    return path
+
+
 @pytest.fixture(scope="session")
 def replay(two_way, tmp_path_factory):
-    path = tmp_path_factory.mktemp("replays") / "mission.rrd"
-    write_replay(two_way.log, two_way.mission, {"seed": 5, "policy": "mst", "ratio": 0.25}, path)
-    return path
+    return written(two_way, tmp_path_factory, policy="mst", ratio=0.25)
 
 
 @pytest.fixture(scope="session")
 def flood_replay(flooded, tmp_path_factory):
-    path = tmp_path_factory.mktemp("replays") / "flood.rrd"
-    write_replay(flooded.log, flooded.mission, {"seed": 5}, path)
-    return path
+    return written(flooded, tmp_path_factory)
 
 
 @pytest.fixture(scope="session")
 def blocked_replay(blocked, tmp_path_factory):
-    path = tmp_path_factory.mktemp("replays") / "blocked.rrd"
-    write_replay(blocked.log, blocked.mission, {"seed": 5}, path)
-    return path
+    return written(blocked, tmp_path_factory)
 
 
 @pytest.fixture(scope="session")
 def still_replay(still, tmp_path_factory):
-    path = tmp_path_factory.mktemp("replays") / "still.rrd"
-    write_replay(still.log, still.mission, {"seed": 5}, path)
-    return path
+    return written(still, tmp_path_factory)

@@ -128,18 +128,13 @@ def moved(log, *, by_m):
     return replace(log, position_m=log.position_m + drift)
 
 
-def test_a_team_that_stays_is_shown_with_the_area(two_way):
-    half_side_m = two_way.mission.half_side_m
-    assert np.max(np.abs(two_way.log.position_m)) <= half_side_m  # the boundary reflects
-    shown = frame(two_way.log.position_m, half_side_m)
-    assert shown.reach_m == half_side_m
-    assert not shown.moves
-
-
-def test_a_team_that_leaves_the_area_a_little_is_shown_with_it(two_way):
-    log = moved(two_way.log, by_m=(0.0, 100.0))
-    shown = frame(log.position_m, two_way.mission.half_side_m)
-    assert shown.reach_m == np.max(np.abs(log.position_m)) > two_way.mission.half_side_m
+@pytest.mark.parametrize("by_m", [0.0, 100.0])
+def test_a_team_that_leaves_the_area_a_little_or_not_is_shown_with_it(two_way, by_m):
+    """Its mission's boundary reflects."""
+    log, half_side_m = moved(two_way.log, by_m=(0.0, by_m)), two_way.mission.half_side_m
+    shown = frame(log.position_m, half_side_m)
+    assert shown.reach_m == max(half_side_m, np.max(np.abs(log.position_m)))
+    assert (shown.reach_m > half_side_m) == (by_m > 0.0)
     assert not shown.moves
 
 

@@ -14,6 +14,8 @@ ADDRESSED = {"delivered", "lost", "answered", "overheard"}
 BROADCAST = {"transmits", "is heard by"}
 ALWAYS = {"radio range", "r4's tree"}
 MOVING = {"heading", "r4's belief"}
+BEYOND = MOVING | {"r4's tree", "range in\nfree space"}  # of free space
+MISMATCH = {"believed,\ntoo weak", "works,\nunbelieved", "cut off\nfrom r4"}
 
 
 def labels(path):
@@ -30,29 +32,24 @@ def texts(path):
     return {str(text) for of in labels(path) for text in static(path, of, "Points2D:labels")}
 
 
-def test_of_addressed_packets(replay):
-    assert texts(replay) == ADDRESSED | ALWAYS | MOVING
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("replay", ADDRESSED | ALWAYS | MOVING),
+        ("flood_replay", BROADCAST | ALWAYS | MOVING),
+        ("still_replay", ADDRESSED | ALWAYS),
+        ("blocked_replay", BROADCAST | BEYOND | MISMATCH),
+    ],
+)
+def test_all_that_is_shown_is_named(name, expected, request):
+    assert texts(request.getfixturevalue(name)) == expected
 
 
-def test_of_broadcasts(flood_replay):
-    assert texts(flood_replay) == BROADCAST | ALWAYS | MOVING
-
-
-def test_of_a_team_at_rest(still_replay):
-    assert texts(still_replay) == ADDRESSED | ALWAYS
-
-
-def test_beyond_free_space(blocked_replay):
-    surprising = {"believed,\ntoo weak", "works,\nunbelieved", "cut off\nfrom r4"}
-    others = MOVING | {"r4's tree", "range in\nfree space"}
-    assert texts(blocked_replay) == BROADCAST | others | surprising
-
-
-def test_nothing_surprises_where_packets_only_fade(blocked, tmp_path):
+def test_no_mismatch_is_named_where_packets_only_fade(blocked, tmp_path):
     none = blocked.log.mismatch.chosen(np.s_[:0])
     log = replace(blocked.log, mismatch=none, group=np.zeros_like(blocked.log.group))
     write_replay(log, blocked.mission, {"seed": 5}, tmp_path / "a.rrd")
-    assert texts(tmp_path / "a.rrd") == BROADCAST | MOVING | {"r4's tree", "range in\nfree space"}
+    assert texts(tmp_path / "a.rrd") == BROADCAST | BEYOND
 
 
 @pytest.mark.parametrize(

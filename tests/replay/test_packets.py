@@ -12,14 +12,16 @@ def per_window(recorded, fate):
     return np.bincount(recorded.log.packets[fate].row, minlength=len(recorded.log.window))
 
 
-@pytest.mark.parametrize("fate", ["delivered", "lost", "overheard", "answered"])
-def test_links_are_as_many_as_the_costs_count(two_way, fate):
-    np.testing.assert_array_equal(per_window(two_way, fate), two_way.counted(fate))
-
-
-def test_lines_of_broadcasts_are_as_many_as_the_receptions_that_the_costs_count(flooded):
-    assert list(flooded.log.packets) == ["heard"]  # no addressee, so no other fate
-    np.testing.assert_array_equal(per_window(flooded, "heard"), flooded.counted("receptions"))
+@pytest.mark.parametrize(
+    ("flight", "fate", "counted"),
+    [
+        *(("two_way", fate, fate) for fate in ("delivered", "lost", "overheard", "answered")),
+        ("flooded", "heard", "receptions"),
+    ],
+)
+def test_links_are_as_many_as_the_costs_count(flight, fate, counted, request):
+    recorded = request.getfixturevalue(flight)
+    np.testing.assert_array_equal(per_window(recorded, fate), recorded.counted(counted))
 
 
 def test_a_broadcast_leads_to_each_robot_that_decoded_it(flooded):

@@ -116,16 +116,6 @@ def test_what_is_kept_does_not_keep_what_is_not():
         assert not isinstance(kept, np.ndarray) or kept.base is None, name
 
 
-def test_it_knows_how_much_it_holds():
-    swarm = Swarm(paper("stationary", num_robots=6, num_windows=3), [0])
-    record = Recorder(swarm)
-    assert record.num_bytes == 0
-    for window in rollout(swarm, make_policy("round-robin", swarm.mission)):
-        record.add(window)
-    kept = [*record._age, *(value for row in record._rows for value in row.values())]
-    assert record.num_bytes == sum(each.nbytes for each in kept)
-
-
 def test_an_unknown_robot_is_as_old_as_the_mission():
     log, _ = flown_log()
     first = log.ego_age[0]

@@ -10,37 +10,14 @@ from rerun.chunk import RrdReader
 from swarm_mj.replay.read import check_replay, windows
 from swarm_mj.replay.write import write_replay
 
-ENTITIES = {
-    "/arena/robots",
-    "/arena/heading",
-    "/arena/trail",
-    "/arena/ego",
-    "/arena/area/walls",
-    "/arena/belief/ring",
-    "/arena/belief/error",
-    "/arena/tree",
-    "/arena/radio/delivered",
-    "/arena/radio/lost",
-    "/arena/radio/answered",
-    "/arena/radio/unanswered",
-    "/arena/radio/overheard",
-    "/arena/radio/range",
-    "/legend/ramp",
-    "/tree/nodes",
-    "/tree/edges",
-    "/ages",
-    "/plots/age/mean",
-    "/plots/age/ego",
-    "/plots/task/cost",
-    "/plots/radio/delivered",
-    "/state/r000",
-    "/about",
-}
+
+def entities(path):
+    """What a replay shows."""
+    return {chunk.entity_path for chunk in RrdReader(path).stream()}
 
 
-def test_all_layers_are_there(replay):
-    found = {chunk.entity_path for chunk in RrdReader(replay).stream()}
-    assert found >= ENTITIES
+def test_what_has_no_layer_is_there(replay):
+    assert entities(replay) >= {"/legend/ramp", "/ages", "/plots/age/ego", "/state/r000", "/about"}
 
 
 def test_the_config_is_kept_as_properties(replay):
@@ -87,11 +64,6 @@ def test_a_failure_while_writing_leaves_nothing(two_way, tmp_path, monkeypatch):
     with pytest.raises(OSError, match="no space left"):
         write_replay(two_way.log, two_way.mission, {"seed": 1}, tmp_path / "mission.rrd")
     assert list(tmp_path.iterdir()) == []
-
-
-def entities(path):
-    """What a replay shows."""
-    return {chunk.entity_path for chunk in RrdReader(path).stream()}
 
 
 def test_a_broadcast_has_no_arrow_and_no_verdict(flood_replay):

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from PIL import ImageDraw
 
 from swarm_mj.mission import paper
@@ -46,6 +47,13 @@ def footage(age_mean, *, is_broadcast=False):
     )
 
 
+def drawn(draw, *arguments):
+    """A dark picture of 400 by 160 pixels after something was drawn on it."""
+    picture = blank(400, 160)
+    draw(ImageDraw.Draw(picture), *arguments)
+    return picture
+
+
 def has(picture, colour, tolerance=6):
     return np.abs(np.asarray(picture).astype(int) - colour).max(axis=2) <= tolerance
 
@@ -54,9 +62,7 @@ def test_a_constant_age_is_a_line_at_its_height():
     """10 of an axis to 10 is on top, 0 at the bottom."""
     heights = []
     for age in (10.0, 5.0, 0.001):
-        picture = blank(400, 160)
-        plot = AgePlot([footage([age] * 5 + [10.0])], BOX, 10)
-        plot.draw_until(ImageDraw.Draw(picture), [4])
+        picture = drawn(AgePlot([footage([age] * 5 + [10.0])], BOX, 10).draw_until, [4])
         rows, _ = np.nonzero(has(picture, palette.MEAN_AGE, 40))
         heights.append(np.median(rows))
     top, middle, bottom = heights
@@ -67,10 +73,8 @@ def test_a_constant_age_is_a_line_at_its_height():
 def test_the_legend_names_what_is_drawn_only():
     samples = {}
     for is_broadcast in (True, False):
-        picture = blank(400, 160)
         seen = footage([1.0], is_broadcast=is_broadcast)
-        draw_legend(ImageDraw.Draw(picture), [seen], 10.0, BOX, 12)
-        samples[is_broadcast] = picture
+        picture = samples[is_broadcast] = drawn(draw_legend, [seen], 10.0, BOX, 12)
         assert np.any(has(picture, palette.UNKNOWN))
         assert np.any(has(picture, (253, 231, 37)))  # the ramp's fresh end
     assert np.any(has(samples[False], palette.LOST))
@@ -96,8 +100,7 @@ def with_one_too_weak(seen):
 def test_the_legend_names_links_that_surprise_if_there_are_any():
     found = []
     for seen in (footage([1.0]), with_one_too_weak(footage([1.0]))):
-        picture = blank(400, 160)
-        draw_legend(ImageDraw.Draw(picture), [seen], 10.0, BOX, 12)
+        picture = drawn(draw_legend, [seen], 10.0, BOX, 12)
         colours = (palette.MISMATCH["too_weak"], palette.CUT_OFF, palette.MISMATCH["unbelieved"])
         found.append([bool(np.any(has(picture, colour, 0))) for colour in colours])
     assert found == [[False] * 3, [True, True, False]]
@@ -108,8 +111,7 @@ def test_the_plot_has_columns_for_who_is_cut_off():
     red = palette.dim(palette.CUT_OFF, SHADE)
     heights = []
     for seen in (footage([10.0] * 5), with_one_too_weak(footage([10.0] * 5))):
-        picture = blank(400, 160)
-        AgePlot([seen], BOX, 10).draw_axes(ImageDraw.Draw(picture))
+        picture = drawn(AgePlot([seen], BOX, 10).draw_axes)
         heights.append(np.sum(np.any(has(picture, red, 0), axis=1)))
     none, whole = heights
     assert none == 0
@@ -119,22 +121,20 @@ def test_the_plot_has_columns_for_who_is_cut_off():
 
 def said(robots, others):
     """Where red texts are after shortfalls were drawn: rows and columns."""
-    picture = blank(400, 160)
     margin_db = -np.arange(3, 3 + len(others), dtype=np.int16)
     numbers = np.array(others, dtype=np.int16), margin_db
-    draw_shortfalls(ImageDraw.Draw(picture), np.array(robots), *numbers, 12)
+    picture = drawn(draw_shortfalls, np.array(robots), *numbers, 12)
     return np.nonzero(has(picture, palette.TOO_WEAK, 60))
 
 
-def test_a_shortfall_is_said_beside_the_robot_at_the_far_end():
-    rows, columns = said([[300.0, 90.0], [50.0, 50.0]], [1])
-    assert 55 < columns.min() <= columns.max() < 100
-    assert abs(np.mean(rows) - 50.0) < 3.0
-
-
-def test_a_shortfall_covers_no_other_robot_if_it_can():
-    rows, columns = said([[300.0, 90.0], [150.0, 50.0], [175.0, 50.0]], [1])
-    assert columns.max() < 145
+@pytest.mark.parametrize(
+    ("robots", "low", "high"),
+    [([[300, 90], [50, 50]], 55, 100), ([[300, 90], [150, 50], [175, 50]], 50, 145)],
+)
+def test_a_shortfall_stands_next_to_the_far_robot_and_covers_no_other(robots, low, high):
+    """To the right of robot 1, or to its left if there is another robot."""
+    rows, columns = said(np.array(robots, dtype=float), [1])
+    assert low < columns.min() <= columns.max() < high
     assert abs(np.mean(rows) - 50.0) < 3.0
 
 
@@ -158,17 +158,14 @@ def test_a_shortfall_stands_on_dark_ground():
 def test_the_title_counts_who_is_cut_off():
     is_red = []
     for seen in (footage([1.0]), with_one_too_weak(footage([1.0]))):
-        picture = blank(400, 160)
-        draw_title(ImageDraw.Draw(picture), seen, 0, Box(0, 0, 400, 160), 12, (0, 255, 0))
+        picture = drawn(draw_title, seen, 0, Box(0, 0, 400, 160), 12, (0, 255, 0))
         is_red.append(bool(np.any(has(picture, palette.TOO_WEAK, 20))))
     assert is_red == [False, True]
 
 
 def test_the_title_stays_in_its_part_of_the_picture():
-    picture = blank(400, 160)
-    draw_title(
-        ImageDraw.Draw(picture), footage([1.0, 2.0]), 1, Box(100, 0, 400, 160), 12, (255, 0, 0)
-    )
+    box = Box(100, 0, 400, 160)
+    picture = drawn(draw_title, footage([1.0, 2.0]), 1, box, 12, (255, 0, 0))
     pixels = np.asarray(picture)
     assert np.all(pixels[:, :100] == palette.BACKGROUND)
     assert np.any(has(picture, palette.TEXT))
@@ -178,9 +175,9 @@ def test_the_title_stays_in_its_part_of_the_picture():
 def test_a_title_has_a_line_for_each_part_of_ones_own():
     lowest = []
     for parts in ({}, {"channel": "my:Radio"}, {"channel": "my:Radio", "scene": "my:walls"}):
-        picture, seen = blank(400, 160), footage([1.0])
+        seen = footage([1.0])
         seen = replace(seen, facts=replace(seen.facts, **parts))
-        draw_title(ImageDraw.Draw(picture), seen, 0, Box(0, 0, 400, 160), 12, (255, 0, 0))
+        picture = drawn(draw_title, seen, 0, Box(0, 0, 400, 160), 12, (255, 0, 0))
         rows, _ = np.nonzero(~has(picture, palette.BACKGROUND))
         lowest.append(rows.max())
     assert np.all(np.diff(lowest) >= 8)
