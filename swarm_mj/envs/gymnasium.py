@@ -1,4 +1,4 @@
-"""The Gymnasium face: a team under one controller, whose action is whom each robot addresses."""
+"""The Gymnasium face: a team under one controller, whose action is everyone's recipient."""
 
 from typing import Any
 
@@ -24,18 +24,9 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
     metadata = RENDERING
 
     def __init__(
-        self,
-        mission: Mission | str = "flocking",
-        *,
-        render_mode: str | None = None,
-        **options: Any,
+        self, mission: Mission | str = "flocking", *, render_mode: str | None = None, **options: Any
     ) -> None:
-        """Take a mission or its task, and options of `make_batch`, such as fields of `Mission`.
-
-        Raises:
-            ValueError: A value is unknown or out of range.
-            TypeError: An option is unknown.
-        """
+        """Take a mission or its task, and options of `make_batch`; raises as that does."""
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
         self.batch = make_batch(mission, **options)
         check_team_reward(self.batch)
@@ -53,45 +44,34 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         """
         check_reset(options or {})
         super().reset(seed=seed, options=options)
-        begun = next_seed(self.np_random) if seed is None else seed
-        self.batch.restart([begun])
-        self._screen.update(self.batch)
-        return self._observation(), self._info()
+        self.batch.restart([next_seed(self.np_random) if seed is None else seed])
+        return self._seen()
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, Info]:
         """Fly one window; `action[i]` is whom robot i addresses, itself for silence.
-
-        Returns:
-            What the robots see, the reward, False, whether the mission was cut off here, and what
-            the window cost.
 
         Raises:
             ValueError: The action is not one integer from 0 to N - 1 per robot, or the mission is
                 over.
         """
         reward = self.batch.step(np.asarray(action)[np.newaxis])
-        self._screen.update(self.batch)
-        is_over = self.batch.is_over
-        return self._observation(), float(reward[0, 0]), False, is_over, self._info()
+        observation, info = self._seen()
+        return observation, float(reward[0, 0]), False, self.batch.is_over, info
 
     def action_masks(self) -> Bool[np.ndarray, "A"]:
         """Return where an action may help, robot by robot, in the form of `MaskablePPO`."""
         return self.batch.observation["action_mask"].ravel().astype(np.bool_)
 
     def render(self) -> UInt8[np.ndarray, "H W 3"] | None:
-        """Return the mission as it is now, in the render mode "rgb_array".
-
-        Raises:
-            OSError: No OpenGL works here; it says what to install.
-        """
-        return self._screen.picture(self.batch) if self.render_mode == "rgb_array" else None
+        """Draw the mission as it is now, in the mode "rgb_array"; raises OSError without OpenGL."""
+        return self._screen.picture(self.batch)
 
     def close(self) -> None:
         """Give back what pictures took."""
         self._screen.close()
 
-    def _info(self) -> Info:
-        return {name: values[0].item() for name, values in self.batch.infos().items()}
-
-    def _observation(self) -> Observation:
-        return {name: values[0] for name, values in self.batch.observation.items()}
+    def _seen(self) -> tuple[Observation, Info]:
+        """Show the present state, and return its view and info."""
+        self._screen.update(self.batch)
+        info = {name: values[0].item() for name, values in self.batch.infos().items()}
+        return {name: values[0] for name, values in self.batch.observation.items()}, info

@@ -136,14 +136,15 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         Raises:
             OSError: No OpenGL works here; it says what to install.
         """
-        if self.render_mode != "rgb_array":
+        if self.render_mode is None:
             return None
         places = {
             int(env): (group.batch, int(row))
             for group in self._groups
             for row, env in zip(group.rows, group.envs, strict=True)
         }
-        return tuple(self._screen.picture(*places[env]) for env in range(self.num_envs))
+        pictures = (self._screen.picture(*places[env]) for env in range(self.num_envs))
+        return tuple(each for each in pictures if each is not None)
 
     def close_extras(self, **_: Any) -> None:
         """Give back what pictures took."""

@@ -35,39 +35,32 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
     metadata = METADATA
 
     def __init__(
-        self,
-        mission: Mission | str = "flocking",
-        *,
-        render_mode: str | None = None,
-        **options: Any,
+        self, mission: Mission | str = "flocking", *, render_mode: str | None = None, **options: Any
     ) -> None:
-        """Take a mission or its task, and options of `make_batch`, such as fields of `Mission`.
-
-        Raises:
-            ValueError: A value is unknown or out of range.
-            TypeError: An option is unknown.
-        """
+        """Take a mission or its task, and options of `make_batch`; raises as that does."""
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
         self.batch = make_batch(mission, **options)
         self._screen = Screen(render_mode)
         self.render_mode = render_mode
         self.possible_agents = [f"robot_{i}" for i in range(self.batch.mission.num_robots)]
         self.agents: list[str] = []
+        self._robot = {agent: i for i, agent in enumerate(self.possible_agents)}
+        # One object for each agent: PettingZoo seeds them one by one.
         self._spaces = {agent: robot_spaces(self.batch) for agent in self.possible_agents}
         self._rng, _ = seeding.np_random()
 
     def observation_space(self, agent: str) -> Space[Any]:
-        """What an agent sees; see `robot_spaces`."""
+        """Return an agent's view; see `robot_spaces`."""
         return self._spaces[agent][0]
 
     def action_space(self, agent: str) -> Space[Any]:
-        """Whom an agent addresses; its own number is silence."""
+        """Return an agent's recipients; its own number is silence."""
         return self._spaces[agent][1]
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, Info]]:
-        """Begins a mission; every agent's info has its seed. Options are ignored.
+        """Begin a mission; every agent's info has its seed. Options are ignored.
 
         Raises:
             ValueError: No connected team could be drawn.
@@ -75,8 +68,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         del options
         if seed is not None:
             self._rng, _ = seeding.np_random(seed)
-        begun = next_seed(self._rng) if seed is None else seed
-        self.batch.restart([begun])
+        self.batch.restart([next_seed(self._rng) if seed is None else seed])
         self._screen.update(self.batch)
         self.agents = list(self.possible_agents)
         return self._observations(), self._infos()
@@ -84,19 +76,12 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
     def step(
         self, actions: dict[str, Action]
     ) -> tuple[
-        dict[str, Observation],
-        dict[str, float],
-        dict[str, bool],
-        dict[str, bool],
-        dict[str, Info],
+        dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, Info]
     ]:
-        """One window, in which each agent addresses a robot.
+        """Fly one window, in which each agent addresses a robot.
 
         An agent without an action is silent, and so is one that has dropped out whatever it does.
-
-        Returns:
-            By agent: what it sees, its reward, whether it was switched off, whether the mission was
-            cut off, and what the window cost the team. Nothing if nobody is left.
+        Its team's costs are in everyone's info. Nothing is returned if nobody is left.
 
         Raises:
             ValueError: There is no such agent, or an action is no robot; nothing has moved.
@@ -105,38 +90,33 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         for agent, action in actions.items():
             self._check_action(agent, action)
             if agent in self.agents:
-                chosen[self._robot(agent)] = np.squeeze(action)  # some wrap it
+                chosen[self._robot[agent]] = np.squeeze(action)  # some wrap it
         if not self.agents:
             return {}, {}, {}, {}, {}
         recipient = np.array([chosen])
-        check_robots("action", recipient, self.batch.flown.buffers.shape)
+        check_robots("action", recipient, self.batch.shape)
         reward = self.batch.step(recipient)[0]
         self._screen.update(self.batch)
         is_active, is_over = self.batch.is_active[0], self.batch.is_over
-        seen = self._observations()
-        rewards = {agent: float(reward[self._robot(agent)]) for agent in self.agents}
-        ended = {agent: not is_active[self._robot(agent)] for agent in self.agents}
+        seen, infos = self._observations(), self._infos()
+        rewards = {agent: float(reward[self._robot[agent]]) for agent in self.agents}
+        ended = {agent: not is_active[self._robot[agent]] for agent in self.agents}
         cut = dict.fromkeys(self.agents, is_over)
-        infos = self._infos()
         self.agents = [] if is_over else [agent for agent in self.agents if not ended[agent]]
         return seen, rewards, ended, cut, infos
 
     def render(self) -> UInt8[np.ndarray, "H W 3"] | None:
-        """Return the mission as it is now, in the render mode "rgb_array".
-
-        Raises:
-            OSError: No OpenGL works here; it says what to install.
-        """
-        return self._screen.picture(self.batch) if self.render_mode == "rgb_array" else None
+        """Draw the mission as it is now, in the mode "rgb_array"; raises OSError without OpenGL."""
+        return self._screen.picture(self.batch)
 
     def close(self) -> None:
         """Give back what pictures took."""
         self._screen.close()
 
     def _check_action(self, agent: str, action: object) -> None:
-        """Raise ValueError for who is no agent, and for what is no action."""
+        """Raise ValueError for unknown agents and missing actions."""
         names = self.possible_agents
-        if agent not in names:
+        if agent not in self._robot:
             raise ValueError(
                 f"agents are {names[0]} to {names[-1]}, not {agent!r:.80}; leave it out"
             )
@@ -146,23 +126,18 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
                 "own for silence, not None"
             )
 
-    def _robot(self, agent: str) -> int:
-        return int(agent.removeprefix("robot_"))
-
     def _infos(self) -> dict[str, Info]:
-        """The same for every agent: the mission's seed, and what the window cost the team."""
         info = {name: values[0].item() for name, values in self.batch.infos().items()}
         return {agent: dict(info) for agent in self.agents}
 
     def _observations(self) -> dict[str, Observation]:
-        """What each agent sees."""
         seen = self.batch.observation
         return {
-            agent: {name: values[0, self._robot(agent)] for name, values in seen.items()}
+            agent: {name: values[0, self._robot[agent]] for name, values in seen.items()}
             for agent in self.agents
         }
 
 
 def parallel_env(mission: Mission | str = "flocking", **options: Any) -> SwarmParallelEnv:
-    """A mission as PettingZoo's `ParallelEnv`, by the name that is usual there; see the class."""
+    """Return a mission as PettingZoo's `ParallelEnv`, by the usual name; see the class."""
     return SwarmParallelEnv(mission, **options)

@@ -20,50 +20,46 @@ WIDTH, HEIGHT = 800, 600  # of a picture [pixels]
 
 
 class Screen:
-    """Shows missions as MuJoCo draws them: robots coloured by their age, and packets as arcs.
+    """Missions as MuJoCo draws them: robots coloured by their age, and packets as arcs.
 
-    In the mode "rgb_array" there are pictures for whoever asks; in "human" a window shows every
-    window of the mission, not faster than it would last. Either starts when it is needed.
+    The mode "rgb_array" gives pictures on request; "human" shows every window of the mission, not
+    faster than it would last. Either starts when it is needed.
     """
 
     def __init__(self, mode: str | None, modes: Sequence[str] = MODES) -> None:
-        """Take a render mode, one of these, or None, in which nothing is seen.
-
-        Raises:
-            ValueError: There is no such mode.
-        """
+        """Take a render mode, or None for no pictures; raises ValueError for an unknown one."""
         if mode is not None and mode not in modes:
             raise ValueError(f"render_mode must be one of {', '.join(modes)}, not {mode!r}")
-        self._mode = mode
+        self.mode = mode
         self._renderer: SceneRenderer | None = None
         self._viewer: SceneViewer | None = None
         self._shown_s = 0.0
 
     def update(self, batch: MissionBatch) -> None:
-        """Show the team's first mission to a human, if one looks on.
+        """Show the first mission in a window, in the mode "human".
 
         Raises:
             OSError: There is no display.
         """
-        if self._mode != "human":
+        if self.mode != "human":
             return
-        if self._viewer is None:
-            from swarm_mj.replay.rendering.viewer import (
-                SceneViewer,  # looks for a display when imported
-            )
+        if self._viewer is None:  # its module looks for a display when imported
+            from swarm_mj.replay.rendering.viewer import SceneViewer
 
             self._viewer = SceneViewer(batch.mission, scene=batch.flown.scene)
         self._viewer.show(contents_of(batch.flown))
         time.sleep(max(0.0, self._shown_s + batch.mission.window_s - time.monotonic()))
         self._shown_s = time.monotonic()
 
-    def picture(self, batch: MissionBatch, index: int = 0) -> UInt8[np.ndarray, "H W 3"]:
-        """One of a team's missions as it is now, RGB.
+    def picture(self, batch: MissionBatch, index: int = 0) -> UInt8[np.ndarray, "H W 3"] | None:
+        """Draw one of the missions as it is now, in the mode "rgb_array".
 
         Raises:
             ValueError: It has not begun.
             OSError: No OpenGL works here; it says what to install.
         """
+        if self.mode != "rgb_array":
+            return None
         contents = contents_of(batch.flown, index)
         if self._renderer is None:
             self._renderer = SceneRenderer(batch.mission, WIDTH, HEIGHT, scene=batch.flown.scene)

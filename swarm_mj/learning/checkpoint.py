@@ -123,7 +123,15 @@ def load(
         ValueError: The file is damaged, foreign, of another version or of other settings.
         OSError: The file cannot be read.
     """
-    state = _read(path, _max_bytes(model))
+    state = read_torch(path, _max_bytes(model))
+    version = state.get("version") if isinstance(state, dict) else None
+    if not isinstance(version, int):
+        raise ValueError(f"{path} is no checkpoint of swarm-mj train")
+    if version != CHECKPOINT_VERSION:
+        raise ValueError(
+            f"checkpoint {path} has version {version!r:.40}, and this swarm_mj reads "
+            f"{CHECKPOINT_VERSION}; resume with the version that wrote it"
+        )
     try:
         if read_json(state["training"], Training) != training:
             raise ValueError("it was made with other settings than the run's")
@@ -211,11 +219,13 @@ def _max_bytes(model: PPO) -> int:
     return 2 * (weights + np.dtype(np.int16).itemsize * decisions) + SPARE_BYTES
 
 
-def _read(path: Path, max_bytes: int) -> dict[str, Any]:
+def read_torch(path: Path, max_bytes: int) -> Any:  # noqa: ANN401 - whatever was saved
     """Return what a file of torch holds, without running code from it.
 
     Raises:
-        ValueError: It is no whole checkpoint of this version.
+        ValueError: There is no such file, or it is too large, damaged or foreign, or its folder's
+            link leads elsewhere.
+        OSError: It cannot be read.
     """
     content = io.BytesIO(read_file(path, "checkpoint", max_bytes, folder=path.parent))
     try:
@@ -225,20 +235,11 @@ def _read(path: Path, max_bytes: int) -> dict[str, Any]:
             if not is_plain or archive.testzip() is not None:
                 raise zipfile.BadZipFile
         content.seek(0)
-        state = torch.load(content, map_location="cpu", weights_only=True)
+        return torch.load(content, map_location="cpu", weights_only=True)
     except Exception as error:  # torch names no exception of its own for damaged files
         raise ValueError(
             f"checkpoint {path} is damaged, or none; begin a new run with another --out"
         ) from error
-    version = state.get("version") if isinstance(state, dict) else None
-    if not isinstance(version, int):
-        raise ValueError(f"{path} is no checkpoint of swarm-mj train")
-    if version != CHECKPOINT_VERSION:
-        raise ValueError(
-            f"checkpoint {path} has version {version!r:.40}, and this swarm_mj reads "
-            f"{CHECKPOINT_VERSION}; resume with the version that wrote it"
-        )
-    return state
 
 
 def _restore(

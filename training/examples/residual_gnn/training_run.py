@@ -21,7 +21,7 @@ from residual_gnn.ppo import PpoSettings, improve
 from residual_gnn.recording import Recorder, TrainingBatch, collect_batch
 from residual_gnn.rule import RestingRule
 from residual_gnn.torch_network import ResidualNetwork
-from swarm_mj.learning.torch_file import read_torch
+from swarm_mj.learning.checkpoint import read_torch
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 from swarm_mj.radio.mission_radio import radio_of
