@@ -1,14 +1,14 @@
-"""Users' own parts, by name: what is loaded, how it is called, and what is said if it cannot be."""
+"""Users' components, by name: what is loaded, how it is called, and errors in one line."""
 
 import json
 import sys
-import textwrap
 
 import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.mission.components import (
     Components,
+    components_in,
     digest,
     is_ours,
     load,
@@ -18,9 +18,8 @@ from swarm_mj.mission.components import (
 
 MISSION = paper(num_robots=3)
 PARTS = '''
-"""Parts."""
-
 import json
+from functools import partial
 
 class Needs:
     def __init__(self, mission):
@@ -54,8 +53,6 @@ def breaks(mission):
 def breaks_later(position_m, recipient):
     raise KeyError("lost")
 
-from functools import partial
-
 def given_mission_last(probability, mission):
     made = Needs(mission)
     made.probability = probability
@@ -68,13 +65,22 @@ by_place, by_name = partial(given_mission_last, 0.1), partial(given_mission_last
 of_a_class = partial(Needless, 0.5)
 near = partial(within, range_m=9.0)
 '''
+MODULES = {
+    "own_parts": PARTS,
+    "own_broken": "x = 1\ndef (:\n",
+    "own_needy": "import nowhere_at_all\n",
+    "own_quitter": "raise SystemExit(3)\n",
+    "own_inner": "def late(position_m, recipient):\n    raise KeyError(1)\n",
+    "own_outer": "from own_inner import late\n",
+}
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def parts(here):
-    """A module `own_parts` in the current folder."""
+    """Modules `own_...` in the current folder."""
     path, modules = list(sys.path), set(sys.modules)
-    (here / "own_parts.py").write_text(textwrap.dedent(PARTS))
+    for name, text in MODULES.items():
+        (here / f"{name}.py").write_text(text)
     yield here
     sys.path[:] = path
     for name in set(sys.modules) - modules:
@@ -82,28 +88,48 @@ def parts(here):
             del sys.modules[name]
 
 
-@pytest.mark.parametrize("name", ["Needs", "MayTake", "maker"])
-@pytest.mark.usefixtures("parts")
-def test_what_takes_a_mission_is_given_it(name):
-    assert make("controller", f"own_parts:{name}", MISSION).num_robots == 3
+@pytest.mark.parametrize(
+    ("name", "made_with"),
+    [
+        ("Needs", {"num_robots": 3}),
+        ("MayTake", {"num_robots": 3}),
+        ("maker", {"num_robots": 3}),
+        ("Needless", {"probability": 0.25}),
+        ("of_a_class", {"probability": 0.5}),
+        ("by_place", {"num_robots": 3, "probability": 0.1}),
+        ("by_name", {"num_robots": 3, "probability": 0.1}),
+    ],
+)
+def test_what_takes_a_mission_is_given_it(name, made_with):
+    made = make("controller", f"own_parts:{name}", MISSION)
+    assert {key: getattr(made, key) for key in made_with} == made_with
 
 
-@pytest.mark.usefixtures("parts")
-def test_what_needs_nothing_is_given_nothing():
-    assert make("policy", "own_parts:Needless", MISSION).probability == 0.25
-
-
-@pytest.mark.parametrize("name", ["plain", "an_object"])
-@pytest.mark.usefixtures("parts")
-def test_what_takes_two_arguments_is_the_part_itself(name):
+@pytest.mark.parametrize("name", ["plain", "an_object", "near"])
+def test_what_takes_two_arguments_is_the_component_itself(name):
     found = make("channel", f"own_parts:{name}", MISSION)
     assert found is getattr(sys.modules["own_parts"], name)
+    assert Components(channel=f"own_parts:{name}").made(MISSION).channel is found
 
 
-def test_a_part_of_the_package_can_be_named_too():
-    from swarm_mj.policies.tdma import Tdma
+@pytest.mark.parametrize("name", ["number", "maker"])
+def test_components_must_be_functions_or_like_them(name):
+    with pytest.raises(ValueError, match="must be a function of two arguments, or make an object"):
+        Components(channel=f"own_parts:{name}").made(MISSION)
+    assert callable(Components(channel="own_parts:Plain").made(MISSION).channel)
 
-    assert isinstance(make("policy", "swarm_mj.policies.tdma:Tdma", MISSION), Tdma)
+
+def test_names_are_those_typed_or_of_the_objects():
+    components = Components(channel="my:Radio", controller=json.dump, scene=json.JSONDecoder.decode)
+    names = {"channel": "my:Radio", "controller": "dump", "scene": "JSONDecoder.decode"}
+    assert components.names == names
+    assert components_in(names | {"seed": 3, "policy": "mst"}).given == names
+    assert components.title == ", channel my:Radio, controller dump, scene JSONDecoder.decode"
+
+
+def test_only_the_packages_own_components_get_live_arrays():
+    assert is_ours(make("policy", "swarm_mj.policies.tdma:Tdma", MISSION))
+    assert not is_ours(load("channel", "own_parts:plain"))
 
 
 @pytest.mark.parametrize("name", ["foo", "foo:", ":Foo", "a b:C", "a:b:c", "a/b:C", "a:B.c", ""])
@@ -121,65 +147,44 @@ def test_another_form_is_refused(name):
         ),
         ("own_parts.deeper:Needs", r"no module own_parts.deeper in"),
         ("own_parts:Need", r"own_parts.py has no Need; did you mean Needs\?"),
-        ("own_parts:breaks", r"raised AttributeError: .*no_such_field.* \(own_parts.py, line 33\)"),
+        ("own_parts:breaks", r"raised AttributeError: .*no_such_field.* \(own_parts.py, line 30\)"),
         ("own_broken:Any", r"importing it raised SyntaxError: .*own_broken.py, line 2"),
         (
             "own_needy:Any",
             r"raised ModuleNotFoundError: No module named 'nowhere_at_all' \(own_need",
         ),
         ("own_quitter:Any", r"importing it raised SystemExit: 3"),
+        ("csma:Csma(0.3)", r"`mine = functools.partial\(Csma, 0.3\)` into csma.py and name csma:m"),
+        ("csma:Csma()", r"`mine = functools.partial\(Csma\)` into csma.py"),
+        ("fading.py:Rayleigh", "channel fading.py:Rayleigh: leave out .py: fading:Rayleigh$"),
+        ("./sub/fading.py:Rayleigh", "leave out .py: sub.fading:Rayleigh$"),
     ],
 )
-def test_what_cannot_be_made_is_said_in_one_line(parts, name, complaint):
-    (parts / "own_broken.py").write_text("x = 1\ndef (:\n")
-    (parts / "own_needy.py").write_text("import nowhere_at_all\n")
-    (parts / "own_quitter.py").write_text("raise SystemExit(3)\n")
+def test_what_cannot_be_made_is_said_in_one_line(name, complaint):
     with pytest.raises(ValueError, match=complaint) as refused:
         make("channel", name, MISSION)
     assert str(refused.value).startswith(f"channel {name}")
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("name", ["number", "Plain", "maker"])
-@pytest.mark.usefixtures("parts")
-def test_parts_must_be_functions_or_like_them(name):
-    channel = Components(channel=f"own_parts:{name}")
-    if name == "Plain":  # its object is called
-        assert callable(channel.made(MISSION).channel)
-    else:
-        with pytest.raises(ValueError, match="must be a function of two arguments, or make an"):
-            channel.made(MISSION)
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("own_parts:breaks_later", "raised KeyError: 'lost'"),
+        ("own_outer:late", "raised KeyError: 1"),
+    ],
+)
+def test_errors_in_flight_name_the_component_even_of_a_module_behind_it(name, said):
+    late = make("channel", name, MISSION)
+    with pytest.raises(ValueError, match=f"^channel {name} {said}"), one_line_each():
+        late(None, None)
 
 
-@pytest.mark.usefixtures("parts")
-def test_what_a_part_raises_in_flight_names_it():
-    breaks = make("channel", "own_parts:breaks_later", MISSION)
-    with (
-        pytest.raises(ValueError, match=r"^channel own_parts:breaks_later raised KeyError: 'lost'"),
-        one_line_each(),
-    ):
-        breaks(None, None)
-
-
-def test_what_others_raise_is_left_alone():
-    with pytest.raises(KeyError), one_line_each():
-        raise KeyError("ours")
-
-
-@pytest.mark.usefixtures("parts")
-def test_what_a_part_was_made_with_is_no_part():
-    """An object of json's is named; what json raises elsewhere is left alone."""
+def test_errors_of_others_are_left_alone():
+    """An object of json's is named; what json raises elsewhere is not its fault."""
     load("channel", "own_parts:decoder")
     with pytest.raises(json.JSONDecodeError), one_line_each():
         json.loads("x")
-
-
-def test_a_part_that_the_module_took_from_another_of_ones_own(parts):
-    (parts / "own_inner.py").write_text("def late(position_m, recipient):\n    raise KeyError(1)\n")
-    (parts / "own_outer.py").write_text("from own_inner import late\n")
-    late = make("channel", "own_outer:late", MISSION)
-    with pytest.raises(ValueError, match="channel own_outer:late raised"), one_line_each():
-        late(None, None)
 
 
 def test_a_digest_changes_with_the_file(parts):
@@ -190,52 +195,11 @@ def test_a_digest_changes_with_the_file(parts):
     assert digest("own_parts:plain") != before
 
 
-@pytest.mark.parametrize("name", ["by_place", "by_name"])
-@pytest.mark.usefixtures("parts")
-def test_a_partial_function_is_given_the_mission_that_it_still_needs(name):
-    made = make("policy", f"own_parts:{name}", MISSION)
-    assert (made.num_robots, made.probability) == (3, 0.1)
-
-
-@pytest.mark.usefixtures("parts")
-def test_a_partial_class_is_made_and_a_partial_function_of_two_arguments_is_the_part():
-    assert make("policy", "own_parts:of_a_class", MISSION).probability == 0.5
-    near = make("channel", "own_parts:near", MISSION)
-    assert near is sys.modules["own_parts"].near
-
-
-@pytest.mark.parametrize(
-    ("name", "way_out"),
-    [
-        (
-            "csma:Csma(0.3)",
-            r"`mine = functools.partial\(Csma, 0.3\)` into csma.py and name csma:mine",
-        ),
-        ("csma:Csma()", r"`mine = functools.partial\(Csma\)` into csma.py"),
-        ("fading.py:Rayleigh", "channel fading.py:Rayleigh: leave out .py: fading:Rayleigh$"),
-        ("./sub/fading.py:Rayleigh", "leave out .py: sub.fading:Rayleigh$"),
-    ],
-)
-def test_other_forms_that_one_would_try_are_told_the_right_one(name, way_out):
-    with pytest.raises(ValueError, match=way_out):
-        load("channel", name)
-
-
-def test_only_the_packages_own_components_get_live_arrays(parts):  # noqa: ARG001
-    from swarm_mj.policies.tdma import Tdma
-
-    assert is_ours(Tdma())
-    assert not is_ours(load("channel", "own_parts:plain"))
-
-
 @pytest.mark.parametrize(
     ("component", "said"),
     [
         ({"controller": lambda states: states}, r"a controller is called with \(buffers, states\)"),
-        (
-            {"channel": lambda: 0},
-            r"a channel is called with \(position_m, recipient\), but .* \(\)",
-        ),
+        ({"channel": lambda: 0}, r"a channel is called with \(position_m, recipient\), but"),
         ({"scene": lambda _spec: None}, r"a scene is called with \(spec, mission\)"),
     ],
 )
