@@ -45,6 +45,11 @@ def learner(mission, settings=SHORT):
     return RestingPlanner(mission, settings, turns, learns=True)
 
 
+def rounded(field, values):
+    """Numbers as they arrive in a field of a packet."""
+    return field.low + field.step * field.codes(values)
+
+
 PLANNED = {}  # by exactly what plans follow from, which spares working them out for every robot
 
 
@@ -173,7 +178,7 @@ class LearningMind:
         of = fit(counts[1], counts[0], self.settings.learning)
         *_, mean, std = link_fields(self.mission)
         known = sum(self.told[i].slot if i in self.told else -1 for i in range(num_robots))
-        return Table((-known, self.me), of.law, mean.rounded(of.mean_db), std.rounded(of.std_db))
+        return Table((-known, self.me), of.law, rounded(mean, of.mean_db), rounded(std, of.std_db))
 
     def plan_for(self, position_m, slot):
         """When the plan began, who transmits from then on, and the powers it believes in."""

@@ -181,10 +181,8 @@ def _planning(mission: Mission) -> Callable[[], object]:
 
     def plan() -> object:
         snapshots = take_snapshots(
-            buffers.position_m[0],
-            buffers.velocity_mps[0],
-            buffers.timestamp[0],
-            buffers.is_known[0],
+            buffers,
+            0,
             now,
             mission.window_s,
             num_windows / 2.0,

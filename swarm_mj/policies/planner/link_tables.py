@@ -145,12 +145,9 @@ def _log_probabilities() -> tuple[Float[np.ndarray, "K F X"], Float[np.ndarray, 
 
 def _decodes(margin_db: Float[np.ndarray, "K X"]) -> Float[np.ndarray, "K F X"]:
     """Return how probably a packet decodes, by each law."""
-    ratios = (10.0 ** (margin_db / 10.0)).tolist()
-    by_law = [
-        [[probability_at(_curves(law), 0, ratio) for ratio in row] for row in ratios]
-        for law in range(len(LAWS))
-    ]
-    return np.array(by_law).transpose(1, 0, 2)
+    ratios, laws = (10.0 ** (margin_db / 10.0)).tolist(), range(len(LAWS))
+    chances = [[[probability_at(_curves(f), 0, x) for x in row] for f in laws] for row in ratios]
+    return np.array(chances)
 
 
 @cache

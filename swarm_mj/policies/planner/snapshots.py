@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.policies.planner.settings import SnapshotSettings
+from swarm_mj.protocol.buffers import Buffers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,20 +32,20 @@ class Snapshots:
 
 
 def take_snapshots(
-    position_m: Float[np.ndarray, "N N 2"],
-    velocity_mps: Float[np.ndarray, "N N 2"],
-    timestamp: Float[np.ndarray, "N N"],
-    is_known: Bool[np.ndarray, "N N"],
+    buffers: Buffers,
+    b: int,
     now: float,
     window_s: float,
     windows_ahead: float,
     settings: SnapshotSettings,
 ) -> Snapshots:
-    """Return every robot's snapshot, row i from buffer i alone: T^{i,k} [windows] and M^{i,k}.
+    """Return every robot's snapshot in mission b, row i from its own buffer alone.
 
     They are taken for the middle of an epoch some windows ahead. The best has most robots fresh,
     then the least mean age of these, then the lowest identity.
     """
+    is_known, timestamp = buffers.is_known[b], buffers.timestamp[b]
+    position_m, velocity_mps = buffers.position_m[b], buffers.velocity_mps[b]
     num_robots, num_known = len(is_known), np.sum(is_known, axis=1)
     age = np.where(is_known, now - timestamp, 0.0)
     ahead = age + windows_ahead
@@ -60,7 +61,7 @@ def take_snapshots(
     is_divided = rests & (num_fresh < settings.min_fresh_share * num_robots)
     steady = np.minimum(ahead, settings.steady_windows)
     return Snapshots(
-        is_known=is_known.copy(),
+        is_known=is_known,
         is_fresh=is_fresh | is_divided[:, None],
         position_m=position_m + velocity_mps * steady[..., None] * window_s,
         position_std_m=position_std_m,

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from learning_reference import rounded
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.planner.link_evidence import NUM_BINS, Evidence
@@ -118,8 +119,8 @@ def test_packets_carry_tables_exactly(seed):
     table = fit(*drawn(shadowed(seed, 12.0), seed), SETTINGS)
     *_, mean, std = link_fields(MISSION)
     assert table.mean_db.any()
-    np.testing.assert_array_equal(mean.rounded(table.mean_db), table.mean_db)
-    np.testing.assert_array_equal(std.rounded(table.std_db), table.std_db)
+    np.testing.assert_array_equal(rounded(mean, table.mean_db), table.mean_db)
+    np.testing.assert_array_equal(rounded(std, table.std_db), table.std_db)
     np.testing.assert_array_equal(table.mean_db % 0.25, 0.0)
 
 

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from learning_reference import rounded
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.planner.payloads import carries, check_room, link_fields
@@ -68,5 +69,5 @@ def test_fields_of_tables_reach_over_all_that_is_told_apart():
     """Excess losses from -30 to 18 dB, and standard deviations below 48 dB, by 0.25 dB."""
     *_, mean, std = link_fields(REST)
     told_db = np.arange(-30.0, 18.1, 0.25)
-    np.testing.assert_array_equal(mean.rounded(told_db), told_db)
-    np.testing.assert_array_equal(std.rounded(told_db + 30.0), told_db + 30.0)
+    np.testing.assert_array_equal(rounded(mean, told_db), told_db)
+    np.testing.assert_array_equal(rounded(std, told_db + 30.0), told_db + 30.0)

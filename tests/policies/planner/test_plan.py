@@ -13,7 +13,7 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.planner import plan
 from swarm_mj.policies.planner.plan import Plan, epoch_plan, lookahead_of
 from swarm_mj.policies.planner.settings import PlannerSettings, ScheduleSettings, SnapshotSettings
-from swarm_mj.policies.planner.snapshots import Snapshots, take_snapshots
+from swarm_mj.policies.planner.snapshots import take_snapshots
 from swarm_mj.policies.planner.weights import heuristic_weights
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.window import transmit
@@ -28,28 +28,24 @@ AGED = SnapshotSettings(fresh_rounds=0.0, min_fresh_windows=8.0)
 SETTINGS = PlannerSettings()
 
 
-def snapshots_of(team, seed, *, age=NOW):
-    """What robots may believe that heard of most others, some of them long ago."""
+def snapshots_of(team, seed):
+    """Beliefs of robots that heard of most others, some of them long ago."""
     rng, num_robots = np.random.default_rng(seed), team.num_robots
-    shape = (num_robots, num_robots)
-    timestamp = NOW - rng.integers(0, 2 * int(age), shape) / 2
+    shape, buffers = (num_robots, num_robots), empty_buffers(1, num_robots)
+    timestamp = NOW - rng.integers(0, 2 * int(NOW), shape) / 2
     timestamp *= rng.random(shape) < 0.8
     np.fill_diagonal(timestamp, NOW)
-    position_m = team.position_m + rng.normal(0.0, 20.0, (*shape, 2))
-    velocity_mps = rng.uniform(-3.0, 3.0, (*shape, 2))
-    return take_snapshots(
-        position_m, velocity_mps, timestamp, timestamp > 0.0, NOW, 0.1, 15.0, AGED
-    )
+    buffers.timestamp[0] = timestamp
+    buffers.position_m[0] = team.position_m + rng.normal(0.0, 20.0, (*shape, 2))
+    buffers.velocity_mps[0] = rng.uniform(-3.0, 3.0, (*shape, 2))
+    return take_snapshots(buffers, 0, NOW, 0.1, 15.0, AGED)
 
 
 def true_snapshots(team):
-    """Everyone is known, fresh, and where it is believed to be."""
-    shape = (team.num_robots, team.num_robots)
-    true_m = np.broadcast_to(team.position_m, (*shape, 2)).copy()
-    everyone = np.ones(shape, dtype=bool)
-    return take_snapshots(
-        true_m, np.zeros((*shape, 2)), np.ones(shape), everyone, 9.0, 0.1, 15.0, SnapshotSettings()
-    )
+    """Everyone is known, fresh, at rest, and where it is believed to be."""
+    buffers = empty_buffers(1, team.num_robots)
+    buffers.timestamp[...], buffers.position_m[...] = 1.0, team.position_m
+    return take_snapshots(buffers, 0, 9.0, 0.1, 15.0, SnapshotSettings())
 
 
 def team_of(num_robots, seed):
@@ -84,12 +80,6 @@ def test_a_plan_depends_on_one_snapshot_and_nothing_else(seed, num_robots):
     planned, again = plan_of(team, mine, owner), plan_of(team, mixed, maker)
     np.testing.assert_array_equal(all_transmitters(planned), all_transmitters(again))
     np.testing.assert_array_equal(planned.outcome(), again.outcome())
-
-
-def test_another_snapshot_is_another_plan():
-    team = team_of(8, 3)
-    plans = [all_transmitters(plan_of(team, snapshots_of(team, 3), owner)) for owner in (0, 1)]
-    assert np.any(plans[0] != plans[1])
 
 
 @few
@@ -181,17 +171,6 @@ def test_a_plan_is_the_schedule_of_its_snapshot_s_links(monkeypatch):
     assert settings == SETTINGS.weights
 
 
-def test_a_plan_does_not_change_what_it_is_made_of():
-    team = team_of(8, 2)
-    snapshots = snapshots_of(team, 2)
-    before = copy.deepcopy((team.timestamp, vars(snapshots)))
-    plan_of(team, snapshots, 4).outcome()
-    np.testing.assert_array_equal(team.timestamp, before[0])
-    for name, array in before[1].items():
-        np.testing.assert_array_equal(getattr(snapshots, name), array)
-    assert isinstance(snapshots, Snapshots)
-
-
 def test_large_teams_look_less_far_ahead():
     """Whose plans would take long otherwise."""
     numbers = ScheduleSettings(
@@ -205,15 +184,6 @@ def test_large_teams_look_less_far_ahead():
     ]:
         assert lookahead_of(num_robots, is_certain=True, settings=numbers) == at_rest
         assert lookahead_of(num_robots, is_certain=False, settings=numbers) == moving
-
-
-def test_looking_ahead_is_by_team_size():
-    """Of the same snapshot, the plan of a team too large to look ahead is another one."""
-    team = team_of(12, 1)
-    far = all_transmitters(plan_of(team, true_snapshots(team)))
-    too_large = scheduled(max_lookahead_robots=11)
-    near = all_transmitters(plan_of(team, true_snapshots(team), settings=too_large))
-    assert np.any(far != near)
 
 
 def test_who_was_not_heard_of_for_three_rounds_is_planned_without():

@@ -135,19 +135,6 @@ def test_epochs_by_hand():
     assert [regular_length(n, epochs) for n in (2, 20, 21, 40, 81)] == [10, 10, 10, 20, 40]
 
 
-def test_epochs_are_half_as_many_windows_as_there_are_robots():
-    """As `docs/policies.md` says: a team of 24 takes new snapshots every 12 windows."""
-    flight = Flight(paper("stationary", num_robots=24), 1, settings=NEAR_SIGHTED)
-    flight.fly(first_epochs(24)[-1])
-    taken = []
-    for window in range(37):
-        before = flight.team._upcoming
-        flight.fly(1)
-        if flight.team._upcoming is not before:
-            taken.append(window)
-    assert taken == [0, 12, 24, 36]
-
-
 def test_nobody_plans_before_the_snapshots_of_the_discovery_have_spread():
     """Its snapshots are frozen as it ends, travel for an epoch, and are flown by after it."""
     flight = Flight(paper("stationary", num_robots=10), 4)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from swarm_mj.policies.planner.settings import SnapshotSettings
 from swarm_mj.policies.planner.snapshots import Snapshots, better, take_snapshots
+from swarm_mj.protocol.buffers import empty_buffers
 
 seeds = st.integers(0, 2**32 - 1)
 NOW = 20.0
@@ -23,6 +24,20 @@ def believing(fresh_windows):
         std_per_distance=0.45,
         min_fresh_share=0.75,
     )
+
+
+def buffers_of(position_m, velocity_mps, timestamp):
+    """One mission's, that hold this."""
+    buffers = empty_buffers(1, len(timestamp))
+    buffers.position_m[0], buffers.velocity_mps[0] = position_m, velocity_mps
+    buffers.timestamp[0] = timestamp
+    return buffers
+
+
+def taken_from(position_m, velocity_mps, timestamp, windows_ahead, settings):
+    """Snapshots at t = 20, in windows of 0.1 s."""
+    buffers = buffers_of(position_m, velocity_mps, timestamp)
+    return take_snapshots(buffers, 0, NOW, 0.1, windows_ahead, settings)
 
 
 def taken_by_hand(fresh_windows=20.0):
@@ -46,16 +61,7 @@ def taken_by_hand(fresh_windows=20.0):
             [[0.0, 5.0], [90.0, 90.0], [0.0, 5.0]],
         ]
     )
-    return take_snapshots(
-        position_m,
-        velocity_mps,
-        timestamp,
-        timestamp > 0.0,
-        NOW,
-        0.1,
-        8.0,
-        believing(fresh_windows),
-    )
+    return taken_from(position_m, velocity_mps, timestamp, 8.0, believing(fresh_windows))
 
 
 def test_positions_go_on_with_their_velocity_by_hand():
@@ -116,9 +122,7 @@ def test_who_does_not_even_observe_itself_ranks_last():
     """Robot 0 was switched off at t = 5 and knows all, as of then."""
     timestamp = np.array([[5.0, 5.0, 5.0], [5.0, 20.0, 18.0], [5.0, 16.0, 20.0]])
     nothing, moving = np.zeros((3, 3, 2)), np.eye(3)[..., None] * np.ones(2)
-    snapshots = take_snapshots(
-        nothing, moving, timestamp, timestamp > 0.0, NOW, 0.1, 5.0, believing(10.0)
-    )
+    snapshots = taken_from(nothing, moving, timestamp, 5.0, believing(10.0))
     assert snapshots.rank.tolist() == [2, 0, 1]
     assert np.sum(snapshots.is_fresh, axis=1).tolist() == [0, 2, 2]
 
@@ -127,9 +131,7 @@ def test_where_nobody_moves_and_many_are_stale_all_count_as_fresh():
     """Two of three are fresh, fewer than three quarters: the team is divided, nobody is lost."""
     timestamp = np.array([[20.0, 5.0, 18.0], [5.0, 20.0, 18.0], [19.0, 16.0, 20.0]])
     nothing = np.zeros((3, 3, 2))
-    snapshots = take_snapshots(
-        nothing, nothing, timestamp, timestamp > 0.0, NOW, 0.1, 5.0, believing(10.0)
-    )
+    snapshots = taken_from(nothing, nothing, timestamp, 5.0, believing(10.0))
     assert np.all(snapshots.is_fresh)
     assert snapshots.rank.tolist() == [1, 2, 0]  # which still counts who is
 
@@ -137,25 +139,23 @@ def test_where_nobody_moves_and_many_are_stale_all_count_as_fresh():
 def test_snapshots_as_good_rank_by_identity():
     timestamp = np.array([[20.0, 14.0], [14.0, 20.0]])
     nothing = np.zeros((2, 2, 2))
-    taken = take_snapshots(
-        nothing, nothing, timestamp, timestamp > 0.0, NOW, 0.1, 5.0, believing(20.0)
-    )
+    taken = taken_from(nothing, nothing, timestamp, 5.0, believing(20.0))
     assert taken.rank.tolist() == [0, 1]
 
 
 def random_memory(seed, num_robots):
-    """Positions, velocities, T and who is known, at t = 20."""
+    """Positions, velocities and T, at t = 20."""
     rng = np.random.default_rng(seed)
     timestamp = rng.integers(1, 2 * int(NOW), (num_robots, num_robots)) / 2
     timestamp *= rng.random((num_robots, num_robots)) < 0.7
     np.fill_diagonal(timestamp, NOW)
     position_m = rng.uniform(-150.0, 150.0, (num_robots, num_robots, 2))
     velocity_mps = rng.uniform(-3.0, 3.0, (num_robots, num_robots, 2))
-    return position_m, velocity_mps, timestamp, timestamp > 0.0
+    return position_m, velocity_mps, timestamp
 
 
 def taken(memory, fresh_windows=9.0):
-    return take_snapshots(*memory, NOW, 0.1, 15.0, believing(fresh_windows))
+    return taken_from(*memory, 15.0, believing(fresh_windows))
 
 
 @given(seed=seeds, num_robots=st.integers(2, 8))
@@ -182,10 +182,10 @@ def test_eq9_a_snapshot_is_its_owner_s_memory_alone(seed, num_robots):
 
 
 def test_a_snapshot_does_not_change_with_the_buffer():
-    memory = random_memory(3, 5)
-    snapshots = taken(memory)
+    buffers = buffers_of(*random_memory(3, 5))
+    snapshots = take_snapshots(buffers, 0, NOW, 0.1, 15.0, believing(9.0))
     before = copy.deepcopy(snapshots)
-    for array in memory:
+    for array in vars(buffers).values():
         array[:] = 0
     for field in fields(Snapshots):
         np.testing.assert_array_equal(getattr(snapshots, field.name), getattr(before, field.name))
