@@ -147,7 +147,7 @@ def test_another_form_is_refused(name):
         ),
         ("own_parts.deeper:Needs", r"no module own_parts.deeper in"),
         ("own_parts:Need", r"own_parts.py has no Need; did you mean Needs\?"),
-        ("own_parts:breaks", r"raised AttributeError: .*no_such_field.* \(own_parts.py, line 30\)"),
+        ("own_parts:breaks", r"raised AttributeError: .*no_such_field.* \(own_parts.py, line 32\)"),
         ("own_broken:Any", r"importing it raised SyntaxError: .*own_broken.py, line 2"),
         (
             "own_needy:Any",
