@@ -157,6 +157,6 @@ def _in_scene(footage: "Footage", scene: str | None) -> "Footage":
         return replace(footage, **Components(scene=scene).made(footage.facts.mission).given)
     if flown_in is not None:
         hint = "; --scene shows it, too." if is_own(flown_in) else "."
-        told = f"The video shows the bare arena. The mission was flown in the scene {flown_in!r}"
-        plain_console(is_error=True).print(told + hint)
+        text = f"The video shows the bare arena. The mission was flown in the scene {flown_in!r}"
+        plain_console(is_error=True).print(text + hint)
     return footage

@@ -107,6 +107,7 @@ def draw_states(out: RerunLog) -> None:
     for i in range(state.shape[1]):
         path = f"state/r{i:03d}"
         out.fixed(path, configuration)
+        # A lane keeps its state until the next change, so that one row per window is not needed.
         changes = np.flatnonzero(np.diff(state[:, i], prepend=-1))
         columns = rr.StateChange.columns(state=names[state[changes, i]])
         out.timed(path, columns, out.log.window[changes])

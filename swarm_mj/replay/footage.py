@@ -40,6 +40,7 @@ def frame(position_m: Float[np.ndarray, "T N 2"], half_side_m: float) -> Frame:
         centre_m = np.zeros((len(position_m), 2))
         return Frame(centre_m=centre_m, reach_m=max(half_side_m, farthest_m))
     low_m, high_m = np.min(position_m, axis=1), np.max(position_m, axis=1)
+    # Of constant size all the same: a changing scale would look like motion.
     return Frame(centre_m=(low_m + high_m) / 2.0, reach_m=float(np.max(high_m - low_m)) / 2.0)
 
 
@@ -113,6 +114,7 @@ class Footage:
         position_m, age, facts = self.position_m[row], self.age[row], self.facts
         starts, ends = [np.zeros((0, 2))], [np.zeros((0, 2))]
         colours = [np.zeros((0, 3), dtype=np.uint8)]
+        # The fates are in the order of drawing, so that what matters more covers the rest.
         for fate, drawn in self.segments.items():
             first, last = np.searchsorted(drawn.row, [row, row + 1])
             starts.append(drawn.start_m[first:last])

@@ -46,6 +46,7 @@ def fates(
     The second phase answers the first. `recipient` is S^i in both phases, `heard` the sender that
     each robot decoded; a robot's own number is none.
     """
+    # A robot decodes at most one packet in a phase, so `heard` has every reception once.
     row, phase, hearer = np.nonzero(is_other(heard))
     speaker = heard[row, phase, hearer]
     received = (row, speaker, hearer)
@@ -95,6 +96,7 @@ def arcs(
     """Return points along parabolas that start and end at `base_m` above the ground [m]."""
     share = np.linspace(0.0, 1.0, SEGMENTS + 1)
     span_m = np.linalg.norm(end_m - start_m, axis=1)
+    # The longer the higher: packets that cross on the ground stay apart in the picture.
     height_m = base_m + 4.0 * RISE * span_m[:, None] * share * (1.0 - share)
     ground_m = start_m[:, None] + share[:, None] * (end_m - start_m)[:, None]
     return np.concatenate([ground_m, height_m[..., None]], axis=2)

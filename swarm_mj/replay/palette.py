@@ -103,6 +103,7 @@ def robot_colours(
 
 def nice_scale(age_windows: Float[np.ndarray, "..."]) -> float:
     """Return a round number of windows that 19 ages in 20 lie below."""
+    # Without the oldest: robots that are hardly ever reached would make all others look alike.
     return nice_top(max(1.0, float(np.percentile(age_windows, 95))))
 
 

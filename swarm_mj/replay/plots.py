@@ -125,4 +125,5 @@ def draw_plots(out: RerunLog, shown: Sequence[Plot]) -> None:
 
 def rate(per_window: Int[np.ndarray, "T"]) -> np.ndarray:
     """Return the packets in the last `RATE_WINDOWS` windows, at each window."""
+    # Over several windows, for the counts of single ones would hide the trend.
     return np.convolve(per_window, np.ones(RATE_WINDOWS))[: len(per_window)]

@@ -87,7 +87,7 @@ def read_footage(path: Path) -> Footage:
         facts, columns = read_json(text, Facts), _columns(path)
         age = _numbers(columns["/scene/robots age"]).reshape(-1, facts.mission.num_robots)
         position_m = _numbers(columns["/scene/robots Cylinders3D:centers"])
-        # Teams at rest have no headings, and in free space nobody is cut off.
+        # Teams at rest have no headings, and in free space no robot is cut off.
         ends, cut_off = np.zeros((*age.shape, 6)), np.zeros(age.shape)
         if (lines := columns.get("/scene/heading LineStrips3D:strips")) is not None:
             ends = _numbers(lines).reshape(ends.shape)
@@ -114,6 +114,7 @@ def read_footage(path: Path) -> Footage:
 
 def _columns(path: Path) -> Columns:
     """Read what a video shows, each component in the order of its windows."""
+    # In one pass: each reader decodes the file anew.
     found: dict[str, list[pa.Table]] = {}
     shown = ["/scene/**", "/plots/age/mean"]
     for chunk in RrdReader(path).stream().filter(content=shown, is_static=False):

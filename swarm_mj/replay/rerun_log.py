@@ -100,6 +100,7 @@ class RerunLog:
     ) -> None:
         """Write one row per window: of the log, or of the windows given."""
         at = self.log.window if window is None else window
+        # Two timelines: one to step by windows, one to play in seconds.
         times = [
             rr.TimeColumn(TIMELINE, sequence=at),
             rr.TimeColumn("mission_time", duration=at * self._window_s),

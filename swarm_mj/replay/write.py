@@ -86,7 +86,7 @@ def draw(
 ) -> None:
     """Draw every layer of a replay; `packets` by their fate."""
     log, mission, full_scale = out.log, footage.facts.mission, footage.facts.full_scale
-    colours, known = (  # the tree shows what is known, whoever is on
+    colours, known = (  # the tree also shows robots that are off
         palette.robot_colours(log.ego_age, full_scale, log.is_known, is_on, log.ego)
         for is_on in (log.is_on, np.ones_like(log.is_on))
     )

@@ -36,6 +36,7 @@ def contents_of(
     for what, value, end in (("index", index, len(swarm.now)), ("observer", observer, num)):
         if not 0 <= value < end:
             raise ValueError(f"{what} must be from 0 to {end - 1}, not {value}")
+    # A copy: the swarm writes its arrays in place, and the picture may be drawn later.
     position_m = states.position_m[index].copy()
     is_on = np.ones(num, bool) if states.is_active is None else states.is_active[index]
     age = swarm.now[index] - buffers.timestamp[index, observer]

@@ -229,6 +229,7 @@ class AgePlot:
         below = inner.bottom + 2
         draw.text((inner.left, below), "0", palette.SENT, small)
         draw.text((inner.right, below), f"{self._end_s:g} s", palette.SENT, small, anchor="ra")
+        # From the start on: what is still to come sets the axis, which does not change.
         for curve, colour in zip(self._curves, CURVES, strict=False):
             draw.line(curve, dim(colour, FAINT), 1)
 

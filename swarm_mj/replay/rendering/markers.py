@@ -34,6 +34,7 @@ def draw_markers(scene: MjvScene, contents: Contents, camera: Camera) -> None:
     for points, colour in zip(lifted, contents.packet_colour, strict=True):
         for start, end in itertools.pairwise(points):
             _add_line(scene, start, end, colour, line_pixels)
+    # Last, for of very dense teams there is no room for all; robots and packets go first.
     room = scene.maxgeom - scene.ngeom
     height_m = ROBOT_HEIGHT * ROBOT * picture_m
     lines_m = np.pad(contents.lines_m, ((0, 0), (0, 0), (0, 1)), constant_values=height_m)

@@ -112,6 +112,7 @@ class SceneRenderer:
         """Give OpenGL's memory back; nothing can be drawn any more."""
         if self._is_open:
             self._is_open = False
+            # Otherwise it would be freed in the context of another renderer.
             self._opengl.make_current()
             self._context.free()
             self._opengl.free()

@@ -62,7 +62,7 @@ def encode_mp4(pictures: Iterable[Picture], style: VideoStyle) -> bytes:
     with av.open(content, "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(style.fps).limit_denominator())
         stream.width, stream.height = style.width, style.height
-        stream.pix_fmt = "yuv420p"
+        stream.pix_fmt = "yuv420p"  # the only one that all browsers play
         stream.options = {"crf": QUALITY, "preset": "fast"}
         for picture in pictures:
             container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
