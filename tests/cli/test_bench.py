@@ -44,17 +44,17 @@ def test_noise_is_the_spread_of_what_should_be_the_same():
     assert noise([4.0, 6.0]).endswith("50%; the machine was busy, so measure again when it is not.")
 
 
-@pytest.mark.parametrize(
-    ("options", "complaint"),
-    [
-        (["--missions", "0"], "missions must be a whole number from 1 to 10000, not 0"),
-        (["--threads", "0"], "threads must be a whole number from 1 to 256, not 0"),
-        (["--episodes", "-1"], "episodes must be a whole number from 0 to 10000, not -1"),
-        (["--jobs", "0"], "jobs must be a whole number from 1 to 256, not 0"),
-        (["--seconds", "nan"], "seconds must be a number from 0.1 to 600 [s], not nan"),
-    ],
-)
-def test_bench_refuses_bad_input(swarm_mj, options, complaint):
-    done = swarm_mj("bench", *options)
+REFUSED = {
+    "--missions 0": "missions must be a whole number from 1 to 10000, not 0",
+    "--threads 0": "threads must be a whole number from 1 to 256, not 0",
+    "--episodes -1": "episodes must be a whole number from 0 to 10000, not -1",
+    "--jobs 0": "jobs must be a whole number from 1 to 256, not 0",
+    "--seconds nan": "seconds must be a number from 0.1 to 600 [s], not nan",
+}
+
+
+@pytest.mark.parametrize("options", REFUSED)
+def test_bench_refuses_bad_input(swarm_mj, options):
+    done = swarm_mj("bench", *options.split())
     assert done.returncode == 2
-    assert complaint in done.stderr
+    assert REFUSED[options] in done.stderr

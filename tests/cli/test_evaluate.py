@@ -225,34 +225,28 @@ def test_one_mission_of_one_window_has_results(swarm_mj, tmp_path):
     assert "lower bound (connectivity)" in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("options", "complaint"),
-    [
-        (["--episodes", "0"], "episodes must be a whole number from 1 to 100000, not 0"),
-        (["--jobs", "0"], "jobs must be a whole number from 1 to 256, not 0"),
-        (["--robots", "10", "1"], "a whole number from 2 to 1000 [robots], not 1"),
-        (
-            ["--failure-fraction", "0.95"],
-            "failure fraction must be a number from 0 to 0.9 [of the team], not 0.95",
-        ),
-        (
-            ["--preset", "mine"],
-            "preset must be one of paper, reference, indoor, urban, open-field, not 'mine'",
-        ),
-        (["--policy", "magic"], "policy must be one of"),
-        (["--baseline", "magic"], "baseline must be one of the policies evaluated"),
-        (["--range-ratio", "0.02", "--csv", "r.csv", "--jobs", "2"], "too sparse"),
-        (["--resume"], "--resume needs the --json or --csv"),
-        (["--csv", "r.json", "--json", "./r.json"], "same file"),
-        (["--json", "o.json", "--csv", "o.json.progress"], "--csv must be named *.csv, not o.json"),
-        (["--csv", "."], "--csv must be named *.csv, not ."),
-    ],
-)
-def test_bad_input_is_one_clear_line(capsys, monkeypatch, tmp_path, options, complaint):
-    monkeypatch.chdir(tmp_path)
-    assert main(["evaluate", *options]) == 2
+REFUSED = {
+    "--episodes 0": "episodes must be a whole number from 1 to 100000, not 0",
+    "--jobs 0": "jobs must be a whole number from 1 to 256, not 0",
+    "--robots 10 1": "a whole number from 2 to 1000 [robots], not 1",
+    "--failure-fraction 0.95": "must be a number from 0 to 0.9 [of the team], not 0.95",
+    "--preset mine": "must be one of paper, reference, indoor, urban, open-field, not 'mine'",
+    "--policy magic": "policy must be one of",
+    "--baseline magic": "baseline must be one of the policies evaluated",
+    "--range-ratio 0.02 --csv r.csv --jobs 2": "too sparse",
+    "--resume": "--resume needs the --json or --csv",
+    "--csv r.json --json ./r.json": "same file",
+    "--json o.json --csv o.json.progress": "--csv must be named *.csv, not o.json",
+    "--csv .": "--csv must be named *.csv, not .",
+}
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize("options", REFUSED)
+def test_bad_input_is_one_clear_line(capsys, options):
+    assert main(["evaluate", *options.split()]) == 2
     printed = capsys.readouterr()
-    assert complaint in printed.err
+    assert REFUSED[options] in printed.err
     assert len(printed.err.strip().splitlines()) == 1
     assert printed.out == ""
 

@@ -63,29 +63,23 @@ def test_the_mode_is_flown_on_request(runs):
     assert costs["a"]["packets_attempted"] != costs["b"]["packets_attempted"]
 
 
-@pytest.mark.parametrize(
-    ("options", "complaint"),
-    [
-        (["fly", "--policy", "runs/z"], "there is no policy runs/z; name a .safetensors file"),
-        (["fly", "--policy", "runs"], "runs holds policies; name one of them: runs/x/policy.saf"),
-        (["fly", "--policy", "runs/y", "--probability", "0.1"], "takes no transmission probab"),
-        (
-            ["fly", "--policy", "mst", "--deterministic"],
-            "--deterministic applies to learned policies only, not to mst",
-        ),
-        (["evaluate", "--policy", "mst", "--deterministic"], "none is among mst; leave it out"),
-        (["evaluate", "--policy", "mst", "runs/z"], "there is no policy runs/z"),
-        (["evaluate", "--policy", "runs/y", "--probability", "0.1"], "takes no transmission prob"),
-        (
-            ["evaluate", "--policy", "runs/y", "--baseline", "runs/x"],
-            "not 'runs/x'; add it to them",
-        ),
-    ],
-)
-def test_bad_input_is_one_clear_line(capsys, options, complaint):
-    assert main(options) == 2
+REFUSED = {
+    "fly --policy runs/z": "there is no policy runs/z; name a .safetensors file",
+    "fly --policy runs": "runs holds policies; name one of them: runs/x/policy.saf",
+    "fly --policy runs/y --probability 0.1": "takes no transmission probab",
+    "fly --policy mst --deterministic": "applies to learned policies only, not to mst",
+    "evaluate --policy mst --deterministic": "none is among mst; leave it out",
+    "evaluate --policy mst runs/z": "there is no policy runs/z",
+    "evaluate --policy runs/y --probability 0.1": "takes no transmission prob",
+    "evaluate --policy runs/y --baseline runs/x": "not 'runs/x'; add it to them",
+}
+
+
+@pytest.mark.parametrize("line", REFUSED)
+def test_bad_input_is_one_clear_line(capsys, line):
+    assert main(line.split()) == 2
     printed = capsys.readouterr()
-    assert complaint in printed.err
+    assert REFUSED[line] in printed.err
     assert len(printed.err.strip().splitlines()) == 1
     assert printed.out == ""
 
