@@ -92,17 +92,18 @@ def make_policy(
     is_deterministic: bool = False,
     features: Sequence[str] = (),
 ) -> Policy:
-    """Return a policy by its name.
+    """Return a policy by its name, for a mission.
+
+    The mission's preset says how the baselines behave where paper and code differ, and its numbers
+    normalise what a learned policy sees.
 
     Args:
         name: See the module.
-        mission: Whose preset says how the baseline behaves where paper and code differ, and whose
-            numbers normalise what a learned policy sees.
+        mission: The mission to be flown.
         probability: Of transmission, for `HAVE_PROBABILITY`; None is the one tuned for the regime
             nearest to the mission's.
         is_deterministic: Whether a learned policy takes the most probable recipient, not a draw.
-        features: Names, as `module:Name`, of own feature sets that may be imported for a learned
-            policy.
+        features: Own feature sets, as `module:Name`, that may be imported for a learned policy.
 
     Raises:
         ValueError: The name is unknown, no sound policy is there, a probability is out of range or
@@ -188,9 +189,10 @@ def normalised(name: str) -> str:
 
 def listed(names: Iterable[str]) -> list[str]:
     """Return policies' names, each once; `all` stands for `POLICIES`, after the others."""
-    names = list(names)
-    named = [name for name in names if name != "all"]
-    return list(dict.fromkeys([*named, *(POLICIES if "all" in names else ())]))
+    named = dict.fromkeys(names)
+    return [
+        name for name in named | dict.fromkeys(POLICIES if "all" in named else ()) if name != "all"
+    ]
 
 
 def flown_name(name: str, mission: Mission) -> str:

@@ -17,25 +17,19 @@ from swarm_mj.radio.spatial_reuse import keep_joined, known_powers
 
 
 class SpatialTdma(BroadcastPolicy):
-    """TDMA in which robots far enough from the one whose turn it is broadcast beside it.
+    """TDMA in which robots far enough from the owner of the turn broadcast at the same time.
 
-    The common rule, who joins the owner of the turn, is that of `radio.spatial_reuse`.
-    Each robot applies the rule to its own buffer, alone, and robots that believe the same decide
-    the same. Until a robot has heard of everyone it speaks in its own turn only: so the team begins
-    as `Tdma` does, and no robot that joins overlooks a listener of the owner's. Uses the robot's
-    own buffer, identity, the team's size, the order, the clock, the radio's range and threshold.
-    Of what the mission grants of the channel it uses the mean powers.
+    The common rule, who joins the owner of the turn, is that of `radio.spatial_reuse`. Each robot
+    applies the rule to its own buffer, alone, and robots that believe the same decide the same.
+    Until a robot has heard of everyone it transmits in its own turn only: so the team begins as
+    `Tdma` does, and no robot that joins overlooks a listener of the owner's. Of what the mission
+    grants of the channel it uses the mean powers.
     """
 
     uses = "as tdma, and the positions in its buffer: robots far enough apart share a slot"
 
     def __init__(self, *, range_m: float, threshold: float) -> None:
-        """Prepare the policy.
-
-        Args:
-            range_m: Distance at which a lone transmission just decodes [m].
-            threshold: Least SINR that decodes, linear [1].
-        """
+        """Take the distance at which a lone transmission just decodes, and its SINR, linear [1]."""
         self._range_m = range_m
         self._threshold = threshold
         self._law: PowerLaw | None = None
@@ -46,21 +40,15 @@ class SpatialTdma(BroadcastPolicy):
         self._law = None if law is None else law._replace(at_1_m=law.at_1_m / noise_mw)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Draws every mission's order; arguments as in `Policy.start`."""
+        """Draw every mission's order; arguments as in `Policy.start`."""
         self._order = draw_order(num_robots, rngs)
         self._known = None if self._law is None else known_powers(self._law, len(rngs))
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
-        """Each robot whose turn it is or that may join."""
+        """Return each robot whose turn it is or that may join."""
         is_oneself = np.eye(views.num_robots, dtype=np.bool_)
         is_sending = np.all(views.buffers.is_known | is_oneself, axis=2)
-        keep_joined(
-            views.buffers.position_m,
-            self._order,
-            slot_of(views.now),
-            self._range_m,
-            self._threshold,
-            is_sending,
-            self._known,
-        )
+        rule = self._range_m, self._threshold
+        turn = slot_of(views.now)
+        keep_joined(views.buffers.position_m, self._order, turn, *rule, is_sending, self._known)
         return is_sending

@@ -1,6 +1,6 @@
-"""Transmission probabilities (IV-C: "some probability p") tuned per regime, and how.
+"""Transmission probabilities (IV-C: "some probability p") tuned per regime, in `tuned.csv`.
 
-`tuned.csv` beside this file holds one row per policy and regime; `tools/tune.py` wrote it.
+The table has one row per policy and regime; `tools/tune.py` wrote it.
 """
 
 import math
@@ -21,11 +21,7 @@ REGIME = ("preset", "task", "num_robots", "range_ratio", "velocity_ratio")
 
 @dataclass(frozen=True, kw_only=True)
 class Tuned:
-    """The best probability of a policy in one regime: a row of the table, its columns in order.
-
-    Raises:
-        ValueError: There is no such regime, or a number is out of range.
-    """
+    """The best probability of a policy in one regime: a row of the table, its columns in order."""
 
     policy: str  # a name among `POLICIES`
     preset: str
@@ -50,12 +46,8 @@ class Tuned:
 def tuned_probability(policy_name: str, mission: Mission) -> float:
     """Return a policy's tuned probability in the regime that is nearest to a mission's.
 
-    Nearest by the ratios of team size, range and velocity, among the regimes of the same preset
-    and task: the mission's own where the table has it. Tasks and presets that nobody tuned for take
-    another's.
-
-    Raises:
-        ValueError: The policy was not tuned for the mission's preset and task.
+    Nearest by the ratios of team size, range and velocity, among the regimes of the same preset and
+    task, or of those in `TUNED_AS`; ValueError if there are none.
     """
     preset, task = (TUNED_AS.get(name, name) for name in (mission.preset, mission.task))
     group = (policy_name, preset, task)
@@ -69,11 +61,7 @@ def tuned_probability(policy_name: str, mission: Mission) -> float:
 
 
 def read_table(path: Path) -> list[Tuned]:
-    """Return the rows of a table.
-
-    Raises:
-        ValueError: The file cannot be read, a column is missing or unknown, or a value is none.
-    """
+    """Return the rows of a table; ValueError if it is no such table, or a value is none."""
     names, rows = read_rows(path, "table", MOST_BYTES)
     kinds = Tuned.__annotations__
     if names != list(kinds):
@@ -93,7 +81,7 @@ def _table() -> list[Tuned]:
 
 
 def _distance(row: Tuned, mission: Mission) -> float:
-    """How far a row's regime is from a mission's: in logarithms, squared."""
+    """Return how far a row's regime is from a mission's: in logarithms, squared."""
     ratios = [row.num_robots / mission.num_robots, row.range_ratio / mission.range_ratio]
     if mission.task != "stationary":
         ratios.append(row.velocity_ratio / mission.velocity_ratio)

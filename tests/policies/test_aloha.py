@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm_mj.policies.aloha import Aloha, num_contenders
-from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
 
@@ -34,10 +33,6 @@ def started(probability, num_missions, num_robots):
     policy = Aloha(probability, range_m=RANGE_M)
     policy.start(num_robots, [np.random.default_rng((7, b)) for b in range(num_missions)])
     return policy
-
-
-def test_two_transmissions_a_window_on_local_knowledge():
-    assert issubclass(Aloha, BroadcastPolicy)
 
 
 def test_contenders_by_hand():
@@ -86,17 +81,3 @@ def test_probability_0_is_silence_and_1_is_a_storm():
     for _ in range(100):
         assert not np.any(is_sending(silent, views))
         assert np.all(is_sending(storm, views))
-
-
-def test_mission_does_not_depend_on_its_neighbours():
-    alone, beside = started(0.7, 1, 5), started(0.7, 3, 5)
-    for _ in range(100):
-        np.testing.assert_array_equal(
-            is_sending(alone, everyone_near(1, 5)), is_sending(beside, everyone_near(3, 5))[:1]
-        )
-
-
-@pytest.mark.parametrize("probability", [-0.01, 1.01, math.nan])
-def test_bad_probability_is_a_clear_error(probability):
-    with pytest.raises(ValueError, match=f"probability must be from 0 to 1, not {probability:g}"):
-        Aloha(probability, range_m=RANGE_M)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from swarm_mj.policies.gossip import InnovationGossip
-from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
 
@@ -23,10 +22,6 @@ def is_telling(policy, timestamp):
     buffers = empty_buffers(*timestamp.shape[:2])
     buffers.timestamp[:] = timestamp
     return policy.transmits(LocalViews(buffers=buffers, now=np.zeros(len(timestamp)), phases=()))
-
-
-def test_two_transmissions_a_window_on_local_knowledge():
-    assert issubclass(InnovationGossip, BroadcastPolicy)
 
 
 def test_robots_with_news_enough_broadcast_for_certain_and_then_rest():
@@ -79,16 +74,3 @@ def test_news_add_up_until_they_are_told():
 def test_probability_0_is_silence():
     policy = started(0.0)
     assert not any(np.any(is_telling(policy, np.full((1, 4, 4), t))) for t in range(200))
-
-
-def test_mission_does_not_depend_on_its_neighbours():
-    alone, beside = started(0.05), started(0.05, num_missions=3)
-    for t in range(60):
-        few = is_telling(alone, np.full((1, 4, 4), t))
-        np.testing.assert_array_equal(few, is_telling(beside, np.full((3, 4, 4), t))[:1])
-
-
-@pytest.mark.parametrize("probability", [-0.01, 1.01, math.nan])
-def test_bad_probability_is_a_clear_error(probability):
-    with pytest.raises(ValueError, match=f"probability must be from 0 to 1, not {probability:g}"):
-        InnovationGossip(probability)

@@ -1,11 +1,15 @@
 import copy
 import inspect
+import math
 
 import numpy as np
 import pytest
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
+from swarm_mj.policies.aloha import Aloha
+from swarm_mj.policies.gossip import InnovationGossip
+from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
+from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy
 from swarm_mj.policies.random_flooding import RandomFlooding
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.packets import PacketField
@@ -162,6 +166,21 @@ def test_policy_must_say_whom_it_addresses(kind):
         Undecided()
 
 
-def test_policy_starts_without_ado():
-    """A policy that neither draws nor remembers needs no start of its own."""
-    assert Policy().start(4, generators()) is None
+@pytest.mark.parametrize("name", POLICIES)
+def test_a_mission_does_not_depend_on_those_next_to_it(name):
+    """One policy flies them together, or one of them alone."""
+    three, alone = Swarm(MISSION, [5, 6, 7]), Swarm(MISSION, [6])
+    together, apart = make_policy(name, MISSION), make_policy(name, MISSION)
+    for _ in range(30):
+        three.step(together)
+        alone.step(apart)
+        np.testing.assert_array_equal(three.phases[1].recipient[1:2], alone.phases[1].recipient)
+        np.testing.assert_array_equal(three.phases[0].recipient[1:2], alone.phases[0].recipient)
+
+
+@pytest.mark.parametrize("kind", [Aloha, InnovationGossip, MinimumSpanningTree, RandomFlooding])
+@pytest.mark.parametrize("probability", [-0.01, 1.01, math.nan])
+def test_a_bad_probability_is_a_clear_error(kind, probability):
+    options = {"range_m": 1.0} if kind is Aloha else {}
+    with pytest.raises(ValueError, match=f"probability must be from 0 to 1, not {probability!r}"):
+        kind(probability, **options)

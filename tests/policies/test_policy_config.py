@@ -32,31 +32,17 @@ def test_a_config_comes_back_as_it_was(features, commit):
     assert read_json(json.dumps(asdict(config)), GnnConfig) == config
 
 
-def test_a_whole_number_is_a_number(sound):
-    config = read_json(json.dumps(sound | {"silence_logit": 3}), GnnConfig)
-    assert config.silence_logit == 3.0
-    assert type(config.silence_logit) is float
-
-
 @pytest.mark.parametrize(
     ("key", "value", "complaint"),
     [
         ("wings", 2, "unknown field `wings`"),
-        ("w" * 1000, 2, "unknown field `www"),
         ("network", [1], r"Expected `object`, got `array` - at `\$\.network`"),
         ("features", "paper", "num_features is 18, but the paper features are 8"),
         ("features", "all", "extended, or module:Name of your own, not 'all'"),
-        ("features", 7, "Expected `str`, got `int` - at .*features"),
-        ("silence_logit", "3", "Expected `float`, got `str` - at .*silence_logit"),
         ("silence_logit", 100.5, "silence_logit must be a number from -100 to 100, not 100.5"),
-        ("silence_logit", -1e300, r"silence_logit must be a number from -100 to 100, not -1e\+300"),
         ("silence_logit", math.nan, "JSON is malformed"),
         ("training", [], "Expected `object`, got `array` - at .*training"),
-        ("training", {"minutes": math.inf}, "JSON is malformed"),
-        ("training", {"a": [json.loads("[" * 30 + "]" * 30)]}, "it is nested too deep"),
-        ("evaluation", "x" * 1000, "Expected `object`, got `str` - at .*evaluation"),
         ("commit", 5, r"Expected `str \| null`, got `int` - at .*commit"),
-        ("version", None, r"Expected `str`, got `null` - at `\$\.version`"),
     ],
 )
 def test_what_no_config_says(sound, key, value, complaint):
@@ -68,11 +54,6 @@ def test_what_no_config_says(sound, key, value, complaint):
     [
         ("wings", 2, r"unknown field `wings` - at `\$\.network`"),
         ("latent", 6.0, r"Expected `int`, got `float` - at `\$\.network\.latent`"),
-        ("latent", 10**6, "latent must be a whole number from 1 to 1024, not 1000000"),
-        ("latent", 0, "latent must be a whole number from 1 to 1024, not 0"),
-        ("receptive_field", -1, "receptive_field must be a whole number from 0 to 16, not -1"),
-        ("depth", 99, "depth must be a whole number from 1 to 8, not 99"),
-        ("is_linear", 1, "Expected `bool`, got `int` - at .*is_linear"),
         ("edges", "all", "Invalid enum value 'all' - at .*edges"),
         ("num_outputs", 3, "num_outputs must be 1 or 2, not 3"),
         ("num_features", 8, "num_features is 8, but the extended features are 18"),

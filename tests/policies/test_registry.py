@@ -1,6 +1,5 @@
 """Policies by their names, and directories in their place."""
 
-import math
 import os
 
 import numpy as np
@@ -99,12 +98,6 @@ def test_what_is_neither_a_name_nor_a_directory(name):
 def test_a_path_that_leads_nowhere():
     with pytest.raises(ValueError, match=r"there is no policy runs/y; name a \.safetensors file"):
         make_policy("runs/y", MISSION)
-
-
-@here
-def test_a_learned_policy_has_no_probability():
-    with pytest.raises(ValueError, match="mine takes no transmission probability; leave out"):
-        make_policy("mine", MISSION, 0.1)
 
 
 @here
@@ -214,18 +207,6 @@ def test_iv_c_tree_is_the_presets(mission, is_recomputed, root_transmits):
             np.testing.assert_array_equal(*(swarm.decide() for swarm in swarms))
             for swarm in swarms:
                 swarm._physics.place(swarm.states.position_m[:, ::-1], swarm.states.velocity_mps)
-
-
-def test_unknown_policy_is_a_clear_error():
-    with pytest.raises(ValueError, match=r"one of random-flooding, round-robin, mst.*not 'rumour'"):
-        make_policy("rumour", MISSION)
-
-
-@pytest.mark.parametrize("name", TUNED)
-@pytest.mark.parametrize("probability", [-0.1, 1.5, math.inf])
-def test_bad_probability_is_a_clear_error(name, probability):
-    with pytest.raises(ValueError, match="probability must be from 0 to 1"):
-        make_policy(name, MISSION, probability)
 
 
 @pytest.mark.parametrize("name", TUNED)

@@ -126,14 +126,11 @@ def test_a_policy_is_one_file_that_others_can_read(policy):
 
 def test_a_policy_is_the_same_bytes_every_time(policy):
     before = policy.read_bytes()
+    save_tiny(policy, "paper")
+    assert policy.read_bytes() != before
     save_tiny(policy)
     assert policy.read_bytes() == before
-
-
-def test_a_card_of_ones_own(tmp_path):
-    network = tiny_network()
-    written = save_policy(tmp_path / "x", network, tiny_config(network), "# Mine\n")
-    assert json.loads(metadata_of(written)["swarm_mj policy"])["card"] == "# Mine\n"
+    assert [path.name for path in policy.parent.iterdir()] == [policy.name]
 
 
 def test_loading_draws_no_random_numbers(policy):
@@ -141,12 +138,6 @@ def test_loading_draws_no_random_numbers(policy):
     state = torch.get_rng_state()
     load_policy(policy, MISSION)
     assert torch.equal(torch.get_rng_state(), state)
-
-
-def test_saving_again_replaces_the_policy(policy):
-    network = save_tiny(policy, "paper", seed=2)
-    assert read_policy(policy)[0].shape == network.shape
-    assert [path.name for path in policy.parent.iterdir()] == [policy.name]
 
 
 @pytest.mark.parametrize(
@@ -407,13 +398,6 @@ def test_weights_that_could_not_be_loaded_are_not_saved(policy):
     with pytest.raises(ValueError, match=r"mine\.safetensors may have up to 64000000 bytes, not 1"):
         save_policy(policy, wide, tiny_config(wide))
     assert torch.equal(read_policy(policy)[0].output.weight, tiny_network().output.weight)
-
-
-def test_weights_of_another_shape_are_not_stored(tmp_path):
-    less = {name: values for name, values in plain_weights().items() if name != "0.bias"}
-    with pytest.raises(ValueError, match=r"it lacks the tensor 0\.bias"):
-        save_weights(tmp_path / "x", less, PLAIN)
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_config_of_another_network_is_not_saved(tmp_path):

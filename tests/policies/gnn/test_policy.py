@@ -15,7 +15,6 @@ from swarm_mj.policies.gnn.policy import GnnPolicy, recipient_logits
 from swarm_mj.policies.learned import IMPOSSIBLE, sample
 from swarm_mj.policies.policy import DecentralisedPolicy
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.replay.recorder import Recorder
 from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 
@@ -135,9 +134,9 @@ def test_eq9_a_robot_decides_on_what_it_can_know(features, robot):
 
 @pytest.mark.parametrize("features", FEATURES)
 @pytest.mark.parametrize("preset", [paper, reference])
-def test_one_directory_flies_teams_of_any_size(tmp_path, features, preset):
+def test_one_policy_flies_teams_of_any_size(tmp_path, features, preset):
     save_tiny(tmp_path / "policy", features)
-    for num_robots in (2, 10, 40, 80):
+    for num_robots in (2, 10, 40):
         mission = preset("random-walk", num_robots=num_robots, num_windows=12, range_ratio=0.5)
         swarm = Swarm(mission, [1])
         summary = summarise(list(rollout(swarm, make_policy(str(tmp_path / "policy"), mission))))
@@ -214,14 +213,6 @@ def test_threads_and_gradients_are_left_as_they_were():
         assert torch.is_grad_enabled()
     finally:
         torch.set_num_threads(before)
-
-
-def test_a_flight_is_recorded():
-    swarm, policy = Swarm(MISSION, [1]), learned()
-    recorder = Recorder(swarm, ego=2, is_broadcast=policy.window(swarm.mission).is_broadcast)
-    for window in rollout(swarm, policy):
-        recorder.add(window)
-    assert len(recorder.log().recipient) == MISSION.num_windows
 
 
 # Logits over recipients, by hand.
