@@ -31,25 +31,6 @@ from swarm_mj.system.terminal import num_cores, plain_console
 
 MARKS = {"ok": "ok", "absent": "-", "broken": "BROKEN"}
 PACKAGE = "swarm_mj"
-PURPOSES = {  # of packages that flying itself does without
-    "av": "videos of replays",
-    "dm-control": "the dm_control environment",
-    "dm-env": "the dm_control environment",
-    "gymnasium": "Gymnasium environments, training",
-    "matplotlib": "figures",
-    "pandas": "data frames of results",
-    "pillow": "pictures of replays",
-    "pyarrow": "replays",
-    "rerun-sdk": "replays and their viewer",
-    "safetensors": "learned policies",
-    "scipy": "intervals of evaluations",
-    "stable-baselines3": "training",
-    "tensorboard": "curves of trainings",
-    "torch": "learned policies, training",
-    "pettingzoo": "PettingZoo environments",
-    "docs": "building the documentation",
-    "dev": "tests, formatter, type checker",
-}
 LITTLE_MEMORY = 2 * 10**9  # a flight with its replay takes half a gigabyte, a training two
 LITTLE_DISK = 10**9
 LONGEST_S = 120.0  # of a trial; the first flight of an installation compiles for half a minute
@@ -73,12 +54,15 @@ print("yes")
 """
 
 
+State = Literal["ok", "absent", "broken"]  # absent: flying does without; broken: nothing flies
+
+
 class Finding(NamedTuple):
     """One thing that was looked at."""
 
     group: str  # the heading it stands under
     name: str
-    state: Literal["ok", "absent", "broken"]  # absent: flying does without; broken: nothing flies
+    state: State
     found: str
     mend: str = ""  # what to do, if it is not ok
 
@@ -90,7 +74,7 @@ class Trial(NamedTuple):
     name: str  # if it is VARIABLE=VALUE, the program runs with that
     program: str
     mend: str
-    state: Literal["absent", "broken"] = "absent"  # if it fails
+    state: State = "absent"  # if it fails
 
 
 RENDERING = "rendering without a display"
@@ -133,32 +117,34 @@ def packages() -> Iterator[Finding]:
     asked = [Requirement(text) for text in metadata.requires(PACKAGE) or ()]
     brought = [each for each in asked if each.marker is None or each.marker.evaluate({"extra": ""})]
     for each in brought:
-        purpose = "flying" if each.name in CORE else PURPOSES.get(each.name, "parts of swarm_mj")
-        problem = _problem(each)
-        if problem is None:
-            yield Finding("packages", each.name, "ok", metadata.version(each.name))
-        else:
-            state = "broken" if each.name in CORE else "absent"
-            mend = f"pip install '{each.name}{each.specifier}'"
-            yield Finding("packages", each.name, state, f"{problem}; for {purpose}", mend)
+        mend = f"pip install '{each.name}{each.specifier}'"
+        state = "broken" if each.name in CORE else "absent"
+        yield _installed(each.name, [each], "flying" if each.name in CORE else "", mend, state)
     for extra in metadata.metadata(PACKAGE).get_all("Provides-Extra") or ():
         own = [each for each in asked if each.marker and each.marker.evaluate({"extra": extra})]
         own = [each for each in own if each not in brought and each.name != PACKAGE]
-        missing = ", ".join(each.name for each in own if _problem(each))
-        found = f"lacks {missing}" if missing else "installed"
-        found, state = f"{found}; for {PURPOSES.get(extra, 'more')}", "absent" if missing else "ok"
-        mend = f"pip install '{PACKAGE}[{extra}]'" if missing else ""
-        yield Finding("packages", f"extra {extra}", state, found, mend)
+        yield _installed(f"extra {extra}", own, "", f"pip install '{PACKAGE}[{extra}]'", "absent")
+
+
+def _installed(name: str, asked: list[Requirement], need: str, mend: str, state: State) -> Finding:
+    """Find whether packages are installed in the versions asked for."""
+    problems = list(filter(None, map(_problem, asked)))
+    if problems:
+        needed = f"; {need} needs it" if need else ""
+        return Finding("packages", name, state, ", ".join(problems) + needed, mend)
+    found = metadata.version(name) if name == asked[0].name else "installed"
+    return Finding("packages", name, "ok", found)
 
 
 def _problem(requirement: Requirement) -> str | None:
     """Return what is wrong with a package as it is installed, if anything is."""
+    name = requirement.name
     try:
-        found = metadata.version(requirement.name)
+        found = metadata.version(name)
     except metadata.PackageNotFoundError:
-        return "not installed"
+        return f"{name} is not installed"
     fits = requirement.specifier.contains(found, prereleases=True)
-    return None if fits else f"{found}, which is not {requirement.specifier}"
+    return None if fits else f"{name} {found} is not {requirement.specifier}"
 
 
 def tried() -> Iterator[Finding]:
@@ -194,8 +180,12 @@ def machine() -> Iterator[Finding]:
     set_to = f", OMP_NUM_THREADS={threads}" if threads else ""
     yield Finding("speed", "cores", "ok", f"{num_cores()} may be used{set_to}")
     yield _compiled_code()
-    yield _room("memory free", free_memory(), LITTLE_MEMORY, "end other programs")
-    yield _room("disk free here", free_room(Path.cwd()), LITTLE_DISK, "name another folder")
+    for name, free, little, mend in (
+        ("memory free", free_memory(), LITTLE_MEMORY, "end other programs"),
+        ("disk free here", free_room(Path.cwd()), LITTLE_DISK, "name another folder"),
+    ):
+        less = "" if free >= little else f", less than {in_gb(little)}"
+        yield Finding("room", name, "absent" if less else "ok", f"{in_gb(free)}{less}", mend)
     group, names = "rerun's viewer", ("DISPLAY", "WAYLAND_DISPLAY")
     found = [f"{name}={os.environ[name]}" for name in names if os.environ.get(name)]
     if found or not sys.platform.startswith("linux"):
@@ -207,21 +197,15 @@ def machine() -> Iterator[Finding]:
 def _compiled_code() -> Finding:
     """Find where numba keeps what it compiled; without a place every start compiles."""
     compiled: Any = reception.sinr
-    folder, name = compiled.stats.cache_path, "compiled code"
-    mend = "set NUMBA_CACHE_DIR to a folder that you can write"
-    if folder is None:
-        return Finding("speed", name, "absent", "not kept: every start compiles anew", mend)
+    folder, problem = compiled.stats.cache_path, "not kept: every start compiles anew"
     try:
-        check_writable(Path(folder) / "kernels")
+        if folder is not None:
+            check_writable(Path(folder) / "kernels")
+            return Finding("speed", "compiled code", "ok", f"kept in {folder}")
     except OSError as error:
-        return Finding("speed", name, "absent", f"{folder} cannot be written ({error})", mend)
-    return Finding("speed", name, "ok", f"kept in {folder}")
-
-
-def _room(name: str, free: int, little: int, mend: str) -> Finding:
-    state = "ok" if free >= little else "absent"
-    found = in_gb(free) + ("" if free >= little else f", less than {in_gb(little)}")
-    return Finding("room", name, state, found, mend)
+        problem = f"{folder} cannot be written ({error})"
+    mend = "set NUMBA_CACHE_DIR to a folder that you can write"
+    return Finding("speed", "compiled code", "absent", problem, mend)
 
 
 def _print(found: list[Finding], *, works: bool) -> None:
