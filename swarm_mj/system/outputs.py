@@ -48,11 +48,12 @@ def check_outputs(*outputs: Output, inputs: Iterable[Path] = (), must_be_new: bo
         named[target] = what
         if os.path.exists(target) and sources & {target, *map(str, Path(target).parents)}:
             raise ValueError(f"{what} {path} is an input, or part of one; name another")
-        if suffix and path.suffix.lower() not in suffix.split("|"):
-            ways = " or ".join(f"*{ending}" for ending in suffix.split("|"))
-            raise ValueError(f"{what} must be named {ways}, not {path}")
         try:
             _check_place(what, path, must_be_new=must_be_new)
+            if suffix and path.suffix.lower() not in suffix.split("|"):
+                ways = " or ".join(f"*{ending}" for ending in suffix.split("|"))
+                raise ValueError(f"{what} must be named {ways}, not {path}")
+            check_writable(path)
         except OSError as error:
             reason = f"{error.strerror}{way_out and f'; {way_out}'}"
             kind = OSError if error.errno in MACHINES_FAULT else ValueError
@@ -68,7 +69,6 @@ def _check_place(what: str, path: Path, *, must_be_new: bool) -> None:
             raise ValueError(f"{what} {path} is a device or a pipe; name a file")
         if must_be_new:
             raise ValueError(f"{what} {path} exists; name another, or replace it with --force")
-    check_writable(path)
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tries import tries
 
-FLIPS, CUTS = 300, 100
+FLIPS, CUTS = 100, 30
 ROOT = Path(__file__).parent.parent.parent
 BAD_INPUT = 2
 

@@ -101,6 +101,7 @@ def test_under_nohup_the_work_goes_on(forks, tmp_path):
 # Runs `swarm-mj` with standard streams whose reader has gone.
 UNREAD = """
 import os, pty, sys
+from swarm_mj.cli import main
 if __name__ == "__main__":
     reader, writer = getattr({"os": os, "pty": pty}[sys.argv[1]], sys.argv[2])()
     os.dup2(writer, 1)
@@ -133,6 +134,7 @@ def test_a_reader_that_goes_away_is_no_error(forks, tmp_path, kind, arguments, l
 # Runs `swarm-mj` with some of its standard streams on a full disk.
 FULL = """
 import os, sys
+from swarm_mj.cli import main
 if __name__ == "__main__":
     for number in sys.argv[1]:
         os.dup2(os.open("/dev/full", os.O_WRONLY), int(number))
