@@ -52,7 +52,8 @@ def with_causes_of(robot, mine, theirs, after):
     for b in range(len(SEEDS)):
         kept = causes(after, b, robot) if after else [robot]
         for name, array in vars(mixed.buffers).items():
-            array[b, kept] = getattr(mine.buffers, name)[b, kept]
+            if array.ndim > 1:  # by robots
+                array[b, kept] = getattr(mine.buffers, name)[b, kept]
         for own, other in zip(mine.phases, mixed.phases, strict=True):
             for name, array in vars(other).items():
                 array[b, causes(mine, b, robot)] = getattr(own, name)[b, causes(mine, b, robot)]
@@ -70,6 +71,8 @@ def renamed(view, name, new_name):
     """The view of a team whose robot i is robot name[i] of this one."""
     buffers = copy.deepcopy(view.buffers)
     for field, array in vars(view.buffers).items():
+        if array.ndim == 1:  # by missions only
+            continue
         pairs = np.ascontiguousarray(array[:, name][:, :, name])
         if field == "parent":
             pairs = np.where(pairs < 0, pairs, new_name[pairs])

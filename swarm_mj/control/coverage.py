@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 from swarm_mj.control.controller import steer
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.protocol.buffers import NEVER, Buffers
+from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.system.compiled import compiled
 
 
@@ -27,8 +27,9 @@ class Coverage:
     def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N 2"]:
         """Steer each robot to the centroid of the cell that it believes to be its own [m/s²]."""
         target_m = np.empty_like(states.position_m)
-        is_known, known_m = buffers.timestamp > NEVER, buffers.position_m
-        _centroids(is_known, known_m, states.position_m, self._half_side_m, target_m)
+        _centroids(
+            buffers.is_known, buffers.position_m, states.position_m, self._half_side_m, target_m
+        )
         return steer(target_m, states)
 
     def cost(self, states: RobotStates, /) -> Float[np.ndarray, "B"]:

@@ -9,12 +9,12 @@ the robots oscillate ever wider; stale information makes them aim at where teamm
 import math
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from swarm_mj.control.controller import steer
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.protocol.buffers import NEVER, Buffers
+from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.system.compiled import compiled
 
 BLOCK_SHARE = 0.5  # width of the formation over the side of the area
@@ -31,7 +31,7 @@ class Formation:
     def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N 2"]:
         """Steer each robot to the mean of its places relative to known teammates [m/s²]."""
         target_m = states.position_m.copy()
-        _mean_places(buffers.timestamp, buffers.position_m, self._place_m, target_m)
+        _mean_places(buffers.is_known, buffers.position_m, self._place_m, target_m)
         return steer(target_m, states)
 
     def cost(self, states: RobotStates, /) -> Float[np.ndarray, "B"]:
@@ -56,19 +56,19 @@ def block(num_robots: int, width_m: float) -> Float[np.ndarray, "N 2"]:
 
 @compiled()
 def _mean_places(
-    timestamp: Float[np.ndarray, "B N N"],
+    is_known: Bool[np.ndarray, "B N N"],
     known_m: Float[np.ndarray, "B N N 2"],
     place_m: Float[np.ndarray, "N 2"],
     target_m: Float[np.ndarray, "B N 2"],
 ) -> None:
     """Write the targets of robots that know teammates."""
-    num_missions, num_robots = timestamp.shape[:2]
+    num_missions, num_robots = is_known.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
             for axis in range(2):
                 total, num_known = 0.0, 0
                 for j in range(num_robots):
-                    if j != i and timestamp[b, i, j] > NEVER:
+                    if j != i and is_known[b, i, j]:
                         total += known_m[b, i, j, axis] + place_m[i, axis] - place_m[j, axis]
                         num_known += 1
                 if num_known:

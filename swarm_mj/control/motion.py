@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from swarm_mj.control.controller import Controller
 from swarm_mj.control.coverage import Coverage
@@ -11,7 +11,7 @@ from swarm_mj.control.formation import Formation
 from swarm_mj.mission import FlockingSet, Mission, Task
 from swarm_mj.mission.batched_rng import Stream, normal
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.protocol.buffers import NEVER, Buffers
+from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.protocol.costs import velocity_variance
 from swarm_mj.system.compiled import compiled
 
@@ -90,29 +90,27 @@ def flocking(
             other than 0 in the buffer (`moving`, the authors' code). The robot itself is in it;
             while F is empty the acceleration is 0.
     """
-    counts_heard = flocking_set == "heard"
     acceleration = np.zeros_like(velocity_mps)
-    known_mps = buffers.velocity_mps
-    _mean_difference(buffers.timestamp, known_mps, velocity_mps, counts_heard, acceleration)
+    is_counted = None if flocking_set == "moving" else buffers.is_known
+    _mean_difference(is_counted, buffers.velocity_mps, velocity_mps, acceleration)
     return acceleration
 
 
 @compiled()
 def _mean_difference(
-    timestamp: Float[np.ndarray, "B N N"],
+    is_counted: Bool[np.ndarray, "B N N"] | None,
     known_mps: Float[np.ndarray, "B N N 2"],
     velocity_mps: Float[np.ndarray, "B N 2"],
-    counts_heard: bool,
     acceleration: Float[np.ndarray, "B N 2"],
 ) -> None:
-    num_missions, num_robots = timestamp.shape[:2]
+    num_missions, num_robots = known_mps.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
             for axis in range(2):
                 total, num_counted = 0.0, 0
                 for j in range(num_robots):
                     known = known_mps[b, i, j, axis]
-                    if (timestamp[b, i, j] > NEVER) if counts_heard else (known != 0.0):
+                    if known != 0.0 if is_counted is None else is_counted[b, i, j]:
                         total += known - velocity_mps[b, i, axis]
                         num_counted += 1
                 if num_counted:

@@ -121,7 +121,7 @@ class SwarmTask(_Task):
     def get_observation(self, physics: SwarmPhysics) -> OrderedDict[str, np.ndarray | np.float64]:
         """What the buffers hold (II-B), [i, j]: what i knows about j; and the time [windows]."""
         buffers = vars(physics.swarm.buffers)
-        known = {name: array[0].copy() for name, array in buffers.items()}
+        known = {name: array[0].copy() for name, array in buffers.items() if array.ndim > 1}
         return OrderedDict(known, now=physics.swarm.now[0])
 
     def get_reward(self, physics: SwarmPhysics) -> float:

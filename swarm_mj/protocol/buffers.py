@@ -16,7 +16,6 @@ from swarm_mj.system.compiled import compiled
 NO_PARENT = -1  # of oneself, and of a teammate never heard of over the radio
 BROADCAST = -1  # the recipient of a packet for everyone who hears it
 NEVER = 0.0  # T_0 and L_0: the clock's first tick is half a window, so 0 is before everything
-AT_START = 1e-300  # T of what was granted of t = 0: after T_0, and lost in any sum with a time
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,11 +27,12 @@ class Buffers:
     velocity_mps: Float[np.ndarray, "B N N 2"]  # M^{i,j}: how fast j was, as i knows it [m/s]
     parent: Int[np.ndarray, "B N N"]  # P^{i,j}: whom j first passed it to, or NO_PARENT
     last_attempt: Float[np.ndarray, "B N N"]  # L^{i,j}: when i last addressed j [windows], or NEVER
+    is_granted: Bool[np.ndarray, "B"]  # all states at t = 0 were known: then NEVER means T = 0
 
     @property
     def is_known(self) -> Bool[np.ndarray, "B N N"]:
-        """Whether i has observed j, or received an entry of it, since the start (T > T_0)."""
-        return self.timestamp > NEVER
+        """Whether i has observed j or received an entry of it (T > T_0), or knew its start."""
+        return (self.timestamp > NEVER) | self.is_granted[:, None, None]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -57,14 +57,15 @@ def empty_buffers(num_missions: int, num_robots: int) -> Buffers:
         velocity_mps=np.zeros((*shape, 2)),
         parent=np.full(shape, NO_PARENT, dtype=np.int32),
         last_attempt=np.full(shape, NEVER),
+        is_granted=np.zeros(num_missions, dtype=np.bool_),
     )
 
 
 def grant_start(buffers: Buffers, states: RobotStates) -> None:
-    """Write everyone's true state at the start into empty buffers; without parents, as granted."""
-    buffers.timestamp[:] = AT_START
+    """Write all true states at the start into empty buffers, without parents."""
     buffers.position_m[:] = states.position_m[:, None]
     buffers.velocity_mps[:] = states.velocity_mps[:, None]
+    buffers.is_granted[:] = True
 
 
 def observe_self(buffers: Buffers, states: RobotStates, now: Float[np.ndarray, "B"]) -> None:
@@ -92,7 +93,7 @@ def record_attempt(
 
     Args:
         buffers: Written in place.
-        recipient: Whom each robot addresses; itself is silence, and `BROADCAST` is nobody.
+        recipient: Whom each robot addresses; itself is silence, and `BROADCAST` is no robot.
         now: t [windows].
         is_active: Who notes anything; None is everyone.
         silence_is_attempt: Whether a silent robot notes having addressed itself.
@@ -105,14 +106,14 @@ def merge(
     heard: Int[np.ndarray, "B N"],
     is_sent: Bool[np.ndarray, "B N N"] | None = None,
 ) -> None:
-    """Take over all entries that are strictly newer in the packet each robot decoded (Eq. 8).
+    """Replace all entries by those strictly newer in the packet each robot decoded (Eq. 8).
 
     A packet holds its sender's buffer as it was before the phase. Information that comes straight
     from its subject gets the receiver as parent (II-B: P^{i,k} = i).
 
     Args:
         buffers: Written in place.
-        heard: The sender that each robot decoded; itself is nobody.
+        heard: The sender that each robot decoded, or itself.
         is_sent: `[b, i, k]`: whether i's packet has an entry of k; None: packets are whole.
     """
     _merge_newer(

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.protocol.buffers import AT_START, NEVER, Buffers
+from swarm_mj.protocol.buffers import NEVER, Buffers
 from swarm_mj.protocol.window import Phase
 from swarm_mj.system.compiled import compiled
 
@@ -58,7 +58,8 @@ def age_of_information(
     Returns:
         The age [windows], and whether all of these know all of these.
     """
-    return _mean_age(buffers.timestamp, now, is_active)
+    age, is_complete = _mean_age(buffers.timestamp, now, is_active)
+    return age, is_complete | buffers.is_granted
 
 
 @compiled()
@@ -90,18 +91,20 @@ def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets
         phases: The window's two phases.
         is_broadcast: Whether both are broadcasts (IV-C), or the second answers the first (Alg. 1).
     """
-    first, second = (_count(phase.recipient, phase.heard) for phase in phases)
+    first, second = (_Counts(*np.zeros((5, len(phase.recipient)))) for phase in phases)
+    for phase, counts in zip(phases, (first, second), strict=True):
+        _add_counts(phase.recipient, phase.heard, counts)
     none = np.full_like(first.sent, np.nan)
-    counts = dict.fromkeys((spec.name for spec in fields(Packets)), none)
+    fates = dict.fromkeys((spec.name for spec in fields(Packets)), none)
     both = first.sent + second.sent
     if is_broadcast:
         heard, receptions = first.heard + second.heard, first.receptions + second.receptions
-        counts |= {"sent": both, "heard": heard, "receptions": receptions}
+        fates |= {"sent": both, "heard": heard, "receptions": receptions}
     else:
         overheard = first.overheard + second.overheard
-        counts |= {"sent": first.sent, "attempted": first.sent, "delivered": first.delivered}
-        counts |= {"overheard": overheard, "answered": second.delivered}
-    return Packets(**counts | {"transmitted": both})
+        fates |= {"sent": first.sent, "attempted": first.sent, "delivered": first.delivered}
+        fates |= {"overheard": overheard, "answered": second.delivered}
+    return Packets(**fates | {"transmitted": both})
 
 
 def mean_hops(
@@ -110,7 +113,7 @@ def mean_hops(
     """Return the mean depth of teammates in the parent trees (II-B), 0 without teammates [hops].
 
     Args:
-        buffers: What everyone knows.
+        buffers: All robots' buffers; a state known beforehand came over no radio, so has no depth.
         is_active: Whose depths in whose trees count, through any robot; None is everyone.
 
     Raises:
@@ -137,7 +140,7 @@ class WindowCosts:
     """The costs of one window, in every mission."""
 
     age_windows: Float[np.ndarray, "B"]  # age of information after the window (Eq. 10)
-    is_complete: Bool[np.ndarray, "B"]  # whether everyone knows everyone
+    is_complete: Bool[np.ndarray, "B"]  # whether all robots know all others
     velocity_variance_m2ps2: Float[np.ndarray, "B"]  # Eq. 17
     packets: Packets
     task_cost: TaskCost | None = None  # after the window; None if the controller has none
@@ -200,12 +203,6 @@ class _Counts(NamedTuple):
     receptions: Float[np.ndarray, "B"]
 
 
-def _count(recipient: Int[np.ndarray, "B N"], heard: Int[np.ndarray, "B N"]) -> _Counts:
-    counts = _Counts(*np.zeros((5, len(recipient))))
-    _add_counts(recipient, heard, counts)
-    return counts
-
-
 @compiled()
 def _add_counts(
     recipient: Int[np.ndarray, "B N"], heard: Int[np.ndarray, "B N"], counts: _Counts
@@ -244,8 +241,7 @@ def _mean_depth(
             depth[:] = -1
             depth[i] = 0
             for j in range(num_robots):
-                is_granted = timestamp[b, i, j] == AT_START  # and has come over no radio
-                if timestamp[b, i, j] > NEVER and j != i and not is_granted:
+                if timestamp[b, i, j] > NEVER and j != i:
                     k = j
                     length = 0
                     while depth[k] < 0:

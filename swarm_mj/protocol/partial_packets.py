@@ -1,9 +1,9 @@
 """Packets that do not hold the whole buffer: the choice of entries (II-B, with a bit rate).
 
-A robot always sends its own entry, and then those whose T has risen most since it last sent
-them, of equals the freshest. So every entry gets its turn. An entry names its parent as it is if
-the parent's own entry is in the packet, and otherwise the sender: so what a receiver holds remains
-a tree, although some robots on the way are left out.
+A robot always sends its own entry, and then those whose T has risen most since it last sent them;
+ties go to the freshest. So every entry gets its turn. An entry keeps its parent if the parent's own
+entry is in the packet, and otherwise names the sender: so buffers remain trees, although some
+robots on the way are left out.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -31,9 +31,9 @@ def with_room(buffers: Buffers, num_entries: int) -> Buffers:
         return replace(buffers, num_entries=min(num_entries, buffers.shape[1]))
     if num_entries >= buffers.shape[1]:
         return buffers
-    arrays = {spec.name: getattr(buffers, spec.name) for spec in fields(Buffers)}
+    whole = {spec.name: getattr(buffers, spec.name) for spec in fields(Buffers)}
     last_sent = np.full(buffers.timestamp.shape, NEVER)
-    return PartialBuffers(**arrays, num_entries=num_entries, last_sent=last_sent)
+    return PartialBuffers(**whole, num_entries=num_entries, last_sent=last_sent)
 
 
 def entries_sent(

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import (
-    AT_START,
     NEVER,
     NO_PARENT,
     Buffers,
@@ -22,7 +21,7 @@ from swarm_mj.protocol.buffers import (
 
 seeds = st.integers(0, 2**32 - 1)
 sizes = st.integers(1, 6)
-NAMES = [spec.name for spec in fields(Buffers)]
+NAMES = [spec.name for spec in fields(Buffers) if spec.name != "is_granted"]
 
 
 def some_buffers(rng, num_missions, num_robots):
@@ -34,6 +33,7 @@ def some_buffers(rng, num_missions, num_robots):
         velocity_mps=rng.normal(size=(*shape, 2)),
         parent=rng.integers(-1, num_robots, shape).astype(np.int32),
         last_attempt=rng.integers(0, 5, shape) / 2.0,
+        is_granted=np.zeros(num_missions, dtype=np.bool_),
     )
 
 
@@ -76,7 +76,7 @@ def renamed(buffers, old_name):
     values = {name: getattr(buffers, name)[:, old_name][:, :, old_name] for name in NAMES}
     parent = values["parent"]
     values["parent"] = np.where(parent == NO_PARENT, NO_PARENT, new_name[parent])
-    return Buffers(**values)
+    return replace(buffers, **values)
 
 
 def test_empty_buffers_know_nothing():
@@ -214,7 +214,7 @@ def test_renaming_the_robots_renames_what_they_know(seed, num_robots):
 @settings(max_examples=50, deadline=None)
 def test_missions_side_by_side_do_not_mix(seed, num_robots):
     _, buffers, heard = case(seed, 3, num_robots)
-    rows = [Buffers(**{n: getattr(buffers, n)[[b]].copy() for n in NAMES}) for b in range(3)]
+    rows = [Buffers(**{n: each[[b]].copy() for n, each in vars(buffers).items()}) for b in range(3)]
     merge(buffers, heard)
     for b, row in enumerate(rows):
         merge(row, heard[[b]])
@@ -232,9 +232,11 @@ def test_what_is_granted_of_the_start_is_known_and_as_old_as_the_mission():
         velocity_mps=np.array([[[0.5, 0.0], [0.0, 0.25]]]),
     )
     buffers = empty_buffers(1, 2)
+    assert not buffers.is_known.any()
     grant_start(buffers, states)
     assert buffers.is_known.all()
-    np.testing.assert_array_equal(0.5 - buffers.timestamp, np.full((1, 2, 2), 0.5))  # to the digit
+    assert buffers.read_only().is_known.all()
+    np.testing.assert_array_equal(buffers.timestamp, np.zeros((1, 2, 2)))  # T is the start
     for i in range(2):
         np.testing.assert_array_equal(buffers.position_m[:, i], states.position_m)
         np.testing.assert_array_equal(buffers.velocity_mps[:, i], states.velocity_mps)
@@ -242,13 +244,14 @@ def test_what_is_granted_of_the_start_is_known_and_as_old_as_the_mission():
 
 
 def test_eq8_the_first_packet_replaces_what_was_granted():
+    states = RobotStates(position_m=np.ones((1, 2, 2)), velocity_mps=np.ones((1, 2, 2)))
     buffers = empty_buffers(1, 2)
-    buffers.timestamp[:] = AT_START
+    grant_start(buffers, states)
     observe_self(
         buffers,
-        RobotStates(position_m=np.ones((1, 2, 2)), velocity_mps=np.ones((1, 2, 2))),
+        states,
         np.array([0.5]),
     )
     merge(buffers, np.array([[0, 0]]))
-    assert buffers.timestamp[0].tolist() == [[0.5, AT_START], [0.5, 0.5]]
+    assert buffers.timestamp[0].tolist() == [[0.5, 0.0], [0.5, 0.5]]
     assert buffers.parent[0].tolist() == [[NO_PARENT, NO_PARENT], [1, NO_PARENT]]

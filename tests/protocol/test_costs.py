@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.protocol.buffers import AT_START, NO_PARENT, empty_buffers
+from swarm_mj.protocol.buffers import NO_PARENT, empty_buffers
 from swarm_mj.protocol.costs import (
     age_of_information,
     count_packets,
@@ -286,7 +286,8 @@ def test_a_windows_costs_are_each_of_them():
 def test_what_was_granted_at_the_start_has_come_over_no_radio():
     """Robot 0 has heard robot 1 itself, and robot 2 over robot 1; robot 3 it was told of."""
     buffers = empty_buffers(1, 4)
-    buffers.timestamp[:] = AT_START
+    buffers.is_granted[:] = True
     buffers.timestamp[0, 0, :3] = 1.0
     buffers.parent[0, 0, :3] = [NO_PARENT, 0, 1]
     assert mean_hops(buffers).tolist() == [1.5]
+    assert age_of_information(buffers, np.array([1.0]))[1].tolist() == [True]

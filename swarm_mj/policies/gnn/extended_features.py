@@ -75,9 +75,9 @@ class ExtendedFeatures(FeatureExtractor):
         num_missions, num_robots = buffers.shape
         node = np.empty((num_missions, num_robots, num_robots), dtype=NODE)
         may_address = np.empty(node.shape, dtype=np.bool_)
-        times = buffers.timestamp, buffers.last_attempt, views.now
-        _fill(*times, believed_m, self._memory, range_m, node, may_address)
-        is_known = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
+        times, is_observed = (buffers.timestamp, buffers.last_attempt, views.now), buffers.is_known
+        _fill(*times, is_observed, believed_m, self._memory, range_m, node, may_address)
+        is_known = is_observed | np.eye(num_robots, dtype=np.bool_)
         _fill_by_position(believed_m, is_known, views.now, range_m, node)
         now, threshold = views.now.astype(np.int64), from_db(self._mission.sinr_threshold_db)
         write_joined(believed_m, is_known, now, range_m, threshold, node["has_joined"])
@@ -117,10 +117,10 @@ LOG_AGES = np.array([math.log1p(n / 2) / math.log1p(LONG_WINDOWS) for n in range
 
 
 @compiled()
-def _log_age(now: float, then: float) -> float:
+def _log_age(now: float, then: float, ever: bool) -> float:
     """Return the age on this scale: 0 is now, 1 is long ago or never."""
     age = now - then
-    if then <= NEVER or age >= LONG_WINDOWS:
+    if not ever or age >= LONG_WINDOWS:
         return 1.0
     place = int(2.0 * age)
     return LOG_AGES[place] if place == 2.0 * age and place >= 0 else _logarithm(age)
@@ -146,6 +146,7 @@ def _fill(
     timestamp: Float[np.ndarray, "B N N"],
     last_attempt: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
+    is_observed: Bool[np.ndarray, "B N N"],
     position_m: Float[np.ndarray, "B N N 2"],
     memory: Memory,
     range_m: float,
@@ -162,20 +163,22 @@ def _fill(
             num_known = 0
             for k in range(num_robots):
                 own[k] = timestamp[b, i, k]
-                num_known += k == i or timestamp[b, i, k] > NEVER
+                num_known += k == i or is_observed[b, i, k]
             for k in range(num_robots):
                 ranges = math.sqrt(squared_distance(position_m[b, i], k, i)) / range_m
-                is_known = k == i or timestamp[b, i, k] > NEVER
+                is_known = k == i or is_observed[b, i, k]
                 is_near = is_known and k != i and ranges <= 1.0
                 of_k = node[b, i, k]
                 of_k.is_oneself = k == i
                 of_k.is_known = is_known
-                of_k.timestamp_age = _log_age(now[b], timestamp[b, i, k])
+                of_k.timestamp_age = _log_age(now[b], timestamp[b, i, k], is_observed[b, i, k])
                 of_k.distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known else 0.0
                 of_k.is_near = is_near
-                of_k.heard_age = _log_age(now[b], memory.heard[b, i, k])
-                of_k.attempt_age = _log_age(now[b], last_attempt[b, i, k])
-                of_k.addressed_age = _log_age(now[b], memory.addressed_by[b, i, k])
+                heard, addressed = memory.heard[b, i, k], memory.addressed_by[b, i, k]
+                of_k.heard_age = _log_age(now[b], heard, heard > NEVER)
+                attempt = last_attempt[b, i, k]
+                of_k.attempt_age = _log_age(now[b], attempt, attempt > NEVER)
+                of_k.addressed_age = _log_age(now[b], addressed, addressed > NEVER)
                 of_k.news, of_k.unsaid_news = 0.0, 0.0
                 if is_near:
                     news = _news(own, memory.neighbour[b, i, k], memory.said[b, i])
@@ -184,7 +187,8 @@ def _fill(
                 of_k.known_share = num_known / num_robots
                 of_k.team_size = num_robots / TEAM
                 may_address[b, i, k] = k == i or not is_known or ranges <= ADDRESS_RANGES
-            _fill_oneself(i, _log_age(now[b], memory.sent[b, i]), node[b, i])
+            sent = memory.sent[b, i]
+            _fill_oneself(i, _log_age(now[b], sent, sent > NEVER), node[b, i])
 
 
 @compiled()
