@@ -243,7 +243,8 @@ def test_alg1_the_others_notice_no_more_than_if_they_had_gone_away(preset, talk)
         talk(buffers, replace(states, is_active=is_active), recipient, channel, now)
         talk(apart, gone, np.where(is_active, recipient, np.arange(7)), channel, now)
         for field, array in vars(apart).items():
-            found = getattr(buffers, field)[is_pair]
-            np.testing.assert_array_equal(found, array[is_pair], err_msg=field)
+            if array.ndim > 1:  # by robots
+                found = getattr(buffers, field)[is_pair]
+                np.testing.assert_array_equal(found, array[is_pair], err_msg=field)
         num_news += np.sum((buffers.timestamp > start)[is_pair & ~np.eye(7, dtype=bool)])
     assert num_news > 20

@@ -48,7 +48,8 @@ class Apart(BroadcastPolicy):
         """All that is not robot i's is lost, but T and P of whom it decoded in the last slot."""
         seen = copy.deepcopy(views)
         for array in vars(seen.buffers).values():
-            array[:, np.arange(views.num_robots) != i] = 0
+            if array.ndim > 1:  # by robots
+                array[:, np.arange(views.num_robots) != i] = 0
         for phase, true in zip(seen.phases, views.phases, strict=True):
             phase.heard[...] = phase.recipient[...] = np.arange(views.num_robots)
             phase.heard[:, i] = true.heard[:, i]
