@@ -6,7 +6,7 @@ from jaxtyping import UInt8
 
 from swarm_mj.mission import Mission
 from swarm_mj.replay import palette
-from swarm_mj.replay.footage import Frame
+from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.packets import PacketLinks, transmitters
 from swarm_mj.replay.rerun_log import RerunLog
 
@@ -40,13 +40,13 @@ def draw_map(
     _draw_radio(out, packets, mission.range_m)
 
 
-def square_m(frame: Frame) -> float:
+def square_m(frame: Ground) -> float:
     """Return the side of the grid's squares: 100 m, or a power of ten more for a large ground."""
     across_m = 2.0 * frame.reach_m + float(np.max(np.ptp(frame.centre_m, axis=0)))
     return SQUARE_M * 10.0 ** max(0, int(np.ceil(np.log10(across_m / SQUARE_M / MAX_SQUARES))))
 
 
-def grid(frame: Frame) -> list[list[tuple[float, float]]]:
+def grid(frame: Ground) -> list[list[tuple[float, float]]]:
     """Return lines at whole squares, over all the ground that the map ever shows."""
     square = square_m(frame)
     x_low, y_low = np.floor((np.min(frame.centre_m, axis=0) - frame.reach_m) / square)

@@ -18,7 +18,7 @@ NEAR = 1.5  # times the area: robots that stay within it are shown around the ar
 
 
 @dataclass(frozen=True, kw_only=True)
-class Frame:
+class Ground:
     """The part of the ground that is shown: a square of constant size that may move."""
 
     centre_m: Float[np.ndarray, "T 2"]  # in each window [m]
@@ -30,7 +30,7 @@ class Frame:
         return bool(np.any(self.centre_m))
 
 
-def frame(position_m: Float[np.ndarray, "T N 2"], half_side_m: float) -> Frame:
+def frame(position_m: Float[np.ndarray, "T N 2"], half_side_m: float) -> Ground:
     """Return the smallest square that holds the area and all ways, or else all robots at any time.
 
     It follows the team if robots go far beyond the area, which is centred on the origin.
@@ -38,10 +38,10 @@ def frame(position_m: Float[np.ndarray, "T N 2"], half_side_m: float) -> Frame:
     farthest_m = float(np.max(np.abs(position_m)))
     if farthest_m <= NEAR * half_side_m:
         centre_m = np.zeros((len(position_m), 2))
-        return Frame(centre_m=centre_m, reach_m=max(half_side_m, farthest_m))
+        return Ground(centre_m=centre_m, reach_m=max(half_side_m, farthest_m))
     low_m, high_m = np.min(position_m, axis=1), np.max(position_m, axis=1)
     # Of constant size all the same: a changing scale would look like motion.
-    return Frame(centre_m=(low_m + high_m) / 2.0, reach_m=float(np.max(high_m - low_m)) / 2.0)
+    return Ground(centre_m=(low_m + high_m) / 2.0, reach_m=float(np.max(high_m - low_m)) / 2.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +99,7 @@ class Footage:
     scene: Scene | None = None  # what changed the arena; files have its name only
 
     @cached_property
-    def frame(self) -> Frame:
+    def frame(self) -> Ground:
         """The part of the ground that is shown: of an open area, only where robots ever are."""
         mission = self.facts.mission
         whole = frame(self.position_m, mission.half_side_m)
@@ -107,7 +107,7 @@ class Footage:
             return whole
         low_m, high_m = (end(self.position_m, axis=(0, 1)) for end in (np.min, np.max))
         centre_m = np.tile((low_m + high_m) / 2.0, (len(self.window), 1))
-        return Frame(centre_m=centre_m, reach_m=max(1.0, float(np.max(high_m - low_m)) / 2.0))
+        return Ground(centre_m=centre_m, reach_m=max(1.0, float(np.max(high_m - low_m)) / 2.0))
 
     def contents(self, row: int, full_scale: float | None = None) -> Contents:
         """Return a moment's picture: the window, from 0, by a scale of ages [windows]."""

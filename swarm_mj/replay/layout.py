@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 from swarm_mj.replay import legend, palette
 from swarm_mj.replay.arena import square_m
 from swarm_mj.replay.charts import TREE_HEIGHT, TREE_WIDTH
-from swarm_mj.replay.footage import Frame
+from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.plots import Plot
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import TIMELINE
@@ -32,7 +32,7 @@ class Layout(rrb.Blueprint):
         del self._stream
 
 
-def layout(log: Log, frame: Frame, shown: Sequence[Plot]) -> Layout:
+def layout(log: Log, frame: Ground, shown: Sequence[Plot]) -> Layout:
     """Return the blueprint: tabs of the mission, its scene, and the radio of every robot."""
     reach, follows = MARGIN * frame.reach_m, ", follows the team" if frame.moves else ""
     name = f"Map, squares of {square_m(frame):g} m{follows}"
@@ -76,7 +76,7 @@ def _drawing(
     )
 
 
-def _space(frame: Frame) -> rrb.Spatial3DView:
+def _space(frame: Ground) -> rrb.Spatial3DView:
     reach = frame.reach_m
     eye = rrb.EyeControls3D(
         position=(0.0, -1.35 * reach, 1.75 * reach),

@@ -8,7 +8,7 @@ import rerun as rr
 from jaxtyping import Float, Int
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.footage import Frame
+from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.palette import Colour, dim
 from swarm_mj.replay.recorder import Log
 
@@ -20,7 +20,7 @@ def screen(points: float) -> float:
     return -points
 
 
-class Layer(NamedTuple):
+class EntityStyle(NamedTuple):
     """How the things of one entity are drawn, and their samples in the legend."""
 
     kind: Any  # rerun's archetype
@@ -38,40 +38,40 @@ class Layer(NamedTuple):
 
 
 LAYERS = {
-    "arena/area/grid": Layer(rr.LineStrips2D, palette.GRID, 0.5, -20.0),
-    "arena/area/outline": Layer(rr.LineStrips2D, palette.OUTLINE, 1.5, -19.0),
-    "arena/area/walls": Layer(rr.LineStrips2D, palette.WALL, 1.5, -19.0),
-    "arena/world/filling": Layer(rr.LineStrips2D, palette.OBSTACLE, 0.5, -11.0),
-    "arena/world/obstacle": Layer(rr.LineStrips2D, palette.WALL, 0.8, -10.0),
-    "arena/trail": Layer(rr.LineStrips2D, palette.TRAIL, 1.0, -5.0),
-    "arena/radio/range": Layer(rr.Ellipses2D, palette.RANGE, 0.6, 1.0),
-    "arena/world/unbelieved": Layer(rr.LineStrips2D, None, 0.6, 2.0),
-    "arena/world/too_weak": Layer(rr.LineStrips2D, None, 0.5, 2.5),
-    "arena/belief/error": Layer(rr.LineStrips2D, dim(palette.BELIEF, 0.8), 0.6, 3.0),
-    "arena/belief/ring": Layer(rr.Ellipses2D, palette.BELIEF, 0.8, 4.0),
-    "arena/tree": Layer(rr.LineStrips2D, palette.TREE, 0.8, 6.0),
-    "arena/radio/overheard": Layer(rr.LineStrips2D, dim(palette.OVERHEARD, 0.6), 0.7, 10.0),
-    "arena/radio/heard": Layer(rr.LineStrips2D, palette.BROADCAST, 1.0, 18.0),
-    "arena/radio/unanswered": Layer(rr.Arrows2D, dim(palette.ANSWERED, 0.6), 1.2, 18.0),
-    "arena/radio/lost/rest": Layer(rr.LineStrips2D, dim(palette.LOST, 0.5), 0.7, 18.0),
-    "arena/radio/lost": Layer(rr.Arrows2D, palette.LOST, 1.8, 19.0),
-    "arena/radio/delivered": Layer(rr.Arrows2D, palette.DELIVERED, 2.0, 20.0),
-    "arena/radio/answered": Layer(rr.Arrows2D, palette.ANSWERED, 1.5, 21.0),
-    "arena/world/cut_off": Layer(rr.Points2D, palette.CUT_OFF, 12.0, 24.0),
-    "arena/radio/transmitter": Layer(rr.Points2D, palette.BROADCAST, 9.0, 25.0),
-    "arena/heading": Layer(rr.LineStrips2D, palette.HEADING, 0.8, 29.0),
-    "arena/robots": Layer(rr.Points2D, None, 5.5, 30.0),
-    "arena/ego/name": Layer(rr.Points2D, palette.EGO, 0.1, 30.0),
-    "arena/ego": Layer(rr.Ellipses2D, palette.EGO, 1.2, 31.0),
-    "tree/hops": Layer(rr.LineStrips2D, palette.GRID, 0.5, 0.0),
-    "tree/edges": Layer(rr.LineStrips2D, palette.TREE, 0.8, 1.0),
-    "tree/nodes": Layer(rr.Points2D, None, 4.5, 2.0),
-    "scene/grid": Layer(rr.LineStrips3D, palette.OUTLINE, 0.5),
-    "scene/heading": Layer(rr.LineStrips3D, palette.HEADING, 0.8),
-    "scene/world/unbelieved": Layer(rr.LineStrips3D, None, 0.6),
-    "scene/world/too_weak": Layer(rr.LineStrips3D, None, 0.5),
+    "arena/area/grid": EntityStyle(rr.LineStrips2D, palette.GRID, 0.5, -20.0),
+    "arena/area/outline": EntityStyle(rr.LineStrips2D, palette.OUTLINE, 1.5, -19.0),
+    "arena/area/walls": EntityStyle(rr.LineStrips2D, palette.WALL, 1.5, -19.0),
+    "arena/world/filling": EntityStyle(rr.LineStrips2D, palette.OBSTACLE, 0.5, -11.0),
+    "arena/world/obstacle": EntityStyle(rr.LineStrips2D, palette.WALL, 0.8, -10.0),
+    "arena/trail": EntityStyle(rr.LineStrips2D, palette.TRAIL, 1.0, -5.0),
+    "arena/radio/range": EntityStyle(rr.Ellipses2D, palette.RANGE, 0.6, 1.0),
+    "arena/world/unbelieved": EntityStyle(rr.LineStrips2D, None, 0.6, 2.0),
+    "arena/world/too_weak": EntityStyle(rr.LineStrips2D, None, 0.5, 2.5),
+    "arena/belief/error": EntityStyle(rr.LineStrips2D, dim(palette.BELIEF, 0.8), 0.6, 3.0),
+    "arena/belief/ring": EntityStyle(rr.Ellipses2D, palette.BELIEF, 0.8, 4.0),
+    "arena/tree": EntityStyle(rr.LineStrips2D, palette.TREE, 0.8, 6.0),
+    "arena/radio/overheard": EntityStyle(rr.LineStrips2D, dim(palette.OVERHEARD, 0.6), 0.7, 10.0),
+    "arena/radio/heard": EntityStyle(rr.LineStrips2D, palette.BROADCAST, 1.0, 18.0),
+    "arena/radio/unanswered": EntityStyle(rr.Arrows2D, dim(palette.ANSWERED, 0.6), 1.2, 18.0),
+    "arena/radio/lost/rest": EntityStyle(rr.LineStrips2D, dim(palette.LOST, 0.5), 0.7, 18.0),
+    "arena/radio/lost": EntityStyle(rr.Arrows2D, palette.LOST, 1.8, 19.0),
+    "arena/radio/delivered": EntityStyle(rr.Arrows2D, palette.DELIVERED, 2.0, 20.0),
+    "arena/radio/answered": EntityStyle(rr.Arrows2D, palette.ANSWERED, 1.5, 21.0),
+    "arena/world/cut_off": EntityStyle(rr.Points2D, palette.CUT_OFF, 12.0, 24.0),
+    "arena/radio/transmitter": EntityStyle(rr.Points2D, palette.BROADCAST, 9.0, 25.0),
+    "arena/heading": EntityStyle(rr.LineStrips2D, palette.HEADING, 0.8, 29.0),
+    "arena/robots": EntityStyle(rr.Points2D, None, 5.5, 30.0),
+    "arena/ego/name": EntityStyle(rr.Points2D, palette.EGO, 0.1, 30.0),
+    "arena/ego": EntityStyle(rr.Ellipses2D, palette.EGO, 1.2, 31.0),
+    "tree/hops": EntityStyle(rr.LineStrips2D, palette.GRID, 0.5, 0.0),
+    "tree/edges": EntityStyle(rr.LineStrips2D, palette.TREE, 0.8, 1.0),
+    "tree/nodes": EntityStyle(rr.Points2D, None, 4.5, 2.0),
+    "scene/grid": EntityStyle(rr.LineStrips3D, palette.OUTLINE, 0.5),
+    "scene/heading": EntityStyle(rr.LineStrips3D, palette.HEADING, 0.8),
+    "scene/world/unbelieved": EntityStyle(rr.LineStrips3D, None, 0.6),
+    "scene/world/too_weak": EntityStyle(rr.LineStrips3D, None, 0.5),
     **{
-        f"scene/packets/{fate}": Layer(rr.LineStrips3D, colour, 1.0)
+        f"scene/packets/{fate}": EntityStyle(rr.LineStrips3D, colour, 1.0)
         for fate, (colour, _) in palette.PACKETS.items()
     },
 }
@@ -81,7 +81,7 @@ class RerunLog:
     """Writes a log's entities; one that changes shows the row of the last window."""
 
     def __init__(
-        self, recording: rr.RecordingStream, log: Log, frame: Frame, window_s: float
+        self, recording: rr.RecordingStream, log: Log, frame: Ground, window_s: float
     ) -> None:
         self._recording = recording
         self._window_s = window_s

@@ -8,7 +8,7 @@ from reading import column, counts, rows, rows_of_strips, static
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.arena import square_m
-from swarm_mj.replay.footage import Frame
+from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.write import write_replay
 
 
@@ -75,7 +75,7 @@ def test_a_map_that_follows_the_team_keeps_it_in_the_middle(two_way, tmp_path):
 )
 def test_squares_are_few_enough_to_be_seen(reach_m, way_m, square):
     centre_m = np.array([[0.0, 0.0], [way_m, 0.0]])
-    assert square_m(Frame(centre_m=centre_m, reach_m=reach_m)) == square
+    assert square_m(Ground(centre_m=centre_m, reach_m=reach_m)) == square
 
 
 def test_headings_have_one_length_and_the_direction_of_flight(replay, two_way):
