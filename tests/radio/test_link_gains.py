@@ -1,8 +1,8 @@
 """Received powers of senders against the laws they are made of, and how often they are made."""
 
 import numpy as np
+from walls import walls
 
-from swarm_mj.physics.state import BOX, Obstacles
 from swarm_mj.radio import link_gains
 from swarm_mj.radio.link_gains import LinkGains
 from swarm_mj.radio.power_law import NO_OBSTACLES, PowerLaw
@@ -51,17 +51,9 @@ def test_powers_are_worked_out_once_for_each_sender_and_place(monkeypatch):
 
 def test_obstacles_take_their_share():
     """A wall of 10 dB between x < 0 and x > 0."""
-    wall = Obstacles(
-        kind=np.array([BOX]),
-        centre_m=np.zeros((1, 3)),
-        rotation=np.eye(3)[None],
-        size_m=np.array([[1.0, 1e4, 1e4]]),
-        reach_m=np.array([2e4]),
-        power_left=np.array([0.1]),
-    )
     position_m = places()
     position_m[:, :, 0] = np.where(np.arange(4) < 2, -1.0, 1.0) * (5.0 + np.abs(position_m[..., 0]))
-    behind = gains(obstacles=wall).received_mw(position_m, np.arange(2), EVERYONE)
+    behind = gains(obstacles=walls(0.1, 0)).received_mw(position_m, np.arange(2), EVERYONE)
     open_air = gains().received_mw(position_m, np.arange(2), EVERYONE)
     is_across = (np.arange(4) < 2)[:, None] != (np.arange(4) < 2)
     np.testing.assert_allclose(behind, open_air * np.where(is_across, 0.1, 1.0))

@@ -5,23 +5,16 @@ import math
 import numpy as np
 import pytest
 from scipy.stats import norm
+from walls import walls
 
 from swarm_mj.mission import paper
 from swarm_mj.mission.specification import KNOWABLE
-from swarm_mj.physics.state import BOX, Obstacles
 from swarm_mj.radio.link_models import TrueLinks
 from swarm_mj.radio.links import links_between, lone_probabilities
 from swarm_mj.radio.mission_radio import mission_radio, radio_of
 from swarm_mj.radio.power_law import NO_OBSTACLES
 
-WALL = Obstacles(  # of 10 dB, between x < 0 and x > 0
-    kind=np.array([BOX]),
-    centre_m=np.zeros((1, 3)),
-    rotation=np.eye(3)[None],
-    size_m=np.array([[1.0, 1e4, 1e4]]),
-    reach_m=np.array([2e4]),
-    power_left=np.array([0.1]),
-)
+WALL = walls(0.1, 0)  # 10 dB, between x < 0 and x > 0
 ON_A_LINE_M = np.array([[-100.0, 0.0], [-20.0, 0.0], [100.0, 0.0]])
 
 

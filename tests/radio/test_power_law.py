@@ -4,25 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from walls import walls
 
-from swarm_mj.physics.state import BOX, Obstacles
 from swarm_mj.radio.free_space import path_loss_db
 from swarm_mj.radio.link_gains import LinkGains
 from swarm_mj.radio.power_law import PowerLaw, power_after, powers_between, two_ray_breakpoint_m
 
 PLACES_M = np.array([[-30.0, 0.0], [-40.0, 0.0], [30.0, 40.0]])
-
-
-def wall(power_left):
-    """Between x < 0 and x > 0."""
-    return Obstacles(
-        kind=np.array([BOX]),
-        centre_m=np.zeros((1, 3)),
-        rotation=np.eye(3)[None],
-        size_m=np.array([[1.0, 1e4, 1e4]]),
-        reach_m=np.array([2e4]),
-        power_left=np.array([power_left]),
-    )
 
 
 def test_free_space_is_the_inverse_square_by_hand():
@@ -34,7 +22,7 @@ def test_free_space_is_the_inverse_square_by_hand():
 
 def test_a_steeper_law_and_a_wall_by_hand():
     """Beyond 20 m the fourth power: 1/20² (20/d)⁴; a tenth is left behind the wall."""
-    law = PowerLaw(np.ones(3), 20.0, 4.0, wall(0.1))
+    law = PowerLaw(np.ones(3), 20.0, 4.0, walls(0.1, 0))
     power = powers_between(PLACES_M, law)
     assert power[0, 1] == pytest.approx(1 / 100)
     assert power[0, 2] == pytest.approx(0.1 * 20.0**2 / 5200.0**2)
@@ -45,7 +33,7 @@ def test_the_law_is_that_of_the_channel():
     """Of one without shadowing, where robots stand anywhere."""
     rng = np.random.default_rng(1)
     position_m = rng.uniform(-300.0, 300.0, (12, 2))
-    law = PowerLaw(rng.uniform(1.0, 4.0, 12), 30.0, 2.7, wall(0.25))
+    law = PowerLaw(rng.uniform(1.0, 4.0, 12), 30.0, 2.7, walls(0.25, 0))
     gains = LinkGains(law, None)
     gains.start([rng])
     everyone = np.ones((1, 12), dtype=bool)

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from spatial_rule import agreed_senders, radio
+from walls import walls
 
 from swarm_mj.mission import paper
-from swarm_mj.physics.state import BOX, Obstacles
 from swarm_mj.radio.mission_radio import mission_radio
 from swarm_mj.radio.spatial_reuse import (
     believes_as_the_last,
@@ -62,14 +62,7 @@ def test_nobody_joins_after_a_robot_of_unknown_place(unknown, expected):
     assert [np.flatnonzero(row).tolist() for row in has_joined[0]] == [expected] * 4
 
 
-WALLS = Obstacles(  # of 15 dB each, along both axes
-    kind=np.array([BOX, BOX]),
-    centre_m=np.zeros((2, 3)),
-    rotation=np.tile(np.eye(3), (2, 1, 1)),
-    size_m=np.array([[1.0, 1e4, 1e4], [1e4, 1.0, 1e4]]),
-    reach_m=np.array([2e4, 2e4]),
-    power_left=np.array([10**-1.5, 10**-1.5]),
-)
+WALLS = walls(10**-1.5, 0, 1)  # 15 dB each
 
 
 @given(seed=seeds, num_robots=st.integers(2, 12), stands_still=st.booleans())
