@@ -75,7 +75,7 @@ def test_assets_come_from_the_wheel(installed, tmp_path):
         installed,
         tmp_path,
         "-c",
-        "from swarm_mj.system.assets import asset; print(asset('arena.xml'))",
+        "from swarm_mj.system.packages import asset; print(asset('arena.xml'))",
     )
     assert done.stdout.strip() == str(installed / "swarm_mj" / "assets" / "arena.xml")
 

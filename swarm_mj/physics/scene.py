@@ -10,7 +10,7 @@ from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 from swarm_mj.physics.arenas import arena_of
 from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
-from swarm_mj.system.assets import asset
+from swarm_mj.system.packages import asset
 
 Scene = Callable[[MjSpec, Mission], None]  # changes the arena before it is compiled
 

@@ -30,9 +30,8 @@ from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.protocol.packets import fits, packet_of
 from swarm_mj.radio.free_space import from_db
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.system.assets import asset
 from swarm_mj.system.fields import check_kind, did_you_mean
-from swarm_mj.system.packages import need
+from swarm_mj.system.packages import asset, need
 
 WITHOUT_PAYLOAD = "planner --payload none"  # packets carry T, M and P alone
 PAYLOADS = ("snapshots", "none")

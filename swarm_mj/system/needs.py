@@ -47,17 +47,11 @@ def check_fits(
     is_forced: bool,
     way_on: str = ", or try it with --yes",
 ) -> None:
-    """Pass if a command's needs will be met, or nobody minds.
-
-    Args:
-        needs: The command's.
-        output: Where it writes, if it does.
-        way_out: What to choose instead.
-        is_forced: Whether `--yes` was given.
-        way_on: How to start all the same, if there is a way.
+    """Pass if a command's needs will be met, or it is forced by `--yes`.
 
     Raises:
-        ValueError: Memory, addresses or the disk will not suffice; it says by how much.
+        ValueError: Memory, addresses or the disk will not suffice; it says by how much, what to
+            choose instead (the way out), and how to start all the same (the way on).
     """
     addresses = free_addresses()
     has = [("of memory", needs.memory, free_memory(), "are free")]

@@ -25,12 +25,9 @@ class Output(NamedTuple):
 
 
 def check_outputs(*outputs: Output, inputs: Iterable[Path] = (), must_be_new: bool = False) -> None:
-    """Pass if a command can write all its files; missing folders will be made.
+    """Pass if a command can write all its files and loses none of its inputs.
 
-    Args:
-        *outputs: The files.
-        inputs: Files and folders that the command reads, so that none is lost.
-        must_be_new: Whether existing files are refused.
+    Missing folders will be made.
 
     Raises:
         ValueError: A file exists, is a folder or an input, is named wrongly, or its folder cannot

@@ -1,15 +1,25 @@
-"""Packages that not everyone has installed: which one is missing, and how to get it.
+"""Files that this package brings, and the packages that it needs: how to get one that is missing.
 
-A plain `pip install swarm_mj` brings them all; its core, which flies, does without them.
+A plain `pip install swarm_mj` brings them all; its core, which flies, does without most.
 """
 
 from importlib import metadata
 from importlib.util import find_spec
+from pathlib import Path
 
 # What flying imports; `pyproject.toml` has their versions under the same name.
 CORE = ("jaxtyping", "msgspec", "mujoco", "numba", "numpy", "packaging", "psutil", "rich")
 # Modules that are named otherwise than the packages that bring them.
 BROUGHT_BY = {"PIL": "pillow", "dm_control": "dm-control", "rerun": "rerun-sdk"}
+
+
+def asset(name: str) -> Path:
+    """Return a file or folder of `assets/`, in a checkout or in an installed wheel."""
+    package = Path(__file__).parents[1]
+    for folder in (package / "assets", package.parent / "assets"):
+        if (folder / name).exists():
+            return folder / name
+    raise FileNotFoundError(f"asset {name} is neither in the package nor beside it; reinstall")
 
 
 def need(module: str, what: str, way_out: str = "") -> None:

@@ -27,13 +27,9 @@ MAX_LETTERS = 160  # of what msgspec says
 def open_file(path: Path, what: str, *, folder: Path | None = None) -> BinaryIO:
     """Open a regular file, at once: pipes and devices would be waited for, or have no end.
 
-    Args:
-        path: The file; it may be a link.
-        what: It is called in a message.
-        folder: Where it must be, if it must be somewhere: no link leads out of it.
-
     Raises:
-        ValueError: There is no such file, or it cannot be read.
+        ValueError: There is no such file, it cannot be read, or a link leads out of the folder
+            where it must be.
     """
     try:
         if folder is not None and not path.resolve().is_relative_to(folder.resolve()):
@@ -69,8 +65,7 @@ def read_rows(path: Path, what: str, most_bytes: int) -> tuple[list[str], list[R
     """Return a CSV file: the names of its columns, and its rows with the lines that they end on.
 
     Raises:
-        ValueError: It cannot be read or is too large, is no CSV, or a row has more cells, or fewer,
-            than there are columns.
+        ValueError: It cannot be read, is too large, or is no CSV with as many cells as columns.
     """
     content = read_file(path, what, most_bytes)
     try:
@@ -85,11 +80,7 @@ def read_rows(path: Path, what: str, most_bytes: int) -> tuple[list[str], list[R
 
 
 def read_json(text: bytes | str, kind: type[Kind]) -> Kind:
-    """Return a text of JSON as a dataclass or another type that msgspec knows.
-
-    Raises:
-        ValueError: It is no JSON, is nested too deep, or is not of the kind.
-    """
+    """Return a text of JSON as a kind that msgspec knows, such as a dataclass."""
     return read_plain(_plain(text), kind)
 
 
@@ -113,11 +104,7 @@ def read_document(text: bytes | str, name: str, version: int, kind: type[Kind]) 
 
 
 def read_plain(value: object, kind: type[Kind]) -> Kind:
-    """Return numbers, texts, lists and dicts as a dataclass, or another type that msgspec knows.
-
-    Raises:
-        ValueError: They are not of the kind.
-    """
+    """Return numbers, texts, lists and dicts as `read_json` does, or raise ValueError."""
     try:
         return msgspec.convert(_with_all_keys(value, kind), kind, dec_hook=_made)
     except msgspec.ValidationError as error:

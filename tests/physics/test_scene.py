@@ -5,7 +5,7 @@ import pytest
 from swarm_mj.mission import Mission, paper
 from swarm_mj.physics.scene import compose, num_substeps, timestep_s
 from swarm_mj.physics.state import ROBOT_RADIUS_M, RobotStates
-from swarm_mj.system.assets import asset
+from swarm_mj.system.packages import asset
 
 # Half the side of the square in which 40 robots share a square kilometre, by hand [m].
 HALF_SIDE_M = {10: 250.0, 40: 500.0, 90: 750.0}

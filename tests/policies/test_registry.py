@@ -30,7 +30,7 @@ from swarm_mj.policies.spatial_tdma import SpatialTdma
 from swarm_mj.policies.tdma import Tdma
 from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.assets import asset
+from swarm_mj.system.packages import asset
 
 MISSION = paper("flocking", num_robots=8)
 REST = paper("stationary", num_robots=8)

@@ -9,7 +9,7 @@ import pytest
 from packaging.requirements import Requirement
 
 from swarm_mj.system import packages
-from swarm_mj.system.packages import BROUGHT_BY, CORE, missing, need
+from swarm_mj.system.packages import BROUGHT_BY, CORE, asset, missing, need
 
 ROOT = Path(__file__).parent.parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -56,3 +56,13 @@ def test_the_guide_names_the_core_for_those_who_have_a_wheel_only():
     (line,) = re.findall(r"^pip install (jaxtyping .*)$", guide, re.MULTILINE)
     named = [Requirement(text) for text in shlex.split(line)]
     assert tuple(each.name for each in named) == CORE
+
+
+def test_files_and_folders_are_found():
+    assert asset("arena.xml").is_file()
+    assert asset("policies/gnn.safetensors").is_file()
+
+
+def test_what_is_missing_is_named():
+    with pytest.raises(FileNotFoundError, match=r"asset gone\.xml is neither in the package nor"):
+        asset("gone.xml")
