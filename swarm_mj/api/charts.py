@@ -1,6 +1,7 @@
 """Charts of flights and evaluations: one mission over time, and policies below each other."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -28,10 +29,10 @@ def draw_flight(
     window_s: float,
     task_cost: tuple[str, str] | None,
 ) -> Figure:
-    """Return a mission's costs over its windows, one above the other.
+    """Return a chart of a mission's costs over its windows.
 
     Args:
-        columns: As `Run.columns` gives them.
+        columns: As `Run.columns` returns them.
         title: Of the figure.
         policy: Its name, which decides the colour.
         window_s: A window's length [s].
@@ -41,8 +42,11 @@ def draw_flight(
     own_cost = None if task_cost is None or task_cost[0] == Flocking.cost_name else task_cost
     moves = bool(np.any(columns["velocity_variance"]))
     with styled():
-        figure, axes = _panels(2 if own_cost or moves else 1)
-        figure.suptitle(escape_mathtext(title), x=0.01, ha="left", fontsize=TITLE_PT)
+        number = 2 if own_cost or moves else 1
+        figure, axes = _axes(number, 1, HEAD_IN + number * PANEL_IN, sharex=True)
+        for each in axes:
+            each.margins(x=0.01)
+        _set_title(figure, title)
         _draw_age(axes[0], columns, colour)
         if own_cost:
             axes[1].plot(columns["window"], columns["task_cost"], color=colour)
@@ -57,28 +61,19 @@ def draw_flight(
 def draw_evaluation(results: Sequence[Result]) -> Figure:
     """Return a chart of policies, the lowest age first; of flocks, with velocity variances."""
     shown = sorted(results, key=lambda result: result.aoi_mean)
-    flocks, first = shown[0].task == "flocking", shown[0]
-    costs = ["aoi", "velocity_variance"] if flocks else ["aoi"]
+    first, costs = shown[0], list(LABELS)[: 2 if shown[0].task == "flocking" else 1]
     with styled():
-        figure, axes = plt.subplots(
-            *(1, len(costs)),
-            sharey=True,
-            squeeze=False,
-            layout="constrained",
-            figsize=(WIDTH_IN, HEAD_IN + ROW_IN * len(shown)),
-        )
+        figure, axes = _axes(1, len(costs), HEAD_IN + ROW_IN * len(shown), sharey=True)
         about = f"{first.task}, {first.num_robots} robots, {first.episodes} missions from seed "
-        own = components_in(vars(first))
-        title = escape_mathtext(f"{about}{first.seed}{own.title}")
-        figure.suptitle(title, x=0.01, ha="left", fontsize=TITLE_PT)
-        for each, cost in zip(axes[0], costs, strict=True):
+        _set_title(figure, f"{about}{first.seed}{components_in(vars(first)).title}")
+        for each, cost in zip(axes, costs, strict=True):
             for place, result in enumerate(shown):
                 _draw_mean(each, place, result, cost)
             each.set_xlabel(LABELS[cost].replace("\n", " "))
             each.grid(visible=False, axis="y")
             each.set_xlim(left=0.0)
-        axes[0, 0].set_yticks(range(len(shown)), [look_of(r.policy).label for r in shown])
-        axes[0, 0].set_ylim(len(shown) - 0.5, -0.5)
+        axes[0].set_yticks(range(len(shown)), [look_of(r.policy).label for r in shown])
+        axes[0].set_ylim(len(shown) - 0.5, -0.5)
     return _kept(figure)
 
 
@@ -100,7 +95,7 @@ def _draw_variance(axes: Axes, columns: Mapping[str, Course], colour: str) -> No
 
 
 def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:
-    """Return a policy's mean with its 95 % interval, if there is one."""
+    """Draw a policy's mean with its 95 % interval, if there is one."""
     look, mean = look_of(result.policy), getattr(result, f"{cost}_mean")
     ends = [getattr(result, f"{cost}_ci_{end}") for end in ("low", "high")]
     if None not in ends:
@@ -108,22 +103,20 @@ def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:
     axes.plot(mean, place, color=look.colour, marker=look.marker, markersize=look.size + 2.0)
 
 
-def _panels(number: int) -> tuple[Figure, list[Axes]]:
-    """Return a figure of so many panels above each other."""
+def _axes(rows: int, columns: int, height_in: float, **how: Any) -> tuple[Figure, list[Axes]]:
+    size = (WIDTH_IN, height_in)
     figure, axes = plt.subplots(
-        *(number, 1),
-        sharex=True,
-        squeeze=False,
-        layout="constrained",
-        figsize=(WIDTH_IN, HEAD_IN + number * PANEL_IN),
+        rows, columns, squeeze=False, layout="constrained", figsize=size, **how
     )
-    for each in axes[:, 0]:
-        each.margins(x=0.01)
-    return figure, list(axes[:, 0])
+    return figure, list(axes.flat)
+
+
+def _set_title(figure: Figure, title: str) -> None:
+    figure.suptitle(escape_mathtext(title), x=0.01, ha="left", fontsize=TITLE_PT)
 
 
 def _kept(figure: Figure) -> Figure:
-    """Return the figure, which notebooks would else show twice: as open, and as a cell's result."""
+    # A notebook shows a figure twice if it is open and a cell's result.
     if "inline" in str(plt.get_backend()):
         plt.close(figure)
     return figure

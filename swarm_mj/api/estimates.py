@@ -11,7 +11,7 @@ from swarm_mj.system.needs import ADDRESSES, LIBRARIES, OF_RERUN, OF_TORCH, Need
 
 
 def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:
-    """Of `fly`."""
+    """Return the needs of `fly`."""
     memory = missions_memory(mission.num_robots, 1, is_learned=is_learned(policy))
     addresses = ADDRESSES + (OF_TORCH if is_learned(policy) else 0.0)
     if not is_recorded:
@@ -24,7 +24,7 @@ def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:
 
 
 def study_needs(study: Study, num_jobs: int) -> Needs:
-    """Of `evaluate`: processes with a batch each, what they found, and the files of that."""
+    """Return the needs of `evaluate`: a batch in each process, and the results of all."""
     batches = study.batches
     largest = max(
         missions_memory(
@@ -42,6 +42,6 @@ def study_needs(study: Study, num_jobs: int) -> Needs:
 
 
 def figures_needs(results: Iterable[Path], num_files: int) -> Needs:
-    """Of `figures`: the results as objects, and pictures of 1 MB at most."""
+    """Return the needs of `figures`: the results as objects, and pictures of 1 MB at most."""
     read = sum(path.stat().st_size for path in results if path.is_file())
     return Needs(memory=2.0 * LIBRARIES + 10.0 * read, file=1e6 * num_files)

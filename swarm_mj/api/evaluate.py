@@ -28,18 +28,18 @@ if TYPE_CHECKING:  # each takes its time to import
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-# pandas prints the ends of a wide table, so there stands what one looks for.
+# pandas prints only the ends of a wide table, so these columns stand there.
 FIRST = ("policy", "num_robots", "aoi_mean", "aoi_sem")
 LAST = ("aoi_ci_low", "aoi_ci_high", "packets_per_window")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Evaluation:
-    """What policies cost on the same missions.
+    """Costs of policies on the same missions.
 
     Attributes:
         mission: The missions' numbers.
-        results: What each policy cost, in the order in which they were named.
+        results: The costs of each policy, in the order in which they were named.
     """
 
     mission: Mission
@@ -56,7 +56,7 @@ class Evaluation:
 
     @property
     def summary(self) -> Metrics:
-        """What each policy cost, by its name: `summary["tdma"].aoi_mean` [windows].
+        """Costs by the policy's name: `summary["tdma"].aoi_mean` [windows].
 
         The names are the columns of `swarm-mj evaluate --csv`.
         """

@@ -61,7 +61,7 @@ class PolicyOptions(Components):
 
     @property
     def how(self) -> dict[str, Any]:
-        """What `make_policy` takes beside a policy's name and a mission."""
+        """Arguments of `make_policy`, but for the policy's name and the mission."""
         return {
             "probability": self.probability,
             "is_deterministic": self.is_deterministic,
@@ -110,7 +110,7 @@ def check_in_use(given: Collection[str], missions: Sequence[Mission]) -> None:
 
 
 def mission_flags(mission: Mission) -> str:
-    """The options that make a mission; those that are as usual are left out, but for the task."""
+    """Return the options that make a mission, without defaults except for the task."""
     usual = replace(PRESETS[mission.preset](mission.task), preset=Mission().preset)
     named = {spec: getattr(mission, spec.name) for spec in SPECS}
     return " ".join(
@@ -128,7 +128,7 @@ def _mission_options(*, is_many: bool = False) -> Iterator[Option]:
 
 
 def _default_of(spec: Field[Any]) -> str:
-    """Return a mission's default; where it depends on the task, the flock's beside the others'."""
+    """Return a mission's default; where it depends on the task, the flock's and the others'."""
     flocks, others = (
         as_typed(getattr(paper(task), spec.name)) for task in ("flocking", "stationary")
     )

@@ -82,14 +82,9 @@ def nested(
 
 
 def parse_options(kind: type[T], arguments: Sequence[str], prog: str, summary: str) -> T:
-    """Return the command line as an instance of its dataclass.
+    """Return the command line as an instance of its dataclass, `kind`.
 
-    Args:
-        kind: The dataclass; its `EPILOG`, if it has one, ends the help, and a field called `typed`,
-            if it has one, takes the arguments themselves.
-        arguments: What was typed after the command.
-        prog: How the command is called.
-        summary: What it does.
+    Its `EPILOG`, if it has one, ends the help; a field `typed` takes the arguments themselves.
 
     Raises:
         ValueError: A value is not among the choices, or out of range, or no name of a file.

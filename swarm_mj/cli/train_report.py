@@ -1,4 +1,4 @@
-"""The bar of a training run, and its report: the policy kept, beside others."""
+"""The bar of a training run, and its report: the policy kept, and others."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -39,7 +39,7 @@ class Watch(WorkBar):
 
     @property
     def has_begun(self) -> bool:
-        """Whether there was anything to do."""
+        """True once there was anything to do."""
         return self._start is not None
 
     def __call__(self, status: "Status") -> bool:

@@ -5,8 +5,8 @@ their code; one row per point and cost, methods named as in the figures.
 
 Figs. 3 and 4 both give a stationary team at range ratio 0.25, from different missions: Fig. 3 draws
 it as the baselines' level lines (44.43, 45.28, 42.02), Fig. 4 as a point of its curves (46.76,
-47.28, 43.31). Both are in `points`; beside an evaluation stands Fig. 4's, as the curve it belongs
-to is the one that evaluations sweep. Fig. 5's curves fit random walks, not stationary teams: its
+47.28, 43.31). Both are in `points`; evaluations are compared with Fig. 4's, whose curve they
+sweep. Fig. 5's curves fit random walks, not stationary teams: its
 40 robots cost what random walks of 40 cost at range ratio 0.25 and velocity ratio 0.15.
 """
 

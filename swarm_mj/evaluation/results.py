@@ -16,7 +16,7 @@ from swarm_mj.system.reading import read_rows
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """What one policy cost in one regime, over all missions; None is what does not exist.
+    """Costs of one policy in one regime, over all missions; None is what does not exist.
 
     Age of information (AoI, Eq. 10) and ages are in windows, velocity variance (Eq. 17) in m²/s².
     `_std` is the sample's standard deviation, `_sem` the mean's standard error, `_ci_` the mean's
@@ -57,7 +57,7 @@ class Result:
     aoi_steady_sem: float | None
     age_p95: float  # over all ordered pairs of two robots and all windows of all missions
     age_worst: float  # as above
-    # What instant sharing within connected parts would leave; None over a channel of one's own.
+    # What instant sharing within connected parts would leave; None over a custom channel.
     aoi_floor_mean: float | None
     aoi_floor_sem: float | None
 

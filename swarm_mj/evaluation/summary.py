@@ -72,10 +72,8 @@ def summarise(
         Evaluated(
             result=Result(
                 **_regime(study, policy, regime),
-                **_costs(own),
-                **_task_costs(own, study.task_cost(regime)),
+                **_costs(own, study.task_cost(regime)),
                 **_packets(own, regime, study.make_policy(policy, regime)),
-                **_completeness(own),
                 **_differences(own, merged[regime, flown_name(study.compared_to, regime)]),
                 **_published(policy, None if study.components.names else regime),
                 version=made_by["version"],
@@ -119,27 +117,21 @@ def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
     )
 
 
-def _costs(costs: BatchCosts) -> dict[str, Any]:
-    """Return age of information and velocity variance over missions, and ages over pairs."""
+def _costs(costs: BatchCosts, task_cost: tuple[str, str] | None) -> dict[str, Any]:
+    """Return costs over missions, and ages over pairs; the task's cost by its name and unit."""
     columns: dict[str, Any] = {}
     for cost in COSTS:
         found = spread(np.array(getattr(costs, cost)))
         columns |= {f"{cost}_{name}": value for name, value in found.items()}
-    columns |= _mean_and_sem("aoi_steady", costs.aoi_steady)
-    columns |= _mean_and_sem("aoi_floor", costs.aoi_floor)
+    names = ["aoi_steady", "aoi_floor"]
+    if task_cost is not None:
+        columns |= dict(zip(("task_cost_name", "task_cost_unit"), task_cost, strict=True))
+        names += ["task_cost", "task_cost_last"]
+    for name in names:
+        columns |= _mean_and_sem(name, getattr(costs, name))
     for name, share in (("age_p95", 0.95), ("age_worst", 1.0)):
         columns[name] = SLOT_WINDOWS * quantile_of_counts(np.array(costs.ages), share)
     return {name: value for name, value in columns.items() if name in COLUMNS}
-
-
-def _task_costs(costs: BatchCosts, label: tuple[str, str] | None) -> dict[str, Any]:
-    """Return the task's cost over missions, and its controller's name for it."""
-    if label is None:
-        return {}
-    columns: dict[str, Any] = {"task_cost_name": label[0], "task_cost_unit": label[1]}
-    for name in ("task_cost", "task_cost_last"):
-        columns |= _mean_and_sem(name, getattr(costs, name))
-    return columns
 
 
 def _mean_and_sem(name: str, costs: Sequence[float | None]) -> dict[str, float | None]:
@@ -158,10 +150,13 @@ def _known(costs: Sequence[float | None]) -> list[float] | None:
 
 
 def _packets(costs: BatchCosts, regime: Mission, policy: Policy) -> dict[str, Any]:
-    """Return how many were sent, how many were decoded, and their bytes."""
+    """Return how many were sent and decoded, their bytes, and how far knowledge spread."""
     sent, num_windows = sum(costs.packets_sent), len(costs.aoi) * regime.num_windows
     packet_bytes = policy.packet(regime).num_bytes
     sent_bytes = packet_bytes * sum(costs.packets_transmitted)
+    # A mission that never was complete counts as late as any, so that the median stays honest.
+    complete = [np.inf if window is None else window for window in costs.complete_window]
+    median = float(np.median(complete))
     return {
         "packets_per_window": sent / num_windows,
         "packet_bytes": packet_bytes,
@@ -169,6 +164,9 @@ def _packets(costs: BatchCosts, regime: Mission, policy: Policy) -> dict[str, An
         "delivery_ratio": _per_packet(costs.packets_delivered, sent),
         "heard_ratio": _per_packet(costs.packets_heard, sent),
         "hearers_per_packet": _per_packet(costs.receptions, sent),
+        "hops_mean": float(np.mean(costs.hops)),
+        "complete_window_median": median if np.isfinite(median) else None,
+        "complete_share": float(np.mean(np.isfinite(complete))),
     }
 
 
@@ -176,18 +174,6 @@ def _per_packet(counts: Sequence[int | None], sent: int) -> float | None:
     """Return a count over the packets sent; None if it does not apply to them, or none was sent."""
     applicable = [count for count in counts if count is not None]
     return sum(applicable) / sent if applicable and sent else None
-
-
-def _completeness(costs: BatchCosts) -> dict[str, Any]:
-    """Return mean hops, and when every robot knew every other."""
-    complete = [window for window in costs.complete_window if window is not None]
-    episodes = len(costs.aoi)
-    median = np.median(complete + [np.inf] * (episodes - len(complete)))
-    return {
-        "hops_mean": float(np.mean(costs.hops)),
-        "complete_window_median": float(median) if np.isfinite(median) else None,
-        "complete_share": len(complete) / episodes,
-    }
 
 
 def _differences(costs: BatchCosts, baseline: BatchCosts) -> dict[str, Any]:
