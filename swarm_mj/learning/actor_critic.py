@@ -17,10 +17,12 @@ from swarm_mj.policies.gnn.shape import GnnShape
 
 
 class GnnActorCritic(ActorCriticPolicy):
-    """Logits over recipients for every robot, and one value for every robot.
+    """Logits over recipients for every robot, and one value for every environment.
 
     The two come from separate networks (III-C), or, to save time, from one whose last number per
-    node is the value.
+    node is the value. An environment is a robot, or a team: then log-probability, entropy and value
+    are sums over its robots. There is one difference between the presets: the paper's value is one
+    scalar per robot, of its own node; the authors' code sums those of all nodes of all graphs.
     """
 
     def __init__(
@@ -32,10 +34,11 @@ class GnnActorCritic(ActorCriticPolicy):
         shape: GnnShape,
         shares_trunk: bool,
         silence_logit: float,
+        sums_nodes: bool,
         **others: Any,
     ) -> None:
         self._shape, self._shares_trunk = shape, shares_trunk
-        self._silence_logit = silence_logit
+        self._silence_logit, self._sums_nodes = silence_logit, sums_nodes
         super().__init__(observation_space, action_space, lr_schedule, **others)
 
     def _build(self, lr_schedule: Schedule) -> None:
@@ -85,11 +88,20 @@ class GnnActorCritic(ActorCriticPolicy):
     def logits_and_value(
         self, obs: PyTorchObs
     ) -> tuple[Float[Tensor, "E *robots N"], Float[Tensor, "E"]]:
-        """What the decisions of each environment are drawn from, and its value."""
+        """Return the logits of each environment's decisions, and its value."""
         assert isinstance(obs, dict)
-        owner = obs["owner"].long()
-        logits, values = self._robots(obs, owner.squeeze(1))
-        return logits, values.gather(1, owner).squeeze(1)
+        if "owner" in obs:
+            owner = obs["owner"].long()
+            logits, values = self._robots(obs, owner.squeeze(1))
+            return logits, values.gather(1, owner).squeeze(1)
+        shape, is_robot = obs["may_address"].shape[:2], obs["is_robot"].bool()
+        everyone = torch.arange(shape[1], device=is_robot.device)
+        logits, values = self._robots(obs, everyone.repeat(shape[0]))
+        counted = is_robot[:, :, None] & is_robot[:, None, :]
+        if not self._sums_nodes:
+            counted = counted & torch.eye(shape[1], dtype=torch.bool, device=counted.device)
+        value = (values.unflatten(0, shape) * counted).flatten(1).sum(1)
+        return logits.unflatten(0, shape), value
 
     def forward(
         self, obs: PyTorchObs, deterministic: bool = False
@@ -116,38 +128,13 @@ class GnnActorCritic(ActorCriticPolicy):
         return self.logits_and_value(obs)[1]
 
 
-class TeamActorCritic(GnnActorCritic):
-    """A joint decision: its log-probability, entropy and value are sums over the robots (III-C).
-
-    There is one difference between the presets: the paper's value is one scalar per robot, of its
-    own node; the authors' code sums the scalars of all nodes of all robots' graphs.
-    """
-
-    def __init__(self, *spaces_and_schedule: Any, sums_nodes: bool, **others: Any) -> None:
-        self._sums_nodes = sums_nodes
-        super().__init__(*spaces_and_schedule, **others)
-
-    def logits_and_value(
-        self, obs: PyTorchObs
-    ) -> tuple[Float[Tensor, "E *robots N"], Float[Tensor, "E"]]:
-        """What the decisions of each team are drawn from, and its value."""
-        assert isinstance(obs, dict)
-        shape = obs["may_address"].shape[:2]
-        num_teams, num_robots = shape
-        owner = torch.arange(num_robots, device=obs["node"].device).repeat(num_teams)
-        logits, values = self._robots(obs, owner)
-        counted = obs["is_robot"].bool()[:, :, None] & obs["is_robot"].bool()[:, None, :]
-        if not self._sums_nodes:
-            counted = counted & torch.eye(num_robots, dtype=torch.bool, device=counted.device)
-        value = (values.unflatten(0, shape) * counted).flatten(1).sum(1)
-        return logits.unflatten(0, shape), value
-
-
 def boltzmann_sample(logits: Float[Tensor, "*rows N"]) -> Int[Tensor, "*rows"]:
     """Return a draw from each row's Boltzmann distribution, by its cumulated probabilities."""
+    # In doubles: a uniform single is below 1 by more than their rounding, so the last recipient
+    # that has no probability is never drawn.
     cumulated = logits.double().softmax(-1).cumsum(-1)
-    uniform = torch.rand(*logits.shape[:-1], 1, device=logits.device)  # below 1 by more than ...
-    return (cumulated <= uniform * cumulated[..., -1:]).sum(-1)  # ... a double's rounding
+    uniform = torch.rand(*logits.shape[:-1], 1, device=logits.device)
+    return (cumulated <= uniform * cumulated[..., -1:]).sum(-1)
 
 
 def log_probability(

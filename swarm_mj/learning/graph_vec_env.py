@@ -23,8 +23,6 @@ from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.graphs import Graphs
 from swarm_mj.protocol.buffers import NO_PARENT
 
-Spaces = dict[str, spaces.Space]
-
 
 @dataclass(frozen=True, kw_only=True)
 class ActionHistory:
@@ -51,19 +49,22 @@ class GraphVecEnv(SwarmVecEnv):
             ValueError: The missions cannot be shared out evenly, or a size would have no batch.
         """
         self._rng, self._agent_reward = rng, training.reward
-        per_robot = training.credit_assignment == "robot"
-        batches = _make_batches(training, "credit" if per_robot else training.reward)
+        self.agent, self.batches = training.credit_assignment, _make_batches(training)
         self.num_nodes = max(training.robots)  # of every graph
-        sizes = [batch.mission.num_robots for batch in batches for _ in range(batch.num_missions)]
+        for n, batch in enumerate(self.batches):
+            last_window = training.mission.num_windows * (n + 1) // len(self.batches)
+            batch.restart(self._draw_seeds(batch), max(1, last_window))
+        self._recipients: list[list[np.ndarray]] = [[] for _ in self.batches]
+        sizes = [batch.shape[1] for batch in self.batches for _ in range(batch.num_missions)]
         self._owner = np.concatenate([np.arange(size, dtype=np.int32) for size in sizes])[:, None]
         self._is_robot = np.arange(self.num_nodes) < np.array(sizes)[:, None]
-        make_spaces = _robot_spaces if per_robot else _team_spaces
-        seen, action = make_spaces(self.num_nodes, batches[0].num_features)
-        super().__init__(batches, training.credit_assignment, spaces.Dict(seen), action)
-        self._recipients: list[list[np.ndarray]] = [[] for _ in batches]
-        for n, batch in enumerate(batches):
-            last_window = training.mission.num_windows * (n + 1) // len(batches)
-            batch.restart(self._draw_seeds(batch), max(1, last_window))
+        seen = {name: self._space_of(rows) for name, rows in self._observe().items()}
+        action = (
+            spaces.Discrete(self.num_nodes)
+            if self.agent == "robot"
+            else spaces.MultiDiscrete([self.num_nodes] * self.num_nodes)
+        )
+        super().__init__(self.batches, self.agent, spaces.Dict(seen), action)
 
     @property
     def num_teams(self) -> int:
@@ -133,6 +134,14 @@ class GraphVecEnv(SwarmVecEnv):
         observation["may_address"] |= np.eye(self.num_nodes, dtype=np.bool_)
         return observation
 
+    def _space_of(self, rows: np.ndarray) -> spaces.Space:
+        """Return the space of one environment's share of an observation."""
+        if rows.dtype == np.bool_:
+            return spaces.MultiBinary(rows.shape[1:])
+        is_number = rows.dtype == np.float32
+        low, high = (-np.inf, np.inf) if is_number else (NO_PARENT, self.num_nodes - 1)
+        return spaces.Box(low, high, rows.shape[1:], rows.dtype.type)
+
 
 def env_of(model: PPO) -> GraphVecEnv:
     """Return a model's environment, inside any wrappers."""
@@ -150,14 +159,11 @@ def padded(graphs: Sequence[Graphs], num_nodes: int) -> Observation:
 
     def rows_of(name: str, fill: int, dtype: type) -> np.ndarray:
         parts = [getattr(each, name) for each in graphs]
-        if all(part.shape[1] == num_nodes for part in parts):
-            return np.concatenate(parts, dtype=dtype)
-        shape = (sum(map(len, parts)), num_nodes, *parts[0].shape[2:])
-        rows, start = np.full(shape, fill, dtype=dtype), 0
-        for part in parts:
-            rows[start : start + len(part), : part.shape[1]] = part
-            start += len(part)
-        return rows
+        for n, part in enumerate(parts):
+            if part.shape[1] < num_nodes:
+                width = [(0, 0), (0, num_nodes - part.shape[1]), (0, 0)][: part.ndim]
+                parts[n] = np.pad(part, width, constant_values=fill)
+        return np.concatenate(parts, dtype=dtype)
 
     return {
         "node": rows_of("node", 0, np.float32),
@@ -167,32 +173,7 @@ def padded(graphs: Sequence[Graphs], num_nodes: int) -> Observation:
     }
 
 
-def _robot_spaces(num_nodes: int, num_features: int) -> tuple[Spaces, spaces.Space]:
-    """Return one robot's spaces: the graph, and the recipient."""
-    seen = _graph_spaces((num_nodes,), num_features)
-    return seen | {"owner": spaces.Box(0, num_nodes - 1, (1,), np.int32)}, spaces.Discrete(
-        num_nodes
-    )
-
-
-def _team_spaces(num_nodes: int, num_features: int) -> tuple[Spaces, spaces.Space]:
-    """Return a team's spaces: a graph for each robot, and everyone's recipient."""
-    seen = _graph_spaces((num_nodes, num_nodes), num_features)
-    seen["is_robot"] = spaces.MultiBinary(num_nodes)
-    return seen, spaces.MultiDiscrete([num_nodes] * num_nodes)
-
-
-def _graph_spaces(nodes: tuple[int, ...], num_features: int) -> Spaces:
-    """Return the spaces of one environment's graphs, as `padded` orders them."""
-    return {
-        "node": spaces.Box(-np.inf, np.inf, (*nodes, num_features), np.float32),
-        "parent": spaces.Box(-1, nodes[-1] - 1, nodes, np.int32),
-        "may_address": spaces.MultiBinary(nodes),
-        "has_turn": spaces.MultiBinary([*nodes[:-1], 1]),
-    }
-
-
-def _make_batches(training: Training, reward: str) -> list[MissionBatch]:
+def _make_batches(training: Training) -> list[MissionBatch]:
     """Return batches that share out all missions evenly; team sizes take turns."""
     num_missions, num_batches, sizes = training.missions, training.groups, training.robots
     if num_missions % num_batches or not len(sizes) <= num_batches <= num_missions:
@@ -205,7 +186,7 @@ def _make_batches(training: Training, reward: str) -> list[MissionBatch]:
             replace(training.mission, num_robots=sizes[n % len(sizes)]),
             num_missions // num_batches,
             features=training.features,
-            reward=reward,
+            reward="credit" if training.credit_assignment == "robot" else training.reward,
             components=training.components,
         )
         for n in range(num_batches)

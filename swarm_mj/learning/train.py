@@ -8,7 +8,6 @@ with, if any) and, on request, `replays/`.
 import warnings
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -19,7 +18,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from swarm_mj.learning import checkpoint
 from swarm_mj.learning.active_rollout_buffer import ActiveRolloutBuffer
-from swarm_mj.learning.actor_critic import GnnActorCritic, TeamActorCritic
+from swarm_mj.learning.actor_critic import GnnActorCritic
 from swarm_mj.learning.callback import Listener, Stopped, TrainingCallback
 from swarm_mj.learning.graph_vec_env import GraphVecEnv, env_of
 from swarm_mj.learning.run_folder import (
@@ -55,20 +54,11 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
     env: VecEnv = inner
     if training.reward == "velocity-variance":  # as in the authors' code
         env = VecNormalize(inner, norm_obs=False, norm_reward=True, gamma=ppo.discount)
-    policy_settings: dict[str, Any] = {
-        "shape": training.network,
-        "shares_trunk": training.shares_trunk,
-        "silence_logit": training.silence_logit,
-        "optimizer_kwargs": {"eps": ppo.adam_epsilon},
-    }
-    is_team = training.credit_assignment == "team"
-    if is_team:
-        policy_settings["sums_nodes"] = training.sums_nodes
     drops = training.drops_silence
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "You have specified a mini-batch size")  # one is smaller
         model = PPO(
-            TeamActorCritic if is_team else GnnActorCritic,
+            GnnActorCritic,
             env,
             learning_rate=ppo.learning_rate,
             n_steps=ppo.num_steps,
@@ -84,7 +74,13 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
             seed=training.seed % 2**32,
             normalize_advantage=not drops,  # a credit's zero means something
             rollout_buffer_class=ActiveRolloutBuffer if drops else DictRolloutBuffer,
-            policy_kwargs=policy_settings,
+            policy_kwargs={
+                "shape": training.network,
+                "shares_trunk": training.shares_trunk,
+                "silence_logit": training.silence_logit,
+                "sums_nodes": training.sums_nodes,
+                "optimizer_kwargs": {"eps": ppo.adam_epsilon},
+            },
         )
     # By optimiser steps, not by PPO's share of a budget, which a resumed run may raise.
     model.lr_schedule = lambda _: decayed_rate(ppo, model._n_updates)
