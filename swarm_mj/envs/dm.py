@@ -1,7 +1,7 @@
 """The dm_control face: one mission as a `control.Environment`, with its cameras and its viewer.
 
-The swarm flies the mission; dm_control is shown where the robots are. What is written into its
-physics is seen in a picture, and is overwritten at the next window.
+The swarm flies the mission; dm_control is shown where the robots are. Changes of its physics are
+seen in a picture, and are overwritten at the next window.
 """
 
 from collections import OrderedDict
@@ -34,10 +34,10 @@ def make_environment(
     controller: Controller | None = None,
     scene: Scene | None = None,
 ) -> control.Environment:
-    """One mission as an environment of dm_control, and so of dm_env.
+    """Return one mission as an environment of dm_control, and so of dm_env.
 
     A step is a window, an episode is a mission: the first one with the seed given, the next one
-    with `seed + 1`, and so on. The parts are those of `Swarm`.
+    with `seed + 1`, and so on. The components are those of `Swarm`.
 
     Raises:
         ValueError: The seed is negative, or no connected team could be drawn.
@@ -53,14 +53,14 @@ class SwarmPhysics(mujoco.Physics):
     """
 
     def __init__(self, swarm: Swarm, seed: int) -> None:
-        """Compiles the scene of a swarm and starts a mission with this seed."""
+        """Compile the scene of a swarm and start a mission with this seed."""
         model = compose(swarm.mission, scene=swarm.scene).compile()
         super().__init__(wrapper.MjData(wrapper.MjModel(model)))
         self.swarm = swarm
         self.restart(seed)
 
     def restart(self, seed: int) -> None:
-        """Start a mission with this seed; until told otherwise, everyone is silent."""
+        """Start a mission with this seed; until `recipient` is set, all are silent."""
         self._seed = seed
         self.swarm.restart([seed])
         self.recipient: Int[np.ndarray, "B N"] = self.swarm.views.silence.copy()
@@ -72,13 +72,13 @@ class SwarmPhysics(mujoco.Physics):
         self.restart(self._seed)
 
     def step(self, nstep: int = 1) -> None:
-        """Flies so many windows of Alg. 1 with the recipients that stand in `recipient`."""
+        """Fly windows of Alg. 1 with the recipients in `recipient`."""
         for _ in range(nstep):
             self.swarm.step_with_recipients(self.recipient)
         self._show()
 
     def timestep(self) -> float:
-        """One window, however many steps MuJoCo takes for it [s]."""
+        """Return the length of a window, however many steps MuJoCo takes for it [s]."""
         return self.swarm.mission.window_s
 
     def _show(self) -> None:
@@ -92,7 +92,7 @@ class SwarmPhysics(mujoco.Physics):
 
 
 class SwarmTask(_Task):
-    """Choose whom every robot addresses, so that what they know of each other is young."""
+    """Choose everyone's recipient, so that the robots' information on each other is young."""
 
     def __init__(self, seed: int) -> None:
         """Take the seed of the first episode's mission."""
@@ -104,7 +104,7 @@ class SwarmTask(_Task):
         self._next_seed += 1
 
     def before_step(self, action: np.ndarray | Sequence[int], physics: SwarmPhysics) -> None:
-        """Set whom each robot addresses; itself is silence.
+        """Set each robot's recipient; itself is silence.
 
         Raises:
             ValueError: The action is not one integer from 0 to N - 1 per robot.
@@ -114,18 +114,18 @@ class SwarmTask(_Task):
         physics.recipient = recipient.astype(np.int64)
 
     def action_spec(self, physics: SwarmPhysics) -> specs.BoundedArray:
-        """Whom each robot addresses, shape (N,), from 0 to N - 1."""
+        """Return the recipient of each robot, shape (N,), from 0 to N - 1."""
         num_robots = physics.swarm.mission.num_robots
         return specs.BoundedArray((num_robots,), np.int64, 0, num_robots - 1, name="recipient")
 
     def get_observation(self, physics: SwarmPhysics) -> OrderedDict[str, np.ndarray | np.float64]:
-        """What the buffers hold (II-B), [i, j]: what i knows about j; and the time [windows]."""
+        """Return the buffers (II-B), [i, j]: what i knows about j; and the time [windows]."""
         buffers = vars(physics.swarm.buffers)
         known = {name: array[0].copy() for name, array in buffers.items() if array.ndim > 1}
         return OrderedDict(known, now=physics.swarm.now[0])
 
     def get_reward(self, physics: SwarmPhysics) -> float:
-        """Minus the age of information after the window (cost of Eq. 10) [windows]."""
+        """Return minus the age of information after the window (cost of Eq. 10) [windows]."""
         swarm = physics.swarm
         age, _ = age_of_information(swarm.buffers, swarm.now, swarm.states.is_active)
         return -float(age[0])

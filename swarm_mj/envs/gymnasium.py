@@ -48,7 +48,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         return self._seen()
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, Info]:
-        """Fly one window; `action[i]` is whom robot i addresses, itself for silence.
+        """Fly one window; `action[i]` is the recipient of robot i, itself for silence.
 
         Raises:
             ValueError: The action is not one integer from 0 to N - 1 per robot, or the mission is

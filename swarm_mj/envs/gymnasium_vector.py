@@ -105,7 +105,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         return self._copied(), infos
 
     def step(self, actions: np.ndarray) -> Step:
-        """Fly one window of every mission; `actions[b, i]` is whom robot i of mission b addresses.
+        """Fly one window of every mission; `actions[b, i]` is that of robot i.
 
         Raises:
             ValueError: A recipient is no robot, there is not one per robot, or a mission is over

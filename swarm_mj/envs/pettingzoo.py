@@ -81,7 +81,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         """Fly one window, in which each agent addresses a robot.
 
         An agent without an action is silent, and so is one that has dropped out whatever it does.
-        Its team's costs are in everyone's info. Nothing is returned if nobody is left.
+        Everyone's info has the team's costs. All is empty once no agent is left.
 
         Raises:
             ValueError: There is no such agent, or an action is no robot; nothing has moved.

@@ -110,7 +110,7 @@ def save_policy(model: BaseAlgorithm, path: Path | str) -> Path:
 
 
 def _trained_on(model: BaseAlgorithm) -> MissionBatch:
-    """The missions that a model was trained on; raises ValueError if a policy cannot be made."""
+    """Return a model's missions; raises ValueError if no policy can be made of it."""
     env, kind = model.get_env(), type(model).__name__
     if not hasattr(model.policy, "action_dist"):
         raise ValueError(

@@ -1,4 +1,4 @@
-"""What robots see and do, as Gymnasium's spaces; every face has the same."""
+"""Observation and action spaces, the same in every face."""
 
 from typing import Any
 
@@ -13,11 +13,11 @@ from swarm_mj.protocol.buffers import NO_PARENT
 
 
 def robot_spaces(batch: MissionBatch) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
-    """What one robot sees, and whom it addresses.
+    """Return one robot's observation space, and its recipients.
 
     `observation` [N, F] is what it knows of every teammate, itself included: see `FEATURES` of the
     feature set; all are normalised, and none has a unit. `action_mask` [N] is 1 for recipients
-    worth a thought; itself, which is silence, always is. `parent` [N] is the robot that a
+    within reach; itself, which is silence, always is. `parent` [N] is the robot that a
     teammate's news came over first, or -1.
     """
     num_robots = batch.mission.num_robots
@@ -32,7 +32,7 @@ def robot_spaces(batch: MissionBatch) -> tuple[spaces.Space[Any], spaces.Space[A
 
 
 def team_spaces(batch: MissionBatch) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
-    """What all robots see, with a leading axis N, and whom each addresses."""
+    """Return all robots' observation space, with a leading axis N, and everyone's recipients."""
     num_robots = batch.mission.num_robots
     seen, _ = robot_spaces(batch)
     return batch_space(seen, num_robots), spaces.MultiDiscrete([num_robots] * num_robots)

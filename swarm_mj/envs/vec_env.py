@@ -70,7 +70,7 @@ class SwarmVecEnv(VecEnv):
         """
         reward, done = np.zeros(self.num_envs, np.float32), np.zeros(self.num_envs, np.bool_)
         for batch, envs in zip(self.batches, self._envs, strict=True):
-            # Teams smaller than the largest one are padded; nobody else may be addressed there.
+            # Teams smaller than the largest one are padded with columns of silence.
             recipient = self._actions[envs].reshape(batch.num_missions, -1)
             paid = batch.step(recipient[:, : batch.mission.num_robots])
             reward[envs] = self._scaled(paid, batch)[:, : self._per_mission(batch)].ravel()

@@ -146,7 +146,7 @@ def log_probability(
 
 
 def entropy(logits: Float[Tensor, "E *robots N"]) -> Float[Tensor, "E"]:
-    """The entropy of each environment's Boltzmann distributions, summed over its robots [nats]."""
+    """Return the entropy of each environment's decisions, summed over its robots [nats]."""
     log_p = logits.log_softmax(-1)
     each = -(log_p.exp() * log_p).sum(-1)
     return each.flatten(1).sum(1) if each.dim() > 1 else each

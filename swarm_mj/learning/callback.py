@@ -1,4 +1,4 @@
-"""What PPO calls during a run: held-out evaluations, the best policy, checkpoints, replays."""
+"""PPO's callback during a run: held-out evaluations, the best policy, checkpoints, replays."""
 
 import time
 from collections.abc import Callable
@@ -192,8 +192,8 @@ class TrainingCallback(BaseCallback):
             others = self._references()
             self._count_time()
             means, begun = progress.since_evaluation.means(), progress.minutes
-            told = partial(self._on_window, "Evaluating")
-            held_out = evaluate(self._training, network.to(self._ppo.device), told)
+            on_window = partial(self._on_window, "Evaluating")
+            held_out = evaluate(self._training, network.to(self._ppo.device), on_window)
         except Stopped:
             return
         self._count_time()
@@ -228,9 +228,9 @@ class TrainingCallback(BaseCallback):
         progress = self._progress
         if not (self._goes_on and progress.curve) or progress.has_chosen:
             return
-        told = partial(self._on_window, "Choosing")
+        on_window = partial(self._on_window, "Choosing")
         try:
-            choice, costs = choose(self._training, progress.curve, self._networks, told)
+            choice, costs = choose(self._training, progress.curve, self._networks, on_window)
         except Stopped:
             return
         (row,) = (each for each in progress.curve if each["decisions"] == choice.decisions)

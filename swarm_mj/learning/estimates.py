@@ -19,7 +19,7 @@ from swarm_mj.system.needs import (
 
 
 def training_needs(training: Training, limits: Limits) -> Needs:
-    """Of `train`: a rollout and the passes over it, held-out missions, checkpoints, replays."""
+    """Estimate a run: a rollout and the passes over it, held-out missions, checkpoints, replays."""
     missions = [replace(training.mission, num_robots=size) for size in training.robots]
     largest, rollout = max(missions, key=lambda each: each.num_robots), rollout_bytes(training)
     decisions = limits.decisions or MAX_DECISIONS
@@ -43,7 +43,7 @@ def training_needs(training: Training, limits: Limits) -> Needs:
 
 
 def rollout_bytes(training: Training) -> int:
-    """What a run's largest arrays take: the rollout, and what robots remember of packets."""
+    """Return the size of a run's largest arrays: the rollout, and the robots' packet memory."""
     nodes = max(training.robots)
     rows = training.missions * nodes  # a graph each
     graph = nodes * (4 * training.network.num_features + 4 + 1)  # features, parent, may address
@@ -52,7 +52,7 @@ def rollout_bytes(training: Training) -> int:
 
 
 def passes_bytes(training: Training) -> float:
-    """What a minibatch leaves behind in the networks on its way to the gradient."""
+    """Return the size of the activations that a minibatch keeps for its gradient."""
     nodes, ppo, shape = max(training.robots), training.ppo, training.network
     rows = training.missions * nodes * ppo.num_steps / ppo.num_minibatches
     kept = 0.4 if training.drops_silence else 1.0  # of the rows

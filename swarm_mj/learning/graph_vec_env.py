@@ -152,7 +152,7 @@ def env_of(model: PPO) -> GraphVecEnv:
 
 
 def padded(graphs: Sequence[Graphs], num_nodes: int) -> Observation:
-    """Join all batches' graphs by name, with unconnected nodes that nobody may address.
+    """Join all batches' graphs by name, with unconnected nodes that no robot may address.
 
     Their R rows have M = `num_nodes` nodes, at least as many as the batches'; `has_turn` is [R, 1].
     """

@@ -185,7 +185,7 @@ def fly(
 
 
 def _shares_of(on_window: OnWindow, total: int) -> Iterator[OnWindow]:
-    """Yield, for one of so many flights after the other, what tells the share of all of them."""
+    """Yield a listener for each flight in turn, which reports the share of all of them."""
     for n in range(total):
         yield lambda share, n=n: on_window((n + share) / total)
 

@@ -40,7 +40,7 @@ Row = dict[str, float]
 
 @dataclass(frozen=True, kw_only=True)
 class Cost:
-    """What a policy costs: its age of information [windows], or its velocity variance [m²/s²]."""
+    """A policy's age of information [windows], or its velocity variance [m²/s²]."""
 
     mean: Amount
     sem: Amount | None  # None of one mission
@@ -88,7 +88,7 @@ def finalists(curve: Sequence[Row]) -> list[Row]:
 
 
 def num_missions(training: Training, decisions: int, num_flights: int) -> int:
-    """Return how many missions of each team size each of so many flights has at the end.
+    """Return the missions of each team size that a flight has at the end.
 
     All flights together take up to a share of the run, but each has at least the missions of an
     evaluation: fewer would tell less than is known already.

@@ -1,4 +1,4 @@
-"""What a training run depends on, and what is usual for both kinds of credit assignment."""
+"""Settings of a training run, and their defaults for both kinds of credit assignment."""
 
 import math
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ class PpoSettings:
         1e-3, "of Adam, at the start", label="learning rate", low=1e-9, high=1.0
     )
     decay: float = _share(0.95)  # of the learning rate ...
-    decay_steps: int = _count(200, 10**9)  # ... in each of so many optimiser steps ...
+    decay_steps: int = _count(200, 10**9)  # ... in this many optimiser steps ...
     least_share: float = _share(0.1)  # ... but not below this share of it
     num_steps: int = _count(32, 100_000)  # windows of each mission in a rollout
     num_minibatches: int = _count(10, 10**6)  # that a rollout is shared out to
@@ -161,7 +161,7 @@ class Training:
 
     @property
     def cost(self) -> Literal["aoi", "velocity_variance"]:
-        """What the run is to lower, as learning curves call it."""
+        """The cost that the run lowers, by its name in learning curves."""
         return "aoi" if self.reward == "aoi" else "velocity_variance"
 
     @property
@@ -192,7 +192,7 @@ def _per_team(*, is_reference: bool) -> dict[str, Any]:
     """III-C, or the authors' code: other features, and two numbers per node.
 
     Both have the code's edges. Over the text's, which lead from children to parents, nothing of the
-    robot itself reaches a teammate's node: whom it addresses could depend neither on where it is
+    robot itself reaches a teammate's node: its recipient could depend neither on where it is
     nor on the time.
     """
     features, num_outputs = ("reference", 2) if is_reference else ("paper", 1)

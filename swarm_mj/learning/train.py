@@ -99,7 +99,7 @@ def _batch_size(training: Training, num_envs: int) -> int:
 
 
 def decayed_rate(ppo: PpoSettings, num_epochs: int) -> float:
-    """Return the learning rate after so many passes: it falls in steps of the optimiser (III-C)."""
+    """Return the learning rate after some passes: it falls in steps of the optimiser (III-C)."""
     share = ppo.decay ** (num_epochs * ppo.num_minibatches // ppo.decay_steps)
     return ppo.learning_rate * max(share, ppo.least_share)
 
