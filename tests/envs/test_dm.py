@@ -36,29 +36,6 @@ class TestDmEnvsOwnLaws(test_utils.EnvironmentTestMixin, unittest.TestCase):
         yield from random_recipients(20)
 
 
-@pytest.mark.parametrize("physics", MODES)
-@pytest.mark.parametrize("task", TASKS)
-def test_equals_the_swarm_flown_by_hand(task, physics):
-    mission = small(task, physics=physics)
-    environment = make_environment(mission, seed=3)
-    swarm = Swarm(mission, [3])
-    step = environment.reset()
-    assert (step.reward, step.discount) == (None, None)
-    num_parents = 0
-    for recipient in random_recipients(30):
-        costs = swarm.step_with_recipients(recipient[None])
-        step = environment.step(recipient)
-        for name in BUFFERS:
-            np.testing.assert_array_equal(step.observation[name], getattr(swarm.buffers, name)[0])
-        np.testing.assert_array_equal(
-            environment.physics.swarm.states.position_m, swarm.states.position_m
-        )
-        assert step.observation["now"] == swarm.now[0]
-        assert step.reward == -costs.age_windows[0]
-        num_parents += (step.observation["parent"] != NO_PARENT).sum()
-    assert num_parents > 100  # they did talk
-
-
 def test_eq10_reward_is_minus_the_mean_age():
     """Over all N² pairs, in windows; what is unknown after the first window is 1 window old."""
     environment = make_environment(small())

@@ -46,42 +46,22 @@ def drawn(env, rng):
     return np.concatenate([t if env.agent == "team" else t.ravel() for t in teams])
 
 
-@pytest.mark.parametrize("features", ["paper", "reference", "extended"])
-@pytest.mark.parametrize("credit", CREDITS)
-def test_random_actions_pass_stable_baselines_checks(credit, features):
-    env = VecCheckNan(env_of(credit, features=features), raise_exception=True)
-    monitored = VecMonitor(env)
-    env.action_space.seed(1)
-    observation = monitored.reset()
-    num_episodes = 0
-    for _ in range(2 * WINDOWS):
-        assert all(map(env.observation_space.contains, rows_of(observation)))
-        actions = np.array([env.action_space.sample() for _ in range(env.num_envs)])
-        observation, reward, done, infos = monitored.step(actions)
-        assert reward.shape == done.shape == (env.num_envs,)
-        assert reward.dtype == np.float32
-        assert done.dtype == np.bool_
-        assert len(infos) == env.num_envs
-        num_episodes += sum("episode" in info for info in infos)
-    assert num_episodes == env.num_envs * (2 + 2 + 2 + 2) / 4
-
-
 @pytest.mark.parametrize("sizes", [(4,), (3, 5)])
+@pytest.mark.parametrize("features", ["paper", "extended"])
 @pytest.mark.parametrize("credit", CREDITS)
-def test_observations_have_the_shapes_and_types_of_their_space(credit, sizes):
-    env, rng = env_of(credit, sizes), np.random.default_rng(2)
-    space = env.observation_space
-    observation = env.reset()
-    for _ in range(WINDOWS + 2):
-        assert observation.keys() == space.spaces.keys()
-        for name, rows in observation.items():
-            assert rows.shape == (env.num_envs, *space[name].shape)
-            assert np.can_cast(rows.dtype, space[name].dtype) or rows.dtype == np.bool_
-        assert all(map(space.contains, rows_of(observation)))
-        observation, _, _, infos = env.step(drawn(env, rng))
-        for info in infos:
-            if info:
-                assert space.contains(info["terminal_observation"])
+def test_random_actions_pass_stable_baselines_checks(credit, features, sizes):
+    inner, rng = env_of(credit, sizes, features=features), np.random.default_rng(2)
+    monitored = VecMonitor(VecCheckNan(inner, raise_exception=True))
+    observation, num_episodes = monitored.reset(), 0
+    for _ in range(2 * WINDOWS):
+        assert all(map(inner.observation_space.contains, rows_of(observation)))
+        observation, reward, done, infos = monitored.step(drawn(inner, rng))
+        assert reward.shape == done.shape == (inner.num_envs,)
+        assert (reward.dtype, done.dtype) == (np.float32, np.bool_)
+        num_episodes += sum("episode" in info for info in infos)
+        lasts = [info["terminal_observation"] for info in infos if "TimeLimit.truncated" in info]
+        assert all(map(inner.observation_space.contains, lasts))
+    assert num_episodes == inner.num_envs * 2
 
 
 @pytest.mark.parametrize("credit", CREDITS)

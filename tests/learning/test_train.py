@@ -108,18 +108,6 @@ def with_ppo(training, **changes):
     return replace(training, ppo=replace(training.ppo, **changes))
 
 
-def test_the_learning_rate_falls_in_steps_of_the_optimiser():
-    """3 minibatches a pass: 4 passes are 12 steps. No rate is below a hundredth of the first."""
-    training = with_ppo(
-        small_training(), learning_rate=0.5, decay=0.1, decay_steps=12, least_share=0.01
-    )
-    model, _ = make_model(training)
-    assert model.lr_schedule(1.0) == 0.5
-    for passes, rate in ((3, 0.5), (4, 0.05), (7, 0.05), (8, 0.005), (12, 0.005)):
-        model._n_updates = passes
-        assert model.lr_schedule(0.3) == pytest.approx(rate)
-
-
 def test_the_optimiser_steps_at_that_rate(tmp_path):
     """Two passes a rollout and three minibatches a pass: the third rollout begins at step 12."""
     training = with_ppo(small_training(), learning_rate=1e-3, decay=0.5, decay_steps=12)
