@@ -1,4 +1,4 @@
-"""What policies share whose robots evaluate a trained network: draws and a digest (III-C)."""
+"""The common base of policies whose robots evaluate a trained network (III-C)."""
 
 import hashlib
 from abc import ABC, abstractmethod
@@ -18,7 +18,7 @@ DIGITS = 12  # of a digest: enough to tell policies apart
 
 
 class LearnedPolicy(DecentralisedPolicy, ABC):
-    """Addresses the recipient that the network's Boltzmann distribution draws, or its mode."""
+    """Robots address a draw from the network's Boltzmann distribution, or its mode."""
 
     def __init__(
         self,

@@ -21,7 +21,7 @@ Weights = dict[str, np.ndarray]  # by name; `0.weight` [Out, In] and `0.bias` [O
 
 @dataclass(frozen=True, kw_only=True)
 class MlpShape:
-    """What a plain network is made of; raises ValueError for what is unknown or out of range."""
+    """The layers of a plain network; raises ValueError for what is unknown or out of range."""
 
     num_robots: int = setting(low=2, high=1000)  # N: of the one team size that it flies
     features: str  # the name of a feature set, see `FEATURE_SETS`
@@ -66,7 +66,7 @@ class MlpPolicy(LearnedPolicy):
         """Return each robot's logits over recipients.
 
         Each mission is one product of matrices: one product of all would round otherwise for other
-        numbers of missions, so a mission would depend on those beside it.
+        numbers of missions, so a mission would depend on those flown with it.
         """
         num_robots = self._shape.num_robots
         may_address = graphs.may_address.reshape(-1, num_robots, num_robots)

@@ -1,4 +1,4 @@
-"""What a policy may know is its type (Eq. 9): local views, or the truth."""
+"""Policies, whose type is what they may know: local views (Eq. 9), or the truth."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ Parameters = Mapping[str, bool | int | float | str]  # what a policy was made wi
 
 
 class Policy:
-    """Chooses whom every robot addresses next, and what a window looks like.
+    """A choice of the robot that every robot addresses next, and of the form of a window.
 
     Attributes:
         uses: The information that each robot decides by, or the centre, in a few words.
@@ -35,7 +35,7 @@ class Policy:
 
     @property
     def payload(self) -> str:
-        """What packets carry beyond T, M and P (II-B); "none" is what the paper's carry."""
+        """The payload of packets beyond T, M and P (II-B); "none" in the paper."""
         return "none"
 
     def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:  # noqa: ARG002
@@ -52,7 +52,7 @@ class Policy:
 
     @property
     def parameters(self) -> Parameters:
-        """What the policy was made with, by name; kept next to what it costs."""
+        """Numbers that the policy was made with, by name; results keep them."""
         return {}
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
@@ -67,7 +67,7 @@ class DecentralisedPolicy(Policy, ABC):
 
     @abstractmethod
     def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """Return whom each robot addresses; itself is silence.
+        """Return the robot that each robot addresses; itself is silence.
 
         Row [b, i] may depend on view [b, i] only.
         """
@@ -112,11 +112,11 @@ class CentralisedPolicy(Policy, ABC):
 
     @abstractmethod
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
-        """Return whom each robot addresses, by all views and true states; itself is silence."""
+        """Return each robot's recipient, by all views and true states; itself is silence."""
 
 
 class RandomTransmission(Policy):
-    """What policies share whose robots draw whether they transmit."""
+    """The common base of policies whose robots draw whether they transmit."""
 
     def __init__(self, probability: float) -> None:
         """Take the probability in [0, 1], whose meaning is each policy's own, or ValueError."""

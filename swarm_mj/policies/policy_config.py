@@ -1,4 +1,4 @@
-"""What is known of a stored network besides its weights: a config, and a card for readers."""
+"""The config of a stored network, all but its weights, and a card for readers."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -14,7 +14,7 @@ SUFFIX = ".safetensors"  # of a stored policy's file
 
 @dataclass(frozen=True, kw_only=True)
 class PolicyConfig:
-    """Where a stored network comes from, whatever its kind."""
+    """The origin of a stored network, whatever its kind."""
 
     training: dict[str, Any]  # JSON: the mission, the settings, the budget spent, the command
     evaluation: dict[str, Any]  # JSON: what it cost on which missions
@@ -24,7 +24,7 @@ class PolicyConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class GnnConfig(PolicyConfig):
-    """What a stored GNN's weights belong to; raises ValueError for what does not fit together."""
+    """All of a stored GNN but its weights; raises ValueError for what does not fit together."""
 
     network: GnnShape
     features: str  # the name of a feature set, see `FEATURE_SETS`
@@ -37,7 +37,7 @@ class GnnConfig(PolicyConfig):
 
 @dataclass(frozen=True, kw_only=True)
 class MlpConfig(PolicyConfig):
-    """What a stored plain network's weights belong to."""
+    """All of a stored plain network but its weights."""
 
     network: MlpShape
 

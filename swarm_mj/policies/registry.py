@@ -157,19 +157,19 @@ def _own(name: str, mission: Mission) -> Policy:
 
 
 def is_stored(name: str) -> bool:
-    """Whether a policy's name is that of a file or a folder, there or not."""
+    """Return whether a policy's name is that of a file or a folder, there or not."""
     is_path = any(separator in name for separator in (os.sep, os.altsep) if separator)
     is_there = os.path.isdir(name) or os.path.isfile(f"{name}{SUFFIX}")
     return name not in POLICIES and (is_path or name.endswith(SUFFIX) or is_there)
 
 
 def is_learned(name: str) -> bool:
-    """Whether a policy is a trained network: the shipped one, or a stored one."""
+    """Return whether a policy is a trained network: the shipped one, or a stored one."""
     return name == SHIPPED or is_stored(name)
 
 
 def is_own_policy(name: str) -> bool:
-    """Whether a policy is a user's own, named `module:Name`."""
+    """Return whether a policy is a user's own, named `module:Name`."""
     return is_own(name) and not is_stored(name)
 
 

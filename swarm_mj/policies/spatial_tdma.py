@@ -1,6 +1,6 @@
 """TDMA with spatial reuse (Nelson and Kleinrock 1985), by interference (Grönkvist, Hansson 2001).
 
-Each robot reckons whom its teammates would decode, from where it believes them to be.
+Each robot predicts which packets its teammates would decode, from their believed positions.
 """
 
 from collections.abc import Sequence

@@ -94,7 +94,7 @@ def load_policy(
     """Return a policy, ready to fly a mission, which may be of another kind than it was trained on.
 
     The mission's area, duration and range normalise what the robots see. A deterministic policy
-    takes the most probable recipient instead of a draw. Feature sets of one's own are imported only
+    takes the most probable recipient instead of a draw. Users' own feature sets are imported only
     if their names, as `module:Name`, are among `features`: a policy cannot make us run code.
 
     Raises:

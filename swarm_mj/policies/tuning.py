@@ -13,7 +13,7 @@ from swarm_mj.system.fields import check, check_value, setting
 from swarm_mj.system.reading import read_rows
 
 TABLE = Path(__file__).with_name("tuned.csv")
-MOST_BYTES = 10_000_000
+MAX_BYTES = 10_000_000
 TUNED_AS = {"formation": "random-walk", "coverage": "random-walk"}  # teams within walls, too
 TUNED_AS |= dict.fromkeys(WORLDS, "paper")  # whose numbers these have but for arena and channel
 REGIME = ("preset", "task", "num_robots", "range_ratio", "velocity_ratio")
@@ -62,7 +62,7 @@ def tuned_probability(policy_name: str, mission: Mission) -> float:
 
 def read_table(path: Path) -> list[Tuned]:
     """Return the rows of a table; ValueError if it is no such table, or a value is none."""
-    names, rows = read_rows(path, "table", MOST_BYTES)
+    names, rows = read_rows(path, "table", MAX_BYTES)
     kinds = Tuned.__annotations__
     if names != list(kinds):
         raise ValueError(f"columns of {path} must be {', '.join(kinds)}")

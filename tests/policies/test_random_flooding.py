@@ -28,10 +28,6 @@ def is_sending(recipient):
     return recipient != np.arange(recipient.shape[-1])
 
 
-def test_iv_c_probability_0_is_silence():
-    assert not np.any(is_sending(decided(0.0, 200)))
-
-
 def test_iv_c_probability_1_addresses_the_whole_team_alike():
     """As in the authors' code the recipient is uniform over all N, so 1 in N is silence."""
     recipient = decided(1.0, 2000)

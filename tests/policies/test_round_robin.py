@@ -41,15 +41,6 @@ def test_iv_c_schedule_skips_the_base(order, first_three):
     assert [decided(SQUARE_M[None, order], window)[0] for window in range(3)] == first_three
 
 
-def test_iv_c_two_robots_have_one_turn():
-    assert decided(SQUARE_M[None, 2:], 0) == decided(SQUARE_M[None, 2:], 7) == [[0, 0]]
-
-
-def test_iv_c_every_mission_has_its_own_base():
-    both_m = np.stack([SQUARE_M, SQUARE_M[[2, 0, 1, 3]]])
-    assert decided(both_m, 1) == [[0, 2, 2, 3], [0, 1, 0, 3]]
-
-
 def test_iv_c_base_is_nearest_to_the_centre_not_to_the_team():
     """The middle robot of a line beside the centre is no base: the one nearest the origin is."""
     line_m = np.array([[[300.0, 0.0], [200.0, 0.0], [100.0, 0.0]]])

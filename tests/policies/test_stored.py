@@ -20,9 +20,8 @@ from safetensors.numpy import load_file, save_file
 from tiny_policies import FEATURES, save_tiny, tiny_config, tiny_network
 
 from swarm_mj.mission import paper
-from swarm_mj.policies.mlp import MlpPolicy, MlpShape
+from swarm_mj.policies.mlp import MlpShape
 from swarm_mj.policies.policy_config import MlpConfig, model_card
-from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.stored import (
     find_policy,
     load_policy,
@@ -177,13 +176,6 @@ def test_folders_of_version_0_1_are_read(tmp_path, named):
     assert torch.equal(network.output.weight, tiny_network().output.weight)
     (tmp_path / "runs" / "x" / "policy" / "config.json").write_text("{}")
     refused(tmp_path / named, "missing required field `format`")
-
-
-@pytest.mark.parametrize("is_deterministic", [True, False])
-def test_the_command_line_finds_a_plain_network(plain, is_deterministic):
-    found = make_policy(str(plain), MISSION, is_deterministic=is_deterministic)
-    assert isinstance(found, MlpPolicy)
-    assert found.parameters["is_deterministic"] == is_deterministic
 
 
 def test_a_plain_network_flies_teams_of_its_size_alone(plain):

@@ -28,9 +28,9 @@ def edges_to(
 ) -> WantedEdges:
     """Return the edges between nodes and parents, in each direction; a parent of -1 is none."""
     num_graphs, num_nodes = parent.shape
-    most, num, num_wanted = parent.size * len(is_upward), 0, 0
-    end, start = np.empty(most, np.int64), np.empty(most, np.int64)
-    direction, place = np.empty(most, np.int64), np.empty(num_nodes, np.int64)
+    max_edges, num, num_wanted = parent.size * len(is_upward), 0, 0
+    end, start = np.empty(max_edges, np.int64), np.empty(max_edges, np.int64)
+    direction, place = np.empty(max_edges, np.int64), np.empty(num_nodes, np.int64)
     for r in range(num_graphs):
         for k in range(num_nodes):
             place[k] = num_wanted if is_wanted[r, k] else -1

@@ -256,11 +256,11 @@ def write_turns(
     """Write 1 for the robots that have a turn by one robot's beliefs, 0 for the others.
 
     A common order of identities and the clock, thinned by distance: robot `t mod N` leads in window
-    t. After it the others join in the order of their identities, from half a round away on, so that
-    nobody's turns come close to each other, unless they are closer than the radius to a robot that
-    has joined (a maximal independent set). A robot of unknown position may be near anyone: nobody
-    joins after it. Robots that believe the same positions find the same sets, without a word.
-    `is_close` is overwritten: room to mark who is too close to one that has a turn.
+    t. After it the others join in the order of their identities, unless they are closer than the
+    radius to a robot that has joined (a maximal independent set); from half a round away on, so
+    that no robot's turns come close to each other. A robot of unknown position may be near anyone,
+    so nobody joins after it. Robots that believe the same positions find the same sets without a
+    word. `is_close` is overwritten: room to mark who is too close to one that has a turn.
     """
     num_robots = is_known.shape[0]
     has_turn[:] = 0.0

@@ -65,7 +65,7 @@ def load_features(features: str) -> None:
 
 
 def is_own_set(features: str) -> bool:
-    """Whether a feature set is a user's own, named `module:Name`."""
+    """Return whether a feature set is a user's own, named `module:Name`."""
     return FORM.fullmatch(features) is not None
 
 

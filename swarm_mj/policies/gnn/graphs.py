@@ -34,7 +34,7 @@ class Graphs:
 
 
 class FeatureExtractor(ABC):
-    """Makes graphs of local views; one that remembers packets must see every window."""
+    """A maker of graphs of local views; one that remembers packets must see every window."""
 
     names: ClassVar[tuple[str, ...]]  # of the features, in order; there are F
     uses: ClassVar[str] = "its buffer"  # what they are made of, in a few words

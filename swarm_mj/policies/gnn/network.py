@@ -108,7 +108,7 @@ class AggregationGnn(nn.Module):
     """Encodes, applies the GN block K times, decodes each stage, maps all linearly (Eq. 14)."""
 
     def __init__(self, shape: GnnShape) -> None:
-        """Draws the parameters from PyTorch's own generator."""
+        """Draw the parameters from PyTorch's own generator."""
         super().__init__()
         self.shape = shape
         width = shape.latent

@@ -1,4 +1,4 @@
-"""What a robot remembers of the packets that it sent and decoded, next to its buffer.
+"""The packets that a robot sent and decoded, as far as it remembers them next to its buffer.
 
 Row `[b, i]` is written from what robot `i` sent and decoded only. A packet's timestamps are its
 sender's at that time; they are followed from window to window here, by Alg. 1.
@@ -17,7 +17,7 @@ from swarm_mj.system.compiled import compiled
 
 
 class Memory(NamedTuple):
-    """When each robot last heard, addressed and was addressed by whom, and what packets said."""
+    """Times of packets between each pair of robots, and the timestamps that packets carried."""
 
     heard: Float32[np.ndarray, "B N N"]  # when i last decoded a packet of k itself [windows]
     addressed_by: Float32[np.ndarray, "B N N"]  # when such a packet was last meant for i [windows]

@@ -1,4 +1,4 @@
-"""What an Aggregation GNN is made of, and what it can be given."""
+"""The layers of an Aggregation GNN, as settings."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -10,11 +10,7 @@ Edges = Literal["paper", "reference", "both"]
 
 @dataclass(frozen=True, kw_only=True)
 class GnnShape:
-    """What an Aggregation GNN is made of.
-
-    Raises:
-        ValueError: A number is out of its range, or the edges have no such name.
-    """
+    """The layers of an Aggregation GNN; raises ValueError for what is out of range or unknown."""
 
     num_features: int = setting(low=1, high=1024)  # F: numbers per node
     num_outputs: int = setting(1, low=1, high=1024)  # O: numbers per node that come out
@@ -37,5 +33,5 @@ class GnnShape:
 
     @property
     def has_core(self) -> bool:
-        """Whether there is a GN block with something to learn."""
+        """True if there is a GN block with something to learn."""
         return self.receptive_field > 0 and not self.is_linear

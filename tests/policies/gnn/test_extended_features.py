@@ -406,24 +406,3 @@ def test_a_maximal_independent_set_of_those_asked(team):
                 assert is_in_its_way.sum() == 1  # itself
             else:
                 assert any(is_in_its_way[:place])
-
-
-@given(teams())
-def test_everyone_leads_once_in_n_windows(team):
-    """Whoever leads has a turn at any radius; at a huge one, nobody else has."""
-    believed_m, _, now = team
-    num_robots = len(believed_m)
-    everyone = np.ones(num_robots, dtype=bool)
-    for window in range(now, now + num_robots):
-        has_turn = turns(believed_m, everyone, window, np.array([100.0, 1e6]))
-        assert np.all(has_turn[:, window % num_robots])
-        assert has_turn[1].sum() == 1
-
-
-@given(teams())
-def test_where_unknown_robots_are_believed_to_be_does_not_matter(team):
-    believed_m, is_known, now = team
-    elsewhere_m = np.where(is_known[:, None], believed_m, 0.0)
-    np.testing.assert_array_equal(
-        turns(believed_m, is_known, now), turns(elsewhere_m, is_known, now)
-    )

@@ -244,16 +244,6 @@ def test_nothing_is_added_to_silence_in_ones_turn(has_turn, own_0, own_2):
     assert found == [[own_0, 1.0, -2.0], [3.0, 0.0, own_2]]
 
 
-@pytest.mark.parametrize("silence_logit", [0.0, -1.5])
-def test_of_two_numbers_all_that_sends_nothing_is_silence(silence_logit):
-    """Zero power to anyone, and full power to oneself."""
-    own_0 = math.log(math.exp(0.0) + math.exp(-1.0) + math.exp(0.25) + math.exp(0.5))
-    own_2 = math.log(math.exp(1.0) + math.exp(2.0) + math.exp(4.0) + math.exp(1.0))
-    found = logits(torch.stack([FULL, ZERO], dim=2), silence_logit=silence_logit)
-    expected = [[own_0 + silence_logit, 1.0, -2.0], [3.0, 0.0, own_2 + silence_logit]]
-    np.testing.assert_allclose(found, expected, rtol=1e-6)
-
-
 def test_two_numbers_make_the_probabilities_of_the_2_n_actions():
     """Against the softmax over all six actions of a row, those that are silence added up."""
     output = torch.stack([FULL, ZERO], dim=2)
