@@ -5,14 +5,16 @@ The channels, the schedulers and the policies that predict receptions all call t
 """
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from swarm_mj.system.compiled import compiled
 
-NOBODY = -1  # in place of a robot's index
+# In place of a robot's index. A Python integer would be a type of its own to numba, which then
+# compiles all that it reaches twice.
+NOBODY = cast(int, np.int64(-1))
 MIN_DISTANCE_M = 1e-3  # robots closer than this count as this far apart, which keeps gains finite
 LOGISTIC = 1.702  # 1 / (1 + exp(-1.702 z)) is within 0.01 of the normal distribution function
 CERTAIN = 2.5  # standard deviations beyond which a packet decodes for certain, or never

@@ -85,7 +85,7 @@ def schedule(
         if is_free[p]:
             first = NOBODY
             if lookahead.width > 1:
-                first = _best_first(timestamp, now, task, lookahead, is_free[p:])
+                first = _best_first(timestamp, now, task, lookahead, is_free, p)
             _choose(timestamp, task, first, transmits[p], after)
             for i in range(timestamp.shape[0]):
                 for k in range(timestamp.shape[0]):
@@ -102,8 +102,9 @@ def _best_first(
     task: _Task,
     lookahead: Lookahead,
     is_free: Bool[np.ndarray, "P"],
+    p: int,
 ) -> int:
-    """Return the first transmitter whose branch knows most, summed over its slots, or `NOBODY`."""
+    """Return the first transmitter of slot p by whose branch most is known, or `NOBODY`."""
     num_robots = timestamp.shape[0]
     gain = np.zeros((num_robots, num_robots))
     _fill_gains(timestamp, task, gain)
@@ -112,6 +113,7 @@ def _best_first(
     for i in range(num_robots):
         alone[i] = _value(task.links, gain, air, nobody, i)
     best, most_known = NOBODY, -np.inf
+    end = min(p + lookahead.depth, is_free.shape[0])
     for _ in range(lookahead.width):
         first, first_value = NOBODY, 0.0
         for i in range(num_robots):
@@ -120,7 +122,7 @@ def _best_first(
         if first == NOBODY:
             return best
         alone[first] = 0.0
-        known = _follow(timestamp, now, task, first, is_free[: lookahead.depth])
+        known = _follow(timestamp, now, task, first, is_free, p, end)
         if known > most_known:
             best, most_known = first, known
     return best
@@ -133,19 +135,25 @@ def _follow(
     task: _Task,
     first: int,
     is_free: Bool[np.ndarray, "P"],
+    begin: int,
+    end: int,
 ) -> float:
     """Return the sum of all timestamps after each of the slots that begin with this transmitter."""
     before, after = timestamp.copy(), np.empty_like(timestamp)
     transmits = np.zeros(timestamp.shape[0], dtype=np.bool_)
     known = 0.0
-    for p in range(is_free.shape[0]):
-        if p > 0:
+    for p in range(begin, end):
+        if p > begin:
             now += 1.0
             observe_own(before, now)
         if is_free[p]:
-            _choose(before, task, first if p == 0 else NOBODY, transmits, after)
+            _choose(before, task, first if p == begin else NOBODY, transmits, after)
             before, after = after, before
-        known += float(before.sum())
+        total = np.float32(0.0)
+        for i in range(before.shape[0]):
+            for k in range(before.shape[0]):
+                total += before[i, k]
+        known += float(total)
     return known
 
 
