@@ -130,7 +130,7 @@ class MissionBatch:
 
     @property
     def is_over(self) -> bool:
-        """Whether the last window has been flown."""
+        """True after the last window."""
         return bool(self.flown.now[0] >= self.last_window)
 
     @property

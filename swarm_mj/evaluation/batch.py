@@ -48,7 +48,7 @@ class Batch:
 
 @dataclass(frozen=True, kw_only=True)
 class BatchCosts:
-    """What every mission of a batch cost: one number a mission, in the order of the seeds."""
+    """The costs of a batch: one number per mission, in the order of the seeds."""
 
     aoi: list[Cost]  # Eq. 10, mean over windows [windows]
     aoi_steady: list[Cost]  # as above, over the second half of the mission
@@ -114,7 +114,7 @@ class Tally:
         """Start at nothing; the swarm is at the start of its missions."""
         mission, num_missions = swarm.mission, len(swarm.now)
         self._swarm = swarm
-        self._floor: ConnectivityFloor | None = None  # it reckons with the mission's own range
+        self._floor: ConnectivityFloor | None = None  # it uses the mission's own range
         if isinstance(swarm.channel, FreeSpaceRadio) and swarm.channel == radio_of(mission):
             self._floor = ConnectivityFloor(num_missions, mission.num_robots, mission.range_m)
         self._num_steady = mission.num_windows - mission.num_windows // 2

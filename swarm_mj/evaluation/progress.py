@@ -83,7 +83,7 @@ class _Flown:
     costs: BatchCosts
 
     def fits(self, batch: Batch) -> bool:
-        """Whether there is a number of each kind for each mission, and one for each age."""
+        """Return whether there is a number of each kind for each mission, and one for each age."""
         lengths = {name: len(numbers) for name, numbers in vars(self.costs).items()}
         num_missions = len(batch.seeds)
         expected = dict.fromkeys(lengths, num_missions) | {"ages": num_ages(batch.mission)}

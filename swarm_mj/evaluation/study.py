@@ -30,7 +30,7 @@ BATCH_SIZE = 25  # missions side by side: as fast as many, and little lost by an
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """What an evaluation is asked for; every policy meets the same missions in each regime.
+    """The settings of an evaluation; all policies fly the same missions in each regime.
 
     Raises:
         ValueError: Nothing to evaluate, an unknown policy, or a number out of range.
@@ -114,7 +114,7 @@ class Study:
 
     @cached_property
     def parameters(self) -> dict[tuple[Mission, str], Parameters]:
-        """What each policy was made with in each regime when the study began."""
+        """Parameters of each policy in each regime, as of the start of the study."""
         return {pair: self.make_policy(pair[1], pair[0]).parameters for pair in self.pairs}
 
     def make_policy(self, policy: str, regime: Mission) -> Policy:

@@ -107,7 +107,7 @@ class TrainingCallback(BaseCallback):
 
     @property
     def has_stalled(self) -> bool:
-        """Whether the run no longer learns."""
+        """True if the run no longer learns."""
         return has_stalled(self._progress.curve, self._limits.patience)
 
     def _on_rollout_start(self) -> None:
@@ -118,7 +118,7 @@ class TrainingCallback(BaseCallback):
             raise Stopped
 
     def _is_time(self) -> bool:
-        """Whether the minutes are over, but for those that the choice of a policy will take."""
+        """Return whether the minutes are over, except those that the selection will take."""
         limit, evaluation = self._limits.minutes, self._progress.evaluation_minutes
         if limit is None:
             return False

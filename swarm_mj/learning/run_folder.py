@@ -126,7 +126,7 @@ class Progress:
 
     @property
     def has_chosen(self) -> bool:
-        """Whether the policy that is kept was chosen after all that the run has learned."""
+        """True if the kept policy was selected after the last training step."""
         return self.choice is not None and self.choice.run_decisions == self.decisions
 
     @property

@@ -109,7 +109,7 @@ def reserved_minutes(
 
 
 def has_stalled(curve: Sequence[Row], patience: int | None) -> bool:
-    """Whether the last `patience` evaluations brought nothing better; never with None or 0."""
+    """Return whether the last `patience` evaluations brought no gain; never with None or 0."""
     if not patience or len(curve) <= patience:
         return False
     before, since = (

@@ -166,12 +166,12 @@ class Training:
 
     @property
     def sums_nodes(self) -> bool:
-        """Whether a team's value sums all nodes of all graphs, as in the authors' code."""
+        """True if a team's value sums all nodes of all graphs, as in the authors' code."""
         return self.mission.preset == "reference"
 
     @property
     def drops_silence(self) -> bool:
-        """Whether silent rows, which without discount earn nothing, may be left out."""
+        """True if silent rows, which without discount have no credit, may be left out."""
         return self.credit_assignment == "robot" and self.ppo.discount == 0.0
 
 

@@ -237,7 +237,7 @@ class Mission:
 
     @property
     def has_walls(self) -> bool:
-        """Whether robots are reflected at the boundary of the area."""
+        """True if robots are reflected at the boundary of the area."""
         return self.boundary == "reflect"
 
     @property

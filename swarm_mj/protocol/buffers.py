@@ -20,7 +20,7 @@ NEVER = 0.0  # T_0 and L_0: the clock's first tick is half a window, so 0 is bef
 
 @dataclass(frozen=True, kw_only=True)
 class Buffers:
-    """What every robot i knows about every robot j, in all B missions at once."""
+    """The knowledge of every robot i about every robot j, in all B missions."""
 
     timestamp: Float[np.ndarray, "B N N"]  # T^{i,j}: when j observed it [windows], or NEVER
     position_m: Float[np.ndarray, "B N N 2"]  # M^{i,j}: where j was, as i knows it [m]
@@ -31,7 +31,7 @@ class Buffers:
 
     @property
     def is_known(self) -> Bool[np.ndarray, "B N N"]:
-        """Whether i has observed j or received an entry of it (T > T_0), or knew its start."""
+        """True where i has observed j, received an entry of it (T > T_0), or knew its start."""
         return (self.timestamp > NEVER) | self.is_granted[:, None, None]
 
     @property

@@ -21,7 +21,7 @@ _FADES, _ERASURES, _BURSTS = np.uint64(1), np.uint64(2), np.uint64(3)  # what a 
 
 
 class Reception(NamedTuple):
-    """What decides whether a packet of a given mean power decodes."""
+    """The parameters that decide whether a packet of a given mean power decodes."""
 
     noise_mw: float  # sigma [mW]
     threshold: float  # least SINR that decodes, linear [1]

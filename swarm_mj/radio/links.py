@@ -39,7 +39,7 @@ class Links(NamedTuple):
 
     @property
     def is_doubtful(self) -> bool:
-        """Whether powers fade, or are known up to an error, even where positions are known."""
+        """True if powers fade, or are known up to an error, even where positions are known."""
         return len(self.curves) > 0
 
 

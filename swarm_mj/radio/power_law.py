@@ -33,7 +33,7 @@ NO_OBSTACLES = Obstacles(
 
 
 class PowerLaw(NamedTuple):
-    """What mean powers follow from, where no shadowing is known; free space unless given."""
+    """The law of mean powers without shadowing; free space by default."""
 
     at_1_m: Float[np.ndarray, "N"]  # power of each robot's packets after one metre, in any unit
     breakpoint_m: float = math.inf  # up to which free space holds

@@ -1,4 +1,4 @@
-"""What a world beyond free space adds: obstacles, mismatched links, robots that are cut off.
+"""The additions beyond free space: obstacles, mismatched links, robots that are cut off.
 
 The map and the view in 3-D draw the same things in the same colours.
 """

@@ -1,4 +1,4 @@
-"""What pictures and videos show of a mission, window by window; a replay's file holds it."""
+"""The footage of a mission for pictures and videos, window by window, kept in replays."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,7 +26,7 @@ class Ground:
 
     @property
     def moves(self) -> bool:
-        """Whether it follows the team."""
+        """True if it follows the team."""
         return bool(np.any(self.centre_m))
 
 
@@ -46,7 +46,7 @@ def frame(position_m: Float[np.ndarray, "T N 2"], half_side_m: float) -> Ground:
 
 @dataclass(frozen=True, kw_only=True)
 class Facts:
-    """What does not change in a mission."""
+    """The constants of a mission."""
 
     mission: Mission
     policy: str

@@ -58,7 +58,7 @@ class Log:
 
     @property
     def has_motion(self) -> bool:
-        """Whether any robot moves."""
+        """True if any robot moves."""
         return bool(np.any(self.velocity_mps))
 
     @property
@@ -68,17 +68,17 @@ class Log:
 
     @property
     def is_other_known(self) -> Bool[np.ndarray, "T N"]:
-        """Whether the ego robot has heard of j, which is not itself."""
+        """True if the ego robot has heard of j, which is not itself."""
         return self.is_known & (np.arange(self.is_known.shape[1]) != self.ego)
 
     @property
     def has_parent(self) -> Bool[np.ndarray, "T N"]:
-        """Whether what the ego robot knows of j came over the radio."""
+        """True if the ego robot's entry of j came over the radio."""
         return self.is_other_known & (self.parent != NO_PARENT)
 
     @property
     def is_cut_off(self) -> Bool[np.ndarray, "T N"]:
-        """Whether a robot can exchange no packets with the ego robot, over whatever hops."""
+        """True if a robot cannot exchange packets with the ego robot, over any number of hops."""
         if self.group is None:
             return np.zeros(self.is_on.shape, dtype=bool)
         is_apart = self.group != self.group[:, [self.ego]]

@@ -31,7 +31,7 @@ ADDRESSES, OF_TORCH, OF_RERUN = 0.5 * GB, 0.7 * GB, 3.0 * GB
 
 @dataclass(frozen=True, kw_only=True)
 class Needs:
-    """What a command takes beyond what its process has when it starts [bytes]."""
+    """The memory and disk that a command takes beyond its process's start [bytes]."""
 
     memory: float
     addresses: float = ADDRESSES  # of these, beyond the memory

@@ -1,4 +1,4 @@
-"""What commands print, and how they name themselves."""
+"""The output of commands, and their names."""
 
 import os
 import shutil

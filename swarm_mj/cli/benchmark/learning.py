@@ -72,7 +72,7 @@ def _network_rows(mission: Mission, num_missions: int, seconds: float) -> Iterat
 
 
 def _forward_us(network: torch.nn.Module, *inputs: torch.Tensor, seconds: float) -> float:
-    """What a network takes that does not learn [µs]."""
+    """Time a forward pass without gradients [µs]."""
     return microseconds(torch.inference_mode()(lambda: network(*inputs)), seconds)
 
 
@@ -116,7 +116,7 @@ class _Clock(BaseCallback):
 
 
 def _graphs(mission: Mission, features: str, num_missions: int) -> tuple[torch.Tensor, ...]:
-    """What teams see that have talked for a while: features and parents of all robots' nodes."""
+    """Return the features and parents of all robots' nodes after a warm-up."""
     swarm, policy = Swarm(mission, range(num_missions)), RoundRobin()
     extractor = make_extractor(features, mission)
     extractor.start(num_missions, mission.num_robots)

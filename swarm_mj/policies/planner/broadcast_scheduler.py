@@ -49,7 +49,7 @@ class Lookahead(NamedTuple):
 
 
 class _Task(NamedTuple):
-    """What a schedule is made for."""
+    """The inputs of a schedule."""
 
     links: Links
     weights: Weights

@@ -37,11 +37,11 @@ class Discovery:
         ]
 
     def is_discovered(self, slot: int, is_complete: bool) -> bool:
-        """Whether a slot is the discovery's, by a snapshot that has all robots or not."""
+        """Return whether a slot is the discovery's, by a snapshot that has all robots or not."""
         return not is_complete and not self._is_late(slot)
 
     def is_sought(self, slot: int, is_fresh: Bool[np.ndarray, "N"]) -> bool:
-        """Whether a slot is the search's, by a snapshot in which these are fresh."""
+        """Return whether a slot is the search's, by a snapshot in which these are fresh."""
         is_turn = (slot // SLOTS_PER_WINDOW) % self._search.every_windows == 0
         return is_turn and self._is_late(slot) and not np.all(is_fresh)
 

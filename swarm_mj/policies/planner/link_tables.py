@@ -39,7 +39,7 @@ class LinkTable:
 
     @cached_property
     def changes_nothing(self) -> bool:
-        """Whether the plan may go on: losses that strike all links alike favour no other."""
+        """True if the plan may stay: losses that affect all links equally favour no other."""
         fades = LAWS[self.law][0] != NO_FADING
         return not (fades or np.any(self.mean_db) or np.any(self.std_db))
 

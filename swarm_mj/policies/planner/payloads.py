@@ -71,7 +71,7 @@ def link_fields(mission: Mission) -> tuple[PacketField, ...]:
 
 
 def carries(fields: tuple[PacketField, ...], mission: Mission) -> bool:
-    """Whether the mission's slots hold a whole packet with these fields."""
+    """Return whether the mission's slots hold a whole packet with these fields."""
     return fits(packet_of(mission, fields), mission)
 
 

@@ -219,7 +219,7 @@ class _Team:
 
 
 def _is_common(buffers: Buffers, b: int) -> bool:
-    """Whether all robots know of all robots, and the same: how they were at one moment."""
+    """Return whether all robots have the same complete picture of one moment."""
     timestamp = buffers.timestamp[b]
     return bool(np.all(buffers.is_known[b]) and np.all(timestamp == timestamp[0, 0]))
 

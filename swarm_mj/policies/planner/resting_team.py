@@ -152,11 +152,11 @@ class CommonTimes:
         self._spread = round(settings.spread_rounds * slots)
 
     def are_made(self, slot: int) -> bool:
-        """Whether everyone makes a table before this slot."""
+        """Return whether all robots make a table before this slot."""
         return self.are_flown(slot + self._spread)
 
     def are_flown(self, slot: int) -> bool:
-        """Whether everyone begins to fly by the tables made last."""
+        """Return whether all robots begin to use the tables made last."""
         return slot >= self._first and slot == self.begin(slot)
 
     def begin(self, slot: int) -> int:

@@ -27,7 +27,7 @@ class Snapshots:
     rank: Int[np.ndarray, "N"]  # the best snapshot has rank 0
 
     def is_complete(self, owner: int) -> bool:
-        """Whether someone's snapshot has all robots."""
+        """Return whether a robot's snapshot has all robots."""
         return bool(np.all(self.is_known[owner]))
 
 

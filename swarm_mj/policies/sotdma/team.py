@@ -76,7 +76,7 @@ class SotdmaTeam:
 
     @property
     def takes_turns(self) -> bool:
-        """Whether there was no frame so far."""
+        """True before the first frame."""
         return self._table is None
 
     def transmits(

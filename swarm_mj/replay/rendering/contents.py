@@ -1,4 +1,4 @@
-"""What a picture shows of a swarm that is flying."""
+"""The contents of a picture of a running swarm."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What stands around the scene in a video: titles, a legend, and the mean age over time."""
+"""The frame around a video's scene: titles, a legend, and the mean age over time."""
 
 from collections.abc import Sequence
 from functools import cache
