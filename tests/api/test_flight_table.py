@@ -173,6 +173,8 @@ def test_a_task_with_a_cost_of_its_own_shows_that_instead_of_velocities():
 
 def test_the_title_names_the_arena_and_what_the_channel_adds():
     assert flight_title(paper("flocking"), "tdma", 3) == "flocking, tdma, 40 robots, seed 3"
+    title = flight_title(paper("stationary", failure_fraction=0.5), "mst", 7)
+    assert title == "stationary, mst, 40 robots, 50% of them off half-way, seed 7"
     title = flight_title(paper("random-walk", collide=True), "tdma", 3)
     assert title == "random-walk, tdma, 40 robots that collide, seed 3"
     mission = paper("random-walk", arena="blocks", fading="rayleigh", prior_knowledge="map")

@@ -91,19 +91,6 @@ def test_parts_by_name_are_those_of_the_command_line(here):
     assert run.title.endswith("own_fly_parts:Mine, 6 robots, seed 1, channel own_fly_parts:deaf")
 
 
-def test_parts_by_name_are_evaluated_too(here):
-    (here / "own_study_parts.py").write_text(OWN)
-    found = swarm_mj.evaluate(
-        ["own_study_parts:Mine", "tdma"], "stationary", num_missions=2, seed=1, **SHORT
-    )
-    mine, tdma = (found.summary[policy].aoi_mean for policy in found.summary)
-    assert mine == tdma
-    deaf = swarm_mj.evaluate(
-        "tdma", "stationary", channel="own_study_parts:deaf", num_missions=2, seed=1, **SHORT
-    )
-    assert deaf.summary.tdma.hearers_per_packet == 0.0
-
-
 def test_ctrl_c_keeps_what_was_flown(monkeypatch):
     windows = flight.rollout
 

@@ -30,6 +30,7 @@ def test_the_commands_to_begin_with_exist():
     [
         ("flyy", "swarm-mj: error: there is no command 'flyy'; did you mean fly?"),
         ("xyz", "swarm-mj: error: there is no command 'xyz' (see"),
+        ("-- fly", "swarm-mj: error: "),
         ("--versoin", "did you mean --version?"),
         ("fly --polcy tdma", "unrecognized arguments: --polcy tdma; did you mean --policy?"),
         ("fly --polcy=tdma", "did you mean --policy?"),

@@ -139,13 +139,6 @@ def test_bad_options_are_refused(swarm_mj, results, options, complaint):
     assert complaint in refusal(swarm_mj("figures", results, "--out", ".", *options))
 
 
-def test_help_names_the_figures_and_formats(swarm_mj):
-    text = swarm_mj("figures", "--help").stdout
-    for word in ("fig2, fig3, fig4, fig5, fig6", "svg, png, pdf", "RESULTS.csv", "--force"):
-        assert word in text
-    assert "None" not in text
-
-
 def test_results_of_robots_that_were_told_more_are_not_drawn_beside_the_papers(swarm_mj, tmp_path):
     everything = SYNTHETIC["everything"]()
     write_csv(tmp_path / "all.csv", [replace(everything[0], prior_knowledge="map,start")])

@@ -2,6 +2,7 @@
 
 import pytest
 
+import swarm_mj
 from swarm_mj.api.fly import mission_of
 from swarm_mj.cli import main, parse
 from swarm_mj.cli.mission_options import NAMES, mission_flags
@@ -31,7 +32,7 @@ def test_robots_of_a_world_walk_unless_told_otherwise(preset):
     assert mission("--preset", preset) == PRESETS[preset]("random-walk")
     assert missions("--preset", preset) == (PRESETS[preset]("random-walk"),)
     assert mission("--preset", preset, "--task", "flocking") == PRESETS[preset]("flocking")
-    assert mission_of("fly", None, {"preset": preset}, ()) == PRESETS[preset]("random-walk")
+    assert mission_of(swarm_mj.fly, None, {"preset": preset}) == PRESETS[preset]("random-walk")
 
 
 def test_flocks_have_no_boundary_unless_they_are_given_one():

@@ -137,11 +137,3 @@ sys.exit(str(heavy) if heavy else 0)
 """
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
-
-
-@pytest.mark.parametrize("arguments", [["flly"], ["--", "fly"], ["--wings"]])
-def test_a_line_without_a_command_is_refused_in_one_line(capsys, arguments):
-    assert main(arguments) == 2
-    printed = capsys.readouterr()
-    assert len(printed.err.splitlines()) == 1
-    assert printed.out == ""

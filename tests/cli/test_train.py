@@ -159,13 +159,6 @@ def test_limits_are_kept_and_may_be_moved(here, capsys):
     capsys.readouterr()
 
 
-@pytest.mark.usefixtures("here")
-def test_options_of_the_run_may_be_repeated(capsys):
-    train("--out", "r", *SMALL, "--budget", 128)
-    assert train("--out", "r", *SMALL, "--credit", "robot", "--seed", 0, "--resume") == 0
-    capsys.readouterr()
-
-
 def test_a_run_begins_with_a_policy_and_its_network(whole, here, capsys):
     """Which has 4 wide layers, whatever the usual ones are."""
     policy = whole[0] / "runs" / "whole"
@@ -187,21 +180,6 @@ def test_missions_of_several_sizes_are_shared_out_evenly(here, capsys):
     training = read_run(here / "r").training
     assert (training.robots, training.missions, training.groups) == ((3, 4, 5), 18, 3)
     assert "stationary, 3, 4, 5 robots" in capsys.readouterr().out
-
-
-def test_help_suffices(capsys):
-    for arguments in (["--help"], ["train", "--help"]):
-        assert main(arguments) == 0
-        shown = " ".join(capsys.readouterr().out.split())
-        assert "train" in shown
-        assert "None" not in shown
-    for text in (
-        "(default: robot)",
-        "(default: 200000, team: 2000000; none with --minutes)",
-        "goes on with --out OUT --resume",
-        "Exit codes",
-    ):
-        assert text in shown
 
 
 @pytest.mark.usefixtures("here")

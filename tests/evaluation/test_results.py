@@ -109,26 +109,17 @@ def test_cells_that_are_not_what_they_must_be(tmp_path, cells, complaint):
         read_results(tmp_path / "r.csv")
 
 
-def test_files_from_before_broadcasts_were_counted_are_read(tmp_path):
-    new = ("payload", "heard_ratio", "hearers_per_packet")
+@pytest.mark.parametrize(
+    ("new", "default"),
+    [(("payload", "heard_ratio", "hearers_per_packet"), None), (("failure_fraction",), 0.0)],
+)
+def test_older_files_that_lack_columns_with_defaults_are_read(tmp_path, new, default):
     old = {name: cell for name, cell in asdict(some_result()).items() if name not in new}
     with (tmp_path / "old.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, old)
         writer.writeheader()
         writer.writerow(old)
-    assert read_results(tmp_path / "old.csv") == [some_result(**dict.fromkeys(new))]
-
-
-def test_files_from_before_robots_could_be_switched_off_are_read(tmp_path):
-    write_csv(tmp_path / "r.csv", [some_result(failure_fraction=0.0)])
-    header, row = (tmp_path / "r.csv").read_text().splitlines()
-    place = COLUMNS.index("failure_fraction")
-    old = [",".join(cells[:place] + cells[place + 1 :]) for cells in [header.split(",")]]
-    cells = row.split(",", place + 1)
-    (tmp_path / "old.csv").write_text("\n".join([*old, ",".join(cells[:place] + cells[-1:])]))
-    assert read_results(tmp_path / "old.csv") == [some_result(failure_fraction=0.0)]
-    write_csv(tmp_path / "r.csv", [some_result(failure_fraction=0.2)])
-    assert read_results(tmp_path / "r.csv")[0].failure_fraction == 0.2
+    assert read_results(tmp_path / "old.csv") == [some_result(**dict.fromkeys(new, default))]
 
 
 def test_missing_columns_are_named(tmp_path):
