@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import ARENAS
-from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import is_own_policy, is_stored, make_policy
 from swarm_mj.replay.estimates import replay_memory
 from swarm_mj.replay.recorder import Recorder
@@ -39,13 +38,12 @@ class Flown(NamedTuple):
 
 
 def fly_swarm(
-    swarm: Swarm, policy: Policy, recorder: Recorder | None, bar: WorkBar, *, way_on: str | None
+    swarm: Swarm, recorder: Recorder | None, bar: WorkBar, *, way_on: str | None
 ) -> Flown:
     """Fly a swarm's missions.
 
     Args:
-        swarm: At the start of its missions.
-        policy: Who addresses whom.
+        swarm: At the start of its missions, its policy started.
         recorder: Takes each window, if there is one.
         bar: Shows the progress.
         way_on: How to fly on when memory runs short, for the message; None flies on regardless.
@@ -61,7 +59,7 @@ def fly_swarm(
         return Flown(flown, code, ending, time.perf_counter() - start_s)
 
     with suppress(MemoryError), memory_errors(), deferred_interrupt() as is_interrupted, bar:
-        for window in rollout(swarm, policy):
+        for window in rollout(swarm):
             if recorder:
                 recorder.add(window)
             flown.append(window)

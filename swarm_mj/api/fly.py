@@ -76,19 +76,18 @@ def fly(
     needs = flight_needs(mission, name, is_recorded=record)
     check_fits(needs, None, way_out, is_forced=False, way_on="")
     swarm = Swarm(mission, [seed], **components.given)
-    is_broadcast = chosen.window(mission).is_broadcast
-    recorder = Recorder(swarm, ego=observer, is_broadcast=is_broadcast) if record else None
+    swarm.start(chosen)
+    recorder = Recorder(swarm, ego=observer) if record else None
     with quiet_bar("Compiling", COMPILING_WINDOWS, "windows") as compiling:
         like = "tdma" if isinstance(policy, Policy) else name  # an object flies only once
         compile_ahead(mission, like, compiling.advance, **how)
     bar = quiet_bar("Flying", mission.num_windows, "windows")
-    flown = fly_swarm(swarm, chosen, recorder, bar, way_on="")
+    flown = fly_swarm(swarm, recorder, bar, way_on="")
     if flown.code != DONE:
         kept = f"{len(flown.windows)} of {mission.num_windows} windows; these are kept"
         warnings.warn(f"{flown.ending} after {kept}", stacklevel=2)
     return run_of(
-        mission,
-        chosen,
+        swarm,
         flown,
         name=name,
         seed=seed,

@@ -16,10 +16,10 @@ from swarm_mj.api.flight_table import flight_numbers, flight_rows, flight_title,
 from swarm_mj.api.metrics import Metrics
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components, components_in
-from swarm_mj.policies.policy import Policy
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rendering.style import DEFAULTS, default_seconds, fitted
 from swarm_mj.simulation.rollout import WindowRecord, summarise
+from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.atomic import write_bytes, write_csv, write_json
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import as_typed
@@ -236,8 +236,7 @@ class Run:
 
 
 def run_of(
-    mission: Mission,
-    policy: Policy,
+    swarm: Swarm,
     flown: Flown,
     *,
     name: str,
@@ -246,7 +245,8 @@ def run_of(
     components: Components,
     log: Log | None = None,
 ) -> Run:
-    """Return a mission flown as a `Run`; the config is everything that makes it again."""
+    """Return a swarm's mission, flown, as a `Run`; the config is everything that makes it again."""
+    mission, policy = swarm.mission, swarm.policy
     config = {
         **asdict(mission),
         "policy": name,

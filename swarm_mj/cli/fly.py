@@ -92,16 +92,16 @@ def run(options: FlyOptions) -> int:
     with preparing:
         compile_ahead(mission, name, **options.how)
         swarm = Swarm(mission, [options.seed], **components.given)
-        is_broadcast = policy.window(mission).is_broadcast
-        recorder = Recorder(swarm, ego=ego, is_broadcast=is_broadcast) if path else None
+        swarm.start(policy)
+        recorder = Recorder(swarm, ego=ego) if path else None
     for note in notes_on(mission):
         console.print(note)
     bar = WorkBar("Flying", mission.num_windows, "windows", console=console)
     way_on = None if options.yes else "; --yes flies on all the same"
-    flown = fly_swarm(swarm, policy, recorder, bar, way_on=way_on)
+    flown = fly_swarm(swarm, recorder, bar, way_on=way_on)
     given = {"seed": options.seed, "observer": ego, "components": options.components}
     with deferred_interrupt():
-        run = run_of(mission, policy, flown, name=name, **given)
+        run = run_of(swarm, flown, name=name, **given)
         try:  # a file may fail; the table is printed all the same
             with console.status("Writing ..."):
                 _write(run, options.json, path, recorder)

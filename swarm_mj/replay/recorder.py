@@ -88,11 +88,8 @@ class Log:
 class Recorder:
     """Copies what a replay shows from the swarm's first mission, window by window."""
 
-    def __init__(self, swarm: Swarm, *, ego: int = 0, is_broadcast: bool = False) -> None:
-        """Prepare the record of the ego robot's knowledge; raise ValueError if it does not exist.
-
-        A window is two broadcasts (IV-C), or else a request and a response (Alg. 1).
-        """
+    def __init__(self, swarm: Swarm, *, ego: int = 0) -> None:
+        """Prepare the record of what the ego robot knows; raise ValueError if there is none."""
         num_robots = swarm.mission.num_robots
         if not isinstance(ego, Integral) or not 0 <= ego < num_robots:
             raise ValueError(f"observer must be from 0 to {num_robots - 1}, not {ego!r}")
@@ -100,7 +97,6 @@ class Recorder:
         self._stride = max(1, int(np.ceil(matrices_bytes / MAX_AGE_MATRIX_BYTES)))
         self._swarm = swarm
         self._ego = ego
-        self._is_broadcast = is_broadcast
         self._rows: list[dict[str, np.ndarray]] = []
         self._age: list[np.ndarray] = []
         self._task_costs: list[TaskCost] = []
@@ -164,7 +160,7 @@ class Recorder:
         return Log(
             ego=self._ego,
             window=window,
-            is_broadcast=self._is_broadcast,
+            is_broadcast=self._swarm.is_broadcast,
             scene=self._swarm.scene,
             age_window=age_window,
             age=np.stack(self._age[: len(age_window)]),

@@ -52,20 +52,25 @@ class Summary:
     hearers_per_packet: Float[np.ndarray, "B"]  # robots that decoded a broadcast; nan if none flew
 
 
-def rollout(swarm: Swarm, policy: Policy) -> Iterator[WindowRecord]:
+def rollout(swarm: Swarm, policy: Policy | None = None) -> Iterator[WindowRecord]:
     """Fly the missions, one window at a time, for the caller to watch, record or break off.
+
+    Args:
+        swarm: At the start of its missions.
+        policy: Is started; None is the one that was started already.
 
     Yields:
         The costs of each window; the swarm stands at the end of that window.
 
     Raises:
-        ValueError: The swarm has flown already.
+        ValueError: The swarm has flown already, or no policy was started.
         TypeError: The swarm or the policy is none.
     """
     check_kind("swarm", swarm, Swarm, "Swarm(mission, [1])")
     if np.any(swarm.now > 0):
         raise ValueError(f"the swarm has flown {swarm.now[0]:g} windows already; restart it first")
-    swarm.start(policy)
+    if policy is not None:
+        swarm.start(policy)
     for _ in range(swarm.mission.num_windows):
         costs = swarm.step()
         yield WindowRecord(costs=costs, hops=mean_hops(swarm.buffers, swarm.states.is_active))

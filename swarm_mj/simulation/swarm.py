@@ -119,6 +119,7 @@ class Swarm:
         if mission.grants("start"):
             grant_start(self.buffers, self.states)
         self.phases: tuple[Phase, ...] = ()
+        self.is_broadcast = False  # whether the last window's packets were for everyone (IV-C)
         self._read_only = self.buffers.read_only()
         self._policy: CentralisedPolicy | DecentralisedPolicy | None = None
 
@@ -228,7 +229,7 @@ class Swarm:
         self, window: WindowProtocol, decide: Callable[[], Int[np.ndarray, "B N"]]
     ) -> WindowCosts:
         """Fly one window of this protocol."""
-        start = self.now
+        start, self.is_broadcast = self.now, window.is_broadcast
 
         def decide_after(phases: tuple[Phase, ...]) -> Int[np.ndarray, "B N"]:
             if phases:  # a later slot is decided by its own clock, and knows the earlier one

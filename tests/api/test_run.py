@@ -17,6 +17,7 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay.read import windows
 from swarm_mj.replay.rendering import style
 from swarm_mj.replay.rendering.style import VideoStyle
+from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 
 SHORT = {"num_robots": 6, "num_windows": 20, "range_ratio": 0.5}
@@ -102,7 +103,9 @@ def test_a_flight_that_ended_early_is_called_interrupted(unrecorded, code):
     mission = paper("stationary", **SHORT)
     flown = Flown(list(unrecorded.windows), code, "", 2.5)
     how = {"name": "mst", "seed": 3, "observer": 0, "components": Components()}
-    run = run_of(mission, make_policy("mst", mission), flown, **how)
+    swarm = Swarm(mission, [3])
+    swarm.start(make_policy("mst", mission))
+    run = run_of(swarm, flown, **how)
     assert (run.summary.num_windows, run.summary.wall_seconds) == (20, 2.5)
     assert run.summary.interrupted == (code != DONE)
     assert run.report()["config"] == unrecorded.config

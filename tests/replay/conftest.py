@@ -32,7 +32,7 @@ def record(policy_name, probability, *, task="flocking", **overrides):
     mission = paper(task, **settings)
     swarm = Swarm(mission, [5])
     policy = make_policy(policy_name, mission, probability)
-    recorder = Recorder(swarm, ego=4, is_broadcast=policy.window(mission).is_broadcast)
+    recorder = Recorder(swarm, ego=4)
     packets = []
     for window in rollout(swarm, policy):
         recorder.add(window)

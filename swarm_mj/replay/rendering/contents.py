@@ -15,7 +15,6 @@ def contents_of(
     index: int = 0,
     *,
     observer: int = 0,
-    is_broadcast: bool = False,
     full_scale: float | None = None,
 ) -> Contents:
     """Return what one of a swarm's missions looks like now, with the window just flown.
@@ -24,7 +23,6 @@ def contents_of(
         swarm: The missions.
         index: The mission.
         observer: The robot by whose knowledge the others are coloured; it is white itself.
-        is_broadcast: Whether windows are two broadcasts (IV-C) instead of those of Alg. 1.
         full_scale: The age from which robots are darkest [windows]; unless given, the number of
             robots: a round in which everyone has its turn.
 
@@ -48,7 +46,7 @@ def contents_of(
             policy="",
             seed=0,
             observer=observer,
-            is_broadcast=is_broadcast,
+            is_broadcast=swarm.is_broadcast,
             full_scale=full_scale or float(num),
         ),
         window=np.array([1]),
@@ -56,7 +54,7 @@ def contents_of(
         velocity_mps=states.velocity_mps[[index]],
         age=np.where(buffers.is_known[index, observer], age, np.nan)[None],
         is_on=is_on[None],
-        segments=_last_packets(swarm, index, is_broadcast),
+        segments=_last_packets(swarm, index),
         age_mean=np.zeros(1),
         is_cut_off=(is_on & is_on[observer] & is_apart)[None],
         mismatch=None if seen is None else seen.mismatch,
@@ -67,11 +65,11 @@ def contents_of(
     return replace(footage.contents(0), centre_m=square.centre_m[0], reach_m=reach_m)
 
 
-def _last_packets(swarm: Swarm, index: int, is_broadcast: bool) -> dict[str, PacketSegments]:
+def _last_packets(swarm: Swarm, index: int) -> dict[str, PacketSegments]:
     """Return the packets of one mission's last window; before the first one there are none."""
     if not swarm.phases:
         return {}
     recipient = np.stack([[phase.recipient[index] for phase in swarm.phases]])
     heard = np.stack([[phase.heard[index] for phase in swarm.phases]])
-    packets = fates(recipient, heard, is_broadcast=is_broadcast)
+    packets = fates(recipient, heard, is_broadcast=swarm.is_broadcast)
     return packet_segments(packets, swarm.states.position_m[[index]])

@@ -54,7 +54,7 @@ def test_a_broadcast_leads_to_all_who_hear_it(swarm):
     policy = make_policy("random-flooding", swarm.mission, 0.3)
     for _ in range(4):
         swarm.step(policy)
-    contents = contents_of(swarm, 1, is_broadcast=True)
+    contents = contents_of(swarm, 1)
     num_heard = sum(int(np.sum(phase.heard[1] != np.arange(8))) for phase in swarm.phases)
     assert len(contents.start_m) == num_heard
     assert {tuple(colour) for colour in contents.packet_colour.tolist()} <= {palette.BROADCAST}

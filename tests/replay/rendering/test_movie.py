@@ -28,7 +28,7 @@ STYLE = VideoStyle(width=480, height=320, seconds=1.0, fps=6)
 def flown(policy_name, mission):
     swarm = Swarm(mission, [1])
     policy = make_policy(policy_name, mission)
-    recorder = Recorder(swarm, is_broadcast=policy.window(mission).is_broadcast)
+    recorder = Recorder(swarm)
     for window in rollout(swarm, policy):
         recorder.add(window)
     return footage_of(recorder.log(), mission, policy_name, 1)
