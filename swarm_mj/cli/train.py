@@ -27,7 +27,7 @@ from swarm_mj.learning.run_folder import (
     SETTINGS,
     Limits,
     Progress,
-    Run,
+    TrainingRun,
     check_new,
     read_run,
 )
@@ -93,7 +93,7 @@ def run(options: TrainOptions) -> int:
     return DONE
 
 
-def _asked_run(options: TrainOptions) -> Run:
+def _asked_run(options: TrainOptions) -> TrainingRun:
     """Return the run that the options ask for; raise ValueError before anything is written."""
     run = _begun_run(options) if options.resume else _new_run(options)
     run = replace(run, limits=asked_limits(run.limits, options))
@@ -104,7 +104,7 @@ def _asked_run(options: TrainOptions) -> Run:
     return run
 
 
-def _begun_run(options: TrainOptions) -> Run:
+def _begun_run(options: TrainOptions) -> TrainingRun:
     run = read_run(options.out, own_names(options.settings))
     if options.init is not None:
         raise ValueError(f"{options.out} has begun, so --init {options.init} is too late")
@@ -113,14 +113,14 @@ def _begun_run(options: TrainOptions) -> Run:
     return run
 
 
-def _new_run(options: TrainOptions) -> Run:
+def _new_run(options: TrainOptions) -> TrainingRun:
     check_new(options.out)
     init = options.init
     training = asked_settings(options.settings, read_policy(init)[1] if init else None, init)
     credit = training.credit_assignment
     limits = Limits(decisions=BUDGETS[credit], patience=PATIENCE[credit])
     command = shlex.join(["swarm-mj", "train", *options.typed])
-    return Run(training=training, limits=limits, command=command, init=init)
+    return TrainingRun(training=training, limits=limits, command=command, init=init)
 
 
 def asked_limits(limits: Limits, options: TrainOptions) -> Limits:
@@ -131,7 +131,7 @@ def asked_limits(limits: Limits, options: TrainOptions) -> Limits:
     return replace(limits, **{name: x for name, x in others.items() if x is not None})
 
 
-def _print(out: Path, asked: Run, progress: Progress, *, is_over: bool) -> None:
+def _print(out: Path, asked: TrainingRun, progress: Progress, *, is_over: bool) -> None:
     """Print the run's report, and the commands that use its policy."""
     training, console = asked.training, plain_console()
     credit, sizes = training.credit_assignment, ", ".join(map(str, training.robots))

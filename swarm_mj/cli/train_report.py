@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from swarm_mj.learning.run_folder import Limits, Progress, Run
+from swarm_mj.learning.run_folder import Limits, Progress, TrainingRun
 from swarm_mj.learning.selection import (
     ORACLE,
     ORACLE_ROBOTS,
@@ -29,7 +29,9 @@ NAMES = {"first": "the policy it began with"}
 class Watch(WorkBar):
     """The listener of a run: a bar, and a line for every evaluation; it passes Ctrl-C on."""
 
-    def __init__(self, console: Console, run: Run, is_interrupted: Callable[[], bool]) -> None:
+    def __init__(
+        self, console: Console, run: TrainingRun, is_interrupted: Callable[[], bool]
+    ) -> None:
         """Prepare the bar; `is_interrupted` says whether Ctrl-C was pressed."""
         super().__init__("Training", 1.0, console=console, shows_time_left=False)
         self._console, self._run, self._is_interrupted = console, run, is_interrupted
@@ -103,7 +105,7 @@ def reference_ages(row: dict[str, float]) -> dict[str, float]:
     return {name: age for name, age in ages.items() if age is not None}
 
 
-def report(run: Run, progress: Progress) -> dict[str, str]:
+def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
     """Return rows for the closing table: the policy kept, and others on the same missions."""
     best, choice = progress.best, progress.choice
     if best is None:
@@ -136,7 +138,7 @@ def report(run: Run, progress: Progress) -> dict[str, str]:
     return rows
 
 
-def verdicts(run: Run, progress: Progress) -> Iterator[str]:
+def verdicts(run: TrainingRun, progress: Progress) -> Iterator[str]:
     """Yield what a reader should know beyond the numbers: losses, and how fair the choice is."""
     choice = progress.choice
     if has_stopped_early(run, progress):
@@ -160,7 +162,7 @@ def verdicts(run: Run, progress: Progress) -> Iterator[str]:
             yield f"The policy kept {lost if is_clear else level} {behind} on the same missions."
 
 
-def has_stopped_early(run: Run, progress: Progress) -> bool:
+def has_stopped_early(run: TrainingRun, progress: Progress) -> bool:
     """Return whether a run stopped because it no longer learned, and not at its budget."""
     limits = run.limits
     is_left = limits.decisions is None or progress.decisions < limits.decisions
@@ -183,14 +185,14 @@ def _text(status: "Status", start: "Status", limits: Limits) -> str:
     return ", ".join(parts)
 
 
-def _oracle_missions(run: Run) -> str:
+def _oracle_missions(run: TrainingRun) -> str:
     """Return how many of the evaluations' missions of each team size the oracle has flown."""
     held_out = run.training.held_out
     number = reference_missions(run.training).get(ORACLE, held_out)  # an old run flew all
     return f"{number} of {held_out} missions"
 
 
-def _amount(run: Run, value: float, error: float | None) -> str:
+def _amount(run: TrainingRun, value: float, error: float | None) -> str:
     """Return a value with its error, in the unit of the cost that the run lowers."""
     unit, digits = ("windows", 2) if run.training.cost == "aoi" else ("m²/s²", 4)
     spread = "" if error is None else f" ± {error:.{digits}f}"

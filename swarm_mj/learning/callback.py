@@ -29,7 +29,7 @@ from swarm_mj.learning.run_folder import (
     REPLAYS,
     Accumulator,
     Progress,
-    Run,
+    TrainingRun,
     write_curve,
 )
 from swarm_mj.learning.selection import (
@@ -78,7 +78,7 @@ class TrainingCallback(BaseCallback):
     def __init__(
         self,
         model: PPO,
-        run: Run,
+        run: TrainingRun,
         folder: Path,
         progress: Progress,
         networks: checkpoint.Networks,

@@ -67,7 +67,7 @@ class Limits:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class TrainingRun:
     """A request for a training run."""
 
     training: Training
@@ -135,14 +135,14 @@ class Progress:
         return min(self.curve, key=lambda row: row["objective"], default=None)
 
 
-def write_run(folder: Path, run: Run) -> None:
+def write_run(folder: Path, run: TrainingRun) -> None:
     """Write a run's `settings.json`; raises OSError if the folder cannot be written."""
     init = None if run.init is None else str(run.init.resolve())
     header = {"format": FORMAT, "format_version": FORMAT_VERSION}
     write_json(folder / SETTINGS, header | asdict(run) | {"init": init})
 
 
-def read_run(folder: Path, named: Collection[str] = ()) -> Run:
+def read_run(folder: Path, named: Collection[str] = ()) -> TrainingRun:
     """Return what a run was asked for when it began, or last went on.
 
     Args:
@@ -160,7 +160,7 @@ def read_run(folder: Path, named: Collection[str] = ()) -> Run:
         raise ValueError(f"{folder} holds no run to go on with; to begin one, leave out --resume")
     text = read_file(path, "settings", MAX_BYTES, folder=folder)
     try:
-        run = read_document(text, FORMAT, FORMAT_VERSION, Run)
+        run = read_document(text, FORMAT, FORMAT_VERSION, TrainingRun)
     except ValueError as error:
         raise ValueError(
             f"settings {path} are damaged, no run's, or from an earlier version: {error}"

@@ -29,7 +29,7 @@ from swarm_mj.learning.run_folder import (
     TENSORBOARD,
     Limits,
     Progress,
-    Run,
+    TrainingRun,
     check_begun,
     check_new,
     write_curve,
@@ -104,7 +104,9 @@ def decayed_rate(ppo: PpoSettings, num_epochs: int) -> float:
     return ppo.learning_rate * max(share, ppo.least_share)
 
 
-def train(run: Run, folder: Path, *, listener: Listener, is_resumed: bool = False) -> Progress:
+def train(
+    run: TrainingRun, folder: Path, *, listener: Listener, is_resumed: bool = False
+) -> Progress:
     """Train until a limit, or until the listener returns False; return where the run stands.
 
     Args:
@@ -150,7 +152,7 @@ def _learn(model: PPO, limits: Limits, callback: TrainingCallback) -> None:
 
 
 def _begun(
-    folder: Path, run: Run, model: PPO, rng: np.random.Generator
+    folder: Path, run: TrainingRun, model: PPO, rng: np.random.Generator
 ) -> tuple[Progress, checkpoint.Networks]:
     """Take a run to its last checkpoint, or else to its beginning; then it can be resumed.
 

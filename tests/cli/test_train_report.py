@@ -18,12 +18,12 @@ from swarm_mj.cli.train_report import (
     verdicts,
 )
 from swarm_mj.learning.callback import Status
-from swarm_mj.learning.run_folder import Limits, Progress, Run
+from swarm_mj.learning.run_folder import Limits, Progress, TrainingRun
 from swarm_mj.learning.selection import Choice, Cost
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import paper
 
-RUN = Run(
+RUN = TrainingRun(
     training=usual_settings("robot", paper("stationary"), (40,)),
     limits=Limits(decisions=200_000, patience=2),
 )

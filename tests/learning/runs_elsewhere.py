@@ -21,7 +21,7 @@ from swarm_mj.cli import main
 from swarm_mj.learning import callback
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.held_out import reference_columns
-from swarm_mj.learning.run_folder import Limits, Progress, Run
+from swarm_mj.learning.run_folder import Limits, Progress, TrainingRun
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import train
 from swarm_mj.mission import paper
@@ -71,7 +71,7 @@ def timed(folder):
     progress, num_sessions = Progress(), 0
     while progress.decisions < 192:
         limits = Limits(decisions=192, minutes=progress.minutes + 0.1 / 60.0)
-        asked = Run(training=training, limits=limits)
+        asked = TrainingRun(training=training, limits=limits)
         progress = train(asked, folder / "timed", listener=go_on, is_resumed=num_sessions > 0)
         num_sessions += 1
     ends = [end_of(folder / name) for name in ("untimed", "timed")]

@@ -6,7 +6,7 @@ from dataclasses import replace
 import torch
 from safetensors.torch import load_file
 
-from swarm_mj.learning.run_folder import CHECKPOINT, Limits, Run
+from swarm_mj.learning.run_folder import CHECKPOINT, Limits, TrainingRun
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import train
 from swarm_mj.mission import paper
@@ -49,7 +49,7 @@ class StopAfter:
 def run(training, folder, decisions=192, listener=go_on, *, init=None, is_resumed=False):
     """Trains; checkpoints stand between all rollouts."""
     limits = Limits(decisions=decisions, checkpoint_every_s=0.0)
-    asked = Run(training=training, limits=limits, init=init)
+    asked = TrainingRun(training=training, limits=limits, init=init)
     return train(asked, folder, listener=listener, is_resumed=is_resumed)
 
 

@@ -10,7 +10,7 @@ from small_runs import StopAfter, go_on, run, small_training
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from swarm_mj.learning import callback
-from swarm_mj.learning.run_folder import CURVE, REPLAYS, TENSORBOARD, Limits, Run
+from swarm_mj.learning.run_folder import CURVE, REPLAYS, TENSORBOARD, Limits, TrainingRun
 from swarm_mj.learning.settings import HELD_OUT_SEED, TEST_SEED
 from swarm_mj.learning.train import train
 from swarm_mj.policies.registry import make_policy
@@ -44,7 +44,7 @@ def whole(tmp_path_factory):
         return True
 
     limits = Limits(decisions=192, replay_every=100)
-    asked = Run(training=TRAINING, limits=limits, command="swarm-mj train --out x")
+    asked = TrainingRun(training=TRAINING, limits=limits, command="swarm-mj train --out x")
     progress = train(asked, folder, listener=listen)
     return folder, progress, heard
 
@@ -141,14 +141,14 @@ def test_a_run_stops_when_evaluations_bring_no_gain_however_often_it_was_interru
     monkeypatch.setattr(callback, "evaluate", judged)
     limits, is_resumed = Limits(decisions=640, patience=2), False
     for _ in range(10):
-        asked = Run(training=TRAINING, limits=limits)
+        asked = TrainingRun(training=TRAINING, limits=limits)
         listener = StopAfter(sitting)
         progress = train(asked, tmp_path / "run", listener=listener, is_resumed=is_resumed)
         is_resumed = True
         if progress.choice is not None:
             break
     assert [row["decisions"] for row in progress.curve] == [0.0, 64.0, 128.0, 192.0, 256.0]
-    asked = Run(training=TRAINING, limits=replace(limits, patience=0))
+    asked = TrainingRun(training=TRAINING, limits=replace(limits, patience=0))
     progress = train(asked, tmp_path / "run", listener=StopAfter(17), is_resumed=True)
     assert progress.curve[-1]["decisions"] == 320.0
 
@@ -158,7 +158,7 @@ def test_a_stall_stops_a_run_only_when_the_last_weights_are_judged(tmp_path, mon
     evaluate = callback.evaluate
     monkeypatch.setattr(callback, "evaluate", lambda *a: replace(evaluate(*a), objective=1.0))
     run(TRAINING, tmp_path / "run", 640, lambda status: status.decisions <= 128)
-    asked = Run(training=TRAINING, limits=Limits(decisions=640, patience=2))
+    asked = TrainingRun(training=TRAINING, limits=Limits(decisions=640, patience=2))
     progress = train(asked, tmp_path / "run", listener=go_on, is_resumed=True)
     assert progress.decisions == 160
     assert [row["decisions"] for row in progress.curve] == [0.0, 64.0, 128.0, 160.0]
@@ -171,7 +171,7 @@ def test_what_an_evaluation_takes_is_known_after_resuming(tmp_path):
     progress = run(TRAINING, tmp_path / "run", 64, StopAfter(3))
     assert progress.evaluation_minutes > 0.0
     limits = Limits(minutes=progress.minutes + 0.5 * progress.evaluation_minutes)
-    asked = Run(training=TRAINING, limits=limits)
+    asked = TrainingRun(training=TRAINING, limits=limits)
     again = train(asked, tmp_path / "run", listener=go_on, is_resumed=True)
     assert again.decisions == progress.decisions == 32
 
@@ -239,7 +239,7 @@ def test_a_better_policy_takes_the_place_of_the_last_and_a_worse_one_does_not(
 def test_minutes_end_a_run_after_a_whole_rollout(tmp_path, monkeypatch):
     """Where none are kept back for the choice."""
     monkeypatch.setattr(callback, "reserved_minutes", lambda *_: 0.0)
-    asked = Run(training=TRAINING, limits=Limits(minutes=1e-9))
+    asked = TrainingRun(training=TRAINING, limits=Limits(minutes=1e-9))
     progress = train(asked, tmp_path / "run", listener=go_on)
     assert progress.decisions == 0
     assert [row["decisions"] for row in progress.curve] == [0.0]
@@ -250,7 +250,7 @@ def test_minutes_end_a_run_after_a_whole_rollout(tmp_path, monkeypatch):
         return True
 
     limits = Limits(minutes=progress.minutes + 0.5 / 60.0)
-    asked = Run(training=TRAINING, limits=limits)
+    asked = TrainingRun(training=TRAINING, limits=limits)
     progress = train(asked, tmp_path / "run", listener=slow, is_resumed=True)
     assert progress.decisions % 32 == 0
     assert 0 < progress.decisions <= 64

@@ -18,7 +18,7 @@ from swarm_mj.learning.run_folder import (
     Accumulator,
     Limits,
     Progress,
-    Run,
+    TrainingRun,
     check_begun,
     check_new,
     read_run,
@@ -29,7 +29,9 @@ from swarm_mj.mission.components import Components
 
 LIMITS = Limits(decisions=5, minutes=0.5, replay_every=3)
 ROW = {"decisions": 10.0, "aoi": 1 / 3, "objective": 0.2}
-RUN = Run(training=small_training(sizes=(4, 6)), limits=LIMITS, command="swarm-mj train --out x")
+RUN = TrainingRun(
+    training=small_training(sizes=(4, 6)), limits=LIMITS, command="swarm-mj train --out x"
+)
 
 
 def changed(folder, change):
