@@ -49,9 +49,10 @@ def locational_cost(
     """
     cost = np.zeros(len(position_m))
     for b in range(len(position_m)):
-        for i in np.flatnonzero(counts[b]):
-            polygon = cell(position_m[b], counts[b], i, half_side_m)
-            cost[b] += moments(polygon, position_m[b, i])[3]
+        for i in range(counts.shape[1]):
+            if counts[b, i]:
+                polygon = cell(position_m[b], counts[b], i, half_side_m)
+                cost[b] += moments(polygon, position_m[b, i])[3]
     return cost / (2.0 * half_side_m) ** 2
 
 
