@@ -71,14 +71,6 @@ def test_disconnected_teams_are_redrawn_not_repaired():
     assert (distance <= 0.1).mean() == pytest.approx(0.274, abs=0.05)
 
 
-def test_the_seed_fixes_the_positions():
-    def draw(seed):
-        return connected_positions(20, 400.0, 250.0, np.random.default_rng(seed))
-
-    assert (draw(7) == draw(7)).all()
-    assert (draw(7) != draw(8)).any()
-
-
 def test_hopeless_density_is_an_error_that_says_what_to_do():
     with pytest.raises(ValueError, match=r"40 robots with a range of 0.5 m") as refusal:
         connected_positions(40, 500.0, 0.5, np.random.default_rng(0))

@@ -11,32 +11,25 @@ from swarm_mj.radio.free_space import path_loss_db
 TASKS = ["stationary", "random-walk", "flocking"]
 
 
-@pytest.mark.parametrize("task", TASKS)
-def test_paper_follows_the_text(task):
-    mission = paper(task)
-    assert (mission.preset, mission.task) == ("paper", task)
-    assert mission.max_acceleration_mps2 == 20.0
-    assert mission.wall_hit == "mirror"
-    assert mission.half_duplex == "strict"
-    assert mission.flocking_set == "heard"
-    assert not mission.silence_is_attempt
-    assert not mission.moves_each_transmission
-    assert not mission.tree_recomputed
-    assert not mission.tree_root_transmits
+TEXT = {
+    "preset": "paper", "max_acceleration_mps2": 20.0, "wall_hit": "mirror",
+    "half_duplex": "strict", "flocking_set": "heard", "silence_is_attempt": False,
+    "moves_each_transmission": False, "tree_recomputed": False, "tree_root_transmits": False,
+}  # fmt: skip
+CODE = {
+    "preset": "reference", "max_acceleration_mps2": 10.0, "wall_hit": "clip",
+    "half_duplex": "eavesdroppers", "flocking_set": "moving", "silence_is_attempt": True,
+    "moves_each_transmission": True, "tree_root_transmits": True,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_reference_follows_the_code(task):
-    mission = reference(task)
-    assert (mission.preset, mission.task) == ("reference", task)
-    assert mission.max_acceleration_mps2 == 10.0
-    assert mission.wall_hit == "clip"
-    assert mission.half_duplex == "eavesdroppers"
-    assert mission.flocking_set == "moving"
-    assert mission.silence_is_attempt
-    assert mission.moves_each_transmission
-    assert mission.tree_recomputed == (task in ("random-walk", "flocking"))  # "for mobile teams"
-    assert mission.tree_root_transmits
+def test_presets_follow_the_text_and_the_code(task):
+    code = CODE | {"tree_recomputed": task in ("random-walk", "flocking")}  # "for mobile teams"
+    for preset, numbers in ((paper, TEXT), (reference, code)):
+        mission = preset(task)
+        assert {name: getattr(mission, name) for name in numbers} == numbers
+        assert mission.task == task
 
 
 @pytest.mark.parametrize("preset", [paper, reference])

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from channels import unreliable
 
-from swarm_mj.envs.dm import make_environment
 from swarm_mj.mission import paper, reference
 from swarm_mj.mission.placement import draw_survivors
 from swarm_mj.physics.state import RobotStates
@@ -186,29 +185,12 @@ def test_a_restart_switches_everyone_on():
     np.testing.assert_array_equal(last.costs.age_windows, flown.costs.age_windows)
 
 
-def test_the_reward_of_an_environment_is_of_who_is_active():
-    mission = small("stationary", num_windows=4, num_robots=5)
-    environment = make_environment(mission, seed=1)
-    environment.reset()
-    rewards = [environment.step([1, 1, 2, 3, 4]).reward for _ in range(4)]
-    swarm = Swarm(mission, [1])
-    costs = [swarm.step_with_recipients(np.array([[1, 1, 2, 3, 4]])) for _ in range(4)]
-    assert rewards == [-cost.age_windows[0] for cost in costs]
-
-
 def some_team(rng):
-    """Buffers after some windows with everyone on, and what the next ones are made of."""
-    buffers = empty_buffers(2, 7)
-    now = np.zeros(2)
-    for _ in range(4):
-        states = some_states(rng)
-        window(
-            buffers,
-            states,
-            some_recipients(rng),
-            unreliable(int(now[0]), senders_listen=False),
-            now,
-        )
+    """Buffers after some windows with everyone on, and the time."""
+    buffers, now = empty_buffers(2, 7), np.zeros(2)
+    for seed in range(4):
+        channel = unreliable(seed, senders_listen=False)
+        window(buffers, some_states(rng), some_recipients(rng), channel, now)
         now = now + 1.0
     return buffers, now
 
