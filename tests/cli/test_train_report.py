@@ -10,7 +10,6 @@ from rich.console import Console
 
 from swarm_mj.cli.train_report import (
     Watch,
-    age_of,
     has_stopped_early,
     minutes_left,
     report,
@@ -167,11 +166,6 @@ def test_the_time_left_is_by_this_sessions_speed():
     assert minutes_left(now, start, Limits(decisions=1_500)) == 0.0
 
 
-def test_an_age_has_its_error_if_it_has_one():
-    assert age_of(ROW) == "31.50 ± 0.25"
-    assert age_of({"aoi": 31.5}) == "31.50"
-
-
 def heard_by(is_interrupted, statuses, terminal=False):
     """What is drawn for these, and whether each asked to go on."""
     file = io.StringIO()
@@ -204,20 +198,16 @@ def test_every_new_evaluation_is_a_line_and_those_of_earlier_sessions_are_not():
     assert answers == [True] * 4
 
 
-def test_the_bar_says_where_the_run_stands():
-    shown, _, _ = heard_by(
-        lambda: False,
-        [status(1_000, 1.0, [ROW]), status(2_000, 2.0, [ROW], aoi=28.0)],
-        terminal=True,
-    )
-    assert "Training" in shown
+def test_the_bar_says_where_the_run_stands_and_what_is_evaluated():
+    statuses = [
+        status(1_000, 1.0, [ROW]),
+        status(2_000, 2.0, [ROW], aoi=28.0),
+        status(2_000, 2.0, [ROW], evaluated=0.4, what="Choosing"),
+    ]
+    for count, said in ((2, "Training"), (3, "Choosing"), (3, "missions 40%")):
+        assert said in heard_by(lambda: False, statuses[:count], terminal=True)[0]
+    shown, _, _ = heard_by(lambda: False, statuses[:2], terminal=True)
     assert "2,000 decisions, age 28.0, held out 31.5, 17/s, 0:02:00 left" in shown
-
-
-def test_the_bar_says_that_missions_are_evaluated():
-    shown, _, _ = heard_by(lambda: False, [status(0, 0.1, evaluated=0.4, what="Choosing")], True)
-    assert "Choosing" in shown
-    assert "missions 40%" in shown
 
 
 def test_ctrl_c_is_passed_on_and_said_once():

@@ -80,17 +80,6 @@ def test_the_freshest_comes_first_in_each_regime(printed):
     assert sum("preset paper: 1 robots" in line for line in lines) == 2
 
 
-def test_regimes_in_which_robots_fail_are_apart_and_say_so(printed):
-    results = [
-        some_result("a", 3.0, failure_fraction=0.0),
-        some_result("a", 4.0, failure_fraction=0.2),
-    ]
-    lines = printed(results, 100)
-    assert sum("preset paper: 1 robots" in line for line in lines) == 2
-    assert sum(" 1 windows of paper physics" in line for line in lines) == 2
-    assert sum(" 20% of the robots off half-way" in line for line in lines) == 1
-
-
 def rows(lines, policy):
     """The words of both lines of a policy's row."""
     first = next(index for index, line in enumerate(lines) if line.startswith(policy))
@@ -135,14 +124,6 @@ def test_what_packets_weigh_and_what_teams_send(printed):
     assert "sent by the team [kbit/s]: mst 8.0" in lines
 
 
-def test_regimes_of_other_bit_rates_are_tables_of_their_own(printed):
-    lines = printed([some_result("mst", 1.0, bit_rate=rate) for rate in (250e3, 1e6)], 100)
-    assert [line for line in lines if line.startswith("bit rate")] == [
-        "bit rate 250 kbit/s,",
-        "bit rate 1 Mbit/s,",
-    ]
-
-
 def test_an_option_stands_below_its_policy(printed):
     lines = printed([some_result("planner --payload none", 1.0, payload="none")], 100)
     above, below = rows(lines, "planner")
@@ -165,21 +146,23 @@ def test_the_lower_bound_stands_below(printed):
     assert "ower bound" not in unknown
 
 
-def test_regimes_of_other_channels_and_arenas_are_tables_of_their_own(printed):
-    plain = {"arena": "open", "prior_knowledge": "nothing"}
-    others = (
-        {},
-        {"arena": "blocks"},
-        {"radio": "fading rayleigh"},
-        {"prior_knowledge": "map,start"},
-    )
-    lines = printed([some_result("a", 1.0, **plain | other) for other in others], 100)
-    text = "\n".join(lines)
-    assert text.count("lower bound (connectivity)") == 4
-    assert text.count("known ") == 1
-    assert ",\nknown map,start\n" in text
-    assert ",\narena blocks\n" in text
-    assert ",\nradio fading rayleigh" in text
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        ({"failure_fraction": 0.2}, "1 windows of paper physics, 20% of the robots off half-way\n"),
+        ({"bit_rate": 250e3}, ",\nbit rate 250 kbit/s\n"),
+        ({"bit_rate": 1e6}, ",\nbit rate 1 Mbit/s\n"),
+        ({"arena": "blocks"}, ",\narena blocks\n"),
+        ({"radio": "fading rayleigh"}, ",\nradio fading rayleigh\n"),
+        ({"prior_knowledge": "map,start"}, ",\nknown map,start\n"),
+        ({"channel": "my:Radio"}, ",\nchannel my:Radio\n"),
+    ],
+)
+def test_other_regimes_are_tables_of_their_own_and_say_so(printed, other, said):
+    plain = NOTHING | {"arena": "open", "prior_knowledge": "nothing", "failure_fraction": 0.0}
+    text = "\n".join(printed([some_result("a", 1.0, **plain | each) for each in ({}, other)], 100))
+    assert text.count("preset paper: 1 robots") == 2
+    assert text.count(said) == 1
 
 
 def test_a_tasks_own_cost_has_a_column_and_a_sentence(printed):
