@@ -3,11 +3,10 @@
 import math
 from collections.abc import Callable, Iterator
 from datetime import timedelta
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from swarm_mj.learning.run_folder import Limits, Progress, TrainingRun
+from swarm_mj.learning.run_folder import Limits, Progress, Status, TrainingRun
 from swarm_mj.learning.selection import (
     ORACLE,
     ORACLE_ROBOTS,
@@ -17,9 +16,6 @@ from swarm_mj.learning.selection import (
     reference_missions,
 )
 from swarm_mj.system.progress import WorkBar
-
-if TYPE_CHECKING:  # stable-baselines3 takes its time to import
-    from swarm_mj.learning.callback import Status
 
 FINISHING = "finishing this rollout, then all is kept; Ctrl-C again breaks off at once"
 CLEAR = 2.0  # standard errors of a difference that is not due to chance
@@ -44,7 +40,7 @@ class Watch(WorkBar):
         """True once there was anything to do."""
         return self._start is not None
 
-    def __call__(self, status: "Status") -> bool:
+    def __call__(self, status: Status) -> bool:
         """Show a status; return whether to go on."""
         if self._start is None:
             self._start, self._num_rows = status, len(status.progress.curve)
@@ -63,7 +59,7 @@ class Watch(WorkBar):
         # Asked at every redrawing, so Ctrl-C shows before the run reports again.
         return "Finishing" if self._is_interrupted() else self.what
 
-    def _print_new_row(self, status: "Status") -> None:
+    def _print_new_row(self, status: Status) -> None:
         curve = status.progress.curve
         if len(curve) == self._num_rows:
             return
@@ -78,13 +74,13 @@ class Watch(WorkBar):
         )
 
 
-def share_done(status: "Status", limits: Limits) -> float:
+def share_done(status: Status, limits: Limits) -> float:
     """Return the share of a run that is done, by the limit that it is nearest to."""
     pairs = ((status.decisions, limits.decisions), (status.minutes, limits.minutes))
     return min(1.0, max((done / limit for done, limit in pairs if limit), default=0.0))
 
 
-def minutes_left(status: "Status", start: "Status", limits: Limits) -> float | None:
+def minutes_left(status: Status, start: Status, limits: Limits) -> float | None:
     """Return the minutes until the first limit, at the speed since `start`; None if unknown."""
     left = [limits.minutes - status.minutes] if limits.minutes else []
     made = status.decisions - start.decisions
@@ -169,7 +165,7 @@ def has_stopped_early(run: TrainingRun, progress: Progress) -> bool:
     return is_left and has_stalled(progress.curve, limits.patience)
 
 
-def _text(status: "Status", start: "Status", limits: Limits) -> str:
+def _text(status: Status, start: Status, limits: Limits) -> str:
     parts = [f"{status.decisions:,} decisions"]
     if status.evaluated is not None:
         parts.append(f"missions {status.evaluated:.0%}")

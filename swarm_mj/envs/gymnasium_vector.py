@@ -21,7 +21,6 @@ from swarm_mj.envs.spaces import team_spaces
 from swarm_mj.mission import Mission
 from swarm_mj.system.fields import did_you_mean
 
-METADATA: dict[str, Any] = {**RENDERING, "render_modes": ["rgb_array"]}
 Step = tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Info]
 
 
@@ -41,7 +40,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
     `options={"reset_mask": mask}`, which begins the missions where the mask is True.
     """
 
-    metadata = METADATA
+    metadata: dict[str, Any] = {**RENDERING, "render_modes": ["rgb_array"]}  # noqa: RUF012
 
     def __init__(
         self,
@@ -70,7 +69,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         self._groups: list[_Group] = []
         self._is_over = np.zeros(num_envs, dtype=np.bool_)
         self._rngs: dict[int, np.random.Generator] = {}  # that draw seeds, by environment
-        batch = self._make_batch(1)
+        batch = make_batch(mission, 1, **options)
         check_team_reward(batch)
         self.single_observation_space, self.single_action_space = team_spaces(batch)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -150,9 +149,6 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         """Give back what pictures took."""
         self._screen.close()
 
-    def _make_batch(self, num_missions: int) -> MissionBatch:
-        return make_batch(self._mission, num_missions, **self._options)
-
     def _mask_of(self, options: dict[str, Any]) -> Bool[np.ndarray, "B"]:
         """Return which environments are to begin."""
         mask = np.asarray(options.get("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
@@ -212,7 +208,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         for group in self._groups:
             if group.batch.num_missions == len(envs) and np.isin(group.envs, envs).all():
                 return group.batch
-        return self._make_batch(len(envs))
+        return make_batch(self._mission, len(envs), **self._options)
 
     def _play(self, group: _Group, actions: np.ndarray) -> np.ndarray:
         """Fly one window of a group; return its environments' rewards."""
@@ -244,7 +240,6 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
 
 
 def _mode_of(mode: str | AutoresetMode) -> AutoresetMode:
-    """Return the autoreset mode of this name; raises ValueError for another."""
     modes = [each.value for each in AutoresetMode]
     if mode not in (*modes, *AutoresetMode):
         raise ValueError(

@@ -1,8 +1,7 @@
 """PPO's callback during a run: held-out evaluations, the best policy, checkpoints, replays."""
 
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,16 +27,16 @@ from swarm_mj.learning.run_folder import (
     CURVE,
     REPLAYS,
     Accumulator,
+    Listener,
     Progress,
+    Status,
     TrainingRun,
     write_curve,
 )
 from swarm_mj.learning.selection import (
-    JUDGED,
-    REFERENCES,
+    REFERENCE_COLUMNS,
     Row,
     candidates,
-    column,
     has_stalled,
     reserved_minutes,
 )
@@ -49,27 +48,10 @@ OPTIMISER = tuple(
     f"train/{name}"
     for name in ("entropy", "explained_variance", "approx_kl", "clip_fraction", "value_loss")
 )
-REFERENCE_COLUMNS = [column(cost, name) for cost in JUDGED for name in REFERENCES]
 
 
 class Stopped(Exception):  # noqa: N818 - nothing went wrong
     """Stopped by a limit or the caller; state saved."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Status:
-    """A run's state after a window of training or of an evaluation, for listeners."""
-
-    decisions: int
-    minutes: float
-    aoi: float  # of the missions in training, in the last window [windows]
-    progress: Progress  # with the curve so far; the run's own, so only to be read
-    evaluated: float | None  # the share of an evaluation that is flown; None while training
-    what: str = "Training"  # or what is flown
-
-
-# Returns whether to go on; if not, the rollout is finished, or the evaluation left for later.
-Listener = Callable[[Status], bool]
 
 
 class TrainingCallback(BaseCallback):
@@ -90,8 +72,7 @@ class TrainingCallback(BaseCallback):
         self._run, self._training, self._limits = run, run.training, run.limits
         self._folder, self._progress, self._networks = folder, progress, networks
         self._rng, self._listener = rng, listener
-        self._counted_s = time.monotonic()  # up to here, time is in the progress
-        self._saved_s = -np.inf
+        self._counted_s, self._saved_s = time.monotonic(), -np.inf  # counted: in the progress
         self._aoi = float("nan")
         self._goes_on = True
 

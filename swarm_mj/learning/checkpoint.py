@@ -39,15 +39,6 @@ Word = Annotated[int, Meta(ge=0, lt=2**32)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Moments:
-    """The running moments of `VecNormalize`."""
-
-    mean: Annotated[float, Meta(ge=-1e30, le=1e30)]
-    var: Amount
-    count: Amount
-
-
-@dataclass(frozen=True, kw_only=True)
 class _Counters:
     """The part of a checkpoint that is neither tensors nor a library's own state."""
 
@@ -55,7 +46,8 @@ class _Counters:
     num_updates: Count
     seeds: list[list[int]]  # of the missions under way, by batch; replaying checks their range
     last_windows: list[int]  # when they end, by batch
-    reward_moments: _Moments | None
+    # Of `VecNormalize`: the mean, variance and count of its returns.
+    reward_moments: tuple[Annotated[float, Meta(ge=-1e30, le=1e30)], Amount, Amount] | None
     numpy_rng: tuple[
         Literal["MT19937"],
         Annotated[list[Word], Meta(min_length=624, max_length=624)],
@@ -70,19 +62,15 @@ def save(
     path: Path,
     training: Training,
     model: PPO,
-    rng: np.random.Generator,
+    rng: np.random.Generator,  # that draws the missions' seeds
     progress: Progress,
     networks: Networks,
 ) -> None:
-    """Write a checkpoint; call it between rollouts. `rng` draws the missions' seeds.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
+    """Write a checkpoint, between rollouts; raises OSError if the file cannot be written."""
     name, keys, *rest = np.random.get_state()  # noqa: NPY002 - PPO shuffles minibatches with it
     env, batches, histories = model.get_env(), env_of(model).batches, env_of(model).histories
     is_normalised = isinstance(env, VecNormalize)
-    moments = vars(env.ret_rms).items() if is_normalised else ()
+    moments = [env.ret_rms.mean, env.ret_rms.var, env.ret_rms.count] if is_normalised else None
     is_cuda = model.device.type == "cuda"
     state: dict[str, Any] = {
         "version": CHECKPOINT_VERSION,
@@ -98,7 +86,7 @@ def save(
             n: torch.tensor(np.array(each.recipients, np.int16).reshape(-1, *batch.shape))
             for n, (batch, each) in enumerate(zip(batches, histories, strict=True))
         },
-        "reward_moments": {name: float(x) for name, x in moments} if is_normalised else None,
+        "reward_moments": moments and [float(each) for each in moments],
         "returns": torch.tensor(env.returns) if is_normalised else torch.zeros(0),
         "torch_rng": torch.get_rng_state(),
         "cuda_rng": torch.cuda.get_rng_state(model.device) if is_cuda else None,
@@ -115,9 +103,7 @@ def save(
 def load(
     path: Path, training: Training, model: PPO, rng: np.random.Generator
 ) -> tuple[Progress, Networks]:
-    """Put a model and its missions, made of these settings, back to where a checkpoint was made.
-
-    Returns where the run stands, and the networks of its candidates.
+    """Put a model and its missions back to a checkpoint; return its progress and candidates.
 
     Raises:
         ValueError: The file is damaged, foreign, of another version or of other settings.
@@ -125,12 +111,10 @@ def load(
     """
     state = read_torch(path, _max_bytes(model))
     version = state.get("version") if isinstance(state, dict) else None
-    if not isinstance(version, int):
-        raise ValueError(f"{path} is no checkpoint of swarm-mj train")
     if version != CHECKPOINT_VERSION:
         raise ValueError(
-            f"checkpoint {path} has version {version!r:.40}, and this swarm_mj reads "
-            f"{CHECKPOINT_VERSION}; resume with the version that wrote it"
+            f"{path} is no checkpoint of swarm-mj train, or has version {version!r:.40}, and this "
+            f"swarm_mj reads {CHECKPOINT_VERSION}; resume with the version that wrote it"
         )
     try:
         if read_json(state["training"], Training) != training:
@@ -142,7 +126,7 @@ def load(
             networks[at].load_state_dict(weights)
         _restore(state, counters, model, rng)
     except Exception as error:  # generators of random numbers take states as they please
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        reason = (str(error) or type(error).__name__).splitlines()[0]
         raise ValueError(
             f"checkpoint {path} is damaged, or another run's ({reason:.200}); begin a new run with "
             "another --out"
@@ -223,8 +207,7 @@ def read_torch(path: Path, max_bytes: int) -> Any:  # noqa: ANN401 - whatever wa
     """Return what a file of torch holds, without running code from it.
 
     Raises:
-        ValueError: There is no such file, or it is too large, damaged or foreign, or its folder's
-            link leads elsewhere.
+        ValueError: It is missing, too large, damaged or foreign, or a link out of its folder.
         OSError: It cannot be read.
     """
     content = io.BytesIO(read_file(path, "checkpoint", max_bytes, folder=path.parent))
@@ -257,7 +240,8 @@ def _restore(
     model._last_obs = env_of(model).replay(histories)
     model._last_episode_starts = state["episode_starts"].numpy()
     if isinstance(env, VecNormalize) and counters.reward_moments is not None:
-        vars(env.ret_rms).update(asdict(counters.reward_moments))
+        for name, value in zip(("mean", "var", "count"), counters.reward_moments, strict=True):
+            setattr(env.ret_rms, name, value)
         env.returns = state["returns"].numpy()
     # Last, as making networks and replaying missions may draw.
     torch.set_rng_state(state["torch_rng"])

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -133,6 +133,22 @@ class Progress:
     def best(self) -> Row | None:
         """The best evaluation."""
         return min(self.curve, key=lambda row: row["objective"], default=None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Status:
+    """A run's state after a window of training or of an evaluation, for listeners."""
+
+    decisions: int
+    minutes: float
+    aoi: float  # of the missions in training, in the last window [windows]
+    progress: Progress  # with the curve so far; the run's own, so only to be read
+    evaluated: float | None  # the share of an evaluation that is flown; None while training
+    what: str = "Training"  # or what is flown
+
+
+# Returns whether to go on; if not, the rollout is finished, or the evaluation left for later.
+Listener = Callable[[Status], bool]
 
 
 def write_run(folder: Path, run: TrainingRun) -> None:

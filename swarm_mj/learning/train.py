@@ -19,7 +19,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from swarm_mj.learning import checkpoint
 from swarm_mj.learning.active_rollout_buffer import ActiveRolloutBuffer
 from swarm_mj.learning.actor_critic import GnnActorCritic
-from swarm_mj.learning.callback import Listener, Stopped, TrainingCallback
+from swarm_mj.learning.callback import Stopped, TrainingCallback
 from swarm_mj.learning.graph_vec_env import GraphVecEnv, env_of
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
@@ -28,6 +28,7 @@ from swarm_mj.learning.run_folder import (
     SETTINGS,
     TENSORBOARD,
     Limits,
+    Listener,
     Progress,
     TrainingRun,
     check_begun,

@@ -16,8 +16,7 @@ from swarm_mj.cli.train_report import (
     share_done,
     verdicts,
 )
-from swarm_mj.learning.callback import Status
-from swarm_mj.learning.run_folder import Limits, Progress, TrainingRun
+from swarm_mj.learning.run_folder import Limits, Progress, Status, TrainingRun
 from swarm_mj.learning.selection import Choice, Cost
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import paper
