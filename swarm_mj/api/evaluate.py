@@ -11,8 +11,7 @@ from swarm_mj.api.fly import mission_of, names_of
 from swarm_mj.api.metrics import Metrics
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.results import COLUMNS, write_csv
-from swarm_mj.evaluation.run_study import DEFAULT_POLICIES, Processes, fly_study, study_bar
-from swarm_mj.evaluation.study import Study
+from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study, fly_study, study_bar
 from swarm_mj.evaluation.summary import Evaluated, summarise, write_evaluated
 from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission

@@ -14,14 +14,14 @@ from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_m
 from swarm_mj.evaluation import progress
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.results import write_csv
-from swarm_mj.evaluation.run_study import (
+from swarm_mj.evaluation.study import (
     DEFAULT_POLICIES,
     Processes,
+    Study,
     fly_study,
     num_flown,
     study_bar,
 )
-from swarm_mj.evaluation.study import Study
 from swarm_mj.evaluation.summary import summarise, write_evaluated
 from swarm_mj.evaluation.table import print_results
 from swarm_mj.mission import Mission

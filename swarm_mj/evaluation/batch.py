@@ -10,7 +10,7 @@ from msgspec import Meta
 from swarm_mj.evaluation.lower_bound import ConnectivityFloor
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components, one_line_each
-from swarm_mj.policies.policy import Parameters
+from swarm_mj.policies.policy import Parameters, Policy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.window import SLOT_WINDOWS
 from swarm_mj.radio.free_space import FreeSpaceRadio
@@ -43,7 +43,12 @@ class Batch:
     components: Components = Components()  # by name, as they are made in other processes
     parameters: Parameters | None = None  # what it must have, where that is known
     mission: Mission
-    seeds: tuple[int, ...]  # one per mission
+    seeds: tuple[int, ...] = ()  # one per mission
+
+    def made(self) -> Policy:
+        """Make the batch's policy."""
+        how = {"is_deterministic": self.is_deterministic, "features": self.features}
+        return make_policy(self.policy, self.mission, self.probability, **how)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,12 +73,13 @@ class BatchCosts:
 
 
 def num_ages(mission: Mission) -> int:
-    """How many different ages there can be, in slots."""
+    """Return how many different ages there can be, in slots."""
     return round(mission.num_windows / SLOT_WINDOWS) + 1
 
 
+@one_line_each()  # what is raised loses its places on the way between processes
 def fly_batch(batch: Batch) -> BatchCosts:
-    """Flies a batch's missions from the first window to the last.
+    """Fly a batch's missions from the first window to the last.
 
     A mission's costs depend on its own seed, not on the missions beside it.
 
@@ -81,19 +87,7 @@ def fly_batch(batch: Batch) -> BatchCosts:
         ValueError: Unknown policy, one that has changed, a bad seed, no connected team could be
             drawn, or a part of the user's own raised.
     """
-    with one_line_each():  # what is raised loses its places on the way between processes
-        return _fly(batch)
-
-
-def _fly(batch: Batch) -> BatchCosts:
-    swarm = Swarm(batch.mission, batch.seeds, **batch.components.given)
-    policy = make_policy(
-        batch.policy,
-        batch.mission,
-        batch.probability,
-        is_deterministic=batch.is_deterministic,
-        features=batch.features,
-    )
+    swarm, policy = Swarm(batch.mission, batch.seeds, **batch.components.given), batch.made()
     if batch.parameters is not None and policy.parameters != batch.parameters:
         raise ValueError(
             f"policy {batch.policy} has changed since the evaluation began; evaluate a copy of it"

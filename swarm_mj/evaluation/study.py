@@ -1,14 +1,20 @@
-"""A study: which policies meet which missions."""
+"""A study: which policies meet which missions, and their flights."""
 
 import json
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from itertools import product
 from typing import Any
 
+from rich.console import Console
+
 from swarm_mj.control.controller import Costed
 from swarm_mj.control.motion import controller_of
-from swarm_mj.evaluation.batch import Batch
+from swarm_mj.evaluation.batch import Batch, BatchCosts, fly_batch
+from swarm_mj.evaluation.jobs import run_jobs
+from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components, digest
 from swarm_mj.policies.policy import Parameters, Policy
@@ -17,15 +23,24 @@ from swarm_mj.policies.registry import (
     flown_name,
     is_learned,
     is_own_policy,
-    make_policy,
     normalised,
 )
 from swarm_mj.simulation.swarm import MAX_SEED
 from swarm_mj.system.fields import check, setting
+from swarm_mj.system.interrupt import deferred_interrupt
+from swarm_mj.system.progress import WorkBar
 from swarm_mj.system.provenance import code_digest, commit, version
 
+DEFAULT_POLICIES = ("planner", *BASELINES)
 MAX_EPISODES = 100_000
 BATCH_SIZE = 25  # missions side by side: as fast as many, and little lost by an interruption
+
+
+@dataclass(frozen=True, kw_only=True)
+class Processes:
+    """How many processes share a study's missions."""
+
+    jobs: int = setting(1, "processes", low=1, high=256)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,14 +113,9 @@ class Study:
         """All the work, pair by pair, in the order of the seeds."""
         seeds = range(self.seed, self.seed + self.episodes)
         return tuple(
-            Batch(
-                policy=policy,
-                probability=self.probability,
-                is_deterministic=self.is_deterministic and is_learned(policy),
-                features=self.features,
-                components=self.components,
+            replace(
+                self._batch(policy, regime),
                 parameters=self.parameters[regime, policy],
-                mission=regime,
                 seeds=tuple(seeds[start : start + BATCH_SIZE]),
             )
             for regime, policy in self.pairs
@@ -119,16 +129,19 @@ class Study:
 
     def make_policy(self, policy: str, regime: Mission) -> Policy:
         """Make a policy as it is evaluated in a regime; refuse one whose packets never fit."""
-        is_deterministic = self.is_deterministic and is_learned(policy)
-        made = make_policy(
-            policy,
-            regime,
-            self.probability,
-            is_deterministic=is_deterministic,
-            features=self.features,
-        )
+        made = self._batch(policy, regime).made()
         made.packet(regime)
         return made
+
+    def _batch(self, policy: str, regime: Mission) -> Batch:
+        return Batch(
+            policy=policy,
+            probability=self.probability,
+            is_deterministic=self.is_deterministic and is_learned(policy),
+            features=self.features,
+            components=self.components,
+            mission=regime,
+        )
 
     def task_cost(self, regime: Mission) -> tuple[str, str] | None:
         """Return the name and the unit of a regime's task cost; None if its controller has none."""
@@ -165,3 +178,42 @@ class Study:
         """Return the names of all parts that are the user's own."""
         own = [name for name in self.policies if is_own_policy(name)]
         return [*own, *self.features, *self.components.names.values()]
+
+
+def num_flown(study: Study, costs: Mapping[int, BatchCosts]) -> int:
+    """Return how many of a study's missions have been flown."""
+    return sum(len(study.batches[index].seeds) for index in costs)
+
+
+def study_bar(
+    study: Study, costs: Mapping[int, BatchCosts], console: Console, *, after_s: float = 0.0
+) -> WorkBar:
+    """Return a bar of a study's missions, as far as they are flown."""
+    total, done = study.episodes * len(study.pairs), num_flown(study, costs)
+    return WorkBar("Flying", total, "missions", completed=done, console=console, after_s=after_s)
+
+
+def fly_study(
+    study: Study,
+    costs: dict[int, BatchCosts],
+    num_jobs: int,
+    keep: Callable[[int, BatchCosts], None] | None,
+    bar: WorkBar,
+) -> None:
+    """Fly the batches that `costs` lacks, into `costs` and where they are kept.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C was pressed; `costs` has all batches that were flown.
+    """
+    left = [index for index in range(len(study.batches)) if index not in costs]
+    flown = run_jobs(fly_batch, [study.batches[index] for index in left], num_jobs)
+    with bar, closing(flown):
+        for which, batch_costs in flown:
+            index = left[which]
+            with deferred_interrupt() as is_interrupted:
+                costs[index] = batch_costs
+                if keep:
+                    keep(index, batch_costs)
+            if is_interrupted():
+                raise KeyboardInterrupt
+            bar.move_to(num_flown(study, costs))

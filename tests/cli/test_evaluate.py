@@ -237,7 +237,7 @@ REFUSED = {
     "--resume": "--resume needs the --json or --csv",
     "--csv r.json --json ./r.json": "same file",
     "--json o.json --csv o.json.progress": "--csv must be named *.csv, not o.json",
-    "--csv .": "--csv must be named *.csv, not .",
+    "--csv .": "--csv . is a folder; name a file",
 }
 
 

@@ -96,7 +96,7 @@ REFUSED = {
     "--observer 40": "observer must be from 0 to 39, not 40",
     "--range-ratio 0.02": "too sparse",
     "--record replay.txt": "must be named *.rrd",
-    "--json .": "--json must be named *.json, not .",
+    "--json .": "--json . is a folder; name a file",
     "--json summary": "--json must be named *.json, not summary",
     "--record a.rrd --json ./a.rrd": "same file",
     "--no-record --view": "--view needs a replay",

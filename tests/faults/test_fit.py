@@ -9,7 +9,7 @@ from tries import tries
 
 from swarm_mj.api import flight
 from swarm_mj.cli import main
-from swarm_mj.evaluation import run_study
+from swarm_mj.evaluation import study as studies
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.replay.read import check_replay
 from swarm_mj.replay.recorder import Recorder
@@ -196,7 +196,7 @@ def test_an_evaluation_that_runs_out_of_memory_is_resumed(monkeypatch, capsys, t
         return fly_batch(batch)
 
     with monkeypatch.context() as small:
-        small.setattr(run_study, "fly_batch", flown)
+        small.setattr(studies, "fly_batch", flown)
         assert main([*study, "--csv", "a.csv"]) == 1
     assert capsys.readouterr().err.splitlines()[-1:] == [
         "Out of memory after 5 of 10 missions; the same command with --resume continues."
