@@ -95,15 +95,14 @@ PRESETS = PAPERS | {name: partial(world, name) for name in WORLDS}
 
 def where_flown(mission: Mission) -> list[str]:
     """Return arena and channel in words: a world by its preset, and what differs from it."""
-    arena, radio = f"arena {mission.arena}", mission.beyond_free_space
-    if mission.preset not in WORLDS:
-        return [*([arena] if mission.arena != OPEN else []), *([radio] if radio else [])]
-    usual, changed = PRESETS[mission.preset](), []
+    is_world, radio = mission.preset in WORLDS, mission.beyond_free_space
+    usual = PRESETS[mission.preset]() if is_world else Mission()
+    where = [f"preset {mission.preset}"] if is_world else []
     if mission.arena != usual.arena:
-        changed.append(arena)
+        where.append(f"arena {mission.arena}")
     if radio != usual.beyond_free_space:
-        changed.append(radio or "free space")
-    return [f"preset {mission.preset}", *changed]
+        where.append(radio or "free space")
+    return where
 
 
 def make_mission(**given: Any) -> Mission:
