@@ -232,10 +232,20 @@ def is_near(row, k, place_m, reach_m):
     return seen[k] > 0.0 and np.hypot(*(position_m[k] - place_m)) < reach_m
 
 
+def transmitters(swarm, policy, num_windows):
+    """Flies on; who transmitted in each slot [slot, mission, robot]."""
+    slots = []
+    for _ in range(num_windows):
+        swarm.step(policy)
+        silence = np.arange(swarm.mission.num_robots)
+        slots += [phase.recipient != silence for phase in swarm.phases]
+    return np.array(slots)
+
+
 def rows(buffers, i):
-    """Robot i's own T, positions and velocities."""
-    arrays = (buffers.timestamp, buffers.position_m, buffers.velocity_mps)
-    return [array[0, i].copy() for array in arrays]
+    """Robot i's own T, positions and velocities; a known start is a moment after T_0."""
+    seen = np.maximum(buffers.timestamp[0, i], np.where(buffers.is_granted[0], 1e-300, 0.0))
+    return [seen, buffers.position_m[0, i].copy(), buffers.velocity_mps[0, i].copy()]
 
 
 class Flight(BroadcastPolicy):

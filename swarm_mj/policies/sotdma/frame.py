@@ -60,6 +60,7 @@ def switch(frame: Frame, s: int, k: int, transmits: bool) -> None:
             heard[j] = j
 
 
+# Maxima and sums in any order let the compiler use its vectors; whole slots add up exactly.
 @compiled(fastmath={"reassoc", "nnan", "nsz"})
 def _merge(held: Float32[np.ndarray, "N"], sent: Float32[np.ndarray, "N"]) -> None:
     for k in range(held.shape[0]):
@@ -115,6 +116,7 @@ def best_slot(
         for j in range(num_robots):
             if frame.heard[s, j] == k and is_marked[s, j]:
                 frame.heard[s, j] = j
+        # A move makes teammates' beliefs wrong until they hear of it, so small gains do not count.
         age = mean_age(frame) - (min_gain if s == own else 0.0)
         if age < least:
             best, least = s, age
@@ -174,6 +176,7 @@ def chosen(
     for n in range(chose.shape[0]):
         k, slot = int(chose[n, 0]), int(chose[n, 1])
         if k != i and is_known[k] and announced[k] < slot:
+            # Marks are private, so a prediction has to do without those of k.
             switch(frame, slots[k], k, False)
             slots[k] = best_slot(frame, k, slots[k], rule.min_gain, no_marks)
             switch(frame, slots[k], k, True)

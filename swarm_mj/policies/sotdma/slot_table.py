@@ -109,10 +109,12 @@ def read_packets(
         known = _slot_of(timestamp[j, i])
         table.decoded[i, j], table.got_through[i, j] = slot, known
         sent, place = table.sent[i], table.sent_place[i]
+        # A packet counts once per neighbour, however often that one repeats what it knows.
         is_due = frames.first_slot <= sent < slot and table.judged[i, j] < sent
         if place == NO_PLACE or not is_due:
             continue
         table.judged[i, j] = sent
+        # T alone may have come through others; P says that j decoded the packet itself.
         got_through = known >= sent and parent[j, i] == j
         news = (1.0 if got_through else 0.0) - table.outbound_delivery_ratio[i]
         table.outbound_delivery_ratio[i] += RECENT_WEIGHT * news

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from channels import to_nobody
-from decentralised_reference import PlannedApart
+from decentralised_reference import PlannedApart, transmitters
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.registry import make_policy
@@ -19,16 +19,6 @@ def only_plan(policy):
     """The plan that all robots of the first mission follow."""
     (flight,) = policy._teams[0]._flights.values()
     return flight.plan
-
-
-def transmitters(swarm, policy, num_windows):
-    """Flies on; who transmitted in each slot [slot, mission, robot]."""
-    rows = []
-    for _ in range(num_windows):
-        swarm.step(policy)
-        silence = np.arange(swarm.mission.num_robots)
-        rows += [phase.recipient != silence for phase in swarm.phases]
-    return np.array(rows)
 
 
 @pytest.mark.parametrize("preset", [paper, reference])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from decentralised_reference import transmitters
 from learning_reference import LearnedApart, learner
 
 from swarm_mj.mission import paper
@@ -19,13 +20,8 @@ CHANNELS = {
 }
 
 
-def transmitters(mission, policy, seeds, num_windows=60):
-    """Who transmits in each slot [slot, mission, robot]."""
-    swarm, slots = Swarm(mission, seeds), []
-    for _ in range(num_windows):
-        swarm.step(policy)
-        slots += [phase.recipient != np.arange(mission.num_robots) for phase in swarm.phases]
-    return np.array(slots)
+def flown(mission, policy, seeds, num_windows=60):
+    return transmitters(Swarm(mission, seeds), policy, num_windows)
 
 
 @pytest.mark.parametrize("channel", CHANNELS)
@@ -68,16 +64,16 @@ def test_a_robot_that_missed_the_best_table_flies_by_the_best_it_has():
 @pytest.mark.parametrize("seed", range(2))
 def test_in_free_space_the_planner_flies_as_without_a_payload(seed):
     mission = paper("stationary", num_robots=8)
-    flown = transmitters(mission, learner(mission), [seed])
-    plain = transmitters(mission, make_policy("planner --payload none", mission), [seed])
-    np.testing.assert_array_equal(flown, plain)
+    learned = flown(mission, learner(mission), [seed])
+    plain = flown(mission, make_policy("planner --payload none", mission), [seed])
+    np.testing.assert_array_equal(learned, plain)
 
 
 def test_the_same_seed_is_the_same_flight_whatever_flies_beside():
     mission = paper("stationary", num_robots=6, shadowing_db=6.0, erasure=0.1)
-    beside = transmitters(mission, learner(mission), [5, 3], 36)
-    np.testing.assert_array_equal(beside, transmitters(mission, learner(mission), [5, 3], 36))
-    alone = transmitters(mission, learner(mission), [3], 36)
+    beside = flown(mission, learner(mission), [5, 3], 36)
+    np.testing.assert_array_equal(beside, flown(mission, learner(mission), [5, 3], 36))
+    alone = flown(mission, learner(mission), [3], 36)
     np.testing.assert_array_equal(alone[:, 0], beside[:, 1])
     assert np.any(beside[:, 0] != beside[:, 1])
 

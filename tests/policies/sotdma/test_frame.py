@@ -17,7 +17,7 @@ from swarm_mj.policies.sotdma.frame import (
     switch,
 )
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.radio.power_law import power_law, powers_between
+from swarm_mj.radio.power_law import PowerLaw, powers_between
 
 RADIO = radio_of(paper("stationary"))
 NUM_ROBOTS, NUM_SLOTS, FRAMES = 9, 5, 3
@@ -28,7 +28,7 @@ def team(seed):
     """Positions [m], and powers between them [noise]."""
     position_m = np.random.default_rng(seed).uniform(-400.0, 400.0, (NUM_ROBOTS, 2))
     at_1_m = np.full(NUM_ROBOTS, RADIO.received_at_1_m_mw / RADIO.noise_mw)
-    return position_m, powers_between(position_m, power_law(at_1_m))
+    return position_m, powers_between(position_m, PowerLaw(at_1_m))
 
 
 def frame_of(power, slots, interference=1.0):

@@ -2,6 +2,7 @@ import copy
 
 import numpy as np
 import pytest
+from decentralised_reference import transmitters
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.policy import BroadcastPolicy
@@ -13,14 +14,10 @@ REST = paper("stationary", num_robots=12, range_ratio=0.2)
 FIRST = 36  # the first slot of a frame, of 11 slots
 
 
-def transmitters(mission, name, seeds, num_windows):
+def flown(mission, seeds, num_windows):
     """Who transmits in each slot [slot, mission, robot], and the policy."""
-    swarm, policy, rows = Swarm(mission, seeds), make_policy(name, mission), []
-    swarm.start(policy)
-    for _ in range(num_windows):
-        swarm.step(policy)
-        rows += [phase.recipient != np.arange(mission.num_robots) for phase in swarm.phases]
-    return np.array(rows), policy
+    policy = make_policy("sotdma", mission)
+    return transmitters(Swarm(mission, seeds), policy, num_windows), policy
 
 
 class Apart(BroadcastPolicy):
@@ -74,16 +71,17 @@ def test_eq9_robots_decide_by_their_buffers_and_by_t_and_p_in_packets(preset, ta
 
 
 def test_it_begins_as_spatial_tdma():
-    first, _ = transmitters(REST, "sotdma", [1, 2], FIRST // 2)
-    np.testing.assert_array_equal(first, transmitters(REST, "spatial-tdma", [1, 2], FIRST // 2)[0])
+    first, _ = flown(REST, [1, 2], FIRST // 2)
+    turns = transmitters(Swarm(REST, [1, 2]), make_policy("spatial-tdma", REST), FIRST // 2)
+    np.testing.assert_array_equal(first, turns)
 
 
 def test_everyone_transmits_once_in_every_frame_in_the_slot_it_owns():
-    flown, policy = transmitters(REST, "sotdma", [3], 100)
+    slots, policy = flown(REST, [3], 100)
     frames = policy._teams[0]._frames
     assert frames.first_slot == FIRST
     places = np.array([place_of(slot, frames) for slot in range(FIRST, 200)])
-    sent = flown[FIRST:, 0]
+    sent = slots[FIRST:, 0]
     frame = np.cumsum(places == 0)[places != NO_PLACE]
     counts = [np.sum(sent[places != NO_PLACE][frame == n], axis=0) for n in range(1, 13)]
     # Whoever moves to a later slot of the frame in which it chooses transmits twice in it, or not
@@ -97,7 +95,7 @@ def test_everyone_transmits_once_in_every_frame_in_the_slot_it_owns():
 
 def test_robots_agree_on_slots():
     """Within a frame of the last choice almost everyone knows everyone's slot."""
-    _, policy = transmitters(REST, "sotdma", [3, 4, 5], 150)
+    _, policy = flown(REST, [3, 4, 5], 150)
     for team in policy._teams:
         slots = team._table.slots
         assert np.mean(slots == np.diagonal(slots)) > 0.9
@@ -115,13 +113,13 @@ def test_eq10_news_is_younger_than_by_turns(task):
 
 
 def test_the_same_seed_is_the_same_flight_whatever_flies_beside():
-    beside, _ = transmitters(REST, "sotdma", [5, 6], 60)
-    alone, _ = transmitters(REST, "sotdma", [6], 60)
+    beside, _ = flown(REST, [5, 6], 60)
+    alone, _ = flown(REST, [6], 60)
     np.testing.assert_array_equal(beside[:, 1:], alone)
 
 
 def test_packets_that_hold_a_part_of_t_tell_nothing_of_who_was_heard():
     mission = paper("stationary", num_robots=12, range_ratio=0.2, bit_rate=10_000.0)
     for each, tells in ((mission, False), (REST, True)):
-        _, policy = transmitters(each, "sotdma", [1], 60)
+        _, policy = flown(each, [1], 60)
         assert np.any(policy._teams[0]._table.decoded > LONG_AGO) == tells
