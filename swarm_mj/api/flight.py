@@ -8,20 +8,25 @@ import gc
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any, NamedTuple
 
+from swarm_mj.api.flight_table import flight_numbers
+from swarm_mj.api.metrics import Metrics
+from swarm_mj.api.run import Run
 from swarm_mj.mission import Mission
+from swarm_mj.mission.components import Components
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies.registry import is_own_policy, is_stored, make_policy
 from swarm_mj.replay.estimates import replay_memory
-from swarm_mj.replay.recorder import Recorder
-from swarm_mj.simulation.rollout import WindowRecord, rollout
+from swarm_mj.replay.recorder import Log, Recorder
+from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import free_memory, in_gb, memory_errors
 from swarm_mj.system.progress import WorkBar
+from swarm_mj.system.provenance import commit, version
 
 WINDOWS_BETWEEN_LOOKS = 50  # at the free memory
 COMPILING_WINDOWS = 10  # in which three robots use all that a flight does, schedules included
@@ -99,6 +104,35 @@ def compile_ahead(
         policy_name, how = "tdma", {}
     for _ in rollout(Swarm(smallest, [0]), make_policy(policy_name, smallest, **how)):
         on_window()
+
+
+def run_of(
+    swarm: Swarm,
+    flown: Flown,
+    *,
+    name: str,
+    seed: int,
+    observer: int,
+    components: Components,
+    log: Log | None = None,
+) -> Run:
+    """Return a swarm's mission, flown, as a `Run`; the config is everything that makes it again."""
+    mission, policy = swarm.mission, swarm.policy
+    config = {
+        **asdict(mission),
+        "policy": name,
+        **policy.parameters,
+        "packet_bytes": policy.packet(mission).num_bytes,
+        "seed": seed,
+        "observer": observer,
+        "version": version(),
+        "commit": commit(),
+        **components.names,
+    }
+    numbers = flight_numbers(mission, policy, summarise(flown.windows))
+    numbers |= {"wall_seconds": flown.wall_s, "interrupted": flown.code != DONE}
+    windows = tuple(flown.windows)
+    return Run(mission=mission, config=config, summary=Metrics(numbers), windows=windows, log=log)
 
 
 def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | None:

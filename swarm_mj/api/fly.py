@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.api.estimates import flight_needs
-from swarm_mj.api.flight import COMPILING_WINDOWS, compile_ahead, fly_swarm
-from swarm_mj.api.run import Run, run_of
+from swarm_mj.api.flight import COMPILING_WINDOWS, compile_ahead, fly_swarm, run_of
+from swarm_mj.api.run import Run
 from swarm_mj.control.controller import Controller
 from swarm_mj.mission import Mission, make_mission
 from swarm_mj.mission.components import Components

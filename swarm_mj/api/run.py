@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,22 +11,18 @@ import numpy as np
 from jaxtyping import Float
 from rich.table import Table
 
-from swarm_mj.api.flight import Flown
-from swarm_mj.api.flight_table import flight_numbers, flight_rows, flight_title, window_columns
+from swarm_mj.api.flight_table import flight_rows, flight_title, window_columns
 from swarm_mj.api.metrics import Metrics
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import Components, components_in
+from swarm_mj.mission.components import components_in
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rendering.style import DEFAULTS, default_seconds, fitted
-from swarm_mj.simulation.rollout import WindowRecord, summarise
-from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.system.atomic import write_bytes, write_csv, write_json
-from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import as_typed
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
 from swarm_mj.system.progress import is_notebook, quiet_bar
-from swarm_mj.system.provenance import commit, version
 from swarm_mj.system.terminal import named_values, plain_console
 
 if TYPE_CHECKING:  # each takes its time to import, and flights do without
@@ -233,32 +229,3 @@ class Run:
             for row in rows
         )
         write_csv(path, list(columns), texts)
-
-
-def run_of(
-    swarm: Swarm,
-    flown: Flown,
-    *,
-    name: str,
-    seed: int,
-    observer: int,
-    components: Components,
-    log: Log | None = None,
-) -> Run:
-    """Return a swarm's mission, flown, as a `Run`; the config is everything that makes it again."""
-    mission, policy = swarm.mission, swarm.policy
-    config = {
-        **asdict(mission),
-        "policy": name,
-        **policy.parameters,
-        "packet_bytes": policy.packet(mission).num_bytes,
-        "seed": seed,
-        "observer": observer,
-        "version": version(),
-        "commit": commit(),
-        **components.names,
-    }
-    numbers = flight_numbers(mission, policy, summarise(flown.windows))
-    numbers |= {"wall_seconds": flown.wall_s, "interrupted": flown.code != DONE}
-    windows = tuple(flown.windows)
-    return Run(mission=mission, config=config, summary=Metrics(numbers), windows=windows, log=log)

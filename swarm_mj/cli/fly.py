@@ -11,8 +11,8 @@ from typing import ClassVar
 from rich.console import Console
 
 from swarm_mj.api.estimates import flight_needs
-from swarm_mj.api.flight import Flown, compile_ahead, fly_swarm
-from swarm_mj.api.run import Run, run_of
+from swarm_mj.api.flight import Flown, compile_ahead, fly_swarm, run_of
+from swarm_mj.api.run import Run
 from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, one_mission
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import notes_on

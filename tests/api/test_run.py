@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import swarm_mj
-from swarm_mj.api.flight import Flown
-from swarm_mj.api.run import run_of
+from swarm_mj.api.flight import Flown, run_of
 from swarm_mj.mission import paper
 from swarm_mj.mission.components import Components
 from swarm_mj.policies.registry import make_policy
