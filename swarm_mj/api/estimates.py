@@ -6,7 +6,7 @@ from pathlib import Path
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import is_learned
-from swarm_mj.replay.estimates import replay_file, replay_memory
+from swarm_mj.replay.recorder import replay_file, replay_memory
 from swarm_mj.system.needs import ADDRESSES, LIBRARIES, OF_RERUN, OF_TORCH, Needs, missions_memory
 
 

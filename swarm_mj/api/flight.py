@@ -18,8 +18,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies.registry import is_own_policy, is_stored, make_policy
-from swarm_mj.replay.estimates import replay_memory
-from swarm_mj.replay.recorder import Log, Recorder
+from swarm_mj.replay.recorder import Log, Recorder, replay_memory
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED

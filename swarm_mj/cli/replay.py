@@ -16,6 +16,7 @@ from swarm_mj.replay.rendering.style import (
     VideoStyle,
     default_seconds,
     fitted,
+    video_needs,
 )
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
@@ -101,8 +102,6 @@ def run(options: ReplayOptions) -> int:
 
 
 def _make_video(options: ReplayOptions, video: Path) -> int:
-    from swarm_mj.replay.estimates import video_needs
-
     if options.web:
         raise ValueError("--web is not allowed with --video; leave one out")
     if len(options.file) > MAX_MISSIONS:

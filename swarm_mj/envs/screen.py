@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from swarm_mj.envs.mission_batch import MissionBatch
-from swarm_mj.replay.rendering.contents import contents_of
+from swarm_mj.replay.footage import contents_of
 from swarm_mj.replay.rendering.scene import SceneRenderer
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from swarm_mj.learning.run_folder import MAX_DECISIONS, Limits
 from swarm_mj.learning.selection import OTHER_FLIGHTS, num_missions
 from swarm_mj.learning.settings import Training
-from swarm_mj.replay.estimates import replay_file, replay_memory
+from swarm_mj.replay.recorder import replay_file, replay_memory
 from swarm_mj.system.needs import (
     ADDRESSES,
     GB,

@@ -1,14 +1,20 @@
-"""The replay's map: the area, the robots, what the ego robot believes, its tree, the radio."""
+"""The replay's map: the area and obstacles, robots, the ego robot's beliefs and tree, the radio."""
+
+import itertools
+from typing import Any
 
 import numpy as np
 import rerun as rr
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
+from scipy.spatial import ConvexHull
 
 from swarm_mj.mission import Mission
+from swarm_mj.physics.state import BOX, CAPSULE, CYLINDER, ROBOT_HEIGHT_M, Obstacles
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Ground
+from swarm_mj.replay.mismatch import PIECES, LinkMismatch, mismatch_lines
 from swarm_mj.replay.packets import PacketLinks, transmitters
-from swarm_mj.replay.rerun_log import RerunLog
+from swarm_mj.replay.rerun_log import LAYERS, RerunLog
 
 SQUARE_M = 100.0
 MAX_SQUARES = 60  # across the ground; more would be too small to see
@@ -17,6 +23,9 @@ TRAIL_STRIDE = 15
 TRAIL_EVERY = 5  # windows; in between, the last one is shown
 HEADING_SHARE = 0.06  # a heading's length, of half the map's width
 RING_SHARE = 0.014  # the radius of a ring around a believed position, likewise
+FILL_SHARE = 0.008  # of half the map's width: between the lines that fill an obstacle
+CORNERS = 24  # of a circle
+LATITUDES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 9)  # of a ball's circles
 MIRROR = np.diag([1.0, -1.0, 1.0])  # rerun's 2D views have y down, the map has it up
 
 
@@ -25,9 +34,13 @@ def draw_map(
     mission: Mission,
     packets: dict[str, PacketLinks],
     colours: UInt8[np.ndarray, "T N 3"],
+    obstacles: Obstacles,
 ) -> None:
-    """Draw the map, with packets by their fate, but for what the environment adds."""
+    """Draw the map, with packets by their fate."""
     _draw_area(out, mission)
+    _draw_obstacles(out, obstacles)
+    if out.log.mismatch is not None:
+        _draw_mismatch(out, out.log.mismatch)
     _draw_robots(out, colours)
     if out.log.has_motion:
         where = out.log.position_m.reshape(-1, 2)
@@ -140,3 +153,73 @@ def _draw_arrows(out: RerunLog, fate: str, links: PacketLinks, aside_m: float) -
     left = np.stack([-way[:, 1], way[:, 0]], axis=1) / np.maximum(length, 1e-6)
     origins, vectors = start + aside_m * left, palette.PACKETS[fate][1] * way
     out.layer(f"arena/radio/{fate}", links.row, origins=origins, vectors=vectors)
+
+
+def _draw_obstacles(out: RerunLog, obstacles: Obstacles) -> None:
+    """Draw on the map where obstacles are in the way of the antennas."""
+    if not (outlines := footprints(obstacles, ROBOT_HEIGHT_M)):
+        return
+    path, apart_m = "arena/world/filling", FILL_SHARE * out.frame.reach_m
+    lines = [line for outline in outlines for line in filling(outline, apart_m)]
+    # The width is in metres, since rerun fills no areas.
+    style: dict[str, Any] = LAYERS[path].style | {"radii": 0.55 * apart_m}
+    out.fixed(path, rr.LineStrips2D.from_fields(strips=lines, **style))
+    out.fixed_layer("arena/world/obstacle", strips=outlines)
+
+
+def _draw_mismatch(out: RerunLog, mismatch: LinkMismatch) -> None:
+    """Draw links on which channel and belief differ, and who is cut off from the ego robot."""
+    log = out.log
+    position_m = log.position_m[mismatch.window - log.window[0]]
+    for kind, links in mismatch.by_kind.items():
+        lines_m, link = mismatch_lines(links, position_m, PIECES[kind])
+        out.mismatch_lines(f"arena/world/{kind}", kind, links.chosen(link), lines_m)
+    row, robot = np.nonzero(log.is_cut_off)
+    out.layer("arena/world/cut_off", row, positions=log.position_m[row, robot])
+
+
+def footprints(obstacles: Obstacles, height_m: float) -> list[Float[np.ndarray, "K 2"]]:
+    """Return the outline of each obstacle that reaches this height, once round [m]."""
+    outlines = []
+    for kind, centre_m, rotation, size_m in zip(*obstacles[:4], strict=True):
+        points_m = _surface(int(kind), size_m) @ rotation.T + centre_m
+        # The outline is the hull of where lines from the points above to those below pass.
+        is_above = points_m[:, 2] > height_m
+        above, below = points_m[is_above][:, None], points_m[~is_above][None]
+        share = (above[..., 2:] - height_m) / (above[..., 2:] - below[..., 2:])
+        cut = (above + share * (below - above))[..., :2].reshape(-1, 2)
+        if len(cut) > 2:
+            corners = cut[ConvexHull(cut).vertices]
+            outlines.append(np.concatenate([corners, corners[:1]]))
+    return outlines
+
+
+def filling(
+    outline_m: Float[np.ndarray, "K 2"], apart_m: float
+) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    """Return lines from west to east, so far apart, that fill an outline [m]."""
+    y_low, y_high = np.min(outline_m[:, 1]), np.max(outline_m[:, 1])
+    num = max(1, int(np.ceil((y_high - y_low) / apart_m)))
+    lines = []
+    for y in y_low + (np.arange(num) + 0.5) * (y_high - y_low) / num:
+        xs = [
+            a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+            for a, b in itertools.pairwise(outline_m.tolist())
+            if min(a[1], b[1]) <= y < max(a[1], b[1])
+        ]
+        lines.append(((min(xs), y), (max(xs), y)))
+    return lines
+
+
+def _surface(kind: int, size_m: Float[np.ndarray, "3"]) -> Float[np.ndarray, "K 3"]:
+    """Return points whose convex hull is the obstacle, in its own frame [m]."""
+    if kind == BOX:
+        return size_m * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    angle = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(CORNERS)], axis=1)
+    ball = np.concatenate([np.cos(at) * circle + (0.0, 0.0, np.sin(at)) for at in LATITUDES])
+    if kind in (CYLINDER, CAPSULE):
+        half = np.array([0.0, 0.0, size_m[1]])
+        disc = size_m[0] * (circle if kind == CYLINDER else ball)
+        return np.concatenate([disc - half, disc + half])
+    return ball * (size_m if np.all(size_m > 0.0) else size_m[0])

@@ -9,9 +9,8 @@ import rerun.blueprint as rrb
 
 from swarm_mj.replay import legend, palette
 from swarm_mj.replay.arena import square_m
-from swarm_mj.replay.charts import TREE_HEIGHT, TREE_WIDTH
+from swarm_mj.replay.charts import TREE_HEIGHT, TREE_WIDTH, Plot
 from swarm_mj.replay.footage import Ground
-from swarm_mj.replay.plots import Plot
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import TIMELINE
 

@@ -6,6 +6,7 @@ from numbers import Integral
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.costs import TaskCost
@@ -13,6 +14,7 @@ from swarm_mj.replay.mismatch import LinkMismatch, joined, radio_snapshot, strid
 from swarm_mj.replay.packets import PacketLinks, fates
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.needs import GB
 
 # Longer or larger flights keep the age matrix of every k-th window only.
 MAX_AGE_MATRIX_BYTES = 64e6
@@ -168,3 +170,15 @@ class Recorder:
             mismatch=joined(self._mismatches[: len(seen)], seen) if self._mismatches else None,
             **columns,
         )
+
+
+def replay_memory(mission: Mission, num_windows: int) -> float:
+    """Return the memory that recording takes at its peak, when the replay is written."""
+    matrices = min(MAX_AGE_MATRIX_BYTES, AGE_BYTES * num_windows * mission.num_robots**2)
+    return 0.1 * GB + (15e3 + 1e3 * mission.num_robots) * num_windows + 2.2 * matrices
+
+
+def replay_file(mission: Mission) -> float:
+    """Return a replay's size, of teams that move; others' are smaller."""
+    matrices = min(MAX_AGE_MATRIX_BYTES, AGE_BYTES * mission.num_windows * mission.num_robots**2)
+    return 0.5e6 + (500.0 + 150.0 * mission.num_robots) * mission.num_windows + 0.25 * matrices

@@ -9,10 +9,12 @@ from jaxtyping import Float, Int
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Ground
+from swarm_mj.replay.mismatch import LinkMismatch, shades
 from swarm_mj.replay.palette import Colour, dim
 from swarm_mj.replay.recorder import Log
 
 TIMELINE = "window"
+LINK_NUMBERS = ("sender", "receiver", "loss_db", "margin_db")  # of mismatched links, kept in files
 
 
 def screen(points: float) -> float:
@@ -150,6 +152,17 @@ class RerunLog:
     ) -> None:
         """Write circles; `row` as for `layer`."""
         self.layer(path, row, centers=centre, half_sizes=np.full(centre.shape, radius_m))
+
+    def mismatch_lines(
+        self, path: str, kind: str, links: LinkMismatch, lines_m: Float[np.ndarray, "L 2 A"]
+    ) -> None:
+        """Write a line for each of these links; those who click on one read its numbers."""
+        self.fixed_layer(path)
+        per_snapshot = np.bincount(links.row, minlength=len(links.window))
+        columns = LAYERS[path].kind.columns(strips=lines_m, colors=shades(kind, links))
+        numbers = rr.AnyValues.columns(**{name: getattr(links, name) for name in LINK_NUMBERS})
+        parts = (part for each in (columns, numbers) for part in each.partition(per_snapshot))
+        self.timed(path, parts, links.window)
 
 
 def lifted(at_m: Float[np.ndarray, "*S 2"], height_m: float) -> Float[np.ndarray, "*S 3"]:

@@ -16,12 +16,10 @@ from swarm_mj.physics.solid_geoms import obstacles_of
 from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 from swarm_mj.replay import charts, palette
 from swarm_mj.replay.arena import draw_map
-from swarm_mj.replay.environment import draw_mismatch, draw_obstacles
 from swarm_mj.replay.footage import Footage, footage_of, frame
 from swarm_mj.replay.layout import layout
 from swarm_mj.replay.legend import draw_legend
 from swarm_mj.replay.packets import PacketLinks, is_other
-from swarm_mj.replay.plots import Plot, draw_plots, plots
 from swarm_mj.replay.read import FACTS, with_digest
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog
@@ -32,16 +30,10 @@ APPLICATION = "swarm_mj"
 
 
 def write_replay(log: Log, mission: Mission, config: Mapping[str, Any], path: Path) -> None:
-    """Write a replay; the file appears under its name only when it is whole.
+    """Write or replace a replay, which appears under its name only when it is whole.
 
-    Args:
-        log: The record.
-        mission: Its numbers.
-        config: Kept in the file as recording properties; values are numbers, texts or booleans.
-        path: The file, replaced if it exists; missing folders are made.
-
-    Raises:
-        OSError: The file cannot be written.
+    `config` is kept in the file as recording properties: numbers, texts or booleans. Missing
+    folders are made. Raise OSError if the file cannot be written.
     """
     # Rerun's own writer of files hides a full disk, or waits for space for good.
     recorded = with_digest(_recorded(log, mission, config, path.stem))
@@ -54,7 +46,7 @@ def _recorded(log: Log, mission: Mission, config: Mapping[str, Any], name: str) 
     packets, own = log.packets, components_in(config)
     policy, seed = config.get("policy") or "", config.get("seed", 0)
     footage = footage_of(log, mission, policy, seed, own)
-    shown, plotted = frame(log.position_m, mission.half_side_m), plots(log, packets)
+    shown, plotted = frame(log.position_m, mission.half_side_m), charts.plots(log, packets)
     with rr.RecordingStream(APPLICATION, send_properties=False) as recording:
         stream = recording.binary_stream()
         laid_out = layout(log, shown, plotted)
@@ -82,7 +74,7 @@ def _sent(log: Log, mission: Mission, config: Mapping[str, Any]) -> dict[str, st
 
 
 def draw(
-    out: RerunLog, footage: Footage, packets: dict[str, PacketLinks], plotted: list[Plot]
+    out: RerunLog, footage: Footage, packets: dict[str, PacketLinks], plotted: list[charts.Plot]
 ) -> None:
     """Draw every layer of a replay; `packets` by their fate."""
     log, mission, full_scale = out.log, footage.facts.mission, footage.facts.full_scale
@@ -90,14 +82,12 @@ def draw(
         palette.robot_colours(log.ego_age, full_scale, log.is_known, is_on, log.ego)
         for is_on in (log.is_on, np.ones_like(log.is_on))
     )
-    draw_map(out, mission, packets, colours)
     model = stage(out, mission)
+    # First, for rerun takes the type of "loss_db" from its first use, and obstacles' is no integer.
     draw_space(out, model, footage.segments, colours)
-    draw_obstacles(out, obstacles_of(model))
-    if log.mismatch is not None:
-        draw_mismatch(out, log.mismatch)
+    draw_map(out, mission, packets, colours, obstacles_of(model))
     draw_legend(out, full_scale)
     charts.draw_tree(out, known)
     charts.draw_age_matrix(out, full_scale)
-    draw_plots(out, plotted)
+    charts.draw_plots(out, plotted)
     charts.draw_states(out)

@@ -100,7 +100,7 @@ def test_an_interrupt_leaves_nothing(flown, here, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("swarm_mj.replay.rendering.movie.Movie.picture", interrupted)
+    monkeypatch.setattr("swarm_mj.replay.rendering.video.Movie.picture", interrupted)
     arguments = ["replay", str(flown / "tdma.rrd"), "--video", "a.mp4", *SMALL]
     assert main(arguments) == 130
     assert list(here.iterdir()) == []

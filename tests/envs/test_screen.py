@@ -13,7 +13,7 @@ from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
 from swarm_mj.envs.pettingzoo import parallel_env
 from swarm_mj.envs.screen import HEIGHT, WIDTH, Screen
 from swarm_mj.mission import paper
-from swarm_mj.replay.rendering.contents import contents_of
+from swarm_mj.replay.footage import contents_of
 from swarm_mj.replay.rendering.scene import SceneRenderer
 from swarm_mj.simulation.swarm import Swarm
 

@@ -10,7 +10,7 @@ from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import make_model
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.packet_memory import empty_memory
-from swarm_mj.replay.estimates import replay_file
+from swarm_mj.replay.recorder import replay_file
 
 
 @pytest.mark.parametrize("credit", ["robot", "team"])

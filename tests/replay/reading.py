@@ -4,15 +4,17 @@ import numpy as np
 from rerun.chunk import RrdReader
 
 
+def entities(path):
+    """The names of everything a replay has."""
+    return {chunk.entity_path for chunk in RrdReader(path).stream()}
+
+
 def column(path, entity, component):
     """The one timed chunk of an entity: a component's rows as nested lists."""
-    chunks = [
-        chunk.to_record_batch()
-        for chunk in RrdReader(path).stream().filter(content=entity)
-        if not chunk.is_static
-    ]
-    (chunk,) = (batch for batch in chunks if component in batch.schema.names)
-    return chunk.column(component)
+    chunks = RrdReader(path).stream().filter(content=entity)
+    batches = [chunk.to_record_batch() for chunk in chunks if not chunk.is_static]
+    (batch,) = (batch for batch in batches if component in batch.schema.names)
+    return batch.column(component)
 
 
 def rows(path, entity, component, *shape):
@@ -27,11 +29,9 @@ def counts(path, entity, component):
 
 def static(path, entity, component):
     """A component that never changes."""
-    (value,) = (
-        chunk.to_record_batch().column(component)
-        for chunk in RrdReader(path).stream().filter(content=entity)
-        if chunk.is_static and component in chunk.to_record_batch().schema.names
-    )
+    chunks = RrdReader(path).stream().filter(content=entity)
+    batches = (chunk.to_record_batch() for chunk in chunks if chunk.is_static)
+    (value,) = (batch.column(component) for batch in batches if component in batch.schema.names)
     return np.array(value.to_pylist()).ravel()
 
 
@@ -39,3 +39,9 @@ def rows_of_strips(path, entity):
     """Straight lines as [start, end] pairs, all windows in a row."""
     lines = column(path, entity, "LineStrips2D:strips").flatten()
     return lines.flatten().flatten().to_numpy().reshape(-1, 2, 2)
+
+
+def colours(path, entity, component, num):
+    """RGB of `num` things in each window."""
+    rgba = column(path, entity, component).flatten().to_numpy()
+    return np.stack([(rgba >> shift) & 255 for shift in (24, 16, 8)], axis=-1).reshape(-1, num, 3)

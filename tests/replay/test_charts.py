@@ -1,10 +1,11 @@
-"""What the tree, the age matrix and the state lanes show, against plain loops."""
+"""Tree, age matrix, state lanes and plots, against plain loops."""
 
 import numpy as np
+import pytest
 from reading import column, rows_of_strips
 
 from swarm_mj.mission.geometry import spanning_tree
-from swarm_mj.replay.charts import dendrogram, radio_states, walk
+from swarm_mj.replay.charts import broadcast_counts, dendrogram, plots, radio_states, rate, walk
 
 
 def test_a_walk_visits_everyone_once_and_children_after_parents(two_way):
@@ -48,24 +49,17 @@ def test_a_broadcasting_robot_transmits_hears_or_is_silent(flooded):
 def test_rows_of_the_matrix_own_and_columns_are_owned(replay, two_way):
     """The ego robot's row, wherever the walk put it, is what the ego robot knows."""
     tensors = column(replay, "/ages", "Tensor:data").flatten().to_pylist()
-    shown = np.array(tensors[-1]["buffer"]).reshape(12, 12)
-    full_scale = shown.max()
-    own = np.sort(np.minimum(two_way.log.ego_age[-1], full_scale)).astype(np.float16)
-    about = np.minimum(two_way.log.age[-1, :, two_way.log.ego], full_scale)
-    assert any(np.array_equal(np.sort(row), own) for row in shown)
-    assert any(np.array_equal(np.sort(owned), np.sort(about)) for owned in shown.T)
-    assert not any(np.array_equal(np.sort(row), np.sort(about)) for row in shown)
-
-
-def test_the_matrix_holds_every_pair_s_age(replay, two_way):
-    tensors = column(replay, "/ages", "Tensor:data").flatten()
-    shown = np.stack([np.array(tensor["buffer"]) for tensor in tensors.to_pylist()])
-    expected = two_way.log.age.reshape(len(shown), -1)
-    full_scale = shown.max()
-    # Rows and columns are permuted alike, so the ages agree as a set.
-    np.testing.assert_array_equal(
-        np.sort(shown, axis=1), np.sort(np.minimum(expected, full_scale), axis=1)
-    )
+    matrices = np.stack([np.array(tensor["buffer"]) for tensor in tensors])
+    full_scale, log = matrices.max(), two_way.log
+    # Rows and columns are permuted alike, so that the ages agree as a set.
+    expected = np.minimum(log.age.reshape(len(matrices), -1), full_scale)
+    np.testing.assert_array_equal(np.sort(matrices, axis=1), np.sort(expected, axis=1))
+    shown = np.sort(matrices[-1].reshape(12, 12), axis=1).tolist()
+    own = np.sort(np.minimum(log.ego_age[-1], full_scale)).astype(np.float16).tolist()
+    about = np.sort(np.minimum(log.age[-1, :, log.ego], full_scale)).tolist()
+    assert own in shown
+    assert about not in shown
+    assert about in np.sort(matrices[-1].reshape(12, 12).T, axis=1).tolist()
 
 
 def test_the_tree_s_lines_join_nodes_a_hop_apart(replay, two_way):
@@ -104,10 +98,59 @@ def test_depth_is_the_number_of_hops_to_the_observer(two_way):
                 at = log.parent[t, at]
                 hops += 1
             assert place[t, j, 0] == hops
+    known = place[-1][log.is_known[-1]]
+    assert len(np.unique(known, axis=0)) == len(known)  # no two robots share a place
 
 
-def test_no_two_robots_share_a_place(two_way):
-    log = two_way.log
-    place = dendrogram(log.parent, log.is_known, log.ego)[-1]
-    known = place[~np.isnan(place[:, 0])]
-    assert len(np.unique(known, axis=0)) == len(known) == np.sum(log.is_known[-1])
+def test_the_rate_counts_the_last_ten_windows():
+    counts = np.arange(25)
+    np.testing.assert_array_equal(
+        rate(counts), [sum(counts[max(0, t - 9) : t + 1]) for t in range(25)]
+    )
+
+
+@pytest.mark.parametrize(
+    ("flight", "names"),
+    [("two_way", ["delivered", "lost", "overheard", "answered"]), ("flooded", ["sent", "heard"])],
+)
+def test_the_packet_plot_counts_as_the_costs_do(flight, names, request):
+    recorded = request.getfixturevalue(flight)
+    curves = plots(recorded.log, recorded.log.packets)[1].curves
+    assert [curve.path for curve in curves] == [f"radio/{name}" for name in names]
+    for curve, name in zip(curves, names, strict=True):
+        np.testing.assert_array_equal(curve.values, rate(recorded.counted(name).astype(int)))
+
+
+def test_broadcasts_are_as_many_as_the_costs_count(flooded):
+    sent, heard = broadcast_counts(flooded.log)
+    np.testing.assert_array_equal(sent, flooded.counted("sent"))
+    np.testing.assert_array_equal(heard, flooded.counted("heard"))
+
+
+def test_the_plot_of_the_world_has_shares_of_links_and_robots(blocked, blocked_replay):
+    log = blocked.log
+    expected = {"believed, too weak": [], "works, unbelieved": [], "cut off from r4": []}
+    weak, works, cut_off = expected.values()
+    for window in log.mismatch.window.tolist():
+        where, seen = log.position_m[window - 1], log.mismatch.at(window)
+        num_near = sum(
+            np.linalg.norm(where[i] - where[j]) <= 250.0 for i in range(14) for j in range(i)
+        )
+        num_weak = seen.is_too_weak.tolist().count(True)
+        num_extra = len(seen.row) - num_weak
+        weak.append(100.0 * num_weak / num_near)
+        works.append(100.0 * num_extra / (num_near - num_weak + num_extra))
+        team = log.group[window - 1].tolist()
+        cut_off.append(100.0 * sum(of != team[4] for of in team) / 13)
+    shares = {curve.name: curve.values for curve in plots(log, log.packets)[2].curves}
+    for name, values in expected.items():
+        np.testing.assert_allclose(shares[name], values)
+    shown = column(blocked_replay, "/plots/world/cut_off_from_r4", "Scalars:scalars")
+    np.testing.assert_allclose(shown.flatten().to_numpy(), cut_off)
+
+
+def test_plots_are_the_costs(replay, two_way):
+    shown = column(replay, "/plots/task/cost", "Scalars:scalars").flatten().to_numpy()
+    np.testing.assert_allclose(shown, two_way.log.velocity_variance_m2ps2, rtol=1e-12)
+    values = column(replay, "/plots/age/mean", "Measurements:values").flatten().to_numpy()
+    np.testing.assert_allclose(values, two_way.log.age_mean, rtol=1e-6)

@@ -7,11 +7,6 @@ from swarm_mj.replay.packets import RISE, SEGMENTS, arcs, packet_segments, trans
 from swarm_mj.replay.palette import LOST_SHARE
 
 
-def per_window(recorded, fate):
-    """How many packets of a fate each window has."""
-    return np.bincount(recorded.log.packets[fate].row, minlength=len(recorded.log.window))
-
-
 @pytest.mark.parametrize(
     ("flight", "fate", "counted"),
     [
@@ -21,7 +16,11 @@ def per_window(recorded, fate):
 )
 def test_links_are_as_many_as_the_costs_count(flight, fate, counted, request):
     recorded = request.getfixturevalue(flight)
-    np.testing.assert_array_equal(per_window(recorded, fate), recorded.counted(counted))
+    links = recorded.log.packets[fate]
+    assert np.all(np.diff(links.row) >= 0)
+    found = np.bincount(links.row, minlength=len(recorded.log.window))
+    np.testing.assert_array_equal(found, recorded.counted(counted))
+    assert np.any(found)
 
 
 def test_a_broadcast_leads_to_each_robot_that_decoded_it(flooded):
@@ -44,11 +43,6 @@ def test_transmitters_are_who_speaks_without_being_asked(flight, slots, request)
         assert found[t, i] == any(log.recipient[t, slot, i] != i for slot in slots)
 
 
-def test_every_fate_occurs_in_the_fixture(two_way):
-    for fate, links in two_way.log.packets.items():
-        assert len(links.row) > 0, fate
-
-
 def test_answers_heard_or_not_are_the_delivered_requests_turned_round(two_way):
     links = two_way.log.packets
     delivered = links["delivered"]
@@ -63,32 +57,20 @@ def test_answers_heard_or_not_are_the_delivered_requests_turned_round(two_way):
     assert answers == requests
 
 
-def test_lines_run_from_sender_to_receiver(two_way):
-    links = two_way.log.packets["overheard"]
-    start, end = links.ends(two_way.log.position_m)
-    for n, (row, sender, receiver) in enumerate(
-        zip(links.row, links.sender, links.receiver, strict=True)
-    ):
-        np.testing.assert_array_equal(start[n], two_way.log.position_m[row, sender])
-        np.testing.assert_array_equal(end[n], two_way.log.position_m[row, receiver])
-    assert np.all(np.diff(links.row) >= 0)
-
-
-def test_segments_are_as_many_as_packets_of_their_fate_in_the_order_of_drawing(two_way, flooded):
+def test_segments_are_in_the_order_of_drawing(two_way, flooded):
     segments = packet_segments(two_way.log.packets, two_way.log.position_m)
     assert list(segments) == ["overheard", "unanswered", "lost", "delivered", "answered"]
-    for fate in ("delivered", "lost", "answered"):
-        found = np.bincount(segments[fate].row, minlength=30)
-        np.testing.assert_array_equal(found, two_way.counted(fate))
     assert list(packet_segments(flooded.log.packets, flooded.log.position_m)) == ["heard"]
 
 
 def test_a_lost_packet_stops_short_and_a_delivered_one_arrives(two_way):
     log, packets = two_way.log, two_way.log.packets
-    for fate, share in (("lost", LOST_SHARE), ("unanswered", LOST_SHARE), ("delivered", 1.0)):
+    for fate in packets:
+        share = LOST_SHARE if fate in ("lost", "unanswered") else 1.0
         links, drawn = packets[fate], packet_segments(packets, log.position_m)[fate]
         start = log.position_m[links.row, links.sender]
         end = log.position_m[links.row, links.receiver]
+        np.testing.assert_array_equal(drawn.row, links.row)
         np.testing.assert_allclose(drawn.start_m, start)
         np.testing.assert_allclose(drawn.end_m, share * end + (1.0 - share) * start)
 
@@ -101,7 +83,4 @@ def test_an_arc_starts_and_ends_at_its_ends_and_is_highest_in_the_middle():
     np.testing.assert_allclose(points[:, -1], np.pad(end, ((0, 0), (0, 1)), constant_values=2.0))
     np.testing.assert_allclose(points[:, SEGMENTS // 2, 2], 2.0 + RISE * np.array([100.0, 40.0]))
     np.testing.assert_allclose(points[0, :, 1], 0.0)
-
-
-def test_no_packets_are_no_arcs():
-    assert arcs(np.zeros((0, 2)), np.zeros((0, 2)), 0.0).shape == (0, SEGMENTS + 1, 3)
+    assert arcs(start[:0], end[:0], 0.0).shape == (0, SEGMENTS + 1, 3)

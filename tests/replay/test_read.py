@@ -25,21 +25,23 @@ def test_what_is_no_whole_replay_is_refused(replay, tmp_path, change):
         check_replay(other)
 
 
-def test_the_command_named_can_be_pasted(tmp_path):
-    (tmp_path / "a b.rrd").write_bytes(b"{}")
-    with pytest.raises(ValueError, match=r"`rerun '/.*a b\.rrd'`"):
-        check_replay(tmp_path / "a b.rrd")
-
-
-def test_no_replay_is_no_crash(tmp_path):
-    with pytest.raises(ValueError, match="there is no replay"):
-        check_replay(tmp_path / "missing.rrd")
+@pytest.mark.parametrize(
+    ("name", "complaint"),
+    [
+        ("a b.rrd", r"`rerun '/.*a b\.rrd'`"),  # can be pasted
+        ("fading.py", r"fading.py is no .rrd file; `swarm-mj fly` records them"),
+        ("missing.rrd", "there is no replay"),
+    ],
+)
+def test_a_complaint_names_the_file_and_the_way_out(tmp_path, name, complaint):
+    if "missing" not in name:
+        (tmp_path / name).write_bytes(b"{}")
+    with pytest.raises(ValueError, match=complaint):
+        check_replay(tmp_path / name)
 
 
 def test_a_copy_is_as_good(replay, tmp_path):
-    copy = tmp_path / "copy.rrd"
-    shutil.copy(replay, copy)
-    check_replay(copy)
+    check_replay(shutil.copy(replay, tmp_path / "copy.rrd"))
 
 
 @pytest.fixture

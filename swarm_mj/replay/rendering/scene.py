@@ -21,8 +21,13 @@ from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.physics.solid_geoms import obstacle_geoms
 from swarm_mj.replay.footage import Contents
-from swarm_mj.replay.rendering.camera import FOV_Y_DEG, Camera, look_at
-from swarm_mj.replay.rendering.markers import GEOMS_PER_ROBOT, draw_markers
+from swarm_mj.replay.rendering.markers import (
+    FOV_Y_DEG,
+    GEOMS_PER_ROBOT,
+    Camera,
+    draw_markers,
+    look_at,
+)
 from swarm_mj.replay.rendering.opengl import make_context, unusable
 
 MAX_PIXELS = 4096  # of a picture's side
@@ -45,13 +50,7 @@ class SceneRenderer:
     def __init__(
         self, mission: Mission, width: int = 1280, height: int = 720, *, scene: Scene | None = None
     ) -> None:
-        """Compile the scene and start OpenGL.
-
-        Args:
-            mission: Its scene is drawn.
-            width: Of the pictures [pixels].
-            height: Of the pictures [pixels].
-            scene: What changes the arena, if anything does: `swarm.scene`.
+        """Compile the scene, changed by `scene`, for pictures of this size [pixels].
 
         Raises:
             ValueError: The size is outside its range.
@@ -85,11 +84,7 @@ class SceneRenderer:
         return look_at(contents.centre_m, contents.reach_m, self._width, self._height)
 
     def frame(self, contents: Contents) -> UInt8[np.ndarray, "H W 3"]:
-        """Return the picture of these contents, RGB, its first row on top.
-
-        Raises:
-            ValueError: There is not one position per robot of the mission.
-        """
+        """Return the picture, RGB, its first row on top; ValueError for another team size."""
         if len(contents.position_m) != self._mission.num_robots:
             raise ValueError(
                 f"contents must have {self._mission.num_robots} robots, "

@@ -1,8 +1,10 @@
-"""The size, length and smoothness of a video; imported without what draws."""
+"""The size, length, smoothness and cost of a video; imported without what draws."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
+
+from swarm_mj.system.needs import ADDRESSES, LIBRARIES, OF_RERUN, Needs
 
 if TYPE_CHECKING:
     from swarm_mj.replay.footage import Footage
@@ -52,3 +54,14 @@ def default_seconds(footages: "Sequence[Footage]") -> float:
     """Return the missions' own time, if that is neither short nor long."""
     flown_s = max(len(each.window) * each.facts.mission.window_s for each in footages)
     return min(LONGEST_S, max(SHORTEST_S, flown_s))
+
+
+def video_needs(width: int, height: int, num_pictures: int | float, suffix: str) -> Needs:
+    """Return what `replay --video` takes; a GIF's pictures are kept until the last is drawn."""
+    pixels = width * height
+    kept = num_pictures if suffix == GIF else 0.0
+    return Needs(
+        memory=3.0 * LIBRARIES + (130.0 + 1.5 * kept) * pixels,
+        addresses=ADDRESSES + OF_RERUN,
+        file=0.1e6 + 0.05 * num_pictures * pixels,
+    )

@@ -11,8 +11,7 @@ from mujoco._structs import MjData
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene
 from swarm_mj.replay.footage import Contents
-from swarm_mj.replay.rendering.camera import look_at
-from swarm_mj.replay.rendering.markers import draw_markers
+from swarm_mj.replay.rendering.markers import draw_markers, look_at
 from swarm_mj.replay.rendering.scene import BEACONS, pictured
 
 SIZE = 1280, 720  # that sizes on the window are meant for [pixels]
@@ -24,15 +23,7 @@ class SceneViewer:
     """MuJoCo's passive viewer; closing the window ends the view, and nothing else."""
 
     def __init__(self, mission: Mission, *, scene: Scene | None = None) -> None:
-        """Open the window.
-
-        Args:
-            mission: Its scene is shown.
-            scene: What changes the arena, if anything does: `swarm.scene`.
-
-        Raises:
-            OSError: There is no display, or the window is closed already.
-        """
+        """Open the window; raise OSError without a display, or if it is closed already."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             if not glfw.init():  # MuJoCo's viewer would wait forever

@@ -1,15 +1,15 @@
-"""What is added to a scene for robots and packets."""
+"""Robots and packets in a scene; the camera's geometry, by hand."""
 
 from dataclasses import replace
 
 import mujoco
 import numpy as np
+import pytest
 from moments import moment
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.packets import SEGMENTS
-from swarm_mj.replay.rendering.camera import look_at
-from swarm_mj.replay.rendering.markers import draw_markers
+from swarm_mj.replay.rendering.markers import FOV_Y_DEG, draw_markers, look_at
 
 
 def drawn(contents):
@@ -53,3 +53,26 @@ def test_a_packet_is_an_arc_of_lines_and_a_heading_one_more():
     assert len(drawn(contents)) == 2 + SEGMENTS
     contents.velocity_mps[0] = (3.0, 0.0)
     assert len(drawn(contents)) == 3 + SEGMENTS
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 720), (400, 400), (300, 900)])
+def test_the_whole_square_is_seen_and_fills_the_picture(width, height):
+    centre, reach = np.array([250.0, -100.0]), 700.0
+    camera = look_at(centre, reach, width, height)
+    corners = np.array([[x, y, 0.0] for x in (-reach, reach) for y in (-reach, reach)])
+    seen = camera.pixels(corners + np.append(centre, 0.0))
+    assert np.all(seen >= 0.0)
+    assert np.all(seen <= [width, height])
+    extent = np.ptp(seen, axis=0) / [width, height]
+    assert 0.8 < extent.max() < 1.0
+
+
+def test_the_target_is_in_the_middle_north_is_up_and_a_pixel_as_large_as_the_lens_says():
+    camera = look_at(np.zeros(2), 100.0, 640, 480)
+    middle = np.append(camera.target_m, 0.0)
+    at, east, north, above = camera.pixels(middle + np.vstack([np.zeros(3), np.eye(3)]))
+    np.testing.assert_allclose(at, [320, 240])
+    np.testing.assert_allclose(east, [320 + 1.0 / camera.pixel_m, 240])
+    assert max(north[1], above[1]) < 240
+    whole_m = 2.0 * camera.distance_m * np.tan(np.deg2rad(FOV_Y_DEG) / 2.0)
+    np.testing.assert_allclose(camera.pixel_m * 480, whole_m)

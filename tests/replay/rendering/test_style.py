@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from swarm_mj.replay.rendering.style import VideoStyle, default_seconds, fitted
+from swarm_mj.replay.rendering.style import VideoStyle, default_seconds, fitted, video_needs
 
 
 @pytest.mark.parametrize(
@@ -35,3 +35,10 @@ def test_missions_are_shown_in_their_own_time_within_reason(num_windows, seconds
     facts = SimpleNamespace(mission=SimpleNamespace(window_s=0.1))
     footages = [SimpleNamespace(window=range(number), facts=facts) for number in num_windows]
     assert default_seconds(footages) == pytest.approx(seconds)
+
+
+def test_a_gif_s_pictures_are_kept_and_an_mp4_s_are_not():
+    """500 pictures of 1000 by 1000."""
+    gif, mp4 = (video_needs(1000, 1000, 500.0, suffix) for suffix in (".gif", ".mp4"))
+    assert gif.memory - mp4.memory == pytest.approx(750e6)
+    assert video_needs(1000, 1000, 5000.0, ".mp4").memory == mp4.memory

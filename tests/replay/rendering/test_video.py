@@ -1,24 +1,146 @@
-"""Videos, decoded again: size, length, colours, and who is refused."""
+"""Videos: what is where in their pictures; size, length and colours, decoded again."""
 
 import io
+import itertools
+from dataclasses import replace
 
 import av
 import numpy as np
 import pytest
+from mujoco import mjtGeom
 from PIL import Image, ImageSequence
+from scipy import ndimage
 
+from swarm_mj.mission import paper
+from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay import palette
+from swarm_mj.replay.footage import footage_of
+from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.rendering.style import VideoStyle
-from swarm_mj.replay.rendering.video import encode_gif, encode_mp4, make_video
+from swarm_mj.replay.rendering.video import Movie, encode_gif, encode_mp4, make_video
+from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.swarm import Swarm
 
-STYLE = VideoStyle(width=320, height=240, seconds=1.0, fps=10)
+with_opengl = pytest.mark.usefixtures("opengl")
+STYLE = VideoStyle(width=480, height=320, seconds=1.0, fps=6)
+
+
+def flown(policy_name, mission):
+    swarm = Swarm(mission, [1])
+    policy = make_policy(policy_name, mission)
+    recorder = Recorder(swarm)
+    for window in rollout(swarm, policy):
+        recorder.add(window)
+    return footage_of(recorder.log(), mission, policy_name, 1)
+
+
+@pytest.fixture(scope="module")
+def tdma():
+    return flown("tdma", paper("flocking", num_robots=8, num_windows=20))
+
+
+@pytest.fixture(scope="module")
+def mst():
+    return flown("mst", paper("flocking", num_robots=8, num_windows=12))
+
+
+@with_opengl
+def test_there_are_as_many_pictures_as_asked_for_from_the_first_window_to_the_last(tdma):
+    with Movie([tdma], STYLE) as movie:
+        pictures = list(movie)
+        np.testing.assert_array_equal(pictures[0], movie.picture([0]))
+        np.testing.assert_array_equal(pictures[-1], movie.picture([19]))
+    assert len(pictures) == len(movie) == 6
+    assert all(picture.shape == (320, 480, 3) for picture in pictures)
+    for one, next_one in itertools.pairwise(pictures):
+        assert np.any(one != next_one)
+
+
+@with_opengl
+def test_two_missions_stand_side_by_side_and_the_shorter_one_stops(tdma, mst):
+    """Six pictures of 20 windows: the other mission's twelfth is its last from the fourth on."""
+    with Movie([tdma, mst], STYLE) as movie:
+        pictures = list(movie)
+    halves = [picture[:240, 250:] for picture in pictures]  # of the second mission, without text
+    assert np.any(halves[0] != halves[1])
+    np.testing.assert_array_equal(halves[3], halves[5])
+    assert np.any(pictures[3][:240, :230] != pictures[5][:240, :230])
+
+
+@with_opengl
+def test_the_curve_grows_with_the_mission(tdma):
+    """The bright part of the plot's curve."""
+    is_bright = []
+    with Movie([tdma], STYLE) as movie:
+        for picture in movie:
+            plot = picture[250:, 160:].astype(int)
+            is_bright.append(np.sum(np.abs(plot - palette.MEAN_AGE).max(axis=2) < 30))
+    assert np.all(np.diff(is_bright) > 0)
+
+
+def test_three_missions_are_too_many(tdma):
+    with pytest.raises(ValueError, match="a video shows 1 or 2 missions, not 3"):
+        Movie([tdma] * 3, STYLE)
+
+
+@with_opengl
+def test_observers_are_white_and_the_others_are_not(tdma):
+    with Movie([replace(tdma, age=np.full_like(tdma.age, np.nan))], STYLE) as movie:
+        scene = movie.picture([10])[:250]
+    blobs, count = ndimage.label(scene.min(axis=2) > 235)
+    sizes = np.bincount(blobs.ravel(), minlength=count + 1)[1:]
+    assert np.sum(sizes > 30) == 1  # letters are smaller
+
+
+@with_opengl
+@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
+def test_a_mission_s_video_has_all_pictures(tdma, suffix):
+    seen = []
+    content = make_video([tdma], suffix, STYLE, lambda: seen.append(1))
+    with av.open(io.BytesIO(content)) as container:
+        shapes = [(frame.height, frame.width) for frame in container.decode(video=0)]
+    assert shapes == [(320, 480)] * 6
+    assert len(seen) == 6
+
+
+@with_opengl
+def test_links_that_surprise_and_their_shortfalls_are_seen():
+    mission = paper("random-walk", num_robots=10, num_windows=6, arena="blocks", shadowing_db=6.0)
+    city = flown("tdma", mission)
+    assert len(city.shortfalls(5)[1]) > 0
+    without = replace(city, mismatch=None, is_cut_off=np.zeros_like(city.is_cut_off))
+    num_red = []
+    for footage in (city, without):
+        with Movie([footage], STYLE) as movie:
+            picture = movie.picture([5])[:250].astype(int)
+        num_red.append(np.sum(picture[..., 0] - picture[..., 1:].max(axis=2) > 60))
+    seen, unseen = num_red
+    assert seen > 100
+    assert unseen == 0
+
+
+@with_opengl
+def test_a_scene_of_one_s_own_is_seen(tdma):
+    def with_tower(spec, _mission):
+        kind = mjtGeom.mjGEOM_BOX
+        spec.worldbody.add_geom(type=kind, size=[40, 40, 20], rgba=[1, 0, 0, 1])
+
+    is_red = []
+    for scene in (None, with_tower):
+        with Movie([replace(tdma, scene=scene)], STYLE) as movie:
+            picture = movie.picture([5]).astype(int)
+        is_red.append(np.any(picture[..., 0] - picture[..., 1:].max(axis=2) > 80))
+    assert is_red == [False, True]
+
+
+PLAIN = VideoStyle(width=320, height=240, seconds=1.0, fps=10)
 COLOURS = [palette.LOST, palette.DELIVERED, palette.BROADCAST, palette.EGO]
 
 
 def moving():
     """A square of each colour on the dark ground, which moves to the right."""
-    for k in range(STYLE.num_frames):
-        picture = np.full((STYLE.height, STYLE.width, 3), palette.BACKGROUND, dtype=np.uint8)
+    for k in range(PLAIN.num_frames):
+        picture = np.full((PLAIN.height, PLAIN.width, 3), palette.BACKGROUND, dtype=np.uint8)
         for row, colour in enumerate(COLOURS):
             picture[20 + 50 * row : 40 + 50 * row, 10 + 8 * k : 30 + 8 * k] = colour
         yield picture
@@ -39,14 +161,14 @@ def decoded(content, suffix):
 def made(suffix):
     pictures = list(moving())
     return (
-        encode_gif(pictures, STYLE, pictures) if suffix == ".gif" else encode_mp4(pictures, STYLE)
+        encode_gif(pictures, PLAIN, pictures) if suffix == ".gif" else encode_mp4(pictures, PLAIN)
     )
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
 def test_a_video_gives_back_its_pictures(suffix):
     back = list(decoded(made(suffix), suffix))
-    assert len(back) == STYLE.num_frames
+    assert len(back) == PLAIN.num_frames
     for picture, original in zip(back, moving(), strict=True):
         assert picture.shape == original.shape
         assert np.abs(picture.astype(int) - original).mean() < 4.0
@@ -61,7 +183,7 @@ def test_a_gif_keeps_colours_that_fill_little_of_it():
 def test_a_gif_lasts_as_long_as_it_should_even_if_pictures_repeat():
     """Equal pictures that follow each other are kept as one that lasts longer."""
     still = [next(moving())] * 4 + list(moving())[4:]
-    with Image.open(io.BytesIO(encode_gif(still, STYLE, still))) as image:
+    with Image.open(io.BytesIO(encode_gif(still, PLAIN, still))) as image:
         lasts_ms = [frame.info["duration"] for frame in ImageSequence.Iterator(image)]
     assert sum(lasts_ms) == 1000
 
