@@ -9,6 +9,7 @@ from swarm_mj.cli.bench import noise
 from swarm_mj.cli.benchmark import learning
 
 
+@pytest.mark.slow
 def test_bench_prints_the_whole_and_its_parts(swarm_mj):
     short = ("--seconds", 0.1, "--episodes", 1, "--no-learning")
     done = swarm_mj("bench", "--missions", 1, 3, *short)

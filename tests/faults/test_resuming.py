@@ -319,6 +319,7 @@ def test_crafted_checkpoints_are_refused(begun, capsys, record_property):
     record_property("tries", len(CRAFTED_STATES))
 
 
+@pytest.mark.slow
 @pytest.mark.fault("damaged files are told")
 def test_damaged_checkpoints_are_told_or_whole(begun, record_property):
     """Fault 22: of a zip file's bits, those that say when it was made mean nothing."""

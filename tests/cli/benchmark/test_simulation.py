@@ -45,6 +45,7 @@ def test_twenty_blocks_are_obstacles():
     assert np.all(np.abs(found.centre_m[:, :2]) + 55.0 <= mission.half_side_m)
 
 
+@pytest.mark.slow
 def test_an_evaluations_timing_is_consistent():
     rows = {row.name: row.value for row in evaluation_rows(2, num_jobs=1, seconds=0.05)}
     assert all(value > 0 for value in rows.values())
