@@ -10,12 +10,10 @@ from swarm_mj.mission import paper
 from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.random_flooding import RandomFlooding
-from swarm_mj.protocol.buffers import empty_buffers, merge, record_attempt
+from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.costs import mean_hops
 from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
-
-NOW = np.ones(2)
 
 
 def small(**overrides):
@@ -38,17 +36,15 @@ def test_robots_that_do_not_exist_are_refused(robot):
     complaint = f"of robot 2 in mission 1 must be from 0 to 4, not {robot}"
     with pytest.raises(ValueError, match=complaint):
         swarm.step_with_recipients(recipient)
-    with pytest.raises(ValueError, match=complaint):
-        merge(empty_buffers(2, 5), recipient)
 
 
 @pytest.mark.parametrize("robot", [-2, 5, 10**8])
-def test_addressees_that_do_not_exist_are_refused(robot):
+def test_addressees_that_do_not_exist_are_refused(robot, monkeypatch):
     """Of a broadcast, too, for which -1 stands for everyone."""
     recipient = np.array([[-1, 1, robot, 3, 4]])
-    complaint = f"of robot 2 in mission 0 must be from 0 to 4, not {robot}"
-    with pytest.raises(ValueError, match=complaint):
-        record_attempt(empty_buffers(1, 5), recipient, np.array([1.0]))
+    monkeypatch.setattr(RandomFlooding, "recipients", lambda _self, _views: recipient)
+    with pytest.raises(ValueError, match=f"robot 2 in mission 0 must be from 0 to 4, not {robot}"):
+        Swarm(small(), [1]).step(RandomFlooding(0.5))
 
 
 def test_a_channel_of_another_shape_is_refused():
