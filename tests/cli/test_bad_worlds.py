@@ -12,8 +12,8 @@ def mjcf(geom):
 FILES = {
     "full": (
         mjcf(GEOM.replace("20 20 5", "2000 2000 5")),
-        "6 of 6 robots found no free space in 1000 draws over 387 m by 387 m; choose an arena that "
-        "leaves more room, or fewer robots",
+        "6 of 6 robots found no free space in 1000 draws over an area of 387 m by 387 m; choose an "
+        "arena that leaves more room, or fewer robots",
     ),
     "empty": (
         mjcf(GEOM.replace('group="1"', "")),
