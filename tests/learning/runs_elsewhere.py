@@ -115,18 +115,16 @@ def killed(folder):
 
 def _train_and_die(arguments, moment, moments):
     """Trains as `swarm-mj train`, and dies after the file of this number is placed."""
-    placed = []
+    placed, place = [], os.replace
 
-    def then_die(place):
-        def placing(self, target):
-            place(self, target)
-            placed.append(f"{Path(target).name}")
+    def then_die(part, target):
+        place(part, target)
+        if Path(target).resolve().is_relative_to(Path.cwd()):  # others are compilers' caches
+            placed.append(Path(target).name)
             if len(placed) - 1 == moment:
                 os.kill(os.getpid(), signal.SIGKILL)
 
-        return placing
-
-    Path.replace, Path.rename = then_die(Path.replace), then_die(Path.rename)
+    os.replace = then_die
     code = main(arguments)
     moments.write_text("\n".join(placed))
     return code
