@@ -126,11 +126,9 @@ def load(
             networks[at].load_state_dict(weights)
         _restore(state, counters, model, rng)
     except Exception as error:  # generators of random numbers take states as they please
-        reason = (str(error) or type(error).__name__).splitlines()[0]
-        raise ValueError(
-            f"checkpoint {path} is damaged, or another run's ({reason:.200}); begin a new run with "
-            "another --out"
-        ) from error
+        reason = (str(error) or type(error).__name__).splitlines()[0][:200]
+        said = f"checkpoint {path} is damaged, or another run's ({reason})"
+        raise ValueError(f"{said}; begin a new run with another --out") from error
     return counters.progress, networks
 
 

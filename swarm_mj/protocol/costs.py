@@ -50,13 +50,10 @@ def age_of_information(
 ) -> tuple[Float[np.ndarray, "B"], Bool[np.ndarray, "B"]]:
     """Return the mean over all pairs i, j of t - T^{i,j}, own age included (Eq. 10).
 
-    Args:
-        buffers: What everyone knows.
-        now: t [windows].
-        is_active: Whose pairs count, at least one robot's in each mission; None is everyone's.
+    Pairs of active robots count, at least one robot's in each mission; None is all robots.
 
     Returns:
-        The age [windows], and whether all of these know all of these.
+        The age at t [windows], and whether all of these know all of these.
     """
     age, is_complete = _mean_age(buffers.timestamp, now, is_active)
     return age, is_complete | buffers.is_granted
@@ -87,9 +84,7 @@ def velocity_variance(
 def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets:
     """Count the fates of one window's packets, per mission.
 
-    Args:
-        phases: The window's two phases.
-        is_broadcast: Whether both are broadcasts (IV-C), or the second answers the first (Alg. 1).
+    Both phases are broadcasts (IV-C), or the second answers the first (Alg. 1).
     """
     first, second = (_Counts(*np.zeros((5, len(phase.recipient)))) for phase in phases)
     for phase, counts in zip(phases, (first, second), strict=True):

@@ -38,10 +38,7 @@ def draw_tree(out: RerunLog, colours: UInt8[np.ndarray, "T N 3"]) -> None:
 def dendrogram(
     parent: Int[np.ndarray, "T N"], is_known: Bool[np.ndarray, "T N"], root: int
 ) -> Float[np.ndarray, "T N 2"]:
-    """Place each robot that the root, the ego robot, has heard of; nan for the others (II-B).
-
-    x is its depth [hops], y its height, 0 to 1; `parent` is P of the root's buffer.
-    """
+    """Place robots by depth [hops] and height, 0 to 1, in the root's tree P; nan if unknown."""
     place = np.full((*parent.shape, 2), np.nan)
     is_child = is_known & (np.arange(parent.shape[1]) != root)
     for parents, known, its in zip(parent.tolist(), is_child, place, strict=True):

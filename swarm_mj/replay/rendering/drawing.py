@@ -21,7 +21,7 @@ SHADE = 0.35  # of columns behind a curve
 NUM_SHADES = 48
 SHORTFALL = "missing to decode"  # the meaning of the numbers next to robots
 TAG = 2  # of dark ground around a number [pixels]
-LABELS_FIRST = 1000  # a number had rather cover so many robots than another number
+LABELS_FIRST = 1000  # a number covers up to this many robots rather than another number
 ROOM, STEP = 3.7, 1.1  # for a legend's samples, and from one to the next [of the text's size]
 
 
