@@ -50,7 +50,8 @@ def with_row_of(mine, theirs):
         *zip(mine.phases, mixed.phases, strict=True),
     ]:
         for name, array in vars(own).items():
-            vars(other)[name][:, ROW] = array[:, ROW]
+            if array.ndim > 1:  # by robots
+                vars(other)[name][:, ROW] = array[:, ROW]
     return mixed
 
 

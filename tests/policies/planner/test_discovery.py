@@ -149,7 +149,8 @@ def test_eq9_politeness_is_one_s_own_buffer_s(seed):
         for _ in range(2)
     )
     for name, array in vars(mine).items():
-        vars(theirs)[name][:, row] = array[:, row]
+        if array.ndim > 1:  # by robots
+            vars(theirs)[name][:, row] = array[:, row]
     for slot in range(8):
         alone, in_company = (turns.transmits(slot, them, 0)[row] for them in (mine, theirs))
         assert alone == in_company
