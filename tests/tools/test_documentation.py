@@ -85,7 +85,7 @@ def test_the_tour_shows_what_its_cells_show(built):
 def test_every_equation_leads_to_its_code(built):
     page = (built / "paper-map.html").read_text(encoding="utf-8")
     assert all(f"<td>Eq. {n}</td>" in page for n in range(1, 18))
-    assert "interference_mw" in page  # the code itself is there
+    assert '<span class="n">interference</span>' in page  # the code itself is there
 
 
 def test_links_between_files_become_links_of_the_site():
