@@ -231,7 +231,8 @@ class Swarm:
         """Fly one window of this protocol."""
         start, self.is_broadcast = self.now, window.is_broadcast
 
-        def decide_after(phases: tuple[Phase, ...]) -> Int[np.ndarray, "B N"]:
+        # Annotated in plain types: those of jaxtyping would be made anew in every window.
+        def decide_after(phases: tuple[Phase, ...]) -> np.ndarray:
             if phases:  # a later slot is decided by its own clock, and knows the earlier one
                 self.phases, self.now = phases, start + len(phases) * SLOT_WINDOWS
             recipient = np.asarray(decide())
