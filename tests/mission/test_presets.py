@@ -5,6 +5,7 @@ import math
 import pytest
 
 from swarm_mj.mission import PAPERS, PRESETS, WORLDS, paper, reference
+from swarm_mj.mission.presets import where_flown
 from swarm_mj.physics.solid_geoms import LOSS_DB
 from swarm_mj.radio.free_space import path_loss_db
 
@@ -117,3 +118,8 @@ def test_a_block_takes_about_what_umi_loses_without_line_of_sight():
     without_db = 35.3 * math.log10(200.0) + 22.4 + 21.3 * math.log10(2.4)
     through_db = loss_db(urban, 200.0) + LOSS_DB["building"]
     assert through_db == pytest.approx(without_db, abs=2.0)
+
+
+def test_where_a_world_is_flown_names_only_what_was_changed():
+    assert where_flown(PRESETS["urban"]()) == ["preset urban"]
+    assert where_flown(PRESETS["urban"](arena="forest")) == ["preset urban", "arena forest"]
