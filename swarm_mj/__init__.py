@@ -28,9 +28,9 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     IV-A    Eq. 17  velocity variance        protocol.costs.velocity_variance
     IV-B            mission specification    mission.specification.Mission
     IV-B            initial positions        mission.placement.connected_positions
-    IV-C            random flooding          policies.random_flooding.RandomFlooding
-    IV-C            round robin              policies.round_robin.RoundRobin
-    IV-C            minimum spanning tree    policies.minimum_spanning_tree.MinimumSpanningTree
+    IV-C            random flooding          policies.random_access.RandomFlooding
+    IV-C            round robin              policies.centralised.RoundRobin
+    IV-C            minimum spanning tree    policies.centralised.MinimumSpanningTree
 
 Around the paper: `system` (compiling, declared fields, files that appear whole, processes),
 `simulation` (B missions side by side; a policy from the first window to the last), more `policies`

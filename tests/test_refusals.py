@@ -9,7 +9,7 @@ import pytest
 from swarm_mj.mission import paper
 from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.policy import Policy
-from swarm_mj.policies.random_flooding import RandomFlooding
+from swarm_mj.policies.random_access import RandomFlooding
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.costs import mean_hops
 from swarm_mj.simulation.rollout import rollout, summarise

@@ -5,8 +5,7 @@ import torch
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.fast import FastAggregationGnn
 from swarm_mj.policies.gnn.feature_sets import make_extractor
-from swarm_mj.policies.gnn.shape import GnnShape
-from swarm_mj.policies.policy_config import GnnConfig
+from swarm_mj.policies.policy_config import GnnConfig, GnnShape
 from swarm_mj.policies.stored import save_policy
 
 torch.set_num_threads(1)  # tests share the machine's cores

@@ -24,8 +24,7 @@ from swarm_mj.evaluation.jobs import run_jobs
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import reference
 from swarm_mj.policies.gnn.network import AggregationGnn
-from swarm_mj.policies.gnn.shape import GnnShape
-from swarm_mj.policies.policy_config import GnnConfig
+from swarm_mj.policies.policy_config import GnnConfig, GnnShape
 from swarm_mj.policies.stored import save_policy
 from swarm_mj.system.fields import setting
 from swarm_mj.system.provenance import version

@@ -16,8 +16,7 @@ from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission, make_mission
 from swarm_mj.mission.components import GROUP, Components, is_own
 from swarm_mj.policies.gnn.feature_sets import check_named, is_own_set, load_features, num_features
-from swarm_mj.policies.gnn.shape import GnnShape
-from swarm_mj.policies.policy_config import GnnConfig
+from swarm_mj.policies.policy_config import GnnConfig, GnnShape
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.system.fields import as_typed
 

@@ -18,8 +18,7 @@ from swarm_mj.envs.options import check_team_reward, make_batch
 from swarm_mj.envs.spaces import robot_spaces, team_spaces
 from swarm_mj.envs.vec_env import AGENTS, SwarmVecEnv
 from swarm_mj.mission import Mission
-from swarm_mj.policies.mlp import MlpShape
-from swarm_mj.policies.policy_config import MlpConfig
+from swarm_mj.policies.policy_config import MlpConfig, MlpShape
 from swarm_mj.policies.stored import save_weights
 from swarm_mj.system.provenance import commit, version
 

@@ -13,7 +13,7 @@ from torch import Tensor
 from swarm_mj.policies.gnn.fast import FastAggregationGnn
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.gnn.policy import recipient_logits
-from swarm_mj.policies.gnn.shape import GnnShape
+from swarm_mj.policies.policy_config import GnnShape
 
 
 class GnnActorCritic(ActorCriticPolicy):

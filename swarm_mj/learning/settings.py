@@ -7,8 +7,8 @@ from typing import Any, Literal, get_args
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components
-from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, check_fit, is_own_set, num_features
-from swarm_mj.policies.gnn.shape import GnnShape
+from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, is_own_set, num_features
+from swarm_mj.policies.policy_config import GnnShape, check_fit
 from swarm_mj.system.fields import FieldOf, check, check_value, setting
 
 CreditAssignment = Literal["robot", "team"]  # per robot, per team

@@ -1,8 +1,12 @@
-"""The common base of policies whose robots evaluate a trained network (III-C)."""
+"""Policies whose robots evaluate a trained network (III-C): their common base, and perceptrons.
+
+`gnn.policy` has the Aggregation GNN, which needs torch and flies teams of any size.
+"""
 
 import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -10,6 +14,7 @@ from jaxtyping import Float, Int
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.policy import DecentralisedPolicy, Parameters
+from swarm_mj.policies.policy_config import MlpShape, Weights
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.system.compiled import compiled
 
@@ -91,3 +96,41 @@ def sample(
                 if left < 0.0:
                     break
     return chosen
+
+
+class MlpPolicy(LearnedPolicy):
+    """Perceptrons on the features of all teammates in one row; they fit one team size alone."""
+
+    def __init__(
+        self, shape: MlpShape, weights: Weights, extractor: FeatureExtractor, **options: Any
+    ) -> None:
+        """Take weights of that shape, and what makes the features that they were trained on."""
+        super().__init__(extractor, **options)
+        self._shape = shape
+        self._weights = weights
+        self.uses = f"{extractor.uses}, by a trained network"
+
+    def logits(self, graphs: Graphs) -> Float[np.ndarray, "R N"]:
+        """Return each robot's logits over recipients.
+
+        Each mission is one product of matrices: one product of all would round otherwise for other
+        numbers of missions, so a mission would depend on those flown with it.
+        """
+        num_robots = self._shape.num_robots
+        may_address = graphs.may_address.reshape(-1, num_robots, num_robots)
+        node = graphs.node.reshape(*may_address.shape[:2], -1)
+        values = np.concatenate([may_address.astype(np.float32), node], axis=2)
+        num_layers = len(self._shape.hidden) + 1
+        for n in range(num_layers):
+            values = values @ self._weights[f"{n}.weight"].T + self._weights[f"{n}.bias"]
+            if n < num_layers - 1:
+                is_tanh = self._shape.activation == "tanh"
+                values = np.tanh(values) if is_tanh else np.maximum(values, 0.0)
+        logits = values.astype(np.float64).reshape(-1, num_robots)
+        if not self._shape.obeys_mask:
+            return logits
+        return np.where(graphs.may_address, logits, IMPOSSIBLE)
+
+    def identity(self) -> tuple[object, Weights]:
+        """Return the shape and the weights."""
+        return self._shape, self._weights

@@ -2,13 +2,11 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from numbers import Real
 
 import numpy as np
 from jaxtyping import Bool, Int
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.local_views import LocalViews
@@ -113,22 +111,3 @@ class CentralisedPolicy(Policy, ABC):
     @abstractmethod
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """Return each robot's recipient, by all views and true states; itself is silence."""
-
-
-class RandomTransmission(Policy):
-    """The common base of policies whose robots draw whether they transmit."""
-
-    def __init__(self, probability: float) -> None:
-        """Take the probability in [0, 1], whose meaning is each policy's own, or ValueError."""
-        if not isinstance(probability, Real) or not 0.0 <= float(probability) <= 1.0:
-            raise ValueError(f"transmission probability must be from 0 to 1, not {probability!r}")
-        self._probability = probability
-
-    @property
-    def parameters(self) -> Parameters:
-        """The probability."""
-        return {"probability": self._probability}
-
-    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Give every robot its own stream of numbers; arguments as in `Policy.start`."""
-        self._stream = Stream(rngs, uniform, (num_robots,))

@@ -1,15 +1,72 @@
-"""The config of a stored network, all but its weights, and a card for readers."""
+"""The config of a stored network, all but its weights: shape, features, origin; and its card."""
 
+import itertools
 import json
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Literal, get_args
 
-from swarm_mj.policies.gnn.feature_sets import check_fit, is_own_set
-from swarm_mj.policies.gnn.shape import GnnShape
-from swarm_mj.policies.mlp import MlpShape
+import numpy as np
+
+from swarm_mj.policies.gnn.feature_sets import is_own_set, num_features
 from swarm_mj.system.fields import check, setting
 
 SUFFIX = ".safetensors"  # of a stored policy's file
+Edges = Literal["paper", "reference", "both"]
+Activation = Literal["tanh", "relu"]
+Weights = dict[str, np.ndarray]  # by name
+
+
+@dataclass(frozen=True, kw_only=True)
+class GnnShape:
+    """The layers of an Aggregation GNN; raises ValueError for what is out of range or unknown."""
+
+    num_features: int = setting(low=1, high=1024)  # F: numbers per node
+    num_outputs: int = setting(1, low=1, high=1024)  # O: numbers per node that come out
+    latent: int = setting(64, "width of every layer", low=1, high=1024)
+    depth: int = setting(3, "layers of every MLP, a ReLU after all but the last", low=1, high=8)
+    receptive_field: int = setting(
+        5, "K: how often the one shared GN block is applied", low=0, high=16
+    )
+    # GN(v) = A v with the mean-normalised adjacency A
+    is_linear: bool = setting(False, "the linear variant: no perceptrons in the GN block")
+    # paper: parents hear children; reference: children hear parents
+    edges: Edges = setting(
+        "paper",
+        "edges from children to parents as in the text, back as in the authors' code, or both",
+        choices=get_args(Edges),
+    )
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    @property
+    def has_core(self) -> bool:
+        """True if there is a GN block with something to learn."""
+        return self.receptive_field > 0 and not self.is_linear
+
+
+@dataclass(frozen=True, kw_only=True)
+class MlpShape:
+    """The layers of a plain network; raises ValueError for what is unknown or out of range."""
+
+    num_robots: int = setting(low=2, high=1000)  # N: of the one team size that it flies
+    features: str  # the name of a feature set, see `FEATURE_SETS`
+    num_features: int = setting(low=1, high=1024)  # F: numbers per teammate
+    hidden: tuple[int, ...] = setting(low=1, high=4096)  # widths of the layers but the last
+    activation: Activation = setting(choices=get_args(Activation))  # after all layers but the last
+    obeys_mask: bool  # whether it addresses only recipients that the features allow
+
+    def __post_init__(self) -> None:
+        check(self)
+        _check_num_features(self.num_features, self.features)
+
+    def tensors(self) -> dict[str, tuple[int, ...]]:
+        """Return the weights' shapes by name: `0.weight` [Out, In] and `0.bias` [Out] first."""
+        widths = [self.num_robots * (1 + self.num_features), *self.hidden, self.num_robots]
+        shapes: dict[str, tuple[int, ...]] = {}
+        for n, (before, after) in enumerate(itertools.pairwise(widths)):
+            shapes |= {f"{n}.weight": (after, before), f"{n}.bias": (after,)}
+        return shapes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +102,22 @@ class MlpConfig(PolicyConfig):
     def features(self) -> str:
         """The name of the feature set that it was trained on."""
         return self.network.features
+
+
+def check_fit(network: GnnShape, features: str) -> None:
+    """Raise ValueError unless a network takes a feature set, and gives what decisions need."""
+    _check_num_features(network.num_features, features)
+    if network.num_outputs not in (1, 2):
+        raise ValueError(f"network.num_outputs must be 1 or 2, not {network.num_outputs}")
+
+
+def _check_num_features(given: int, features: str) -> None:
+    # A user's own set is not imported, as its name may stand in a file: it may have any number.
+    expected = given if is_own_set(features) else num_features(features)
+    if given != expected:
+        raise ValueError(
+            f"network.num_features is {given}, but the {features} features are {expected}"
+        )
 
 
 def model_card(config: GnnConfig | MlpConfig) -> str:

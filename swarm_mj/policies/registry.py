@@ -11,21 +11,17 @@ from typing import Any
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import is_own, make
-from swarm_mj.policies.aloha import Aloha
-from swarm_mj.policies.gossip import InnovationGossip
+from swarm_mj.policies.centralised import MinimumSpanningTree, RoundRobin
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle
-from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
 from swarm_mj.policies.planner.payloads import carries, link_fields
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.policies.policy_config import SUFFIX
-from swarm_mj.policies.random_flooding import RandomFlooding
-from swarm_mj.policies.round_robin import RoundRobin
+from swarm_mj.policies.random_access import Aloha, InnovationGossip, RandomFlooding
 from swarm_mj.policies.sotdma.policy import SelfOrganisedTdma
-from swarm_mj.policies.spatial_tdma import SpatialTdma
-from swarm_mj.policies.tdma import Tdma
+from swarm_mj.policies.tdma import SpatialTdma, Tdma
 from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.protocol.packets import fits, packet_of
 from swarm_mj.radio.free_space import from_db
@@ -48,14 +44,14 @@ def _sotdma(mission: Mission) -> SelfOrganisedTdma:
     return SelfOrganisedTdma(radio_of(mission), _spatial_tdma(mission), reads_packets=reads_packets)
 
 
+def _resting_planner(mission: Mission, *, learns: bool = False) -> RestingPlanner:
+    return RestingPlanner(mission, PlannerSettings(), _spatial_tdma(mission), learns=learns)
+
+
 def _planner(mission: Mission) -> Planner | RestingPlanner:
     if mission.task != "stationary":
         return Planner(mission)
     return _resting_planner(mission, learns=carries(link_fields(mission), mission))
-
-
-def _resting_planner(mission: Mission, *, learns: bool = False) -> RestingPlanner:
-    return RestingPlanner(mission, PlannerSettings(), _spatial_tdma(mission), learns=learns)
 
 
 # What makes each policy, given the mission and, for these four, a transmission probability.
@@ -94,15 +90,10 @@ def make_policy(
     """Return a policy by its name, for a mission.
 
     The mission's preset says how the baselines behave where paper and code differ, and its numbers
-    normalise what a learned policy sees.
-
-    Args:
-        name: See the module.
-        mission: The mission to be flown.
-        probability: Of transmission, for `HAVE_PROBABILITY`; None is the one tuned for the regime
-            nearest to the mission's.
-        is_deterministic: Whether a learned policy takes the most probable recipient, not a draw.
-        features: Own feature sets, as `module:Name`, that may be imported for a learned policy.
+    normalise what a learned policy sees. Policies of `HAVE_PROBABILITY` transmit with the one tuned
+    for the regime nearest to the mission's unless it is given. A deterministic learned policy takes
+    the most probable recipient, not a draw. `features` are own feature sets, as `module:Name`, that
+    may be imported for a learned policy.
 
     Raises:
         ValueError: The name is unknown, no sound policy is there, a probability is out of range or
@@ -188,10 +179,9 @@ def normalised(name: str) -> str:
 
 def listed(names: Iterable[str]) -> list[str]:
     """Return policies' names, each once; `all` stands for `POLICIES`, after the others."""
-    named = dict.fromkeys(names)
-    return [
-        name for name in named | dict.fromkeys(POLICIES if "all" in named else ()) if name != "all"
-    ]
+    names = list(names)
+    every = dict.fromkeys((*names, *(POLICIES if "all" in names else ())))
+    return [name for name in every if name != "all"]
 
 
 def flown_name(name: str, mission: Mission) -> str:

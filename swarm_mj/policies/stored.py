@@ -17,9 +17,8 @@ from safetensors.numpy import save
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import is_own_set, trained_extractor
-from swarm_mj.policies.learned import LearnedPolicy
-from swarm_mj.policies.mlp import MlpPolicy, Weights
-from swarm_mj.policies.policy_config import SUFFIX, GnnConfig, MlpConfig, model_card
+from swarm_mj.policies.learned import LearnedPolicy, MlpPolicy
+from swarm_mj.policies.policy_config import SUFFIX, GnnConfig, MlpConfig, Weights, model_card
 from swarm_mj.system.atomic import write_bytes
 from swarm_mj.system.packages import need
 from swarm_mj.system.reading import check_size, open_file, read_document, read_file, read_plain
@@ -56,28 +55,21 @@ def save_policy(
 def save_weights(
     path: Path, weights: Weights, config: GnnConfig | MlpConfig, card: str | None = None
 ) -> Path:
-    """Store a policy, whole or not at all; a file there is replaced.
+    """Store a policy, whole or not at all; return its file, which replaces one of that name.
 
-    Args:
-        path: Where; `.safetensors` is appended unless it ends so.
-        weights: Of the config's network, by name.
-        config: What they belong to.
-        card: In Markdown; `model_card` of the config unless given.
-
-    Returns:
-        The file.
+    `.safetensors` is appended unless the path ends so. The card, in Markdown, is `model_card` of
+    the config unless given.
 
     Raises:
         ValueError: `load_policy` would not take it.
         OSError: The file cannot be written.
     """
     path = path if path.suffix == SUFFIX else Path(f"{path}{SUFFIX}")
-    check_tensors(_shapes(config, path), weights)
-    header = {"format": FORMAT, "format_version": VERSION}
-    kind = "gnn" if isinstance(config, GnnConfig) else "mlp"
+    _check_tensors(config, path, weights)
+    (kind,) = (name for name, its in CONFIGS.items() if isinstance(config, its))
+    said = {"format": FORMAT, "format_version": VERSION, "kind": kind, "config": asdict(config)}
     try:
-        said = {"kind": kind, "config": asdict(config), "card": card or model_card(config)}
-        text = json.dumps(header | said, allow_nan=False)
+        text = json.dumps(said | {"card": card or model_card(config)}, allow_nan=False)
     except (TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"config must be JSON all through: {error}") from error
     _config_of(text)
@@ -103,27 +95,23 @@ def load_policy(
         OSError: It cannot be read.
     """
     weights, config = read_weights(path)
+    own, num_features, where = config.features, config.network.num_features, f"policy {path}"
     size = config.network.num_robots if isinstance(config, MlpConfig) else mission.num_robots
     if mission.num_robots != size:
         raise ValueError(
-            f"policy {path} flies teams of {size} robots, for which it was trained, not "
+            f"{where} flies teams of {size} robots, for which it was trained, not "
             f"{mission.num_robots}; choose --robots {size}"
         )
-    own, num_features = config.features, config.network.num_features
-    where = f"policy {path}"
     extractor = trained_extractor(own, num_features, mission, named=features, where=where)
+    own_features = own if is_own_set(own) else None
+    options: Any = {"is_deterministic": is_deterministic, "own_features": own_features}
     if isinstance(config, MlpConfig):
-        return MlpPolicy(config.network, weights, extractor, is_deterministic=is_deterministic)
+        return MlpPolicy(config.network, weights, extractor, **options)
     from swarm_mj.policies.gnn.fast import network_of
     from swarm_mj.policies.gnn.policy import GnnPolicy
 
-    return GnnPolicy(
-        network_of(config.network, weights),
-        extractor,
-        silence_logit=config.silence_logit,
-        is_deterministic=is_deterministic,
-        own_features=own if is_own_set(own) else None,
-    )
+    network = network_of(config.network, weights)
+    return GnnPolicy(network, extractor, silence_logit=config.silence_logit, **options)
 
 
 def read_policy(path: Path) -> tuple["AggregationGnn", GnnConfig]:
@@ -147,14 +135,14 @@ def read_weights(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
     try:
         if place.is_dir():  # a GNN as swarm_mj 0.1 stored it
             text = read_file(place / OLD_CONFIG, "config", MAX_BYTES)
-            weights, _ = read_tensors(place / OLD_WEIGHTS)
+            weights, _ = _read_tensors(place / OLD_WEIGHTS)
             config = read_document(text, FORMAT, 1, GnnConfig)
         else:
-            weights, metadata = read_tensors(place)
+            weights, metadata = _read_tensors(place)
             if FORMAT not in metadata:
                 raise ValueError("it has weights, but does not say of which policy")
             config = _config_of(metadata[FORMAT])
-        check_tensors(_shapes(config, path), weights)
+        _check_tensors(config, path, weights)
     except ValueError as error:
         raise ValueError(f"policy {place}: {error}; {WAY_OUT}") from error
     return weights, config
@@ -180,33 +168,16 @@ def find_policy(path: Path) -> Path:
     )
 
 
-def read_tensors(path: Path) -> tuple[Weights, dict[str, str]]:
-    """Return the tensors and the metadata of a `.safetensors` file; ValueError if it is none."""
+def _read_tensors(path: Path) -> tuple[Weights, dict[str, str]]:
     with open_file(path, "policy") as file:  # which refuses pipes; `safe_open` would wait for them
         check_size(f"policy {path}", os.fstat(file.fileno()).st_size, MAX_BYTES)
     try:
         with safe_open(path, "numpy") as file:
             names = file.keys()  # it is no mapping
             return {name: file.get_tensor(name) for name in names}, file.metadata() or {}
-    except (
-        SafetensorError,
-        AttributeError,
-        TypeError,
-    ) as error:  # the last two: no type of NumPy's
+    # The last two: no type of NumPy's.
+    except (SafetensorError, AttributeError, TypeError) as error:
         raise ValueError(f"it is damaged, or no safetensors file ({error})") from error
-
-
-def check_tensors(shapes: Mapping[str, tuple[int, ...]], tensors: Weights) -> None:
-    """Raise ValueError unless these are tensors of these shapes, single-precision and finite."""
-    for name in sorted(shapes.keys() ^ tensors.keys()):
-        known = "lacks the" if name in shapes else "has an unknown"
-        raise ValueError(f"it {known} tensor {name:.80}")
-    for name, tensor in tensors.items():
-        given = f"{list(tensor.shape)} of {tensor.dtype}"
-        if given != f"{list(shapes[name])} of float32":
-            raise ValueError(f"tensor {name} must be {list(shapes[name])} of float32, not {given}")
-        if not np.all(np.isfinite(tensor)):
-            raise ValueError(f"tensor {name} has numbers that are not finite")
 
 
 def _config_of(text: str) -> GnnConfig | MlpConfig:
@@ -214,8 +185,24 @@ def _config_of(text: str) -> GnnConfig | MlpConfig:
     return read_plain(said.config, CONFIGS[said.kind])
 
 
+def _check_tensors(config: GnnConfig | MlpConfig, path: Path, tensors: Weights) -> None:
+    """Raise ValueError unless these are a network's tensors, single-precision and finite."""
+    shapes = _shapes(config, path)
+    for name in sorted(shapes.keys() ^ tensors.keys()):
+        known = "lacks the" if name in shapes else "has an unknown"
+        raise ValueError(f"it {known} tensor {name:.80}")
+    for name, tensor in tensors.items():
+        given, wanted = (
+            f"{list(tensor.shape)} of {tensor.dtype}",
+            f"{list(shapes[name])} of float32",
+        )
+        if given != wanted:
+            raise ValueError(f"tensor {name} must be {wanted}, not {given}")
+        if not np.all(np.isfinite(tensor)):
+            raise ValueError(f"tensor {name} has numbers that are not finite")
+
+
 def _shapes(config: GnnConfig | MlpConfig, path: Path) -> Mapping[str, tuple[int, ...]]:
-    """Return the shapes of a network's tensors by their names."""
     if isinstance(config, MlpConfig):
         return config.network.tensors()
     need("torch", f"policy {path}", "fly another")

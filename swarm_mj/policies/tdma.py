@@ -1,4 +1,7 @@
-"""Time-division multiple access: one robot broadcasts after the other."""
+"""Time-division multiple access: one robot broadcasts after the other, or several far apart.
+
+For the second see Nelson and Kleinrock 1985; by interference, Grönkvist and Hansson 2001.
+"""
 
 from collections.abc import Sequence
 
@@ -8,6 +11,9 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.window import SLOT_WINDOWS
+from swarm_mj.radio.link_models import Belief
+from swarm_mj.radio.power_law import PowerLaw
+from swarm_mj.radio.spatial_reuse import keep_joined, known_powers
 
 
 class Tdma(BroadcastPolicy):
@@ -30,6 +36,44 @@ class Tdma(BroadcastPolicy):
         place = slot_of(views.now) % views.num_robots
         owner = self._order[np.arange(len(place)), place]
         return views.silence == owner[:, None]
+
+
+class SpatialTdma(BroadcastPolicy):
+    """TDMA in which robots far enough from the owner of the turn broadcast at the same time.
+
+    The common rule, who joins the owner of the turn, is that of `radio.spatial_reuse`: each robot
+    predicts from its own buffer, alone, which packets its teammates would decode, and robots that
+    believe the same decide the same. Until a robot has heard of everyone it transmits in its own
+    turn only: so the team begins as `Tdma` does, and no robot that joins overlooks a listener of
+    the owner's. Of what the mission grants of the channel it uses the mean powers.
+    """
+
+    uses = "as tdma, and the positions in its buffer: robots far enough apart share a slot"
+
+    def __init__(self, *, range_m: float, threshold: float) -> None:
+        """Take the distance at which a lone transmission just decodes, and its SINR, linear [1]."""
+        self._range_m = range_m
+        self._threshold = threshold
+        self._law: PowerLaw | None = None
+
+    def inform(self, belief: Belief) -> None:
+        """Take the powers that robots believe in; they are in units of the noise."""
+        law, noise_mw = belief.law, belief.radio.noise_mw
+        self._law = None if law is None else law._replace(at_1_m=law.at_1_m / noise_mw)
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Draw every mission's order; arguments as in `Policy.start`."""
+        self._order = draw_order(num_robots, rngs)
+        self._known = None if self._law is None else known_powers(self._law, len(rngs))
+
+    def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
+        """Return each robot whose turn it is or that may join."""
+        is_oneself = np.eye(views.num_robots, dtype=np.bool_)
+        is_sending = np.all(views.buffers.is_known | is_oneself, axis=2)
+        rule = self._range_m, self._threshold
+        turn = slot_of(views.now)
+        keep_joined(views.buffers.position_m, self._order, turn, *rule, is_sending, self._known)
+        return is_sending
 
 
 def draw_order(num_robots: int, rngs: Sequence[np.random.Generator]) -> Int[np.ndarray, "B N"]:

@@ -57,7 +57,14 @@ def tuned_probability(policy_name: str, mission: Mission) -> float:
             f"{policy_name} has no tuned probability for {mission.preset} {mission.task} missions; "
             "pass one, or run tools/tune.py"
         )
-    return min(rows, key=lambda row: _distance(row, mission)).probability
+
+    def distance(row: Tuned) -> float:  # between regimes: in logarithms, squared
+        ratios = [row.num_robots / mission.num_robots, row.range_ratio / mission.range_ratio]
+        if mission.task != "stationary":
+            ratios.append(row.velocity_ratio / mission.velocity_ratio)
+        return sum(math.log(ratio) ** 2 for ratio in ratios)
+
+    return min(rows, key=distance).probability
 
 
 def read_table(path: Path) -> list[Tuned]:
@@ -78,11 +85,3 @@ def read_table(path: Path) -> list[Tuned]:
 @cache
 def _table() -> list[Tuned]:
     return read_table(TABLE)
-
-
-def _distance(row: Tuned, mission: Mission) -> float:
-    """Return how far a row's regime is from a mission's: in logarithms, squared."""
-    ratios = [row.num_robots / mission.num_robots, row.range_ratio / mission.range_ratio]
-    if mission.task != "stationary":
-        ratios.append(row.velocity_ratio / mission.velocity_ratio)
-    return sum(math.log(ratio) ** 2 for ratio in ratios)

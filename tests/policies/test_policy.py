@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies.aloha import Aloha
-from swarm_mj.policies.gossip import InnovationGossip
-from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
+from swarm_mj.policies.centralised import MinimumSpanningTree
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy
-from swarm_mj.policies.random_flooding import RandomFlooding
+from swarm_mj.policies.random_access import Aloha, InnovationGossip, RandomFlooding
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.packets import PacketField
 from swarm_mj.simulation.swarm import Swarm

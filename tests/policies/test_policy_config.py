@@ -7,8 +7,7 @@ from dataclasses import asdict, replace
 import pytest
 from tiny_policies import FEATURES, tiny_config, tiny_network
 
-from swarm_mj.policies.mlp import MlpShape
-from swarm_mj.policies.policy_config import GnnConfig, MlpConfig, model_card
+from swarm_mj.policies.policy_config import GnnConfig, GnnShape, MlpConfig, MlpShape, model_card
 from swarm_mj.system.reading import read_json
 
 
@@ -108,3 +107,40 @@ def test_the_card_of_a_plain_network_says_how_to_fly_it_as_it_was_trained():
     flags = "--task random-walk --robots 3 --features my_features:Ages"
     assert f"    swarm-mj fly --policy FILE {flags}\n" in written
     assert "It flies teams of 3 robots only." in written
+
+
+@pytest.mark.parametrize(
+    ("kind", "its", "complaint"),
+    [
+        (
+            GnnShape,
+            {"num_features": 0},
+            "num_features must be a whole number from 1 to 1024, not 0",
+        ),
+        (GnnShape, {"num_outputs": 1025}, "num_outputs must be a whole number from 1 to 1024, not"),
+        (GnnShape, {"latent": 0}, "latent must be a whole number from 1 to 1024"),
+        (GnnShape, {"depth": 9}, "depth must be a whole number from 1 to 8, not 9"),
+        (GnnShape, {"receptive_field": -1}, "receptive_field must be a whole number from 0 to 16"),
+        (GnnShape, {"receptive_field": 17}, "receptive_field must be a whole number from 0 to 16"),
+        (MlpShape, {"num_robots": 1}, "num_robots must be a whole number from 2 to 1000, not 1"),
+        (MlpShape, {"hidden": (0,)}, "hidden must be a whole number from 1 to 4096, not 0"),
+        (MlpShape, {"features": "mine"}, "features must be one of"),
+        (MlpShape, {"num_features": 18}, "num_features is 18, but the paper features are 8"),
+    ],
+)
+def test_a_shape_refuses_what_is_out_of_range(kind, its, complaint):
+    usual = {"num_features": 8}
+    if kind is MlpShape:
+        usual |= {"num_robots": 4, "features": "paper", "hidden": (3,), "activation": "tanh"}
+        usual |= {"obeys_mask": True}
+    with pytest.raises(ValueError, match=complaint):
+        kind(**(usual | its))
+
+
+@pytest.mark.parametrize(
+    ("receptive_field", "is_linear", "has_core"),
+    [(0, False, False), (0, True, False), (2, True, False), (1, False, True)],
+)
+def test_only_a_block_that_is_applied_and_not_linear_learns(receptive_field, is_linear, has_core):
+    shape = GnnShape(num_features=3, receptive_field=receptive_field, is_linear=is_linear)
+    assert shape.has_core == has_core

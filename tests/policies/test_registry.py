@@ -7,14 +7,12 @@ import pytest
 from tiny_policies import save_tiny
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies.aloha import Aloha
-from swarm_mj.policies.gossip import InnovationGossip
+from swarm_mj.policies.centralised import MinimumSpanningTree, RoundRobin
 from swarm_mj.policies.greedy_oracle.policy import GreedyOracle
 from swarm_mj.policies.learned import LearnedPolicy
-from swarm_mj.policies.minimum_spanning_tree import MinimumSpanningTree
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner
-from swarm_mj.policies.random_flooding import RandomFlooding
+from swarm_mj.policies.random_access import Aloha, InnovationGossip, RandomFlooding
 from swarm_mj.policies.registry import (
     POLICIES,
     flown_name,
@@ -24,10 +22,8 @@ from swarm_mj.policies.registry import (
     normalised,
     with_payload,
 )
-from swarm_mj.policies.round_robin import RoundRobin
 from swarm_mj.policies.sotdma.policy import SelfOrganisedTdma
-from swarm_mj.policies.spatial_tdma import SpatialTdma
-from swarm_mj.policies.tdma import Tdma
+from swarm_mj.policies.tdma import SpatialTdma, Tdma
 from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.packages import asset

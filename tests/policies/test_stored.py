@@ -20,8 +20,7 @@ from safetensors.numpy import load_file, save_file
 from tiny_policies import FEATURES, save_tiny, tiny_config, tiny_network
 
 from swarm_mj.mission import paper
-from swarm_mj.policies.mlp import MlpShape
-from swarm_mj.policies.policy_config import MlpConfig, model_card
+from swarm_mj.policies.policy_config import MlpConfig, MlpShape, model_card
 from swarm_mj.policies.stored import (
     find_policy,
     load_policy,

@@ -10,7 +10,7 @@ from swarm_mj.control.motion import initial_velocity
 from swarm_mj.mission import paper, reference
 from swarm_mj.mission.placement import is_connected
 from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy, DecentralisedPolicy
-from swarm_mj.policies.random_flooding import RandomFlooding
+from swarm_mj.policies.random_access import RandomFlooding
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.simulation.swarm import Swarm
 

@@ -12,11 +12,11 @@ from swarm_mj.cli.benchmark.simulation import Row, microseconds
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import make_model
 from swarm_mj.mission import Mission, paper
+from swarm_mj.policies.centralised import RoundRobin
 from swarm_mj.policies.gnn.fast import FastAggregationGnn
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.graphs import PaperFeatures
-from swarm_mj.policies.gnn.shape import GnnShape
-from swarm_mj.policies.round_robin import RoundRobin
+from swarm_mj.policies.policy_config import GnnShape
 from swarm_mj.simulation.swarm import Swarm
 
 NUM_ROBOTS = 40

@@ -26,12 +26,12 @@ from swarm_mj.mission import Mission, paper
 from swarm_mj.physics.arenas import BLOCK_M, HALF_HEIGHT_M
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP
+from swarm_mj.policies.centralised import RoundRobin
 from swarm_mj.policies.planner.plan import epoch_plan
 from swarm_mj.policies.planner.policy import regular_length
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import take_snapshots
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.policies.round_robin import RoundRobin
 from swarm_mj.protocol.costs import mean_hops, window_costs
 from swarm_mj.protocol.window import channel_at, window
 from swarm_mj.radio.link_models import Belief

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from swarm_mj.policies.gnn.edge_sums import EdgeSums, as_array, edges_to
 from swarm_mj.policies.gnn.network import AggregationGnn, Core
-from swarm_mj.policies.gnn.shape import Edges, GnnShape
+from swarm_mj.policies.policy_config import Edges, GnnShape
 
 NODES_AT_ONCE = 6400  # on a CPU: with more the caches spill, with fewer every step starts in vain
 IS_UPWARD = {"paper": (True,), "reference": (False,), "both": (True, False)}  # child to parent

@@ -6,7 +6,6 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.components import FORM, load
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, PaperFeatures, ReferenceFeatures
-from swarm_mj.policies.gnn.shape import GnnShape
 from swarm_mj.system.fields import did_you_mean
 
 FEATURE_SETS: dict[str, type[FeatureExtractor]] = {
@@ -83,9 +82,8 @@ def trained_extractor(
 ) -> FeatureExtractor:
     """Return the extractor that a stored network, which `where` calls, was trained on.
 
-    Raises:
-        ValueError: It is a user's own and not among those named, it cannot be loaded, or it now has
-            another number of features.
+    Raise ValueError if it is a user's own and not among those named, cannot be loaded, or now has
+    another number of features.
     """
     check_named(features, named, where)
     if is_own_set(features):
@@ -97,22 +95,3 @@ def trained_extractor(
             f"{len(extractor.names)}"
         )
     return extractor
-
-
-def check_num_features(given: int, features: str) -> None:
-    """Raise ValueError unless a feature set has this count of numbers, or is a user's own.
-
-    That is not imported, as the name may stand in a file: it may have any number.
-    """
-    expected = given if is_own_set(features) else num_features(features)
-    if given != expected:
-        raise ValueError(
-            f"network.num_features is {given}, but the {features} features are {expected}"
-        )
-
-
-def check_fit(network: GnnShape, features: str) -> None:
-    """Raise ValueError unless a network takes a feature set, and gives what decisions need."""
-    check_num_features(network.num_features, features)
-    if network.num_outputs not in (1, 2):
-        raise ValueError(f"network.num_outputs must be 1 or 2, not {network.num_outputs}")

@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
-from swarm_mj.policies.gnn.shape import Edges, GnnShape
+from swarm_mj.policies.policy_config import Edges, GnnShape
 
 
 class EdgeSet(NamedTuple):

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 import torch
@@ -23,14 +24,13 @@ class GnnPolicy(LearnedPolicy):
         extractor: FeatureExtractor,
         *,
         silence_logit: float = 0.0,
-        is_deterministic: bool = False,
-        own_features: str | None = None,
+        **options: Any,
     ) -> None:
         """Take the network as it is, live, on any device: later changes of its weights count.
 
         The logit is added to silence, but in a robot's own turn.
         """
-        super().__init__(extractor, is_deterministic=is_deterministic, own_features=own_features)
+        super().__init__(extractor, **options)
         self._network = network
         self._silence_logit = silence_logit
         self.uses = f"{extractor.uses}, by a trained graph neural network"
@@ -70,14 +70,9 @@ def recipient_logits(
     """Return each robot's logits over recipients; oneself is silence (III-C).
 
     With one number per node it is the node's logit. With two, as in the authors' code, they are the
-    logits of addressing it at full and at zero power; all that send nothing count together.
-
-    Args:
-        output: The network's numbers, O is 1 or 2.
-        owner: The robot of each row.
-        may_address: Recipients to choose among, `IMPOSSIBLE` elsewhere; the owner always is one.
-        silence_logit: Added to silence.
-        has_turn: Robots whose turn it is: nothing is added to their silence; None is nobody.
+    logits of addressing it at full and at zero power; all that send nothing count together. Each
+    row is of one robot, its `owner`, whose silence gains `silence_logit` unless it has a turn.
+    Recipients that it may not address have `IMPOSSIBLE`; the owner always may.
     """
     own = owner[:, None]
     logits = output[:, :, 0]
@@ -95,10 +90,7 @@ def recipient_logits(
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Keep torch from starting threads: small batches are slower on several.
-
-    The setting is the process's, so it is put back.
-    """
+    # Small batches are slower on several threads; the setting is the process's, so it is put back.
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

@@ -24,8 +24,7 @@ from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting_team import RestingTeam
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import BroadcastPolicy
-from swarm_mj.policies.spatial_tdma import SpatialTdma
-from swarm_mj.policies.tdma import slot_of
+from swarm_mj.policies.tdma import SpatialTdma, slot_of
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.packets import PacketField
 from swarm_mj.radio.link_models import Belief

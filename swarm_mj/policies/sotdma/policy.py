@@ -21,8 +21,7 @@ from jaxtyping import Bool
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.sotdma.team import SotdmaSettings, SotdmaTeam
-from swarm_mj.policies.spatial_tdma import SpatialTdma
-from swarm_mj.policies.tdma import draw_order, slot_of
+from swarm_mj.policies.tdma import SpatialTdma, draw_order, slot_of
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.link_models import Belief

@@ -15,7 +15,7 @@ from swarm_mj.cli.benchmark.simulation import (
 from swarm_mj.mission import paper
 from swarm_mj.physics.scene import compose
 from swarm_mj.physics.solid_geoms import obstacles_of
-from swarm_mj.policies.round_robin import RoundRobin
+from swarm_mj.policies.centralised import RoundRobin
 from swarm_mj.protocol.costs import mean_hops
 from swarm_mj.simulation.swarm import Swarm
 

@@ -9,7 +9,7 @@ import torch
 import swarm_mj.policies.gnn.fast
 from swarm_mj.policies.gnn.fast import FastAggregationGnn
 from swarm_mj.policies.gnn.network import AggregationGnn
-from swarm_mj.policies.gnn.shape import GnnShape
+from swarm_mj.policies.policy_config import GnnShape
 
 DIRECTIONS = ["paper", "reference", "both"]
 SHAPES = list(itertools.product(DIRECTIONS, [False, True], [1, 2, 3], [0, 1, 3]))

@@ -6,7 +6,7 @@ import pytest
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, make_extractor
 from swarm_mj.policies.gnn.graphs import PaperFeatures, ReferenceFeatures
-from swarm_mj.policies.random_flooding import RandomFlooding
+from swarm_mj.policies.random_access import RandomFlooding
 from swarm_mj.protocol.buffers import NO_PARENT, empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.simulation.swarm import Swarm

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm_mj.policies.gnn.network import AggregationGnn, edges_of, mean_aggregation
-from swarm_mj.policies.gnn.shape import GnnShape
+from swarm_mj.policies.policy_config import GnnShape
 
 DIRECTIONS = ["paper", "reference", "both"]
 VARIANTS = list(itertools.product(DIRECTIONS, [False, True]))

@@ -1,4 +1,4 @@
-"""Minimum spanning tree (IV-C): every robot talks to its parent in the tree of least length."""
+"""The paper's baselines that know all true positions (IV-C): round robin, minimum spanning tree."""
 
 from collections.abc import Sequence
 
@@ -7,14 +7,35 @@ from jaxtyping import Int
 
 from swarm_mj.mission.geometry import ROOT, spanning_tree
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.policies.policy import CentralisedPolicy, RandomTransmission
+from swarm_mj.policies.policy import CentralisedPolicy
+from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.protocol.local_views import LocalViews
+
+
+class RoundRobin(CentralisedPolicy):
+    """One robot after the other exchanges buffers with the one nearest the centre (IV-C).
+
+    Time-division multiple access around a base station (Miao et al. 2016), which is chosen anew in
+    each window from all true positions.
+    """
+
+    uses = "the true positions: a base near the middle talks to each robot in turn"
+
+    def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
+        """Return the base, for the one robot whose turn it is."""
+        missions = np.arange(len(views.now))
+        base = np.argmin(np.sum(states.position_m**2, axis=2), axis=1)
+        turn = views.now.astype(np.int64) % (views.num_robots - 1)
+        turn += turn >= base
+        recipient = views.silence.copy()
+        recipient[missions, turn] = base
+        return recipient
 
 
 class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
     """Every robot exchanges buffers with its parent in the tree with probability p (IV-C).
 
-    Centralised: the tree is built from all true positions at the start of the mission.
+    The tree, of least length, is built from all true positions at the start of the mission.
     """
 
     uses = "the true positions at the start: a robot talks to its parent in their spanning tree"
@@ -22,13 +43,10 @@ class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
     def __init__(
         self, probability: float, *, is_recomputed: bool = False, root_transmits: bool = False
     ) -> None:
-        """Prepare the policy.
+        """Take the probability of a robot's transmission, in each window.
 
-        Args:
-            probability: Of a robot's transmission, in each window.
-            is_recomputed: Whether the tree is built anew in each window.
-            root_transmits: Whether the root addresses robot N - 1, as in the authors' code (its
-                missing parent, -1, counts from the end there), or stays silent.
+        The tree may be recomputed in each window. With `root_transmits` the root addresses robot
+        N - 1, as in the authors' code, where its missing parent, -1, counts from the end.
         """
         super().__init__(probability)
         self._is_recomputed = is_recomputed
