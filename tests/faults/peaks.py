@@ -5,6 +5,7 @@ import os
 import sys
 from pathlib import Path
 
+import swarm_mj.learning.train  # noqa: F401 - the estimate counts it with torch, which is loaded
 from swarm_mj.cli import main
 
 

@@ -40,7 +40,7 @@ MEASURED = [
 @pytest.mark.slow
 @pytest.mark.fault("memory: estimates")
 def test_estimates_are_near_the_peaks(forks, tmp_path, record_property):
-    """Fault 8: nothing was estimated. The measured processes have loaded torch already."""
+    """Fault 8: nothing was estimated. The measured processes have loaded what trains already."""
     lines = MEASURED[: tries(5)]
     record_property("tries", len(lines))
     (tmp_path / "lines.json").write_text(json.dumps(lines))
