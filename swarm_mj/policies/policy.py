@@ -12,7 +12,7 @@ from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.packets import Packet, PacketField, fitting, packet_of
 from swarm_mj.protocol.window import DoubleBroadcast, RequestResponse, WindowProtocol
-from swarm_mj.radio.link_models import Belief, TrueLinks
+from swarm_mj.radio.mission_radio import Belief, TrueLinks
 from swarm_mj.system.fields import name_of
 
 Parameters = Mapping[str, bool | int | float | str]  # what a policy was made with, by name

@@ -11,10 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt64
 
-from swarm_mj.radio.counters import keyed_uniform, link_key, mixed
-from swarm_mj.radio.fading import NO_FADING, fade, is_in_burst
-from swarm_mj.radio.link_gains import LinkGains
+from swarm_mj.physics.state import ROBOT_HEIGHT_M
+from swarm_mj.radio.fading import NO_FADING, fade, is_in_burst, keyed_uniform, link_key, mixed
+from swarm_mj.radio.obstruction import obstruct
+from swarm_mj.radio.power_law import PowerLaw, write_path_loss
 from swarm_mj.radio.reception import Air, decoded, incoming_at, silent_air, transmit
+from swarm_mj.radio.shadowing import Waves, draw_waves, follow_robots, shadow
 from swarm_mj.system.compiled import compiled
 
 _FADES, _ERASURES, _BURSTS = np.uint64(1), np.uint64(2), np.uint64(3)  # what a key is used for
@@ -33,47 +35,71 @@ class Reception(NamedTuple):
 
 
 class ComposedChannel:
-    """The channel of B missions; `at` gives that of one slot."""
+    """The channel of B missions; `at` gives that of one slot.
 
-    def __init__(self, gains: LinkGains, reception: Reception) -> None:
-        self.gains = gains
+    Mean powers follow from the law (in mW), shadowing and positions. They are computed for those
+    robots that transmit, once for each place: for a team at rest, once in a mission.
+    """
+
+    def __init__(
+        self,
+        law: PowerLaw,
+        reception: Reception,
+        *,
+        shadowing_db: float = 0.0,
+        shadowing_distance_m: float = 1.0,
+    ) -> None:
         self.reception = reception
+        self._law = law
+        self._shadowing = shadowing_db, shadowing_distance_m
 
-    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:  # noqa: ARG002 - as a policy's
-        """Start new missions; one generator each."""
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Start new missions; one generator each, from which its own shadowing is drawn, too."""
         self.key = np.array([rng.integers(2**64, dtype=np.uint64) for rng in rngs])
-        self.gains.start(rngs)
+        shape = len(rngs), num_robots
+        self._position_m = np.full((*shape, 2), np.nan)
+        self._is_done = np.zeros(shape, dtype=np.bool_)
+        self._received_mw = np.zeros((*shape, num_robots))
+        is_shadowed = self._shadowing[0] > 0.0
+        self._waves = draw_waves(*self._shadowing, num_robots, rngs) if is_shadowed else None
 
     def at(self, slot: Int[np.ndarray, "W"], mission: Int[np.ndarray, "W"]) -> "SlotChannel":
         """Return the channel of W rows: of each its slot and its mission, counted from 0."""
         return SlotChannel(self, slot, mission)
 
+    def received_mw(
+        self,
+        position_m: Float[np.ndarray, "W N 2"],
+        mission: Int[np.ndarray, "W"],
+        is_sender: Bool[np.ndarray, "W N"],
+    ) -> Float[np.ndarray, "B N N"]:
+        """Return the power of sender i at robot j before fades [mW]; of others, anything.
+
+        Rows of one mission agree on positions. The next call overwrites the powers.
+        """
+        known = self._position_m, self._is_done, self._received_mw
+        _update_powers(position_m, mission, is_sender, self._law, self._waves, *known)
+        return self._received_mw
+
+    def mean_powers_mw(
+        self, position_m: Float[np.ndarray, "N 2"], mission: int
+    ) -> Float[np.ndarray, "N N"]:
+        """Return the power of each robot of a mission at each other before fades [mW]."""
+        everyone = np.ones((1, len(position_m)), dtype=np.bool_)
+        return self.received_mw(position_m[None], np.array([mission]), everyone)[mission].copy()
+
     def largest_part(
         self, position_m: Float[np.ndarray, "N 2"], mission: int
     ) -> Bool[np.ndarray, "N"]:
-        """Return the largest group in which everyone reaches everyone.
+        """Return the largest group of a mission's robots in which everyone reaches everyone.
 
-        Links are those whose packets decode in silence and without fades.
-
-        Args:
-            position_m: Where the robots of one mission are [m].
-            mission: Which one; its shadowing is its own.
-
-        Returns:
-            Who belongs to it; of groups that are equally large, the one with the first robot.
+        Links are those whose packets decode in silence and without fades. Of groups that are
+        equally large, it is the one with the first robot.
         """
         rule = self.reception
         is_linked = self.mean_powers_mw(position_m, mission) >= rule.noise_mw * rule.threshold
         group = strong_groups(is_linked)
         return group == np.argmax(np.bincount(group))
-
-    def mean_powers_mw(
-        self, position_m: Float[np.ndarray, "N 2"], mission: int
-    ) -> Float[np.ndarray, "N N"]:
-        """Return the power of each robot at each other before fades; arguments as above [mW]."""
-        everyone = np.ones((1, len(position_m)), dtype=np.bool_)
-        row = np.array([mission])
-        return self.gains.received_mw(position_m[None], row, everyone)[mission].copy()
 
 
 @dataclass(frozen=True)
@@ -88,19 +114,11 @@ class SlotChannel:
         self, position_m: Float[np.ndarray, "W N 2"], recipient: Int[np.ndarray, "W N"]
     ) -> Int[np.ndarray, "W N"]:
         """Return whose packet each robot decodes; arguments as in `Channel`."""
-        channel = self.channel
+        channel, heard = self.channel, np.empty_like(recipient)
         is_sender = recipient != np.arange(recipient.shape[1])
-        received_mw = channel.gains.received_mw(position_m, self.mission, is_sender)
-        heard = np.empty_like(recipient)
-        _decode(
-            received_mw,
-            recipient,
-            self.slot,
-            self.mission,
-            channel.key,
-            channel.reception,
-            heard,
-        )
+        received_mw = channel.received_mw(position_m, self.mission, is_sender)
+        slot = self.slot, self.mission, channel.key, channel.reception
+        _decode(received_mw, recipient, *slot, heard)
         return heard
 
 
@@ -117,6 +135,36 @@ def strong_groups(is_linked: Bool[np.ndarray, "N N"]) -> Int[np.ndarray, "N"]:
 
 
 @compiled()
+def _update_powers(
+    position_m: Float[np.ndarray, "W N 2"],
+    mission: Int[np.ndarray, "W"],
+    is_sender: Bool[np.ndarray, "W N"],
+    law: PowerLaw,
+    waves: Waves | None,
+    known_m: Float[np.ndarray, "B N 2"],
+    is_done: Bool[np.ndarray, "B N"],
+    received_mw: Float[np.ndarray, "B N N"],
+) -> None:
+    """Write the powers of senders that are new where the robots now are."""
+    for w in range(mission.shape[0]):
+        b = mission[w]
+        # Any one that moved makes all powers at it change, not only its own.
+        if np.any(position_m[w] != known_m[b]):
+            known_m[b] = position_m[w]
+            is_done[b] = False
+            if waves is not None:  # without waves, code for shadowing is not even compiled
+                follow_robots(waves, b, position_m[w])
+        for i in range(is_sender.shape[1]):
+            if is_sender[w, i] and not is_done[b, i]:
+                is_done[b, i] = True
+                power_mw = received_mw[b, i]
+                write_path_loss(i, position_m[w], law, power_mw)
+                if waves is not None:
+                    shadow(waves, b, i, power_mw)
+                obstruct(i, position_m[w], ROBOT_HEIGHT_M, law.obstacles, power_mw)
+
+
+@compiled()
 def _decode(
     received_mw: Float[np.ndarray, "B N N"],
     recipient: Int[np.ndarray, "W N"],
@@ -130,21 +178,20 @@ def _decode(
     num_rows, num_robots = recipient.shape
     for w in range(num_rows):
         key = np.uint64(mission_key[mission[w]])
-        air = _air(received_mw[mission[w]], recipient[w], key, slot[w], rule)
+        air = _faded_air(received_mw[mission[w]], recipient[w], key, slot[w], rule)
         for j in range(num_robots):
             i = decoded(incoming_at(air, j), j, rule.noise_mw, rule.threshold)
             heard[w, j] = j if i == j or _is_lost(i, j, key, slot[w], rule) else i
 
 
 @compiled()
-def _air(
+def _faded_air(
     received_mw: Float[np.ndarray, "N N"],
     recipient: Int[np.ndarray, "N"],
     key: np.uint64,
     slot: int,
     rule: Reception,
 ) -> Air:
-    """Return all packets of a slot, faded."""
     fades = mixed(mixed(key, _FADES), np.uint64(slot))
     hears_while_sending = rule.recipient_hears_while_sending
     air = silent_air(recipient.shape[0])

@@ -26,15 +26,10 @@ class Channel(Protocol):
     def __call__(
         self, position_m: Float[np.ndarray, "B N 2"], recipient: Int[np.ndarray, "B N"]
     ) -> Int[np.ndarray, "B N"]:
-        """Decide whose packet each robot decodes.
+        """Return the sender that each robot decodes; itself is nobody.
 
-        Args:
-            position_m: Positions [m].
-            recipient: Whom each robot addresses, or -1 for everyone; itself is silence.
-
-        Returns:
-            The sender that each robot decodes; itself is nobody. A robot that transmits may decode
-            another's packet; nobody decodes a robot that is silent.
+        Each robot addresses its recipient, or with -1 everyone; itself is silence. A robot that
+        transmits may decode another's packet; nobody decodes a robot that is silent.
         """
         ...
 
@@ -94,16 +89,9 @@ class FreeSpaceRadio:
         self, position_m: Float[np.ndarray, "B N 2"], recipient: Int[np.ndarray, "B N"]
     ) -> Int[np.ndarray, "B N"]:
         """Return the sender that each robot decodes (Eqs. 1-4); arguments as in `Channel`."""
-        heard = np.empty_like(recipient)
-        _decode_strongest(
-            position_m,
-            recipient,
-            self.received_at_1_m_mw,
-            self.noise_mw,
-            self.threshold,
-            self.recipient_hears_while_sending,
-            heard,
-        )
+        heard, at_1_m_mw = np.empty_like(recipient), self.received_at_1_m_mw
+        rule = self.noise_mw, self.threshold, self.recipient_hears_while_sending
+        _decode_strongest(position_m, recipient, at_1_m_mw, *rule, heard)
         return heard
 
 

@@ -18,7 +18,6 @@ from swarm_mj.radio.reception import (
     add_packet,
     decode_probability,
     incoming_at,
-    received_power,
     silent_air,
     sinr,
     transmit,
@@ -60,7 +59,8 @@ def links_between(
     """
     apart_m = position_m[:, None] - position_m[None, :]
     distance_m = np.maximum(np.sqrt(np.sum(apart_m**2, axis=2)), MIN_DISTANCE_M)
-    received_mw = _received_powers(radio.received_at_1_m_mw, distance_m)
+    received_mw = radio.received_at_1_m_mw / distance_m**2  # as `received_power`
+    np.fill_diagonal(received_mw, 0.0)  # nobody receives itself
     if is_known is not None:
         received_mw *= is_known[:, None] & is_known[None, :]
     distance_over_std = np.full_like(distance_m, np.inf)
@@ -76,10 +76,7 @@ def links_between(
 def doubtful(links: Links, curves: Curves, std_db: Float[np.ndarray, "N N"]) -> Links:
     """Return the same links over a channel that fades, or whose powers are known up to an error.
 
-    Args:
-        links: Between robots whose positions are true, or only believed.
-        curves: Of `decode_curves`.
-        std_db: Standard deviation of that error; what positions add to it is added here [dB].
+    That error's standard deviation is in dB, without what positions add to it.
     """
     return links._replace(
         curves=curves, row=row_of(np.hypot(std_db, 2.0 * DB_PER_NEPER / links.distance_over_std))
@@ -92,19 +89,6 @@ def chance(links: Links, ratio: float, i: int, j: int) -> float:
     if links.curves.shape[0] == 0:
         return decode_probability(ratio, links.threshold, links.distance_over_std[i, j])
     return probability_at(links.curves, links.row[i, j], ratio / links.threshold)
-
-
-@compiled()
-def _received_powers(
-    at_1_m_mw: float, distance_m: Float[np.ndarray, "N N"]
-) -> Float[np.ndarray, "N N"]:
-    """Return the power of i at j [mW]; nobody receives itself."""
-    received_mw = np.zeros_like(distance_m)
-    for i in range(len(distance_m)):
-        for j in range(len(distance_m)):
-            if i != j:
-                received_mw[i, j] = received_power(at_1_m_mw, distance_m[i, j] * distance_m[i, j])
-    return received_mw
 
 
 @compiled()
@@ -150,13 +134,9 @@ def listen(
 ) -> None:
     """Predict which packets robots may decode (Eqs. 3-4).
 
-    Args:
-        links: The radio.
-        air: All packets but one.
-        also: Who transmits besides, or `NOBODY`.
-        listens: Which robots listen; nobody does while it transmits.
-        heard: The sender that each robot may decode, overwritten; itself is nobody.
-        probability: That it does; overwritten.
+    All of `air` is in the air, and the packet of `also`, unless that is `NOBODY`. `heard` and
+    `probability` are overwritten for all robots: by themselves, which is nobody, and by 0 for
+    those that transmit or do not listen.
     """
     for j in range(listens.shape[0]):
         heard[j], probability[j] = j, 0.0

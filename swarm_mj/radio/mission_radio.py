@@ -1,14 +1,21 @@
-"""The radio that a mission's numbers make (IV-B): its channel, and what is believed of it."""
+"""The radio that a mission's numbers make (IV-B): its channel, and what policies know of it.
+
+Belief and truth are models before fades, which neither foresees. Index order: `i` sends, `j`
+receives.
+"""
 
 import math
+from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import Obstacles
 from swarm_mj.radio.composed import ComposedChannel, Reception
+from swarm_mj.radio.decode_curves import KNOWN, Curves, decode_curves
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.free_space import (
     Channel,
@@ -17,16 +24,68 @@ from swarm_mj.radio.free_space import (
     from_db,
     transmit_power_dbm,
 )
-from swarm_mj.radio.link_gains import LinkGains
-from swarm_mj.radio.link_models import Belief, TrueLinks
+from swarm_mj.radio.links import Links, doubtful, links_between
 from swarm_mj.radio.power_law import (
     FREE_SPACE_EXPONENT,
     NO_OBSTACLES,
     TWO_RAY_EXPONENT,
     PowerLaw,
+    powers_between,
     two_ray_breakpoint_m,
 )
-from swarm_mj.radio.shadowing import Shadowing
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Belief:
+    """The channel as all robots of a mission believe it to be."""
+
+    radio: FreeSpaceRadio
+    law: PowerLaw | None = None  # of mean powers [mW]; None is that of free space
+    reception: Reception | None = None  # the statistics of fades and losses; None: there are none
+    shadowing_db: float = 0.0  # standard deviation of the powers' unknown part [dB]
+
+    def law_over_noise(self, num_robots: int) -> PowerLaw:
+        """Return the law of a team's mean powers, free space's too, in units of the noise."""
+        at_1_m_mw = np.full(num_robots, self.radio.received_at_1_m_mw)
+        law = PowerLaw(at_1_m_mw) if self.law is None else self.law
+        return law._replace(at_1_m=law.at_1_m / self.radio.noise_mw)
+
+    def links(
+        self,
+        position_m: Float[np.ndarray, "N 2"],
+        spread_m: Float[np.ndarray, "N"] | None = None,
+        is_known: Bool[np.ndarray, "N"] | None = None,
+    ) -> Links:
+        """Return the links between believed positions; arguments as of `links_between`."""
+        links = links_between(self.radio, position_m, spread_m, is_known)
+        if (law := self.law) is not None:
+            # The steeper the path loss, the more dB an error of the distance is worth.
+            is_far = links.received_mw < self.radio.received_at_1_m_mw / law.breakpoint_m**2
+            steepness = np.where(is_far, law.exponent / FREE_SPACE_EXPONENT, 1.0)
+            received_mw = powers_between(position_m, law) * (links.received_mw > 0.0)
+            links = links._replace(
+                received_mw=received_mw,
+                interference_mw=received_mw,
+                distance_over_std=links.distance_over_std / steepness,
+            )
+        return _with_chances(links, self.reception, self.shadowing_db)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrueLinks:
+    """A channel before its fades: mean powers and statistics."""
+
+    radio: FreeSpaceRadio
+    channel: ComposedChannel | None = None  # None is the radio in free space
+
+    def links(self, position_m: Float[np.ndarray, "N 2"], mission: int) -> Links:
+        """Return the links between true positions of one mission, which has its own shadowing."""
+        links = links_between(self.radio, position_m)
+        if self.channel is None:
+            return links
+        powers_mw = self.channel.mean_powers_mw(position_m, mission)
+        links = links._replace(received_mw=powers_mw, interference_mw=powers_mw)
+        return _with_chances(links, self.channel.reception, 0.0)
 
 
 class MissionRadio(NamedTuple):
@@ -69,27 +128,27 @@ def mission_radio(
             is free space: nothing else is known of such a channel.
     """
     radio = radio_of(mission)
-    law, reception = _law(mission, radio), _reception(mission, radio)
-    channel: Channel | VaryingChannel = radio
-    if own is not None:
-        channel = own
-    elif mission.beyond_free_space or len(obstacles.kind) > 0:
-        gains = LinkGains(law._replace(obstacles=obstacles), _shadowing(mission))
-        channel = ComposedChannel(gains, reception)
+    law, reception, shadowing_db = _law(mission, radio), _reception(mission), mission.shadowing_db
+    channel: Channel | VaryingChannel = radio if own is None else own
+    if own is None and (mission.beyond_free_space or len(obstacles.kind) > 0):
+        channel = ComposedChannel(
+            law._replace(obstacles=obstacles),
+            reception,
+            shadowing_db=shadowing_db,
+            shadowing_distance_m=mission.shadowing_distance_m,
+        )
+    truth = TrueLinks(
+        radio=radio, channel=channel if isinstance(channel, ComposedChannel) else None
+    )
     known = obstacles if mission.grants("map") else NO_OBSTACLES
     belief = Belief(radio=radio)
     if mission.beyond_free_space and mission.grants("statistics"):
-        belief = Belief(
-            radio=radio,
-            law=law._replace(obstacles=known),
-            reception=reception,
-            shadowing_db=mission.shadowing_db,
-        )
+        law = law._replace(obstacles=known)
+        belief = Belief(radio=radio, law=law, reception=reception, shadowing_db=shadowing_db)
     elif len(known.kind) > 0:
         everyone_mw = np.full(mission.num_robots, radio.received_at_1_m_mw)
         belief = Belief(radio=radio, law=PowerLaw(everyone_mw, obstacles=known))
-    composed = channel if isinstance(channel, ComposedChannel) else None
-    return MissionRadio(channel, belief, TrueLinks(radio=radio, channel=composed))
+    return MissionRadio(channel, belief, truth)
 
 
 def by_robot(mission: Mission, default_mw: float) -> Float[np.ndarray, "N"]:
@@ -110,13 +169,8 @@ def _law(mission: Mission, radio: FreeSpaceRadio) -> PowerLaw:
     return PowerLaw(by_robot(mission, radio.received_at_1_m_mw), breakpoint_m, exponent)
 
 
-def _shadowing(mission: Mission) -> Shadowing | None:
-    if mission.shadowing_db == 0.0:
-        return None
-    return Shadowing(std_db=mission.shadowing_db, correlation_m=mission.shadowing_distance_m)
-
-
-def _reception(mission: Mission, radio: FreeSpaceRadio) -> Reception:
+def _reception(mission: Mission) -> Reception:
+    radio = radio_of(mission)
     rician_k = {"none": NO_FADING, "rayleigh": NO_LINE_OF_SIGHT, "rician": mission.rician_k}
     return Reception(
         noise_mw=radio.noise_mw,
@@ -127,3 +181,22 @@ def _reception(mission: Mission, radio: FreeSpaceRadio) -> Reception:
         burst_end=mission.burst_end,
         recipient_hears_while_sending=radio.recipient_hears_while_sending,
     )
+
+
+def _with_chances(links: Links, reception: Reception | None, std_db: float) -> Links:
+    """Return the same links with the probabilities of their packets, where they are uncertain."""
+    curves = KNOWN if reception is None else _curves(reception, is_certain=std_db == 0.0)
+    if curves is KNOWN:
+        return links
+    return doubtful(links, curves, np.full(links.received_mw.shape, std_db))
+
+
+@cache
+def _curves(reception: Reception, *, is_certain: bool) -> Curves:
+    """Return the curves of these statistics; `KNOWN` if packets decode for certain, or never."""
+    begin, end = reception.burst_begin, reception.burst_end
+    mean_loss = begin / (begin + end) if begin > 0.0 else 0.0  # share of slots in bursts
+    success = (1.0 - reception.erasure) * (1.0 - mean_loss)
+    if is_certain and reception.rician_k == NO_FADING and success == 1.0:
+        return KNOWN
+    return decode_curves(reception.rician_k, success)

@@ -29,12 +29,7 @@ def obstruct(
 ) -> None:
     """Multiply the power of i's packets at every other robot by what obstacles leave of it.
 
-    Args:
-        i: The sender.
-        position_m: Where the robots are [m].
-        height_m: Of their antennas above the floor [m].
-        obstacles: Of the scene; perhaps none.
-        power: At every robot, changed in place, in any unit.
+    The robots' antennas are at this height above the floor [m].
     """
     if obstacles.kind.shape[0] == 0:
         return
@@ -52,13 +47,9 @@ def obstruct(
 def blocked(
     position_m: Float[np.ndarray, "N 2"], height_m: float, radius_m: float, obstacles: Obstacles
 ) -> Bool[np.ndarray, "N"]:
-    """Return which robots touch an obstacle, by four lines across each.
+    """Return which robots of this radius touch an obstacle, by four lines across each.
 
-    Args:
-        position_m: Where they are [m].
-        height_m: Of their centres above the floor [m].
-        radius_m: Of their bodies [m].
-        obstacles: Of the scene.
+    Their centres are at this height above the floor [m].
     """
     touches = np.zeros(position_m.shape[0], dtype=np.bool_)
     start, along = np.empty(3), np.zeros(3)
@@ -115,20 +106,13 @@ def _next_crossed(
 
 @compiled()
 def _crosses(
-    start_m: Float[np.ndarray, "3"],
-    along_m: Float[np.ndarray, "3"],
-    o: int,
-    obstacles: Obstacles,
+    start_m: Float[np.ndarray, "3"], along_m: Float[np.ndarray, "3"], o: int, obstacles: Obstacles
 ) -> bool:
     """Return whether a line has a point in common with an obstacle."""
     kind, centre_m, size_m = obstacles.kind[o], obstacles.centre_m[o], obstacles.size_m[o]
     frame = obstacles.rotation[o]
-    from_centre_m = (
-        start_m[0] - centre_m[0],
-        start_m[1] - centre_m[1],
-        start_m[2] - centre_m[2],
-    )
-    x, y, z = _turned(from_centre_m, frame)
+    dx, dy, dz = start_m[0] - centre_m[0], start_m[1] - centre_m[1], start_m[2] - centre_m[2]
+    x, y, z = _turned((dx, dy, dz), frame)
     u, v, w = _turned((along_m[0], along_m[1], along_m[2]), frame)
     if kind == BOX:
         part = _within(x, u, size_m[0], (0.0, 1.0))

@@ -58,14 +58,8 @@ def is_received(signal_to_noise: float, threshold: float) -> bool:
 def add_packet(incoming: Incoming, i: int, signal: float, interference: float) -> Incoming:
     """Return what a receiver gets when i transmits, too.
 
-    Signal and interference are two numbers because a receiver may be unable to decode a packet that
-    jams it all the same: while it transmits, or where a scheduler does not count on the link.
-
-    Args:
-        incoming: All other packets.
-        i: The sender.
-        signal: Power at which the packet can be decoded; 0 if it cannot.
-        interference: Power that it adds to all other packets.
+    The signal is 0 where a receiver cannot decode a packet that jams it all the same by its
+    interference: while it transmits, or where a scheduler does not count on the link.
     """
     # Two selections, not a branch: which packet is stronger is as random as the places of robots.
     is_stronger = signal > incoming.strongest  # of equally strong packets the first counts
@@ -85,13 +79,8 @@ def decoded(
 ) -> int:
     """Return the sender whose packet j decodes, or j itself: nobody.
 
-    Args:
-        incoming: All packets at j.
-        j: The receiver.
-        noise: Of the receiver.
-        threshold: Least SINR that decodes, linear [1].
-        factor: Of the interference, where a prediction allows for more than it knows of.
-        more: Interference besides.
+    A prediction that allows for more interference than it knows of scales it by `factor` and adds
+    `more`. The threshold is linear [1].
     """
     # The total less the signal, not a second sum: loops stay linear in the senders, and all callers
     # round alike, so that predictions agree with the channel to the last digit.
@@ -126,13 +115,8 @@ def decode_probability(signal_to_noise: float, threshold: float, distance_over_s
     A lone packet decodes up to some distance; interference shortens it to d sqrt(SINR /
     threshold), so a packet over a believed d comes through if the true distance is below that.
 
-    Args:
-        signal_to_noise: SINR over the believed distance, linear [1].
-        threshold: Least SINR that decodes, linear [1].
-        distance_over_std: The believed distance over its standard deviation; inf is certain.
-
-    Returns:
-        The probability, by a logistic approximation of the normal distribution.
+    The believed distance is given over its standard deviation; inf is certain. The normal
+    distribution is approximated by a logistic one.
     """
     if distance_over_std == np.inf:
         return 1.0 if is_received(signal_to_noise, threshold) else 0.0

@@ -9,7 +9,6 @@ makes links the same in both directions.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -20,14 +19,6 @@ from swarm_mj.system.compiled import compiled
 
 NUM_WAVES = 64
 STEPS_PER_CORRELATION = 10.0  # places within that share of d_corr count as one
-
-
-@dataclass(frozen=True, kw_only=True)
-class Shadowing:
-    """How much and how quickly the loss of a link varies with where its ends are."""
-
-    std_db: float
-    correlation_m: float  # d_corr [m]
 
 
 class Waves(NamedTuple):
@@ -42,16 +33,19 @@ class Waves(NamedTuple):
     std_db: float
 
 
-def draw_waves(shadowing: Shadowing, num_robots: int, rngs: Sequence[np.random.Generator]) -> Waves:
+def draw_waves(
+    std_db: float, correlation_m: float, num_robots: int, rngs: Sequence[np.random.Generator]
+) -> Waves:
     """Draw every mission's own shadowing, from one generator each.
 
-    The spectrum of exp(-d / d_corr) in the plane has wave numbers k with the distribution
+    Losses have a standard deviation of `std_db`, and `correlation_m` is d_corr. The spectrum of
+    exp(-d / d_corr) in the plane has wave numbers k with the distribution
     1 - 1 / sqrt(1 + (k d_corr)^2), in all directions alike.
     """
 
     def wave_numbers(rng: np.random.Generator) -> Float[np.ndarray, "W 2"]:
         uniform, angle = rng.random(NUM_WAVES), rng.uniform(0.0, 2.0 * np.pi, NUM_WAVES)
-        number = np.sqrt(1.0 / (1.0 - uniform) ** 2 - 1.0) / shadowing.correlation_m
+        number = np.sqrt(1.0 / (1.0 - uniform) ** 2 - 1.0) / correlation_m
         return number[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
     drawn = [
@@ -62,8 +56,8 @@ def draw_waves(shadowing: Shadowing, num_robots: int, rngs: Sequence[np.random.G
         *(np.stack(each) for each in zip(*drawn, strict=True)),
         place=np.full((len(rngs), num_robots, 2), np.nan),
         ends=np.empty((len(rngs), num_robots, 4, NUM_WAVES), dtype=np.float32),
-        step_m=shadowing.correlation_m / STEPS_PER_CORRELATION,
-        std_db=shadowing.std_db,
+        step_m=correlation_m / STEPS_PER_CORRELATION,
+        std_db=std_db,
     )
 
 

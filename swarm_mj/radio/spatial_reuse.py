@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Float32, Int
 
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.radio.power_law import PowerLaw, write_powers
-from swarm_mj.radio.reception import is_received, received_power, sinr
+from swarm_mj.radio.reception import NOBODY, is_received, received_power, sinr
 from swarm_mj.system.compiled import compiled
 
 NOISE = 1.0
@@ -33,11 +33,12 @@ class KnownPowers(NamedTuple):
 
 
 class _Belief(NamedTuple):
-    """The powers in which one robot believes."""
+    """The powers in which one robot believes, apart from `_Slot`: loops then copy fewer arrays."""
 
     believed_m: Float[np.ndarray, "N 2"]
     at_1_m: float  # in free space, where nearly all pairs are judged by few of them: no table then
     power: Float[np.ndarray, "N N"]  # by a law, rows as far as they are computed
+    threshold: float
 
 
 class _Slot(NamedTuple):
@@ -74,46 +75,27 @@ def write_joined(
 ) -> None:
     """Write who sends in free space by the rule, in the order of identities, as each believes.
 
-    Args:
-        believed_m: Where robot i believes the others to be [m].
-        is_known: Whom it knows; after the first unknown robot that is asked nobody joins.
-        turn: Whose turn it is, mod N.
-        range_m: Distance at which a lone transmission just decodes [m].
-        threshold: Least SINR that decodes, linear [1].
-        has_joined: 1 where robot k sends, by robot i's beliefs, else 0; overwritten.
+    `has_joined` is 1 where robot k sends, by robot i's beliefs, else 0. After the first robot that
+    is asked and unknown nobody joins. Other arguments are as of `keep_joined`.
     """
     num_missions, num_robots = is_known.shape[:2]
     at_1_m = threshold * range_m * range_m
-    has_joined[...] = 0.0
     for b in range(num_missions):
+        owner = int(turn[b]) % num_robots
+        asked = _asked(np.arange(num_robots), turn[b])
         for i in range(num_robots):
             if believes_as_the_last(believed_m[b], is_known[b], i):
-                for k in range(num_robots):
-                    has_joined[b, i, k] = has_joined[b, i - 1, k]
-            else:
-                belief = _Belief(believed_m[b, i], at_1_m, FREE_SPACE)
-                _join_in_turn(belief, is_known[b, i], int(turn[b]), threshold, has_joined[b, i])
-
-
-@compiled()
-def _join_in_turn(
-    belief: _Belief,
-    is_known: Bool[np.ndarray, "N"],
-    turn: int,
-    threshold: float,
-    has_joined: Float32[np.ndarray, "N"],
-) -> None:
-    """Mark who sends by one robot's beliefs."""
-    num_robots = is_known.shape[0]
-    slot = _silent_slot(num_robots)
-    half_round = turn + num_robots // 2
-    for place in range(-1, num_robots):
-        k = (turn if place < 0 else half_round + place) % num_robots  # first the owner of the turn
-        if not is_known[k]:
-            break
-        if place < 0 or _may_join(k, belief, threshold, slot):
-            has_joined[k] = 1.0
-            _join(k, belief, threshold, slot)
+                has_joined[b, i] = has_joined[b, i - 1]
+                continue
+            belief = _Belief(believed_m[b, i], at_1_m, FREE_SPACE, threshold)
+            slot = _silent_slot(num_robots)
+            if is_known[b, i, owner]:
+                _join(owner, belief, slot)
+                unknown = np.flatnonzero(~is_known[b, i][asked])
+                num_asked = unknown[0] if len(unknown) > 0 else num_robots
+                _join_in_turn(asked[:num_asked], NOBODY, belief, slot, None, b)
+            for k in range(num_robots):
+                has_joined[b, i, k] = slot.is_sender[k]
 
 
 @compiled()
@@ -155,18 +137,21 @@ def keep_joined(
     """
     num_missions, num_robots = order.shape
     at_1_m = threshold * range_m * range_m
-    asked = np.empty(num_robots, dtype=np.int64)  # whether they join, one after the other
     for b in range(num_missions):
         owner = order[b, turn[b] % num_robots]
-        half_round = turn[b] + num_robots // 2
-        for place in range(num_robots):
-            asked[place] = order[b, (half_round + place) % num_robots]
+        asked = _asked(order[b], turn[b])
         for i in range(num_robots):
             if i != owner and is_sending[b, i]:
                 power = FREE_SPACE if known is None else _powers_for(believed_m[b, i], known, b)
-                belief = _Belief(believed_m[b, i], at_1_m, power)
-                is_sending[b, i] = _joins(i, owner, asked, belief, known, b, threshold)
+                belief = _Belief(believed_m[b, i], at_1_m, power, threshold)
+                is_sending[b, i] = _joins(i, owner, asked, belief, known, b)
         is_sending[b, owner] = True
+
+
+@compiled()
+def _asked(order: Int[np.ndarray, "N"], turn: int) -> Int[np.ndarray, "N"]:
+    """Return who is asked to join, one after the other."""
+    return np.roll(order, -(turn + order.shape[0] // 2))
 
 
 @compiled()
@@ -177,26 +162,38 @@ def _joins(
     belief: _Belief,
     known: KnownPowers | None,
     b: int,
-    threshold: float,
 ) -> bool:
     """Return whether robot i joins the owner of the turn, by the rule and its own beliefs."""
     slot = _silent_slot(asked.shape[0])
     if known is not None:
         _compute(owner, known, b)
         _compute(i, known, b)
-    _join(owner, belief, threshold, slot)
+    _join(owner, belief, slot)
     # A robot that may not join the owner alone may not join it with others either.
-    if not _may_join(i, belief, threshold, slot):
+    if not _may_join(i, belief, slot):
         return False
-    # A sender that is asked again may not join either: nobody would gain by it.
+    _join_in_turn(asked, i, belief, slot, known, b)
+    return slot.is_sender[i]
+
+
+@compiled()
+def _join_in_turn(
+    asked: Int[np.ndarray, "A"],
+    last: int,
+    belief: _Belief,
+    slot: _Slot,
+    known: KnownPowers | None,
+    b: int,
+) -> None:
+    """Let robots join, one after the other, up to the `last`."""
     for k in asked:
+        # A sender that is asked again may not join either: nobody would gain by it.
         if known is not None and slot.signal[k] == 0.0:
             _compute(k, known, b)
-        if _may_join(k, belief, threshold, slot):
-            _join(k, belief, threshold, slot)
-        if k == i:
+        if _may_join(k, belief, slot):
+            _join(k, belief, slot)
+        if k == last:
             break
-    return slot.is_sender[i]
 
 
 @compiled()
@@ -224,7 +221,7 @@ def _silent_slot(num_robots: int) -> _Slot:
 
 
 @compiled()
-def _may_join(k: int, belief: _Belief, threshold: float, slot: _Slot) -> bool:
+def _may_join(k: int, belief: _Belief, slot: _Slot) -> bool:
     """Return whether nobody would lose a packet and somebody would gain one if k sent, too."""
     is_sender, signal, total = slot
     if signal[k] > 0.0:
@@ -237,15 +234,15 @@ def _may_join(k: int, belief: _Belief, threshold: float, slot: _Slot) -> bool:
                 if power > signal[j]:
                     return False
                 interference = total[j] - signal[j] + power
-                if not is_received(sinr(signal[j], interference, NOISE), threshold):
+                if not is_received(sinr(signal[j], interference, NOISE), belief.threshold):
                     return False
-            elif is_received(sinr(power, total[j], NOISE), threshold):
+            elif is_received(sinr(power, total[j], NOISE), belief.threshold):
                 is_of_use = True
     return is_of_use
 
 
 @compiled()
-def _join(k: int, belief: _Belief, threshold: float, slot: _Slot) -> None:
+def _join(k: int, belief: _Belief, slot: _Slot) -> None:
     """Make k a sender: mark whom it reaches, and add its packet to the air."""
     is_sender, signal, total = slot
     is_sender[k] = True
@@ -253,7 +250,7 @@ def _join(k: int, belief: _Belief, threshold: float, slot: _Slot) -> None:
         if j != k:
             power = _power(k, j, belief)
             is_free = not is_sender[j] and signal[j] == 0.0
-            if is_free and is_received(sinr(power, total[j], NOISE), threshold):
+            if is_free and is_received(sinr(power, total[j], NOISE), belief.threshold):
                 signal[j] = power
             total[j] += power
 

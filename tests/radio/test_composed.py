@@ -1,34 +1,37 @@
-"""The composed channel against free space, loops in NumPy, and replays of its slots."""
+"""The composed channel against free space, laws, loops in NumPy, and replays of its slots."""
 
 import math
 
 import numpy as np
 import pytest
+from walls import walls
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.radio.composed import ComposedChannel, Reception
-from swarm_mj.radio.link_gains import LinkGains
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.radio.power_law import PowerLaw
-from swarm_mj.radio.shadowing import Shadowing
 
 NUM_ROBOTS = 12
+SHADOWED = {"shadowing_db": 6.0, "shadowing_distance_m": 20.0}
 
 
-def channel(seeds, *, mission=None, shadowing=None, **reception):
-    radio = radio_of(mission or paper("stationary"))
-    at_1_m_mw = np.full(NUM_ROBOTS, radio.received_at_1_m_mw)
-    made = ComposedChannel(
-        LinkGains(PowerLaw(at_1_m_mw), shadowing),
-        Reception(
-            noise_mw=radio.noise_mw,
-            threshold=radio.threshold,
-            recipient_hears_while_sending=radio.recipient_hears_while_sending,
-            **reception,
-        ),
-    )
-    made.start(NUM_ROBOTS, [np.random.default_rng(seed) for seed in seeds])
+def started(seeds, law, reception, **shadowing):
+    made = ComposedChannel(law, reception, **shadowing)
+    made.start(len(law.at_1_m), [np.random.default_rng(seed) for seed in seeds])
     return made
+
+
+def channel(seeds, *, mission=None, at_1_m_mw=None, shadowing=None, **reception):
+    radio = radio_of(mission or paper("stationary"))
+    if at_1_m_mw is None:
+        at_1_m_mw = np.full(NUM_ROBOTS, radio.received_at_1_m_mw)
+    rule = Reception(
+        noise_mw=radio.noise_mw,
+        threshold=radio.threshold,
+        recipient_hears_while_sending=radio.recipient_hears_while_sending,
+        **reception,
+    )
+    return started(seeds, PowerLaw(at_1_m_mw), rule, **shadowing or {})
 
 
 def scenes(seed, num_missions):
@@ -98,7 +101,7 @@ HARD = {
     "erasure": 0.2,
     "burst_begin": 0.05,
     "burst_end": 0.2,
-    "shadowing": Shadowing(std_db=6.0, correlation_m=20.0),
+    "shadowing": SHADOWED,
 }
 
 
@@ -136,7 +139,7 @@ def test_one_robots_silence_changes_no_other_links_fade():
 def test_fades_and_shadowing_are_the_same_in_both_directions():
     """Two robots 200 m apart, each alone on the air in the same slot: both hear, or neither."""
     rows = np.arange(30)
-    made = channel(rows, rician_k=2.0, shadowing=Shadowing(std_db=6.0, correlation_m=20.0))
+    made = channel(rows, rician_k=2.0, shadowing=SHADOWED)
     position_m = np.zeros((30, NUM_ROBOTS, 2))
     position_m[:, 1:, 0] = 200.0
     hears = {}
@@ -163,15 +166,73 @@ def test_a_team_is_connected_if_everyone_reaches_everyone():
 
 def test_being_heard_is_not_enough_to_be_connected():
     """Robot 0 sends with 20 dB more: at 2000 m it is heard by others, which it does not hear."""
-    radio = radio_of(paper("stationary"))
-    at_1_m_mw = np.full(NUM_ROBOTS, radio.received_at_1_m_mw)
+    at_1_m_mw = np.full(NUM_ROBOTS, radio_of(paper("stationary")).received_at_1_m_mw)
     at_1_m_mw[0] *= 100.0
-    made = ComposedChannel(
-        LinkGains(PowerLaw(at_1_m_mw), None),
-        Reception(noise_mw=radio.noise_mw, threshold=radio.threshold),
-    )
-    made.start(NUM_ROBOTS, [np.random.default_rng(0)])
+    made = channel([0], at_1_m_mw=at_1_m_mw)
     position_m = np.zeros((NUM_ROBOTS, 2))
     for apart_m, is_connected in ((240.0, True), (2000.0, False)):
         position_m[0, 0] = apart_m
         assert np.all(made.largest_part(position_m, 0)) == is_connected
+
+
+EVERYONE = np.ones((2, 4), dtype=bool)
+SENT = np.array([1.0, 1.0, 4.0, 1.0])  # after one metre
+
+
+def gains(seeds=(1, 2), *, slope=(np.inf, 2.0), obstacles=None, **shadowing):
+    law = PowerLaw(SENT, *slope) if obstacles is None else PowerLaw(SENT, *slope, obstacles)
+    return started(seeds, law, Reception(1.0, 1.0), **shadowing)
+
+
+def places(seed=0):
+    return np.random.default_rng(seed).uniform(-300.0, 300.0, (2, 4, 2))
+
+
+def test_powers_are_each_robots_own_after_the_path_loss():
+    position_m = places()
+    received_mw = gains(slope=(10.0, 3.0)).received_mw(position_m, np.arange(2), EVERYONE)
+    for b in range(2):
+        for i in range(4):
+            for j in range(4):
+                apart_m = np.linalg.norm(position_m[b, i] - position_m[b, j])
+                sent_mw = 4.0 if i == 2 else 1.0
+                expected = 0.0 if i == j else sent_mw / 100.0 * (10.0 / apart_m) ** 3
+                np.testing.assert_allclose(received_mw[b, i, j], expected, rtol=1e-9)
+
+
+def test_powers_are_computed_once_for_each_sender_and_place():
+    """What is computed already is not written again."""
+    made, position_m, mission = gains(), places(), np.arange(2)
+    powers = made.received_mw(position_m, mission, EVERYONE & (np.arange(4) == 0))
+    powers[:] = -1.0
+    made.received_mw(position_m, mission, EVERYONE)
+    np.testing.assert_array_equal(powers < 0.0, np.arange(4)[:, None] == [[[0] * 4]] * 2)
+    powers[:] = -1.0
+    position_m[1, 3] += 1.0  # mission 1 moves, mission 0 stays
+    made.received_mw(position_m, mission, EVERYONE)
+    assert np.all(powers < 0.0, axis=(1, 2)).tolist() == [True, False]
+    assert np.all(powers[1] >= 0.0)
+
+
+def test_obstacles_take_their_share():
+    """A wall of 10 dB between x < 0 and x > 0."""
+    position_m = places()
+    position_m[:, :, 0] = np.where(np.arange(4) < 2, -1.0, 1.0) * (5.0 + np.abs(position_m[..., 0]))
+    behind = gains(obstacles=walls(0.1, 0)).received_mw(position_m, np.arange(2), EVERYONE)
+    open_air = gains().received_mw(position_m, np.arange(2), EVERYONE)
+    is_across = (np.arange(4) < 2)[:, None] != (np.arange(4) < 2)
+    np.testing.assert_allclose(behind, open_air * np.where(is_across, 0.1, 1.0))
+
+
+def test_rows_may_be_any_missions_and_repeat_them():
+    made, position_m = gains(), places()
+    mission = np.array([1, 0, 1])
+    rows = made.received_mw(position_m[mission], mission, np.ones((3, 4), dtype=bool)).copy()
+    np.testing.assert_array_equal(rows, gains().received_mw(position_m, np.arange(2), EVERYONE))
+
+
+def test_moving_back_finds_the_same_shadowing():
+    made, there, here = gains(**SHADOWED), *map(places, (1, 2))
+    first = made.received_mw(there, np.arange(2), EVERYONE).copy()
+    made.received_mw(here, np.arange(2), EVERYONE)
+    np.testing.assert_array_equal(made.received_mw(there, np.arange(2), EVERYONE), first)

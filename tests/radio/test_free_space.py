@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm_mj.radio.free_space import (
-    Channel,
     FreeSpaceRadio,
     channel_gain,
     from_db,
@@ -92,7 +91,6 @@ def test_eq1_path_loss_by_hand():
 
 
 @given(distance_m=st.floats(1e-3, 1e5), frequency_hz=st.floats(1e6, 1e12))
-@settings(max_examples=50, deadline=None)
 def test_eq1_path_loss_is_friis_free_space(distance_m, frequency_hz):
     friis_db = 20 * math.log10(4 * math.pi * distance_m * frequency_hz / 299_792_458.0)
     # The paper rounds -147.5522 dB to -147.55 dB.
@@ -105,13 +103,6 @@ def test_eq1_path_loss_is_friis_free_space(distance_m, frequency_hz):
 )
 def test_eq2_gain_by_hand(loss_db, gain):
     assert channel_gain(loss_db) == pytest.approx(gain)
-
-
-@given(distance_m=st.floats(0.1, 1e4), factor=st.floats(0.1, 10.0))
-@settings(max_examples=50, deadline=None)
-def test_eq2_gain_falls_with_the_square_of_the_distance(distance_m, factor):
-    near, far = (channel_gain(path_loss_db(d, 2.4e9)) for d in (distance_m, factor * distance_m))
-    assert near / far == pytest.approx(factor**2)
 
 
 def test_powers_by_hand():
@@ -151,7 +142,7 @@ def test_eq3_interference_by_hand():
 
 
 @given(seed=seeds, num_robots=st.integers(2, 8), eavesdroppers=st.booleans())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_eq4_decoded_as_by_loops(seed, num_robots, eavesdroppers):
     position_m, recipient = scene(seed, num_robots)
     clear = packets_above_threshold(position_m[0], recipient[0], eavesdroppers, POWER_DBM, 1.0)
@@ -163,7 +154,7 @@ def test_eq4_decoded_as_by_loops(seed, num_robots, eavesdroppers):
 
 
 @given(seed=seeds, num_robots=st.integers(2, 8))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_below_0_db_the_nearest_packet_that_clears_the_threshold_wins(seed, num_robots):
     position_m, recipient = scene(seed, num_robots)
     power_dbm = POWER_DBM - 11.0  # as far at a threshold of -10 dB
@@ -183,15 +174,6 @@ def test_several_packets_can_clear_a_threshold_below_0_db():
     assert alone(radio(threshold_db=-10.0), position_m, recipient) == [0, 0, 2]
 
 
-@given(seed=seeds, num_robots=st.integers(2, 10))
-@settings(max_examples=50, deadline=None)
-def test_a_transmitter_hears_nothing(seed, num_robots):
-    position_m, recipient = scene(seed, num_robots)
-    heard = radio()(position_m, recipient)[0]
-    for j in range(num_robots):
-        assert heard[j] == j or recipient[0, j] == j
-
-
 def test_the_codes_rule_lets_a_sending_recipient_hear():
     position_m = [[0, 0], [200, 0], [100, 100]]
     each_other = [1, 0, 2]
@@ -208,13 +190,6 @@ def test_the_codes_rule_keeps_a_sending_eavesdropper_deaf():
     assert alone(radio(eavesdroppers=True), position_m, [1, 1, 3, 3])[2] == 2
 
 
-def test_silence_is_heard_by_nobody():
-    position_m, _ = scene(0, 6)
-    for eavesdroppers in (False, True):
-        silent = np.arange(6)[None]
-        assert (radio(eavesdroppers=eavesdroppers)(position_m, silent) == silent).all()
-
-
 def test_coincident_robots_stay_finite():
     here, away = [5.0, 5.0], [200.0, 5.0]
     assert alone(radio(), [here, here], [1, 1]) == [0, 0]
@@ -227,7 +202,6 @@ def test_coincident_robots_stay_finite():
 
 
 @given(seed=seeds, num_robots=st.integers(2, 10), eavesdroppers=st.booleans())
-@settings(max_examples=50, deadline=None)
 def test_renaming_the_robots_renames_what_they_hear(seed, num_robots, eavesdroppers):
     channel = radio(eavesdroppers=eavesdroppers)
     position_m, recipient = scene(seed, num_robots)
@@ -239,7 +213,6 @@ def test_renaming_the_robots_renames_what_they_hear(seed, num_robots, eavesdropp
 
 
 @given(seed=seeds, eavesdroppers=st.booleans())
-@settings(max_examples=50, deadline=None)
 def test_missions_side_by_side_do_not_hear_each_other(seed, eavesdroppers):
     channel = radio(eavesdroppers=eavesdroppers)
     position_m, recipient = scene(seed, 7, num_missions=4)
@@ -261,10 +234,6 @@ def test_the_random_scenes_hold_what_matters():
             both_ways += j != i and heard[j] == i and recipient[0, j] != j
         overheard += sum(i != j and recipient[0, i] != j for j, i in enumerate(heard))
     assert min(decoded, collided, overheard, both_ways) >= 20
-
-
-def test_the_radio_is_a_channel():
-    assert isinstance(radio(), Channel)
 
 
 def test_below_0_db_a_sender_hears_the_strongest_packet_meant_for_it():

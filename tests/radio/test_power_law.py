@@ -7,7 +7,6 @@ import pytest
 from walls import walls
 
 from swarm_mj.radio.free_space import path_loss_db
-from swarm_mj.radio.link_gains import LinkGains
 from swarm_mj.radio.power_law import PowerLaw, power_after, powers_between, two_ray_breakpoint_m
 
 PLACES_M = np.array([[-30.0, 0.0], [-40.0, 0.0], [30.0, 40.0]])
@@ -27,19 +26,6 @@ def test_a_steeper_law_and_a_wall_by_hand():
     assert power[0, 1] == pytest.approx(1 / 100)
     assert power[0, 2] == pytest.approx(0.1 * 20.0**2 / 5200.0**2)
     assert power[2, 1] == pytest.approx(0.1 * 20.0**2 / 6500.0**2)
-
-
-def test_the_law_is_that_of_the_channel():
-    """Of one without shadowing, where robots stand anywhere."""
-    rng = np.random.default_rng(1)
-    position_m = rng.uniform(-300.0, 300.0, (12, 2))
-    law = PowerLaw(rng.uniform(1.0, 4.0, 12), 30.0, 2.7, walls(0.25, 0))
-    gains = LinkGains(law, None)
-    gains.start([rng])
-    everyone = np.ones((1, 12), dtype=bool)
-    expected = gains.received_mw(position_m[None], np.array([0]), everyone)[0]
-    power = powers_between(position_m, law)
-    np.testing.assert_allclose(power, expected, rtol=1e-12)
 
 
 FREQUENCY_HZ = 2.4e9

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from swarm_mj.radio.free_space import DB_PER_NEPER
-from swarm_mj.radio.shadowing import Shadowing, draw_waves, follow_robots, shadow
+from swarm_mj.radio.shadowing import draw_waves, follow_robots, shadow
 
 
 @numba.njit
@@ -28,8 +28,7 @@ def loss_db(first_m, other_m, waves, i=0):
 def drawn():
     """3000 missions, each with a link of 200 m somewhere."""
     rng = np.random.default_rng(0)
-    shadowing = Shadowing(std_db=6.0, correlation_m=20.0)
-    waves = draw_waves(shadowing, 2, [np.random.default_rng(seed) for seed in range(3000)])
+    waves = draw_waves(6.0, 20.0, 2, [np.random.default_rng(seed) for seed in range(3000)])
     waves = waves._replace(step_m=1e-3)  # which rounds nothing
     first_m = rng.uniform(-400.0, 400.0, (3000, 2))
     angle = rng.uniform(0.0, 2 * np.pi, 3000)

@@ -34,8 +34,7 @@ from swarm_mj.policies.planner.snapshots import take_snapshots
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import mean_hops, window_costs
 from swarm_mj.protocol.window import channel_at, window
-from swarm_mj.radio.link_models import Belief
-from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.radio.mission_radio import Belief, radio_of
 from swarm_mj.simulation.swarm import Swarm
 
 ORACLE_EPISODES = 4  # it takes its time

@@ -12,7 +12,7 @@ from swarm_mj.policies.policy import CentralisedPolicy
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 from swarm_mj.radio.free_space import FreeSpaceRadio
-from swarm_mj.radio.link_models import TrueLinks
+from swarm_mj.radio.mission_radio import TrueLinks
 
 
 class GreedyOracle(CentralisedPolicy):

@@ -9,8 +9,8 @@ from swarm_mj.policies.planner.snapshots import Snapshots
 from swarm_mj.policies.planner.weights import heuristic_weights
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
-from swarm_mj.radio.link_models import Belief
 from swarm_mj.radio.links import Links
+from swarm_mj.radio.mission_radio import Belief
 
 
 def lookahead_of(num_robots: int, *, is_certain: bool, settings: ScheduleSettings) -> Lookahead:

@@ -41,8 +41,7 @@ from swarm_mj.protocol.buffers import NEVER, Buffers
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.packets import PacketField
 from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW
-from swarm_mj.radio.link_models import Belief
-from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.radio.mission_radio import Belief, radio_of
 
 
 class Planner(BroadcastPolicy):

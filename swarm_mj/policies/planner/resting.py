@@ -27,8 +27,7 @@ from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.tdma import SpatialTdma, slot_of
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.packets import PacketField
-from swarm_mj.radio.link_models import Belief
-from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.radio.mission_radio import Belief, radio_of
 
 
 class RestingPlanner(BroadcastPolicy):

@@ -22,8 +22,8 @@ from swarm_mj.policies.planner.settings import LearningSettings, PlannerSettings
 from swarm_mj.policies.planner.snapshots import better
 from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
-from swarm_mj.radio.link_models import Belief
 from swarm_mj.radio.links import Links
+from swarm_mj.radio.mission_radio import Belief
 
 NOT_YET = np.iinfo(np.int64).max
 

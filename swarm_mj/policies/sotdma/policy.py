@@ -24,7 +24,7 @@ from swarm_mj.policies.sotdma.team import SotdmaSettings, SotdmaTeam
 from swarm_mj.policies.tdma import SpatialTdma, draw_order, slot_of
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import FreeSpaceRadio
-from swarm_mj.radio.link_models import Belief
+from swarm_mj.radio.mission_radio import Belief
 
 
 class SelfOrganisedTdma(BroadcastPolicy):

@@ -20,7 +20,7 @@ from swarm_mj.policies.sotdma.slot_table import (
 )
 from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
-from swarm_mj.radio.link_models import Belief
+from swarm_mj.radio.mission_radio import Belief
 from swarm_mj.radio.power_law import powers_between, write_powers
 
 

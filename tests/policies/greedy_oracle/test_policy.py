@@ -13,8 +13,7 @@ from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.radio.link_models import TrueLinks
-from swarm_mj.radio.mission_radio import mission_radio, radio_of
+from swarm_mj.radio.mission_radio import TrueLinks, mission_radio, radio_of
 from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 

@@ -18,8 +18,8 @@ from swarm_mj.policies.planner.weights import heuristic_weights
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.window import transmit
 from swarm_mj.radio.decode_curves import decode_curves
-from swarm_mj.radio.link_models import Belief
 from swarm_mj.radio.links import doubtful, links_between
+from swarm_mj.radio.mission_radio import Belief
 
 seeds = st.integers(0, 2**32 - 1)
 few = settings(max_examples=20)

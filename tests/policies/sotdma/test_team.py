@@ -9,8 +9,7 @@ from swarm_mj.mission import paper
 from swarm_mj.policies.sotdma.slot_table import NO_PLACE, place_of
 from swarm_mj.policies.sotdma.team import SotdmaSettings, SotdmaTeam
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.radio.link_models import Belief
-from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.radio.mission_radio import Belief, radio_of
 
 NUM_ROBOTS, FIRST = 12, 36  # the first slot of a frame, of 11 slots
 ORDER = np.random.default_rng(0).permutation(NUM_ROBOTS)

@@ -23,7 +23,7 @@ from swarm_mj.policies.tdma import slot_of
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 from swarm_mj.radio.free_space import FreeSpaceRadio
-from swarm_mj.radio.link_models import Belief
+from swarm_mj.radio.mission_radio import Belief
 
 DIGITS = 12  # of a digest: enough to tell policies apart
 

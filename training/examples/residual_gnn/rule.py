@@ -11,7 +11,7 @@ from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.tdma import draw_order, slot_of
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import FreeSpaceRadio
-from swarm_mj.radio.link_models import Belief
+from swarm_mj.radio.mission_radio import Belief
 
 MOST_PLANS = 512  # that are kept for positions that come again
 FARTHEST = 40  # later transmissions count as this far ahead [slots]
