@@ -43,6 +43,7 @@ def _tiny():
     return {name.removeprefix("--").replace("-", "_"): int(value) for name, value in pairs}
 
 
+@pytest.mark.slow
 def test_the_weights_correct_the_plan_of_a_stationary_team(tmp_path, monkeypatch):
     """The plan alone is that of `planner` without payload."""
     monkeypatch.syspath_prepend(str(SHIPPED.parents[1]))
