@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from swarm_mj.cli import script
-from swarm_mj.evaluation.figures.style import CAPTION, FAINT, INK, WIDTH_IN, look_of, save, styled
+from swarm_mj.evaluation.figures.style import CAPTION, FAINT, WIDTH_IN, look_of, save, styled
 from swarm_mj.evaluation.results import read_results
 from swarm_mj.system.fields import setting
 from swarm_mj.system.outputs import Output, check_outputs
@@ -99,7 +99,7 @@ def draw(curve: Mapping[str, np.ndarray], levels: Mapping[str, float]) -> Figure
         axes.fill_between(curve["minutes"], age - sem, age + sem, **band)
         for policy, level in levels.items():
             _draw_level(axes, policy, level)
-        axes.set_title(TITLE, loc="left", color=INK)
+        axes.set_title(TITLE, loc="left")
         axes.set_xlabel("minutes of training")
         axes.set_ylabel("age of information [windows]")
         axes.set_ylim(0.0, HEADROOM * max(*age, *levels.values()))

@@ -11,7 +11,7 @@ from swarm_mj.api.fly import mission_of, names_of
 from swarm_mj.api.metrics import Metrics
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.results import COLUMNS, write_csv
-from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study, fly_study, study_bar
+from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study, fly_study
 from swarm_mj.evaluation.summary import Evaluated, summarise, write_evaluated
 from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission
@@ -192,9 +192,8 @@ def evaluate(
     way_out = "choose fewer num_jobs, num_robots, num_windows or num_missions"
     check_fits(study_needs(study, num_jobs), None, way_out, is_forced=False, way_on="")
     costs: dict[int, BatchCosts] = {}
-    bar = study_bar(study, costs, quiet_console(), after_s=AFTER_S)
     with memory_errors():
-        fly_study(study, costs, num_jobs, None, bar)
+        fly_study(study, costs, num_jobs, None, quiet_console(), after_s=AFTER_S)
     return Evaluation(mission=mission, results=summarise(study, costs, study.header()))
 
 

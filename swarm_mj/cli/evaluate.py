@@ -14,14 +14,7 @@ from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_m
 from swarm_mj.evaluation import progress
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.results import write_csv
-from swarm_mj.evaluation.study import (
-    DEFAULT_POLICIES,
-    Processes,
-    Study,
-    fly_study,
-    num_flown,
-    study_bar,
-)
+from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study, fly_study, num_flown
 from swarm_mj.evaluation.summary import summarise, write_evaluated
 from swarm_mj.evaluation.table import print_results
 from swarm_mj.mission import Mission
@@ -103,13 +96,13 @@ def _evaluate(options: EvaluateOptions, study: Study, kept: Path | None) -> int:
     console, header = Console(stderr=True, highlight=False), study.header()
     costs: dict[int, BatchCosts] = {}
     if kept and options.resume and kept.exists():
-        costs = progress.resume(kept, header, study.batches)
+        costs = progress.resume(kept, header)
     elif kept:
         progress.start(kept, header)
     try:
         keep = partial(progress.append, kept, header) if kept else None
         with memory_errors():
-            fly_study(study, costs, options.jobs, keep, study_bar(study, costs, console))
+            fly_study(study, costs, options.jobs, keep, console)
     except (KeyboardInterrupt, MemoryError) as error:
         is_memory = isinstance(error, MemoryError)
         hint = "the same command with --resume continues" if kept else "nothing was kept"

@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.console import Console
 
 from swarm_mj.api.estimates import figures_needs
-from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS
+from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS, RESULT_FIGURES
 from swarm_mj.evaluation.results import Result, read_results
 from swarm_mj.mission.components import components_in
 from swarm_mj.mission.specification import NOTHING, OPEN
@@ -50,8 +50,9 @@ def run(options: FiguresOptions) -> int:
     with Console(stderr=True).status("Drawing ...") as status:
         # matplotlib takes its time to import; it would warn of a cache that it cannot write.
         logging.getLogger("matplotlib").setLevel(logging.ERROR)
-        from swarm_mj.evaluation.figures.curves import NoPointsError
-        from swarm_mj.evaluation.figures.drawing import draw_figure
+        from swarm_mj.evaluation.figures.curves import NoPointsError, preset_of
+        from swarm_mj.evaluation.figures.drawing import draw
+        from swarm_mj.evaluation.figures.flock import draw_flock
         from swarm_mj.evaluation.figures.style import save
 
         policy, seed = options.flock_policy, options.flock_seed
@@ -59,7 +60,10 @@ def run(options: FiguresOptions) -> int:
         for name in paths:
             status.update(f"Drawing {name} ...")
             try:
-                drawn[name] = draw_figure(name, results, flock_policy=policy, flock_seed=seed)
+                if name == FLOCK:
+                    drawn[name] = draw_flock(preset_of(results), policy, seed)
+                else:
+                    drawn[name] = draw(RESULT_FIGURES[name], results)
             except NoPointsError:
                 is_last_hope = name == FIGURES[-1] and set(drawn) <= {FLOCK}
                 if options.figure != FIGURES or is_last_hope:

@@ -1,11 +1,10 @@
 """A batch of missions: one policy in one regime, flown side by side, and what each cost."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from msgspec import Meta
 
 from swarm_mj.evaluation.lower_bound import ConnectivityFloor
 from swarm_mj.mission import Mission
@@ -27,9 +26,6 @@ TOTALS = {  # totals, and what `protocol.costs.Packets` calls them
     "packets_heard": "heard",
     "receptions": "receptions",
 }
-# What is allowed where costs are read back; rounding may leave a little less than nothing.
-Cost = Annotated[float, Meta(ge=-1e-6, le=1e30)]
-Count = Annotated[int, Meta(ge=0, le=2**53)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,26 +51,21 @@ class Batch:
 class BatchCosts:
     """The costs of a batch: one number per mission, in the order of the seeds."""
 
-    aoi: list[Cost]  # Eq. 10, mean over windows [windows]
-    aoi_steady: list[Cost]  # as above, over the second half of the mission
-    aoi_floor: list[Cost | None]  # the connectivity floor, as above; None: own channel
-    velocity_variance: list[Cost]  # Eq. 17, mean over windows [m²/s²]
-    hops: list[Cost]  # depth of the parent trees, mean over windows
-    task_cost: list[Cost | None]  # mean over windows; None if the controller has none
-    task_cost_last: list[Cost | None]  # as above, after the last window
-    complete_window: list[Count | None]  # everyone had first heard of everyone
-    packets_sent: list[Count]  # requests or broadcasts
-    packets_transmitted: list[Count]  # all that were on the air, responses too
-    packets_delivered: list[Count | None]  # requests that their addressee decoded; None: broadcasts
-    packets_heard: list[Count | None]  # broadcasts that somebody decoded; None: addressed packets
-    receptions: list[Count | None]  # times that a robot decoded a broadcast; None: as above
-    ages: list[Count]  # of all missions: how often a robot's knowledge of another had each age,
+    aoi: list[float]  # Eq. 10, mean over windows [windows]
+    aoi_steady: list[float]  # as above, over the second half of the mission
+    aoi_floor: list[float | None]  # the connectivity floor, as above; None: own channel
+    velocity_variance: list[float]  # Eq. 17, mean over windows [m²/s²]
+    hops: list[float]  # depth of the parent trees, mean over windows
+    task_cost: list[float | None]  # mean over windows; None if the controller has none
+    task_cost_last: list[float | None]  # as above, after the last window
+    complete_window: list[int | None]  # everyone had first heard of everyone
+    packets_sent: list[int]  # requests or broadcasts
+    packets_transmitted: list[int]  # all that were on the air, responses too
+    packets_delivered: list[int | None]  # requests that their addressee decoded; None: broadcasts
+    packets_heard: list[int | None]  # broadcasts that somebody decoded; None: addressed packets
+    receptions: list[int | None]  # times that a robot decoded a broadcast; None: as above
+    ages: list[int]  # of all missions: how often a robot's knowledge of another had each age,
     # in slots, from 0 to the mission's length
-
-
-def num_ages(mission: Mission) -> int:
-    """Return how many different ages there can be, in slots."""
-    return round(mission.num_windows / SLOT_WINDOWS) + 1
 
 
 @one_line_each()  # what is raised loses its places on the way between processes
@@ -116,24 +107,24 @@ class Tally:
         self._sums = {name: np.zeros(num_missions) for name in names}
         self._task_cost, self._last_task_cost = np.full((2, num_missions), np.nan)
         self._complete = np.full(num_missions, np.inf)
-        self._ages = np.zeros(num_ages(mission), dtype=np.int64)
+        self._ages = np.zeros(round(mission.num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
 
     def add(self, flown: WindowRecord) -> None:
         """Add a window; the swarm stands at its end."""
-        swarm, costs, is_active = self._swarm, flown.costs, self._swarm.states.is_active
+        swarm, costs, states = self._swarm, flown.costs, self._swarm.states
+        # Always an array, so that the loops below are compiled for one kind of arguments.
+        is_active = np.ones(states.position_m.shape[:2], dtype=np.bool_)
+        if states.is_active is not None:
+            is_active = states.is_active
         is_steady = swarm.now[0] > swarm.mission.num_windows - self._num_steady
-        packets = {name: getattr(costs.packets, count) for name, count in TOTALS.items()}
-        added = packets | {
-            "aoi": costs.age_windows,
-            "aoi_steady": costs.age_windows * is_steady,
-            "aoi_floor": self._floor.next(swarm.states.position_m, swarm.now, is_active)
-            if self._floor
-            else np.nan,
-            "velocity_variance": costs.velocity_variance_m2ps2,
-            "hops": flown.hops,
-        }
-        for name, total in self._sums.items():
-            total += added[name]
+        self._sums["aoi"] += costs.age_windows
+        self._sums["aoi_steady"] += costs.age_windows * is_steady
+        self._sums["velocity_variance"] += costs.velocity_variance_m2ps2
+        self._sums["hops"] += flown.hops
+        floor = self._floor.next(states.position_m, swarm.now, is_active) if self._floor else np.nan
+        self._sums["aoi_floor"] += floor
+        for name, count in TOTALS.items():
+            self._sums[name] += getattr(costs.packets, count)
         if costs.task_cost is not None:
             self._last_task_cost = costs.task_cost.value
             self._task_cost = np.nan_to_num(self._task_cost) + costs.task_cost.value
@@ -144,27 +135,21 @@ class Tally:
     def costs(self) -> BatchCosts:
         """Return what the missions cost, all windows of them flown."""
         sums, num_windows = self._sums, self._swarm.mission.num_windows
-        packets: dict[str, Any] = {name: _whole(sums[name]) for name in TOTALS}
+        own: dict[str, Any] = {name: _known(sums[name], int) for name in TOTALS}
+        own |= {name: _known(sums[name] / num_windows, float) for name in (*MEANS, "aoi_floor")}
         return BatchCosts(
-            **{name: (sums[name] / num_windows).tolist() for name in MEANS},
-            **packets,
+            **own,
             aoi_steady=(sums["aoi_steady"] / self._num_steady).tolist(),
-            aoi_floor=_finite(sums["aoi_floor"] / num_windows),
-            task_cost=_finite(self._task_cost / num_windows),
-            task_cost_last=_finite(self._last_task_cost),
-            complete_window=_whole(self._complete),
+            task_cost=_known(self._task_cost / num_windows, float),
+            task_cost_last=_known(self._last_task_cost, float),
+            complete_window=_known(self._complete, int),
             ages=self._ages.tolist(),
         )
 
 
-def _finite(costs: Float[np.ndarray, "B"]) -> list[float | None]:
-    """Costs; what does not apply is None."""
-    return [float(cost) if np.isfinite(cost) else None for cost in costs]
-
-
-def _whole(counts: Float[np.ndarray, "B"]) -> list[int | None]:
-    """Whole numbers; what never happened, or does not apply, is None."""
-    return [int(count) if np.isfinite(count) else None for count in counts]
+def _known(costs: Float[np.ndarray, "B"], kind: type) -> list[Any]:
+    """Return costs as this kind of number; None where one never happened, or does not apply."""
+    return [kind(cost) if np.isfinite(cost) else None for cost in costs]
 
 
 @compiled()
@@ -172,22 +157,15 @@ def count_ages(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
     counts: Int[np.ndarray, "bins"],
-    is_active: Bool[np.ndarray, "B N"] | None = None,
+    is_active: Bool[np.ndarray, "B N"],
 ) -> None:
-    """Count how old what each robot knows of each other robot is.
-
-    Args:
-        timestamp: T [windows].
-        now: t [windows].
-        counts: By age in slots; added to in place.
-        is_active: Whose pairs count; None is everyone's.
-    """
+    """Add to `counts`, by age in slots, how old what active robots know of each other is."""
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
-            if is_active is not None and not is_active[b, i]:
+            if not is_active[b, i]:
                 continue
             for j in range(num_robots):
-                if is_active is None or is_active[b, j]:
+                if is_active[b, j]:
                     counts[int((now[b] - timestamp[b, i, j]) / SLOT_WINDOWS)] += 1
             counts[int((now[b] - timestamp[b, i, i]) / SLOT_WINDOWS)] -= 1

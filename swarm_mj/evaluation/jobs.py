@@ -25,17 +25,10 @@ SURROUNDINGS |= {"MUJOCO_GL": "disable", "PYTHONSAFEPATH": "1"}
 def run_jobs(
     work: Callable[[Piece], Product], pieces: Sequence[Piece], num_jobs: int
 ) -> Generator[tuple[int, Product]]:
-    """Do all pieces of work.
+    """Do all pieces of work; yield each one's index and product, in the order they are done.
 
-    Ctrl-C reaches this process only; the others end with it, however it ends.
-
-    Args:
-        work: A function of a module, which other processes can import.
-        pieces: What to do; pickled on the way to another process, as are the products.
-        num_jobs: Processes; one is this process itself.
-
-    Yields:
-        A piece's index and its product, in the order in which they are done.
+    One of `num_jobs` is this process itself. Others import `work`, and pieces and products are
+    pickled on the way. Ctrl-C reaches this process only; the others end with it, however it ends.
 
     Raises:
         OSError: A process ended before its work did.
@@ -47,9 +40,7 @@ def run_jobs(
         return
     # Forked processes would inherit locks that MuJoCo's threads hold.
     with guard() as watch, ProcessPoolExecutor(num_jobs, get_context("spawn")) as pool:
-        with _surrounded():
-            resource_tracker.ensure_running()  # multiprocessing's; to start it lifts all shields
-        with deferred_interrupt() as is_interrupted, _shielded(), _surrounded():
+        with deferred_interrupt() as is_interrupted, _inherited():
             futures = {pool.submit(work, piece): index for index, piece in enumerate(pieces)}
             # The pool itself leaves its processes waiting for work for ever if this one is killed.
             for process in pool._processes.values():
@@ -67,23 +58,16 @@ def run_jobs(
 
 
 @contextmanager
-def _shielded() -> Iterator[None]:
-    """Keep Ctrl-C from processes that are started meanwhile, even as they load."""
+def _inherited() -> Iterator[None]:
+    """Let processes that are started meanwhile inherit SURROUNDINGS, and a mask against Ctrl-C."""
+    before = dict(os.environ)
+    os.environ.update(SURROUNDINGS)
+    resource_tracker.ensure_running()  # multiprocessing's; to start it lifts all masks
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-
-
-@contextmanager
-def _surrounded() -> Iterator[None]:
-    """Let processes that are started meanwhile inherit SURROUNDINGS."""
-    before = dict(os.environ)
-    os.environ.update(SURROUNDINGS)
-    try:
-        yield
-    finally:
         for name in SURROUNDINGS.keys() - before.keys():
             del os.environ[name]
         os.environ.update(before)

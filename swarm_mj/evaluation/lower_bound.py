@@ -25,18 +25,14 @@ class ConnectivityFloor:
         self,
         position_m: Float[np.ndarray, "B N 2"],
         now: Float[np.ndarray, "B"],
-        is_on: Bool[np.ndarray, "B N"] | None = None,
+        is_on: Bool[np.ndarray, "B N"],
     ) -> Float[np.ndarray, "B"]:
         """Share within connected parts, and return the mean age of all pairs as in II-C.
 
-        Args:
-            position_m: True positions, after the robots have moved [m].
-            now: t at the end of the window [windows].
-            is_on: Robots that share, and whose pairs count; None is all.
+        Robots that are on share and count; `position_m` and `now` are of the end of the window.
         """
         age = np.empty(now.shape)
-        shares = np.ones(position_m.shape[:2], dtype=np.bool_) if is_on is None else is_on
-        _share(self._timestamp, position_m, self._range_m, now, shares, age)
+        _share(self._timestamp, position_m, self._range_m, now, is_on, age)
         return age
 
 

@@ -1,24 +1,32 @@
 """The progress file: batches already flown, so that an interruption loses no more than one.
 
 Whole lines, each a digest and JSON: first what the batches depend on, then one batch a line as it
-gets done. A line's digest is of the first line's JSON and its own, so a line of another evaluation
-is told, and so is damage. JSON gives floats back as they were, so a resumed evaluation ends in the
-same files.
+gets done. A line's digest is of the first line's JSON and its own, so it shows a line of another
+evaluation as well as damage, and what passes needs no other check. JSON gives floats back as they
+were, so a resumed evaluation ends in the same files.
 """
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.evaluation.batch import Batch, BatchCosts, Count, num_ages
+from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.system.atomic import append_bytes, write_bytes
 from swarm_mj.system.reading import read_file, read_json
 
 DIGEST_DIGITS = 16
 MAX_BYTES = 2**32  # four times what 100 000 missions of 40 policies take
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Flown:
+    """A line of the file but the first."""
+
+    batch: int
+    costs: BatchCosts
 
 
 def progress_path(output: Path) -> Path:
@@ -28,16 +36,16 @@ def progress_path(output: Path) -> Path:
 
 def start(path: Path, header: dict[str, Any]) -> None:
     """Begin a progress file, in place of any other; raise OSError if that cannot be."""
-    write_bytes(path, _line(b"", header))
+    write_bytes(path, _line(b"", _json(header)))
 
 
 def append(path: Path, header: dict[str, Any], index: int, costs: BatchCosts) -> None:
     """Add what a batch cost, by its index among the study's; raise OSError if that cannot be."""
-    append_bytes(path, _line(_json(header), {"batch": index, "costs": asdict(costs)}))
+    append_bytes(path, _line(_json(header), _json({"batch": index, "costs": asdict(costs)})))
 
 
-def resume(path: Path, header: dict[str, Any], batches: Sequence[Batch]) -> dict[int, BatchCosts]:
-    """Return what an interrupted evaluation of these batches has flown, by their indices.
+def resume(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]:
+    """Return what an interrupted evaluation with this header has flown, by the batches' indices.
 
     A line that was cut off is dropped from the file; it is begun anew if not even its header, what
     the batches depend on, was written.
@@ -49,63 +57,34 @@ def resume(path: Path, header: dict[str, Any], batches: Sequence[Batch]) -> dict
     """
     content = read_file(path, "progress", MAX_BYTES)
     whole, _, cut_off = content.rpartition(b"\n")
-    if not whole and _line(b"", header).startswith(cut_off):
+    if not whole and _line(b"", _json(header)).startswith(cut_off):
         start(path, header)
         return {}
-    damage = (
-        f"progress {path} is damaged, or of another version; start over with --force instead of "
-        "--resume"
-    )
-    first, *rest = whole.split(b"\n")
+    lines = [line.partition(b" ")[2] for line in whole.split(b"\n")]
     try:
-        first = _checked(b"", first)
-        before = read_json(first, dict)
-        flown = [read_json(_checked(first, line), _Flown) for line in rest]
+        before = read_json(lines[0], dict)
+        digested = [_line(b"" if line is lines[0] else lines[0], line) for line in lines]
+        if b"".join(digested) != whole + b"\n":
+            raise ValueError("a line does not have its digest")
+        flown = [read_json(line, _Flown) for line in lines[1:]]
     except ValueError as error:
-        raise ValueError(damage) from error
+        raise ValueError(
+            f"progress {path} is damaged, or of another version; start over with --force instead "
+            "of --resume"
+        ) from error
     if difference := next(_differences("", before, header), ""):
         raise ValueError(
             f"progress {path} is of another evaluation: {difference}; repeat that one, or start "
             "over with --force instead of --resume"
         )
-    if not all(each.batch < len(batches) and each.fits(batches[each.batch]) for each in flown):
-        raise ValueError(damage)
     if cut_off:
         write_bytes(path, whole + b"\n")
     return {each.batch: each.costs for each in flown}
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Flown:
-    """A line of the file but the first."""
-
-    batch: Count
-    costs: BatchCosts
-
-    def fits(self, batch: Batch) -> bool:
-        """Return whether there is a number of each kind for each mission, and one for each age."""
-        lengths = {name: len(numbers) for name, numbers in vars(self.costs).items()}
-        num_missions = len(batch.seeds)
-        expected = dict.fromkeys(lengths, num_missions) | {"ages": num_ages(batch.mission)}
-        return lengths == expected
-
-
-def _line(first: bytes, content: dict[str, Any]) -> bytes:
-    """Return a line; `first` is the JSON of the file's first."""
-    text = _json(content)
-    return _digest(first + text) + b" " + text + b"\n"
-
-
-def _checked(first: bytes, line: bytes) -> bytes:
-    """Return the JSON of a line; raise ValueError if it does not have its digest."""
-    digest, _, text = line.partition(b" ")
-    if digest != _digest(first + text):
-        raise ValueError("a line does not have its digest")
-    return text
-
-
-def _digest(text: bytes) -> bytes:
-    return hashlib.sha256(text).hexdigest()[:DIGEST_DIGITS].encode()
+def _line(first: bytes, text: bytes) -> bytes:
+    """Return a line of JSON with its digest; `first` is the JSON of the file's first line."""
+    return b"%b %b\n" % (hashlib.sha256(first + text).hexdigest()[:DIGEST_DIGITS].encode(), text)
 
 
 def _json(content: dict[str, Any]) -> bytes:

@@ -14,13 +14,13 @@ import math
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 
 from swarm_mj.mission import PAPERS, Mission
 from swarm_mj.system.reading import read_rows
 
-MAX_BYTES = 1_000_000  # of the table
 METHODS = {
     "random flooding": "random-flooding",
     "round robin": "round-robin",
@@ -54,43 +54,38 @@ class Point:
         return METHODS.get(self.method)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Sweep:
+class Sweep(NamedTuple):
     """The figure that sweeps a field of a task's missions, all others as the paper sets them."""
 
     figure: str
     x_name: str
-    irrelevant: frozenset[str] = frozenset()  # fields that change nothing in this task
+    irrelevant: tuple[str, ...] = ()  # fields that change nothing in this task
 
 
 SWEEPS = {
-    "stationary": Sweep(
-        figure="fig4_transmit_power", x_name="range_ratio", irrelevant=frozenset({"velocity_ratio"})
-    ),
-    "random-walk": Sweep(figure="fig5_team_size", x_name="num_robots"),
-    "flocking": Sweep(figure="fig6_flocking", x_name="velocity_ratio"),
+    "stationary": Sweep("fig4_transmit_power", "range_ratio", irrelevant=("velocity_ratio",)),
+    "random-walk": Sweep("fig5_team_size", "num_robots"),
+    "flocking": Sweep("fig6_flocking", "velocity_ratio"),
 }
 
 
 @cache
 def points() -> tuple[Point, ...]:
     """Return all points of all curves, in the order of the file."""
-    _, rows = read_rows(Path(__file__).with_suffix(".csv"), "table", MAX_BYTES)
-    return tuple(
-        msgspec.convert(row | {"cost": COSTS[row["cost"]]}, Point, strict=False) for _, row in rows
-    )
+    _, rows = read_rows(Path(__file__).with_suffix(".csv"), "table", 1_000_000)
+    named = [row | {"cost": COSTS[row["cost"]]} for _, row in rows]
+    return msgspec.convert(named, tuple[Point, ...], strict=False)
 
 
 def published(policy: str, mission: Mission) -> dict[str, Point]:
-    """Return what the paper reports for one of `POLICIES` in a regime, by cost.
+    """Return what the paper reports for one of `POLICIES` in a regime, by cost, if it does.
 
-    Empty where the paper reports nothing, as where the regime is not its preset's in all that its
-    figure does not sweep.
+    It does only where the regime is its preset's in all that the figure does not sweep.
     """
     if mission.task not in SWEEPS or mission.preset not in PAPERS:
         return {}
     sweep = SWEEPS[mission.task]
-    free = {name: getattr(mission, name) for name in {sweep.x_name, *sweep.irrelevant}}
+    free = {name: getattr(mission, name) for name in (sweep.x_name, *sweep.irrelevant)}
     if mission != PAPERS[mission.preset](mission.task, **free):
         return {}
     x = getattr(mission, sweep.x_name)

@@ -140,8 +140,7 @@ def read_results(path: Path) -> list[Result]:
             raise ValueError(f"{what} lacks the columns {', '.join(missing)}")
         if not rows:
             raise ValueError(f"{what} has no rows")
-        present = [(n, {FORMER_NAMES.get(k, k): v for k, v in row.items()}) for n, row in rows]
-        return [_result(f"{what}, line {line}", row) for line, row in present]
+        return [_result(f"{what}, line {line}", row) for line, row in rows]
     except ValueError as error:
         raise ValueError(f"{error}; make them with `swarm-mj evaluate --csv FILE`") from error
 
@@ -153,9 +152,10 @@ def write_csv(path: Path, results: Iterable[Result]) -> None:
 
 def _result(place: str, row: dict[str, str]) -> Result:
     """Return one row's result; `place` names the row in messages."""
-    given = (spec for spec in fields(Result) if spec.name in row)
+    present = {FORMER_NAMES.get(name, name): cell for name, cell in row.items()}
+    given = (spec for spec in fields(Result) if spec.name in present)
     try:
-        return Result(**{spec.name: _value(spec, row[spec.name]) for spec in given})
+        return Result(**{spec.name: _value(spec, present[spec.name]) for spec in given})
     except ValueError as error:
         raise ValueError(f"{place}: {error}") from error
 

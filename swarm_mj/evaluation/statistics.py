@@ -13,20 +13,15 @@ ROUNDING = 1e-12  # samples that differ by no more than this share of their size
 
 
 def spread(samples: Float[np.ndarray, "n"]) -> dict[str, float | None]:
-    """Return mean, errors and quantiles of independent samples, in their own unit.
+    """Return mean, errors and quantiles of independent samples, one or more, in their own unit.
 
-    `std` is the sample's standard deviation, `sem` the mean's standard error, `ci_low` and
-    `ci_high` the ends of `bootstrap_interval`; p95 is linear between samples.
-
-    Raises:
-        ValueError: There are no samples.
+    `std` is the sample's standard deviation (n - 1 below), `sem` the mean's standard error,
+    `ci_low` and `ci_high` the ends of `bootstrap_interval`; p95 is linear between samples.
     """
-    if samples.size == 0:
-        raise ValueError("statistics need at least 1 sample, not 0")
     ci_low, ci_high = bootstrap_interval(samples)
     return {
         "mean": float(np.mean(samples)),
-        "std": standard_deviation(samples),
+        "std": float(np.std(samples, ddof=1)) if samples.size > 1 else None,
         "sem": standard_error(samples),
         "ci_low": ci_low,
         "ci_high": ci_high,
@@ -36,15 +31,9 @@ def spread(samples: Float[np.ndarray, "n"]) -> dict[str, float | None]:
     }
 
 
-def standard_deviation(samples: Float[np.ndarray, "n"]) -> float | None:
-    """Return the sample's standard deviation (n - 1 below); None of fewer than two samples."""
-    return float(np.std(samples, ddof=1)) if samples.size > 1 else None
-
-
 def standard_error(samples: Float[np.ndarray, "n"]) -> float | None:
     """Return the mean's standard error, std / sqrt(n); None of fewer than two samples."""
-    std = standard_deviation(samples)
-    return None if std is None else std / math.sqrt(samples.size)
+    return float(np.std(samples, ddof=1)) / math.sqrt(samples.size) if samples.size > 1 else None
 
 
 def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> tuple[float | None, float | None]:
@@ -71,12 +60,5 @@ def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> tuple[float | None, f
 
 
 def quantile_of_counts(counts: Int[np.ndarray, "bins"], share: float) -> int:
-    """Return the first bin at or below which at least this share of all counts lies.
-
-    Raises:
-        ValueError: Nothing was counted.
-    """
-    total = int(np.sum(counts))
-    if total == 0:
-        raise ValueError("a quantile needs at least 1 count, not 0")
-    return int(np.searchsorted(np.cumsum(counts), share * total))
+    """Return the first bin at or below which at least this share of all counts lies."""
+    return int(np.searchsorted(np.cumsum(counts), share * int(np.sum(counts))))

@@ -18,13 +18,7 @@ from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components, digest
 from swarm_mj.policies.policy import Parameters, Policy
-from swarm_mj.policies.registry import (
-    check_used,
-    flown_name,
-    is_learned,
-    is_own_policy,
-    normalised,
-)
+from swarm_mj.policies.registry import check_used, flown_name, is_learned, is_own_policy, normalised
 from swarm_mj.simulation.swarm import MAX_SEED
 from swarm_mj.system.fields import check, setting
 from swarm_mj.system.interrupt import deferred_interrupt
@@ -85,9 +79,8 @@ class Study:
         for regime in self.regimes:
             self.components.made(regime)
         if self.features:
-            check_used(
-                self.features, (self.make_policy(name, self.regimes[0]) for name in self.policies)
-            )
+            made = (self.make_policy(name, self.regimes[0]) for name in self.policies)
+            check_used(self.features, made)
         asked = list(product(self.regimes, self.policies))
         if len(set(asked)) < len(asked):
             raise ValueError("an evaluation needs each policy and each regime once")
@@ -146,21 +139,18 @@ class Study:
     def task_cost(self, regime: Mission) -> tuple[str, str] | None:
         """Return the name and the unit of a regime's task cost; None if its controller has none."""
         controller = self.components.made(regime).controller or controller_of(regime)
-        if not isinstance(controller, Costed):
-            return None
-        return controller.cost_name, controller.cost_unit
+        is_costed = isinstance(controller, Costed)
+        return (controller.cost_name, controller.cost_unit) if is_costed else None
 
     def config(self, policy: str, regime: Mission) -> dict[str, Any]:
         """All that a policy's missions in a regime depend on, but for their seeds."""
-        return {
-            **asdict(regime),
-            "policy": policy,
-            **self.parameters[regime, policy],
-            **self.components.names,
-        }
+        parameters = self.parameters[regime, policy]
+        return {**asdict(regime), "policy": policy, **parameters, **self.components.names}
 
     def header(self) -> dict[str, Any]:
         """All that the batches' costs depend on, as JSON gives it back."""
+        own = [name for name in self.policies if is_own_policy(name)]
+        own += [*self.features, *self.components.names.values()]
         header = {
             "version": version(),
             "commit": commit(),
@@ -168,16 +158,11 @@ class Study:
             "episodes": self.episodes,
             "seed": self.seed,
             "missions side by side": BATCH_SIZE,
-            "own code": {name: digest(name) for name in self._own_names()},
+            "own code": {name: digest(name) for name in own},
             "baseline": self.compared_to,
             "policies and regimes": [self.config(policy, regime) for regime, policy in self.pairs],
         }
         return json.loads(json.dumps(header))
-
-    def _own_names(self) -> list[str]:
-        """Return the names of all parts that are the user's own."""
-        own = [name for name in self.policies if is_own_policy(name)]
-        return [*own, *self.features, *self.components.names.values()]
 
 
 def num_flown(study: Study, costs: Mapping[int, BatchCosts]) -> int:
@@ -185,35 +170,32 @@ def num_flown(study: Study, costs: Mapping[int, BatchCosts]) -> int:
     return sum(len(study.batches[index].seeds) for index in costs)
 
 
-def study_bar(
-    study: Study, costs: Mapping[int, BatchCosts], console: Console, *, after_s: float = 0.0
-) -> WorkBar:
-    """Return a bar of a study's missions, as far as they are flown."""
-    total, done = study.episodes * len(study.pairs), num_flown(study, costs)
-    return WorkBar("Flying", total, "missions", completed=done, console=console, after_s=after_s)
-
-
 def fly_study(
     study: Study,
     costs: dict[int, BatchCosts],
     num_jobs: int,
     keep: Callable[[int, BatchCosts], None] | None,
-    bar: WorkBar,
+    console: Console,
+    *,
+    after_s: float = 0.0,
 ) -> None:
     """Fly the batches that `costs` lacks, into `costs` and where they are kept.
+
+    A bar on the console shows how far it is, once that takes longer than `after_s`.
 
     Raises:
         KeyboardInterrupt: Ctrl-C was pressed; `costs` has all batches that were flown.
     """
     left = [index for index in range(len(study.batches)) if index not in costs]
     flown = run_jobs(fly_batch, [study.batches[index] for index in left], num_jobs)
+    total, done = study.episodes * len(study.pairs), num_flown(study, costs)
+    bar = WorkBar("Flying", total, "missions", completed=done, console=console, after_s=after_s)
     with bar, closing(flown):
         for which, batch_costs in flown:
-            index = left[which]
             with deferred_interrupt() as is_interrupted:
-                costs[index] = batch_costs
+                costs[left[which]] = batch_costs
                 if keep:
-                    keep(index, batch_costs)
+                    keep(left[which], batch_costs)
             if is_interrupted():
                 raise KeyboardInterrupt
             bar.move_to(num_flown(study, costs))

@@ -27,12 +27,7 @@ def results_text(results: Sequence[Result]) -> str:
 
 
 def print_results(results: Sequence[Result], **where: Any) -> None:
-    """Print a table per regime.
-
-    Args:
-        results: One or more; those of a regime stand together.
-        **where: Arguments of the console that prints; usually none.
-    """
+    """Print a table per regime, whose results stand together, on a console made of `where`."""
     how: dict[str, Any] = {"highlight": False, "markup": False, "force_jupyter": False, **where}
     console = Console(**how)
     longest = max(len(line) for result in results for line in _name(result).splitlines())
@@ -51,13 +46,16 @@ def print_results(results: Sequence[Result], **where: Any) -> None:
 def _regime(result: Result) -> str:
     """Return a table's title."""
     parts: dict[str, object] = {
-        name: getattr(result, name) for name in ("radio", "channel", "controller", "scene")
+        "radio": result.radio,
+        "channel": result.channel,
+        "controller": result.controller,
+        "scene": result.scene,
+        "bit rate": None if result.bit_rate is None else bits_per_second(result.bit_rate),
+        "arena": None if result.arena == OPEN else result.arena,
+        "known": None if result.prior_knowledge == NOTHING else result.prior_knowledge,
     }
-    parts["bit rate"] = None if result.bit_rate is None else bits_per_second(result.bit_rate)
-    parts["arena"] = None if result.arena == OPEN else result.arena
-    known, failing = result.prior_knowledge, result.failure_fraction
-    parts["known"] = None if known == NOTHING else known
     own = "".join(f",\n{kind} {name}" for kind, name in parts.items() if name)
+    failing = result.failure_fraction
     fate = f", {failing:.0%} of the robots off half-way" if failing else ""
     return (
         f"{result.task}, preset {result.preset}: {result.num_robots} robots, range ratio "
@@ -67,8 +65,9 @@ def _regime(result: Result) -> str:
 
 
 def _table(results: Sequence[Result]) -> Table:
-    """Return a table with two lines a policy."""
-    columns = COLUMNS | _columns_of(results[0])
+    """Return a table with two lines a policy, and the columns of the task."""
+    of_task = OF_FLOCKS if results[0].task == "flocking" else OF_OTHERS
+    columns = COLUMNS | (OF_COSTED if _has_own_cost(results[0]) else of_task)
     table = Table(box=SIMPLE_HEAD, show_edge=False, padding=0)
     table.add_column("policy", no_wrap=True)
     for name in columns:
@@ -93,9 +92,15 @@ def _interval(result: Result, name: str) -> str:
     return "" if low is None else f"{low:.2f}, {_number(high)}"
 
 
-def _reached(result: Result) -> float | None:
-    """Return the share of packets that their addressee decoded; of broadcasts, any robot."""
-    return result.heard_ratio if result.delivery_ratio is None else result.delivery_ratio
+def _difference(result: Result, cost: str) -> str:
+    mean = getattr(result, f"{cost}_difference_mean")
+    return f"{_number(mean)}\n{_interval(result, f'{cost}_difference')}"
+
+
+def _packets(result: Result) -> str:
+    """Return packets per window, and the share decoded by the addressee; of broadcasts, by any."""
+    reached = result.heard_ratio if result.delivery_ratio is None else result.delivery_ratio
+    return f"{_number(result.packets_per_window)}\n{_number(reached, '.0%')}"
 
 
 def _published(result: Result) -> str:
@@ -104,32 +109,23 @@ def _published(result: Result) -> str:
     return _mean(result, "published_aoi") + ("" if variance is None else f"\n{variance:.4f}")
 
 
-COLUMNS: dict[str, Callable[[Result], str]] = {
+Columns = dict[str, Callable[[Result], str]]
+COLUMNS: Columns = {
     "AoI ± SEM\n95 %": lambda r: f"{_mean(r, 'aoi')}\n{_interval(r, 'aoi')}",
     "median\np95": lambda r: f"{_number(r.aoi_median)}\n{_number(r.aoi_p95)}",
-    "difference\n95 %": lambda r: (
-        f"{_number(r.aoi_difference_mean)}\n{_interval(r, 'aoi_difference')}"
-    ),
-    "packets\nreached": lambda r: f"{_number(r.packets_per_window)}\n{_number(_reached(r), '.0%')}",
+    "difference\n95 %": lambda r: _difference(r, "aoi"),
+    "packets\nreached": _packets,
     "hearers\nbytes": lambda r: f"{_number(r.hearers_per_packet)}\n{_number(r.packet_bytes, ',d')}",
 }
-OF_TASKS: dict[str, Callable[[Result], str]] = {
+OF_COSTED: Columns = {
     "task cost\nat the end": lambda r: f"{_mean(r, 'task_cost')}\n{_mean(r, 'task_cost_last')}",
-    "difference\nof task cost": lambda r: (
-        f"{_number(r.task_cost_difference_mean)}\n{_interval(r, 'task_cost_difference')}"
-    ),
+    "difference\nof task cost": lambda r: _difference(r, "task_cost"),
 }
-OF_FLOCKS: dict[str, Callable[[Result], str]] = {
+OF_FLOCKS: Columns = {
     "velocity\nvariance": lambda r: _number(r.velocity_variance_mean, ".4f"),
     "published\nAoI, var.": _published,
 }
-
-
-def _columns_of(result: Result) -> dict[str, Callable[[Result], str]]:
-    """Return a task's own columns: its cost, if it has one, or else the published values."""
-    if _has_own_cost(result):
-        return OF_TASKS
-    return OF_FLOCKS if result.task == "flocking" else {"published\nAoI": _published}
+OF_OTHERS: Columns = {"published\nAoI": _published}
 
 
 def _has_own_cost(result: Result) -> bool:
@@ -163,13 +159,15 @@ def _below(results: Sequence[Result]) -> Iterator[str]:
 def _legend(results: Sequence[Result]) -> Iterator[str]:
     """Yield the meanings of the columns, a sentence each."""
     first = results[0]
-    yield "AoI: age of information, how old a robot's news of another is [windows]; mean over"
-    yield f"{first.episodes} missions from seed {first.seed}, standard error and 95 % interval."
-    yield "Median and p95 are over missions."
-    yield f"Difference: AoI minus that of {first.baseline}, mission by mission."
-    yield "Packets: sent in a window, and the share that reached its addressee or, of broadcasts,"
-    yield "at least one robot; hearers: robots that decoded a broadcast, on average."
-    yield "Bytes: of a packet."
+    yield (
+        "AoI: age of information, how old a robot's news of another is [windows]; mean over "
+        f"{first.episodes} missions from seed {first.seed}, standard error and 95 % interval. "
+        "Median and p95 are over missions. "
+        f"Difference: AoI minus that of {first.baseline}, mission by mission. "
+        "Packets: sent in a window, and the share that reached its addressee or, of broadcasts, "
+        "at least one robot; hearers: robots that decoded a broadcast, on average. "
+        "Bytes: of a packet."
+    )
     costs = [f"{r.task_cost_name} [{r.task_cost_unit}]" for r in results if _has_own_cost(r)]
     for cost in dict.fromkeys(costs):
         yield f"Task cost: {cost}, mean over windows ± standard error over missions."

@@ -60,22 +60,19 @@ def test_columns_stand_in_the_order_of_the_fields(tmp_path):
     assert row.startswith(f"mst,flocking,reference,4,{5 / 300!r},")
 
 
-def test_columns_that_no_result_has_are_passed_over(tmp_path):
-    rows = [asdict(some_result()) | {"remark": "by hand"}]
-    with (tmp_path / "r.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, ["remark", *reversed(COLUMNS)])
-        writer.writeheader()
-        writer.writerows(rows)
-    assert read_results(tmp_path / "r.csv") == [some_result()]
-
-
-def with_cells(path, **cells):
-    """A file of two rows, the second with other cells."""
-    rows = [asdict(some_result()), asdict(some_result()) | cells]
+def with_rows(path, *rows):
     with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS)
+        writer = csv.DictWriter(file, rows[0])
         writer.writeheader()
         writer.writerows(rows)
+    return path
+
+
+def test_columns_that_no_result_has_are_passed_over_in_any_order(tmp_path):
+    row = dict(reversed(asdict(some_result()).items()))
+    assert read_results(with_rows(tmp_path / "r.csv", row | {"remark": "by hand"})) == [
+        some_result()
+    ]
 
 
 @pytest.mark.parametrize(
@@ -104,7 +101,8 @@ def with_cells(path, **cells):
     ],
 )
 def test_cells_that_are_not_what_they_must_be(tmp_path, cells, complaint):
-    with_cells(tmp_path / "r.csv", **cells)
+    row = asdict(some_result())
+    with_rows(tmp_path / "r.csv", row, row | cells)
     with pytest.raises(ValueError, match=complaint):
         read_results(tmp_path / "r.csv")
 
@@ -115,24 +113,15 @@ def test_cells_that_are_not_what_they_must_be(tmp_path, cells, complaint):
 )
 def test_older_files_that_lack_columns_with_defaults_are_read(tmp_path, new, default):
     old = {name: cell for name, cell in asdict(some_result()).items() if name not in new}
-    with (tmp_path / "old.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, old)
-        writer.writeheader()
-        writer.writerow(old)
-    assert read_results(tmp_path / "old.csv") == [some_result(**dict.fromkeys(new, default))]
+    assert read_results(with_rows(tmp_path / "old.csv", old)) == [
+        some_result(**dict.fromkeys(new, default))
+    ]
 
 
 def test_missing_columns_are_named(tmp_path):
     without = [name for name in COLUMNS if name not in ("aoi_sem", "task")]
     (tmp_path / "r.csv").write_text(",".join(without) + "\n")
     with pytest.raises(ValueError, match=r"r\.csv lacks the columns task, aoi_sem; make them with"):
-        read_results(tmp_path / "r.csv")
-
-
-@pytest.mark.parametrize("cells", [["mst"], [*["1"] * len(COLUMNS), "1"]])
-def test_rows_need_as_many_cells_as_columns(tmp_path, cells):
-    (tmp_path / "r.csv").write_text(",".join(COLUMNS) + "\n" + ",".join(cells) + "\n")
-    with pytest.raises(ValueError, match="line 2: as many cells as columns"):
         read_results(tmp_path / "r.csv")
 
 

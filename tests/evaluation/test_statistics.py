@@ -12,7 +12,6 @@ from swarm_mj.evaluation.statistics import (
     bootstrap_interval,
     quantile_of_counts,
     spread,
-    standard_deviation,
     standard_error,
 )
 
@@ -33,7 +32,7 @@ def test_spread_by_hand():
 def test_errors_as_scipys():
     samples = np.random.default_rng(0).gamma(2.0, size=30)
     assert standard_error(samples) == pytest.approx(scipy.stats.sem(samples))
-    assert standard_deviation(samples) == pytest.approx(scipy.stats.tstd(samples))
+    assert spread(samples)["std"] == pytest.approx(scipy.stats.tstd(samples))
 
 
 def test_the_interval_is_near_a_plain_bootstraps_and_students():
@@ -78,13 +77,6 @@ def test_one_sample_has_no_errors():
 def test_few_samples_still_have_an_interval_around_them(samples):
     low, high = bootstrap_interval(np.array(samples))
     assert min(samples) <= low <= high <= max(samples)
-
-
-def test_no_samples_are_a_clear_error():
-    with pytest.raises(ValueError, match="at least 1 sample"):
-        spread(np.array([]))
-    with pytest.raises(ValueError, match="at least 1 count"):
-        quantile_of_counts(np.zeros(4, dtype=np.int64), 0.95)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from swarm_mj.evaluation import study as study_module
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.results import COLUMNS
 from swarm_mj.evaluation.study import Study
-from swarm_mj.evaluation.summary import merge, summarise, write_evaluated
+from swarm_mj.evaluation.summary import summarise, write_evaluated
 from swarm_mj.mission import paper, reference
 
 STATIONARY = reference("stationary")
@@ -32,8 +32,8 @@ def costs(aoi, **overrides):
         "aoi_floor": [age / 4.0 for age in aoi],
         "velocity_variance": [age / 10.0 for age in aoi],
         "hops": [1.0] * n,
-        "task_cost": [age / 10.0 for age in aoi],
-        "task_cost_last": [age / 20.0 for age in aoi],
+        "task_cost": [None] * n,
+        "task_cost_last": [None] * n,
         "complete_window": [None] * n,
         "packets_sent": [1000] * n,
         "packets_transmitted": [1500] * n,
@@ -69,59 +69,66 @@ SILENT = costs([1.0], packets_sent=[0], packets_delivered=[None], packets_heard=
 MADE_BY = {"version": "1.2.3", "commit": "abc"}
 
 
-def results(study=None):
-    """The results of both policies."""
-    parts = dict(enumerate([*MST, *ROUND_ROBIN]))
-    return [each.result for each in summarise(study or two_policies(), parts, MADE_BY)]
+def evaluated(study=None, batches=(*MST, *ROUND_ROBIN)):
+    return summarise(study or two_policies(), dict(enumerate(batches)), MADE_BY)
 
 
-def test_age_of_information_by_hand():
-    """40, 43, 46: the mean's distances are 3, 0, 3; 18 / 2 = 9 is the variance."""
-    mst, _ = results()
-    assert mst.aoi_mean == 43.0
-    assert mst.aoi_std == pytest.approx(3.0)
-    assert mst.aoi_sem == pytest.approx(3.0 / math.sqrt(3.0))
-    assert mst.aoi_median == 43.0
-    assert mst.aoi_p95 == pytest.approx(43.0 + 0.9 * 3.0)
-    assert mst.aoi_worst == 46.0
-    assert mst.aoi_steady_mean == 42.5
-    assert mst.aoi_floor_mean == pytest.approx(43.0 / 4.0)
-    assert mst.aoi_floor_sem == pytest.approx(3.0 / 4.0 / math.sqrt(3.0))
-    assert mst.aoi_ci_low < 43.0 < mst.aoi_ci_high
+def results(*given):
+    return [each.result for each in evaluated(*given)]
 
 
-def test_ages_of_all_batches_are_pooled():
-    """110 ages: 95 and 5 of 0, five of 10 half windows, five of 301. 95 % are the first 104.5."""
-    mst, _ = results()
-    assert mst.age_p95 == 5.0
-    assert mst.age_worst == 150.5
+def with_task_costs():
+    """A tenth of the age in metres, at the end a twentieth."""
+    return [
+        replace(
+            batch,
+            task_cost=[age / 10.0 for age in batch.aoi],
+            task_cost_last=[age / 20.0 for age in batch.aoi],
+        )
+        for batch in (*MST, *ROUND_ROBIN)
+    ]
 
 
-def test_velocity_variance_by_hand():
-    mst, _ = results()
-    assert mst.velocity_variance_mean == pytest.approx(4.3)
-    assert mst.velocity_variance_std == pytest.approx(0.3)
-    assert mst.velocity_variance_sem == pytest.approx(0.3 / math.sqrt(3.0))
-    assert mst.velocity_variance_median == pytest.approx(4.3)
-    assert mst.velocity_variance_ci_low < 4.3 < mst.velocity_variance_ci_high
+BY_HAND = {
+    # 40, 43, 46: the mean's distances are 3, 0, 3; 18 / 2 = 9 is the variance.
+    "aoi_mean": 43.0,
+    "aoi_std": 3.0,
+    "aoi_sem": 3.0 / math.sqrt(3.0),
+    "aoi_median": 43.0,
+    "aoi_p95": 43.0 + 0.9 * 3.0,
+    "aoi_worst": 46.0,
+    "aoi_steady_mean": 42.5,
+    "aoi_floor_mean": 43.0 / 4.0,
+    "aoi_floor_sem": 3.0 / 4.0 / math.sqrt(3.0),
+    # 110 ages: 95 and 5 of 0, five of 10 half windows, five of 301. 95 % are the first 104.5.
+    "age_p95": 5.0,
+    "age_worst": 150.5,
+    "velocity_variance_mean": 4.3,
+    "velocity_variance_std": 0.3,
+    "velocity_variance_sem": 0.3 / math.sqrt(3.0),
+    "velocity_variance_median": 4.3,
+    "delivery_ratio": 0.25,
+    "packets_per_window": 2.0,
+    "hops_mean": 3.0,
+    "complete_window_median": 40.0,
+    "complete_share": 2 / 3,
+    # 1500 packets of 367 bytes, responses too, in missions of 500 windows of 0.1 s.
+    "packet_bytes": 367,
+    "bytes_per_second": 1500 * 367 / 50.0,
+    "published_aoi_mean": 43.3069,
+    "published_aoi_sem": 0.97449,
+}
+NONE = ("heard_ratio", "hearers_per_packet", "task_cost_name", "task_cost_mean", "task_cost_sem")
 
 
-def test_talk_by_hand():
+def test_costs_by_hand():
     mst, round_robin = results()
-    assert mst.delivery_ratio == 0.25
-    assert mst.packets_per_window == 2.0
-    assert mst.hops_mean == 3.0
-    assert (mst.complete_window_median, mst.complete_share) == (40.0, pytest.approx(2 / 3))
+    assert {name: getattr(mst, name) for name in BY_HAND} == pytest.approx(BY_HAND)
+    assert {getattr(mst, name) for name in NONE} == {None}
+    assert mst.aoi_ci_low < 43.0 < mst.aoi_ci_high
+    assert mst.velocity_variance_ci_low < 4.3 < mst.velocity_variance_ci_high
     assert (round_robin.delivery_ratio, round_robin.packets_per_window) == (None, 0.0)
-    assert [mst.heard_ratio, mst.hearers_per_packet, mst.payload] == [None, None, "none"]
     assert (round_robin.complete_window_median, round_robin.complete_share) == (None, 0.0)
-
-
-def test_bytes_by_hand():
-    """1500 packets of 367 bytes, responses too, in missions of 500 windows of 0.1 s."""
-    mst, _ = results()
-    assert mst.packet_bytes == 367
-    assert mst.bytes_per_second == pytest.approx(1500 * 367 / 50.0)
 
 
 def test_broadcasts_by_hand():
@@ -134,7 +141,7 @@ def test_broadcasts_by_hand():
         receptions=[1000, 0, 1400],
     )
     study = Study(policies=("planner",), regimes=(STATIONARY,), episodes=3, seed=5)
-    (planner,) = (each.result for each in summarise(study, {0: broadcast, 1: SILENT}, MADE_BY))
+    (planner,) = results(study, (broadcast, SILENT))
     assert planner.packets_per_window == pytest.approx(1500 / (4 * 500))
     assert (planner.heard_ratio, planner.hearers_per_packet) == (0.4, 1.6)
     assert planner.delivery_ratio is None
@@ -163,19 +170,14 @@ def test_the_baseline_can_be_named():
     assert round_robin.aoi_difference_mean is None
 
 
-def test_the_regime_the_paper_and_the_origin_stand_beside():
+def test_the_regime_and_the_origin_stand_beside():
     mst, round_robin = results()
-    assert (mst.policy, mst.task, mst.preset, mst.num_robots) == (
-        *("mst", "stationary", "reference", 40),
-    )
-    assert (mst.episodes, mst.seed, mst.num_windows, mst.boundary) == (3, 5, 500, "reflect")
-    assert mst.probability is not None
-    assert round_robin.probability is None
-    assert mst.published_aoi_mean == 43.3069
-    assert mst.published_aoi_sem == pytest.approx(0.97449)
-    assert mst.published_velocity_variance_mean is None
-    assert mst.version
     config = json.loads(mst.config)
+    assert (mst.policy, mst.task, mst.preset) == ("mst", "stationary", "reference")
+    assert (mst.num_robots, mst.num_windows, mst.boundary) == (40, 500, "reflect")
+    assert (mst.episodes, mst.seed, mst.payload) == (3, 5, "none")
+    assert (mst.version, mst.commit) == ("1.2.3", "abc")
+    assert mst.published_velocity_variance_mean is round_robin.probability is None
     assert config["policy"] == "mst"
     assert config["probability"] == mst.probability
     assert config["max_acceleration_mps2"] == 10.0
@@ -189,8 +191,7 @@ def test_flocks_have_a_published_variance_too():
 
 def test_one_mission_has_no_errors_and_a_difference():
     study = replace(two_policies(), episodes=1)
-    parts = {0: costs([4.0]), 1: costs([6.0])}
-    mst, round_robin = (each.result for each in summarise(study, parts, MADE_BY))
+    mst, round_robin = results(study, (costs([4.0]), costs([6.0])))
     for name in ("std", "sem", "ci_low", "ci_high", "steady_sem", "floor_sem"):
         assert getattr(mst, f"aoi_{name}") is None
     assert (mst.aoi_mean, mst.aoi_median, mst.aoi_p95, mst.aoi_worst) == (4.0,) * 4
@@ -199,28 +200,14 @@ def test_one_mission_has_no_errors_and_a_difference():
 
 
 def test_missions_come_in_the_order_of_their_seeds_whatever_was_done_first():
-    parts = dict(enumerate([*MST, *ROUND_ROBIN]))
-    backwards = dict(reversed(parts.items()))
-    evaluated = summarise(two_policies(), backwards, MADE_BY)
-    assert evaluated == summarise(two_policies(), parts, MADE_BY)
-    assert evaluated[0].aoi == [40.0, 46.0, 43.0]
-    assert evaluated[1].velocity_variance == pytest.approx([4.1, 4.8, 4.9])
-
-
-def test_a_missing_batch_is_a_clear_error():
-    with pytest.raises(ValueError, match="3 of 4 batches are missing"):
-        summarise(two_policies(), {0: MST[0]}, MADE_BY)
-
-
-def test_merging_joins_lists_and_adds_ages():
-    merged = merge(MST)
-    assert merged.aoi == [40.0, 46.0, 43.0]
-    assert merged.complete_window == [30, None, 40]
-    assert (merged.ages[0], merged.ages[10], merged.ages[301]) == (100, 5, 5)
+    backwards = dict(reversed(list(enumerate([*MST, *ROUND_ROBIN]))))
+    assert summarise(two_policies(), backwards, MADE_BY) == evaluated()
+    assert evaluated()[0].aoi == [40.0, 46.0, 43.0]
+    assert evaluated()[1].velocity_variance == pytest.approx([4.1, 4.8, 4.9])
 
 
 def test_a_tasks_cost_is_named_and_compared():
-    mst, round_robin = results(two_policies(paper("coverage", num_robots=5)))
+    mst, round_robin = results(two_policies(paper("coverage", num_robots=5)), with_task_costs())
     assert (mst.task_cost_name, mst.task_cost_unit) == ("distance to the nearest robot", "m")
     assert mst.task_cost_mean == pytest.approx((4.0 + 4.6 + 4.3) / 3)
     assert mst.task_cost_last_mean == pytest.approx(4.3 / 2)
@@ -229,31 +216,23 @@ def test_a_tasks_cost_is_named_and_compared():
     assert mst.published_aoi_mean is None
 
 
-def test_a_task_without_a_cost_has_none():
-    mst, _ = results()
-    assert mst.task_cost_name is None
-    assert mst.task_cost_mean is None
-
-
 def test_a_floor_that_no_mission_has_is_left_out():
     unknown = [costs([1.0, 2.0], aoi_floor=[None, None]), costs([3.0], aoi_floor=[None])]
-    found, _ = summarise(two_policies(), dict(enumerate(unknown + ROUND_ROBIN)), MADE_BY)
-    assert (found.result.aoi_floor_mean, found.result.aoi_floor_sem) == (None, None)
+    found, _ = results(None, (*unknown, *ROUND_ROBIN))
+    assert (found.aoi_floor_mean, found.aoi_floor_sem) == (None, None)
 
 
 def test_json_has_the_columns_with_each_missions_costs(tmp_path):
-    parts = dict(enumerate([*MST, *ROUND_ROBIN]))
-    evaluated = summarise(two_policies(), parts, MADE_BY)
-    write_evaluated(tmp_path / "r.json", evaluated)
+    found = evaluated(two_policies(paper("coverage", num_robots=5)), with_task_costs())
+    write_evaluated(tmp_path / "r.json", found)
     first, second = json.loads((tmp_path / "r.json").read_text())["results"]
     costs_of = ["episode_aoi", "episode_velocity_variance", "episode_task_cost"]
     assert list(first) == [*COLUMNS, *costs_of]
     assert first["episode_aoi"] == [40.0, 46.0, 43.0]
     assert second["episode_task_cost"] == pytest.approx([4.1, 4.8, 4.9])
-    assert {name: second[name] for name in COLUMNS} == asdict(evaluated[1].result)
+    assert {name: second[name] for name in COLUMNS} == asdict(found[1].result)
     (tmp_path / "r.json").unlink()
-    without = [replace(evaluated[0], task_cost=None, aoi=[math.nan])]
-    assert "episode_task_cost" not in without[0].row
+    assert "episode_task_cost" not in evaluated()[0].row
     with pytest.raises(ValueError, match="not JSON compliant"):
-        write_evaluated(tmp_path / "r.json", without)
+        write_evaluated(tmp_path / "r.json", [replace(found[0], aoi=[math.nan])])
     assert not list(tmp_path.iterdir())

@@ -2,8 +2,8 @@
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 from swarm_mj.evaluation.published import SWEEPS, points
 from swarm_mj.mission import PAPERS, Mission, Task
@@ -20,23 +20,14 @@ OPTIONS = {
 # there, and they take several times as long as all others together.
 DRAWN = (
     "tdma",  # first: the others are compared to it
-    "random-flooding",
-    "round-robin",
-    "mst",
-    "aloha",
-    "gossip",
-    "spatial-tdma",
-    "planner",
-    WITHOUT_PAYLOAD,
-    "gnn",
-    "greedy-oracle",
+    *("random-flooding", "round-robin", "mst", "aloha", "gossip", "spatial-tdma"),
+    *("planner", WITHOUT_PAYLOAD, "gnn", "greedy-oracle"),
 )
 PAPER_ONLY = ("planner", WITHOUT_PAYLOAD, "gnn")
 Scale = Literal["linear", "log"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Panel:
+class Panel(NamedTuple):
     """One pair of axes: a cost over the figure's x."""
 
     cost: str  # aoi or velocity_variance, as results and published points name it
@@ -44,8 +35,8 @@ class Panel:
     scale: Scale = "log"
 
 
-AOI = Panel(cost="aoi", label="age of information [windows]")
-VARIANCE = Panel(cost="velocity_variance", label="velocity variance [m²/s²]")
+AOI = Panel("aoi", "age of information [windows]")
+VARIANCE = Panel("velocity_variance", "velocity variance [m²/s²]")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,11 +65,8 @@ class ResultFigure:
     @property
     def fixed(self) -> tuple[str, ...]:
         """The numbers of the mission that are fixed in the figure."""
-        return tuple(
-            name
-            for name in OPTIONS
-            if name != self.x_name and name not in SWEEPS[self.task].irrelevant
-        )
+        free = {self.x_name, *SWEEPS[self.task].irrelevant}
+        return tuple(name for name in OPTIONS if name not in free)
 
     def mission(self, preset: str) -> Mission:
         """Return the missions' numbers as a preset has them; x is any."""
@@ -99,43 +87,40 @@ class ResultFigure:
 
 
 RESULT_FIGURES = {
-    figure.name: figure
-    for figure in (
-        ResultFigure(
-            name="fig3",
-            published="fig3_receptive_field",
-            title="Receptive field",
-            task="stationary",
-            x_name="receptive_field",
-            x_label="receptive field of the GNN [hops]",
-            panels=(replace(AOI, scale="linear"),),
-        ),
-        ResultFigure(
-            name="fig4",
-            published="fig4_transmit_power",
-            title="Transmit power",
-            task="stationary",
-            x_name="range_ratio",
-            x_label="range ratio: how far a packet reaches in silence [km]",
-            x_scale="log",
-        ),
-        ResultFigure(
-            name="fig5",
-            published="fig5_team_size",
-            title="Team size",
-            task="random-walk",
-            x_name="num_robots",
-            x_label="team size [robots]",
-        ),
-        ResultFigure(
-            name="fig6",
-            published="fig6_flocking",
-            title="Flocking",
-            task="flocking",
-            x_name="velocity_ratio",
-            x_label="velocity ratio: how far a robot gets along an axis [km in 50 s]",
-            panels=(AOI, VARIANCE),
-        ),
-    )
+    "fig3": ResultFigure(
+        name="fig3",
+        published="fig3_receptive_field",
+        title="Receptive field",
+        task="stationary",
+        x_name="receptive_field",
+        x_label="receptive field of the GNN [hops]",
+        panels=(AOI._replace(scale="linear"),),
+    ),
+    "fig4": ResultFigure(
+        name="fig4",
+        published="fig4_transmit_power",
+        title="Transmit power",
+        task="stationary",
+        x_name="range_ratio",
+        x_label="range ratio: how far a packet reaches in silence [km]",
+        x_scale="log",
+    ),
+    "fig5": ResultFigure(
+        name="fig5",
+        published="fig5_team_size",
+        title="Team size",
+        task="random-walk",
+        x_name="num_robots",
+        x_label="team size [robots]",
+    ),
+    "fig6": ResultFigure(
+        name="fig6",
+        published="fig6_flocking",
+        title="Flocking",
+        task="flocking",
+        x_name="velocity_ratio",
+        x_label="velocity ratio: how far a robot gets along an axis [km in 50 s]",
+        panels=(AOI, VARIANCE),
+    ),
 }
 FIGURES = (FLOCK, *RESULT_FIGURES)

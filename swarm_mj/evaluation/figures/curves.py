@@ -1,7 +1,7 @@
 """Curves from result files, and the published ones next to them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby
 from typing import Any
@@ -40,18 +40,18 @@ class Curve:
 
 def preset_of(results: Sequence[Result]) -> str:
     """Return the one preset of all results, one of the paper's; raise ValueError otherwise."""
-    presets = list(dict.fromkeys(result.preset for result in results))
-    if len(presets) > 1:
+    first, *others = dict.fromkeys(result.preset for result in results)
+    if others:
         raise ValueError(
-            f"results are of the presets {' and '.join(presets)}; draw one at a time, from files "
-            "of one preset each"
+            f"results are of the presets {' and '.join([first, *others])}; draw one at a time, "
+            "from files of one preset each"
         )
-    if presets[0] not in PAPERS:
+    if first not in PAPERS:
         raise ValueError(
             f"the paper's figures need a preset of the paper's, {' or '.join(PAPERS)}, not "
-            f"{presets[0]!r}"
+            f"{first!r}"
         )
-    return presets[0]
+    return first
 
 
 def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
@@ -82,12 +82,28 @@ def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
 
 
 def curves(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[Curve]:
-    """Return the published curves of a cost, then those of the figure's results.
+    """Return the published curves of a cost (aoi or velocity_variance), then the results' own.
 
     Raises:
-        ValueError: A cost (aoi or velocity_variance) is not positive.
+        ValueError: A cost is not positive.
     """
-    return _published(figure, cost) + _ours(figure, cost, results)
+    drawn = []
+    rows = [point for point in points() if (point.figure, point.cost) == (figure.published, cost)]
+    for method, its in groupby(rows, key=lambda point: point.policy or point.method):
+        values = [(point.x, point.mean, point.sem) for point in its]
+        is_level = not figure.sweeps_missions and len({value[1:] for value in values}) == 1
+        drawn.append(_curve(method, values, is_published=True, is_level=is_level))
+    more = {result.policy for result in results if carries_more(result)}
+    own: dict[tuple[str, bool], list[tuple[float, float, float]]] = {}
+    for result in results:
+        x = _x(figure, result)
+        # A policy without a receptive field is level: the same at both ends of the axis.
+        ends = (figure.xs[0], figure.xs[-1]) if x is None else (x,)
+        mean, sem = _positive(figure, cost, result)
+        own.setdefault((result.policy, x is None), []).extend((end, mean, sem) for end in ends)
+    for (policy, is_level), values in own.items():
+        drawn.append(_curve(policy, values, is_level=is_level, carries_more=policy in more))
+    return drawn
 
 
 def budgets(results: Sequence[Result]) -> list[int]:
@@ -99,51 +115,29 @@ def budgets(results: Sequence[Result]) -> list[int]:
     numbers = set()
     for result in results:
         number = _config(result).get("decisions")
-        if number is None:
-            continue
-        if not (type(number) is int and 0 < number <= MAX_DECISIONS):
+        if number is not None and not (type(number) is int and 0 < number <= MAX_DECISIONS):
             raise ValueError(
                 f"decisions of {result.policy} must be a number from 1 to {MAX_DECISIONS}, not "
                 f"{number!r:.60}"
             )
         numbers.add(number)
-    return sorted(numbers)
+    return sorted(numbers - {None})
 
 
-def _ours(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[Curve]:
-    rows: dict[tuple[str, bool], list[tuple[float, float, float]]] = {}
-    more = {result.policy for result in results if carries_more(result)}
-    for result in results:
-        mean, sem = getattr(result, f"{cost}_mean"), getattr(result, f"{cost}_sem")
-        if mean <= 0.0:
-            raise ValueError(
-                f"{cost}_mean must be above 0, not {mean:g} ({_where(figure, result)}); make it "
-                f"again with `{figure.command(result.preset)}`"
-            )
-        x = _x(figure, result)
-        # A policy without a receptive field is level: the same at both ends of the axis.
-        for end in (figure.xs[0], figure.xs[-1]) if x is None else (x,):
-            row = (end, mean, math.nan if sem is None else sem)
-            rows.setdefault((result.policy, x is None), []).append(row)
-    return [
-        _curve(policy, its, is_level=is_level, carries_more=policy in more)
-        for (policy, is_level), its in rows.items()
-    ]
-
-
-def _published(figure: ResultFigure, cost: str) -> list[Curve]:
-    rows = [p for p in points() if p.figure == figure.published and p.cost == cost]
-    drawn = []
-    for method, its in groupby(rows, key=lambda point: point.policy or point.method):
-        values = [(point.x, point.mean, point.sem) for point in its]
-        is_level = not figure.sweeps_missions and len({value[1:] for value in values}) == 1
-        drawn.append(_curve(method, values, is_published=True, is_level=is_level))
-    return drawn
-
-
-def _curve(method: str, rows: Sequence[tuple[float, float, float]], **traits: bool) -> Curve:
+def _curve(method: str, rows: Iterable[tuple[float, float, float]], **traits: bool) -> Curve:
     x, mean, sem = np.array(sorted(rows), dtype=float).T
     return Curve(method=method, x=x, mean=mean, sem=sem, **traits)
+
+
+def _positive(figure: ResultFigure, cost: str, result: Result) -> tuple[float, float]:
+    """Return a cost's mean and standard error; raise ValueError for what no log axis shows."""
+    mean, sem = getattr(result, f"{cost}_mean"), getattr(result, f"{cost}_sem")
+    if mean <= 0.0:
+        raise ValueError(
+            f"{cost}_mean must be above 0, not {mean:g} ({_where(figure, result)}); make it "
+            f"again with `{figure.command(result.preset)}`"
+        )
+    return mean, math.nan if sem is None else sem
 
 
 def _x(figure: ResultFigure, result: Result) -> float | None:

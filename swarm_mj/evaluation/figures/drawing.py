@@ -1,6 +1,7 @@
-"""Figures by name; result figures are curves with error bars, named at their ends."""
+"""Result figures of the paper: curves with error bars, named at their ends."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -10,10 +11,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 from scipy.optimize import isotonic_regression
 
-from swarm_mj.evaluation.figures.contents import FLOCK, RESULT_FIGURES, Panel, ResultFigure, Scale
-from swarm_mj.evaluation.figures.curves import Curve, budgets, curves, preset_of, results_of
-from swarm_mj.evaluation.figures.flock import draw_flock
-from swarm_mj.evaluation.figures.style import FAINT, INK, WIDTH_IN, look_of, styled, write_caption
+from swarm_mj.evaluation.figures.contents import Panel, ResultFigure, Scale
+from swarm_mj.evaluation.figures.curves import Curve, budgets, curves, results_of
+from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, look_of, styled, write_caption
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
 
 TOP_IN, PANEL_IN, GAP_IN, BOTTOM_IN = 0.86, 3.3, 0.35, 0.75
@@ -33,21 +33,12 @@ PLACE = 1.045  # of the axes' width
 PAPERS_BUDGET = "team decisions each, the paper's on 2,000,000 (III-C)"
 
 
-def draw_figure(
-    name: str, results: Sequence[Result], *, flock_policy: str, flock_seed: int
-) -> Figure:
-    """Draw one of `FIGURES` from results of one preset, or fly and draw a flock.
+def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
+    """Draw our curves and the published ones.
 
     Raises:
-        ValueError: The results hold no point of it or cannot be compared, or no such flock flies.
+        ValueError: The results hold no point of the figure, or cannot be compared.
     """
-    if name == FLOCK:
-        return draw_flock(preset_of(results), flock_policy, flock_seed)
-    return draw(RESULT_FIGURES[name], results)
-
-
-def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
-    """Draw a result figure of the paper: our curves and the published ones."""
     found = results_of(figure, results)
     num_panels = len(figure.panels)
     height_in = TOP_IN + num_panels * PANEL_IN + (num_panels - 1) * GAP_IN + BOTTOM_IN
@@ -117,8 +108,7 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
 
 def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, its: Sequence[Curve]) -> None:
     """Set scales, limits and ticks, which the names of curves depend on."""
-    axes.set_xscale(figure.x_scale)
-    axes.set_yscale(panel.scale)
+    axes.set(xscale=figure.x_scale, yscale=panel.scale)
     x = np.concatenate([curve.x for curve in its])
     y = np.concatenate([curve.mean + way * curve.sem for curve in its for way in (-1.0, 0.0, 1.0)])
     y = y[(y > 0.0) if panel.scale == "log" else np.isfinite(y)]
@@ -131,7 +121,7 @@ def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, its: Sequence[Curv
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_minor_locator(NullLocator())
         axes.yaxis.set_major_formatter(PLAIN)
-    axes.set_title(panel.label, loc="left", color=INK)
+    axes.set_title(panel.label)
 
 
 def _widened(values: Float[np.ndarray, "V"], share: float, scale: Scale) -> tuple[float, float]:
@@ -152,15 +142,17 @@ def _head(
     line = 1.0 - 0.28 / height_in
     drawing.text(LEFT, line, figure.title, fontsize=12, fontweight="bold", va="baseline")
     drawing.text(MARGIN, line, regime, color=FAINT, va="baseline", ha="right")
-    ours = Line2D([], [], color=FAINT, marker="o", markersize=4.5)
-    ring = {"marker": "o", "markersize": 4.5 * RING, "markerfacecolor": "white"}
-    published = Line2D([], [], color=FAINT, linestyle="--", linewidth=1.2, **ring)
-    labels = ["this package, mean ± SEM", "published, mean ± SEM"]
-    if any(carries_more(result) for result in results):
-        labels.append(f"{MORE}: packets {CARRIES_MORE}")
+    mark: dict[str, Any] = {"color": FAINT, "marker": "o"}
+    ring: dict[str, Any] = {"linestyle": "--", "linewidth": 1.2, "markerfacecolor": "white"}
+    handles = {
+        "this package, mean ± SEM": Line2D([], [], markersize=4.5, **mark),
+        "published, mean ± SEM": Line2D([], [], markersize=4.5 * RING, **mark, **ring),
+    }
+    if any(map(carries_more, results)):
+        handles[f"{MORE}: packets {CARRIES_MORE}"] = Line2D([], [], linestyle="")
     drawing.legend(
-        handles=[ours, published, Line2D([], [], linestyle="")][: len(labels)],
-        labels=labels,
+        handles=list(handles.values()),
+        labels=list(handles),
         loc="upper left",
         bbox_to_anchor=(LEFT, 1.0 - 0.4 / height_in),
         ncols=3,
@@ -184,6 +176,7 @@ def name_ends(axes: Axes, its: Sequence[Curve]) -> None:
     places = spread(fraction[:, 1], LINE_IN / (axes.bbox.height / axes.figure.dpi))
     for curve, end, place in zip(named.values(), ends, places, strict=True):
         look = look_of(curve.method)
+        line = {"color": look.colour, "linestyle": "--" if curve.is_published else "-"}
         axes.annotate(
             name_of(curve),
             xy=end,
@@ -195,9 +188,8 @@ def name_ends(axes: Axes, its: Sequence[Curve]) -> None:
             va="center",
             annotation_clip=False,
             arrowprops={
+                **line,
                 "arrowstyle": "-",
-                "color": look.colour,
-                "linestyle": "--" if curve.is_published else "-",
                 "linewidth": 0.6,
                 "shrinkA": 1.0,
                 "shrinkB": 4.0,

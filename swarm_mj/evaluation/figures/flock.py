@@ -1,6 +1,6 @@
 """Fig. 2: a flock at its start and at its end, by the velocities of its robots."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MultipleLocator
 
-from swarm_mj.evaluation.figures.style import FAINT, RAMP, WIDTH_IN, styled, write_caption
+from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, styled, write_caption
 from swarm_mj.evaluation.results import CARRIES_MORE
 from swarm_mj.mission import PAPERS, Mission
 from swarm_mj.policies.registry import make_policy
@@ -20,14 +20,12 @@ from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.provenance import commit, version
 
-HEIGHT_IN = 4.2
 ARROW_SHARE = 0.13  # of a panel's width: the length of its longest arrow
 MARGIN_M = 150.0  # around the robots, for their arrows
 KM = 1000.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Snapshot:
+class Snapshot(NamedTuple):
     """A team at one moment."""
 
     time_s: float
@@ -51,12 +49,12 @@ def fly_flock(mission: Mission, policy_name: str, seed: int) -> tuple[Snapshot, 
     Raises:
         ValueError: The policy is none of `POLICIES`, or the seed out of range.
     """
-    policy = make_policy(policy_name, mission)
-    swarm = Swarm(mission, [seed])
-    start = _snapshot(swarm)
+    policy, swarm = make_policy(policy_name, mission), Swarm(mission, [seed])
+    start = Snapshot(0.0, swarm.states.position_m[0], swarm.states.velocity_mps[0])
     for _ in rollout(swarm, policy):
         pass
-    return start, _snapshot(swarm)
+    end_s = float(swarm.now[0]) * mission.window_s
+    return start, Snapshot(end_s, swarm.states.position_m[0], swarm.states.velocity_mps[0])
 
 
 def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
@@ -66,26 +64,23 @@ def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
     `fly_flock` does.
     """
     mission = PAPERS[preset]("flocking")
-    start, end = fly_flock(mission, policy_name, seed)
+    teams = fly_flock(mission, policy_name, seed)
     with styled():
-        drawing = Figure(figsize=(WIDTH_IN, HEIGHT_IN))
-        left, right, bar = drawing.subplots(1, 3, width_ratios=[1.0, 1.0, 0.04])
+        drawing = Figure(figsize=(WIDTH_IN, 4.2))
+        *panels, bar = drawing.subplots(1, 3, width_ratios=[1.0, 1.0, 0.04])
         drawing.subplots_adjust(left=0.08, right=0.925, top=0.8, bottom=0.18, wspace=0.12)
-        colours = ScalarMappable(Normalize(0.0, float(np.max(start.disagreement_mps))), RAMP)
-        _draw(left, mission, start, colours)
-        _draw(right, mission, end, colours)
-        _frame((left, right), np.concatenate([start.position_m, end.position_m]))
+        largest_mps = float(np.max(teams[0].disagreement_mps))
+        colours = ScalarMappable(Normalize(0.0, largest_mps), "viridis")
+        for axes, team in zip(panels, teams, strict=True):
+            _draw(axes, mission, team, colours)
+            _frame(axes, np.concatenate([team.position_m for team in teams]))
+        panels[0].set_ylabel("y [km]")
+        panels[1].tick_params(labelleft=False)
         drawing.colorbar(colours, cax=bar, label="distance from the team's mean velocity [m/s]")
-        _write(drawing, mission, policy_name, seed)
+        title = "A flock at its start and its end"
+        drawing.text(0.08, 0.93, title, fontsize=12, fontweight="bold")
+        write_caption(drawing, 0.08, 0.03, _caption(mission, policy_name, seed))
     return drawing
-
-
-def _snapshot(swarm: Swarm) -> Snapshot:
-    return Snapshot(
-        time_s=float(swarm.now[0]) * swarm.mission.window_s,
-        position_m=swarm.states.position_m[0],
-        velocity_mps=swarm.states.velocity_mps[0],
-    )
 
 
 def _draw(axes: Axes, mission: Mission, team: Snapshot, colours: ScalarMappable) -> None:
@@ -111,7 +106,7 @@ def _draw(axes: Axes, mission: Mission, team: Snapshot, colours: ScalarMappable)
     key_mps = float(f"{fastest_mps:.1g}")
     axes.quiverkey(arrows, 0.8, 1.11, key_mps, f"{key_mps:g} m/s", labelpos="E", color=FAINT)
     variance = _power(team.variance_m2ps2)
-    axes.set_title(f"after {team.time_s:g} s\nvelocity variance {variance} m²/s²", loc="left")
+    axes.set_title(f"after {team.time_s:g} s\nvelocity variance {variance} m²/s²")
     axes.set_xlabel("x [km]")
 
 
@@ -121,27 +116,21 @@ def _power(value: float) -> str:
     return rf"{digits}$\times$10$^{{{int(exponent)}}}$" if exponent else digits
 
 
-def _frame(panels: tuple[Axes, Axes], position_m: Float[np.ndarray, "P 2"]) -> None:
-    """Show the same square in both panels, around all robots."""
+def _frame(axes: Axes, position_m: Float[np.ndarray, "P 2"]) -> None:
+    """Show the square around all robots, which is the same in both panels."""
     low = (np.min(position_m, axis=0) - MARGIN_M) / KM
     high = (np.max(position_m, axis=0) + MARGIN_M) / KM
     centre, half = (low + high) / 2.0, float(np.max(high - low)) / 2.0
-    for axes in panels:
-        axes.set_xlim(centre[0] - half, centre[0] + half)
-        axes.set_ylim(centre[1] - half, centre[1] + half)
-        axes.set_aspect("equal")
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_locator(MultipleLocator(0.5))
-            axis.set_major_formatter("{x:g}")
-    panels[0].set_ylabel("y [km]")
-    panels[1].tick_params(labelleft=False)
+    axes.set_xlim(centre[0] - half, centre[0] + half)
+    axes.set_ylim(centre[1] - half, centre[1] + half)
+    axes.set_aspect("equal")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MultipleLocator(0.5))
+        axis.set_major_formatter("{x:g}")
 
 
-def _write(drawing: Figure, mission: Mission, policy_name: str, seed: int) -> None:
-    """Title and caption."""
-    drawing.text(0.08, 0.93, "A flock at its start and its end", fontsize=12, fontweight="bold")
+def _caption(mission: Mission, policy_name: str, seed: int) -> str:
     code = f"swarm_mj {version()}" + (f", commit {commit()}" if commit() else "")
     carries = "" if make_policy(policy_name, mission).payload == "none" else f" ({CARRIES_MORE})"
     flown = f"{mission.num_robots} robots, policy {policy_name}{carries}, seed {seed}"
-    caption = f"fig2, preset {mission.preset}: {flown}, {mission.num_windows} windows; {code}"
-    write_caption(drawing, 0.08, 0.03, caption)
+    return f"fig2, preset {mission.preset}: {flown}, {mission.num_windows} windows; {code}"

@@ -7,8 +7,8 @@ oracle, which no team could fly, is black and thin.
 
 import io
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple, cast
 
 import matplotlib.style
 from matplotlib.colors import to_rgb
@@ -19,35 +19,7 @@ from swarm_mj.policies.registry import WITHOUT_PAYLOAD
 from swarm_mj.system.atomic import write_bytes
 
 WIDTH_IN = 7.5  # shown at 900 pixels, a point of type is 1.7 pixels
-DPI = 240
-INK, FAINT, GRID = "#222222", "#666666", "#e4e4e4"
-RAMP = "viridis"
-
-RC = {
-    "font.family": "DejaVu Sans",  # comes with matplotlib
-    "font.size": 9.0,
-    "axes.titlesize": 9.0,
-    "axes.edgecolor": FAINT,
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": GRID,
-    "grid.linewidth": 0.6,
-    "text.color": INK,
-    "xtick.color": FAINT,
-    "ytick.color": FAINT,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "xtick.minor.bottom": False,
-    "ytick.minor.left": False,
-    "lines.linewidth": 1.4,
-    "savefig.dpi": DPI,
-    "savefig.facecolor": "white",
-    "svg.hashsalt": "swarm_mj",  # the same figure is the same file
-}
+FAINT = "#666666"
 # The field that has a format's caption, and those that would say when the file was made.
 METADATA = {
     "svg": ("Description", {"Date": None}),
@@ -57,8 +29,7 @@ METADATA = {
 CAPTION = "caption"  # the name of the text that files also have among their own descriptions
 
 
-@dataclass(frozen=True, kw_only=True)
-class Look:
+class Look(NamedTuple):
     """How a method looks in every figure."""
 
     label: str
@@ -74,34 +45,32 @@ class Look:
 
 
 LOOKS = {
-    "random-flooding": Look(label="random flooding", colour="#e69f00", marker="o"),
-    "round-robin": Look(label="round robin", colour="#56b4e9", marker="s"),
-    "mst": Look(label="MST", colour="#009e73", marker="^"),
-    "aloha": Look(label="slotted ALOHA", colour="#999933", marker="v"),
-    "gossip": Look(label="gossip", colour="#882255", marker="P", size=5.0),
-    "tdma": Look(label="TDMA", colour="#0072b2", marker="D", size=4.0),
-    "spatial-tdma": Look(label="spatial TDMA", colour="#332288", marker="h", size=5.5),
-    "planner": Look(label="planner", colour="#80391e", marker="d"),
-    WITHOUT_PAYLOAD: Look(label="planner, no payload", colour="#a6d854", marker="<"),
-    "gnn": Look(label="gnn (T, M, P only)", colour="#d55e00", marker="*", size=8.0),
-    "greedy-oracle": Look(label="greedy oracle", colour="#000000", marker=".", size=5.0, width=0.8),
-    "GNN": Look(label="GNN", colour="#cc79a7", marker="X"),
-    "linear GNN": Look(label="GNN, linear", colour="#b3589a", marker="p"),
-    "GNN generalized from 0.25": Look(label="GNN, from 0.25", colour="#b3589a", marker="p"),
-    "GNN trained at each size": Look(label="GNN, each size", colour="#cc79a7", marker="X"),
-    "GNN generalized from 40": Look(label="GNN, from 40", colour="#b3589a", marker="p"),
-    "GNN with shared reward": Look(label="GNN, shared reward", colour="#5e16d8", marker="H"),
-    "GNN with credit per robot": Look(label="GNN, own credit", colour="#5e16d8", marker="H"),
-    "GNN trained on AoI": Look(label="GNN, on AoI", colour="#cc79a7", marker="X"),
-    "GNN trained on velocity variance": Look(
-        label="GNN, on variance", colour="#b3589a", marker="p"
-    ),
+    "random-flooding": Look("random flooding", "#e69f00", "o"),
+    "round-robin": Look("round robin", "#56b4e9", "s"),
+    "mst": Look("MST", "#009e73", "^"),
+    "aloha": Look("slotted ALOHA", "#999933", "v"),
+    "gossip": Look("gossip", "#882255", "P", size=5.0),
+    "tdma": Look("TDMA", "#0072b2", "D", size=4.0),
+    "spatial-tdma": Look("spatial TDMA", "#332288", "h", size=5.5),
+    "planner": Look("planner", "#80391e", "d"),
+    WITHOUT_PAYLOAD: Look("planner, no payload", "#a6d854", "<"),
+    "gnn": Look("gnn (T, M, P only)", "#d55e00", "*", size=8.0),
+    "greedy-oracle": Look("greedy oracle", "#000000", ".", size=5.0, width=0.8),
+    "GNN": Look("GNN", "#cc79a7", "X"),
+    "linear GNN": Look("GNN, linear", "#b3589a", "p"),
+    "GNN generalized from 0.25": Look("GNN, from 0.25", "#b3589a", "p"),
+    "GNN trained at each size": Look("GNN, each size", "#cc79a7", "X"),
+    "GNN generalized from 40": Look("GNN, from 40", "#b3589a", "p"),
+    "GNN with shared reward": Look("GNN, shared reward", "#5e16d8", "H"),
+    "GNN with credit per robot": Look("GNN, own credit", "#5e16d8", "H"),
+    "GNN trained on AoI": Look("GNN, on AoI", "#cc79a7", "X"),
+    "GNN trained on velocity variance": Look("GNN, on variance", "#b3589a", "p"),
 }
 
 
 def look_of(method: str) -> Look:
     """Return the look of a policy or a published method; one without a look is grey."""
-    return LOOKS.get(method, Look(label=escape_mathtext(method), colour=FAINT, marker="d"))
+    return LOOKS.get(method, Look(escape_mathtext(method), FAINT, "d"))
 
 
 def escape_mathtext(text: str) -> str:
@@ -111,7 +80,7 @@ def escape_mathtext(text: str) -> str:
 
 def styled() -> AbstractContextManager[None]:
     """Apply this style within a context, regardless of the user's settings."""
-    return matplotlib.style.context(["default", RC])
+    return matplotlib.style.context(["default", "swarm_mj.evaluation.figures.paper"])
 
 
 def write_caption(figure: Figure, x: float, y: float, text: str) -> None:
@@ -127,12 +96,9 @@ def save(figure: Figure, path: Path) -> None:
     """
     kind = path.suffix.removeprefix(".")
     field, undated = METADATA[kind]
-    caption = next(
-        text.get_text()
-        for text in figure.findobj(Text)
-        if isinstance(text, Text) and text.get_gid() == CAPTION
-    )
+    [caption] = figure.findobj(lambda artist: artist.get_gid() == CAPTION)
     drawn = io.BytesIO()
     with styled():
-        figure.savefig(drawn, format=kind, metadata={field: caption, **undated})
+        metadata = {field: cast(Text, caption).get_text(), **undated}
+        figure.savefig(drawn, format=kind, metadata=metadata)
     write_bytes(path, drawn.getbuffer())

@@ -10,8 +10,8 @@ from matplotlib.text import Text
 from scipy.optimize import minimize
 from synthetic import everything, result, sweep
 
-from swarm_mj.evaluation.figures.contents import FIGURES, RESULT_FIGURES
-from swarm_mj.evaluation.figures.drawing import draw, draw_figure, spread
+from swarm_mj.evaluation.figures.contents import RESULT_FIGURES
+from swarm_mj.evaluation.figures.drawing import draw, spread
 from swarm_mj.evaluation.figures.style import LOOKS
 
 FIG3, FIG4, FIG5, FIG6 = RESULT_FIGURES.values()
@@ -32,18 +32,13 @@ def names(axes):
     return {text.get_text(): text for text in axes.texts}
 
 
-def test_a_curve_has_its_points_and_its_standard_errors():
+def test_a_curve_has_its_points_and_errors_and_the_published_one_is_dashed_and_hollow():
     (axes,) = draw(FIG4, sweep("random-flooding", "range_ratio", FLOODING)).axes
-    line, low, high = bars(axes)["random flooding"]
-    np.testing.assert_array_equal(line.get_xdata(), [0.2, 0.5, 1.0])
-    np.testing.assert_array_equal(line.get_ydata(), [70.0, 16.0, 12.0])
+    ours, low, high = bars(axes)["random flooding"]
+    np.testing.assert_array_equal(ours.get_xdata(), [0.2, 0.5, 1.0])
+    np.testing.assert_array_equal(ours.get_ydata(), [70.0, 16.0, 12.0])
     np.testing.assert_allclose(low, [67.0, 15.5, 11.75])
     np.testing.assert_allclose(high, [73.0, 16.5, 12.25])
-
-
-def test_the_published_curve_is_dashed_and_hollow_in_the_same_colour():
-    (axes,) = draw(FIG4, sweep("random-flooding", "range_ratio", FLOODING)).axes
-    ours, _, _ = bars(axes)["random flooding"]
     theirs, low, high = bars(axes)["random flooding, published"]
     np.testing.assert_array_equal(theirs.get_xdata(), [0.2, 0.25, 0.5, 0.75, 1.0])
     assert theirs.get_ydata()[0] == 72.633
@@ -83,6 +78,8 @@ def test_every_method_is_named_once_and_slanted_if_only_the_paper_has_it():
         "round robin": "italic",
         "GNN": "italic",
     }
+    assert names(axes)["something-new"].xy == (0.25, 1.0)
+    assert names(axes)["GNN"].xy == (1.0, 8.57)
 
 
 def test_who_carries_more_than_the_paper_s_packets_is_marked_and_the_mark_explained():
@@ -95,12 +92,6 @@ def test_who_carries_more_than_the_paper_s_packets_is_marked_and_the_mark_explai
     assert texts[2:] == ["+: packets carry more than T, M, P"]
     plain = draw(FIG4, [result("tdma", payload="none")])
     assert len(plain.legends[0].get_texts()) == 2
-
-
-def test_names_point_to_the_ends_of_their_curves():
-    (axes,) = draw(FIG4, sweep("random-flooding", "range_ratio", FLOODING)).axes
-    assert names(axes)["random flooding"].xy == (1.0, 12.0)
-    assert names(axes)["GNN"].xy == (1.0, 8.57)
 
 
 def test_a_level_is_a_line_with_a_band():
@@ -181,39 +172,20 @@ def test_nothing_that_is_written_overlaps_or_leaves_the_page():
         assert not any(box.overlaps(other) for other in boxes[:index])
 
 
-def test_the_oracle_is_a_thin_black_line():
-    (axes,) = draw(FIG4, sweep("greedy-oracle", "range_ratio", {0.2: (20.0, 0.5)})).axes
-    line, _, _ = bars(axes)["greedy oracle"]
-    others = [
-        other.get_linewidth()
-        for name, (other, _, _) in bars(axes).items()
-        if name != "greedy oracle"
-    ]
-    assert line.get_color() == "#000000"
-    assert line.get_linewidth() < min(others)
-
-
-@pytest.mark.parametrize("name", FIGURES)
-def test_every_name_draws_its_figure_under_the_results_preset(name):
-    drawing = draw_figure(name, everything("paper"), flock_policy="round-robin", flock_seed=2)
-    caption = drawing.texts[-1].get_text()
-    assert caption.startswith(f"{name}, preset paper: ")
-    assert ("policy round-robin, seed 2" in caption) == (name == "fig2")
-
-
 WANTED = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12).map(np.array)
 
 
-def test_names_with_room_stay_where_they_are():
-    np.testing.assert_allclose(spread(np.array([0.9, 0.1, 0.5]), 0.1), [0.9, 0.1, 0.5])
-
-
-def test_two_in_one_place_part_by_half_a_gap_each():
-    np.testing.assert_allclose(spread(np.array([0.5, 0.5]), 0.2), [0.4, 0.6])
-
-
-def test_at_the_ends_they_stay_inside():
-    np.testing.assert_allclose(spread(np.array([1.0, 1.0, 0.0]), 0.2), [0.8, 1.0, 0.0])
+@pytest.mark.parametrize(
+    ("wanted", "gap", "places"),
+    [
+        ([0.9, 0.1, 0.5], 0.1, [0.9, 0.1, 0.5]),  # room for all
+        ([0.5, 0.5], 0.2, [0.4, 0.6]),  # two in one place part by half a gap each
+        ([1.0, 1.0, 0.0], 0.2, [0.8, 1.0, 0.0]),  # inside the ends
+        ([0.0, 0.5, 1.0], 1.0, [0.0, 1.0, 2.0]),  # more than fit keep their distance
+    ],
+)
+def test_names_are_spread_by_hand(wanted, gap, places):
+    np.testing.assert_allclose(spread(np.array(wanted), gap), places)
 
 
 @given(WANTED)
@@ -240,7 +212,3 @@ def test_they_are_as_near_as_can_be(seed):
         options={"ftol": 1e-14, "maxiter": 500},
     )
     np.testing.assert_allclose(spread(wanted, gap), solved.x, atol=1e-5)
-
-
-def test_more_than_fit_keep_their_distance():
-    np.testing.assert_allclose(spread(np.array([0.0, 0.5, 1.0]), 1.0), [0.0, 1.0, 2.0])

@@ -63,7 +63,7 @@ def test_both_panels_show_the_same_square_with_units_and_the_caption_says_what_w
     assert "fig2, preset paper: 40 robots, policy round-robin, seed 3, 500 windows" in caption
 
 
-def test_variances_are_told_with_two_digits_by_hand(monkeypatch):
+def test_variances_have_two_digits_by_hand(monkeypatch):
     """Two robots, 3.5 m/s off their mean: 12.25 m²/s². Then 0.00035 m/s: 1.225e-7 m²/s²."""
     teams = [
         Snapshot(
@@ -77,8 +77,3 @@ def test_variances_are_told_with_two_digits_by_hand(monkeypatch):
     left, right, _ = draw_flock("paper", "round-robin", 3).axes
     assert left.get_title("left").endswith("velocity variance 12 m²/s²")
     assert right.get_title("left").endswith(r"velocity variance 1.2$\times$10$^{-7}$ m²/s²")
-
-
-def test_an_unknown_policy_is_refused():
-    with pytest.raises(ValueError, match="policy must be one of"):
-        draw_flock("paper", "nobody", 1)
