@@ -10,7 +10,7 @@ from typing import Any
 from swarm_mj.api.estimates import flight_needs
 from swarm_mj.api.flight import COMPILING_WINDOWS, compile_ahead, fly_swarm, run_of
 from swarm_mj.api.run import Run
-from swarm_mj.control.controller import Controller
+from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission, make_mission
 from swarm_mj.mission.components import Components
 from swarm_mj.physics.scene import Scene

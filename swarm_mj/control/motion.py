@@ -1,19 +1,64 @@
-"""The paper's controllers (IV-A): stand still, walk at random, flock; the table of all tasks."""
+"""Controllers: their interface, the paper's (IV-A), which stand, walk or flock, and the tasks.
+
+Index order: `[b, i]` is robot `i` of mission `b`.
+"""
 
 from collections.abc import Callable, Sequence
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.control.controller import Controller
-from swarm_mj.control.coverage import Coverage
-from swarm_mj.control.formation import Formation
+from swarm_mj.control.added_tasks import Coverage, Formation
 from swarm_mj.mission import FlockingSet, Mission, Task
 from swarm_mj.mission.batched_rng import Stream, normal
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.protocol.costs import velocity_variance
 from swarm_mj.system.compiled import compiled
+
+
+@runtime_checkable
+class Controller(Protocol):
+    """Drives the robots by what they have heard.
+
+    A controller that draws or remembers is also `Started`: it gets the missions' random streams.
+    """
+
+    def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N 2"]:
+        """Return the accelerations u [m/s²], which the physics clips to plus or minus A_max.
+
+        Buffers are read-only. Row [b, i] may use row [b, i] of them and of the states only.
+        """
+        ...
+
+
+@runtime_checkable
+class Costed(Protocol):
+    """A controller with a task cost, next to the age of information."""
+
+    cost_name: str  # such as "formation error"
+    cost_unit: str  # such as "m"
+
+    def cost(self, states: RobotStates, /) -> Float[np.ndarray, "B"]:
+        """Return the task cost of these states, per mission; 0 or more."""
+        ...
+
+
+def costed(controller: Controller) -> Costed | None:
+    """Return a controller that has a task cost, or None.
+
+    Raises:
+        TypeError: It has a cost without a name or a unit.
+    """
+    if isinstance(controller, Costed):
+        return controller
+    if hasattr(controller, "cost"):
+        raise TypeError(
+            "the controller has a cost, which needs a name and a unit; set its cost_name and "
+            'cost_unit, such as "spread of the team" and "m"'
+        )
+    return None
 
 
 def controller_of(mission: Mission) -> Controller:
@@ -83,12 +128,9 @@ def flocking(
 ) -> Float[np.ndarray, "B N 2"]:
     """Return the mean difference of known velocities to the own one, per second [m/s²] (Eq. 16).
 
-    Args:
-        buffers: What each robot has heard.
-        velocity_mps: Every robot's own velocity [m/s].
-        flocking_set: F: robots with T > T_0 (`heard`, the paper) or, per axis, with a velocity
-            other than 0 in the buffer (`moving`, the authors' code). The robot itself is in it;
-            while F is empty the acceleration is 0.
+    The flocking set F is of robots with T > T_0 (`heard`, the paper) or, per axis, with a velocity
+    other than 0 in the buffer (`moving`, the authors' code). The robot itself is in it; while F is
+    empty the acceleration is 0.
     """
     acceleration = np.zeros_like(velocity_mps)
     is_counted = None if flocking_set == "moving" else buffers.is_known

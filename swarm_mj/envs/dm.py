@@ -15,7 +15,7 @@ from dm_control.rl import control
 from dm_env import specs
 from jaxtyping import Int
 
-from swarm_mj.control.controller import Controller
+from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.protocol.checks import check_robots

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.control.controller import Costed
+from swarm_mj.control.motion import Costed
 from swarm_mj.envs.credit import credits_of, snapshot_channel
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components

@@ -7,8 +7,7 @@ from dataclasses import replace
 from numbers import Integral
 from typing import Any, get_args
 
-from swarm_mj.control.controller import Controller, Costed
-from swarm_mj.control.motion import controller_of
+from swarm_mj.control.motion import Controller, Costed, controller_of
 from swarm_mj.envs.mission_batch import REWARDS, MissionBatch
 from swarm_mj.envs.registration import NAMESPACE, environment_id
 from swarm_mj.mission import PRESETS, Mission, Task

@@ -10,8 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
-from swarm_mj.control.controller import Costed
-from swarm_mj.control.motion import controller_of
+from swarm_mj.control.motion import Costed, controller_of
 from swarm_mj.evaluation.batch import Batch, BatchCosts, fly_batch
 from swarm_mj.evaluation.jobs import run_jobs
 from swarm_mj.evaluation.published import BASELINES

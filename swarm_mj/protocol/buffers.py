@@ -50,7 +50,7 @@ class Buffers:
 
 def empty_buffers(num_missions: int, num_robots: int) -> Buffers:
     """Return buffers before the first observation: everything unknown."""
-    shape = (num_missions, num_robots, num_robots)
+    shape = num_missions, num_robots, num_robots
     return Buffers(
         timestamp=np.full(shape, NEVER),
         position_m=np.zeros((*shape, 2)),
@@ -70,15 +70,8 @@ def grant_start(buffers: Buffers, states: RobotStates) -> None:
 
 def observe_self(buffers: Buffers, states: RobotStates, now: Float[np.ndarray, "B"]) -> None:
     """Write every active robot's own state and the time t into its own buffer (Eq. 5)."""
-    _write_own(
-        buffers.timestamp,
-        buffers.position_m,
-        buffers.velocity_mps,
-        states.position_m,
-        states.velocity_mps,
-        now,
-        states.is_active,
-    )
+    known = buffers.timestamp, buffers.position_m, buffers.velocity_mps
+    _write_own(*known, states.position_m, states.velocity_mps, now, states.is_active)
 
 
 def record_attempt(
@@ -89,14 +82,10 @@ def record_attempt(
     *,
     silence_is_attempt: bool = False,
 ) -> None:
-    """Note when each robot last addressed its recipient (Eq. 7).
+    """Note when each active robot last addressed its recipient (Eq. 7).
 
-    Args:
-        buffers: Written in place.
-        recipient: Whom each robot addresses; itself is silence, and `BROADCAST` is no robot.
-        now: t [windows].
-        is_active: Who notes anything; None is everyone.
-        silence_is_attempt: Whether a silent robot notes having addressed itself.
+    None for `is_active` is everyone. A silent robot addresses itself, which may count as an
+    attempt; `BROADCAST` addresses no robot.
     """
     _write_attempt(buffers.last_attempt, recipient, now, silence_is_attempt, is_active)
 
@@ -108,17 +97,14 @@ def merge(
 ) -> None:
     """Replace all entries by those strictly newer in the packet each robot decoded (Eq. 8).
 
-    A packet holds its sender's buffer as it was before the phase. Information that comes straight
-    from its subject gets the receiver as parent (II-B: P^{i,k} = i).
-
-    Args:
-        buffers: Written in place.
-        heard: The sender that each robot decoded, or itself.
-        is_sent: `[b, i, k]`: whether i's packet has an entry of k; None: packets are whole.
+    A packet holds its sender's buffer as it was before the phase, or those entries of it that were
+    sent. Information that comes straight from its subject gets the receiver as parent (II-B:
+    P^{i,k} = i). An entry keeps its parent if the parent's own entry is in the packet, and
+    otherwise names the sender: so buffers remain trees, although some robots on the way are left
+    out.
     """
-    _merge_newer(
-        buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent, heard, is_sent
-    )
+    known = buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent
+    _merge_newer(*known, heard, is_sent)
 
 
 @compiled()
@@ -201,19 +187,23 @@ def _merge_newer(
             senders_listen |= j != i and heard[b, j] != j
         # Packets are read from the buffers before the phase: a copy where a sender also decodes,
         # which only the reference preset lets happen; else no row is both read and written.
-        sent_timestamp, sent_position_m = timestamp[b], position_m[b]
-        sent_velocity_mps, sent_parent = velocity_mps[b], parent[b]
+        sent, sent_parent, sent_m, sent_mps = (
+            timestamp[b],
+            parent[b],
+            position_m[b],
+            velocity_mps[b],
+        )
         if senders_listen:
-            sent_timestamp, sent_position_m = timestamp[b].copy(), position_m[b].copy()
-            sent_velocity_mps, sent_parent = velocity_mps[b].copy(), parent[b].copy()
+            sent, sent_parent = sent.copy(), sent_parent.copy()
+            sent_m, sent_mps = sent_m.copy(), sent_mps.copy()
         for i in range(num_robots):
             j = heard[b, i]
             if j != i:
                 for k in range(num_robots):
-                    if _is_taken(sent_timestamp[j, k], timestamp[b, i, k], is_sent, b, j, k):
-                        timestamp[b, i, k] = sent_timestamp[j, k]
-                        position_m[b, i, k, 0] = sent_position_m[j, k, 0]
-                        position_m[b, i, k, 1] = sent_position_m[j, k, 1]
-                        velocity_mps[b, i, k, 0] = sent_velocity_mps[j, k, 0]
-                        velocity_mps[b, i, k, 1] = sent_velocity_mps[j, k, 1]
+                    if _is_taken(sent[j, k], timestamp[b, i, k], is_sent, b, j, k):
+                        timestamp[b, i, k] = sent[j, k]
+                        position_m[b, i, k, 0] = sent_m[j, k, 0]
+                        position_m[b, i, k, 1] = sent_m[j, k, 1]
+                        velocity_mps[b, i, k, 0] = sent_mps[j, k, 0]
+                        velocity_mps[b, i, k, 1] = sent_mps[j, k, 1]
                         parent[b, i, k] = _new_parent(sent_parent[j, k], is_sent, b, i, j, k)

@@ -15,16 +15,9 @@ from swarm_mj.system.fields import name_of
 def check_robots(
     what: str, robots: np.ndarray, shape: tuple[int, int], *, may_broadcast: bool = False
 ) -> None:
-    """Raise unless there is one robot chosen per robot.
+    """Raise ValueError unless there is one robot chosen per robot of these B missions.
 
-    Args:
-        what: The choice, for the message.
-        robots: The choices.
-        shape: B missions of N robots.
-        may_broadcast: Whether `BROADCAST` is a choice too.
-
-    Raises:
-        ValueError: There are more or fewer choices, or one is no integer from 0 to N - 1.
+    `what` names the choice in the message; `BROADCAST` may be a choice, too.
     """
     if np.shape(robots) != shape:
         given = np.shape(robots)
@@ -34,10 +27,8 @@ def check_robots(
     is_robot = (robots >= (BROADCAST if may_broadcast else 0)) & (robots < shape[1])
     if not np.all(is_robot):
         b, i = np.argwhere(~is_robot)[0]
-        raise ValueError(
-            f"{what} of robot {i} in mission {b} must be from 0 to {shape[1] - 1}, "
-            f"not {robots[b, i]}"
-        )
+        where = f"{what} of robot {i} in mission {b}"
+        raise ValueError(f"{where} must be from 0 to {shape[1] - 1}, not {robots[b, i]}")
 
 
 def checked_decode(

@@ -1,7 +1,6 @@
 """The costs (II-C, IV-A): age of information (Eq. 10), velocity variance (Eq. 17), packets."""
 
-from dataclasses import dataclass, fields
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -50,10 +49,8 @@ def age_of_information(
 ) -> tuple[Float[np.ndarray, "B"], Bool[np.ndarray, "B"]]:
     """Return the mean over all pairs i, j of t - T^{i,j}, own age included (Eq. 10).
 
-    Pairs of active robots count, at least one robot's in each mission; None is all robots.
-
-    Returns:
-        The age at t [windows], and whether all of these know all of these.
+    The age at t is in windows. Second is whether all robots know all. Pairs of active robots count,
+    at least one robot's in each mission; None is all robots.
     """
     age, is_complete = _mean_age(buffers.timestamp, now, is_active)
     return age, is_complete | buffers.is_granted
@@ -86,20 +83,21 @@ def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets
 
     Both phases are broadcasts (IV-C), or the second answers the first (Alg. 1).
     """
-    first, second = (_Counts(*np.zeros((5, len(phase.recipient)))) for phase in phases)
-    for phase, counts in zip(phases, (first, second), strict=True):
-        _add_counts(phase.recipient, phase.heard, counts)
-    none = np.full_like(first.sent, np.nan)
-    fates = dict.fromkeys((spec.name for spec in fields(Packets)), none)
-    both = first.sent + second.sent
-    if is_broadcast:
-        heard, receptions = first.heard + second.heard, first.receptions + second.receptions
-        fates |= {"sent": both, "heard": heard, "receptions": receptions}
-    else:
-        overheard = first.overheard + second.overheard
-        fates |= {"sent": first.sent, "attempted": first.sent, "delivered": first.delivered}
-        fates |= {"overheard": overheard, "answered": second.delivered}
-    return Packets(**fates | {"transmitted": both})
+    sent, delivered, overheard, heard, receptions = _count(phases[0].recipient, phases[0].heard)
+    later, answered, overheard_later, heard_later, receptions_later = _count(
+        phases[1].recipient, phases[1].heard
+    )
+    none = np.full_like(sent, np.nan)
+    return Packets(
+        sent=sent + later if is_broadcast else sent,
+        transmitted=sent + later,
+        attempted=none if is_broadcast else sent,
+        delivered=none if is_broadcast else delivered,
+        overheard=none if is_broadcast else overheard + overheard_later,
+        answered=none if is_broadcast else answered,
+        heard=heard + heard_later if is_broadcast else none,
+        receptions=receptions + receptions_later if is_broadcast else none,
+    )
 
 
 def mean_hops(
@@ -107,9 +105,8 @@ def mean_hops(
 ) -> Float[np.ndarray, "B"]:
     """Return the mean depth of teammates in the parent trees (II-B), 0 without teammates [hops].
 
-    Args:
-        buffers: All robots' buffers; a state known beforehand came over no radio, so has no depth.
-        is_active: Whose depths in whose trees count, through any robot; None is everyone.
+    Depths of active robots in active robots' trees count, through any robot. A state known
+    beforehand came over no radio, so has no depth.
 
     Raises:
         ValueError: Some parents lead nowhere, or in a circle.
@@ -188,34 +185,28 @@ def _mean_age(
     return age, is_complete
 
 
-class _Counts(NamedTuple):
-    """One phase's packets."""
-
-    sent: Float[np.ndarray, "B"]
-    delivered: Float[np.ndarray, "B"]  # decoded by the addressee
-    overheard: Float[np.ndarray, "B"]  # receptions by another
-    heard: Float[np.ndarray, "B"]  # decoded by somebody
-    receptions: Float[np.ndarray, "B"]
-
-
 @compiled()
-def _add_counts(
-    recipient: Int[np.ndarray, "B N"], heard: Int[np.ndarray, "B N"], counts: _Counts
-) -> None:
+def _count(
+    recipient: Int[np.ndarray, "B N"], heard: Int[np.ndarray, "B N"]
+) -> tuple[Float[np.ndarray, "B"], ...]:
+    """Return the packets of one phase: sent, delivered, overheard, heard, and receptions."""
     num_missions, num_robots = recipient.shape
+    sent, delivered = np.zeros(num_missions), np.zeros(num_missions)
+    overheard, num_heard, receptions = sent.copy(), sent.copy(), sent.copy()
     is_heard = np.empty(num_robots, dtype=np.bool_)
     for b in range(num_missions):
         is_heard[:] = False
         for i in range(num_robots):
-            counts.sent[b] += recipient[b, i] != i
+            sent[b] += recipient[b, i] != i
             sender = heard[b, i]
             if sender != i:
                 is_meant = recipient[b, sender] == i
-                counts.delivered[b] += is_meant
-                counts.overheard[b] += not is_meant
-                counts.heard[b] += not is_heard[sender]
-                counts.receptions[b] += 1
+                delivered[b] += is_meant
+                overheard[b] += not is_meant
+                num_heard[b] += not is_heard[sender]
+                receptions[b] += 1
                 is_heard[sender] = True
+    return sent, delivered, overheard, num_heard, receptions
 
 
 @compiled()

@@ -1,4 +1,4 @@
-"""Sizes of packets: the fields, their widths, and the entries that fit into a slot.
+"""Packets: their fields and widths, and which entries are sent where a slot has no room for all.
 
 The paper's packets hold the sender's buffer: T, M and P of every robot (II-B). The simulation hands
 these numbers over as they are. The widths here are what they would take on the air, and a test
@@ -10,24 +10,22 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
-from swarm_mj.protocol.buffers import NO_PARENT
-from swarm_mj.protocol.window import SLOT_WINDOWS
+from swarm_mj.protocol.buffers import NEVER, NO_PARENT, Buffers
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS
+from swarm_mj.system.compiled import compiled
 
 BITS_PER_BYTE = 8
 POSITION_BITS, VELOCITY_BITS = 16, 8  # per axis
+TIE_BREAK = 1e-9  # rises are halves of a window, so this decides between equal ones only
 AGE_BITS = 16  # ages of up to 32,767 windows; older ones count as that old
 
 
 @dataclass(frozen=True, kw_only=True)
 class PacketField:
-    """Numbers of one kind in a packet: code n stands for `low` + n `step`.
-
-    Raises:
-        ValueError: It has no width, a width that no whole number has, or a negative count.
-    """
+    """Numbers of one kind in a packet: code n stands for `low` + n `step`; or ValueError."""
 
     name: str
     bits: int  # of one number
@@ -154,12 +152,7 @@ def fits(packet: Packet, mission: Mission) -> bool:
 
 
 def fitting(packet: Packet, mission: Mission, policy: str) -> Packet:
-    """Return a packet with as many entries as a slot of the mission holds.
-
-    Args:
-        packet: Whole.
-        mission: Whose bit rate counts.
-        policy: Whose packet it is, for the message.
+    """Return a policy's whole packet with as many entries as a slot of the mission holds.
 
     Raises:
         ValueError: The slot does not hold the payload and one entry.
@@ -169,11 +162,10 @@ def fitting(packet: Packet, mission: Mission, policy: str) -> Packet:
         return packet
     least = replace(packet, num_entries=1)
     if least.num_bytes > capacity:
-        needed = least_bit_rate(least.num_bytes, mission)
         raise ValueError(
             f"packets of {policy} need {least.num_bytes} bytes for a single entry, but a slot "
-            f"holds {capacity} bytes at {bits_per_second(rate)}; choose a bit rate of {needed:g} "
-            "or more"
+            f"holds {capacity} bytes at {bits_per_second(rate)}; choose a bit rate of "
+            f"{least_bit_rate(least.num_bytes, mission):g} or more"
         )
     spare = BITS_PER_BYTE * (capacity - least.num_bytes)
     return replace(packet, num_entries=1 + spare // _num_bits(packet.entry))
@@ -189,5 +181,60 @@ def check_whole(what: str, mission: Mission) -> None:
         )
 
 
+@dataclass(frozen=True, kw_only=True)
+class PartialBuffers(Buffers):
+    """Buffers of which only some entries fit into a packet."""
+
+    num_entries: int
+    last_sent: Float[np.ndarray, "B N N"]  # T^{i,j} as i last sent it [windows], or NEVER
+
+
+def with_room(buffers: Buffers, num_entries: int) -> Buffers:
+    """Return the same buffers with packets of at most this many entries."""
+    if isinstance(buffers, PartialBuffers):
+        return replace(buffers, num_entries=min(num_entries, buffers.shape[1]))
+    if num_entries >= buffers.shape[1]:
+        return buffers
+    last_sent = np.full(buffers.timestamp.shape, NEVER)
+    return PartialBuffers(**vars(buffers), num_entries=num_entries, last_sent=last_sent)
+
+
+def entries_sent(
+    buffers: Buffers, recipient: Int[np.ndarray, "B N"]
+) -> Bool[np.ndarray, "B N N"] | None:
+    """Choose the entries that everyone sends in this slot (II-B), and note them; None is all.
+
+    A robot always sends its own entry, and then those whose T has risen most since it last sent
+    them; ties go to the freshest. So every entry gets its turn. True at `[b, i, k]` where i's
+    packet has an entry of k.
+    """
+    if not isinstance(buffers, PartialBuffers):
+        return None
+    is_sent = np.zeros(buffers.timestamp.shape, dtype=np.bool_)
+    _choose(buffers.timestamp, recipient, buffers.num_entries, buffers.last_sent, is_sent)
+    return is_sent
+
+
 def _num_bits(fields: tuple[PacketField, ...]) -> int:
     return sum(each.num_bits for each in fields)
+
+
+@compiled()
+def _choose(
+    timestamp: Float[np.ndarray, "B N N"],
+    recipient: Int[np.ndarray, "B N"],
+    num_entries: int,
+    last_sent: Float[np.ndarray, "B N N"],
+    is_sent: Bool[np.ndarray, "B N N"],
+) -> None:
+    num_missions, num_robots = recipient.shape
+    for b in range(num_missions):
+        for i in range(num_robots):
+            if recipient[b, i] == i:
+                continue
+            urgency = timestamp[b, i] - last_sent[b, i] + TIE_BREAK * timestamp[b, i]
+            urgency[i] = np.inf
+            for k in np.argsort(-urgency)[:num_entries]:
+                if timestamp[b, i, k] > NEVER:
+                    is_sent[b, i, k] = True
+                    last_sent[b, i, k] = timestamp[b, i, k]

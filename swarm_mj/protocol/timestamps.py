@@ -1,4 +1,4 @@
-"""Timestamps T alone (II-B): Eqs. 5 and 8 for planning, replaying and remembering windows.
+"""The clock, and timestamps T alone (II-B): Eqs. 5 and 8 to plan, replay and remember windows.
 
 Index order: `[i, k]` is when robot `k` observed what robot `i` knows of it.
 """
@@ -7,6 +7,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from swarm_mj.system.compiled import compiled
+
+SLOTS_PER_WINDOW = 2  # a transmission takes one, and so do its responses
+SLOT_WINDOWS = 1.0 / SLOTS_PER_WINDOW  # Delta t: what a slot lasts [windows]
 
 
 @compiled()
@@ -34,12 +37,9 @@ def merge_timestamps(
     heard: Int[np.ndarray, "N"],
     timestamp: Float[np.ndarray, "N N"],
 ) -> float:
-    """Merge what everyone decoded, as in Eq. 8, and return the sum of the rises of T.
+    """Merge what everyone decoded into every receiver's T, as in Eq. 8; return the sum of rises.
 
-    Args:
-        packet: T of every sender before the slot.
-        heard: The sender that each robot decoded; itself is nobody.
-        timestamp: T of every receiver, written in place.
+    A packet is T of its sender before the slot.
     """
     total = 0.0
     for i in range(heard.shape[0]):
@@ -59,14 +59,7 @@ def merge_expected(
     probability: Float[np.ndarray, "N"],
     merged: Float[np.ndarray, "N N"],
 ) -> None:
-    """Fill `merged`: the mean of T after Eq. 8.
-
-    Args:
-        timestamp: T before the slot.
-        heard: The sender that each robot may decode; itself is nobody.
-        probability: That it does.
-        merged: T after the slot; overwritten.
-    """
+    """Fill `merged`: the mean of T after Eq. 8, if packets decode with these probabilities."""
     for i in range(heard.shape[0]):
         share = np.float32(probability[i])
         held, sent, row = timestamp[i], timestamp[heard[i]], merged[i]

@@ -14,12 +14,10 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST, Buffers, merge, observe_self, record_attempt
 from swarm_mj.protocol.checks import checked_decode
-from swarm_mj.protocol.partial_packets import entries_sent
+from swarm_mj.protocol.packets import entries_sent
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
 from swarm_mj.system.compiled import compiled
-
-SLOTS_PER_WINDOW = 2  # a transmission takes one, and so do its responses
-SLOT_WINDOWS = 1.0 / SLOTS_PER_WINDOW  # Delta t: what a slot lasts [windows]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,25 +56,12 @@ class RequestResponse:
         channel: Channel | VaryingChannel,
         now: Float[np.ndarray, "B"],
     ) -> tuple[Phase, Phase]:
-        """Play one window.
+        """Play one window from t on [windows], and return the phases of its two slots.
 
-        Args:
-            buffers: Written in place.
-            decide: Whom each robot addresses in the next slot; itself is silence. It is trusted.
-            move: Moves the robots.
-            channel: Who decodes whom (Eq. 6).
-            now: t at the start of the window [windows].
-
-        Returns:
-            The phases of the window's two slots.
-
-        Raises:
-            ValueError: A sender that a user's own channel names is no robot, or silent.
+        Decisions are trusted; a user's own channel is checked (`checked_decode`).
         """
-        recipient = decide(())
-        return window(
-            buffers, move(), recipient, channel, now, silence_is_attempt=self.silence_is_attempt
-        )
+        recipient, noted = decide(()), self.silence_is_attempt
+        return window(buffers, move(), recipient, channel, now, silence_is_attempt=noted)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,10 +91,8 @@ class DoubleBroadcast:
             if self.needs_addressees:
                 next_identity = (np.arange(recipient.shape[1]) + 1) % recipient.shape[1]
                 recipient = np.where(recipient == BROADCAST, next_identity, recipient)
-            t, silence_is_attempt = now + slot * SLOT_WINDOWS, self.silence_is_attempt
-            return transmit(
-                buffers, states, recipient, channel, t, silence_is_attempt=silence_is_attempt
-            )
+            t, noted = now + slot * SLOT_WINDOWS, self.silence_is_attempt
+            return transmit(buffers, states, recipient, channel, t, silence_is_attempt=noted)
 
         recipient = decide(())
         states = move()
@@ -135,18 +118,11 @@ def window(
 ) -> tuple[Phase, Phase]:
     """Play one communication window: a transmission phase, then a response phase (Alg. 1).
 
-    Args:
-        buffers: Written in place.
-        states: True states, fixed during the window; inactive robots take no part.
-        recipient: Whom each robot addresses; itself is silence.
-        channel: Who decodes whom (Eq. 6).
-        now: t at the start of the window [windows].
-        silence_is_attempt: Whether silence counts as addressing oneself (Eq. 7).
+    Buffers are written in place; `states` are true, and fixed during the window; the clock shows
+    the start of the window [windows]. Silence may count as addressing oneself (Eq. 7).
     """
-    now = now + SLOT_WINDOWS
-    transmission = transmit(
-        buffers, states, recipient, channel, now, silence_is_attempt=silence_is_attempt
-    )
+    now, noted = now + SLOT_WINDOWS, silence_is_attempt
+    transmission = transmit(buffers, states, recipient, channel, now, silence_is_attempt=noted)
 
     now = now + SLOT_WINDOWS
     observe_self(buffers, states, now)
@@ -184,12 +160,9 @@ def channel_at(
     now: Float[np.ndarray, "B"],
     mission: Int[np.ndarray, "B"] | None = None,
 ) -> Channel:
-    """Return the channel of the slot that ends at t.
+    """Return the channel of the slot that ends at t, row by row [windows].
 
-    Args:
-        channel: One that stays as it is, or one that is another in every slot.
-        now: t at the end of the slot, row by row [windows].
-        mission: Whose row each is; None is all missions in order.
+    Rows are those of these missions; None is all missions in order.
     """
     # The usual radio is asked for first: to ask for a runtime protocol takes 10 µs.
     if isinstance(channel, FreeSpaceRadio) or not isinstance(channel, VaryingChannel):

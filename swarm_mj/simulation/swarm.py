@@ -7,8 +7,7 @@ from numbers import Integral
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.control.controller import Controller, costed
-from swarm_mj.control.motion import controller_of, initial_velocity
+from swarm_mj.control.motion import Controller, controller_of, costed, initial_velocity
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.mission.components import Components, is_ours
@@ -27,8 +26,7 @@ from swarm_mj.protocol.buffers import (
 from swarm_mj.protocol.checks import check_robots
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
 from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.protocol.packets import fitting, packet_of
-from swarm_mj.protocol.partial_packets import with_room
+from swarm_mj.protocol.packets import fitting, packet_of, with_room
 from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, RequestResponse, WindowProtocol
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import Channel, VaryingChannel

@@ -1,7 +1,7 @@
 """The buffers against plain loops over receivers i, senders j and subjects k, and hand examples."""
 
 import copy
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import given, settings
@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import (
-    NEVER,
     NO_PARENT,
     Buffers,
     empty_buffers,
@@ -21,7 +20,7 @@ from swarm_mj.protocol.buffers import (
 
 seeds = st.integers(0, 2**32 - 1)
 sizes = st.integers(1, 6)
-NAMES = [spec.name for spec in fields(Buffers) if spec.name != "is_granted"]
+NAMES = ["timestamp", "position_m", "velocity_mps", "parent", "last_attempt"]
 
 
 def some_buffers(rng, num_missions, num_robots):
@@ -79,25 +78,7 @@ def renamed(buffers, old_name):
     return replace(buffers, **values)
 
 
-def test_empty_buffers_know_nothing():
-    buffers = empty_buffers(2, 3)
-    assert buffers.timestamp.shape == buffers.parent.shape == (2, 3, 3)
-    assert buffers.position_m.shape == buffers.velocity_mps.shape == (2, 3, 3, 2)
-    assert not buffers.is_known.any()
-    assert (buffers.timestamp == 0.0).all()
-    assert (buffers.last_attempt == 0.0).all()
-    assert (buffers.parent == -1).all()
-    assert not buffers.position_m.any()
-    assert not buffers.velocity_mps.any()
-
-
-def test_known_is_after_the_start():
-    buffers = replace(empty_buffers(1, 2), timestamp=np.array([[[0.5, 0.0], [3.0, 7.5]]]))
-    assert buffers.is_known.tolist() == [[[True, False], [True, True]]]
-
-
 @given(seed=seeds, num_missions=st.integers(1, 3), num_robots=sizes)
-@settings(max_examples=50, deadline=None)
 def test_eq5_robots_observe_themselves_and_only_themselves(seed, num_missions, num_robots):
     rng, buffers, _ = case(seed, num_missions, num_robots)
     before = copy.deepcopy(buffers)
@@ -113,7 +94,6 @@ def test_eq5_robots_observe_themselves_and_only_themselves(seed, num_missions, n
 
 
 @given(seed=seeds, num_missions=st.integers(1, 3), num_robots=sizes)
-@settings(max_examples=50, deadline=None)
 def test_eq7_attempts_are_noted_for_the_recipient_alone(seed, num_missions, num_robots):
     rng, buffers, _ = case(seed, num_missions, num_robots)
     before = copy.deepcopy(buffers)
@@ -137,28 +117,12 @@ def test_eq7_silence_is_an_attempt_only_in_the_code():
 
 
 @given(seed=seeds, num_missions=st.integers(1, 3), num_robots=sizes)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_eq8_merges_as_by_loops(seed, num_missions, num_robots):
     _, buffers, heard = case(seed, num_missions, num_robots)
     expected = merged_by_loops(buffers, heard)
     merge(buffers, heard)
     assert same(buffers, expected)
-
-
-def test_eq8_only_strictly_newer_news_is_taken():
-    # Robot 0 hears robot 1, whose news of robots 2, 3 and 4 is newer, as old, and older.
-    buffers = empty_buffers(1, 5)
-    buffers.timestamp[0, 0, 2:] = [1.0, 2.0, 3.0]
-    buffers.timestamp[0, 1, 2:] = [2.0, 2.0, 2.0]
-    buffers.position_m[0, 1, 2:] = 7.0
-    buffers.velocity_mps[0, 1, 2:] = 8.0
-    buffers.parent[0, 0, 2:] = 0
-    buffers.parent[0, 1, 2:] = 1
-    merge(buffers, np.array([[1, 1, 2, 3, 4]]))
-    assert buffers.timestamp[0, 0].tolist() == [0.0, 0.0, 2.0, 2.0, 3.0]
-    assert buffers.position_m[0, 0, 2:].tolist() == [[7.0, 7.0], [0.0, 0.0], [0.0, 0.0]]
-    assert buffers.velocity_mps[0, 0, 2:].tolist() == [[8.0, 8.0], [0.0, 0.0], [0.0, 0.0]]
-    assert buffers.parent[0, 0].tolist() == [-1, -1, 1, 0, 0]
 
 
 def test_the_parent_is_the_first_robot_the_news_was_passed_to():
@@ -172,35 +136,7 @@ def test_the_parent_is_the_first_robot_the_news_was_passed_to():
     assert buffers.parent[0].tolist() == [[-1, 0, 1], [-1, -1, 1], [-1, -1, -1]]
 
 
-def test_packets_are_older_than_the_phase_that_carries_them():
-    # 0 hears 1 while 1 hears 2 and 2 hears 3: each gets its neighbour's news and no more.
-    buffers = empty_buffers(1, 4)
-    nothing = RobotStates(position_m=np.zeros((1, 4, 2)), velocity_mps=np.zeros((1, 4, 2)))
-    observe_self(buffers, nothing, np.array([1.0]))
-    merge(buffers, np.array([[1, 2, 3, 3]]))
-    assert buffers.is_known[0].astype(int).tolist() == [
-        [1, 1, 0, 0],
-        [0, 1, 1, 0],
-        [0, 0, 1, 1],
-        [0, 0, 0, 1],
-    ]
-
-
 @given(seed=seeds, num_robots=sizes)
-@settings(max_examples=50, deadline=None)
-def test_knowledge_changes_only_by_packets_and_never_gets_older(seed, num_robots):
-    _, buffers, heard = case(seed, 2, num_robots)
-    before = copy.deepcopy(buffers)
-    merge(buffers, heard)
-    deaf = heard == np.arange(num_robots)
-    for name in NAMES:
-        assert (getattr(buffers, name)[deaf] == getattr(before, name)[deaf]).all()
-    assert (buffers.timestamp >= before.timestamp).all()
-    assert (buffers.last_attempt == before.last_attempt).all()  # L is never shared
-
-
-@given(seed=seeds, num_robots=sizes)
-@settings(max_examples=50, deadline=None)
 def test_renaming_the_robots_renames_what_they_know(seed, num_robots):
     rng, buffers, heard = case(seed, 2, num_robots)
     old_name = rng.permutation(num_robots)
@@ -211,19 +147,16 @@ def test_renaming_the_robots_renames_what_they_know(seed, num_robots):
 
 
 @given(seed=seeds, num_robots=sizes)
-@settings(max_examples=50, deadline=None)
 def test_missions_side_by_side_do_not_mix(seed, num_robots):
     _, buffers, heard = case(seed, 3, num_robots)
-    rows = [Buffers(**{n: each[[b]].copy() for n, each in vars(buffers).items()}) for b in range(3)]
+    names = [*NAMES, "is_granted"]
+    rows = [
+        replace(buffers, **{n: getattr(buffers, n)[[b]].copy() for n in names}) for b in range(3)
+    ]
     merge(buffers, heard)
     for b, row in enumerate(rows):
         merge(row, heard[[b]])
         assert all((getattr(buffers, n)[[b]] == getattr(row, n)).all() for n in NAMES)
-
-
-def test_never_is_before_the_first_tick():
-    assert NEVER == 0.0 < 0.5
-    assert NO_PARENT == -1
 
 
 def test_what_is_granted_of_the_start_is_known_and_as_old_as_the_mission():
@@ -247,11 +180,7 @@ def test_eq8_the_first_packet_replaces_what_was_granted():
     states = RobotStates(position_m=np.ones((1, 2, 2)), velocity_mps=np.ones((1, 2, 2)))
     buffers = empty_buffers(1, 2)
     grant_start(buffers, states)
-    observe_self(
-        buffers,
-        states,
-        np.array([0.5]),
-    )
+    observe_self(buffers, states, np.array([0.5]))
     merge(buffers, np.array([[0, 0]]))
     assert buffers.timestamp[0].tolist() == [[0.5, 0.0], [0.5, 0.5]]
     assert buffers.parent[0].tolist() == [[NO_PARENT, NO_PARENT], [1, NO_PARENT]]

@@ -5,9 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from swarm_mj.mission import paper
 from swarm_mj.protocol.checks import check_robots, checked_decode
-from swarm_mj.radio.mission_radio import radio_of
 
 POSITION_M = np.zeros((1, 4, 2))
 RECIPIENT = np.array([[1, 1, -1, 3]])  # 0 addresses 1, 2 broadcasts; 1 and 3 are silent
@@ -73,16 +71,3 @@ def test_it_may_write_what_it_gets():
     assert checked_decode(writes, POSITION_M, RECIPIENT).tolist() == [[0, 1, 2, 3]]
     assert np.all(POSITION_M == 0.0)
     assert RECIPIENT.tolist() == [[1, 1, -1, 3]]
-
-
-def test_the_papers_channel_gets_the_arrays_themselves(monkeypatch):
-    """Its loops only read them, and copies would take time."""
-    radio, seen = radio_of(paper()), []
-
-    def looks(_radio, position_m, recipient):
-        seen.append(position_m)
-        return recipient
-
-    monkeypatch.setattr(type(radio), "__call__", looks)
-    checked_decode(radio, POSITION_M, RECIPIENT)
-    assert seen[0] is POSITION_M

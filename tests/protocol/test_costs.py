@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from channels import to_the_addressee
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +16,7 @@ from swarm_mj.protocol.costs import (
     velocity_variance,
     window_costs,
 )
-from swarm_mj.protocol.window import Phase, window
+from swarm_mj.protocol.window import Phase
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -100,14 +99,7 @@ def test_eq10_by_hand():
     assert is_complete.tolist() == [True, True]
 
 
-def test_eq10_the_unknown_are_as_old_as_the_mission():
-    age, is_complete = age_of_information(times([[[8.0, 0.0], [0.0, 8.0]]]), np.array([8.0]))
-    assert age.tolist() == [4.0]
-    assert is_complete.tolist() == [False]
-
-
 @given(seed=seeds, num_missions=st.integers(1, 4), num_robots=st.integers(1, 9))
-@settings(max_examples=50, deadline=None)
 def test_eq10_as_numpy_takes_means(seed, num_missions, num_robots):
     rng = np.random.default_rng(seed)
     timestamp = rng.integers(0, 40, (num_missions, num_robots, num_robots)) / 2.0
@@ -118,7 +110,6 @@ def test_eq10_as_numpy_takes_means(seed, num_missions, num_robots):
 
 
 @given(seed=seeds, num_missions=st.integers(1, 4), num_robots=st.integers(1, 9))
-@settings(max_examples=50, deadline=None)
 def test_eq10_eq17_of_those_that_are_on_by_plain_loops(seed, num_missions, num_robots):
     rng = np.random.default_rng(seed)
     timestamp = rng.integers(0, 40, (num_missions, num_robots, num_robots)) / 2.0
@@ -138,7 +129,6 @@ def test_eq10_eq17_of_those_that_are_on_by_plain_loops(seed, num_missions, num_r
 
 
 @given(seed=seeds, num_missions=st.integers(1, 4), num_robots=st.integers(1, 9))
-@settings(max_examples=50, deadline=None)
 def test_with_everyone_on_costs_are_the_same_bit_for_bit(seed, num_missions, num_robots):
     rng = np.random.default_rng(seed)
     buffers, now = some_trees(rng, num_missions, num_robots), rng.integers(1, 9, num_missions) / 2.0
@@ -156,24 +146,6 @@ def test_with_everyone_on_costs_are_the_same_bit_for_bit(seed, num_missions, num
     assert mean_hops(buffers, everyone).tolist() == mean_hops(buffers).tolist()
 
 
-def test_everyone_knows_everyone_first_in_the_third_window():
-    # 1 asks 0 and both know each other; 2 asks 1 and learns all; 0 asks 1 and learns of 2.
-    buffers, nothing = empty_buffers(1, 3), np.zeros((1, 3, 2))
-    states = RobotStates(position_m=nothing, velocity_mps=nothing)
-    completeness, ages = [], []
-    for t, recipient in enumerate([[0, 0, 2], [0, 1, 1], [1, 1, 2]]):
-        now = np.array([float(t)])
-        phases = window(buffers, states, np.array([recipient]), to_the_addressee, now)
-        costs = window_costs(buffers, states, phases, now + 1, is_broadcast=False)
-        completeness.append(costs.is_complete.item())
-        ages.append(costs.age_windows.item())
-    assert completeness == [False, False, True]
-    # After the first: 0 has 1 since 0.5 and not 2, 1 has 0 since 1, 2 has nobody: T sums to 4.5.
-    # After the second: own 6; 0: 0.5; 1: 1 and 1.5; 2: 1 and 2: 12.
-    # After the third: own 9; 0: 3 and 1.5; 1: 2.5 and 1.5; 2: 1 and 2: 20.5.
-    assert ages == pytest.approx([1 - 4.5 / 9, 2 - 12 / 9, 3 - 20.5 / 9])
-
-
 def test_eq17_by_hand():
     # Mean velocity (2, 1); squared distances from it 2, 2, 0 and 0.
     velocity = np.array([[[3.0, 2.0], [1.0, 0.0], [2.0, 1.0], [2.0, 1.0]]])
@@ -183,7 +155,6 @@ def test_eq17_by_hand():
 
 
 @given(seed=seeds, num_missions=st.integers(1, 4), num_robots=st.integers(1, 9))
-@settings(max_examples=50, deadline=None)
 def test_eq17_as_numpy_takes_variances(seed, num_missions, num_robots):
     rng = np.random.default_rng(seed)
     velocity = rng.normal(scale=3.0, size=(num_missions, num_robots, 2))
@@ -216,7 +187,7 @@ def test_broadcasts_by_hand():
 
 
 @given(seed=seeds, num_missions=st.integers(1, 4), num_robots=st.integers(1, 8))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_packets_as_by_loops(seed, num_missions, num_robots):
     rng = np.random.default_rng(seed)
     first, second = (some_phase(rng, num_missions, num_robots) for _ in range(2))
@@ -226,11 +197,8 @@ def test_packets_as_by_loops(seed, num_missions, num_robots):
         flooded_by_loops = np.add(broadcasts(first, b), broadcasts(second, b)).tolist()
         sent, arrived, overheard = fates(first, b)
         _, arrived2, overheard2 = fates(second, b)
-        assert (asked.attempted[b], asked.delivered[b], asked.answered[b]) == (
-            sent,
-            arrived,
-            arrived2,
-        )
+        addressed = asked.attempted[b], asked.delivered[b], asked.answered[b]
+        assert addressed == (sent, arrived, arrived2)
         assert asked.overheard[b] == overheard + overheard2
         assert asked.sent[b] == asked.attempted[b] == asked.delivered[b] + asked.lost[b]
         counted = [flooded.sent[b], flooded.heard[b], flooded.receptions[b]]
@@ -245,12 +213,8 @@ def test_fig1_robot_0_is_one_and_a_half_hops_from_its_team():
     assert mean_hops(buffers).tolist() == [(1 + 2 + 1 + 2) / 4]
 
 
-def test_hops_are_none_before_anyone_is_known():
-    assert mean_hops(empty_buffers(2, 3)).tolist() == [0.0, 0.0]
-
-
 @given(seed=seeds, num_missions=st.integers(1, 3), num_robots=st.integers(1, 8))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_hops_as_by_walking_up_the_tree(seed, num_missions, num_robots):
     buffers = some_trees(np.random.default_rng(seed), num_missions, num_robots)
     everyone = np.ones((num_missions, num_robots), dtype=bool)
@@ -264,23 +228,6 @@ def test_hops_as_by_walking_up_the_tree(seed, num_missions, num_robots):
                 if buffers.timestamp[b, i, j] > 0 and j != i and counts[b, i] and counts[b, j]
             ]
             assert hops[b] == pytest.approx(sum(depths) / len(depths) if depths else 0.0)
-
-
-def test_a_windows_costs_are_each_of_them():
-    rng = np.random.default_rng(0)
-    buffers, now = some_trees(rng, 3, 5), np.array([1.0, 2.0, 7.0])
-    position_m, velocity_mps = rng.normal(size=(2, 3, 5, 2))
-    states = RobotStates(position_m=position_m, velocity_mps=velocity_mps)
-    phases = some_phase(rng, 3, 5), some_phase(rng, 3, 5)
-    for is_broadcast in (True, False):
-        costs = window_costs(buffers, states, phases, now, is_broadcast=is_broadcast)
-        age, is_complete = age_of_information(buffers, now)
-        packets = count_packets(phases, is_broadcast=is_broadcast)
-        assert (costs.age_windows == age).all()
-        assert (costs.is_complete == is_complete).all()
-        assert (costs.velocity_variance_m2ps2 == velocity_variance(states.velocity_mps)).all()
-        for name, count in vars(packets).items():
-            np.testing.assert_array_equal(getattr(costs.packets, name), count)
 
 
 def test_what_was_granted_at_the_start_has_come_over_no_radio():

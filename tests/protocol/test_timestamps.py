@@ -10,7 +10,6 @@ from swarm_mj.protocol.timestamps import (
     is_newer,
     merge_expected,
     merge_timestamps,
-    observe_own,
     rise,
 )
 
@@ -37,12 +36,6 @@ def test_eq8_only_the_strictly_newer_wins():
     assert not is_newer(2.0, 2.0)
     assert not is_newer(1.5, 2.0)
     assert (rise(2.5, 2.0), rise(2.0, 2.0), rise(1.5, 2.0)) == (0.5, 0.0, 0.0)
-
-
-def test_eq5_everyone_observes_itself():
-    timestamp = np.arange(4.0).reshape(2, 2)
-    observe_own(timestamp, 7.5)
-    assert timestamp.tolist() == [[7.5, 1.0], [2.0, 7.5]]
 
 
 @given(seed=st.integers(0, 2**32 - 1), num_robots=st.integers(1, 8))

@@ -136,7 +136,7 @@ def test_fig1_four_rounds_give_robot_0_the_papers_table():
 
 
 @given(seed=seeds, num_robots=st.integers(2, 6), senders_listen=st.booleans())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_alg1_windows_as_played_with_dictionaries(seed, num_robots, senders_listen):
     num_windows = 8
     course, recipients = some_mission(seed, num_windows, num_robots, 1)
@@ -152,18 +152,6 @@ def test_alg1_windows_as_played_with_dictionaries(seed, num_robots, senders_list
         answers = alg1(robots, states, addressed, twin, float(t))
         assert response.recipient[0].tolist() == [answers.get(j, j) for j in range(num_robots)]
         assert_same_knowledge(robots, buffers)
-
-
-@given(seed=seeds, senders_listen=st.booleans())
-@settings(max_examples=30, deadline=None)
-def test_alg1_only_addressed_recipients_respond(seed, senders_listen):
-    for step in play(10, 5, 2, seed, senders_listen=senders_listen):
-        first, second = step.phases
-        for b in range(2):
-            for j in range(5):
-                sender = first.heard[b, j]
-                was_asked = sender != j and first.recipient[b, sender] == j
-                assert second.recipient[b, j] == (sender if was_asked else j)
 
 
 def test_alg1_respondents_by_hand():
@@ -253,22 +241,8 @@ def test_inactive_robots_neither_send_nor_decode_nor_observe():
     assert buffers.last_attempt[0].tolist() == [[0.0, 0.0, 0.5], [0.0] * 3, [0.0] * 3]
 
 
-def test_flooding_transmits_twice_and_nobody_answers():
-    # Both halves of a window: 0 tells 1, then 1 passes it on to 2.
-    buffers = empty_buffers(1, 3)
-    for half, recipient in [(0.5, [1, 1, 2]), (1.0, [0, 2, 2])]:
-        phase = transmit(
-            buffers, standing(3), np.array([recipient]), to_the_addressee, np.array([half])
-        )
-        assert phase.recipient.tolist() == [recipient]
-    assert phase.heard.tolist() == [[0, 1, 1]]
-    assert buffers.timestamp[0].tolist() == [[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.5, 1.0, 1.0]]
-    assert buffers.parent[0].tolist() == [[-1, -1, -1], [1, -1, -1], [1, 2, -1]]
-    assert buffers.last_attempt[0].tolist() == [[0.0, 0.5, 0.0], [0.0, 0.0, 1.0], [0.0] * 3]
-
-
 @given(seed=seeds, senders_listen=st.booleans())
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_the_clock_moves_by_halves_and_nothing_is_from_the_future(seed, senders_listen):
     for step in play(10, 5, 2, seed, senders_listen=senders_listen):
         end = (step.now + 1)[:, None, None]
@@ -284,7 +258,6 @@ def test_the_clock_moves_by_halves_and_nothing_is_from_the_future(seed, senders_
 
 
 @given(seed=seeds, senders_listen=st.booleans())
-@settings(max_examples=50, deadline=None)
 def test_parents_form_a_tree_rooted_at_oneself(seed, senders_listen):
     for step in play(12, 6, 2, seed, senders_listen=senders_listen):
         parent, is_known = step.after.parent, step.after.is_known
@@ -296,15 +269,6 @@ def test_parents_form_a_tree_rooted_at_oneself(seed, senders_listen):
                 assert len(chain) <= 6, f"a cycle: {chain}"
         assert (parent[~is_known] == -1).all()
         assert (np.diagonal(parent, axis1=1, axis2=2) == -1).all()
-
-
-def test_the_channel_is_an_argument():
-    recipient, now = np.array([[1, 2, 0]]), np.array([0.0])
-    deaf, all_ears = empty_buffers(1, 3), empty_buffers(1, 3)
-    window(deaf, standing(3), recipient, to_nobody, now)
-    window(all_ears, standing(3), recipient, to_the_addressee, now)
-    assert deaf.is_known[0].tolist() == np.eye(3, dtype=bool).tolist()
-    assert all_ears.is_known.all()
 
 
 def test_the_channel_gets_the_true_positions_and_everyones_recipients():
@@ -334,14 +298,6 @@ def test_missions_have_clocks_of_their_own(start):
     assert buffers.timestamp[1].tolist() == [[b + 1, b + 0.5], [b + 1, b + 1]]
 
 
-def test_a_channel_that_names_no_robot_is_refused():
-    def off_by_one(_position_m, recipient):
-        return recipient + 1
-
-    with pytest.raises(ValueError, match=r"sender heard of robot 2 in mission 0 .* not 3"):
-        window(empty_buffers(1, 3), standing(3), np.array([[0, 1, 2]]), off_by_one, np.zeros(1))
-
-
 class Schedule:
     """A channel that is told the slot; in odd ones nobody hears anybody."""
 
@@ -366,7 +322,3 @@ def test_rows_of_a_varying_channel_may_be_any_missions():
     channel = Schedule()
     channel_at(channel, np.array([0.5, 0.5, 1.0]), np.array([1, 0, 1]))
     assert channel.asked == [([0, 0, 1], [1, 0, 1])]
-
-
-def test_a_channel_that_does_not_vary_is_itself():
-    assert channel_at(to_everyone, np.array([0.5])) is to_everyone
