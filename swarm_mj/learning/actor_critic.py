@@ -10,10 +10,10 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.type_aliases import PyTorchObs, Schedule
 from torch import Tensor
 
-from swarm_mj.policies.gnn.fast import FastAggregationGnn
+from swarm_mj.learning.settings import Training
+from swarm_mj.policies.gnn.fast import FastAggregationGnn, empty_network
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.gnn.policy import recipient_logits
-from swarm_mj.policies.policy_config import GnnShape
 
 
 class GnnActorCritic(ActorCriticPolicy):
@@ -31,22 +31,16 @@ class GnnActorCritic(ActorCriticPolicy):
         action_space: spaces.Space,
         lr_schedule: Schedule,
         *,
-        shape: GnnShape,
-        shares_trunk: bool,
-        silence_logit: float,
-        sums_nodes: bool,
+        training: Training,
         **others: Any,
     ) -> None:
-        self._shape, self._shares_trunk = shape, shares_trunk
-        self._silence_logit, self._sums_nodes = silence_logit, sums_nodes
+        self._training, self._shape = training, training.network
         super().__init__(observation_space, action_space, lr_schedule, **others)
 
     def _build(self, lr_schedule: Schedule) -> None:
-        extra = 1 if self._shares_trunk else 0
-        self.network = FastAggregationGnn(
-            replace(self._shape, num_outputs=self._shape.num_outputs + extra)
-        )
-        if not self._shares_trunk:
+        num_outputs = self._shape.num_outputs + self._training.shares_trunk
+        self.network = FastAggregationGnn(replace(self._shape, num_outputs=num_outputs))
+        if not self._training.shares_trunk:
             self.value_network = FastAggregationGnn(replace(self._shape, num_outputs=1))
         self.optimizer = torch.optim.Adam(
             self.parameters(), lr=lr_schedule(1.0), **self.optimizer_kwargs
@@ -54,8 +48,7 @@ class GnnActorCritic(ActorCriticPolicy):
 
     def acting_network(self) -> AggregationGnn:
         """Return a copy of the network that acts, without what values."""
-        with torch.device("meta"):  # draws no random numbers
-            network = FastAggregationGnn(self._shape)
+        network = empty_network(self._shape)
         weights = {name: t.detach().cpu().clone() for name, t in self.network.state_dict().items()}
         for name in ("output.weight", "output.bias"):
             weights[name] = weights[name][: self._shape.num_outputs].clone()
@@ -76,13 +69,12 @@ class GnnActorCritic(ActorCriticPolicy):
         node, parent = obs["node"].flatten(0, -3), obs["parent"].long().flatten(0, -2)
         may_address, has_turn = obs["may_address"].bool().flatten(0, -2), obs["has_turn"].bool()
         output = self.network(node, parent, may_address)
-        if self._shares_trunk:
+        if self._training.shares_trunk:
             output, values = output[:, :, :-1], output[:, :, -1]  # the last number of each node
         else:
             values = self.value_network(node, parent)[:, :, 0]
-        logits = recipient_logits(
-            output, owner, may_address, self._silence_logit, has_turn.flatten()
-        )
+        silence_logit = self._training.silence_logit
+        logits = recipient_logits(output, owner, may_address, silence_logit, has_turn.flatten())
         return logits, values
 
     def logits_and_value(
@@ -98,7 +90,7 @@ class GnnActorCritic(ActorCriticPolicy):
         everyone = torch.arange(shape[1], device=is_robot.device)
         logits, values = self._robots(obs, everyone.repeat(shape[0]))
         counted = is_robot[:, :, None] & is_robot[:, None, :]
-        if not self._sums_nodes:
+        if not self._training.sums_nodes:
             counted = counted & torch.eye(shape[1], dtype=torch.bool, device=counted.device)
         value = (values.unflatten(0, shape) * counted).flatten(1).sum(1)
         return logits.unflatten(0, shape), value

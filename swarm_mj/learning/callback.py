@@ -4,49 +4,33 @@ import time
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
-from swarm_mj.learning import checkpoint
+from swarm_mj.learning import checkpoint, held_out, selection
 from swarm_mj.learning.graph_vec_env import env_of
-from swarm_mj.learning.held_out import (
-    HeldOut,
-    choose,
-    evaluate,
-    notes_of_choice,
-    notes_of_evaluation,
-    record_replay,
-    reference_columns,
-)
+from swarm_mj.learning.held_out import HeldOut
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
-    CURVE,
     REPLAYS,
     Accumulator,
     Listener,
     Progress,
     Status,
     TrainingRun,
-    write_curve,
 )
-from swarm_mj.learning.selection import (
-    REFERENCE_COLUMNS,
-    Row,
-    candidates,
-    has_stalled,
-    reserved_minutes,
-)
+from swarm_mj.learning.selection import Choice, Row
 from swarm_mj.policies.policy_config import GnnConfig
 from swarm_mj.policies.stored import POLICY, save_policy
 from swarm_mj.system.provenance import commit, version
 
-OPTIMISER = tuple(
-    f"train/{name}"
-    for name in ("entropy", "explained_variance", "approx_kl", "clip_fraction", "value_loss")
+# What PPO logs of itself, by its names.
+OPTIMISER = (
+    *("train/entropy", "train/explained_variance"),
+    *("train/approx_kl", "train/clip_fraction", "train/value_loss"),
 )
 
 
@@ -86,24 +70,22 @@ class TrainingCallback(BaseCallback):
         """Minutes of all sessions so far."""
         return self._progress.minutes + (time.monotonic() - self._counted_s) / 60.0
 
-    @property
-    def has_stalled(self) -> bool:
-        """True if the run no longer learns."""
-        return has_stalled(self._progress.curve, self._limits.patience)
-
     def _on_rollout_start(self) -> None:
         is_last = self._is_time() or not self._goes_on
         # Less --patience may end a run between evaluations: the last weights are judged first.
-        self.between_rollouts(is_last=is_last or self.has_stalled)
-        if is_last or not self._goes_on or self.has_stalled:
+        self.between_rollouts(is_last=is_last or self._has_stalled())
+        if is_last or not self._goes_on or self._has_stalled():
             raise Stopped
+
+    def _has_stalled(self) -> bool:
+        return selection.has_stalled(self._progress.curve, self._limits.patience)
 
     def _is_time(self) -> bool:
         """Return whether the minutes are over, except those that the selection will take."""
         limit, evaluation = self._limits.minutes, self._progress.evaluation_minutes
         if limit is None:
             return False
-        reserved = reserved_minutes(self._training, self.decisions, evaluation, limit)
+        reserved = selection.reserved_minutes(self._training, self.decisions, evaluation, limit)
         return self.minutes + reserved >= limit
 
     def _on_step(self) -> bool:
@@ -120,20 +102,14 @@ class TrainingCallback(BaseCallback):
         self.logger.record("train/entropy", -float(log_p.mean()))
 
     def _tell(self, evaluated: float | None = None, what: str = "Training") -> None:
-        status = Status(
-            decisions=self.decisions,
-            minutes=self.minutes,
-            aoi=self._aoi,
-            progress=self._progress,
-            evaluated=evaluated,
-            what=what,
-        )
+        its = {"decisions": self.decisions, "minutes": self.minutes, "aoi": self._aoi}
+        status = Status(**its, progress=self._progress, evaluated=evaluated, what=what)
         self._goes_on = self._listener(status) and self._goes_on
 
     def between_rollouts(self, *, is_last: bool) -> None:
         """Evaluate, record a replay and keep a checkpoint, each if it is due."""
         progress, decisions, logged = self._progress, self.decisions, self.logger.name_to_value
-        _check_finite(self._ppo, decisions)
+        self._check_finite(decisions)
         progress.decisions = decisions
         means = {name: float(logged[name]) for name in OPTIMISER if name in logged}
         progress.optimiser = means or progress.optimiser  # of PPO's last passes over a rollout
@@ -146,7 +122,7 @@ class TrainingCallback(BaseCallback):
         every = self._limits.replay_every
         if every and decisions >= progress.next_replay and self._goes_on:
             network = checkpoint.acting_network(self._ppo)
-            record_replay(self._training, network, decisions, self._folder / REPLAYS)
+            held_out.record_replay(self._training, network, decisions, self._folder / REPLAYS)
             progress.next_replay = (decisions // every + 1) * every
         is_old = time.monotonic() - self._saved_s >= self._limits.checkpoint_every_s
         if is_old or is_due or is_last or not self._goes_on:
@@ -174,35 +150,36 @@ class TrainingCallback(BaseCallback):
             self._count_time()
             means, begun = progress.since_evaluation.means(), progress.minutes
             on_window = partial(self._on_window, "Evaluating")
-            held_out = evaluate(self._training, network.to(self._ppo.device), on_window)
+            costs = held_out.evaluate(self._training, network.to(self._ppo.device), on_window)
         except Stopped:
             return
         self._count_time()
         progress.evaluation_minutes = progress.minutes - begun
         progress.since_evaluation = Accumulator()
         progress.next_evaluation = (decisions // every + 1) * every
-        known = {name: x for name, x in asdict(held_out).items() if x is not None}
+        known = {name: x for name, x in asdict(costs).items() if x is not None}
         row = {"decisions": float(decisions), "minutes": progress.minutes, **known, **others}
         progress.curve.append(row | means | progress.optimiser)
         for name, value in progress.curve[-1].items():
             self.logger.record(name if "/" in name else f"held_out/{name}", value)
         self.logger.dump(decisions)
-        write_curve(self._folder / CURVE, progress.curve)
+        progress.write_curve(self._folder)
         self._networks[decisions] = network
-        kept = {int(row["decisions"]) for row in candidates(progress.curve)}
+        kept = {int(row["decisions"]) for row in selection.candidates(progress.curve)}
         for dropped in self._networks.keys() - kept:
             del self._networks[dropped]
-        if held_out.objective < progress.best_objective:
-            progress.best_objective, progress.choice = held_out.objective, None
-            self._keep(progress.curve[-1], held_out, notes_of_evaluation(self._training))
+        if costs.objective < progress.best_objective:
+            progress.best_objective, progress.choice = costs.objective, None
+            self._keep(decisions, costs, None)
         self._tell()
 
     def _references(self) -> Row:
         """Return the costs of hand-written policies on the held-out missions, flown once a run."""
         if self._progress.curve:
             first = self._progress.curve[0]
-            return {name: first[name] for name in first if name in REFERENCE_COLUMNS}
-        return reference_columns(self._training, partial(self._on_window, "Flying others"))
+            return {name: first[name] for name in first if name in selection.REFERENCE_COLUMNS}
+        on_window = partial(self._on_window, "Flying others")
+        return held_out.reference_columns(self._training, on_window)
 
     def choose(self) -> None:
         """Choose the policy that is kept, once nothing is left to train and if none is chosen."""
@@ -211,11 +188,11 @@ class TrainingCallback(BaseCallback):
             return
         on_window = partial(self._on_window, "Choosing")
         try:
-            choice, costs = choose(self._training, progress.curve, self._networks, on_window)
+            flown = self._training, progress.curve, self._networks
+            choice, costs = held_out.choose(*flown, on_window)
         except Stopped:
             return
-        (row,) = (each for each in progress.curve if each["decisions"] == choice.decisions)
-        self._keep(row, costs, notes_of_choice(self._training, choice))
+        self._keep(choice.decisions, costs, choice)
         progress.choice = choice
         self._save()
 
@@ -224,26 +201,26 @@ class TrainingCallback(BaseCallback):
         if not self._goes_on:
             raise Stopped
 
-    def _keep(self, row: Row, costs: HeldOut, notes: dict[str, Any]) -> None:
-        """Store the policy of an evaluation, with its costs."""
-        training, decisions = self._training, int(row["decisions"])
+    def _keep(self, decisions: int, costs: HeldOut, choice: Choice | None) -> None:
+        """Store the policy of the evaluation after so many decisions, with its costs."""
+        training = self._training
+        (row,) = (each for each in self._progress.curve if each["decisions"] == decisions)
         made = {"command": self._run.command, "decisions": decisions, "minutes": row["minutes"]}
         config = GnnConfig(
             network=training.network,
             features=training.features,
             silence_logit=training.silence_logit,
             training=asdict(training) | made,
-            evaluation=asdict(costs) | notes,
+            evaluation=asdict(costs) | held_out.notes_of(training, choice),
             commit=commit(),
             version=version(),
         )
         save_policy(self._folder / POLICY, self._networks[decisions], config)
 
-
-def _check_finite(model: PPO, decisions: int) -> None:
-    """Raise ValueError if training has diverged; the last checkpoint is from before that."""
-    if not all(torch.isfinite(weight).all() for weight in model.policy.parameters()):
-        raise ValueError(
-            f"the network's weights are no longer finite after {decisions} decisions; begin a new "
-            "run with a lower learning rate"
-        )
+    def _check_finite(self, decisions: int) -> None:
+        """Raise ValueError if training has diverged; the last checkpoint is from before that."""
+        if not all(torch.isfinite(weight).all() for weight in self._ppo.policy.parameters()):
+            raise ValueError(
+                f"the network's weights are no longer finite after {decisions} decisions; begin a "
+                "new run with a lower learning rate"
+            )

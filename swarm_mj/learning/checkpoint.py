@@ -120,9 +120,8 @@ def load(
         if read_json(state["training"], Training) != training:
             raise ValueError("it was made with other settings than the run's")
         counters = check_state(state, model)
-        networks = {}
+        networks = {at: acting_network(model) for at in state["candidates"]}
         for at, weights in state["candidates"].items():
-            networks[at] = acting_network(model)
             networks[at].load_state_dict(weights)
         _restore(state, counters, model, rng)
     except Exception as error:  # generators of random numbers take states as they please
@@ -193,9 +192,8 @@ def _check_like(given: Any, like: Mapping[Any, Any] | Tensor, name: str) -> None
 
 
 def _max_bytes(model: PPO) -> int:
-    """Return the size of a model's checkpoint, with much room for its curve."""
-    weights = sum(weight.nbytes for weight in model.policy.parameters())
-    weights *= 3 + NUM_BEST + 1  # and Adam's two, and the candidates'
+    # Weights, Adam's two moments of them and the candidates; recipients; much room for the curve.
+    weights = sum(weight.nbytes for weight in model.policy.parameters()) * (3 + NUM_BEST + 1)
     batches = env_of(model).batches
     decisions = sum(batch.mission.num_windows * math.prod(batch.shape) for batch in batches)
     return 2 * (weights + np.dtype(np.int16).itemsize * decisions) + SPARE_BYTES
@@ -230,12 +228,10 @@ def _restore(
     policy.load_state_dict(state["weights"])
     policy.optimizer.load_state_dict(policy.optimizer.state_dict() | {"state": state["adam"]})
     model.num_timesteps, model._n_updates = counters.num_timesteps, counters.num_updates
-    spans = zip(counters.seeds, counters.last_windows, strict=True)
-    histories = [
-        ActionHistory(seeds=seeds, last_window=last, recipients=[*state["recipients"][n].numpy()])
-        for n, (seeds, last) in enumerate(spans)
-    ]
-    model._last_obs = env_of(model).replay(histories)
+    model._last_obs = env_of(model).replay(
+        ActionHistory(seeds, last, [*state["recipients"][n].numpy()])
+        for n, (seeds, last) in enumerate(zip(counters.seeds, counters.last_windows, strict=True))
+    )
     model._last_episode_starts = state["episode_starts"].numpy()
     if isinstance(env, VecNormalize) and counters.reward_moments is not None:
         for name, value in zip(("mean", "var", "count"), counters.reward_moments, strict=True):

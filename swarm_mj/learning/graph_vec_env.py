@@ -3,9 +3,9 @@
 Batches are staggered, so that every rollout holds windows from all parts of a mission.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
@@ -24,8 +24,7 @@ from swarm_mj.policies.gnn.graphs import Graphs
 from swarm_mj.protocol.buffers import NO_PARENT
 
 
-@dataclass(frozen=True, kw_only=True)
-class ActionHistory:
+class ActionHistory(NamedTuple):
     """How a batch came to where it is: replayed, it leads to the same state."""
 
     seeds: list[int]  # of the missions under way
@@ -75,15 +74,15 @@ class GraphVecEnv(SwarmVecEnv):
     def histories(self) -> list[ActionHistory]:
         """The way of each batch to its present state."""
         return [
-            ActionHistory(seeds=batch.seeds, last_window=batch.last_window, recipients=recipients)
+            ActionHistory(batch.seeds, batch.last_window, recipients)
             for batch, recipients in zip(self.batches, self._recipients, strict=True)
         ]
 
     def reset(self) -> Observation:
         """Start the missions under way over; others would shift the seeds of all that follow."""
-        return self.replay([replace(each, recipients=[]) for each in self.histories])
+        return self.replay([each._replace(recipients=[]) for each in self.histories])
 
-    def replay(self, histories: Sequence[ActionHistory]) -> Observation:
+    def replay(self, histories: Iterable[ActionHistory]) -> Observation:
         """Go to the end of histories, one a batch; return the observation there."""
         for n, (batch, history) in enumerate(zip(self.batches, histories, strict=True)):
             batch.restart(history.seeds, history.last_window)
@@ -109,7 +108,7 @@ class GraphVecEnv(SwarmVecEnv):
         return self._rng.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED, size=size).tolist()
 
     def _is_truncated(self) -> Bool[np.ndarray, "E"]:
-        """Return where missions are cut off early: their value goes on, that of ended ones is 0."""
+        # The value of missions cut off early goes on, that of ended ones is 0.
         is_cut = [batch.last_window < batch.mission.num_windows for batch in self.batches]
         return np.repeat(is_cut, [envs.stop - envs.start for envs in self._envs])
 
@@ -135,7 +134,6 @@ class GraphVecEnv(SwarmVecEnv):
         return observation
 
     def _space_of(self, rows: np.ndarray) -> spaces.Space:
-        """Return the space of one environment's share of an observation."""
         if rows.dtype == np.bool_:
             return spaces.MultiBinary(rows.shape[1:])
         is_number = rows.dtype == np.float32

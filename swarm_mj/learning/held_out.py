@@ -16,19 +16,8 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.evaluation.statistics import standard_error
-from swarm_mj.learning.selection import (
-    COMPARED,
-    JUDGED,
-    NEAR,
-    OTHER_FLIGHTS,
-    Choice,
-    Cost,
-    Row,
-    column,
-    finalists,
-    num_missions,
-    reference_missions,
-)
+from swarm_mj.learning import selection
+from swarm_mj.learning.selection import COMPARED, JUDGED, NEAR, OTHER_FLIGHTS, Choice, Cost, Row
 from swarm_mj.learning.settings import CHOICE_SEED, HELD_OUT_SEED, TEST_SEED, Training
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import make_extractor
@@ -76,12 +65,11 @@ def evaluate(
 
 def reference_columns(training: Training, on_window: OnWindow) -> Row:
     """Fly `REFERENCES` on held-out missions; return their costs by the learning curve's columns."""
-    columns, sizes = {}, reference_missions(training)
+    columns, sizes = {}, selection.reference_missions(training)
     shares = _shares_of(on_window, len(sizes))
     for name, size in sizes.items():
         flown = fly(training, partial(make_policy, name), HELD_OUT_SEED, size, next(shares))
-        for cost in JUDGED:
-            columns[column(cost, name)] = _mean(_own_costs(flown, cost))
+        columns |= {selection.column(cost, name): _mean(_own_costs(flown, cost)) for cost in JUDGED}
     return columns
 
 
@@ -92,49 +80,48 @@ def choose(
     on_window: OnWindow,
 ) -> tuple[Choice, HeldOut]:
     """Choose among the finalists of a whole run on fresh missions; return its cost on others."""
-    rows, run_decisions = finalists(curve), int(curve[-1]["decisions"])
+    rows, run_decisions = selection.finalists(curve), int(curve[-1]["decisions"])
     num_flights = len(rows) + OTHER_FLIGHTS  # at most
-    size = num_missions(training, run_decisions, num_flights)
+    size = selection.num_missions(training, run_decisions, num_flights)
     shares = _shares_of(on_window, num_flights)
 
     def flies(row: Row) -> MakePolicy:
         return partial(held_out_policy, training, networks[int(row["decisions"])])
 
-    kept = rows[0]
-    if len(rows) > 1:
-        flown = [fly(training, flies(row), CHOICE_SEED, size, next(shares)) for row in rows]
-        kept = rows[int(np.argmin([_means(training, costs).objective for costs in flown]))]
-    costs = fly(training, flies(kept), TEST_SEED, size, next(shares))
+    def flown(policy_of: MakePolicy, first_seed: int = TEST_SEED) -> Flown:
+        return fly(training, policy_of, first_seed, size, next(shares))
+
+    def objective(row: Row) -> float:
+        return _means(training, flown(flies(row), CHOICE_SEED)).objective
+
+    kept = min(rows, key=objective) if len(rows) > 1 else rows[0]
+    costs = flown(flies(kept))
     own = _own_costs(costs, training.cost)
     compared: dict[str, MakePolicy] = {name: partial(make_policy, name) for name in COMPARED}
     if kept is not curve[0]:
         compared["first"] = flies(curve[0])
-    others = {
-        name: _own_costs(fly(training, policy_of, TEST_SEED, size, next(shares)), training.cost)
-        for name, policy_of in compared.items()
-    }
     choice = Choice(
         decisions=int(kept["decisions"]),
         run_decisions=run_decisions,
         num_finalists=len(rows),
         num_missions=size,
-        kept=Cost(mean=_mean(own), sem=_standard_error(own)),
-        others={name: _compared(own, each) for name, each in others.items()},
+        kept=_cost(own),
+        others={
+            name: _cost(_own_costs(flown(policy_of), training.cost), own)
+            for name, policy_of in compared.items()
+        },
     )
     return choice, _means(training, costs)
 
 
-def notes_of_evaluation(training: Training) -> dict[str, Any]:
-    """Return the card's notes on the policy that is the best of the evaluations."""
-    return {
-        "missions": training.held_out * len(training.robots),
-        "first_seed": HELD_OUT_SEED,
-        "chosen_by": "the least objective of all evaluations on these same missions",
-    }
-
-
-def notes_of_choice(training: Training, choice: Choice) -> dict[str, Any]:
-    """Return the card's notes on a policy that was chosen at the end."""
+def notes_of(training: Training, choice: Choice | None) -> dict[str, Any]:
+    """Return the card's notes on how a policy was chosen; None: by the evaluations so far."""
+    if choice is None:
+        return {
+            "missions": training.held_out * len(training.robots),
+            "first_seed": HELD_OUT_SEED,
+            "chosen_by": "the least objective of all evaluations on these same missions",
+        }
     how = f"the least objective of all evaluations; no other was within {NEAR - 1.0:.0%} of it"
     if choice.num_finalists > 1:
         how = (
@@ -191,7 +178,6 @@ def _shares_of(on_window: OnWindow, total: int) -> Iterator[OnWindow]:
 
 
 def _means(training: Training, costs: Flown) -> HeldOut:
-    """Return what missions flown cost, all team sizes together."""
     age = [np.array([window.age_windows for window in windows]) for windows in costs]
     variance = [np.array([w.velocity_variance_m2ps2 for w in windows]) for windows in costs]
     objective = [each / size for each, size in zip(age, training.robots, strict=True)]
@@ -216,15 +202,13 @@ def _own_costs(costs: Flown, cost: str) -> Samples:
     return [np.mean([getattr(each, name) for each in windows], axis=0) for windows in costs]
 
 
-def _compared(own: Samples, other: Samples) -> Cost:
-    """Return another policy's cost, and how far the kept policy is behind it, pair by pair."""
-    behind = [a - b for a, b in zip(own, other, strict=True)]
-    return Cost(
-        mean=_mean(other),
-        sem=_standard_error(other),
-        behind=_mean(behind),
-        behind_sem=_standard_error(behind),
-    )
+def _cost(samples: Samples, kept: Samples | None = None) -> Cost:
+    """Return a policy's cost and, pair by pair, how far the policy that is kept is behind it."""
+    cost = Cost(mean=_mean(samples), sem=_standard_error(samples))
+    if kept is None:
+        return cost
+    behind = [a - b for a, b in zip(kept, samples, strict=True)]
+    return replace(cost, behind=_mean(behind), behind_sem=_standard_error(behind))
 
 
 def _mean(by_size: Sequence[Float[np.ndarray, "..."]]) -> float:
@@ -232,7 +216,7 @@ def _mean(by_size: Sequence[Float[np.ndarray, "..."]]) -> float:
 
 
 def _standard_error(by_size: Samples) -> float | None:
-    """Return the standard error of the mean over sizes; sizes differ, but they are not drawn."""
+    # Sizes differ, but they are not drawn: the errors of their means add up.
     errors = [standard_error(each) for each in by_size]
     known = [error for error in errors if error is not None]
     return math.hypot(*known) / len(known) if len(known) == len(errors) else None

@@ -1,4 +1,9 @@
-"""A run's folder: its files, what was asked for, and how far the run has come."""
+"""A run's folder: its files, what was asked for, and how far the run has come.
+
+It holds `settings.json`, `checkpoint.pt`, `curve.csv` (one row an evaluation), `tensorboard/`,
+`policy.safetensors` (the one that is kept), `init.safetensors` (the one it began with, if any) and,
+on request, `replays/`.
+"""
 
 import math
 import os
@@ -29,11 +34,7 @@ MAX_DECISIONS, MAX_EVALUATIONS = 10**12, 1_000_000
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """How far a run goes, and what it leaves behind on the way.
-
-    Raises:
-        ValueError: A number is out of range.
-    """
+    """How far a run goes, and what it leaves behind; raises ValueError for what is out of range."""
 
     decisions: int | None = setting(
         None,
@@ -134,6 +135,11 @@ class Progress:
         """The best evaluation."""
         return min(self.curve, key=lambda row: row["objective"], default=None)
 
+    def write_curve(self, folder: Path) -> None:
+        """Write the learning curve into a run's folder; later rows may have more columns."""
+        names = list(dict.fromkeys(name for row in self.curve for name in row))
+        write_csv(folder / CURVE, names, self.curve)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Status:
@@ -161,10 +167,8 @@ def write_run(folder: Path, run: TrainingRun) -> None:
 def read_run(folder: Path, named: Collection[str] = ()) -> TrainingRun:
     """Return what a run was asked for when it began, or last went on.
 
-    Args:
-        folder: The run's.
-        named: The user's own components that it may have, as `module:Name`: to go on runs their
-            code, and a folder may come from anyone.
+    Users' own components, as `module:Name`, must be `named`: to go on runs their code, and a folder
+    may come from anyone.
 
     Raises:
         ValueError: There is no run, its settings are damaged, foreign or of another version, or it
@@ -218,13 +222,3 @@ def check_begun(folder: Path) -> None:
             f"{folder} has lost its {CHECKPOINT}, so its run cannot go on; put it back, or begin "
             "another run in another folder, by --out without --resume"
         )
-
-
-def write_curve(path: Path, curve: list[Row]) -> None:
-    """Write a learning curve, one row an evaluation; later rows may have more columns.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
-    names = list(dict.fromkeys(name for row in curve for name in row))
-    write_csv(path, names, curve)

@@ -88,10 +88,8 @@ ROBOTS_NETWORK = GnnShape(
 class Training:
     """A training run: the same settings make the same policy on the same machine.
 
-    The defaults are those of credit per robot, made to learn in minutes.
-
-    Raises:
-        ValueError: A value is unknown, outside its range, or does not go with another.
+    The defaults are those of credit per robot, made to learn in minutes. Raises ValueError for
+    values that are unknown, out of range, or do not go with each other.
     """
 
     credit_assignment: CreditAssignment = setting(
@@ -113,9 +111,8 @@ class Training:
     )
     network: GnnShape = ROBOTS_NETWORK  # that acts
     shares_trunk: bool = True  # whether values come from its last stage but one number
-    silence_logit: float = setting(
-        7.0, low=-100.0, high=100.0
-    )  # what silence has ahead, but in a robot's own turn: e^7 to 1
+    # What silence has ahead, but in a robot's own turn: e^7 to 1.
+    silence_logit: float = setting(7.0, low=-100.0, high=100.0)
     reward: Reward = setting(
         "aoi", "the cost to lower; velocity-variance needs --credit team", choices=get_args(Reward)
     )
@@ -179,9 +176,7 @@ def usual_settings(credit: str, mission: Mission, robots: Sequence[int], seed: i
     """Return the usual settings of credit per `robot` or per `team`, the paper's way (III-C).
 
     The mission's preset says whose way, where they differ; `dataclasses.replace` changes some.
-
-    Raises:
-        ValueError: A value is unknown or outside its range.
+    Raises ValueError for values that are unknown or out of range.
     """
     check_value(Training.__dataclass_fields__["credit_assignment"], credit)
     own = _per_team(is_reference=mission.preset == "reference") if credit == "team" else {}
@@ -189,19 +184,17 @@ def usual_settings(credit: str, mission: Mission, robots: Sequence[int], seed: i
 
 
 def _per_team(*, is_reference: bool) -> dict[str, Any]:
-    """III-C, or the authors' code: other features, and two numbers per node.
-
-    Both have the code's edges. Over the text's, which lead from children to parents, nothing of the
-    robot itself reaches a teammate's node: its recipient could depend neither on where it is
-    nor on the time.
-    """
+    # III-C, or the authors' code: other features, and two numbers per node. Both have the code's
+    # edges. Over the text's, which lead from children to parents, nothing of the robot itself
+    # reaches a teammate's node: its recipient could depend neither on where it is nor on the time.
     features, num_outputs = ("reference", 2) if is_reference else ("paper", 1)
+    network = GnnShape(
+        num_features=num_features(features), num_outputs=num_outputs, edges="reference"
+    )
     return {
         "credit_assignment": "team",
         "features": features,
-        "network": GnnShape(
-            num_features=num_features(features), num_outputs=num_outputs, edges="reference"
-        ),
+        "network": network,
         "shares_trunk": False,
         "silence_logit": 0.0 if is_reference else EVEN_SILENCE,
         "ppo": TEAM_REFERENCE if is_reference else TEAM_PAPER,

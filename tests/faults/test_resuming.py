@@ -16,8 +16,8 @@ from swarm_mj.evaluation import progress
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.evaluation.study import Study
 from swarm_mj.learning import checkpoint
+from swarm_mj.learning.ppo import make_model
 from swarm_mj.learning.run_folder import CHECKPOINT, SETTINGS, read_run
-from swarm_mj.learning.train import make_model
 from swarm_mj.mission import paper
 from swarm_mj.system.outputs import owned
 

@@ -18,7 +18,7 @@ import torch._dynamo  # noqa: F401 - optimisers import it late, so every child w
 from small_runs import StopAfter, difference, end_of, go_on, run, small_training
 
 from swarm_mj.cli import main
-from swarm_mj.learning import callback
+from swarm_mj.learning import selection
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.held_out import reference_columns
 from swarm_mj.learning.run_folder import Limits, Progress, TrainingRun
@@ -65,7 +65,7 @@ def timed(folder):
     But for what one evaluation more at every stop brings: rows of the curve, candidates, and so
     the policy kept. No minutes are kept back for the choice: every session trains.
     """
-    callback.reserved_minutes = lambda *_: 0.0
+    selection.reserved_minutes = lambda *_: 0.0
     training = small_training()
     run(training, folder / "untimed", 192)
     progress, num_sessions = Progress(), 0

@@ -10,8 +10,8 @@ from torch.distributions import Categorical
 
 from swarm_mj.learning.actor_critic import boltzmann_sample, entropy, log_probability
 from swarm_mj.learning.graph_vec_env import env_of
+from swarm_mj.learning.ppo import make_model
 from swarm_mj.learning.settings import usual_settings
-from swarm_mj.learning.train import make_model
 from swarm_mj.mission import PRESETS
 
 RUNS = [

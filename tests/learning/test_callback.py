@@ -9,7 +9,7 @@ import pytest
 from small_runs import StopAfter, go_on, run, small_training
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from swarm_mj.learning import callback
+from swarm_mj.learning import callback, held_out, selection
 from swarm_mj.learning.run_folder import CURVE, REPLAYS, TENSORBOARD, Limits, TrainingRun
 from swarm_mj.learning.settings import HELD_OUT_SEED, TEST_SEED
 from swarm_mj.learning.train import train
@@ -130,7 +130,7 @@ def test_a_run_stops_when_evaluations_bring_no_gain_however_often_it_was_interru
 ):
     """Of 0, 64, 128, ... decisions: the best is at 128, and two more bring less than 0.5 %."""
     objectives = {0: 3.0, 64: 2.0, 128: 1.0, 192: 0.998, 256: 1.5, 320: 0.1}
-    evaluate = callback.evaluate
+    evaluate = held_out.evaluate
     seen = []
 
     def judged(*arguments):
@@ -138,7 +138,7 @@ def test_a_run_stops_when_evaluations_bring_no_gain_however_often_it_was_interru
         seen.append(found)
         return found
 
-    monkeypatch.setattr(callback, "evaluate", judged)
+    monkeypatch.setattr(held_out, "evaluate", judged)
     limits, is_resumed = Limits(decisions=640, patience=2), False
     for _ in range(10):
         asked = TrainingRun(training=TRAINING, limits=limits)
@@ -155,8 +155,8 @@ def test_a_run_stops_when_evaluations_bring_no_gain_however_often_it_was_interru
 
 def test_a_stall_stops_a_run_only_when_the_last_weights_are_judged(tmp_path, monkeypatch):
     """Asked for less patience half-way between two evaluations."""
-    evaluate = callback.evaluate
-    monkeypatch.setattr(callback, "evaluate", lambda *a: replace(evaluate(*a), objective=1.0))
+    evaluate = held_out.evaluate
+    monkeypatch.setattr(held_out, "evaluate", lambda *a: replace(evaluate(*a), objective=1.0))
     run(TRAINING, tmp_path / "run", 640, lambda status: status.decisions <= 128)
     asked = TrainingRun(training=TRAINING, limits=Limits(decisions=640, patience=2))
     progress = train(asked, tmp_path / "run", listener=go_on, is_resumed=True)
@@ -223,12 +223,12 @@ def test_a_better_policy_takes_the_place_of_the_last_and_a_worse_one_does_not(
     tmp_path, monkeypatch
 ):
     objectives = iter([3.0, 1.0, 2.0, 1.0])
-    evaluate = callback.evaluate
+    evaluate = held_out.evaluate
 
     def judged(*arguments):
         return replace(evaluate(*arguments), objective=next(objectives))
 
-    monkeypatch.setattr(callback, "evaluate", judged)
+    monkeypatch.setattr(held_out, "evaluate", judged)
     monkeypatch.setattr(callback.TrainingCallback, "choose", lambda _: None)
     progress = run(TRAINING, tmp_path / "run")
     assert progress.best_objective == 1.0
@@ -238,7 +238,7 @@ def test_a_better_policy_takes_the_place_of_the_last_and_a_worse_one_does_not(
 
 def test_minutes_end_a_run_after_a_whole_rollout(tmp_path, monkeypatch):
     """Where none are kept back for the choice."""
-    monkeypatch.setattr(callback, "reserved_minutes", lambda *_: 0.0)
+    monkeypatch.setattr(selection, "reserved_minutes", lambda *_: 0.0)
     asked = TrainingRun(training=TRAINING, limits=Limits(minutes=1e-9))
     progress = train(asked, tmp_path / "run", listener=go_on)
     assert progress.decisions == 0

@@ -12,8 +12,8 @@ import torch
 from small_runs import run, small_training
 
 from swarm_mj.learning.checkpoint import IN_A_ROW, acting_network, check_state, load, save
+from swarm_mj.learning.ppo import make_model
 from swarm_mj.learning.run_folder import CHECKPOINT, Accumulator, Progress
-from swarm_mj.learning.train import make_model
 
 TRAINING = small_training()
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from swarm_mj.learning.estimates import rollout_bytes, training_needs
+from swarm_mj.learning.ppo import make_model
 from swarm_mj.learning.run_folder import Limits
 from swarm_mj.learning.settings import usual_settings
-from swarm_mj.learning.train import make_model
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.packet_memory import empty_memory
 from swarm_mj.replay.recorder import replay_file

@@ -14,7 +14,7 @@ from swarm_mj.learning.held_out import (
     evaluate,
     fly,
     held_out_policy,
-    notes_of_choice,
+    notes_of,
     reference_columns,
 )
 from swarm_mj.learning.settings import CHOICE_SEED, HELD_OUT_SEED, TEST_SEED
@@ -162,9 +162,9 @@ def test_the_first_flies_beside_what_was_chosen_if_it_is_another():
 
 def test_the_card_says_on_which_missions_it_was_chosen():
     choice, _ = choose(TRAINING, CURVE, NETWORKS, lambda _share: None)
-    how = notes_of_choice(TRAINING, choice)["chosen_by"]
+    how = notes_of(TRAINING, choice)["chosen_by"]
     assert how.endswith("3 of the best policies on as many other missions, from seed 510000")
-    how = notes_of_choice(TRAINING, replace(choice, num_finalists=1))["chosen_by"]
+    how = notes_of(TRAINING, replace(choice, num_finalists=1))["chosen_by"]
     assert how == "the least objective of all evaluations; no other was within 25% of it"
 
 

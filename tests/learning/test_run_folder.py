@@ -22,7 +22,6 @@ from swarm_mj.learning.run_folder import (
     check_begun,
     check_new,
     read_run,
-    write_curve,
     write_run,
 )
 from swarm_mj.mission.components import Components
@@ -170,7 +169,7 @@ def test_totals_are_per_mission_and_window():
 
 
 def test_a_curve_is_a_table_even_if_later_rows_have_more_columns(tmp_path):
-    write_curve(tmp_path / "curve.csv", [ROW, ROW | {"train/entropy": 0.5}])
+    Progress(curve=[ROW, ROW | {"train/entropy": 0.5}]).write_curve(tmp_path)
     with (tmp_path / "curve.csv").open(newline="") as file:
         first, second = csv.DictReader(file)
     assert {name: float(x) for name, x in first.items() if x} == ROW

@@ -9,8 +9,8 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
 from swarm_mj.cli.benchmark.simulation import Row, microseconds
+from swarm_mj.learning.ppo import make_model
 from swarm_mj.learning.settings import usual_settings
-from swarm_mj.learning.train import make_model
 from swarm_mj.mission import Mission, paper
 from swarm_mj.policies.centralised import RoundRobin
 from swarm_mj.policies.gnn.fast import FastAggregationGnn
