@@ -105,9 +105,8 @@ def load(
 ) -> tuple[Progress, Networks]:
     """Put a model and its missions back to a checkpoint; return its progress and candidates.
 
-    Raises:
-        ValueError: The file is damaged, foreign, of another version or of other settings.
-        OSError: The file cannot be read.
+    Raises ValueError if the file is damaged, foreign, of another version or of other settings,
+    OSError if it cannot be read.
     """
     state = read_torch(path, _max_bytes(model))
     version = state.get("version") if isinstance(state, dict) else None
@@ -140,9 +139,8 @@ def acting_network(model: PPO) -> AggregationGnn:
 def check_state(state: Mapping[str, Any], model: PPO) -> _Counters:
     """Return the counters of a state of a model's run.
 
-    Raises:
-        ValueError: The state is of other shapes, kinds or ranges.
-        Exception: A part is missing, or of quite another kind.
+    Raises ValueError if the state is of other shapes, kinds or ranges, and any Exception if a part
+    is missing, or of quite another kind.
     """
     counters = read_plain({spec.name: state[spec.name] for spec in fields(_Counters)}, _Counters)
     curve, env, batches = counters.progress.curve, model.get_env(), env_of(model).batches
@@ -202,9 +200,8 @@ def _max_bytes(model: PPO) -> int:
 def read_torch(path: Path, max_bytes: int) -> Any:  # noqa: ANN401 - whatever was saved
     """Return what a file of torch holds, without running code from it.
 
-    Raises:
-        ValueError: It is missing, too large, damaged or foreign, or a link out of its folder.
-        OSError: It cannot be read.
+    Raises ValueError if it is missing, too large, damaged or foreign, or a link out of its folder,
+    OSError if it cannot be read.
     """
     content = io.BytesIO(read_file(path, "checkpoint", max_bytes, folder=path.parent))
     try:

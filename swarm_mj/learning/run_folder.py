@@ -168,12 +168,8 @@ def read_run(folder: Path, named: Collection[str] = ()) -> TrainingRun:
     """Return what a run was asked for when it began, or last went on.
 
     Users' own components, as `module:Name`, must be `named`: to go on runs their code, and a folder
-    may come from anyone.
-
-    Raises:
-        ValueError: There is no run, its settings are damaged, foreign or of another version, or it
-            has components that were not named.
-        OSError: The settings cannot be read.
+    may come from anyone. Raises ValueError if one is not, or if there is no run, or its settings are
+    damaged, foreign or of another version; OSError if they cannot be read.
     """
     path = folder / SETTINGS
     if not os.path.lexists(path):

@@ -76,10 +76,7 @@ class LearnedPolicy(DecentralisedPolicy, ABC):
 def sample(
     logits: Float[np.ndarray, "R N"], uniform: Float[np.ndarray, "R"]
 ) -> Int[np.ndarray, "R"]:
-    """Return a recipient from each row's Boltzmann distribution, by its cumulated probabilities.
-
-    `uniform` is one number in [0, 1) a row; the same number is the same decision.
-    """
+    """Return a draw from each row's Boltzmann distribution, by one number in [0, 1) a row."""
     num_rows, num_nodes = logits.shape
     chosen, weight = np.zeros(num_rows, dtype=np.int64), np.empty(num_nodes)
     for r in range(num_rows):

@@ -58,11 +58,8 @@ def save_weights(
     """Store a policy, whole or not at all; return its file, which replaces one of that name.
 
     `.safetensors` is appended unless the path ends so. The card, in Markdown, is `model_card` of
-    the config unless given.
-
-    Raises:
-        ValueError: `load_policy` would not take it.
-        OSError: The file cannot be written.
+    the config unless given. Raises ValueError if `load_policy` would not take it, OSError if the
+    file cannot be written.
     """
     path = path if path.suffix == SUFFIX else Path(f"{path}{SUFFIX}")
     _check_tensors(config, path, weights)
@@ -87,12 +84,8 @@ def load_policy(
 
     The mission's area, duration and range normalise what the robots see. A deterministic policy
     takes the most probable recipient instead of a draw. Users' own feature sets are imported only
-    if their names, as `module:Name`, are among `features`: a policy cannot make us run code.
-
-    Raises:
-        ValueError: As `read_weights`, or its features are not those that may be imported, or it
-            flies teams of another size.
-        OSError: It cannot be read.
+    if their names, as `module:Name`, are among `features`: a policy cannot make us run code. Errors
+    are those of `read_weights`, and ValueError if it flies teams of another size.
     """
     weights, config = read_weights(path)
     own, num_features, where = config.features, config.network.num_features, f"policy {path}"
@@ -127,9 +120,8 @@ def read_policy(path: Path) -> tuple["AggregationGnn", GnnConfig]:
 def read_weights(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
     """Return a policy's weights, each of them checked, and its config.
 
-    Raises:
-        ValueError: There is no policy, or it is damaged, foreign, oversized or of a newer version.
-        OSError: It cannot be read.
+    Raises ValueError if there is no policy, or it is damaged, foreign, oversized or of a newer
+    version, OSError if it cannot be read.
     """
     place = find_policy(path)
     try:

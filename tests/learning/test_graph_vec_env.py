@@ -111,7 +111,7 @@ def test_a_robots_reward_is_its_credit_per_pair():
     env.reset()
     for _ in range(3):
         before = env.histories
-        before = [replace(each, recipients=list(each.recipients)) for each in before]
+        before = [each._replace(recipients=list(each.recipients)) for each in before]
         actions = drawn(env, rng)
         _, reward, _, _ = env.step(actions)
     by_hand, last = [], np.split(actions, [6, 16, 22])

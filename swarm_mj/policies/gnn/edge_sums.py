@@ -92,7 +92,6 @@ def _sum(
     edges: WantedEdges,
     total: Float[np.ndarray, "w C"],
 ) -> None:
-    """Add to `total`."""
     for e in range(len(edges.end)):
         to, start, d = edges.end[e], edges.start[e], edges.direction[e]
         for c in range(total.shape[1]):
@@ -106,7 +105,6 @@ def _spread(
     gradient: Float[np.ndarray, "w C"],
     gradients: tuple[np.ndarray, ...],
 ) -> None:
-    """Add to `gradients` those of the receiver, sender and direction that `_sum` was given."""
     receiver, sender, direction = given
     of_receiver, of_sender, of_direction = gradients
     back = np.empty_like(direction[0])

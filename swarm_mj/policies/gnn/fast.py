@@ -147,7 +147,6 @@ class Composed:
         return output.view(*parent.shape, output.shape[1])
 
     def _decode(self, stage: int, node: Float[Tensor, "n C"]) -> Float[Tensor, "n O"]:
-        """Return a stage's part of the network's numbers."""
         decoded = hidden(self._stages[stage].decoder(node), self._decoder[1:-1])
         return self._outputs[stage](decoded)
 

@@ -22,10 +22,8 @@ _own: dict[str, type[FeatureExtractor]] = {}
 def make_extractor(features: str, mission: Mission) -> FeatureExtractor:
     """Return an extractor by the name of its feature set; it is to be started.
 
-    The mission's area, duration and range normalise the features.
-
-    Raises:
-        ValueError: Unknown name, or a user's own that was not loaded by `load_features`.
+    The mission's area, duration and range normalise the features. Raises ValueError for an unknown
+    name, and for a user's own that was not loaded by `load_features`.
     """
     return _feature_set(features)(mission)
 
@@ -50,10 +48,8 @@ def _feature_set(features: str) -> type[FeatureExtractor]:
 def load_features(features: str) -> None:
     """Import a user's own feature set, `module:Name`, which from then on has that name.
 
-    That runs its code, so the name must be one that the user gave, and none from a file.
-
-    Raises:
-        ValueError: It cannot be loaded, or is no class of a `FeatureExtractor` with names.
+    That runs its code, so the name must be one that the user gave, and none from a file. Raises
+    ValueError if it cannot be loaded, or is no class of a `FeatureExtractor` with names.
     """
     own = load("features", features)
     if not isinstance(own, type) or not issubclass(own, FeatureExtractor):

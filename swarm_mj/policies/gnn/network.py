@@ -128,15 +128,9 @@ class AggregationGnn(nn.Module):
     ) -> Float[Tensor, "R N O"]:
         """Map the features of the nodes of R graphs to numbers for each node.
 
-        A smaller graph may be padded with nodes that have no parent: no edges lead to them.
-
-        Args:
-            node: Features.
-            parent: Index of each node's parent in the same graph, or -1: no edge.
-            is_wanted: Nodes whose numbers are asked for, 0 elsewhere; None is all of them.
-
-        Raises:
-            ValueError: Features of another number than the network's, or a parent that is no node.
+        `parent` is a node of the same graph, or -1: no edge. A smaller graph may be padded with
+        nodes that have no parent. Of nodes that are not wanted the numbers are 0; None is all.
+        Raises ValueError as `check` does.
         """
         self.check(node, parent)
         edges = edges_of(parent, self.shape.edges, node.dtype)
