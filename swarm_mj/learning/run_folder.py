@@ -168,8 +168,8 @@ def read_run(folder: Path, named: Collection[str] = ()) -> TrainingRun:
     """Return what a run was asked for when it began, or last went on.
 
     Users' own components, as `module:Name`, must be `named`: to go on runs their code, and a folder
-    may come from anyone. Raises ValueError if one is not, or if there is no run, or its settings are
-    damaged, foreign or of another version; OSError if they cannot be read.
+    may come from anyone. Raises ValueError if one is not, if there is no run, or if its settings
+    are damaged, foreign or of another version; OSError if they cannot be read.
     """
     path = folder / SETTINGS
     if not os.path.lexists(path):

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Float32, Shaped
 
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
-from swarm_mj.policies.gnn.packet_memory import Memory, empty_memory, remember
+from swarm_mj.policies.gnn.packet_memory import Memory, empty_memory, log_age, logarithm, remember
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.free_space import from_db
@@ -20,7 +20,6 @@ from swarm_mj.radio.spatial_reuse import believes_as_the_last, write_joined
 from swarm_mj.system.compiled import compiled
 
 ADDRESS_RANGES = 1.2  # a teammate believed farther away cannot be addressed [ranges]
-LONG_WINDOWS = 500.0  # ages count by their logarithm, up to 1 at this one [windows]
 FAR_RANGES = 4.0  # distances count up to here [ranges]
 CROWD = 10.0  # neighbours that count as 1
 TEAM = 40.0  # robots that count as 1
@@ -67,12 +66,8 @@ class ExtendedFeatures(FeatureExtractor):
     def graphs(self, views: LocalViews) -> Graphs:
         """Return what every robot's network sees now; must see every window."""
         remember(self._memory, views)
-        buffers, believed_m, range_m = (
-            views.buffers,
-            views.buffers.position_m,
-            self._mission.range_m,
-        )
-        num_missions, num_robots = buffers.shape
+        buffers, range_m = views.buffers, self._mission.range_m
+        believed_m, (num_missions, num_robots) = buffers.position_m, buffers.shape
         node = np.empty((num_missions, num_robots, num_robots), dtype=NODE)
         may_address = np.empty(node.shape, dtype=np.bool_)
         times, is_observed = (buffers.timestamp, buffers.last_attempt, views.now), buffers.is_known
@@ -93,37 +88,14 @@ class ExtendedFeatures(FeatureExtractor):
 class LocalFeatures(ExtendedFeatures):
     """The extended features without whose turn it is: nothing that a common order grants."""
 
-    names: ClassVar[tuple[str, ...]] = tuple(
-        name for name in ExtendedFeatures.names if "turn" not in name
-    )
+    names: ClassVar[tuple[str, ...]] = tuple(n for n in FEATURES.values() if "turn" not in n)
     uses: ClassVar[str] = "its buffer, and the packets it sent and received"
 
     def graphs(self, views: LocalViews) -> Graphs:
         """Return what every robot's network sees now; must see every window."""
         seen = super().graphs(views)
-        is_kept = np.array([name in self.names for name in ExtendedFeatures.names])
+        is_kept = np.array([name in self.names for name in FEATURES.values()])
         return replace(seen, node=seen.node[:, :, is_kept], has_turn=np.zeros_like(seen.has_turn))
-
-
-@compiled()
-def _logarithm(windows: float) -> float:
-    """Return a time on a logarithmic scale, up to 1 at `LONG_WINDOWS`."""
-    return math.log1p(windows) / math.log1p(LONG_WINDOWS)
-
-
-# Ages are of whole and half windows, so almost all of them are looked up: logarithms were most of
-# the time that these features take.
-LOG_AGES = np.array([math.log1p(n / 2) / math.log1p(LONG_WINDOWS) for n in range(1000)])
-
-
-@compiled()
-def _log_age(now: float, then: float, ever: bool) -> float:
-    """Return the age on this scale: 0 is now, 1 is long ago or never."""
-    age = now - then
-    if not ever or age >= LONG_WINDOWS:
-        return 1.0
-    place = int(2.0 * age)
-    return LOG_AGES[place] if place == 2.0 * age and place >= 0 else _logarithm(age)
 
 
 @compiled(fastmath=True)
@@ -171,14 +143,14 @@ def _fill(
                 of_k = node[b, i, k]
                 of_k.is_oneself = k == i
                 of_k.is_known = is_known
-                of_k.timestamp_age = _log_age(now[b], timestamp[b, i, k], is_observed[b, i, k])
+                of_k.timestamp_age = log_age(now[b], timestamp[b, i, k], is_observed[b, i, k])
                 of_k.distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known else 0.0
                 of_k.is_near = is_near
                 heard, addressed = memory.heard[b, i, k], memory.addressed_by[b, i, k]
-                of_k.heard_age = _log_age(now[b], heard, heard > NEVER)
+                of_k.heard_age = log_age(now[b], heard, heard > NEVER)
                 attempt = last_attempt[b, i, k]
-                of_k.attempt_age = _log_age(now[b], attempt, attempt > NEVER)
-                of_k.addressed_age = _log_age(now[b], addressed, addressed > NEVER)
+                of_k.attempt_age = log_age(now[b], attempt, attempt > NEVER)
+                of_k.addressed_age = log_age(now[b], addressed, addressed > NEVER)
                 of_k.news, of_k.unsaid_news = 0.0, 0.0
                 if is_near:
                     news = _news(own, memory.neighbour[b, i, k], memory.said[b, i])
@@ -188,7 +160,7 @@ def _fill(
                 of_k.team_size = num_robots / TEAM
                 may_address[b, i, k] = k == i or not is_known or ranges <= ADDRESS_RANGES
             sent = memory.sent[b, i]
-            _fill_oneself(i, _log_age(now[b], sent, sent > NEVER), node[b, i])
+            _fill_oneself(i, log_age(now[b], sent, sent > NEVER), node[b, i])
 
 
 @compiled()
@@ -199,10 +171,10 @@ def _fill_oneself(i: int, spoken_log_age: float, node: Shaped[np.ndarray, "N"]) 
         news += node[k].news
         unsaid_news += node[k].unsaid_news
         if node[k].is_near > 0.0:  # nobody else has news, and its logarithm is 0, too
-            node[k].news = _logarithm(node[k].news)
-            node[k].unsaid_news = _logarithm(node[k].unsaid_news)
+            node[k].news = logarithm(node[k].news)
+            node[k].unsaid_news = logarithm(node[k].unsaid_news)
     node[i].heard_age = spoken_log_age
-    node[i].news, node[i].unsaid_news = _logarithm(news), _logarithm(unsaid_news)
+    node[i].news, node[i].unsaid_news = logarithm(news), logarithm(unsaid_news)
 
 
 @compiled()
@@ -259,8 +231,7 @@ def write_turns(
     t. After it the others join in the order of their identities, unless they are closer than the
     radius to a robot that has joined (a maximal independent set); from half a round away on, so
     that no robot's turns come close to each other. A robot of unknown position may be near anyone,
-    so nobody joins after it. Robots that believe the same positions find the same sets without a
-    word. `is_close` is overwritten: room to mark who is too close to one that has a turn.
+    so nobody joins after it. `is_close` is overwritten: room to mark who is too close.
     """
     num_robots = is_known.shape[0]
     has_turn[:] = 0.0

@@ -1,9 +1,10 @@
-"""The packets that a robot sent and decoded, as far as it remembers them next to its buffer.
+"""The packets that a robot sent and decoded, as far as it remembers them, and how ages count.
 
 Row `[b, i]` is written from what robot `i` sent and decoded only. A packet's timestamps are its
 sender's at that time; they are followed from window to window here, by Alg. 1.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,8 @@ from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.timestamps import merge_timestamps, observe_own
 from swarm_mj.protocol.window import SLOT_WINDOWS
 from swarm_mj.system.compiled import compiled
+
+LONG_WINDOWS = 500.0  # ages count by their logarithm, up to 1 at this one [windows]
 
 
 class Memory(NamedTuple):
@@ -53,7 +56,6 @@ def _take_in(
     time: Float[np.ndarray, "B"],
     is_transmission: bool,
 ) -> None:
-    """One phase: what was said, who decoded it, and timestamps merged as the buffers were."""
     num_missions, num_robots = recipient.shape
     for b in range(num_missions):
         observe_own(memory.timestamp[b], time[b])
@@ -69,3 +71,24 @@ def _take_in(
                 if recipient[b, k] == i:
                     memory.addressed_by[b, i, k] = time[b]
         merge_timestamps(packet, heard[b], memory.timestamp[b])
+
+
+@compiled()
+def logarithm(windows: float) -> float:
+    """Return a time on a logarithmic scale, up to 1 at `LONG_WINDOWS`."""
+    return math.log1p(windows) / math.log1p(LONG_WINDOWS)
+
+
+# Ages are of whole and half windows, so almost all of them are looked up: logarithms were most of
+# the time that these features take.
+LOG_AGES = np.array([math.log1p(n / 2) / math.log1p(LONG_WINDOWS) for n in range(1000)])
+
+
+@compiled()
+def log_age(now: float, then: float, ever: bool) -> float:
+    """Return the age on this scale: 0 is now, 1 is long ago or never."""
+    age = now - then
+    if not ever or age >= LONG_WINDOWS:
+        return 1.0
+    place = int(2.0 * age)
+    return LOG_AGES[place] if place == 2.0 * age and place >= 0 else logarithm(age)

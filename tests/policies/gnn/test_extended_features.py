@@ -10,12 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm_mj.mission import paper
-from swarm_mj.policies.gnn.extended_features import (
-    ExtendedFeatures,
-    LocalFeatures,
-    _log_age,
-    write_turns,
-)
+from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures, write_turns
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.window import Phase
@@ -322,14 +317,6 @@ def test_names_matter_for_turns_only():
         same = other.graphs(mixed_missions.renamed(view, name, new_name)).node.reshape(node.shape)
         expected = node[:, name][:, :, name]
         np.testing.assert_allclose(same[..., ~is_turn], expected[..., ~is_turn], atol=1e-6)
-
-
-@pytest.mark.parametrize("age", [0.0, 0.5, 1.0, 17.5, 499.5, 0.3, 499.9, 500.0, 2_000.5])
-def test_ages_count_by_their_logarithm_whether_they_are_looked_up_or_not(age):
-    assert _log_age(3_000.0, 3_000.0 - age, True) == pytest.approx(
-        min(1.0, math.log(1 + age) / math.log(501))
-    )
-    assert _log_age(age, 0.0, False) == 1.0  # never
 
 
 # Turns by distance.

@@ -1,11 +1,13 @@
 """What robots remember of packets, against loops over the packets that the simulator sent."""
 
+import math
+
 import numpy as np
 import pytest
 from mixed_missions import NUM_ROBOTS, NUM_WINDOWS, SEEDS, mixed_views, random_recipients
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies.gnn.packet_memory import empty_memory, remember
+from swarm_mj.policies.gnn.packet_memory import empty_memory, log_age, remember
 from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.swarm import Swarm
@@ -106,3 +108,11 @@ def test_a_memory_begins_empty():
     remember(memory, Swarm(paper("stationary", num_robots=3), [1, 2]).views)
     for name in ARRAYS:
         assert not np.any(getattr(memory, name))
+
+
+@pytest.mark.parametrize("age", [0.0, 0.5, 1.0, 17.5, 499.5, 0.3, 499.9, 500.0, 2_000.5])
+def test_ages_count_by_their_logarithm_whether_they_are_looked_up_or_not(age):
+    assert log_age(3_000.0, 3_000.0 - age, True) == pytest.approx(
+        min(1.0, math.log(1 + age) / math.log(501))
+    )
+    assert log_age(age, 0.0, False) == 1.0  # never
