@@ -98,28 +98,21 @@ def test_log_probabilities_entropies_and_values_are_those_of_a_loop_over_robots(
     again = model.policy.evaluate_actions(observation, actions)
     expected = {"value": [], "log_p": [], "entropy": []}
     missions = robot_by_robot(model, training)
-    if credit == "robot":
-        rows = actions.split([len(m) for m in missions])
-        for robots, chosen in zip(missions, rows, strict=True):
-            for i, (distribution, values) in enumerate(robots):
-                expected["value"].append(values[i])
-                expected["log_p"].append(distribution.log_prob(chosen[i]))
-                expected["entropy"].append(distribution.entropy())
-    else:
-        for robots, chosen in zip(missions, actions, strict=True):
-            each = list(enumerate(robots))
-            counted = [v.sum() if preset == "reference" else v[i] for i, (_, v) in each]
-            expected["value"].append(sum(counted))
-            expected["log_p"].append(sum(d.log_prob(chosen[i]) for i, (d, _) in each))
-            expected["entropy"].append(sum(d.entropy() for _, (d, _) in each))
-    for name, found in (("value", value), ("log_p", log_p)):
-        torch.testing.assert_close(
-            found.detach(), torch.stack(expected[name]), atol=2e-5, rtol=1e-4
-        )
-    for name, found in zip(("value", "log_p", "entropy"), again, strict=True):
-        torch.testing.assert_close(
-            found.detach(), torch.stack(expected[name]), atol=2e-5, rtol=1e-4
-        )
+    teams = actions.split([len(m) for m in missions]) if credit == "robot" else actions
+    for robots, chosen in zip(missions, teams, strict=True):
+        each = list(enumerate(robots))
+        sums = credit == "team" and preset == "reference"
+        of_each = {
+            "value": [values.sum() if sums else values[i] for i, (_, values) in each],
+            "log_p": [distribution.log_prob(chosen[i]) for i, (distribution, _) in each],
+            "entropy": [distribution.entropy() for distribution, _ in robots],
+        }
+        for name, numbers in of_each.items():
+            expected[name] += numbers if credit == "robot" else [sum(numbers)]
+    found = [("value", value), ("log_p", log_p), *zip(expected, again, strict=True)]
+    for name, numbers in found:
+        close = {"atol": 2e-5, "rtol": 1e-4}
+        torch.testing.assert_close(numbers.detach(), torch.stack(expected[name]), **close)
     torch.testing.assert_close(model.policy.predict_values(observation), value)
 
 

@@ -50,8 +50,11 @@ def whole(tmp_path_factory):
 
 
 def test_evaluations_come_at_the_start_at_intervals_and_at_the_end(whole):
-    _, progress, _ = whole
+    folder, progress, _ = whole
     assert [row["decisions"] for row in progress.curve] == [0.0, 64.0, 128.0, 192.0]
+    with (folder / CURVE).open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["aoi"]) for row in rows] == [row["aoi"] for row in progress.curve]
 
 
 def test_tensorboard_has_the_numbers_that_matter(whole):
@@ -67,13 +70,6 @@ def test_tensorboard_has_the_numbers_that_matter(whole):
     assert steps == {row["decisions"] for row in progress.curve}
 
 
-def test_the_curve_is_a_table_of_every_evaluation(whole):
-    folder, progress, _ = whole
-    with (folder / CURVE).open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert [float(row["aoi"]) for row in rows] == [row["aoi"] for row in progress.curve]
-
-
 def test_a_curve_that_is_ahead_of_the_checkpoint_is_put_right_on_resuming(tmp_path):
     run(TRAINING, tmp_path / "run", 32)
     path = tmp_path / "run" / CURVE
@@ -83,18 +79,13 @@ def test_a_curve_that_is_ahead_of_the_checkpoint_is_put_right_on_resuming(tmp_pa
     assert path.read_text() == kept
 
 
-def test_the_policy_kept_is_the_one_that_was_chosen(whole):
+def test_the_policy_kept_is_the_one_that_was_chosen_and_flies_as_its_card_says(whole):
     folder, progress, _ = whole
     _, config = read_policy(folder / POLICY)
-    assert progress.choice is not None
     assert config.training["decisions"] == progress.choice.decisions
     assert config.training["command"] == "swarm-mj train --out x"
     assert config.evaluation["aoi"] == pytest.approx(progress.choice.kept.mean)
     assert config.evaluation["first_seed"] == TEST_SEED
-
-
-def test_the_policy_kept_flies_as_is_told(whole):
-    folder, progress, _ = whole
     seeds = range(TEST_SEED, TEST_SEED + progress.choice.num_missions)
     policy = make_policy(str(folder / POLICY), TRAINING.mission)
     summary = summarise(list(rollout(Swarm(TRAINING.mission, seeds), policy)))
@@ -269,12 +260,6 @@ def test_an_evaluation_is_left_for_later_when_the_listener_has_had_enough(tmp_pa
     assert not (tmp_path / "run" / POLICY).exists()
     progress = run(TRAINING, tmp_path / "run", 32, is_resumed=True)
     assert [row["decisions"] for row in progress.curve] == [0.0, 32.0]
-
-
-def test_a_stop_finishes_the_rollout_and_is_not_evaluated(tmp_path):
-    progress = run(TRAINING, tmp_path / "run", listener=StopAfter(3))
-    assert progress.decisions == 32
-    assert [row["decisions"] for row in progress.curve] == [0.0]
 
 
 def test_a_stop_in_the_last_rollout_leaves_its_evaluation_to_the_next_session(tmp_path):

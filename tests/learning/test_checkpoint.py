@@ -41,39 +41,31 @@ def changed(kept, folder, change):
     return (folder / "after.pt").read_bytes()
 
 
-def test_a_sound_one_is_taken(kept, tmp_path):
-    assert load_bytes(tmp_path, kept).decisions == 32
+def without(name):
+    return lambda state: state.pop(name)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 0.999])
-def test_one_that_was_cut_off_is_refused(kept, tmp_path, share):
-    with pytest.raises(ValueError, match=r"c.pt is damaged, or none; begin a new run"):
-        load_bytes(tmp_path, kept[: int(share * len(kept))])
-
-
-def test_foreign_files_are_refused(tmp_path):
-    torch.save({"weights": torch.zeros(3)}, tmp_path / "other.pt")
-    for content in (b"what?", (tmp_path / "other.pt").read_bytes()):
-        with pytest.raises(ValueError, match=r"c.pt is (damaged, or none|no checkpoint)"):
-            load_bytes(tmp_path, content)
-
-
-def test_another_version_is_refused(kept, tmp_path):
-    content = changed(kept, tmp_path, lambda state: state.update(version=99))
-    with pytest.raises(ValueError, match=r"version 99, and this swarm_mj reads 4; resume with"):
+@pytest.mark.parametrize(
+    ("share", "change", "complaint"),
+    [
+        *((share, None, "c.pt is damaged, or none; begin a new") for share in (0.0, 0.3, 0.999)),
+        (1.0, lambda state: state.clear(), "c.pt is no checkpoint"),
+        (1.0, lambda s: s.update(version=99), "version 99, and this swarm_mj reads 4; resume with"),
+        (1.0, without("weights"), r"c.pt is damaged, or another run's \("),
+    ],
+)
+def test_what_is_no_checkpoint_is_refused_in_one_line(kept, tmp_path, share, change, complaint):
+    content = changed(kept, tmp_path, change) if change else kept[: int(share * len(kept))]
+    with pytest.raises(ValueError, match=complaint) as caught:
         load_bytes(tmp_path, content)
+    assert "\n" not in str(caught.value)
 
 
-def test_other_settings_are_refused(kept, tmp_path):
+def test_a_sound_one_is_taken_by_its_own_run_alone(kept, tmp_path):
+    assert load_bytes(tmp_path, kept).decisions == 32
     other = replace(TRAINING, ppo=replace(TRAINING.ppo, entropy=0.5))
     with pytest.raises(ValueError, match="made with other settings than the run's"):
         load_bytes(tmp_path, kept, other)
-
-
-def test_one_that_lacks_something_is_refused_in_one_line(kept, tmp_path):
-    with pytest.raises(ValueError, match=r"c.pt is damaged, or another run's \(") as caught:
-        load_bytes(tmp_path, changed(kept, tmp_path, lambda state: state.pop("weights")))
-    assert "\n" not in str(caught.value)
 
 
 def test_progress_comes_back_to_the_last_bit(tmp_path):
@@ -96,12 +88,6 @@ def test_progress_comes_back_to_the_last_bit(tmp_path):
     kept, own = networks[0].state_dict(), acting_network(model).state_dict()
     assert all(torch.equal(kept[name], own[name]) for name in own)
     assert again.best_objective == math.inf
-
-
-def test_a_run_does_not_begin_over_another(tmp_path):
-    (tmp_path / CHECKPOINT).touch()
-    with pytest.raises(ValueError, match=r"holds checkpoint.pt"):
-        run(TRAINING, tmp_path, 1)
 
 
 def test_one_that_would_grow_when_it_is_read_is_refused(kept, tmp_path):

@@ -7,11 +7,10 @@ import pytest
 from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor
 
 from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED
-from swarm_mj.learning.graph_vec_env import GraphVecEnv, padded
+from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.settings import HELD_OUT_SEED, usual_settings
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.feature_sets import num_features
-from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.simulation.swarm import Swarm
 
 CREDITS = ("robot", "team")
@@ -46,8 +45,7 @@ def drawn(env, rng):
     return np.concatenate([t if env.agent == "team" else t.ravel() for t in teams])
 
 
-@pytest.mark.parametrize("sizes", [(4,), (3, 5)])
-@pytest.mark.parametrize("features", ["paper", "extended"])
+@pytest.mark.parametrize(("features", "sizes"), [("extended", (4,)), ("paper", (3, 5))])
 @pytest.mark.parametrize("credit", CREDITS)
 def test_random_actions_pass_stable_baselines_checks(credit, features, sizes):
     inner, rng = env_of(credit, sizes, features=features), np.random.default_rng(2)
@@ -90,16 +88,10 @@ def test_a_terminal_observation_is_what_was_seen_at_the_end(credit):
         observation, _, done, infos = env.step(drawn(env, rng))
     assert 0 < done.sum() < env.num_envs
     for row in np.flatnonzero(done):
-        last = infos[row]["terminal_observation"]
-        first = {name: rows[row] for name, rows in observation.items()}
+        last, first = infos[row]["terminal_observation"], rows_of(observation)[row]
         assert last.keys() == first.keys()
+        assert last["node"].shape == first["node"].shape
         assert np.any(last["node"] != first["node"])
-        np.testing.assert_array_equal(last["node"].shape, first["node"].shape)
-    if credit == "robot":
-        np.testing.assert_array_equal(
-            [infos[row]["terminal_observation"]["owner"] for row in np.flatnonzero(done)],
-            observation["owner"][done],
-        )
 
 
 def test_a_robots_reward_is_its_credit_per_pair():
@@ -174,30 +166,8 @@ def test_robots_that_do_not_exist_see_nothing_and_may_only_be_silent():
         assert not np.any(observation["may_address"][e, i][~is_robot[e]])
 
 
-def test_rows_of_credit_per_robot_are_teams_robot_by_robot():
-    env = env_of("robot", (3, 5))
-    expected = [*range(3), *range(3), *range(5), *range(5)] * 2
-    np.testing.assert_array_equal(env.reset()["owner"][:, 0], expected)
-
-
-def test_padding_adds_nodes_that_nobody_hears_or_addresses():
-    env = env_of("robot", (3, 5), missions=4, groups=2)
-    small, large = (batch.graphs for batch in env.batches)
-    rows = padded([small, large], 5)
-    assert rows["node"].shape[:2] == (2 * 3 + 2 * 5, 5)
-    for name in ("node", "parent", "may_address"):
-        np.testing.assert_array_equal(rows[name][:6, :3], getattr(small, name))
-        np.testing.assert_array_equal(rows[name][6:], getattr(large, name))
-    assert np.all(rows["node"][:6, 3:] == 0.0)
-    assert np.all(rows["parent"][:6, 3:] == NO_PARENT)
-    assert not np.any(rows["may_address"][:6, 3:])
-    turns = np.concatenate([small.has_turn, large.has_turn])
-    np.testing.assert_array_equal(rows["has_turn"][:, 0], turns)
-
-
-@pytest.mark.parametrize("credit", CREDITS)
-def test_reset_starts_missions_over(credit):
-    env, rng = env_of(credit), np.random.default_rng(2)
+def test_reset_starts_missions_over():
+    env, rng = env_of("robot"), np.random.default_rng(2)
     first = env.reset()
     actions = [drawn(env, rng) for _ in range(2)]
     rewards = [env.step(action)[1] for action in actions]
@@ -232,23 +202,6 @@ def test_the_view_after_an_end_is_the_new_missions_start():
     np.testing.assert_array_equal(observation["parent"][done], expected.parent)
 
 
-@pytest.mark.parametrize("credit", CREDITS)
-def test_histories_replayed_lead_to_the_same_state(credit):
-    """Also that of the features' memory, of the motion's dice, and of all that follows."""
-    first, rng = env_of(credit, (3, 5)), np.random.default_rng(2)
-    for _ in range(17):  # beyond the first ends
-        observation, *_ = first.step(drawn(first, rng))
-    second = env_of(credit, (3, 5), seed=9)
-    replayed = second.replay(first.histories)
-    second._rng.bit_generator.state = first._rng.bit_generator.state
-    for _ in range(WINDOWS):
-        for name, rows in observation.items():
-            np.testing.assert_array_equal(replayed[name], rows)
-        action = drawn(first, rng)
-        (observation, *one), (replayed, *other) = (env.step(action) for env in (first, second))
-        np.testing.assert_array_equal(one[0], other[0])
-
-
 @pytest.mark.parametrize(("missions", "groups"), [(7, 4), (2, 4), (4, 1)])
 def test_missions_that_cannot_be_shared_out_are_refused(missions, groups):
     with pytest.raises(ValueError, match=f"not {missions}"):
@@ -263,16 +216,3 @@ def test_a_mission_of_one_window_starts_anew_every_window():
     assert np.all(done)
     assert infos == [{}] * 6
     assert not set(before) & set(env.batches[0].seeds)
-
-
-def test_robots_that_failed_may_only_be_silent():
-    mission = paper(
-        "stationary", num_robots=5, range_ratio=1.0, num_windows=8, failure_fraction=0.4
-    )
-    env = env_of("robot", (5,), mission=mission, missions=2, groups=1)
-    for window in range(1, 8):
-        seen, *_ = env.step(np.tile(np.arange(5), 2))
-        choices = seen["may_address"].sum(axis=1)
-        assert np.sum(choices == 1) == (4 if window > 4 else 0)
-        is_off = np.flatnonzero(choices == 1)
-        assert np.all(seen["may_address"][is_off, is_off % 5])

@@ -43,10 +43,8 @@ def real_views(seeds):
 def with_row_of(mine, theirs):
     """A copy of `theirs` in which `ROW` of every array, in every dataclass within, is `mine`'s."""
     mixed = copy.deepcopy(theirs)
-    for own, other in [
-        (mine.buffers, mixed.buffers),
-        *zip(mine.phases, mixed.phases, strict=True),
-    ]:
+    phases = zip(mine.phases, mixed.phases, strict=True)
+    for own, other in [(mine.buffers, mixed.buffers), *phases]:
         for name, array in vars(own).items():
             if array.ndim > 1:  # by robots
                 vars(other)[name][:, ROW] = array[:, ROW]
@@ -69,11 +67,6 @@ def knows_its_own_view_only(make):
 @pytest.mark.parametrize("preset", [paper, reference])
 def test_eq9_a_decentralised_robot_decides_on_its_own_view(name, preset):
     assert knows_its_own_view_only(lambda: make_policy(name, preset(num_robots=8)))
-
-
-@pytest.mark.parametrize("name", POLICIES)
-def test_ii_b_policies_say_whether_packets_carry_more_than_the_buffer(name):
-    assert make_policy(name, MISSION).payload == PAYLOAD.get(name, "none")
 
 
 class Heavy(DecentralisedPolicy):
@@ -150,10 +143,11 @@ def test_eq9_the_law_above_tells_cheats_from_honest_policies(cheat, honest):
 
 
 @pytest.mark.parametrize("name", POLICIES)
-def test_every_named_policy_is_of_one_kind(name):
+def test_ii_b_every_named_policy_is_of_one_kind_and_says_what_packets_carry(name):
     policy = make_policy(name, MISSION)
     assert isinstance(policy, CentralisedPolicy) == (name in CENTRALISED)
     assert isinstance(policy, DecentralisedPolicy) == (name in DECENTRALISED)
+    assert policy.payload == PAYLOAD.get(name, "none")
 
 
 @pytest.mark.parametrize("kind", [DecentralisedPolicy, CentralisedPolicy])

@@ -3,11 +3,12 @@
 import copy
 import math
 
-import mixed_missions
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mixed_missions import MISSION as WALK
+from mixed_missions import NUM_ROBOTS, SEEDS, flown, mixed_views, renamed
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures, write_turns
@@ -72,10 +73,8 @@ def test_identity_knowledge_and_ages():
 
 
 def test_ages_count_up_to_500_windows():
-    found, _ = seen(silent_views(now=504.0))
-    check(found, age_of_T=[1.0, 0.0, 1.0, log_age(498)])
-    found, _ = seen(silent_views(now=900.0))
-    check(found, age_of_T=[1.0, 0.0, 1.0, 1.0])
+    for now, about_3 in ((504.0, log_age(498)), (900.0, 1.0)):
+        check(seen(silent_views(now))[0], age_of_T=[1.0, 0.0, 1.0, about_3])
 
 
 def test_distances_by_belief():
@@ -113,11 +112,16 @@ def check_turns(found, *apart_1_5_2_3, by_interference):
     check(found, **{"has a turn, by interference": by_interference})
 
 
+def started(kind=ExtendedFeatures, mission=MISSION):
+    """Features of one team, or of the mixed missions."""
+    extractor = kind(mission)
+    extractor.start(*((1, 4) if mission is MISSION else (len(SEEDS), NUM_ROBOTS)))
+    return extractor
+
+
 def has_turn(view):
     """Whether each robot has a turn by its own beliefs."""
-    extractor = ExtendedFeatures(MISSION)
-    extractor.start(1, 4)
-    return extractor.graphs(view).has_turn.tolist()
+    return started().graphs(view).has_turn.tolist()
 
 
 @pytest.mark.parametrize(
@@ -212,11 +216,8 @@ def test_being_overheard_is_not_being_addressed():
     views = views_of_a_talk()[:2]
     views[1].phases[0].recipient[0, TEACHER] = 2
     found, _ = seen(views)
-    check(
-        found,
-        age_of_last_packet_heard=[1.0, 1.0, 1.0, log_age(0.5)],
-        age_of_last_being_addressed=[1.0] * 4,
-    )
+    check(found, age_of_last_packet_heard=[1.0, 1.0, 1.0, log_age(0.5)])
+    check(found, age_of_last_being_addressed=[1.0] * 4)
 
 
 def test_news_to_those_in_range():
@@ -241,41 +242,30 @@ def test_news_to_those_in_range():
 
 
 def test_a_start_forgets_what_was_heard():
-    extractor = ExtendedFeatures(MISSION)
-    extractor.start(1, 4)
+    extractor = started()
     for view in views_of_a_talk():
         extractor.graphs(view)
     extractor.start(1, 4)
     node = extractor.graphs(silent_views()[0]).node
-    fresh = ExtendedFeatures(MISSION)
-    fresh.start(1, 4)
-    np.testing.assert_array_equal(node, fresh.graphs(silent_views()[0]).node)
+    np.testing.assert_array_equal(node, started().graphs(silent_views()[0]).node)
 
 
 def test_every_feature_is_in_range_and_all_named_here_are_all():
-    swarm_views = mixed_missions.flown(5)
-    extractor = ExtendedFeatures(mixed_missions.MISSION)
-    extractor.start(len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS)
-    for view in swarm_views:
-        node = extractor.graphs(view).node
-        assert node.shape == (
-            len(mixed_missions.SEEDS) * mixed_missions.NUM_ROBOTS,
-            mixed_missions.NUM_ROBOTS,
-            len(extractor.names),
-        )
-        assert np.all((node >= 0.0) & (node <= 2.0))
+    extractor = started(mission=WALK)
     assert len(extractor.names) == 18
+    for view in flown(5):
+        node = extractor.graphs(view).node
+        assert node.shape == (len(SEEDS) * NUM_ROBOTS, NUM_ROBOTS, 18)
+        assert np.all((node >= 0.0) & (node <= 2.0))
 
 
 @pytest.mark.parametrize("robot", [0, 4])
 def test_eq9_a_graph_rests_on_what_its_robot_can_know(robot):
     """All but its own buffer and the packets it decodes is another team's."""
-    extractors = [ExtendedFeatures(mixed_missions.MISSION) for _ in range(2)]
-    for extractor in extractors:
-        extractor.start(len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS)
-    rows = [b * mixed_missions.NUM_ROBOTS + robot for b in range(len(mixed_missions.SEEDS))]
+    extractors = started(mission=WALK), started(mission=WALK)
+    rows = [b * NUM_ROBOTS + robot for b in range(len(SEEDS))]
     num_others = 0
-    for pair in zip(*mixed_missions.mixed_views(robot), strict=True):
+    for pair in zip(*mixed_views(robot), strict=True):
         graphs, same = (o.graphs(view) for o, view in zip(extractors, pair, strict=True))
         for name in ("node", "parent", "may_address", "has_turn"):
             np.testing.assert_array_equal(getattr(graphs, name)[rows], getattr(same, name)[rows])
@@ -284,16 +274,11 @@ def test_eq9_a_graph_rests_on_what_its_robot_can_know(robot):
 
 
 def test_the_local_features_are_the_extended_ones_without_turns():
-    extended, local = (
-        ExtendedFeatures(mixed_missions.MISSION),
-        LocalFeatures(mixed_missions.MISSION),
-    )
+    extended, local = started(mission=WALK), started(LocalFeatures, WALK)
     kept = [k for k, name in enumerate(extended.names) if "turn" not in name]
     assert local.names == tuple(extended.names[k] for k in kept)
     assert len(local.names) == 13
-    for extractor in (extended, local):
-        extractor.start(len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS)
-    for view in mixed_missions.flown(6):
+    for view in flown(6):
         graphs, fewer = extended.graphs(view), local.graphs(view)
         np.testing.assert_array_equal(fewer.node, graphs.node[:, :, kept])
         np.testing.assert_array_equal(fewer.may_address, graphs.may_address)
@@ -303,18 +288,13 @@ def test_the_local_features_are_the_extended_ones_without_turns():
 
 def test_names_matter_for_turns_only():
     """A team under other names sees the same, each under its new name, but for whose turn it is."""
-    name = np.random.default_rng(1).permutation(mixed_missions.NUM_ROBOTS)
-    new_name = np.argsort(name)
-    one, other = ExtendedFeatures(mixed_missions.MISSION), ExtendedFeatures(mixed_missions.MISSION)
-    for extractor in (one, other):
-        extractor.start(len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS)
+    name = np.random.default_rng(1).permutation(NUM_ROBOTS)
+    one, other = started(mission=WALK), started(mission=WALK)
     is_turn = np.array(["turn" in called for called in one.names])
     assert is_turn.sum() == 5
-    for view in mixed_missions.flown(6):
-        node = one.graphs(view).node.reshape(
-            len(mixed_missions.SEEDS), mixed_missions.NUM_ROBOTS, mixed_missions.NUM_ROBOTS, -1
-        )
-        same = other.graphs(mixed_missions.renamed(view, name, new_name)).node.reshape(node.shape)
+    for view in flown(6):
+        node = one.graphs(view).node.reshape(len(SEEDS), NUM_ROBOTS, NUM_ROBOTS, -1)
+        same = other.graphs(renamed(view, name, np.argsort(name))).node.reshape(node.shape)
         expected = node[:, name][:, :, name]
         np.testing.assert_allclose(same[..., ~is_turn], expected[..., ~is_turn], atol=1e-6)
 

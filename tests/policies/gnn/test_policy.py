@@ -21,16 +21,7 @@ from swarm_mj.simulation.swarm import Swarm
 MISSION = paper("random-walk", num_robots=7, num_windows=40)
 
 
-def learned(
-    features="extended",
-    mission=MISSION,
-    *,
-    seed=1,
-    outputs=1,
-    sharpness=2.0,
-    silence_logit=2.5,
-    is_deterministic=False,
-):
+def learned(features="extended", mission=MISSION, *, seed=1, outputs=1, sharpness=2.0, **options):
     """A policy whose robots are silent most of the time, so that packets arrive.
 
     The sharper it is, the more of what it does follows from what it sees, not from the dice.
@@ -41,9 +32,7 @@ def learned(
             if isinstance(layer, torch.nn.Linear):
                 layer.weight *= sharpness
     extractor = make_extractor(features, mission)
-    return GnnPolicy(
-        network, extractor, silence_logit=silence_logit, is_deterministic=is_deterministic
-    )
+    return GnnPolicy(network, extractor, **{"silence_logit": 2.5} | options)
 
 
 def decisions(policy, seeds, mission=MISSION):
@@ -103,20 +92,14 @@ def test_the_mode_is_taken_on_request(features):
 
 
 @pytest.mark.parametrize("features", FEATURES)
-def test_the_same_seed_is_the_same_flight(features):
-    first, second = (decisions(learned(features), [3]) for _ in range(2))
-    np.testing.assert_array_equal(first, second)
-    assert np.any(first != decisions(learned(features), [4]))
-    assert np.any(first != decisions(learned(features, seed=2), [3]))
-
-
-@pytest.mark.parametrize("features", FEATURES)
-def test_a_mission_does_not_depend_on_those_beside_it(features):
-    """One policy flies them in turn, so it must forget the last ones too."""
+def test_a_seed_is_a_flight_whatever_flies_beside_it(features):
+    """One policy flies missions in turn, so it must forget the last ones too."""
     policy = learned(features)
     together = decisions(policy, [3, 4, 5])
     for b, seed in enumerate((3, 4, 5)):
         np.testing.assert_array_equal(decisions(policy, [seed])[:, 0], together[:, b])
+    assert np.any(together[:, 0] != together[:, 1])
+    assert np.any(together[:, :1] != decisions(learned(features, seed=2), [3]))
 
 
 @pytest.mark.parametrize("robot", [0, 4])
@@ -158,27 +141,20 @@ def test_what_is_seen_is_normalised_by_the_mission_flown(tmp_path):
 
 
 def test_it_is_decentralised_and_says_what_it_is():
-    policy = learned()
+    policy = learned(is_deterministic=True)
     assert isinstance(policy, DecentralisedPolicy)
     assert policy.payload == "none"
     assert not policy.window(paper()).is_broadcast
     assert policy.parameters["receptive_field"] == 1
-    assert policy.parameters["is_deterministic"] is False
-    assert learned(is_deterministic=True).parameters["is_deterministic"] is True
+    assert policy.parameters["is_deterministic"] is True
 
 
 def test_the_digest_tells_whatever_changes_decisions():
     def digest(**options):
         return learned(**options).parameters["digest"]
 
-    changed = [
-        digest(),
-        digest(seed=2),
-        digest(silence_logit=0.5),
-        digest(features="paper"),
-        digest(outputs=2),
-    ]
-    assert len(set(changed)) == len(changed)
+    others = ({"seed": 2}, {"silence_logit": 0.5}, {"features": "paper"}, {"outputs": 2})
+    assert len({digest(), *(digest(**options) for options in others)}) == 5
     assert digest() == digest(is_deterministic=True)
     policy = learned()
     before = policy.parameters["digest"]
@@ -228,19 +204,18 @@ def logits(output, may_address=ALL, silence_logit=0.0, has_turn=None):
     return recipient_logits(output, OWNER, may_address, silence_logit, has_turn).tolist()
 
 
-def test_eq9_one_number_per_node_is_its_logit_and_ones_own_is_silence():
-    assert logits(FULL[:, :, None]) == FULL.tolist()
-
-
-def test_the_silence_logit_is_added_to_ones_own():
-    assert logits(FULL[:, :, None], silence_logit=2.0) == [[2.5, 1.0, -2.0], [3.0, 0.0, 3.0]]
-
-
 @pytest.mark.parametrize(
-    ("has_turn", "own_0", "own_2"), [([True, False], 0.5, 3.0), ([False, False], 2.5, 3.0)]
+    ("silence_logit", "has_turn", "own_0", "own_2"),
+    [
+        (0.0, None, 0.5, 1.0),  # one number per node is its logit, and one's own is silence
+        (2.0, None, 2.5, 3.0),
+        (2.0, [True, False], 0.5, 3.0),  # nothing is added to silence in one's turn
+        (2.0, [False, False], 2.5, 3.0),
+    ],
 )
-def test_nothing_is_added_to_silence_in_ones_turn(has_turn, own_0, own_2):
-    found = logits(FULL[:, :, None], silence_logit=2.0, has_turn=torch.tensor(has_turn))
+def test_eq9_the_silence_logit_is_added_to_ones_own_number(silence_logit, has_turn, own_0, own_2):
+    has_turn = has_turn and torch.tensor(has_turn)
+    found = logits(FULL[:, :, None], silence_logit=silence_logit, has_turn=has_turn)
     assert found == [[own_0, 1.0, -2.0], [3.0, 0.0, own_2]]
 
 
