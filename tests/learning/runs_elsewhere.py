@@ -15,15 +15,14 @@ from pathlib import Path
 
 import numpy as np
 import torch._dynamo  # noqa: F401 - optimisers import it late, so every child would
-from small_runs import StopAfter, difference, end_of, go_on, run, small_training
+from small_runs import StopAfter, difference, end_of, run, small_training
 
 from swarm_mj.cli import main
 from swarm_mj.learning import selection
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.held_out import reference_columns
-from swarm_mj.learning.run_folder import Limits, Progress, TrainingRun
+from swarm_mj.learning.run_folder import Progress
 from swarm_mj.learning.settings import usual_settings
-from swarm_mj.learning.train import train
 from swarm_mj.mission import paper
 from swarm_mj.policies.learned import sample
 
@@ -70,9 +69,8 @@ def timed(folder):
     run(training, folder / "untimed", 192)
     progress, num_sessions = Progress(), 0
     while progress.decisions < 192:
-        limits = Limits(decisions=192, minutes=progress.minutes + 0.1 / 60.0)
-        asked = TrainingRun(training=training, limits=limits)
-        progress = train(asked, folder / "timed", listener=go_on, is_resumed=num_sessions > 0)
+        minutes = progress.minutes + 0.1 / 60.0
+        progress = run(training, folder / "timed", is_resumed=num_sessions > 0, minutes=minutes)
         num_sessions += 1
     ends = [end_of(folder / name) for name in ("untimed", "timed")]
     for end in ends:

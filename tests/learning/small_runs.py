@@ -46,9 +46,9 @@ class StopAfter:
         return self.left > 0
 
 
-def run(training, folder, decisions=192, listener=go_on, *, init=None, is_resumed=False):
+def run(training, folder, decisions=192, listener=go_on, *, init=None, is_resumed=False, **limits):
     """Trains; checkpoints stand between all rollouts."""
-    limits = Limits(decisions=decisions, checkpoint_every_s=0.0)
+    limits = Limits(**{"decisions": decisions, "checkpoint_every_s": 0.0} | limits)
     asked = TrainingRun(training=training, limits=limits, init=init)
     return train(asked, folder, listener=listener, is_resumed=is_resumed)
 

@@ -1,12 +1,13 @@
 """Between rollouts: evaluations, what is logged, the best policy, replays, limits."""
 
 import csv
+import itertools
 import json
 import time
 from dataclasses import replace
 
 import pytest
-from small_runs import StopAfter, go_on, run, small_training
+from small_runs import StopAfter, run, small_training
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from swarm_mj.learning import callback, held_out, selection
@@ -21,15 +22,9 @@ from swarm_mj.simulation.swarm import Swarm
 
 TRAINING = small_training()
 PROMISED = {
-    "held_out/aoi",
-    "held_out/aoi_sem",
-    "held_out/objective",
-    "rollout/aoi",
-    "rollout/packets_per_window",
-    "rollout/delivery_ratio",
-    "rollout/decisions_per_s",
-    "train/entropy",
-    "train/explained_variance",
+    *("held_out/aoi", "held_out/aoi_sem", "held_out/objective"),
+    *("rollout/aoi", "rollout/packets_per_window", "rollout/delivery_ratio"),
+    *("rollout/decisions_per_s", "train/entropy", "train/explained_variance"),
     "train/learning_rate",
 }
 
@@ -49,9 +44,13 @@ def whole(tmp_path_factory):
     return folder, progress, heard
 
 
+def evaluated_at(progress):
+    return [row["decisions"] for row in progress.curve]
+
+
 def test_evaluations_come_at_the_start_at_intervals_and_at_the_end(whole):
     folder, progress, _ = whole
-    assert [row["decisions"] for row in progress.curve] == [0.0, 64.0, 128.0, 192.0]
+    assert evaluated_at(progress) == [0.0, 64.0, 128.0, 192.0]
     with (folder / CURVE).open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["aoi"]) for row in rows] == [row["aoi"] for row in progress.curve]
@@ -115,45 +114,40 @@ def test_a_run_that_goes_on_chooses_anew(tmp_path):
     assert again.choice == run(TRAINING, tmp_path / "whole", 128).choice
 
 
+def judge(monkeypatch, objectives):
+    """Let evaluations find these objectives, one after the other."""
+    evaluate, objectives = held_out.evaluate, iter(objectives)
+
+    def judged(*arguments):
+        return replace(evaluate(*arguments), objective=next(objectives))
+
+    monkeypatch.setattr(held_out, "evaluate", judged)
+
+
 @pytest.mark.parametrize("sitting", [10, 1000])
 def test_a_run_stops_when_evaluations_bring_no_gain_however_often_it_was_interrupted(
     tmp_path, monkeypatch, sitting
 ):
     """Of 0, 64, 128, ... decisions: the best is at 128, and two more bring less than 0.5 %."""
-    objectives = {0: 3.0, 64: 2.0, 128: 1.0, 192: 0.998, 256: 1.5, 320: 0.1}
-    evaluate = held_out.evaluate
-    seen = []
-
-    def judged(*arguments):
-        found = replace(evaluate(*arguments), objective=objectives[len(seen) * 64])
-        seen.append(found)
-        return found
-
-    monkeypatch.setattr(held_out, "evaluate", judged)
-    limits, is_resumed = Limits(decisions=640, patience=2), False
+    judge(monkeypatch, [3.0, 2.0, 1.0, 0.998, 1.5, 0.1])
+    asked, is_resumed = (TRAINING, tmp_path / "run", 640), False
     for _ in range(10):
-        asked = TrainingRun(training=TRAINING, limits=limits)
-        listener = StopAfter(sitting)
-        progress = train(asked, tmp_path / "run", listener=listener, is_resumed=is_resumed)
+        progress = run(*asked, StopAfter(sitting), is_resumed=is_resumed, patience=2)
         is_resumed = True
         if progress.choice is not None:
             break
-    assert [row["decisions"] for row in progress.curve] == [0.0, 64.0, 128.0, 192.0, 256.0]
-    asked = TrainingRun(training=TRAINING, limits=replace(limits, patience=0))
-    progress = train(asked, tmp_path / "run", listener=StopAfter(17), is_resumed=True)
-    assert progress.curve[-1]["decisions"] == 320.0
+    assert evaluated_at(progress) == [0.0, 64.0, 128.0, 192.0, 256.0]
+    progress = run(*asked, StopAfter(17), is_resumed=True, patience=0)
+    assert evaluated_at(progress)[-1] == 320.0
 
 
 def test_a_stall_stops_a_run_only_when_the_last_weights_are_judged(tmp_path, monkeypatch):
     """Asked for less patience half-way between two evaluations."""
-    evaluate = held_out.evaluate
-    monkeypatch.setattr(held_out, "evaluate", lambda *a: replace(evaluate(*a), objective=1.0))
+    judge(monkeypatch, itertools.repeat(1.0))
     run(TRAINING, tmp_path / "run", 640, lambda status: status.decisions <= 128)
-    asked = TrainingRun(training=TRAINING, limits=Limits(decisions=640, patience=2))
-    progress = train(asked, tmp_path / "run", listener=go_on, is_resumed=True)
-    assert progress.decisions == 160
-    assert [row["decisions"] for row in progress.curve] == [0.0, 64.0, 128.0, 160.0]
-    assert progress.choice.run_decisions == 160
+    progress = run(TRAINING, tmp_path / "run", 640, is_resumed=True, patience=2)
+    assert progress.decisions == progress.choice.run_decisions == 160
+    assert evaluated_at(progress) == [0.0, 64.0, 128.0, 160.0]
     assert progress.has_chosen
 
 
@@ -161,9 +155,8 @@ def test_what_an_evaluation_takes_is_known_after_resuming(tmp_path):
     """So minutes are kept back for the choice from the first rollout on."""
     progress = run(TRAINING, tmp_path / "run", 64, StopAfter(3))
     assert progress.evaluation_minutes > 0.0
-    limits = Limits(minutes=progress.minutes + 0.5 * progress.evaluation_minutes)
-    asked = TrainingRun(training=TRAINING, limits=limits)
-    again = train(asked, tmp_path / "run", listener=go_on, is_resumed=True)
+    minutes = progress.minutes + 0.5 * progress.evaluation_minutes
+    again = run(TRAINING, tmp_path / "run", None, is_resumed=True, minutes=minutes)
     assert again.decisions == progress.decisions == 32
 
 
@@ -213,13 +206,7 @@ def test_the_totals_of_an_evaluation_are_of_the_windows_since_the_last(whole):
 def test_a_better_policy_takes_the_place_of_the_last_and_a_worse_one_does_not(
     tmp_path, monkeypatch
 ):
-    objectives = iter([3.0, 1.0, 2.0, 1.0])
-    evaluate = held_out.evaluate
-
-    def judged(*arguments):
-        return replace(evaluate(*arguments), objective=next(objectives))
-
-    monkeypatch.setattr(held_out, "evaluate", judged)
+    judge(monkeypatch, [3.0, 1.0, 2.0, 1.0])
     monkeypatch.setattr(callback.TrainingCallback, "choose", lambda _: None)
     progress = run(TRAINING, tmp_path / "run")
     assert progress.best_objective == 1.0
@@ -230,23 +217,20 @@ def test_a_better_policy_takes_the_place_of_the_last_and_a_worse_one_does_not(
 def test_minutes_end_a_run_after_a_whole_rollout(tmp_path, monkeypatch):
     """Where none are kept back for the choice."""
     monkeypatch.setattr(selection, "reserved_minutes", lambda *_: 0.0)
-    asked = TrainingRun(training=TRAINING, limits=Limits(minutes=1e-9))
-    progress = train(asked, tmp_path / "run", listener=go_on)
+    progress = run(TRAINING, tmp_path / "run", None, minutes=1e-9)
     assert progress.decisions == 0
-    assert [row["decisions"] for row in progress.curve] == [0.0]
+    assert evaluated_at(progress) == [0.0]
 
     def slow(status):
         if status.decisions == 36:
             time.sleep(0.5)
         return True
 
-    limits = Limits(minutes=progress.minutes + 0.5 / 60.0)
-    asked = TrainingRun(training=TRAINING, limits=limits)
-    progress = train(asked, tmp_path / "run", listener=slow, is_resumed=True)
-    assert progress.decisions % 32 == 0
-    assert 0 < progress.decisions <= 64
-    assert progress.curve[-1]["decisions"] == progress.decisions
-    assert progress.minutes >= limits.minutes
+    minutes = progress.minutes + 0.5 / 60.0
+    progress = run(TRAINING, tmp_path / "run", None, slow, is_resumed=True, minutes=minutes)
+    assert progress.decisions in (32, 64)
+    assert evaluated_at(progress)[-1] == progress.decisions
+    assert progress.minutes >= minutes
 
 
 def test_an_evaluation_is_left_for_later_when_the_listener_has_had_enough(tmp_path):
@@ -259,15 +243,15 @@ def test_an_evaluation_is_left_for_later_when_the_listener_has_had_enough(tmp_pa
     assert progress.curve == []
     assert not (tmp_path / "run" / POLICY).exists()
     progress = run(TRAINING, tmp_path / "run", 32, is_resumed=True)
-    assert [row["decisions"] for row in progress.curve] == [0.0, 32.0]
+    assert evaluated_at(progress) == [0.0, 32.0]
 
 
 def test_a_stop_in_the_last_rollout_leaves_its_evaluation_to_the_next_session(tmp_path):
     stopped = run(TRAINING, tmp_path / "run", 64, StopAfter(14))
     assert stopped.decisions == 64
-    assert [row["decisions"] for row in stopped.curve] == [0.0]
+    assert evaluated_at(stopped) == [0.0]
     progress = run(TRAINING, tmp_path / "run", 64, is_resumed=True)
-    assert [row["decisions"] for row in progress.curve] == [0.0, 64.0]
+    assert evaluated_at(progress) == [0.0, 64.0]
     whole = run(TRAINING, tmp_path / "whole", 64)
     for row in (progress.curve[-1], whole.curve[-1]):
         del row["minutes"], row["rollout/decisions_per_s"]
