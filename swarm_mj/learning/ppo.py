@@ -48,10 +48,7 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
             seed=training.seed % 2**32,
             normalize_advantage=not drops,  # a credit's zero means something
             rollout_buffer_class=ActiveRolloutBuffer if drops else DictRolloutBuffer,
-            policy_kwargs={
-                "training": training,
-                "optimizer_kwargs": {"eps": ppo.adam_epsilon},
-            },
+            policy_kwargs={"training": training, "optimizer_kwargs": {"eps": ppo.adam_epsilon}},
         )
     # By optimiser steps, not by PPO's share of a budget, which a resumed run may raise.
     model.lr_schedule = lambda _: decayed_rate(ppo, model._n_updates)

@@ -1,11 +1,6 @@
 """Communication policies (IV-C), one file each; `registry` knows their names."""
 
-from swarm_mj.policies.policy import (
-    BroadcastPolicy,
-    CentralisedPolicy,
-    DecentralisedPolicy,
-    Policy,
-)
+from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.local_views import LocalViews
 

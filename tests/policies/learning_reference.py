@@ -30,11 +30,7 @@ NUM_SLOTS = 120  # of a mission, at most
 # Rounds of 8 windows: tables are made in slots 32, 48, 64 and flown by from 40, 56, 72 on.
 SHORT = PlannerSettings(
     learning=LearningSettings(
-        first_rounds=2.5,
-        flown_rounds=1.0,
-        spread_rounds=0.5,
-        min_round_windows=8,
-        min_log_odds=1.0,
+        first_rounds=2.5, flown_rounds=1.0, spread_rounds=0.5, min_round_windows=8, min_log_odds=1.0
     )
 )
 

@@ -9,12 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies.random_access import (
-    Aloha,
-    InnovationGossip,
-    RandomFlooding,
-    num_contenders,
-)
+from swarm_mj.policies.random_access import Aloha, InnovationGossip, RandomFlooding, num_contenders
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import BROADCAST, empty_buffers
 from swarm_mj.protocol.local_views import LocalViews

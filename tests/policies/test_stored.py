@@ -81,8 +81,7 @@ def rewritten(path, change_weights=lambda _: None, change_metadata=lambda _: Non
 
 
 @pytest.mark.parametrize(
-    "shape",
-    [{}, {"is_linear": True}, {"num_outputs": 2, "edges": "both"}, {"receptive_field": 0}],
+    "shape", [{}, {"is_linear": True}, {"num_outputs": 2, "edges": "both"}, {"receptive_field": 0}]
 )
 @pytest.mark.parametrize("features", FEATURES)
 def test_a_loaded_network_gives_identical_logits(tmp_path, features, shape):

@@ -56,8 +56,7 @@ def test_iv_c_rows_say_how_they_were_found_and_are_met_exactly():
 
 
 @pytest.mark.parametrize(
-    ("num_robots", "expected"),
-    [(10, 0.1), (27, 0.1), (29, 0.2), (80, 0.2), (200, 0.2)],
+    ("num_robots", "expected"), [(10, 0.1), (27, 0.1), (29, 0.2), (80, 0.2), (200, 0.2)]
 )
 def test_nearest_is_by_ratio(monkeypatch, num_robots, expected):
     """Between 10 and 80 robots the border is sqrt(800) = 28.3, not 45."""

@@ -114,10 +114,7 @@ def test_eq14_its_parameters_are_those_of_the_plain_network():
     [  # (receiver, sender, feature): 0 is the parent of 1 and 3; in the next graph, 5 of 4
         ("paper", [(0, 1, 0.0), (0, 3, 0.0), (5, 4, 0.0)]),
         ("reference", [(1, 0, 0.0), (3, 0, 0.0), (4, 5, 0.0)]),
-        (
-            "both",
-            [(0, 1, 0.0), (0, 3, 0.0), (5, 4, 0.0), (1, 0, 1.0), (3, 0, 1.0), (4, 5, 1.0)],
-        ),
+        ("both", [(0, 1, 0.0), (0, 3, 0.0), (5, 4, 0.0), (1, 0, 1.0), (3, 0, 1.0), (4, 5, 1.0)]),
     ],
 )
 def test_iii_a_edges_lead_from_senders_to_receivers(edges, found):
