@@ -72,10 +72,8 @@ def robot_by_robot(model, training):
             robots = []
             for i in range(num_robots):
                 row = b * num_robots + i
-                seen = (
-                    torch.tensor(graphs.node[row])[None],
-                    torch.tensor(graphs.parent[row]).long()[None],
-                )
+                node, parent = torch.tensor(graphs.node[row]), torch.tensor(graphs.parent[row])
+                seen = node[None], parent.long()[None]
                 output = policy.network(*seen)[0]
                 if training.shares_trunk:
                     values, output = output[:, -1], output[:, :-1]
@@ -132,7 +130,10 @@ def test_robots_that_do_not_exist_are_silent_and_add_nothing(credit):
 
 
 def test_draws_have_the_frequencies_of_the_boltzmann_distribution():
+    """Those of different robots are independent."""
     torch.manual_seed(1)
+    both = boltzmann_sample(torch.zeros(20_000, 2, 2)).float()
+    assert abs(torch.corrcoef(both.T)[0, 1]) < 4.0 / np.sqrt(20_000)
     logits = torch.tensor([1.0, 0.0, -2.0, 2.5, -1e9])
     count = 40_000
     drawn = torch.bincount(boltzmann_sample(logits.expand(count, 5)), minlength=5) / count
@@ -140,13 +141,6 @@ def test_draws_have_the_frequencies_of_the_boltzmann_distribution():
     error = (expected * (1 - expected) / count).sqrt()
     assert torch.all((drawn - expected).abs() <= 4.0 * error)
     assert drawn[4] == 0.0
-
-
-def test_draws_of_different_robots_are_independent():
-    torch.manual_seed(1)
-    both = boltzmann_sample(torch.zeros(20_000, 2, 2)).float()
-    correlation = torch.corrcoef(both.T)[0, 1]
-    assert abs(correlation) < 4.0 / np.sqrt(20_000)
 
 
 def test_sums_over_robots_by_hand():

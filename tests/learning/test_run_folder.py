@@ -33,17 +33,12 @@ RUN = TrainingRun(
 )
 
 
-def test_a_run_is_read_as_it_was_written(tmp_path):
-    for run in (RUN, replace(RUN, init=tmp_path / "policy", limits=Limits())):
-        write_run(tmp_path / "run", run)
-        assert read_run(tmp_path / "run") == run
-
-
-def test_a_policy_is_named_by_its_whole_path(tmp_path, monkeypatch):
-    """So that the run can go on from another folder."""
+def test_a_run_is_read_as_it_was_written(tmp_path, monkeypatch):
+    """A policy is named by its whole path, so that the run can go on from another folder."""
     monkeypatch.chdir(tmp_path)
-    write_run(tmp_path, replace(RUN, init=Path("policy")))
-    assert read_run(tmp_path).init == tmp_path / "policy"
+    for run in (RUN, replace(RUN, init=tmp_path / "policy", limits=Limits())):
+        write_run(tmp_path / "run", run if run.init is None else replace(run, init=Path("policy")))
+        assert read_run(tmp_path / "run") == run
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", "{}", '{"format": "swarm_mj policy"}'])
@@ -86,20 +81,21 @@ def test_a_folder_without_a_run_says_how_to_begin_one(tmp_path):
 
 
 def test_runs_begin_in_folders_of_their_own(tmp_path):
-    check_new(tmp_path / "new")
-    (tmp_path / "empty").mkdir()
-    check_new(tmp_path / "empty")
+    for name in ("new", "empty"):
+        check_new(tmp_path / name)
+        (tmp_path / "empty").mkdir(exist_ok=True)
     (tmp_path / "empty" / f".{SETTINGS}.123.part").touch()  # a run killed while it began
     check_new(tmp_path / "empty")
     (tmp_path / "file").touch()
-    with pytest.raises(ValueError, match="file is a file; name a folder"):
-        check_new(tmp_path / "file")
     (tmp_path / "empty" / "thesis.tex").touch()
-    with pytest.raises(ValueError, match=r"holds thesis.tex, which is no run's"):
-        check_new(tmp_path / "empty")
     write_run(tmp_path / "run", RUN)
-    with pytest.raises(ValueError, match="holds a run; go on with it by --resume"):
-        check_new(tmp_path / "run")
+    for name, complaint in (
+        ("file", "file is a file; name a folder"),
+        ("empty", r"holds thesis.tex, which is no run's"),
+        ("run", "holds a run; go on with it by --resume"),
+    ):
+        with pytest.raises(ValueError, match=complaint):
+            check_new(tmp_path / name)
 
 
 @pytest.mark.parametrize("name", [CURVE, POLICY])

@@ -114,9 +114,8 @@ def test_rows_are_robots_mission_by_mission(features):
 
 @pytest.mark.parametrize("features", FEATURE_SETS)
 def test_features_are_finite_and_named(features):
-    extractor, swarm = make_extractor(features, MISSION), Swarm(MISSION, [1])
-    graphs = started(extractor).graphs(swarm.views)
-    assert graphs.node.shape == (4, 4, len(extractor.names))
-    assert len(set(extractor.names)) == len(extractor.names)
+    extractor = started(make_extractor(features, MISSION))
+    graphs = extractor.graphs(Swarm(MISSION, [1]).views)
+    assert graphs.node.shape == (4, 4, len(set(extractor.names)))
     assert np.all(np.isfinite(graphs.node))
     assert np.all(np.diagonal(graphs.may_address))

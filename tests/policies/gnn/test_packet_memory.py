@@ -103,13 +103,6 @@ def test_eq9_a_memory_rests_on_packets_sent_and_decoded_only(robot):
     assert num_others > NUM_WINDOWS / 2
 
 
-def test_a_memory_begins_empty():
-    memory = empty_memory(2, 3)
-    remember(memory, Swarm(paper("stationary", num_robots=3), [1, 2]).views)
-    for name in ARRAYS:
-        assert not np.any(getattr(memory, name))
-
-
 @pytest.mark.parametrize("age", [0.0, 0.5, 1.0, 17.5, 499.5, 0.3, 499.9, 500.0, 2_000.5])
 def test_ages_count_by_their_logarithm_whether_they_are_looked_up_or_not(age):
     assert log_age(3_000.0, 3_000.0 - age, True) == pytest.approx(
