@@ -1,8 +1,6 @@
 """The experiment on flocking, on a small scale."""
 
-import importlib.util
-from pathlib import Path
-
+import flocking_converges as experiment
 import numpy as np
 
 from swarm_mj.mission import paper
@@ -10,18 +8,8 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
 
-FILE = Path(__file__).parent.parent.parent / "training" / "flocking_converges.py"
-
-
-def load():
-    spec = importlib.util.spec_from_file_location("flocking_converges", FILE)
-    experiment = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(experiment)
-    return experiment
-
 
 def test_the_share_left_is_last_over_first_variance():
-    experiment = load()
     mission = paper("flocking", num_robots=6, num_windows=40, range_ratio=1.0)
     settings = experiment.Settings(mission=mission, first_seed=3, num_missions=2)
     left = experiment.left_over(settings, "round-robin")

@@ -1,10 +1,9 @@
 """The experiment evaluates what is missing, once, and hands it over whole."""
 
-import importlib.util
-import sys
 from dataclasses import replace
 from pathlib import Path
 
+import paper_figures as experiment
 import pytest
 from synthetic import result
 
@@ -12,7 +11,6 @@ from swarm_mj.cli import parse
 from swarm_mj.evaluation.published import points, published
 from swarm_mj.evaluation.results import read_results, write_csv
 
-FILE = Path(__file__).parent.parent.parent / "training" / "paper_figures.py"
 NAMES = [
     f"{preset}-{task}.csv"
     for preset in ("paper", "reference")
@@ -21,16 +19,7 @@ NAMES = [
 
 
 @pytest.fixture
-def experiment(monkeypatch):
-    spec = importlib.util.spec_from_file_location("paper_figures", FILE)
-    module = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "paper_figures", module)  # dataclasses look there
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture
-def calls(experiment, monkeypatch):
+def calls(monkeypatch):
     """The commands called; instead of flying, each writes itself as its result."""
     seen = []
 
@@ -50,7 +39,7 @@ def calls(experiment, monkeypatch):
 
 
 @pytest.fixture
-def settings(experiment, tmp_path):
+def settings(tmp_path):
     return experiment.Settings(results=tmp_path / "results", drafts=tmp_path / "drafts")
 
 
@@ -58,7 +47,7 @@ def files(folder):
     return sorted(path.name for path in folder.iterdir()) if folder.exists() else []
 
 
-def test_the_commands_cover_every_published_regime(experiment, calls, settings):
+def test_the_commands_cover_every_published_regime(calls, settings):
     seen, *_ = calls
     assert experiment.evaluate(settings, 3, force=False) == 0
     studies = [parse(arguments)[1].study for arguments in seen]
@@ -75,7 +64,7 @@ def test_the_commands_cover_every_published_regime(experiment, calls, settings):
     assert {arguments[arguments.index("--jobs") + 1] for arguments in seen} == {"3"}
 
 
-def test_what_is_there_is_kept(experiment, calls, settings):
+def test_what_is_there_is_kept(calls, settings):
     seen, *_ = calls
     settings.results.mkdir()
     (settings.results / NAMES[0]).write_text("mine")
@@ -88,7 +77,7 @@ def test_what_is_there_is_kept(experiment, calls, settings):
     assert len(seen) == 5
 
 
-def test_an_interruption_hands_over_nothing_and_the_next_run_goes_on(experiment, calls, settings):
+def test_an_interruption_hands_over_nothing_and_the_next_run_goes_on(calls, settings):
     seen, broken, _ = calls
     broken.add(NAMES[2])
     assert experiment.evaluate(settings, 1, force=False) == 130
@@ -101,25 +90,20 @@ def test_an_interruption_hands_over_nothing_and_the_next_run_goes_on(experiment,
     assert files(settings.drafts) == []
 
 
-def test_force_makes_all_anew(experiment, calls, settings):
-    seen, *_ = calls
+def test_force_makes_all_anew_and_if_interrupted_goes_on_without_it(calls, settings):
+    seen, broken, _ = calls
     experiment.evaluate(settings, 1, force=False)
     experiment.evaluate(settings, 1, force=True)
     assert len(seen) == 12
-
-
-def test_an_interrupted_force_goes_on_without_it(experiment, calls, settings):
-    seen, broken, _ = calls
-    experiment.evaluate(settings, 1, force=False)
     broken.add(NAMES[1])
     assert experiment.evaluate(settings, 1, force=True) == 130
     assert files(settings.results) == []
     broken.clear()
     assert experiment.evaluate(settings, 1, force=False) == 0
-    assert len(seen) == 6 + 2 + 5
+    assert len(seen) == 12 + 2 + 5
 
 
-def test_drafts_of_another_commit_are_made_anew(experiment, calls, settings):
+def test_drafts_of_another_commit_are_made_anew(calls, settings):
     seen, broken, made_by = calls
     made_by[0] = "def"
     broken.add(NAMES[2])

@@ -336,16 +336,6 @@ def test_turns_by_hand():
     ]
 
 
-def test_nobody_joins_after_a_robot_of_unknown_position():
-    """In window 2 robot 0 is asked before 3, which is far from everyone."""
-    believed_m = [[0.0, 0.0], [80.0, 0.0], [160.0, 0.0], [900.0, 0.0]]
-    alone = [[False, False, True, False]] * 3
-    assert turns(believed_m, [False, True, True, True], 2).tolist() == alone
-    assert not np.any(turns(believed_m, [True, True, False, True], 2))
-    after_0 = turns(believed_m, [True, False, True, True], 2).tolist()
-    assert after_0 == [[True, False, True, False]] * 2 + [[False, False, True, False]]
-
-
 def test_exactly_a_radius_apart_is_far_enough():
     assert turns([[0.0, 0.0], [100.0, 0.0]], [True] * 2, 0).tolist()[0] == [True, True]
     assert turns([[0.0, 0.0], [99.9, 0.0]], [True] * 2, 0).tolist()[0] == [True, False]
