@@ -26,11 +26,7 @@ class LearnedPolicy(DecentralisedPolicy, ABC):
     """Robots address a draw from the network's Boltzmann distribution, or its mode."""
 
     def __init__(
-        self,
-        extractor: FeatureExtractor,
-        *,
-        is_deterministic: bool = False,
-        own_features: str | None = None,
+        self, extractor: FeatureExtractor, *, is_deterministic: bool = False, own_features: str = ""
     ) -> None:
         """Take what makes the features that the network was trained on, and their name if own."""
         self._extractor = extractor

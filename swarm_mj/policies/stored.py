@@ -96,7 +96,7 @@ def load_policy(
             f"{mission.num_robots}; choose --robots {size}"
         )
     extractor = trained_extractor(own, num_features, mission, named=features, where=where)
-    own_features = own if is_own_set(own) else None
+    own_features = own if is_own_set(own) else ""
     options: Any = {"is_deterministic": is_deterministic, "own_features": own_features}
     if isinstance(config, MlpConfig):
         return MlpPolicy(config.network, weights, extractor, **options)

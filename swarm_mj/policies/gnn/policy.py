@@ -1,7 +1,5 @@
 """A GNN as a policy: every robot's own network on its own buffer's graph (III-A to III-C)."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -49,9 +47,15 @@ class GnnPolicy(LearnedPolicy):
         )
         owner = torch.arange(num_rows) % num_robots
         device, silence_logit = next(self._network.parameters()).device, self._silence_logit
-        with torch.inference_mode(), _one_thread():
-            output = self._network(*(each.to(device) for each in (node, parent, may_address))).cpu()
-            return recipient_logits(output, owner, may_address, silence_logit, has_turn).numpy()
+        num_threads = torch.get_num_threads()
+        torch.set_num_threads(1)  # small batches are slower on several
+        try:
+            with torch.inference_mode():
+                seen = (each.to(device) for each in (node, parent, may_address))
+                output = self._network(*seen).cpu()
+                return recipient_logits(output, owner, may_address, silence_logit, has_turn).numpy()
+        finally:
+            torch.set_num_threads(num_threads)  # the setting is the process's
 
     def identity(self) -> tuple[object, dict[str, np.ndarray]]:
         """Return what the network is made of and sees, and its weights now."""
@@ -86,14 +90,3 @@ def recipient_logits(
             bias = bias.masked_fill(has_turn[:, None], 0.0)
         logits = logits.scatter_add(1, own, bias)
     return logits.masked_fill(~may_address, IMPOSSIBLE)
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    # Small batches are slower on several threads; the setting is the process's, so it is put back.
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
