@@ -111,4 +111,4 @@ def __dir__() -> list[str]:
 
 
 if find_spec("gymnasium"):  # whose `make` then knows the environments; else nobody asks for them
-    import_module("swarm_mj.envs.registration").register_environments()
+    import_module("swarm_mj.envs").register_environments()

@@ -1,1 +1,30 @@
-"""Faces of the swarm for other people's libraries; each is a module that imports its own."""
+"""Faces of the swarm for other people's libraries, and their names in Gymnasium's registry."""
+
+from typing import get_args
+
+import gymnasium
+
+from swarm_mj.mission import Task
+
+NAMESPACE = "swarm_mj"
+
+
+def register_environments() -> None:
+    """Lets `gymnasium.make` and `make_vec` know `swarm_mj/Flocking-v0` and the other tasks' names.
+
+    Each takes the options of `envs.options.make_batch`, among them any field of `Mission`.
+    """
+    for task in get_args(Task):
+        name = environment_id(task)
+        if name not in gymnasium.registry:
+            gymnasium.register(
+                name,
+                entry_point="swarm_mj.envs.gymnasium:SwarmEnv",
+                vector_entry_point="swarm_mj.envs.gymnasium_vector:SwarmVectorEnv",
+                kwargs={"mission": task},
+            )
+
+
+def environment_id(task: str) -> str:
+    """Return a task's environment: `swarm_mj/RandomWalk-v0` is that of `random-walk`."""
+    return f"{NAMESPACE}/{task.title().replace('-', '')}-v0"

@@ -31,13 +31,8 @@ def credits_of(
 ) -> Float[np.ndarray, "B N"]:
     """Return the age that the team would not have lost in a window without each robot.
 
-    Args:
-        timestamp: T at the end of the window before [windows].
-        position_m: Where the robots are in this window [m].
-        recipient: The robot that each one addresses; itself is silence.
-        channel: Of one that may draw or remember, a `snapshot_channel` from before the window.
-        now: t at the start of the window [windows].
-        is_active: The robots that took part and whose age counts; None is all.
+    T is that at the end of the window before, `now` the start of this one [windows]. The channel is
+    a `snapshot_channel` from before the window. Active robots, or all, count.
 
     Returns:
         The credit of every robot, summed over pairs of robots [windows]; it may be negative.
@@ -61,15 +56,16 @@ def credits_of(
         gained = gain(timestamp, position_m[rows], sent_to, channel, now[rows], rows, took_part)
         credit[mission, sender] = gained[mission] - gained[num_missions:]
         return credit
-    # A user's own channel meets B missions at a time, as in flight, and draws the same numbers.
-    together = gain(
-        timestamp, position_m, recipient, snapshot_channel(channel), now, missions, is_active
-    )
+
+    def replayed(recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B"]:
+        # A user's own channel meets B missions at a time, as in flight, and draws the same numbers.
+        again = snapshot_channel(channel)
+        return gain(timestamp, position_m, recipient, again, now, missions, is_active)
+
+    together = replayed(recipient)
     turn = np.cumsum(sends, axis=1) * sends  # 1 for the first sender of a mission, and so on
     for n in range(1, int(turn.max(initial=0)) + 1):
-        sent_to = np.where(turn == n, robots, recipient)
-        replayed = snapshot_channel(channel)
-        gained = gain(timestamp, position_m, sent_to, replayed, now, missions, is_active)
+        gained = replayed(np.where(turn == n, robots, recipient))
         credit += np.where(turn == n, (together - gained)[:, None], 0.0)
     return credit
 

@@ -8,9 +8,8 @@ from gymnasium.utils import EzPickle
 from jaxtyping import Bool, UInt8
 
 from swarm_mj.envs.mission_batch import Info, Observation, next_seed
-from swarm_mj.envs.options import check_reset, check_team_reward, make_batch
+from swarm_mj.envs.options import check_reset, make_team_batch, team_spaces
 from swarm_mj.envs.screen import RENDERING, Screen
-from swarm_mj.envs.spaces import team_spaces
 from swarm_mj.mission import Mission
 
 
@@ -28,10 +27,8 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
     ) -> None:
         """Take a mission or its task, and options of `make_batch`; raises as that does."""
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
-        self.batch = make_batch(mission, **options)
-        check_team_reward(self.batch)
-        self._screen = Screen(render_mode)
-        self.render_mode = render_mode
+        self.batch = make_team_batch(mission, **options)
+        self._screen, self.render_mode = Screen(render_mode), render_mode
         self.observation_space, self.action_space = team_spaces(self.batch)
 
     def reset(

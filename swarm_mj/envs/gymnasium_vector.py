@@ -5,27 +5,22 @@ Missions that begin together are one group, played as one swarm. A mission that 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from gymnasium.utils import EzPickle, seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space, create_empty_array
-from jaxtyping import Bool, Int, UInt8
+from jaxtyping import Int, UInt8
 
 from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, next_seed
-from swarm_mj.envs.options import check_count, check_reset, check_team_reward, make_batch
+from swarm_mj.envs.options import check_count, check_reset, make_team_batch, team_spaces
 from swarm_mj.envs.screen import RENDERING, Screen
-from swarm_mj.envs.spaces import team_spaces
 from swarm_mj.mission import Mission
 from swarm_mj.system.fields import did_you_mean
 
-Step = tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Info]
 
-
-@dataclass(frozen=True, kw_only=True)
-class _Group:
+class _Group(NamedTuple):
     """Missions that began together, and the environments that they still are."""
 
     batch: MissionBatch
@@ -60,8 +55,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         modes = {"autoreset_mode": autoreset_mode, "render_mode": render_mode}
         EzPickle.__init__(self, num_envs, mission, **modes, **options)
         check_count("num_envs", num_envs)
-        self.num_envs = num_envs
-        self._mode = _mode_of(autoreset_mode)
+        self.num_envs, self._mode = num_envs, _mode_of(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self._mode}
         self._screen = Screen(render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
@@ -69,9 +63,8 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         self._groups: list[_Group] = []
         self._is_over = np.zeros(num_envs, dtype=np.bool_)
         self._rngs: dict[int, np.random.Generator] = {}  # that draw seeds, by environment
-        batch = make_batch(mission, 1, **options)
-        check_team_reward(batch)
-        self.single_observation_space, self.single_action_space = team_spaces(batch)
+        spaces = team_spaces(make_team_batch(mission, 1, **options))
+        self.single_observation_space, self.single_action_space = spaces
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._seen = cast(
@@ -97,13 +90,27 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         """
         check_reset(options or {}, ("reset_mask",))
         super().reset(seed=seed if isinstance(seed, int) else None)
-        envs = np.flatnonzero(self._mask_of(options or {}))
-        seeds = self._seeds_of(seed)
+        mask = np.asarray((options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
+        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
+            raise ValueError(
+                f"reset_mask must be {self.num_envs} bools, one an environment and not all False, "
+                f"not {mask!r}"
+            )
+        seeds = [seed] * self.num_envs if seed is None else seed
+        if isinstance(seeds, int):
+            seeds = range(seeds, seeds + self.num_envs)
+        if len(seeds) != self.num_envs:
+            raise ValueError(
+                f"seed must be one number, or {self.num_envs}, one an environment, not {seed!r}"
+            )
         infos: Info = {}
+        envs = np.flatnonzero(mask)
         self._begin(envs, [seeds[env] for env in envs.tolist()], infos)
         return self._copied(), infos
 
-    def step(self, actions: np.ndarray) -> Step:
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Info]:
         """Fly one window of every mission; `actions[b, i]` is that of robot i.
 
         Raises:
@@ -111,18 +118,25 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
                 and nothing begins it anew.
         """
         actions = np.asarray(actions)
-        self._check_actions(actions)
+        self._check_step(actions)
         reward, infos, final = np.zeros(self.num_envs), {}, {}
         late = np.flatnonzero(self._is_over)  # in the mode NEXT_STEP; they begin in this step
         for group in self._groups:
-            if not self._is_over[group.envs[0]]:
-                reward[group.envs] = self._play(group, actions)
-                is_final = group.batch.is_over and self._mode == AutoresetMode.SAME_STEP
+            batch, rows, envs = group
+            if not self._is_over[envs[0]]:
+                recipient = batch.flown.views.silence.astype(actions.dtype)
+                recipient[rows] = actions[envs]
+                reward[envs] = batch.step(recipient)[rows, 0]
+                self._is_over[envs] = batch.is_over
+                is_final = batch.is_over and self._mode == AutoresetMode.SAME_STEP
                 self._note(final if is_final else infos, group)
         is_over = self._is_over.copy()
         is_over[late] = False
         if final:
-            infos |= {"final_obs": self._last_seen(is_over), "_final_obs": is_over.copy()}
+            last_seen = np.full(self.num_envs, None, dtype=object)
+            for env in np.flatnonzero(is_over):
+                last_seen[env] = {name: each[env].copy() for name, each in self._seen.items()}
+            infos |= {"final_obs": last_seen, "_final_obs": is_over.copy()}
             infos |= {"final_info": final, "_final_info": is_over.copy()}
         begun = np.flatnonzero(is_over) if final else late
         if begun.size:
@@ -138,9 +152,9 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         if self.render_mode is None:
             return None
         places = {
-            int(env): (group.batch, int(row))
-            for group in self._groups
-            for row, env in zip(group.rows, group.envs, strict=True)
+            env: (batch, row)
+            for batch, rows, envs in self._groups
+            for row, env in zip(rows.tolist(), envs.tolist(), strict=True)
         }
         pictures = (self._screen.picture(*places[env]) for env in range(self.num_envs))
         return tuple(each for each in pictures if each is not None)
@@ -149,27 +163,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         """Give back what pictures took."""
         self._screen.close()
 
-    def _mask_of(self, options: dict[str, Any]) -> Bool[np.ndarray, "B"]:
-        """Return which environments are to begin."""
-        mask = np.asarray(options.get("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
-        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
-            raise ValueError(
-                f"reset_mask must be {self.num_envs} bools, one an environment and not all False, "
-                f"not {mask!r}"
-            )
-        return mask
-
-    def _seeds_of(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
-        """Return a seed for each environment, or None."""
-        if seed is None or isinstance(seed, int):
-            return [seed if seed is None else seed + env for env in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise ValueError(
-                f"seed must be one number, or {self.num_envs}, one an environment, not {seed!r}"
-            )
-        return seed
-
-    def _check_actions(self, actions: np.ndarray) -> None:
+    def _check_step(self, actions: np.ndarray) -> None:
         if self._is_over.any() and self._mode == AutoresetMode.DISABLED:
             raise ValueError(
                 f"environment {np.argmax(self._is_over)} is over; begin it anew by reset(options="
@@ -183,23 +177,20 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
 
     def _begin(self, envs: Int[np.ndarray, "E"], seeds: Sequence[int | None], infos: Info) -> None:
         """Begin these environments' missions in a group of their own; note their infos."""
-        for env, seed in zip(envs, seeds, strict=True):
+        begun = []
+        for env, seed in zip(envs.tolist(), seeds, strict=True):
             if seed is not None or env not in self._rngs:
                 self._rngs[env], _ = seeding.np_random(seed)
+            begun.append(next_seed(self._rngs[env]) if seed is None else seed)
         batch = self._spare_batch(envs)
-        batch.restart(
-            [
-                next_seed(self._rngs[env]) if seed is None else seed
-                for env, seed in zip(envs, seeds, strict=True)
-            ]
-        )
+        batch.restart(begun)
         left = [(group, ~np.isin(group.envs, envs)) for group in self._groups]
         self._groups = [
-            _Group(batch=group.batch, rows=group.rows[stays], envs=group.envs[stays])
+            _Group(group.batch, group.rows[stays], group.envs[stays])
             for group, stays in left
             if stays.any()
         ]
-        self._groups.append(_Group(batch=batch, rows=np.arange(len(envs)), envs=envs))
+        self._groups.append(_Group(batch, np.arange(len(envs)), envs))
         self._is_over[envs] = False
         self._note(infos, self._groups[-1])
 
@@ -208,32 +199,17 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         for group in self._groups:
             if group.batch.num_missions == len(envs) and np.isin(group.envs, envs).all():
                 return group.batch
-        return make_batch(self._mission, len(envs), **self._options)
-
-    def _play(self, group: _Group, actions: np.ndarray) -> np.ndarray:
-        """Fly one window of a group; return its environments' rewards."""
-        recipient = group.batch.flown.views.silence.astype(actions.dtype)
-        recipient[group.rows] = actions[group.envs]
-        reward = group.batch.step(recipient)[group.rows, 0]
-        self._is_over[group.envs] = group.batch.is_over
-        return reward
+        return make_team_batch(self._mission, len(envs), **self._options)
 
     def _note(self, infos: Info, group: _Group) -> None:
         """Keep a group's view, and write its infos next to masks of whose they are."""
-        for name, each in group.batch.observation.items():
-            self._seen[name][group.envs] = each[group.rows]
-        for name, each in group.batch.infos().items():
-            if name not in infos:
-                infos[name] = np.zeros(self.num_envs, dtype=each.dtype)
-                infos[f"_{name}"] = np.zeros(self.num_envs, dtype=np.bool_)
-            infos[name][group.envs], infos[f"_{name}"][group.envs] = each[group.rows], True
-
-    def _last_seen(self, is_over: Bool[np.ndarray, "B"]) -> np.ndarray:
-        """Return the last view of each environment that is over, and None for the others."""
-        seen = np.full(self.num_envs, None, dtype=object)
-        for env in np.flatnonzero(is_over):
-            seen[env] = {name: each[env].copy() for name, each in self._seen.items()}
-        return seen
+        batch, rows, envs = group
+        for name, each in batch.observation.items():
+            self._seen[name][envs] = each[rows]
+        for name, each in batch.infos().items():
+            own = infos.setdefault(name, np.zeros(self.num_envs, dtype=each.dtype))
+            is_own = infos.setdefault(f"_{name}", np.zeros(self.num_envs, dtype=np.bool_))
+            own[envs], is_own[envs] = each[rows], True
 
     def _copied(self) -> Observation:
         return {name: each.copy() for name, each in self._seen.items()}

@@ -87,13 +87,10 @@ class MissionBatch:
             ValueError: No mission has begun, they are over, or a recipient is no robot; nothing has
                 moved.
         """
-        if self.reward == "credit":
-            return self._step_with_credit(recipient)
-        self.fly(recipient)
-        cost = self.infos()[COSTS[self.reward]]
-        return np.broadcast_to(-cost[:, None], recipient.shape)
-
-    def _step_with_credit(self, recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B N"]:
+        if self.reward != "credit":
+            self.fly(recipient)
+            cost = self.infos()[COSTS[self.reward]]
+            return np.broadcast_to(-cost[:, None], recipient.shape)
         swarm = self.flown
         # The credit replays this window, so it needs T and the channel's draws from before it.
         before, start = swarm.buffers.timestamp.copy(), swarm.now
@@ -114,12 +111,12 @@ class MissionBatch:
 
     def _see(self) -> None:
         """Keep the robots' present graphs; a robot that has failed may only be silent."""
-        graphs, is_active = self._extractor.graphs(self.flown.views), self.flown.states.is_active
-        if is_active is not None:
+        graphs: Graphs = self._extractor.graphs(self.flown.views)
+        if self.flown.states.is_active is not None:
             own = np.tile(np.eye(self.mission.num_robots, dtype=np.bool_), (self.num_missions, 1))
-            may_address = graphs.may_address & (is_active.reshape(-1, 1) | own)
+            may_address = graphs.may_address & (self.is_active.reshape(-1, 1) | own)
             graphs = replace(graphs, may_address=may_address)
-        self.graphs: Graphs = graphs
+        self.graphs = graphs
 
     @property
     def flown(self) -> Swarm:
@@ -141,7 +138,7 @@ class MissionBatch:
 
     @property
     def observation(self) -> Observation:
-        """The robots' present view, new arrays of shape [B, N, ...]; see `spaces.robot_spaces`."""
+        """The robots' present view, new arrays of shape [B, N, ...]; see `options.robot_spaces`."""
         num_robots = self.mission.num_robots
         shape = (*self.shape, num_robots)
         # Silence is always allowed: a user's own features may forget it, and samplers need one way.
@@ -161,24 +158,21 @@ class MissionBatch:
         is known and nothing was sent, ages and packets are 0.
         """
         swarm, costs, controller = self.flown, self.costs, self.flown.controller
+        infos: Info = {"seed": np.array(self.seeds)}
         if costs is None:
-            age_windows, is_complete = age_of_information(swarm.buffers, swarm.now)
-            variance_m2ps2 = velocity_variance(swarm.states.velocity_mps)
-            packets = dict.fromkeys(PACKETS, np.zeros(self.num_missions))
-            task_cost = controller.cost(swarm.states) if isinstance(controller, Costed) else None
-        else:
-            age_windows, is_complete = costs.age_windows, costs.is_complete
-            variance_m2ps2 = costs.velocity_variance_m2ps2
-            packets = {name: getattr(costs.packets, name) for name in PACKETS}
-            task_cost = costs.task_cost.value if costs.task_cost else None
-        return {
-            "seed": np.array(self.seeds),
-            "age_windows": age_windows,
-            "velocity_variance_m2ps2": variance_m2ps2,
-            "is_complete": is_complete,
-            **{f"packets_{name}": count for name, count in packets.items()},
-            **({} if task_cost is None else {"task_cost": task_cost}),
-        }
+            infos["age_windows"], is_complete = age_of_information(swarm.buffers, swarm.now)
+            infos["velocity_variance_m2ps2"] = velocity_variance(swarm.states.velocity_mps)
+            infos["is_complete"] = is_complete
+            infos |= {f"packets_{name}": np.zeros(self.num_missions) for name in PACKETS}
+            if isinstance(controller, Costed):
+                infos["task_cost"] = controller.cost(swarm.states)
+            return infos
+        for name in ("age_windows", "velocity_variance_m2ps2", "is_complete"):
+            infos[name] = getattr(costs, name)
+        infos |= {f"packets_{name}": getattr(costs.packets, name) for name in PACKETS}
+        if costs.task_cost:
+            infos["task_cost"] = costs.task_cost.value
+        return infos
 
 
 def next_seed(rng: np.random.Generator) -> int:

@@ -1,4 +1,4 @@
-"""Options of environments: from what a user asked for to missions, or to a likely other option."""
+"""Options and spaces that all environments share: what users ask for, and what they get."""
 
 import copy
 import re
@@ -7,13 +7,18 @@ from dataclasses import replace
 from numbers import Integral
 from typing import Any, get_args
 
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector.utils import batch_space
+
 from swarm_mj.control.motion import Controller, Costed, controller_of
+from swarm_mj.envs import NAMESPACE, environment_id
 from swarm_mj.envs.mission_batch import REWARDS, MissionBatch
-from swarm_mj.envs.registration import NAMESPACE, environment_id
-from swarm_mj.mission import PRESETS, Mission, Task
+from swarm_mj.mission import MISSION_DISTANCE_M, PRESETS, Mission, Task
 from swarm_mj.mission.components import Components
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies.gnn.feature_sets import is_own_set, load_features
+from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.system.fields import did_you_mean
@@ -45,10 +50,9 @@ def make_batch(
             unit; or "credit", each robot's own: by how much the team's age would be higher had the
             robot been silent in this window [windows].
         with_parents: Whether robots see the parents P as well, for graph networks.
-        channel: As of `Swarm`, or its name, `module:Name`. The environment uses a copy of it, and
-            of the next two.
-        controller: As of `Swarm`.
-        scene: As of `Swarm`.
+        channel: As of `Swarm`, or its name, `module:Name`; a copy of it is used.
+        controller: Likewise.
+        scene: Likewise.
         **fields: Any other field of `Mission`.
 
     Raises:
@@ -100,13 +104,15 @@ def check_reset(options: Collection[str], known: Collection[str] = ()) -> None:
             )
 
 
-def check_team_reward(batch: MissionBatch) -> None:
-    """Raise ValueError for rewards of single robots, where the agent is the team."""
+def make_team_batch(mission: Mission | str, num_missions: int = 1, **options: Any) -> MissionBatch:
+    """Return a `make_batch` where the agent is the team; refuse rewards of single robots."""
+    batch = make_batch(mission, num_missions, **options)
     if batch.reward == "credit":
         raise ValueError(
             "reward credit is each robot's own, and this environment pays the team; choose reward "
             "aoi, or an environment whose agents are robots (swarm_mj.envs.pettingzoo)"
         )
+    return batch
 
 
 def _mission_of(mission: Mission | str, preset: str | None, fields: dict[str, Any]) -> Mission:
@@ -152,10 +158,47 @@ def _check_reward(reward: str, mission: Mission, controller: Controller | None) 
             f"reward task-cost needs a task that has a cost, and {mission.task} has none; choose "
             "another task, or reward aoi"
         )
-    if reward == "credit" and mission.failure_fraction > 0.0:
-        raise ValueError(
-            "reward credit needs robots that do not fail, but failure_fraction is "
-            f"{mission.failure_fraction:g}; set it to 0, or choose reward aoi"
-        )
     if reward == "credit":
+        if mission.failure_fraction > 0.0:
+            raise ValueError(
+                "reward credit needs robots that do not fail, but failure_fraction is "
+                f"{mission.failure_fraction:g}; set it to 0, or choose reward aoi"
+            )
         check_whole("reward credit", mission)
+
+
+def robot_spaces(batch: MissionBatch) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
+    """Return one robot's observation space, and its recipients.
+
+    `observation` [N, F] is what it knows of every teammate, itself included: see `FEATURES` of the
+    feature set; all are normalised, and none has a unit. `action_mask` [N] is 1 for recipients
+    within reach; itself, which is silence, always is. `parent` [N] is the robot that a
+    teammate's news came over first, or -1.
+    """
+    num_robots = batch.mission.num_robots
+    most = np.inf if is_own_set(batch.features) else _largest_feature(batch.mission)
+    seen: dict[str, spaces.Space] = {
+        "action_mask": spaces.Box(0, 1, (num_robots,), np.int8),
+        "observation": spaces.Box(-most, most, (num_robots, batch.num_features), np.float32),
+    }
+    if batch.with_parents:
+        seen["parent"] = spaces.Box(NO_PARENT, num_robots - 1, (num_robots,), np.int32)
+    return spaces.Dict(seen), spaces.Discrete(num_robots)
+
+
+def team_spaces(batch: MissionBatch) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
+    """Return all robots' observation space, with a leading axis N, and everyone's recipients."""
+    num_robots = batch.mission.num_robots
+    seen, _ = robot_spaces(batch)
+    return batch_space(seen, num_robots), spaces.MultiDiscrete([num_robots] * num_robots)
+
+
+def _largest_feature(mission: Mission) -> float:
+    """Return a bound on every number that a feature set makes of a mission.
+
+    Ages are shares of the mission or of 500 windows; positions and distances are those of robots
+    that fly straight on all the time, by the area or by 1 km; counts are by 10 at least.
+    """
+    flown_m = mission.max_velocity_mps * mission.window_s * mission.num_windows
+    lengths = (mission.side_m + 2.0 * flown_m) / min(mission.side_m, MISSION_DISTANCE_M)
+    return float(np.ceil(mission.num_robots + mission.num_windows / 500.0 + lengths))

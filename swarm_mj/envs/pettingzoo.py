@@ -8,9 +8,8 @@ from gymnasium.utils import EzPickle, seeding
 from jaxtyping import UInt8
 
 from swarm_mj.envs.mission_batch import Info, Observation, next_seed
-from swarm_mj.envs.options import make_batch
+from swarm_mj.envs.options import make_batch, robot_spaces
 from swarm_mj.envs.screen import RENDERING, Screen
-from swarm_mj.envs.spaces import robot_spaces
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.checks import check_robots
 
@@ -40,8 +39,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         """Take a mission or its task, and options of `make_batch`; raises as that does."""
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
         self.batch = make_batch(mission, **options)
-        self._screen = Screen(render_mode)
-        self.render_mode = render_mode
+        self._screen, self.render_mode = Screen(render_mode), render_mode
         self.possible_agents = [f"robot_{i}" for i in range(self.batch.mission.num_robots)]
         self.agents: list[str] = []
         self._robot = {agent: i for i, agent in enumerate(self.possible_agents)}
@@ -69,9 +67,8 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         if seed is not None:
             self._rng, _ = seeding.np_random(seed)
         self.batch.restart([next_seed(self._rng) if seed is None else seed])
-        self._screen.update(self.batch)
         self.agents = list(self.possible_agents)
-        return self._observations(), self._infos()
+        return self._seen()
 
     def step(
         self, actions: dict[str, Action]
@@ -95,12 +92,10 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
             return {}, {}, {}, {}, {}
         recipient = np.array([chosen])
         check_robots("action", recipient, self.batch.shape)
-        reward = self.batch.step(recipient)[0]
-        self._screen.update(self.batch)
-        is_active, is_over = self.batch.is_active[0], self.batch.is_over
-        seen, infos = self._observations(), self._infos()
+        reward, is_over = self.batch.step(recipient)[0], self.batch.is_over
+        seen, infos = self._seen()
         rewards = {agent: float(reward[self._robot[agent]]) for agent in self.agents}
-        ended = {agent: not is_active[self._robot[agent]] for agent in self.agents}
+        ended = {agent: not self.batch.is_active[0, self._robot[agent]] for agent in self.agents}
         cut = dict.fromkeys(self.agents, is_over)
         self.agents = [] if is_over else [agent for agent in self.agents if not ended[agent]]
         return seen, rewards, ended, cut, infos
@@ -126,16 +121,16 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
                 "own for silence, not None"
             )
 
-    def _infos(self) -> dict[str, Info]:
+    def _seen(self) -> tuple[dict[str, Observation], dict[str, Info]]:
+        """Show the present state, and return each agent's view and info."""
+        self._screen.update(self.batch)
+        seen = {name: values[0] for name, values in self.batch.observation.items()}
         info = {name: values[0].item() for name, values in self.batch.infos().items()}
-        return {agent: dict(info) for agent in self.agents}
-
-    def _observations(self) -> dict[str, Observation]:
-        seen = self.batch.observation
-        return {
-            agent: {name: values[0, self._robot[agent]] for name, values in seen.items()}
+        views = {
+            agent: {name: rows[self._robot[agent]] for name, rows in seen.items()}
             for agent in self.agents
         }
+        return views, {agent: dict(info) for agent in self.agents}
 
 
 def parallel_env(mission: Mission | str = "flocking", **options: Any) -> SwarmParallelEnv:

@@ -14,8 +14,7 @@ from stable_baselines3.common.vec_env import VecNormalize, unwrap_vec_wrapper
 from torch import nn
 
 from swarm_mj.envs.mission_batch import MissionBatch
-from swarm_mj.envs.options import check_team_reward, make_batch
-from swarm_mj.envs.spaces import robot_spaces, team_spaces
+from swarm_mj.envs.options import make_batch, make_team_batch, robot_spaces, team_spaces
 from swarm_mj.envs.vec_env import AGENTS, SwarmVecEnv
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy_config import MlpConfig, MlpShape
@@ -53,11 +52,12 @@ def make_vec_env(
         raise ValueError(f"agent must be one of {', '.join(AGENTS)}, not {agent!r}")
     for name in {"n_envs", "num_envs"} & options.keys():
         raise TypeError(f"make_vec_env has no {name!r}; did you mean num_missions?")
-    batch = make_batch(mission, num_missions, **options)
-    if agent == "team":
-        check_team_reward(batch)
-    make_spaces = robot_spaces if agent == "robot" else team_spaces
-    env = SwarmVecEnv([batch], agent, *make_spaces(batch))
+    if agent == "robot":
+        batch = make_batch(mission, num_missions, **options)
+        env = SwarmVecEnv([batch], agent, *robot_spaces(batch))
+    else:
+        batch = make_team_batch(mission, num_missions, **options)
+        env = SwarmVecEnv([batch], agent, *team_spaces(batch))
     env.seed(seed)
     return env
 
@@ -82,18 +82,18 @@ def save_policy(model: BaseAlgorithm, path: Path | str) -> Path:
     """
     batch = _trained_on(model)
     layers = _actor(model)
-    activation, hidden = _shape_of(layers)
+    linear = [each for each in layers if isinstance(each, nn.Linear)]
     weights = {
         f"{n}.{name}": tensor.detach().cpu().numpy().copy()
-        for n, layer in enumerate(each for each in layers if isinstance(each, nn.Linear))
+        for n, layer in enumerate(linear)
         for name, tensor in layer.named_parameters()
     }
     network = MlpShape(
         num_robots=batch.mission.num_robots,
         features=batch.features,
         num_features=batch.num_features,
-        hidden=hidden,
-        activation=activation,
+        hidden=tuple(layer.out_features for layer in linear[:-1]),
+        activation=_activation_of(layers),
         obeys_mask=hasattr(model.policy.action_dist, "apply_masking"),
     )
     training = {
@@ -120,7 +120,7 @@ def _trained_on(model: BaseAlgorithm) -> MissionBatch:
         raise ValueError(
             f"the model has no environment; load the model with it: {kind}.load(path, env=env)"
         )
-    inner = env.unwrapped
+    inner, normalised = env.unwrapped, unwrap_vec_wrapper(env, VecNormalize)
     if not isinstance(inner, SwarmVecEnv):
         raise ValueError(
             "a policy is made of a model that decides for one robot, and this one was trained on "
@@ -133,7 +133,6 @@ def _trained_on(model: BaseAlgorithm) -> MissionBatch:
         )
     if inner.batches[0].with_parents:
         raise ValueError("a policy of this kind sees no parents; train without with_parents=True")
-    normalised = unwrap_vec_wrapper(env, VecNormalize)
     if normalised is not None and normalised.norm_obs:
         raise ValueError(
             "a policy cannot be made of a model whose observations VecNormalize normalises, as it "
@@ -157,9 +156,8 @@ def _actor(model: BaseAlgorithm) -> list[nn.Module]:
     return [*policy.mlp_extractor.policy_net, policy.action_net]
 
 
-def _shape_of(layers: list[nn.Module]) -> tuple[Any, tuple[int, ...]]:
-    """Return the activation between layers, and the widths of all but the last."""
-    *hidden, _ = [each.out_features for each in layers if isinstance(each, nn.Linear)]
+def _activation_of(layers: list[nn.Module]) -> Any:  # noqa: ANN401 - one of the names
+    """Return the activation between layers; raises ValueError if none is known of them all."""
     between = {type(each) for each in layers} - {nn.Linear}
     names = {kind: name for name, kind in ACTIVATIONS.items()}
     if len(between) > 1 or not between <= set(names):
@@ -167,4 +165,4 @@ def _shape_of(layers: list[nn.Module]) -> tuple[Any, tuple[int, ...]]:
             f"a policy's activation must be one of {', '.join(ACTIVATIONS)}, not "
             f"{' and '.join(sorted(kind.__name__ for kind in between))}"
         )
-    return names[between.pop()] if between else "tanh", tuple(hidden)
+    return names[between.pop()] if between else "tanh"

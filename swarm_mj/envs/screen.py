@@ -30,17 +30,12 @@ class Screen:
         """Take a render mode, or None for no pictures; raises ValueError for an unknown one."""
         if mode is not None and mode not in modes:
             raise ValueError(f"render_mode must be one of {', '.join(modes)}, not {mode!r}")
-        self.mode = mode
+        self.mode, self._shown_s = mode, 0.0
         self._renderer: SceneRenderer | None = None
         self._viewer: SceneViewer | None = None
-        self._shown_s = 0.0
 
     def update(self, batch: MissionBatch) -> None:
-        """Show the first mission in a window, in the mode "human".
-
-        Raises:
-            OSError: There is no display.
-        """
+        """Show the first mission, in the mode "human"; raises OSError without a display."""
         if self.mode != "human":
             return
         if self._viewer is None:  # its module looks for a display when imported

@@ -33,10 +33,7 @@ class SwarmVecEnv(VecEnv):
     ) -> None:
         """Take missions that have not begun, and whether an agent is a robot or a team."""
         self.batches, self.agent, self.render_mode = list(batches), agent, None
-        sizes = [
-            batch.num_missions * (batch.mission.num_robots if agent == "robot" else 1)
-            for batch in batches
-        ]
+        sizes = [batch.num_missions * self._per_mission(batch) for batch in batches]
         ends = np.cumsum(sizes).tolist()
         self._envs = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
         super().__init__(sum(sizes), observation_space, action_space)
@@ -44,12 +41,14 @@ class SwarmVecEnv(VecEnv):
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Let the next reset begin the missions of seeds from this one on; return each one's."""
-        num_missions = sum(batch.num_missions for batch in self.batches)
-        self._given = [None if seed is None else seed + b for b in range(num_missions)]
+        owners = [batch for batch in self.batches for _ in range(batch.num_missions)]
+        self._given = [None if seed is None else seed + b for b in range(len(owners))]
         self._rngs = [seeding.np_random(each)[0] for each in self._given]
-        per_mission = [self._per_mission(each) for each in self.batches]
-        num_agents = np.repeat(per_mission, [each.num_missions for each in self.batches])
-        return [each for each, n in zip(self._given, num_agents, strict=True) for _ in range(n)]
+        return [
+            given
+            for given, batch in zip(self._given, owners, strict=True)
+            for _ in range(self._per_mission(batch))
+        ]
 
     def reset(self) -> Observation:
         """Begin the missions of the seeds given, and else others; their seeds are in infos."""
@@ -140,10 +139,11 @@ class SwarmVecEnv(VecEnv):
         """Return each environment's mission's seed and the window's costs there."""
         infos: list[dict[str, Any]] = []
         for batch in self.batches:
-            items = [(name, values.tolist()) for name, values in batch.infos().items()]
-            for b in range(batch.num_missions):
-                info = {name: values[b] for name, values in items}
-                infos += [dict(info) for _ in range(self._per_mission(batch))]
+            of_batch = {name: values.tolist() for name, values in batch.infos().items()}
+            for row in zip(*of_batch.values(), strict=True):
+                infos += [
+                    dict(zip(of_batch, row, strict=True)) for _ in range(self._per_mission(batch))
+                ]
         return infos
 
     def _observe(self) -> Observation:

@@ -19,13 +19,7 @@ from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.compiled import compiled
 
 MEANS = ("aoi", "velocity_variance", "hops")  # over windows
-TOTALS = {  # totals, and what `protocol.costs.Packets` calls them
-    "packets_sent": "sent",
-    "packets_transmitted": "transmitted",
-    "packets_delivered": "delivered",
-    "packets_heard": "heard",
-    "receptions": "receptions",
-}
+TOTALS = ("sent", "transmitted", "delivered", "heard", "receptions")  # of `costs.Packets`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +57,7 @@ class BatchCosts:
     packets_transmitted: list[int]  # all that were on the air, responses too
     packets_delivered: list[int | None]  # requests that their addressee decoded; None: broadcasts
     packets_heard: list[int | None]  # broadcasts that somebody decoded; None: addressed packets
-    receptions: list[int | None]  # times that a robot decoded a broadcast; None: as above
+    packets_receptions: list[int | None]  # times that a robot decoded a broadcast; None: as above
     ages: list[int]  # of all missions: how often a robot's knowledge of another had each age,
     # in slots, from 0 to the mission's length
 
@@ -103,8 +97,8 @@ class Tally:
         if isinstance(swarm.channel, FreeSpaceRadio) and swarm.channel == radio_of(mission):
             self._floor = ConnectivityFloor(num_missions, mission.num_robots, mission.range_m)
         self._num_steady = mission.num_windows - mission.num_windows // 2
-        names = (*MEANS, "aoi_steady", "aoi_floor", *TOTALS)
-        self._sums = {name: np.zeros(num_missions) for name in names}
+        sums = (*MEANS, "aoi_steady", "aoi_floor", *TOTALS)
+        self._sums = {name: np.zeros(num_missions) for name in sums}
         self._task_cost, self._last_task_cost = np.full((2, num_missions), np.nan)
         self._complete = np.full(num_missions, np.inf)
         self._ages = np.zeros(round(mission.num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
@@ -123,8 +117,8 @@ class Tally:
         self._sums["hops"] += flown.hops
         floor = self._floor.next(states.position_m, swarm.now, is_active) if self._floor else np.nan
         self._sums["aoi_floor"] += floor
-        for name, count in TOTALS.items():
-            self._sums[name] += getattr(costs.packets, count)
+        for name in TOTALS:
+            self._sums[name] += getattr(costs.packets, name)
         if costs.task_cost is not None:
             self._last_task_cost = costs.task_cost.value
             self._task_cost = np.nan_to_num(self._task_cost) + costs.task_cost.value
@@ -135,7 +129,7 @@ class Tally:
     def costs(self) -> BatchCosts:
         """Return what the missions cost, all windows of them flown."""
         sums, num_windows = self._sums, self._swarm.mission.num_windows
-        own: dict[str, Any] = {name: _known(sums[name], int) for name in TOTALS}
+        own: dict[str, Any] = {f"packets_{name}": _known(sums[name], int) for name in TOTALS}
         own |= {name: _known(sums[name] / num_windows, float) for name in (*MEANS, "aoi_floor")}
         return BatchCosts(
             **own,

@@ -155,7 +155,7 @@ def _packets(costs: Samples, regime: Mission, policy: Policy) -> dict[str, Any]:
         "bytes_per_second": sent_bytes / (num_windows * regime.window_s),
         "delivery_ratio": per_packet("packets_delivered"),
         "heard_ratio": per_packet("packets_heard"),
-        "hearers_per_packet": per_packet("receptions"),
+        "hearers_per_packet": per_packet("packets_receptions"),
         "hops_mean": float(np.mean(costs["hops"])),
         "complete_window_median": float(np.median(complete)),
         "complete_share": float(np.mean(np.isfinite(complete))),

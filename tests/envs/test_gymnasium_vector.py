@@ -8,9 +8,9 @@ import pytest
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
+from swarm_mj.envs import register_environments
 from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
-from swarm_mj.envs.registration import register_environments
 
 SMALL = {"num_robots": 5, "num_windows": 6, "range_ratio": 0.4}
 NUM_ENVS = 3

@@ -8,11 +8,11 @@ import gymnasium
 import numpy as np
 import pytest
 
+from swarm_mj.envs import register_environments
 from swarm_mj.envs.dm import make_environment
 from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
 from swarm_mj.envs.pettingzoo import parallel_env
-from swarm_mj.envs.registration import register_environments
 from swarm_mj.envs.sb3 import make_vec_env
 from swarm_mj.mission import paper
 from swarm_mj.simulation.swarm import Swarm

@@ -1,15 +1,21 @@
 """What users ask for by other libraries' names, and what they are told."""
 
+import re
+from pathlib import Path
+from typing import get_args
+
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 
-import swarm_mj  # noqa: F401 - which registers environments
+from swarm_mj.envs import environment_id, register_environments
 from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
-from swarm_mj.envs.options import check_features_named, make_batch
-from swarm_mj.mission import paper
+from swarm_mj.envs.options import check_features_named, make_batch, robot_spaces, team_spaces
+from swarm_mj.mission import Task, paper
+from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.policies.gnn.graphs import PaperFeatures
 
 SMALL = {"num_robots": 3, "num_windows": 5}
@@ -54,11 +60,9 @@ def test_own_features_name_all_their_numbers(here, monkeypatch):
 
 
 def test_features_are_no_class():
-    with pytest.raises(
-        TypeError, match=r'features="swarm_mj\.policies\.gnn\.graphs:PaperFeatures"'
-    ):
+    named = r'features="swarm_mj\.policies\.gnn\.graphs:PaperFeatures"'
+    with pytest.raises(TypeError, match=named):
         check_features_named(PaperFeatures)
-    check_features_named("swarm_mj.policies.gnn.graphs:PaperFeatures")
 
 
 def test_options_of_reset():
@@ -79,3 +83,81 @@ def test_what_a_vector_is_not():
     for mode in ("SameStep", AutoresetMode.SAME_STEP):
         env = SwarmVectorEnv(1, autoreset_mode=mode, **SMALL)
         assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+
+
+def test_a_robot_sees_a_row_of_what_the_team_sees():
+    team = make_batch("stationary", num_robots=4, features="paper", with_parents=True)
+    seen, action = robot_spaces(team)
+    assert action == spaces.Discrete(4)
+    assert {name: (each.shape, each.dtype) for name, each in seen.items()} == {
+        "action_mask": ((4,), np.int8),
+        "observation": ((4, 8), np.float32),
+        "parent": ((4,), np.int32),
+    }
+    all_seen, joint = team_spaces(team)
+    assert joint == spaces.MultiDiscrete([4, 4, 4, 4])
+    assert {name: each.shape for name, each in all_seen.items()} == {
+        "action_mask": (4, 4),
+        "observation": (4, 4, 8),
+        "parent": (4, 4),
+    }
+    assert set(robot_spaces(make_batch("stationary"))[0]) == {"action_mask", "observation"}
+    team.restart([1])
+    now = {name: each[0] for name, each in team.observation.items()}
+    assert now in all_seen
+    assert {name: each[2] for name, each in now.items()} in seen
+
+
+HUGE = """
+import numpy as np
+from swarm_mj.policies.gnn.graphs import PaperFeatures
+
+class Mine(PaperFeatures):
+    names = ("T", "huge")
+
+    def graphs(self, views):
+        from dataclasses import replace
+        seen = super().graphs(views)
+        return replace(seen, node=np.full((*seen.parent.shape, 2), 1e9, dtype=np.float32))
+"""
+
+
+def test_features_of_ones_own_have_no_bounds(here, monkeypatch):
+    monkeypatch.syspath_prepend(here)
+    (here / "mine_features.py").write_text(HUGE)
+    team = make_batch("stationary", num_robots=3, features="mine_features:Mine")
+    seen, _ = robot_spaces(team)
+    team.restart([1])
+    assert team.observation["observation"].shape == (1, 3, 3, 2)
+    assert {name: each[0, 0] for name, each in team.observation.items()} in seen
+
+
+def test_the_documentation_names_the_columns_in_order():
+    page = (Path(__file__).parents[2] / "docs" / "environments.md").read_text()
+    rows = re.findall(r"^\| (\d+) \| ([^|]+) \|", page, re.MULTILINE)
+    assert rows == [(str(n), name) for n, name in enumerate(ExtendedFeatures.names)]
+    without = [
+        n for n, name in enumerate(ExtendedFeatures.names) if name not in LocalFeatures.names
+    ]
+    assert f"`local` leaves out columns {without[0]} to {without[-1]}" in page
+    assert without == list(range(without[0], without[-1] + 1))
+
+
+@pytest.mark.parametrize("task", get_args(Task))
+def test_every_task_has_an_environment(task):
+    register_environments()
+    env = gymnasium.make(environment_id(task), num_robots=3)
+    assert env.unwrapped.batch.mission.task == task
+    assert env.unwrapped.batch.mission.num_robots == 3
+    assert gymnasium.spec(environment_id(task)).vector_entry_point is not None
+
+
+def test_names_are_written_as_gymnasium_writes_them():
+    assert environment_id("stationary") == "swarm_mj/Stationary-v0"
+    assert environment_id("random-walk") == "swarm_mj/RandomWalk-v0"
+
+
+def test_registering_twice_warns_of_nothing(recwarn):
+    for _ in range(2):
+        register_environments()
+    assert not recwarn.list

@@ -24,7 +24,7 @@ def some_costs(number):
         packets_transmitted=[1, 3],
         packets_delivered=[0, None],
         packets_heard=[None, 2],
-        receptions=[None, 5],
+        packets_receptions=[None, 5],
         ages=[0, 3, 2**40],
     )
 

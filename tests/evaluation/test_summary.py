@@ -39,7 +39,7 @@ def costs(aoi, **overrides):
         "packets_transmitted": [1500] * n,
         "packets_delivered": [250] * n,
         "packets_heard": [None] * n,
-        "receptions": [None] * n,
+        "packets_receptions": [None] * n,
         "ages": [1000] + [0] * 1000,
     }
     return BatchCosts(**(made_up | overrides))
@@ -65,7 +65,9 @@ ROUND_ROBIN = [
 ]
 
 
-SILENT = costs([1.0], packets_sent=[0], packets_delivered=[None], packets_heard=[0], receptions=[0])
+SILENT = costs(
+    [1.0], packets_sent=[0], packets_delivered=[None], packets_heard=[0], packets_receptions=[0]
+)
 MADE_BY = {"version": "1.2.3", "commit": "abc"}
 
 
@@ -138,7 +140,7 @@ def test_broadcasts_by_hand():
         packets_sent=[1000, 200, 300],
         packets_delivered=[None] * 3,
         packets_heard=[500, 0, 100],
-        receptions=[1000, 0, 1400],
+        packets_receptions=[1000, 0, 1400],
     )
     study = Study(policies=("planner",), regimes=(STATIONARY,), episodes=3, seed=5)
     (planner,) = results(study, (broadcast, SILENT))

@@ -1,8 +1,7 @@
 """The README's tables, from made-up results."""
 
-import importlib.util
 import shutil
-import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -15,22 +14,27 @@ TOOL = Path(__file__).parent.parent.parent / "tools" / "results_table.py"
 
 @pytest.fixture(scope="module")
 def tool():
-    spec = importlib.util.spec_from_file_location("results_table", TOOL)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["results_table"] = module  # its options look their module up
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules["results_table"]
+    return import_module("results_table")
 
 
-def test_policies_down_the_swept_number_across_the_least_cost_first(tool, tmp_path, capsys):
+@pytest.fixture
+def printed(tool, tmp_path, capsys):
+    """What the tool prints of some results."""
+
+    def printed_of(rows):
+        write_csv(tmp_path / "some.csv", rows)
+        assert tool.main([str(tmp_path / "some.csv")]) == 0
+        return capsys.readouterr().out
+
+    return printed_of
+
+
+def test_policies_down_the_swept_number_across_the_least_cost_first(printed):
     rows = [
         *sweep("mst", "range_ratio", {0.25: (43.0, 1.0), 0.5: (16.54, 0.1)}),
         *sweep("greedy-oracle", "range_ratio", {0.5: (5.0, 0.25), 0.25: (12.04, 0.06)}),
     ]
-    write_csv(tmp_path / "some.csv", rows)
-    assert tool.main([str(tmp_path / "some.csv")]) == 0
-    assert capsys.readouterr().out == (
+    assert printed(rows) == (
         "stationary, preset reference\n\n"
         "| range ratio, age of information [windows] | 0.25 | 0.5 |\n"
         "| --- | --- | --- |\n"
@@ -39,19 +43,12 @@ def test_policies_down_the_swept_number_across_the_least_cost_first(tool, tmp_pa
     )
 
 
-def test_bit_rates_stand_across_and_team_sizes_apart(tool, tmp_path, capsys):
+def test_bit_rates_stand_across_and_team_sizes_apart(printed):
     rows = [
-        result("tdma", aoi_mean=age, bit_rate=rate, num_robots=robots)
-        for robots, rate, age in [
-            (40, None, 1.0),
-            (40, 250e3, 2.0),
-            (80, None, 3.0),
-            (80, 1e6, 4.0),
-        ]
+        result("tdma", aoi_mean=float(age), bit_rate=rate, num_robots=robots)
+        for robots, rate, age in [(40, None, 1), (40, 250e3, 2), (80, None, 3), (80, 1e6, 4)]
     ]
-    write_csv(tmp_path / "rates.csv", rows)
-    assert tool.main([str(tmp_path / "rates.csv")]) == 0
-    lines = capsys.readouterr().out.splitlines()
+    lines = printed(rows).splitlines()
     heads = [line for line in lines if line.startswith("| bit rate")]
     assert [head.split("|")[2:4] for head in heads] == [
         [" 250 kbit/s ", " no limit "],
@@ -63,7 +60,7 @@ def test_bit_rates_stand_across_and_team_sizes_apart(tool, tmp_path, capsys):
     ]
 
 
-def test_who_carries_more_than_the_paper_s_packets_is_named_so(tool):
+def test_payloads_beyond_the_papers_are_named(tool):
     rows = [
         result("planner", aoi_mean=1.0, payload="snapshots"),
         result("tdma", aoi_mean=2.0, payload="none"),
@@ -73,16 +70,14 @@ def test_who_carries_more_than_the_paper_s_packets_is_named_so(tool):
     assert lines[3].startswith("| tdma |")
 
 
-def test_robots_that_fail_have_a_table_of_their_own(tool, tmp_path, capsys):
+def test_robots_that_fail_have_a_table_of_their_own(printed):
     rows = [
         result("mst", aoi_mean=43.0, aoi_sem=1.0),
         result("mst", aoi_mean=50.0, aoi_sem=1.0, failure_fraction=0.2),
     ]
-    write_csv(tmp_path / "some.csv", rows)
-    assert tool.main([str(tmp_path / "some.csv")]) == 0
-    printed = capsys.readouterr().out
-    assert "stationary, preset reference\n\n|" in printed
-    assert "stationary, preset reference, 20% of the robots off half-way\n\n|" in printed
+    said = printed(rows)
+    assert "stationary, preset reference\n\n|" in said
+    assert "stationary, preset reference, 20% of the robots off half-way\n\n|" in said
 
 
 def test_published_values_stand_in_brackets_and_flocks_have_a_second_table(tool):

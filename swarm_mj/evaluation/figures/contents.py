@@ -43,14 +43,18 @@ VARIANCE = Panel("velocity_variance", "velocity variance [m²/s²]")
 class ResultFigure:
     """One of the paper's result figures."""
 
-    name: str  # on the command line
-    published: str  # the same figure among the published points
+    published: str  # its name among the published points
     title: str
     task: Task
     x_name: str  # a field of the mission, or receptive_field, a policy's own
     x_label: str  # with its unit
     x_scale: Scale = "linear"
     panels: tuple[Panel, ...] = (AOI,)
+
+    @property
+    def name(self) -> str:
+        """Its name on the command line."""
+        return self.published.partition("_")[0]
 
     @property
     def xs(self) -> tuple[float, ...]:
@@ -86,9 +90,8 @@ class ResultFigure:
         return command
 
 
-RESULT_FIGURES = {
-    "fig3": ResultFigure(
-        name="fig3",
+_ALL = (
+    ResultFigure(
         published="fig3_receptive_field",
         title="Receptive field",
         task="stationary",
@@ -96,8 +99,7 @@ RESULT_FIGURES = {
         x_label="receptive field of the GNN [hops]",
         panels=(AOI._replace(scale="linear"),),
     ),
-    "fig4": ResultFigure(
-        name="fig4",
+    ResultFigure(
         published="fig4_transmit_power",
         title="Transmit power",
         task="stationary",
@@ -105,16 +107,14 @@ RESULT_FIGURES = {
         x_label="range ratio: how far a packet reaches in silence [km]",
         x_scale="log",
     ),
-    "fig5": ResultFigure(
-        name="fig5",
+    ResultFigure(
         published="fig5_team_size",
         title="Team size",
         task="random-walk",
         x_name="num_robots",
         x_label="team size [robots]",
     ),
-    "fig6": ResultFigure(
-        name="fig6",
+    ResultFigure(
         published="fig6_flocking",
         title="Flocking",
         task="flocking",
@@ -122,5 +122,6 @@ RESULT_FIGURES = {
         x_label="velocity ratio: how far a robot gets along an axis [km in 50 s]",
         panels=(AOI, VARIANCE),
     ),
-}
+)
+RESULT_FIGURES = {figure.name: figure for figure in _ALL}
 FIGURES = (FLOCK, *RESULT_FIGURES)
