@@ -2,7 +2,8 @@
 
 from typing import get_args
 
-import gymnasium
+# Not `gymnasium` itself: a module of this room has its name.
+from gymnasium.envs.registration import register, registry
 
 from swarm_mj.mission import Task
 
@@ -16,8 +17,8 @@ def register_environments() -> None:
     """
     for task in get_args(Task):
         name = environment_id(task)
-        if name not in gymnasium.registry:
-            gymnasium.register(
+        if name not in registry:
+            register(
                 name,
                 entry_point="swarm_mj.envs.gymnasium:SwarmEnv",
                 vector_entry_point="swarm_mj.envs.gymnasium_vector:SwarmVectorEnv",

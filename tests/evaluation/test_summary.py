@@ -65,9 +65,8 @@ ROUND_ROBIN = [
 ]
 
 
-SILENT = costs(
-    [1.0], packets_sent=[0], packets_delivered=[None], packets_heard=[0], packets_receptions=[0]
-)
+NO_PACKETS = {f"packets_{name}": [0] for name in ("sent", "heard", "receptions")}
+SILENT = costs([1.0], packets_delivered=[None], **NO_PACKETS)
 MADE_BY = {"version": "1.2.3", "commit": "abc"}
 
 
