@@ -12,8 +12,8 @@ from typing import Any
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import is_own, make
 from swarm_mj.policies.centralised import MinimumSpanningTree, RoundRobin
-from swarm_mj.policies.greedy_oracle.policy import GreedyOracle
-from swarm_mj.policies.planner.payloads import carries, link_fields
+from swarm_mj.policies.greedy_oracle import GreedyOracle
+from swarm_mj.policies.planner.link_tables import link_fields
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.planner.settings import PlannerSettings
@@ -51,7 +51,8 @@ def _resting_planner(mission: Mission, *, learns: bool = False) -> RestingPlanne
 def _planner(mission: Mission) -> Planner | RestingPlanner:
     if mission.task != "stationary":
         return Planner(mission)
-    return _resting_planner(mission, learns=carries(link_fields(mission), mission))
+    learns = fits(packet_of(mission, link_fields(mission)), mission)
+    return _resting_planner(mission, learns=learns)
 
 
 # What makes each policy, given the mission and, for these four, a transmission probability.

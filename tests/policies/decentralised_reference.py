@@ -11,10 +11,9 @@ import numpy as np
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.planner.broadcast_scheduler import schedule
-from swarm_mj.policies.planner.plan import lookahead_of
+from swarm_mj.policies.planner.plan import heuristic_weights, lookahead_of
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
-from swarm_mj.policies.planner.weights import heuristic_weights
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.radio.links import links_between
@@ -41,7 +40,7 @@ class Snapshot:
         return all(self.is_known.tolist())
 
 
-def common_orders(seed, mission, settings=SETTINGS.discovery):
+def common_orders(seed, mission, settings=SETTINGS):
     """The order of the search and the groups of the discovery, in a round each [round, group].
 
     Of those that reach over the area a share transmits at once, and fewer after the first rounds;
@@ -56,7 +55,7 @@ def common_orders(seed, mission, settings=SETTINGS.discovery):
     )
     later = max(1, math.floor(at_once * settings.later_share))
     rounds = []
-    for k in range(settings.num_rounds):
+    for k in range(settings.num_orders):
         count = min(at_once if k < settings.num_fast_rounds else later, num_robots - 1)
         robots = rng.permutation(num_robots).tolist()
         rounds.append([robots[first : first + count] for first in range(0, num_robots, count)])
@@ -89,11 +88,11 @@ class Mind:
 
     def length(self, epoch):
         """The discovery, two early ones, then all others [windows]."""
-        epochs = self.settings.epochs
+        epochs = self.settings
         epoch += self.is_told  # then there is no discovery
         if epoch >= 3:
-            return max(epochs.min_regular_windows, round(epochs.regular_rounds * len(self.order)))
-        rounds = epochs.first_rounds if epoch == 0 else epochs.early_rounds
+            return max(epochs.min_epoch_windows, round(epochs.epoch_rounds * len(self.order)))
+        rounds = epochs.first_epoch_rounds if epoch == 0 else epochs.early_epoch_rounds
         return max(2, round(rounds * len(self.order)))
 
     def hear(self, sender, packet):
@@ -114,7 +113,7 @@ class Mind:
         if self.current is None or self.calls(slot):
             return self.has_its_turn(row, slot)
         if self.seeks(slot):
-            turn = slot // 2 // self.settings.search.every_windows
+            turn = slot // 2 // self.settings.search_every_windows
             if slot % 2 == 0:
                 return self.order[turn % len(self.order)] == self.me
             return self.answers(row, turn, flown)
@@ -139,7 +138,7 @@ class Mind:
         num_robots, window_s = len(seen), self.mission.window_s
         known = [k for k in range(num_robots) if seen[k] > 0.0]
         age = [float(now - seen[k]) if k in known else 0.0 for k in range(num_robots)]
-        believes = self.settings.snapshots
+        believes = self.settings
         oldest = max(believes.fresh_rounds * num_robots, believes.min_fresh_windows)
         fresh = [k for k in known if age[k] <= oldest]
         mean_mps = np.sum(velocity_mps[known], axis=0) / len(known)
@@ -163,23 +162,23 @@ class Mind:
         held, length = self.current, self.length(self.epoch)
         begun = self.begins - length
         unheard = begun - np.array(held.seen)
-        is_near = unheard <= self.settings.schedule.gone_rounds * max(20, len(unheard))
+        is_near = unheard <= self.settings.gone_rounds * max(20, len(unheard))
         is_there = held.is_known & (is_near | held.is_fresh)
         links = links_between(
             radio_of(self.mission), held.position_m, held.position_std_m, is_there
         )
         rests = not held.position_std_m.any()
-        known = held.before * (not (rests and self.epoch % self.settings.epochs.forget_every == 0))
+        known = held.before * (not (rests and self.epoch % self.settings.forget_every == 0))
         for k in np.flatnonzero(~held.is_fresh):
             known[k] = np.minimum(known[k], held.seen[k])
             known[:, k] = np.minimum(known[:, k], held.seen[k])
-        lookahead = lookahead_of(len(known), is_certain=rests, settings=self.settings.schedule)
+        lookahead = lookahead_of(len(known), is_certain=rests, settings=self.settings)
         is_free = [
             not (self.calls(h) or self.seeks(h)) for h in range(2 * begun, 2 * self.begins)
         ] + [True] * lookahead.depth
         halves = (2 * known).astype(np.float32)
         transmits = np.zeros((2 * length, len(known)), dtype=bool)
-        weights = heuristic_weights(links, self.settings.weights)
+        weights = heuristic_weights(links, self.settings)
         schedule(halves, 2.0 * begun, links, weights, lookahead, np.array(is_free), transmits)
         self.schedule, self.after = transmits[:, self.me].tolist(), halves.astype(float) / 2
 
@@ -193,13 +192,13 @@ class Mind:
         return (
             self.is_late(slot)
             and is_lacking
-            and slot // 2 % self.settings.search.every_windows == 0
+            and slot // 2 % self.settings.search_every_windows == 0
         )
 
     def is_late(self, slot):
         """After some rounds, or many windows."""
-        rounds = self.settings.search.start_rounds * len(self.order)
-        return slot >= 2 * min(rounds, self.settings.search.latest_start_windows)
+        rounds = self.settings.search_rounds * len(self.order)
+        return slot >= 2 * min(rounds, self.settings.latest_search_windows)
 
     def has_its_turn(self, row, slot):
         """Whether it is one of the group, and knows nobody near who comes before."""
@@ -208,7 +207,7 @@ class Mind:
             return False
         here_m, reach_m = (
             row[1][self.me],
-            self.settings.discovery.polite_ranges * self.mission.range_m,
+            self.settings.polite_ranges * self.mission.range_m,
         )
         return not any(is_near(row, k, here_m, reach_m) for k in group[: group.index(self.me)])
 
@@ -353,8 +352,8 @@ class PlannedApart(BroadcastPolicy):
         num_robots, links = len(position_m), links_between(radio_of(self.mission), position_m)
         transmits = np.zeros((120, num_robots), dtype=bool)
         nothing = np.zeros((num_robots, num_robots), dtype=np.float32)
-        weights = heuristic_weights(links, SETTINGS.weights)
-        lookahead = lookahead_of(num_robots, is_certain=True, settings=SETTINGS.schedule)
+        weights = heuristic_weights(links, SETTINGS)
+        lookahead = lookahead_of(num_robots, is_certain=True, settings=SETTINGS)
         schedule(nothing, 0.0, links, weights, lookahead, np.ones(200, dtype=bool), transmits)
         return transmits
 

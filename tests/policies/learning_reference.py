@@ -13,12 +13,10 @@ import numpy as np
 from decentralised_reference import rows
 
 from swarm_mj.policies.planner.broadcast_scheduler import schedule
-from swarm_mj.policies.planner.link_tables import LAWS, LinkTable, corrected, fit
-from swarm_mj.policies.planner.payloads import link_fields
-from swarm_mj.policies.planner.plan import lookahead_of
+from swarm_mj.policies.planner.link_tables import LAWS, LinkTable, corrected, fit, link_fields
+from swarm_mj.policies.planner.plan import heuristic_weights, lookahead_of
 from swarm_mj.policies.planner.resting import RestingPlanner
-from swarm_mj.policies.planner.settings import LearningSettings, PlannerSettings
-from swarm_mj.policies.planner.weights import heuristic_weights
+from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.radio.links import links_between
@@ -29,9 +27,11 @@ NUM_SLOTS = 120  # of a mission, at most
 
 # Rounds of 8 windows: tables are made in slots 32, 48, 64 and flown by from 40, 56, 72 on.
 SHORT = PlannerSettings(
-    learning=LearningSettings(
-        first_rounds=2.5, flown_rounds=1.0, spread_rounds=0.5, min_round_windows=8, min_log_odds=1.0
-    )
+    first_table_rounds=2.5,
+    flown_rounds=1.0,
+    spread_rounds=0.5,
+    min_round_windows=8,
+    min_log_odds=1.0,
 )
 
 
@@ -56,10 +56,8 @@ def planned(links, settings, num_slots):
         num_robots = len(links.received_mw)
         transmits = np.zeros((num_slots, num_robots), dtype=bool)
         nothing = np.zeros((num_robots, num_robots), dtype=np.float32)
-        weights = heuristic_weights(links, settings.weights)
-        lookahead = lookahead_of(
-            num_robots, is_certain=not links.is_doubtful, settings=settings.schedule
-        )
+        weights = heuristic_weights(links, settings)
+        lookahead = lookahead_of(num_robots, is_certain=not links.is_doubtful, settings=settings)
         free = np.ones(num_slots + lookahead.depth, dtype=bool)
         schedule(nothing, 0.0, links, weights, lookahead, free, transmits)
         PLANNED[key] = transmits
@@ -149,11 +147,15 @@ class LearningMind:
     @property
     def num_slots(self):
         """When the first table is flown by, how long each is, and how long it spreads [slots]."""
-        learning = self.settings.learning
+        learning = self.settings
         of_round = 2 * max(self.mission.num_robots, learning.min_round_windows)
         return [
             round(rounds * of_round)
-            for rounds in (learning.first_rounds, learning.flown_rounds, learning.spread_rounds)
+            for rounds in (
+                learning.first_table_rounds,
+                learning.flown_rounds,
+                learning.spread_rounds,
+            )
         ]
 
     def keep_time(self, slot):
@@ -171,7 +173,7 @@ class LearningMind:
         for j, told in self.told.items():
             for (i, place, is_decoded), times in told.notes:
                 counts[int(is_decoded), j, i, place] = times
-        of = fit(counts[1], counts[0], self.settings.learning)
+        of = fit(counts[1], counts[0], self.settings)
         *_, mean, std = link_fields(self.mission)
         known = sum(self.told[i].slot if i in self.told else -1 for i in range(num_robots))
         return Table((-known, self.me), of.law, rounded(mean, of.mean_db), rounded(std, of.std_db))
@@ -189,16 +191,14 @@ class LearningMind:
             if table is not None:
                 believed = believed * 10.0 ** (table.mean_db / 10.0)
                 of = LinkTable(law=table.law, mean_db=table.mean_db, std_db=table.std_db)
-                links = corrected(prior, of, self.settings.learning)
+                links = corrected(prior, of, self.settings)
             self.plans[key] = (begin, planned(links, self.settings, num_slots), believed, prior)
         return self.plans[key]
 
     def note(self, slot):
         """What it decoded or missed in a slot of which it knows who transmitted."""
         # Whoever told nothing younger for a round is not waited for.
-        least = (
-            slot + 2 - 2 * max(self.mission.num_robots, self.settings.learning.min_round_windows)
-        )
+        least = slot + 2 - 2 * max(self.mission.num_robots, self.settings.min_round_windows)
         knows_all = len(self.told) == self.mission.num_robots and all(
             told.follows or told.slot < least for told in self.told.values()
         )

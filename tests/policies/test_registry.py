@@ -8,7 +8,7 @@ from tiny_policies import save_tiny
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.centralised import MinimumSpanningTree, RoundRobin
-from swarm_mj.policies.greedy_oracle.policy import GreedyOracle
+from swarm_mj.policies.greedy_oracle import GreedyOracle
 from swarm_mj.policies.learned import LearnedPolicy
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner

@@ -66,16 +66,9 @@ def schedule(
     is_free: Bool[np.ndarray, "P"],
     transmits: Bool[np.ndarray, "P N"],
 ) -> None:
-    """Fill `transmits`, slot by slot, and bring `timestamp` to the end of the last.
+    """Fill `transmits`, slot by slot, and bring `timestamp` from `now` to the end of the last.
 
-    Args:
-        timestamp: T, written in place [slots].
-        now: t before the first slot [slots].
-        links: The radio; the robots stand still.
-        weights: Of news.
-        lookahead: How far to look ahead.
-        is_free: The slots that the schedule may fill; in the others nobody transmits.
-        transmits: Who transmits in each.
+    In slots that are not free nobody transmits. Looking ahead may reach beyond those to be filled.
     """
     task = _Task(links, weights, lone_probabilities(links))
     after = np.empty_like(timestamp)
@@ -85,14 +78,14 @@ def schedule(
         if is_free[p]:
             first = NOBODY
             if lookahead.width > 1:
-                first = _best_first(timestamp, now, task, lookahead, is_free, p)
+                ahead = is_free[p : p + lookahead.depth]
+                first = _best_first(timestamp, now, task, lookahead.width, ahead)
             _choose(timestamp, task, first, transmits[p], after)
             for i in range(timestamp.shape[0]):
                 for k in range(timestamp.shape[0]):
                     timestamp[i, k] = after[i, k]
         else:
-            for i in range(timestamp.shape[0]):
-                transmits[p, i] = False
+            transmits[p, :] = False
 
 
 @compiled()
@@ -100,21 +93,18 @@ def _best_first(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
     task: _Task,
-    lookahead: Lookahead,
+    width: int,
     is_free: Bool[np.ndarray, "P"],
-    p: int,
 ) -> int:
-    """Return the first transmitter of slot p by whose branch most is known, or `NOBODY`."""
+    """Return the first transmitter of a slot by whose branch most is known, or `NOBODY`."""
     num_robots = timestamp.shape[0]
-    gain = np.zeros((num_robots, num_robots))
-    _fill_gains(timestamp, task, gain)
+    gain, _ = _gains(timestamp, task)
     air, nobody = silent_air(num_robots), np.zeros(num_robots, dtype=np.bool_)
     alone = np.empty(num_robots)
     for i in range(num_robots):
         alone[i] = _value(task.links, gain, air, nobody, i)
     best, most_known = NOBODY, -np.inf
-    end = min(p + lookahead.depth, is_free.shape[0])
-    for _ in range(lookahead.width):
+    for _ in range(width):
         first, first_value = NOBODY, 0.0
         for i in range(num_robots):
             if alone[i] > first_value:
@@ -122,7 +112,7 @@ def _best_first(
         if first == NOBODY:
             return best
         alone[first] = 0.0
-        known = _follow(timestamp, now, task, first, is_free, p, end)
+        known = _follow(timestamp, now, task, first, is_free)
         if known > most_known:
             best, most_known = first, known
     return best
@@ -135,19 +125,17 @@ def _follow(
     task: _Task,
     first: int,
     is_free: Bool[np.ndarray, "P"],
-    begin: int,
-    end: int,
 ) -> float:
     """Return the sum of all timestamps after each of the slots that begin with this transmitter."""
     before, after = timestamp.copy(), np.empty_like(timestamp)
     transmits = np.zeros(timestamp.shape[0], dtype=np.bool_)
     known = 0.0
-    for p in range(begin, end):
-        if p > begin:
+    for p in range(is_free.shape[0]):
+        if p > 0:
             now += 1.0
             observe_own(before, now)
         if is_free[p]:
-            _choose(before, task, first if p == begin else NOBODY, transmits, after)
+            _choose(before, task, first if p == 0 else NOBODY, transmits, after)
             before, after = after, before
         total = np.float32(0.0)
         for i in range(before.shape[0]):
@@ -165,24 +153,20 @@ def _choose(
     transmits: Bool[np.ndarray, "N"],
     after: Float32[np.ndarray, "N N"],
 ) -> None:
-    """Fill `transmits` with a slot's transmitters, a given first one before all others.
-
-    Fill `after`, too: T as expected after the slot.
-    """
+    """Fill in a slot's transmitters, a given first one before all others, and T as it follows."""
     num_robots, links = timestamp.shape[0], task.links
-    gain = np.zeros((num_robots, num_robots))
-    has_news = _fill_gains(timestamp, task, gain)
+    gain, has_news = _gains(timestamp, task)
     air = silent_air(num_robots)
     heard, probability = np.empty(num_robots, dtype=np.int64), np.empty(num_robots)
     listens = np.ones(num_robots, dtype=np.bool_)
-    for i in range(num_robots):
-        transmits[i] = False
-    value = 0.0
+    transmits[:] = False
+    best, value = first, 0.0
     if first != NOBODY:
         value = _value(links, gain, air, transmits, first)
-        transmits[first], listens[first] = True, False
-        broadcast(links, air, first)
     while True:
+        if best != NOBODY:
+            transmits[best], listens[best] = True, False
+            broadcast(links, air, best)
         best, best_value = NOBODY, value * task.weights.min_share
         for i in range(num_robots):
             if listens[i] and has_news[i]:
@@ -192,8 +176,6 @@ def _choose(
         if best == NOBODY:
             break
         value = best_value
-        transmits[best], listens[best] = True, False
-        broadcast(links, air, best)
     # The sum of powers anew, since its rounding depends on the order of the transmitters.
     listen(links, air_of(links, transmits), NOBODY, listens, heard, probability)
     merge_expected(timestamp, heard, probability, after)
@@ -219,14 +201,12 @@ def _value(
 
 
 @compiled()
-def _fill_gains(
-    timestamp: Float32[np.ndarray, "N N"], task: _Task, gain: Float[np.ndarray, "N N"]
-) -> Bool[np.ndarray, "N"]:
-    """Fill in the value of j decoding i, where it can; return which robots have news for anyone.
-
-    The others should listen.
-    """
+def _gains(
+    timestamp: Float32[np.ndarray, "N N"], task: _Task
+) -> tuple[Float[np.ndarray, "N N"], Bool[np.ndarray, "N"]]:
+    """Return the value of j decoding i, where it can, and which robots have news for anyone."""
     num_robots = timestamp.shape[0]
+    gain = np.zeros((num_robots, num_robots))
     has_news = np.zeros(num_robots, dtype=np.bool_)
     for i in range(num_robots):
         for j in range(num_robots):
@@ -235,7 +215,7 @@ def _fill_gains(
                 gain[i, j] = _gain(timestamp[i], timestamp[j], weight)
                 if gain[i, j] > 0.0:
                     has_news[i] = True
-    return has_news
+    return gain, has_news
 
 
 # Adding in any order lets the compiler use its vectors. Whole slots add up exactly; products to

@@ -3,7 +3,8 @@
 A link's excess is how much stronger it is than was believed, in dB, the same in both directions.
 Every pair of a law of fades and a prior of the excess is a hypothesis. The most probable one is
 taken, unless the channel that was believed explains the observations about as well; then each
-link's excess follows by Bayes' rule.
+link's excess follows by Bayes' rule. Packets carry what robots observed, and two tables: the one
+that the sender plans by, and the best of the next.
 """
 
 from dataclasses import dataclass
@@ -12,8 +13,19 @@ from functools import cache, cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from swarm_mj.policies.planner.link_evidence import BIN_DB, Counts, Evidence, bin_centres_db
-from swarm_mj.policies.planner.settings import LearningSettings
+from swarm_mj.mission import Mission
+from swarm_mj.policies.planner.link_evidence import (
+    BIN_CENTRES_DB,
+    BIN_DB,
+    MAX_KINDS,
+    MAX_TIMES,
+    NUM_BINS,
+    Counts,
+    Evidence,
+)
+from swarm_mj.policies.planner.settings import PlannerSettings
+from swarm_mj.policies.planner.snapshots import NUM_SENT
+from swarm_mj.protocol.packets import PacketField, bits_for, identity, times
 from swarm_mj.radio.decode_curves import Curves, decode_curves, probability_at
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.links import Links, doubtful
@@ -48,27 +60,25 @@ class Tables:
     """The tables of all robots at one time; each is fitted when asked for."""
 
     def __init__(
-        self, evidence: Evidence, known_until: Int[np.ndarray, "N N"], settings: LearningSettings
+        self, evidence: Evidence, known_until: Int[np.ndarray, "N N"], settings: PlannerSettings
     ) -> None:
         """Keep what every robot knew: [j, i] is the last slot of which j knows what i observed.
 
         The best table, of rank 0, is that of the robot whose knowledge is youngest.
         """
-        self._evidence = evidence
-        self._known_until = known_until
-        self._settings = settings
+        self._evidence, self._known_until, self._settings = evidence, known_until, settings
         self.rank = np.argsort(np.argsort(-np.sum(known_until, axis=1), kind="stable"))
         self._tables: dict[int, LinkTable] = {}
 
     def table(self, owner: int) -> LinkTable:
         """Return the table of one robot."""
         if owner not in self._tables:
-            known_until = self._known_until[owner]
-            self._tables[owner] = fit(*self._evidence.counts(known_until), self._settings)
+            counts = self._evidence.counts(self._known_until[owner])
+            self._tables[owner] = fit(*counts, self._settings)
         return self._tables[owner]
 
 
-def fit(decoded: Counts, missed: Counts, settings: LearningSettings) -> LinkTable:
+def fit(decoded: Counts, missed: Counts, settings: PlannerSettings) -> LinkTable:
     """Return the table that follows from packets decoded and missed, rounded as packets carry it.
 
     Rounding here rather than on the air keeps the plan of a table's owner that of everyone.
@@ -95,12 +105,7 @@ def fit(decoded: Counts, missed: Counts, settings: LearningSettings) -> LinkTabl
     return LinkTable(law=law, mean_db=table[0], std_db=table[1])
 
 
-def expected_mw(links: Links, table: LinkTable) -> Float[np.ndarray, "N N"]:
-    """Return the power of i at j, by a table [mW]."""
-    return links.received_mw * 10.0 ** (table.mean_db / 10.0)
-
-
-def corrected(links: Links, table: LinkTable, settings: LearningSettings) -> Links:
+def corrected(links: Links, table: LinkTable, settings: PlannerSettings) -> Links:
     """Return links as a table has them, cautious where it is doubtful.
 
     A packet is expected to be weaker than in the mean, and to interfere more: a plan that fails
@@ -134,7 +139,7 @@ def _curves(law: int) -> Curves:
 @cache
 def _log_probabilities() -> tuple[Float[np.ndarray, "K F X"], Float[np.ndarray, "K F X"]]:
     """Return those of a packet that is decoded, and missed: by bin, law and excess."""
-    margin_db = bin_centres_db()[:, None] + EXCESS_DB[None, :]
+    margin_db = BIN_CENTRES_DB[:, None] + EXCESS_DB[None, :]
     # A link's margin lies somewhere in its bin, always at the same place. So for either outcome it
     # is taken to be where that is most probable; else what is certain would look like luck.
     decoded = _decodes(margin_db + BIN_DB / 2.0)
@@ -162,3 +167,23 @@ def _priors() -> Float[np.ndarray, "P X"]:
     ]
     priors = np.stack([is_expected, *normal, *blocked])
     return priors / priors.sum(axis=1, keepdims=True)
+
+
+def link_fields(mission: Mission) -> tuple[PacketField, ...]:
+    """Return the fields of as many observations as robots may note, and of two tables of links."""
+    num_robots = mission.num_robots
+    num_noted = num_robots * MAX_KINDS
+    num_links = NUM_SENT * num_robots * (num_robots - 1) // 2
+    in_table = {"bits": 8, "count": num_links, "step": STEP_DB, "unit": "dB"}
+    return (
+        PacketField(name="slot since which each robot plans", bits=16, count=num_robots),
+        times(identity("sender of a kind of packet", mission), num_noted),
+        PacketField(name="its margin", bits=bits_for(NUM_BINS), count=num_noted),
+        PacketField(name="whether it was decoded", bits=1, count=num_noted),
+        PacketField(name="how often", bits=bits_for(MAX_TIMES + 1), count=num_noted),
+        times(identity("owner of the table", mission), NUM_SENT),
+        PacketField(name="how much its owner knew", bits=32, count=NUM_SENT),
+        PacketField(name="law of fades and losses", bits=bits_for(len(LAWS)), count=NUM_SENT),
+        PacketField(name="mean excess of a link, in the table", low=-32.0, **in_table),
+        PacketField(name="standard deviation of a link, in the table", **in_table),
+    )

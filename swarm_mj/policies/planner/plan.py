@@ -1,25 +1,24 @@
-"""Plans: who should transmit in each slot, computed as far as they are asked for."""
+"""Plans: who should transmit in each slot, computed as far as they are asked for.
+
+News has heuristic weights, by hand, from the graph of links that a scheduler believes. Index order:
+row `i` sends or is passed through, column `j` or `k` is reached or is the subject.
+"""
+
+import math
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.policies.planner.broadcast_scheduler import Lookahead, schedule
-from swarm_mj.policies.planner.settings import PlannerSettings, ScheduleSettings
+from swarm_mj.policies.planner.broadcast_scheduler import Lookahead, Weights, schedule
+from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import Snapshots
-from swarm_mj.policies.planner.weights import heuristic_weights
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
-from swarm_mj.radio.links import Links
+from swarm_mj.radio.links import Links, lone_probabilities
 from swarm_mj.radio.mission_radio import Belief
+from swarm_mj.system.compiled import compiled
 
-
-def lookahead_of(num_robots: int, *, is_certain: bool, settings: ScheduleSettings) -> Lookahead:
-    """Return how far a team of this size looks ahead, on certain or on merely believed links."""
-    if num_robots > settings.max_lookahead_robots:
-        return Lookahead(1, 1)
-    if is_certain:
-        return Lookahead(settings.rest_width, settings.rest_depth)
-    return Lookahead(settings.moving_width, settings.moving_depth)
+CHUNK_SLOTS = 10  # planned at a time; any number gives the same plan
 
 
 class Plan:
@@ -44,59 +43,49 @@ class Plan:
         if that is said, or else if its links are certain.
         """
         num_robots = len(links.received_mw)
-        self._links = links
-        self._settings = settings.schedule
-        self._weights = heuristic_weights(links, settings.weights)
         is_certain = not links.is_doubtful if is_certain is None else is_certain
-        self._lookahead = lookahead_of(
-            num_robots, is_certain=is_certain, settings=settings.schedule
-        )
-        if timestamp is None:
-            timestamp = np.full((num_robots, num_robots), NEVER)
+        timestamp = np.full((num_robots, num_robots), NEVER) if timestamp is None else timestamp
+        self._links, self._weights = links, heuristic_weights(links, settings)
+        self._lookahead = lookahead_of(num_robots, is_certain=is_certain, settings=settings)
         self._timestamp = (SLOTS_PER_WINDOW * timestamp).astype(np.float32)  # [slots]
         self._now = SLOTS_PER_WINDOW * now
-        self._is_endless = is_free is None
+        self._num_slots = math.inf if is_free is None else len(is_free)
         self._is_free = np.ones(0, dtype=bool) if is_free is None else is_free
         self._transmits = []  # by slots
 
     def transmits(self, slot: int) -> Bool[np.ndarray, "N"]:
-        """Return who transmits in a slot.
-
-        Raises:
-            IndexError: The plan ends before.
-        """
+        """Return who transmits in a slot, or raise IndexError if the plan ends before."""
+        if slot >= self._num_slots:
+            raise IndexError(f"the plan has {self._num_slots} slots")
         while slot >= len(self._transmits):
             self._extend()
         return self._transmits[slot]
 
     def outcome(self) -> Float[np.ndarray, "N N"]:
         """Return T after the last slot of a plan that ends, as expected [windows]."""
-        while len(self._transmits) < len(self._is_free):
+        while len(self._transmits) < self._num_slots:
             self._extend()
         return self._timestamp.astype(np.float64) / SLOTS_PER_WINDOW
 
     def _extend(self) -> None:
         """Compute the next slots: as many whatever is asked for, which plans must not depend on."""
-        begin, num_slots = len(self._transmits), self._settings.chunk_slots
-        if not self._is_endless:
-            num_slots = min(num_slots, len(self._is_free) - begin)
-            if num_slots == 0:
-                raise IndexError(f"the plan has {begin} slots")
+        begin, num_robots = len(self._transmits), len(self._timestamp)
+        num_slots = int(min(CHUNK_SLOTS, self._num_slots - begin))
         # Looking ahead reaches beyond these slots, and beyond the plan's end, where all are free.
         is_free = np.ones(num_slots + self._lookahead.depth, dtype=bool)
         known = self._is_free[begin : begin + len(is_free)]
         is_free[: len(known)] = known
-        transmits = np.empty((num_slots, len(self._timestamp)), dtype=bool)
-        schedule(
-            self._timestamp,
-            self._now + begin,
-            self._links,
-            self._weights,
-            self._lookahead,
-            is_free,
-            transmits,
-        )
+        transmits, now = np.empty((num_slots, num_robots), dtype=bool), self._now + begin
+        network = self._links, self._weights, self._lookahead
+        schedule(self._timestamp, now, *network, is_free, transmits)
         self._transmits.extend(transmits)
+
+
+def lookahead_of(num_robots: int, *, is_certain: bool, settings: PlannerSettings) -> Lookahead:
+    """Return how far a team of this size looks ahead, on certain or on merely believed links."""
+    if num_robots > settings.max_lookahead_robots:
+        return Lookahead(1, 1)
+    return Lookahead(*(settings.rest_lookahead if is_certain else settings.moving_lookahead))
 
 
 def epoch_plan(
@@ -113,8 +102,8 @@ def epoch_plan(
     T and t are those as the epoch begins, as far as they are known with that snapshot [windows].
     """
     is_fresh, observed = snapshots.is_fresh[owner], snapshots.timestamp[owner]
-    round_windows = max(len(observed), settings.schedule.min_round_windows)
-    is_gone = now - observed > settings.schedule.gone_rounds * round_windows
+    round_windows = max(len(observed), settings.min_round_windows)
+    is_gone = now - observed > settings.gone_rounds * round_windows
     is_there = snapshots.is_known[owner] & (is_fresh | ~is_gone)
     std_m = snapshots.position_std_m[owner]
     # The last plan may have expected news of a robot that went missing. In truth nobody knows
@@ -128,3 +117,53 @@ def epoch_plan(
         now=now,
         is_free=is_free,
     )
+
+
+def heuristic_weights(links: Links, settings: PlannerSettings) -> Weights:
+    """Return the weights of squared rises of T: more at receivers that many robots lie behind.
+
+    Squares prefer the stalest entries to many small refreshments. A receiver that passes news on to
+    many others should get it early. The denser the links, the smaller the share of a slot's value
+    that must remain when another robot transmits, and so the more robots transmit at once. Where
+    links or positions are doubtful or a robot has no link, plans should not rely on every packet.
+    """
+    probability = lone_probabilities(links)
+    is_linked = probability >= settings.min_probability
+    has_link = np.any(is_linked, axis=1)
+    hops = expected_hops(np.where(is_linked, probability, 0.0))
+    behind = np.maximum(num_downstream(hops, settings.slack_hops), 1.0)
+    weight = behind**settings.downstream_exponent
+    weight *= np.clip(hops, 1.0, len(weight)) ** settings.hops_exponent
+    share = settings.share_unlinked
+    total, num_linked = float(np.sum(probability)), int(np.sum(has_link))
+    if not links.is_doubtful:
+        share += settings.share_per_link * total / max(1, num_linked * (num_linked - 1))
+    doubt = np.sum(probability / links.distance_over_std) / max(total, settings.min_probability)
+    share += settings.share_per_std * float(doubt)
+    share += 0.0 if np.all(has_link) else settings.share_isolated
+    return Weights(weight.astype(np.float32), min(share, settings.max_share))
+
+
+def expected_hops(probability: Float[np.ndarray, "N N"]) -> Float[np.ndarray, "N N"]:
+    """Return the expected transmissions from i to j by shortest paths; inf out of reach."""
+    # A link of probability p takes 1 / p transmissions.
+    hops = np.divide(1.0, probability, out=np.full_like(probability, np.inf), where=probability > 0)
+    np.fill_diagonal(hops, 0.0)
+    for via in range(len(hops)):  # Floyd and Warshall
+        hops = np.minimum(hops, hops[:, via, None] + hops[via])
+    return hops
+
+
+@compiled()
+def num_downstream(hops: Float[np.ndarray, "N N"], slack: float) -> Float[np.ndarray, "N N"]:
+    """Return how many robots lie behind i for news of k, i itself among them; 0 out of reach."""
+    num_robots = hops.shape[0]
+    behind = np.zeros((num_robots, num_robots))
+    for i in range(num_robots):
+        for k in range(num_robots):
+            if hops[k, i] < np.inf:
+                for j in range(num_robots):
+                    if hops[k, j] < np.inf:
+                        detour = hops[k, i] + hops[i, j] - hops[k, j]
+                        behind[i, k] += 1.0 if detour < slack else 0.0
+    return behind

@@ -32,14 +32,20 @@ from jaxtyping import Bool
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.planner.discovery import Discovery
-from swarm_mj.policies.planner.payloads import check_room, snapshot_fields
 from swarm_mj.policies.planner.plan import Plan, epoch_plan
-from swarm_mj.policies.planner.settings import EpochSettings, PlannerSettings
-from swarm_mj.policies.planner.snapshots import Snapshots, better, take_snapshots
+from swarm_mj.policies.planner.settings import PlannerSettings
+from swarm_mj.policies.planner.snapshots import Snapshots, better, snapshot_fields, take_snapshots
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.protocol.buffers import NEVER, Buffers
 from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.protocol.packets import PacketField
+from swarm_mj.protocol.packets import (
+    PacketField,
+    bits_per_second,
+    fits,
+    least_bit_rate,
+    packet_of,
+    slot_bytes,
+)
 from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW
 from swarm_mj.radio.mission_radio import Belief, radio_of
 
@@ -63,7 +69,7 @@ class Planner(BroadcastPolicy):
         Raises:
             ValueError: The mission's slots do not hold snapshots.
         """
-        check_room(mission)
+        _check_room(mission)
         self._mission = mission
         self._settings = PlannerSettings() if settings is None else settings
         self._belief = Belief(radio=radio_of(mission))
@@ -83,16 +89,8 @@ class Planner(BroadcastPolicy):
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draw each mission's orders of turns and forget; arguments as in `Policy.start`."""
-        range_m, side_m = self._mission.range_m, self._mission.side_m
-        num_reaches = side_m**2 / (math.pi * range_m**2)
         self._teams = [
-            _Team(
-                self._belief,
-                self._mission.window_s,
-                self._settings,
-                Discovery(num_robots, num_reaches, range_m, self._settings, rng),
-            )
-            for rng in rngs
+            _Team(num_robots, self._mission, self._belief, self._settings, rng) for rng in rngs
         ]
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
@@ -108,24 +106,28 @@ class _Team:
     """The robots of one mission, side by side: row i of every array is robot i's memory."""
 
     def __init__(
-        self, belief: Belief, window_s: float, settings: PlannerSettings, discovery: Discovery
+        self,
+        num_robots: int,
+        mission: Mission,
+        belief: Belief,
+        settings: PlannerSettings,
+        rng: np.random.Generator,
     ) -> None:
-        self._belief = belief
-        self._window_s = window_s
-        self._settings = settings
-        self._discovery = discovery
-        self._everyone = np.arange(discovery.num_robots)
+        num_reaches = mission.side_m**2 / (math.pi * mission.range_m**2)
+        self._discovery = Discovery(num_robots, num_reaches, mission.range_m, settings, rng)
+        self._belief, self._settings, self._window_s = belief, settings, mission.window_s
+        everyone = self._everyone = np.arange(num_robots)
         self._first: float | None = None  # when the first decision was asked for [windows]
-        self._num_skipped = 0  # epochs without a discovery begin with the second
         self._epoch = -1
-        self._plans: dict[int, Plan] = {}  # of this epoch, by the owner of the snapshot
+        self._begin = self._end = 0  # of the epoch, after the first decision [windows]
+        self._num_skipped = 0  # epochs without a discovery begin with the second
         self._current: Snapshots | None = None  # taken for this epoch
         self._upcoming: Snapshots | None = None  # taken for the next one
-        self._holds = self._everyone  # the owner of the current snapshot that i flies by
-        self._will_hold = self._everyone  # the owner of the best upcoming snapshot that i has
-        self._continues = self._everyone  # the owner of i's plan when it took its upcoming one
-        self._ended = self._plans  # of the epoch before, and what went with them
-        self._ended_continues = self._continues
+        self._holds = everyone  # the owner of the current snapshot that i flies by
+        self._will_hold = everyone  # the owner of the best upcoming snapshot that i has
+        self._plans: dict[int, Plan] = {}  # of this epoch, by the owner of the snapshot
+        self._planned_by = everyone  # the owner of i's plan when it took its upcoming snapshot
+        self._before: list[Plan | None] = []  # i's plan of the epoch before, by the current one
 
     def transmits(self, views: LocalViews, b: int) -> Bool[np.ndarray, "N"]:
         """Return who transmits in this slot of mission b."""
@@ -140,8 +142,7 @@ class _Team:
             self._holds = better(self._current.rank, self._holds, heard)
         if self._upcoming is not None:
             self._will_hold = better(self._upcoming.rank, self._will_hold, heard)
-        if slot >= SLOTS_PER_WINDOW * self._start(self._epoch + 1):
-            self._epoch += 1
+        if slot >= SLOTS_PER_WINDOW * self._end:
             self._begin_epoch(views.buffers, b, now)
         if self._current is None:
             return self._discovery.transmits(slot, views.buffers, b)
@@ -150,51 +151,52 @@ class _Team:
         for owner in np.unique(self._holds).tolist():
             # Made even where nobody follows it yet, since the next epoch's plan continues it.
             plan = self._plan(self._current, owner)
-            is_fresh, holds = self._current.is_fresh[owner], self._holds == owner
-            if self._discovery.is_discovered(slot, self._current.is_complete(owner)):
+            is_known, is_fresh = self._current.is_known[owner], self._current.is_fresh[owner]
+            if self._discovery.is_discovered(slot, is_known):
                 chosen = self._discovery.transmits(slot, views.buffers, b)
             elif self._discovery.is_sought(slot, is_fresh):
                 chosen = self._discovery.seeks(slot, is_fresh, was_fresh, heard, views.buffers, b)
             else:
-                chosen = plan.transmits(slot - SLOTS_PER_WINDOW * self._start(self._epoch))
-            transmits[holds] = chosen[holds]
+                chosen = plan.transmits(slot - SLOTS_PER_WINDOW * self._begin)
+            follows = self._holds == owner
+            transmits[follows] = chosen[follows]
         return transmits
 
     def _begin_epoch(self, buffers: Buffers, b: int, now: float) -> None:
         """Fly by the snapshots taken for this epoch, and take those for the next."""
-        self._ended, self._ended_continues = self._plans, self._continues
+        self._epoch += 1
+        self._before = [self._plans.get(owner) for owner in self._planned_by.tolist()]
         self._plans = {}
         is_common = self._epoch == 0 and _is_common(buffers, b)
-        if is_common:  # there is nothing to discover
-            self._num_skipped = 1
-            self._upcoming = self._snapshots(buffers, b, now, self._length(0) / 2.0)
+        self._num_skipped += is_common  # there is nothing to discover
+        epoch, num_robots = self._epoch + self._num_skipped, len(self._everyone)
+        length = epoch_windows(epoch, num_robots, self._settings)
+        self._begin, self._end = self._end, self._end + length
+        if is_common:
+            self._upcoming = self._snapshots(buffers, b, now, length / 2.0)
             self._will_hold = np.zeros_like(self._everyone)  # all snapshots are the same
         self._current, self._holds = self._upcoming, self._will_hold
-        if self._epoch > 0 or is_common:
-            length, next_length = (self._length(self._epoch + ahead) for ahead in (0, 1))
+        if epoch > 0:
+            next_length = epoch_windows(epoch + 1, num_robots, self._settings)
             self._upcoming = self._snapshots(buffers, b, now, length + next_length / 2.0)
             self._will_hold = self._holds if is_common else self._everyone
-            self._continues = self._holds
+            self._planned_by = self._holds
 
     def _snapshots(self, buffers: Buffers, b: int, now: float, windows_ahead: float) -> Snapshots:
-        settings = self._settings.snapshots
-        return take_snapshots(buffers, b, now, self._window_s, windows_ahead, settings)
+        return take_snapshots(buffers, b, now, self._window_s, windows_ahead, self._settings)
 
     def _plan(self, current: Snapshots, owner: int) -> Plan:
         """Return the plan that follows from someone's snapshot."""
         if owner not in self._plans:
-            before = self._ended.get(int(self._ended_continues[owner]))
+            before, is_fresh = self._before[owner], current.is_fresh[owner]
             # At rest nothing else would correct two robots that expect different timestamps.
             is_at_rest = not np.any(current.position_std_m[owner])
-            if is_at_rest and self._epoch % self._settings.epochs.forget_every == 0:
+            if is_at_rest and self._epoch % self._settings.forget_every == 0:
                 before = None
-            is_complete, is_fresh = current.is_complete(owner), current.is_fresh[owner]
-            start = self._start(self._epoch)
-            slots = range(SLOTS_PER_WINDOW * start, SLOTS_PER_WINDOW * self._start(self._epoch + 1))
             is_left = [
-                not self._discovery.is_discovered(slot, is_complete)
+                not self._discovery.is_discovered(slot, current.is_known[owner])
                 and not self._discovery.is_sought(slot, is_fresh)
-                for slot in slots
+                for slot in range(SLOTS_PER_WINDOW * self._begin, SLOTS_PER_WINDOW * self._end)
             ]
             self._plans[owner] = epoch_plan(
                 self._belief,
@@ -202,19 +204,10 @@ class _Team:
                 current,
                 owner,
                 np.full(is_fresh.shape * 2, NEVER) if before is None else before.outcome(),
-                start + (self._first or 0.0),
+                self._begin + (self._first or 0.0),
                 np.array(is_left),
             )
         return self._plans[owner]
-
-    def _start(self, epoch: int) -> int:
-        """Return when an epoch begins, after the first decision [windows]."""
-        num_robots, settings = len(self._everyone), self._settings.epochs
-        skipped = epoch_start(self._num_skipped, num_robots, settings)
-        return epoch_start(epoch + self._num_skipped, num_robots, settings) - skipped
-
-    def _length(self, epoch: int) -> int:
-        return self._start(epoch + 1) - self._start(epoch)
 
 
 def _is_common(buffers: Buffers, b: int) -> bool:
@@ -223,16 +216,20 @@ def _is_common(buffers: Buffers, b: int) -> bool:
     return bool(np.all(buffers.is_known[b]) and np.all(timestamp == timestamp[0, 0]))
 
 
-def epoch_start(epoch: int, num_robots: int, settings: EpochSettings) -> int:
-    """Return when an epoch begins: after the discovery, two short ones, and regular ones."""
-    if epoch == 0:
-        return 0
-    early = max(settings.min_early_windows, round(settings.early_rounds * num_robots))
-    first = max(settings.min_early_windows, round(settings.first_rounds * num_robots))
-    num_early, num_regular = min(epoch, 3) - 1, max(epoch - 3, 0)
-    return first + num_early * early + num_regular * regular_length(num_robots, settings)
+def epoch_windows(epoch: int, num_robots: int, settings: PlannerSettings) -> int:
+    """Return how long an epoch is: the discovery, then two short ones, then all others."""
+    if epoch > 2:
+        return max(settings.min_epoch_windows, round(settings.epoch_rounds * num_robots))
+    rounds = settings.early_epoch_rounds if epoch > 0 else settings.first_epoch_rounds
+    return max(settings.min_early_epoch_windows, round(rounds * num_robots))
 
 
-def regular_length(num_robots: int, settings: EpochSettings) -> int:
-    """Return how long an epoch is, except for the first ones [windows]."""
-    return max(settings.min_regular_windows, round(settings.regular_rounds * num_robots))
+def _check_room(mission: Mission) -> None:
+    packet = packet_of(mission, snapshot_fields(mission))
+    if mission.bit_rate is None or fits(packet, mission):
+        return
+    raise ValueError(
+        f"packets of planner need {packet.num_bytes:,} bytes, but a slot holds "
+        f"{slot_bytes(mission):,} bytes at {bits_per_second(mission.bit_rate)}; choose a bit rate "
+        f"of {least_bit_rate(packet.num_bytes, mission):g} or more, or planner --payload none"
+    )

@@ -1,12 +1,18 @@
 """The planner of teams at rest: robots agree from their buffers, and may learn their links.
 
-Where nobody moves, robots that have heard of all hold the same positions. A schedule that follows
-from these positions and the clock is the same on all of them, whatever else their buffers say
-(`resting_team.py`). So every robot takes its turns as in spatial TDMA until it has heard of
-everyone, and from then on transmits when the schedule says so. The schedule begins with a team that
-knows nothing when the mission begins, so that it does not matter when a robot joins it. Without a
-payload they keep this schedule. With one they learn which links are not as they believed, and plan
-anew.
+Where nobody moves, robots that have heard of all hold the same positions. The plan that follows
+from these positions and the clock is common, whatever else buffers say. So every robot takes its
+turns as in spatial TDMA until it has heard of everyone, and from then on transmits when the plan
+says so. The plan begins with a team that knows nothing when the mission begins, so that it does not
+matter when a robot joins it. Without a payload they keep this plan.
+
+Under a channel that the robots do not know, some of its packets never arrive. With a payload,
+robots note what they decoded and what they missed (`link_evidence.py`), and packets carry these
+counts of all robots, each as old as the rest of what they say of it. At common times every robot
+fits a table of links to what it then knows (`link_tables.py`). Packets carry the best table: that
+of the robot whose knowledge is youngest. At the next common time each robot flies by a plan made
+from the best table that it holds. Where the table says that links are as they were believed, the
+plan goes on.
 
 Where robots move, no two buffers hold the same positions for long, and schedules made from them
 would jam each other. A robot that hears of motion does as the planner of moving teams, or, without
@@ -14,20 +20,27 @@ a payload, goes on with spatial TDMA, whose rule tolerates small differences.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.planner.payloads import carries, link_fields, snapshot_fields
+from swarm_mj.policies.planner.link_evidence import NOTHING, Evidence, observe
+from swarm_mj.policies.planner.link_tables import Tables, corrected, link_fields
+from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.policy import Planner
-from swarm_mj.policies.planner.resting_team import RestingTeam
 from swarm_mj.policies.planner.settings import PlannerSettings
+from swarm_mj.policies.planner.snapshots import better, snapshot_fields
 from swarm_mj.policies.policy import BroadcastPolicy
-from swarm_mj.policies.tdma import SpatialTdma, slot_of
+from swarm_mj.policies.tdma import SpatialTdma
 from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.protocol.packets import PacketField
+from swarm_mj.protocol.packets import PacketField, fits, packet_of
+from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW
+from swarm_mj.radio.links import Links
 from swarm_mj.radio.mission_radio import Belief, radio_of
+
+NOT_YET = np.iinfo(np.int64).max
 
 
 class RestingPlanner(BroadcastPolicy):
@@ -50,7 +63,7 @@ class RestingPlanner(BroadcastPolicy):
         self._settings = settings
         self._turns = turns
         self._learns = learns
-        is_ready = learns and carries(snapshot_fields(mission), mission)
+        is_ready = learns and fits(packet_of(mission, snapshot_fields(mission)), mission)
         self._moving = Planner(mission) if is_ready else None
         self.uses = (
             "its buffer, the clock, a common order, its prior knowledge of the radio; and all "
@@ -84,19 +97,14 @@ class RestingPlanner(BroadcastPolicy):
             self._moving.start(num_robots, rngs)
         self._has_moved = np.zeros(len(rngs), dtype=bool)
         self._teams = [
-            RestingTeam(num_robots, self._belief, self._settings, learns=self._learns) for _ in rngs
+            _Team(num_robots, self._belief, self._settings, learns=self._learns) for _ in rngs
         ]
-        self._first = None  # each mission's slot in which the first decision was asked for
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return who transmits, by the schedule it knows or in its turn."""
-        slot = slot_of(views.now)
-        first = self._first = slot if self._first is None else self._first
-        heard = views.phases[-1].heard if views.phases else views.silence
         transmits = self._turns.transmits(views)
         for b, team in enumerate(self._teams):
-            since, begin = int(slot[b] - first[b]), int(first[b])
-            transmits[b] = team.transmits(since, begin, transmits[b], heard[b], views.buffers, b)
+            transmits[b] = team.transmits(views, b, transmits[b])
         if self._moving is not None:
             knows_motion = np.any(views.buffers.velocity_mps, axis=(2, 3))
             self._has_moved |= np.any(knows_motion, axis=1)
@@ -104,3 +112,116 @@ class RestingPlanner(BroadcastPolicy):
                 by_snapshot = self._moving.transmits_in(views, b)
                 transmits[b, knows_motion[b]] = by_snapshot[knows_motion[b]]
         return transmits
+
+
+class _Flight(NamedTuple):
+    """A plan, and what those who follow it believe of links."""
+
+    plan: Plan
+    begin: int  # the slot of the mission in which it does
+    prior: Links  # before anything was learned
+    expected_mw: Float[np.ndarray, "N N"]  # power of i at j, by what was learned [mW]
+
+
+class _Team:
+    """The robots of one mission, side by side; row i of every array is robot i's memory."""
+
+    def __init__(
+        self, num_robots: int, belief: Belief, settings: PlannerSettings, *, learns: bool
+    ) -> None:
+        self._belief, self._settings, self._learns = belief, settings, learns
+        self._everyone = np.arange(num_robots)
+        self._round = SLOTS_PER_WINDOW * max(num_robots, settings.min_round_windows)  # [slots]
+        self._first_slot: int | None = None  # in which the first decision was asked for
+        self._flights: dict[tuple[bytes, int | None], _Flight] = {}  # by positions and table
+        # In the slot before: groups of robots, their flight, and who transmitted by its plan.
+        self._followed: list[tuple[np.ndarray, _Flight, np.ndarray]] = []
+        self._transmitted = np.zeros(num_robots, dtype=bool)
+        self._joined = np.full(num_robots, NOT_YET)  # the slot since when i follows plans
+        self._evidence = Evidence(num_robots)
+        self._current: Tables | None = None
+        self._current_begin = 0  # the slot since when robots fly by these tables
+        self._next: Tables | None = None
+        self._holds = self._everyone  # the owner of the best of the current tables that i has
+        self._will_hold = self._everyone  # the same of the next ones
+
+    def transmits(
+        self, views: LocalViews, b: int, in_turn: Bool[np.ndarray, "N"]
+    ) -> Bool[np.ndarray, "N"]:
+        """Return who transmits in a slot of mission b: by its plan or, if it cannot plan, in turn.
+
+        Every slot is asked for once, in order.
+        """
+        buffers, now = views.buffers, round(float(views.now[b]) / SLOT_WINDOWS)
+        self._first_slot = now if self._first_slot is None else self._first_slot
+        slot = now - self._first_slot
+        knows_motion = np.any(buffers.velocity_mps[b], axis=(1, 2))
+        can_plan = np.all(buffers.is_known[b], axis=1) & ~knows_motion
+        if self._learns and slot > 0:
+            # [j, i]: the last slot of which j knows what i observed. A packet's news of its sender
+            # is from before the slot in which it was sent.
+            observed = np.rint(buffers.timestamp[b] * SLOTS_PER_WINDOW).astype(np.int64)
+            heard = views.phases[-1].heard[b] if views.phases else self._everyone
+            self._learn(slot, heard, observed - 2 - self._first_slot)
+            self._joined[can_plan] = np.minimum(self._joined[can_plan], slot)
+        members: dict[tuple[bytes, int | None], list[int]] = {}
+        for i in np.flatnonzero(can_plan).tolist():
+            key = buffers.position_m[b, i].tobytes(), self._owner(i)
+            members.setdefault(key, []).append(i)
+        self._followed = []
+        transmits = in_turn.copy()
+        for key, robots in members.items():
+            if key not in self._flights:
+                self._flights[key] = self._flight(buffers.position_m[b, robots[0]], key[1])
+            flight = self._flights[key]
+            planned = flight.plan.transmits(slot - flight.begin)
+            transmits[robots] = planned[robots]
+            self._followed.append((np.isin(self._everyone, robots), flight, planned))
+        self._transmitted = transmits
+        return transmits
+
+    def _learn(
+        self, slot: int, heard: Int[np.ndarray, "N"], known_until: Int[np.ndarray, "N N"]
+    ) -> None:
+        """Note what the slot before taught, adopt better tables, and fit or use them in time."""
+        # A robot that has been silent for a round may be gone, and is not waited for.
+        is_silent = known_until < slot - self._round
+        knows_all = np.all(is_silent | (self._joined[None, :] <= known_until), axis=1)
+        kinds = np.full(len(self._everyone), NOTHING)
+        for follows, flight, planned in self._followed:
+            listens = follows & ~self._transmitted & knows_all
+            noted = observe(listens, heard, planned, flight.expected_mw, flight.prior)
+            kinds = np.where(listens, noted, kinds)
+        self._evidence.add(kinds)
+        if self._current is not None:
+            self._holds = better(self._current.rank, self._holds, heard)
+        if self._next is not None:
+            self._will_hold = better(self._next.rank, self._will_hold, heard)
+        if self._are_flown(slot + round(self._settings.spread_rounds * self._round)):
+            self._next = Tables(self._evidence, known_until, self._settings)
+            self._will_hold = self._everyone
+        if self._are_flown(slot) and self._next is not None:
+            self._current, self._holds = self._next, self._will_hold
+            self._current_begin = slot
+            self._flights = {key: of for key, of in self._flights.items() if key[1] is None}
+
+    def _are_flown(self, slot: int) -> bool:
+        """Return whether all robots begin to use the tables made last."""
+        first = round(self._settings.first_table_rounds * self._round)
+        return slot in range(first, slot + 1, round(self._settings.flown_rounds * self._round))
+
+    def _owner(self, i: int) -> int | None:
+        """Return the owner of the table that i flies by; None if it changes nothing."""
+        if self._current is None:
+            return None
+        owner = int(self._holds[i])
+        return None if self._current.table(owner).changes_nothing else owner
+
+    def _flight(self, position_m: Float[np.ndarray, "N 2"], owner: int | None) -> _Flight:
+        prior = self._belief.links(position_m)
+        if owner is None or self._current is None:
+            return _Flight(Plan(prior, self._settings), 0, prior, prior.received_mw)
+        table = self._current.table(owner)
+        plan = Plan(corrected(prior, table, self._settings), self._settings)
+        expected_mw = prior.received_mw * 10.0 ** (table.mean_db / 10.0)
+        return _Flight(plan, self._current_begin, prior, expected_mw)

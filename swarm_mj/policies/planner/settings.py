@@ -9,42 +9,31 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)
-class EpochSettings:
-    """How long the epochs are; every snapshot serves one of them."""
+class PlannerSettings:
+    """Everything about the planner that was tuned."""
 
-    first_rounds: float = 1.0  # before the first snapshots are taken [rounds]
-    early_rounds: float = 0.25  # each of the two epochs after it [rounds]
-    regular_rounds: float = 0.5  # all others; a snapshot must reach the whole team [rounds]
-    min_regular_windows: int = 10  # shortest regular epoch [windows]
-    min_early_windows: int = 2  # shortest of the others [windows]
+    # Epochs: every snapshot serves one of them.
+    first_epoch_rounds: float = 1.0  # before the first snapshots are taken [rounds]
+    early_epoch_rounds: float = 0.25  # each of the two epochs after it [rounds]
+    epoch_rounds: float = 0.5  # all others; a snapshot must reach the whole team [rounds]
+    min_early_epoch_windows: int = 2  # shortest of the first three [windows]
+    min_epoch_windows: int = 10  # shortest of the others [windows]
     forget_every: int = 5  # of these epochs, teams at rest plan one from nothing, to agree again
 
-
-@dataclass(frozen=True, kw_only=True)
-class DiscoverySettings:
-    """Who transmits while robots have yet to hear of each other."""
-
+    # The discovery: who transmits while robots have yet to hear of each other.
     transmitters_per_reach: float = 0.4  # at once, per area that a lone packet covers [1]
     max_transmitters: int = 8  # at once
     num_fast_rounds: int = 1  # in which that many transmit at once
     later_share: float = 0.5  # of these transmit at once from then on [1]
     polite_ranges: float = 1.5  # a transmitter nearer than that comes first [ranges]
-    num_rounds: int = 40  # after which the orders repeat
+    num_orders: int = 40  # rounds after which the orders repeat
 
+    # The search for robots that were not heard from for long.
+    search_rounds: float = 5.0  # when the discovery ends and the search begins [rounds]
+    latest_search_windows: int = 200  # when it begins at the latest [windows]
+    search_every_windows: int = 5  # how often, while robots are missing [windows]
 
-@dataclass(frozen=True, kw_only=True)
-class SearchSettings:
-    """When robots that were not heard from for long are looked for."""
-
-    start_rounds: float = 5.0  # when the discovery ends and the search begins [rounds]
-    latest_start_windows: int = 200  # when it begins at the latest [windows]
-    every_windows: int = 5  # how often, while robots are missing [windows]
-
-
-@dataclass(frozen=True, kw_only=True)
-class SnapshotSettings:
-    """Which robots count as fresh, and how far beliefs err."""
-
+    # Snapshots: which robots count as fresh, and how far beliefs err.
     fresh_rounds: float = 1.0  # a robot not heard from for longer is missing [rounds]
     min_fresh_windows: float = 20.0  # but never earlier [windows]
     steady_windows: float = 15.0  # for which a robot is expected to keep its velocity [windows]
@@ -52,33 +41,16 @@ class SnapshotSettings:
     # At rest, a team of which fewer are fresh is not scattered but flies by plans that differ.
     min_fresh_share: float = 0.75
 
-
-@dataclass(frozen=True, kw_only=True)
-class ScheduleSettings:
-    """How plans are computed from a snapshot.
-
-    Looking ahead takes a time that grows with N³, so large teams do not. Where nobody moves, plans
-    come true as they are, and looking further ahead pays.
-    """
-
-    rest_width: int = 6  # first transmitters that are tried where nobody moves
-    rest_depth: int = 6  # for which each of these is followed [slots]
-    moving_width: int = 4  # the same where robots move
-    moving_depth: int = 4
+    # Plans: looking ahead takes a time that grows with N³, so large teams do not. Where nobody
+    # moves, plans come true as they are, and looking further ahead pays.
+    rest_lookahead: tuple[int, int] = (6, 6)  # width and depth, as in `Lookahead`
+    moving_lookahead: tuple[int, int] = (4, 4)
     max_lookahead_robots: int = 50  # largest team that looks ahead
     gone_rounds: float = 3.0  # a robot not heard from for longer is planned without [rounds]
-    min_round_windows: int = 20  # in which that round is counted for small teams [windows]
-    chunk_slots: int = 10  # planned at a time; any number gives the same plan
+    min_round_windows: int = 20  # in which this round, and those of tables, count [windows]
 
-
-@dataclass(frozen=True, kw_only=True)
-class WeightSettings:
-    """The heuristic weights of news, by receiver and subject.
-
-    Chosen on 8 missions at rest, of 10 and 40 robots at range ratios from 0.2 to 1, and on 20
-    walking ones.
-    """
-
+    # The heuristic weights of news, by receiver and subject, chosen on 8 missions at rest, of 10
+    # and 40 robots at range ratios from 0.2 to 1, and on 20 walking ones.
     downstream_exponent: float = 0.6  # of the number of robots that a receiver passes news on to
     hops_exponent: float = -0.3  # of the number of hops that the news has come
     # The least share of a slot's value that must remain when another robot transmits is the first
@@ -91,33 +63,12 @@ class WeightSettings:
     min_probability: float = 0.05  # links that decode more rarely count as none [1]
     slack_hops: float = 0.25  # by which a path may exceed the shortest, and still is one [hops]
 
-
-@dataclass(frozen=True, kw_only=True)
-class LearningSettings:
-    """How a team at rest learns its links, and when it changes its plan.
-
-    Chosen on four missions of 240 to 300 windows, with seeds from 70000, under shadowing of 6 dB
-    and in the arena `blocks`.
-    """
-
+    # Tables of links in teams at rest, chosen on four missions of 240 to 300 windows, with seeds
+    # from 70000, under shadowing of 6 dB and in the arena `blocks`.
     spread_rounds: float = 0.75  # that a table is given to reach everyone before it is flown by
     flown_rounds: float = 1.5  # for which it is flown by at least, before the next is [rounds]
-    first_rounds: float = 3.0  # when the first is flown by [rounds]
+    first_table_rounds: float = 3.0  # when the first is flown by [rounds]
     min_log_odds: float = 5.0  # of a hypothesis, over the channel that was believed
     cautious_stds: float = 0.5  # by which a packet is expected to be weaker than in the mean
     disturbing_stds: float = 1.0  # by which it is expected to disturb others more
     max_std_db: float = 2.0  # so doubtful schedulers take a link to be at most: errors last [dB]
-    min_round_windows: int = 20  # in which that round is counted for small teams [windows]
-
-
-@dataclass(frozen=True, kw_only=True)
-class PlannerSettings:
-    """Everything about the planner that was tuned."""
-
-    epochs: EpochSettings = EpochSettings()
-    discovery: DiscoverySettings = DiscoverySettings()
-    search: SearchSettings = SearchSettings()
-    snapshots: SnapshotSettings = SnapshotSettings()
-    schedule: ScheduleSettings = ScheduleSettings()
-    weights: WeightSettings = WeightSettings()
-    learning: LearningSettings = LearningSettings()

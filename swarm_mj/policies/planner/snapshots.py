@@ -1,6 +1,8 @@
-"""Snapshots of the team: what the planner's robots agree on.
+"""Snapshots of the team: what the planner's robots agree on, and the fields that carry it.
 
 Index order: row `i` of every array is robot i's snapshot, column `k` what it says about robot k.
+Packets hold N² ages, those that the last plan leads to, so they grow with the square of the team:
+7.3 kB for 40 robots, 27 kB for 80, and 164 kB for 200.
 """
 
 from dataclasses import dataclass
@@ -8,8 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.policies.planner.settings import SnapshotSettings
+from swarm_mj.mission import Mission
+from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.protocol.buffers import Buffers
+from swarm_mj.protocol.packets import POSITION_BITS, PacketField, age, identity, position, times
+
+NUM_SENT = 2  # snapshots or tables in a packet: the current one, and the best of the next
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,10 +32,6 @@ class Snapshots:
     timestamp: Float[np.ndarray, "N N"]  # when k observed itself so [windows]
     rank: Int[np.ndarray, "N"]  # the best snapshot has rank 0
 
-    def is_complete(self, owner: int) -> bool:
-        """Return whether a robot's snapshot has all robots."""
-        return bool(np.all(self.is_known[owner]))
-
 
 def take_snapshots(
     buffers: Buffers,
@@ -37,7 +39,7 @@ def take_snapshots(
     now: float,
     window_s: float,
     windows_ahead: float,
-    settings: SnapshotSettings,
+    settings: PlannerSettings,
 ) -> Snapshots:
     """Return every robot's snapshot in mission b, row i from its own buffer alone.
 
@@ -79,3 +81,21 @@ def better(
     """
     theirs = owner[heard]
     return np.where(rank[theirs] < rank[owner], theirs, owner)
+
+
+def snapshot_fields(mission: Mission) -> tuple[PacketField, ...]:
+    """Return the fields of two snapshots, as precise as T and M."""
+    num_robots = mission.num_robots
+    ages = {"count": num_robots**2, "step": 1 / 16, "unit": "windows"}
+    speeds = {"step": 2.0 * mission.max_velocity_mps / 2**16, "unit": "m/s"}
+    snapshot = (
+        identity("owner of the snapshot", mission),
+        PacketField(name="robots known to the owner", bits=1, count=num_robots),
+        # The errors of positions follow from their ages and this number.
+        PacketField(name="spread of velocities", bits=16, **speeds),
+        # 16 bits reach up to 4,096 windows.
+        PacketField(name="expected age, of all pairs", bits=16, **ages),
+        times(age("age in the snapshot"), num_robots),
+        times(position("position in the snapshot", mission, POSITION_BITS), num_robots),
+    )
+    return tuple(times(field, NUM_SENT) for field in snapshot)

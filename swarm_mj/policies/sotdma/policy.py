@@ -16,23 +16,26 @@ hear it in. One slot in sixteen is left to robots that have lost a neighbour.
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.policy import BroadcastPolicy
-from swarm_mj.policies.sotdma.team import SotdmaSettings, SotdmaTeam
+from swarm_mj.policies.sotdma import slot_table
+from swarm_mj.policies.sotdma.frame import Rule, chosen, first_slots, frame_slots
+from swarm_mj.policies.sotdma.slot_table import NO_PLACE, SlotTable, place_of
 from swarm_mj.policies.tdma import SpatialTdma, draw_order, slot_of
+from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import Belief
+from swarm_mj.radio.power_law import powers_between, write_powers
 
 
 class SelfOrganisedTdma(BroadcastPolicy):
     """TDMA whose slots robots choose themselves, announced implicitly by transmitting.
 
-    Uses the robot's own buffer, T and P in packets that it decoded, its identity, the team's
-    size, the order, the clock and the radio's range and threshold. Of what the mission grants of
-    the channel it uses the mean powers.
+    Of what the mission grants of the channel it uses the mean powers.
     """
 
     uses = (
@@ -42,11 +45,7 @@ class SelfOrganisedTdma(BroadcastPolicy):
     )
 
     def __init__(
-        self,
-        radio: FreeSpaceRadio,
-        turns: SpatialTdma,
-        *,
-        reads_packets: bool = True,
+        self, radio: FreeSpaceRadio, turns: SpatialTdma, *, reads_packets: bool = True
     ) -> None:
         """Prepare the policy, whose robots follow turns at first.
 
@@ -64,7 +63,7 @@ class SelfOrganisedTdma(BroadcastPolicy):
         """Draw every mission's order; arguments as in `Policy.start`."""
         self._turns.start(num_robots, rngs)
         orders = draw_order(num_robots, rngs)
-        self._teams = [SotdmaTeam(order, self._belief, SotdmaSettings()) for order in orders]
+        self._teams = [SotdmaTeam(order, self._belief) for order in orders]
         self._uniform = Stream(rngs, uniform, (num_robots,))
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
@@ -76,7 +75,119 @@ class SelfOrganisedTdma(BroadcastPolicy):
         draw = self._uniform.next()
         for b, team in enumerate(self._teams):
             read = heard[b] if self._reads_packets else views.silence[b]
-            transmits[b] = team.transmits(
-                int(slot[b]), transmits[b], views.buffers, b, read, draw[b]
-            )
+            in_turn, now = transmits[b], int(slot[b])
+            transmits[b] = team.transmits(now, in_turn, views.buffers, b, read, draw[b])
         return transmits
+
+
+class SotdmaTeam:
+    """Robots that choose their slots, each by its own beliefs."""
+
+    def __init__(self, order: Int[np.ndarray, "N"], belief: Belief) -> None:
+        """Prepare the team, whose robots choose in this order."""
+        self._order = order
+        self._law = belief.law_over_noise(len(order))
+        self._rule = Rule(belief.radio.threshold, frame_slots(len(order)))
+        self._first_slot: int | None = None  # of the first frame, known from the first decision on
+        self._table: SlotTable | None = None  # there is none before the first frame
+
+    @property
+    def takes_turns(self) -> bool:
+        """True before the first frame."""
+        return self._table is None
+
+    def transmits(
+        self,
+        slot: int,
+        in_turn: Bool[np.ndarray, "N"],
+        buffers: Buffers,
+        b: int,
+        heard: Int[np.ndarray, "N"],
+        draw: Float[np.ndarray, "N"],
+    ) -> Bool[np.ndarray, "N"]:
+        """Return who transmits in the slot that begins in mission b; ask slot by slot.
+
+        Before the first frame these are the robots in turn. `heard` is the sender that each robot
+        decoded in the last slot, itself: none; `draw` is on [0, 1), for contention.
+        """
+        rule = self._rule
+        if self._first_slot is None:
+            self._first_slot = slot + rule.first_rounds * len(self._order)
+        slot -= self._first_slot
+        if slot < 0:
+            return in_turn
+        is_known = buffers.is_known[b] | np.eye(len(self._order), dtype=bool)
+        if self._table is None:
+            slots = self._first_slots(buffers.position_m[b], is_known)
+            self._table = slot_table.empty_table(slots, rule.num_slots)
+        # A robot observes itself as it transmits, so T says in which slot it last did.
+        ends = np.rint(SLOTS_PER_WINDOW * buffers.timestamp[b]).astype(np.int64)
+        table, known = self._table, ends - 1 - self._first_slot
+        slot_table.read_packets(table, heard, known, buffers.parent[b], slot - 1)
+        slot_table.read_slots(table, known, rule)
+        for i in self._choosers(slot):
+            table.slots[i, i] = self._choice(i, slot, table, is_known[i], buffers.position_m[b, i])
+        place = place_of(slot, rule)
+        if place == NO_PLACE:
+            is_near = is_known & self._is_in_range(buffers.position_m[b])
+            needs = slot_table.are_in_need(table, known, is_near, slot, rule)
+            transmits = needs & (draw < rule.contention_probability)
+        else:
+            transmits = np.diagonal(table.slots) == place
+        table.sent[transmits], table.sent_place[transmits] = slot, place
+        return transmits
+
+    def _choice(
+        self,
+        i: int,
+        slot: int,
+        table: SlotTable,
+        is_known: Bool[np.ndarray, "N"],
+        position_m: Float[np.ndarray, "N 2"],
+    ) -> int:
+        """Return the slot of the frame that robot i chooses, by what it knows."""
+        is_marked = slot_table.marks(table, i, slot, self._rule)
+        lately, power = self._chose_lately(slot), self._powers(position_m, is_known)
+        believed = table.slots[i], table.announced[i], is_known
+        return chosen(i, *believed, is_marked, lately, power, self._rule)
+
+    def _first_slots(
+        self, position_m: Float[np.ndarray, "N N 2"], is_known: Bool[np.ndarray, "N N"]
+    ) -> Int[np.ndarray, "N N"]:
+        """Return everyone's first slots as each robot works them out."""
+        slots = np.empty(is_known.shape, dtype=np.int64)
+        done = {}  # robots that believe the same need it once
+        for i in range(len(slots)):
+            believed = position_m[i].tobytes(), is_known[i].tobytes()
+            if believed not in done:
+                power = self._powers(position_m[i], is_known[i])
+                done[believed] = first_slots(self._order, is_known[i], power, self._rule)
+            slots[i] = done[believed]
+        return slots
+
+    def _choosers(self, slot: int) -> list[int]:
+        """Return who chooses anew in this slot: everyone once in some frames, in common order."""
+        if slot < self._rule.num_slots:  # nobody has heard how the first slots do
+            return []
+        period = self._rule.frames_per_choice * self._rule.num_slots
+        ends = [-(-(slot % period + n) * len(self._order) // period) for n in (0, 1)]
+        return self._order[slice(*ends)].tolist()
+
+    def _chose_lately(self, slot: int) -> Int[np.ndarray, "predicted 2"]:
+        """Return who chose in which slot, the earliest first."""
+        lately = range(slot - self._rule.predicted_slots, slot)
+        pairs = [(k, before) for before in lately for k in self._choosers(before)]
+        return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+    def _is_in_range(self, position_m: Float[np.ndarray, "N N 2"]) -> Bool[np.ndarray, "N N"]:
+        """Return who decodes each robot's lone packets, as it believes."""
+        power = np.empty(position_m.shape[:2])
+        for i in range(len(power)):
+            write_powers(i, position_m[i], self._law, power[i])
+        return power >= self._rule.threshold
+
+    def _powers(
+        self, position_m: Float[np.ndarray, "N 2"], is_known: Bool[np.ndarray, "N"]
+    ) -> Float[np.ndarray, "N N"]:
+        """Return powers between robots that one robot knows, as it believes [noise]."""
+        return powers_between(position_m, self._law) * is_known[:, None] * is_known[None, :]

@@ -3,7 +3,7 @@
 A robot's T of a teammate says when that teammate last transmitted, and so which slot of the frame
 it owns. A packet also says what its sender knows of the robot that decodes it: if T is as young as
 that robot's last packet and P is the sender, then the sender decoded that packet itself. Index
-order: row `[i]` is robot i's own memory; slots count from the start of the mission.
+order: row `[i]` is robot i's own memory; slots count from the start of the first frame.
 """
 
 import math
@@ -12,21 +12,13 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int, Int8, Int32
 
-from swarm_mj.protocol.window import SLOTS_PER_WINDOW
+from swarm_mj.policies.sotdma.frame import Rule
 from swarm_mj.system.compiled import compiled
 
 LONG_AGO = -1_000_000  # before all slots; differences of 32 bits remain exact
 NO_PLACE = -1  # the place of a slot that is left to robots in need
 MAX_MISSED = 100  # that are counted, in 8 bits
 RECENT_WEIGHT = 0.1  # of the last packet in the share that were decoded
-
-
-class Frames(NamedTuple):
-    """How the mission's slots are divided into frames."""
-
-    first_slot: int
-    num_slots: int  # of a frame
-    contention_every: int  # the last of this many slots is no part of them
 
 
 class SlotTable(NamedTuple):
@@ -44,16 +36,7 @@ class SlotTable(NamedTuple):
     missed_at: Int32[np.ndarray, "N F"]  # when it last learned so
 
 
-@compiled()
-def place_of(slot: int, frames: Frames) -> int:
-    """Return where in its frame a slot lies, or `NO_PLACE`."""
-    since = slot - frames.first_slot
-    if since % frames.contention_every == frames.contention_every - 1:
-        return NO_PLACE
-    return (since - since // frames.contention_every) % frames.num_slots
-
-
-def slot_table(slots: Int[np.ndarray, "N N"], num_slots: int) -> SlotTable:
+def empty_table(slots: Int[np.ndarray, "N N"], num_slots: int) -> SlotTable:
     """Return the memory of robots that believe in these slots and remember nothing else."""
     num_robots, pairs = len(slots), slots.shape
     return SlotTable(
@@ -71,34 +54,34 @@ def slot_table(slots: Int[np.ndarray, "N N"], num_slots: int) -> SlotTable:
 
 
 @compiled()
-def _slot_of(timestamp: float) -> int:
-    """Return the slot in which a robot transmitted that was observed at that time [windows]."""
-    return round(SLOTS_PER_WINDOW * timestamp) - 1
+def place_of(slot: int, rule: Rule) -> int:
+    """Return where in its frame a slot lies, or `NO_PLACE`."""
+    if slot % rule.contention_every == rule.contention_every - 1:
+        return NO_PLACE
+    return (slot - slot // rule.contention_every) % rule.num_slots
 
 
 @compiled()
-def read_slots(table: SlotTable, timestamp: Float[np.ndarray, "N N"], frames: Frames) -> None:
-    """Adopt the slots that teammates announced by transmitting in them."""
-    num_robots = timestamp.shape[0]
+def read_slots(table: SlotTable, known: Int[np.ndarray, "N N"], rule: Rule) -> None:
+    """Adopt the slots that teammates announced by transmitting in them, the last as i knows."""
+    num_robots = known.shape[0]
     for i in range(num_robots):
         for k in range(num_robots):
-            slot = _slot_of(timestamp[i, k])
-            if k != i and slot >= frames.first_slot and slot > table.announced[i, k]:
-                place = place_of(slot, frames)
+            if k != i and known[i, k] >= 0 and known[i, k] > table.announced[i, k]:
+                place = place_of(known[i, k], rule)
                 if place != NO_PLACE:
-                    table.announced[i, k], table.slots[i, k] = slot, place
+                    table.announced[i, k], table.slots[i, k] = known[i, k], place
 
 
 @compiled()
 def read_packets(
     table: SlotTable,
     heard: Int[np.ndarray, "N"],
-    timestamp: Float[np.ndarray, "N N"],
+    known: Int[np.ndarray, "N N"],
     parent: Int[np.ndarray, "N N"],
     slot: int,
-    frames: Frames,
 ) -> None:
-    """Note what the packets decoded in the last slot say of the receiver's own.
+    """Note what the packets decoded in this slot, the last, say of the receiver's own.
 
     T and P of a sender are still those in its packet: a robot that sends decodes nothing.
     """
@@ -106,16 +89,15 @@ def read_packets(
         j = heard[i]
         if j == i:
             continue
-        known = _slot_of(timestamp[j, i])
-        table.decoded[i, j], table.got_through[i, j] = slot, known
+        table.decoded[i, j], table.got_through[i, j] = slot, known[j, i]
         sent, place = table.sent[i], table.sent_place[i]
         # A packet counts once per neighbour, however often that one repeats what it knows.
-        is_due = frames.first_slot <= sent < slot and table.judged[i, j] < sent
+        is_due = 0 <= sent < slot and table.judged[i, j] < sent
         if place == NO_PLACE or not is_due:
             continue
         table.judged[i, j] = sent
         # T alone may have come through others; P says that j decoded the packet itself.
-        got_through = known >= sent and parent[j, i] == j
+        got_through = known[j, i] >= sent and parent[j, i] == j
         news = (1.0 if got_through else 0.0) - table.outbound_delivery_ratio[i]
         table.outbound_delivery_ratio[i] += RECENT_WEIGHT * news
         if got_through:
@@ -125,35 +107,31 @@ def read_packets(
             table.missed_at[i, place] = slot
 
 
-def marks(table: SlotTable, i: int, min_probability: float, since: int) -> Bool[np.ndarray, "F N"]:
-    """Return who does not decode robot i in which slot, by what was learned since a slot.
+def marks(table: SlotTable, i: int, slot: int, rule: Rule) -> Bool[np.ndarray, "F N"]:
+    """Return who does not decode robot i in which slot of the frame, by what it learned lately.
 
-    Misses in a row that are less probable than the given probability are no chance.
+    Misses in a row that are less probable than the least probability are no chance.
     """
     loss = max(1.0 - table.outbound_delivery_ratio[i], 1e-3)
-    enough = max(1, math.ceil(math.log(min_probability) / math.log(min(loss, 0.9))))
-    return (table.missed[i] >= enough) & (table.missed_at[i] >= since)[:, None]
+    enough = math.ceil(math.log(rule.min_miss_probability) / math.log(min(loss, 0.9)))
+    is_recent = table.missed_at[i] >= slot - rule.marked_slots
+    return (table.missed[i] >= max(1, enough)) & is_recent[:, None]
 
 
-@compiled()
-def is_in_need(
+def are_in_need(
     table: SlotTable,
-    i: int,
-    timestamp: Float[np.ndarray, "N"],
-    is_near: Bool[np.ndarray, "N"],
+    known: Int[np.ndarray, "N N"],
+    is_near: Bool[np.ndarray, "N N"],
     slot: int,
-    patience: float,
-    resignation: float,
-) -> bool:
-    """Return whether i lost a neighbour, or hears one that has lost i, by its own T [windows].
+    rule: Rule,
+) -> Bool[np.ndarray, "N"]:
+    """Return who lost a neighbour, or hears one that has lost it, by what it knows of the others.
 
-    After the patience a neighbour is lost, after the resignation it counts as gone [slots].
+    A neighbour that is silent for too long is gone.
     """
-    for j in range(timestamp.shape[0]):
-        if is_near[j] and j != i:
-            if patience < slot - _slot_of(timestamp[j]) <= resignation:
-                return True
-            decoded = table.decoded[i, j]
-            if decoded > slot - patience and decoded - table.got_through[i, j] > patience:
-                return True
-    return False
+    patience, resignation = rule.num_slots * np.array([rule.need_frames, rule.lost_frames])
+    silent = slot - known
+    is_lost = (patience < silent) & (silent <= resignation)
+    is_lost_to = table.decoded - table.got_through > patience
+    is_lost_to &= table.decoded > slot - patience
+    return np.any(is_near & (is_lost | is_lost_to), axis=1)

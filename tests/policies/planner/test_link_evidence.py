@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from swarm_mj.policies.planner.link_evidence import (
+    BIN_CENTRES_DB,
     LEAST_MARGIN_DB,
     MAX_KINDS,
     MAX_TIMES,
     NOTHING,
     NUM_BINS,
     Evidence,
-    bin_centres_db,
-    kind_of,
     observe,
 )
 from swarm_mj.radio.decode_curves import KNOWN
@@ -33,23 +32,18 @@ def powers(**of_link):
 
 def observed(heard, transmitted, believed_mw, *, prior_mw=None, listens=None):
     """Whom each robot notes, in which bin, and whether as decoded; None if nothing."""
-    noted, transmitted = np.full(4, NOTHING), np.array(transmitted, dtype=bool)
+    transmitted = np.array(transmitted, dtype=bool)
     prior_mw = believed_mw if prior_mw is None else prior_mw
     certain, row = np.full((4, 4), np.inf), np.zeros((4, 4), dtype=np.int64)
     prior = Links(prior_mw, certain, NOISE_MW, THRESHOLD, KNOWN, row, prior_mw)
     listens = ~transmitted if listens is None else listens
-    observe(listens, np.array(heard), transmitted, believed_mw, prior, noted)
+    noted = observe(listens, np.array(heard), transmitted, believed_mw, prior)
     kinds = [None if kind == NOTHING else np.unravel_index(kind, KINDS) for kind in noted]
     return [kind and (kind[1], kind[2], bool(kind[0])) for kind in kinds]
 
 
 def test_bins_are_two_db_wide_around_their_centres():
-    centres_db = bin_centres_db()
-    assert centres_db[0] == -15.0
-    assert centres_db[7] == -1.0
-    assert centres_db[8] == 1.0
-    assert len(centres_db) == NUM_BINS
-    assert centres_db[-1] == 31.0
+    assert BIN_CENTRES_DB[[0, 7, 8, -1]].tolist() == [-15.0, -1.0, 1.0, 31.0]
 
 
 def test_a_margin_is_the_sinr_over_the_threshold_by_hand():
@@ -109,6 +103,10 @@ def test_the_plan_s_own_belief_that_the_listener_transmits_does_not_count():
     power_mw = powers(p01=100.0)
     listens = np.array([False, True, False, False])
     assert observed([0, 1, 2, 3], [1, 1, 0, 0], power_mw, listens=listens)[1] == (0, 13, False)
+
+
+def kind_of(is_decoded, i, margin, num_robots):
+    return np.ravel_multi_index((int(is_decoded), i, margin), (2, num_robots, NUM_BINS))
 
 
 def of_one(i, margin, is_decoded, num_robots=2):

@@ -1,11 +1,13 @@
+import re
+
 import numpy as np
 import pytest
 from channels import to_nobody, unreliable
 from decentralised_reference import SETTINGS, Flight, Witnessed, common_orders, transmitters
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies.planner.policy import Planner, epoch_start, regular_length
-from swarm_mj.policies.planner.settings import EpochSettings, PlannerSettings, ScheduleSettings
+from swarm_mj.policies.planner.policy import Planner, epoch_windows
+from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.rollout import rollout
@@ -15,20 +17,13 @@ TASKS = ["stationary", "random-walk", "flocking"]
 
 
 # Plans that look no further than the slot in question: seconds less of large teams.
-NEAR_SIGHTED = PlannerSettings(schedule=ScheduleSettings(max_lookahead_robots=0))
-SEEK_EVERY = SETTINGS.search.every_windows
-
-
-def starts(num_robots, epochs, num_epochs=4):
-    return tuple(epoch_start(epoch, num_robots, epochs) for epoch in range(num_epochs))
-
-
-def first_epochs(num_robots):
-    return starts(num_robots, SETTINGS.epochs)
+NEAR_SIGHTED = PlannerSettings(max_lookahead_robots=0)
+SEEK_EVERY = SETTINGS.search_every_windows
 
 
 def length_of(num_robots):
-    return regular_length(num_robots, SETTINGS.epochs)
+    """Of a regular epoch."""
+    return epoch_windows(3, num_robots, SETTINGS)
 
 
 def cut_off(mission, robots, windows, *, is_mute=True, is_deaf=True):
@@ -48,10 +43,9 @@ def cut_off(mission, robots, windows, *, is_mute=True, is_deaf=True):
     return channel
 
 
-def windows_before(epoch, num_robots):
-    """When an epoch begins, of those that are of regular length from the third on [windows]."""
-    starts = first_epochs(num_robots)
-    return starts[3] + (epoch - 3) * length_of(num_robots)
+def windows_before(epoch, num_robots, settings=SETTINGS):
+    """When an epoch begins [windows]."""
+    return sum(epoch_windows(earlier, num_robots, settings) for earlier in range(epoch))
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -84,7 +78,7 @@ def test_a_team_that_knows_how_all_start_plans_from_the_first_slot():
     transmitted = flight.fly(1)
     assert np.sum(transmitted[0]) >= 1
     ((owner, plan),) = flight.team._plans.items()
-    assert flight.team._current.is_complete(owner)
+    assert np.all(flight.team._current.is_known[owner])
     np.testing.assert_array_equal(transmitted, [plan.transmits(slot) for slot in (0, 1)])
 
 
@@ -115,30 +109,41 @@ def test_eq9_sharing_is_planning_apart_where_snapshots_differ(mission, seed, cha
 
 
 def test_ii_b_packets_carry_snapshots_and_nobody_answers():
-    policy = make_policy("planner", MOVING)
+    assert make_policy("planner", MOVING).window(MOVING).is_broadcast
+
+
+def test_snapshots_that_do_not_fit_to_the_byte_are_refused_with_the_ways_out():
+    """`tests/protocol/test_packets.py` counts the 7,263 bytes by hand."""
+    mission = paper("random-walk", bit_rate=7263 * 160.0)  # slots of 50 ms
+    policy = make_policy("planner", mission)
     assert policy.payload == "snapshots"
-    assert policy.window(MOVING).is_broadcast
+    assert policy.packet(mission).num_bytes == 7263
+    message = (
+        "packets of planner need 7,263 bytes, but a slot holds 7,262 bytes at 1.162 Mbit/s; "
+        "choose a bit rate of 1.16208e+06 or more, or planner --payload none"
+    )
+    with pytest.raises(ValueError, match=re.escape(message)):
+        make_policy("planner", paper("random-walk", bit_rate=7262 * 160.0))
 
 
 def test_epochs_by_hand():
     """Of 40 robots: a round of 40 windows, two quarters, then halves; but at least 2 and 10."""
-    epochs = EpochSettings(
-        first_rounds=1.0,
-        early_rounds=0.25,
-        regular_rounds=0.5,
-        min_regular_windows=10,
-        min_early_windows=2,
+    numbers = PlannerSettings(
+        first_epoch_rounds=1.0,
+        early_epoch_rounds=0.25,
+        epoch_rounds=0.5,
+        min_epoch_windows=10,
+        min_early_epoch_windows=2,
     )
-    assert starts(40, epochs, 6) == (0, 40, 50, 60, 80, 100)
-    assert starts(12, epochs) == (0, 12, 15, 18)
-    assert starts(2, epochs) == (0, 2, 4, 6)
-    assert [regular_length(n, epochs) for n in (2, 20, 21, 40, 81)] == [10, 10, 10, 20, 40]
+    for num_robots, starts in ((40, [0, 40, 50, 60, 80]), (12, [0, 12, 15, 18]), (2, [0, 2, 4, 6])):
+        assert [windows_before(n, num_robots, numbers) for n in range(len(starts))] == starts
+    assert [epoch_windows(3, n, numbers) for n in (2, 20, 21, 40, 81)] == [10, 10, 10, 20, 40]
 
 
 def test_nobody_plans_before_the_snapshots_of_the_discovery_have_spread():
     """Its snapshots are frozen as it ends, travel for an epoch, and are flown by after it."""
     flight = Flight(paper("stationary", num_robots=10), 4)
-    _, first_snapshots, first_plans, _ = first_epochs(10)
+    first_snapshots, first_plans = windows_before(1, 10), windows_before(2, 10)
     for window in range(first_plans + 3):
         flight.fly(1)
         assert (flight.team._upcoming is not None) == (window >= first_snapshots)
@@ -158,7 +163,7 @@ def assert_flies_as_planned(flight, num_epochs):
         transmitted = flight.fly(length)
         owner = held_by_all(flight)
         held = flight.team._plans[owner]
-        assert flight.team._current.is_complete(owner)
+        assert np.all(flight.team._current.is_known[owner])
         np.testing.assert_array_equal(transmitted, [held.transmits(h) for h in range(2 * length)])
         np.testing.assert_array_equal(flight.swarm.buffers.timestamp[0], held.outcome())
 
@@ -180,7 +185,7 @@ def test_a_robot_unheard_in_the_discovery_is_found_later(robot):
     others = np.delete(np.arange(8), robot)
     flight.fly(35)
     assert not np.any(flight.swarm.buffers.is_known[0, others, robot])
-    assert not any(map(flight.team._current.is_complete, flight.team._plans))
+    assert not np.any(np.all(flight.team._current.is_known[list(flight.team._plans)], axis=1))
     flight.fly(windows_before(13, 8) - 35)
     assert np.all(flight.swarm.buffers.is_known)
     assert_flies_as_planned(flight, 2)
@@ -206,7 +211,7 @@ def test_who_misses_the_best_snapshot_flies_by_the_best_it_has():
     """A robot that is deaf since the discovery plans by its own snapshot, which is another one than
     its teammates', and transmits when that says so."""
     mission = paper("random-walk", num_robots=8)
-    deaf, since = 6, first_epochs(8)[1]
+    deaf, since = 6, windows_before(1, 8)
     channel = cut_off(mission, deaf, range(since, 200), is_mute=False)
     flight = Witnessed(mission, 2, channel=channel)
     flight.fly(windows_before(3, 8))
@@ -225,7 +230,7 @@ def test_robots_that_never_met_do_not_fall_silent(num_robots):
     flight = Flight(mission, 7, channel=to_nobody)
     order, rounds = common_orders(7, mission)
     turns = [group for groups in rounds for group in groups]
-    late = int(SETTINGS.search.start_rounds * num_robots)
+    late = int(SETTINGS.search_rounds * num_robots)
     for h, transmitted in enumerate(flight.fly(late)):
         assert np.flatnonzero(transmitted).tolist() == sorted(turns[h % len(turns)])
     for window in range(late, late + 2 * num_robots * SEEK_EVERY):

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_mj.policies.planner.settings import SnapshotSettings
-from swarm_mj.policies.planner.snapshots import Snapshots, better, take_snapshots
+from swarm_mj.mission import paper
+from swarm_mj.policies.planner.settings import PlannerSettings
+from swarm_mj.policies.planner.snapshots import Snapshots, better, snapshot_fields, take_snapshots
 from swarm_mj.protocol.buffers import empty_buffers
 
 seeds = st.integers(0, 2**32 - 1)
@@ -17,7 +18,7 @@ NOW = 20.0
 
 def believing(fresh_windows):
     """What the arithmetic here is about, whatever suits the planner best."""
-    return SnapshotSettings(
+    return PlannerSettings(
         fresh_rounds=0.0,
         min_fresh_windows=fresh_windows,
         steady_windows=15.0,
@@ -196,3 +197,11 @@ def test_robots_adopt_the_better_of_what_they_have_and_decode():
     rank, owner = np.array([1, 2, 0, 3]), np.array([0, 1, 3, 2])
     assert better(rank, owner, np.array([3, 0, 2, 1])).tolist() == [2, 0, 3, 2]
     assert better(rank, owner, np.arange(4)).tolist() == owner.tolist()
+
+
+def test_packets_hold_two_snapshots_by_hand():
+    """Of 40 robots: an owner, who is known to it, the spread of velocities, ages of all pairs, and
+    ages and positions of all; `tests/protocol/test_packets.py` counts the bytes of a packet."""
+    snapshot = 8 + 40 + 16 + 1600 * 16 + 40 * 16 + 40 * 2 * 16
+    fields = snapshot_fields(paper("random-walk"))
+    assert sum(field.num_bits for field in fields) == 2 * snapshot

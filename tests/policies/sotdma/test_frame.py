@@ -33,10 +33,17 @@ def team(seed):
 
 def frame_of(power, slots, interference=1.0):
     """A frame in which robot k transmits in `slots[k]`, unless that is `NOWHERE`."""
-    frame = empty_frame(power, Rule(RADIO.threshold, interference, NUM_SLOTS, FRAMES, 10.0, 0.0))
+    rule = Rule(
+        RADIO.threshold,
+        NUM_SLOTS,
+        interference=interference,
+        simulated_frames=FRAMES,
+        start_frames=2.0,
+    )
+    frame = empty_frame(power, rule)
     for k, slot in enumerate(slots):
         if slot != NOWHERE:
-            switch(frame, slot, k, True)
+            switch(frame, slot, k)
     return frame
 
 
@@ -106,7 +113,7 @@ def test_the_best_slot_is_the_youngest_of_all_that_were_tried(seed):
     np.testing.assert_array_equal(frame.transmits, before[1])
 
 
-RULE = Rule(threshold=1.25, interference=1.2, num_slots=4, frames=3, start_age=20.0, min_gain=0.2)
+RULE = Rule(threshold=1.25, num_slots=4, simulated_frames=3, start_frames=5.0)
 NO_MARKS = np.zeros((4, 7), dtype=bool)
 EVERYONE = np.ones(7, dtype=bool)
 NO_CHOICES = np.zeros((0, 2), dtype=np.int64)
@@ -125,7 +132,7 @@ def best(power, slots, k, own, min_gain=0.2, is_marked=NO_MARKS):
     frame = empty_frame(power, RULE)
     for j, slot in enumerate(slots):
         if j != k and slot != NOWHERE:
-            switch(frame, slot, j, True)
+            switch(frame, slot, j)
     return best_slot(frame, k, own, min_gain, is_marked)
 
 

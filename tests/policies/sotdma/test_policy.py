@@ -1,4 +1,5 @@
 import copy
+import math
 
 import numpy as np
 import pytest
@@ -7,7 +8,11 @@ from decentralised_reference import transmitters
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.registry import make_policy
+from swarm_mj.policies.sotdma.frame import frame_slots
+from swarm_mj.policies.sotdma.policy import SotdmaTeam
 from swarm_mj.policies.sotdma.slot_table import LONG_AGO, NO_PLACE, place_of
+from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.radio.mission_radio import Belief, radio_of
 from swarm_mj.simulation.swarm import Swarm
 
 REST = paper("stationary", num_robots=12, range_ratio=0.2)
@@ -78,9 +83,9 @@ def test_it_begins_as_spatial_tdma():
 
 def test_everyone_transmits_once_in_every_frame_in_the_slot_it_owns():
     slots, policy = flown(REST, [3], 100)
-    frames = policy._teams[0]._frames
-    assert frames.first_slot == FIRST
-    places = np.array([place_of(slot, frames) for slot in range(FIRST, 200)])
+    rule = policy._teams[0]._rule
+    assert policy._teams[0]._first_slot == FIRST
+    places = np.array([place_of(slot, rule) for slot in range(200 - FIRST)])
     sent = slots[FIRST:, 0]
     frame = np.cumsum(places == 0)[places != NO_PLACE]
     counts = [np.sum(sent[places != NO_PLACE][frame == n], axis=0) for n in range(1, 13)]
@@ -123,3 +128,87 @@ def test_packets_that_hold_a_part_of_t_tell_nothing_of_who_was_heard():
     for each, tells in ((mission, False), (REST, True)):
         _, policy = flown(each, [1], 60)
         assert np.any(policy._teams[0]._table.decoded > LONG_AGO) == tells
+
+
+NUM_ROBOTS = 12
+ORDER = np.random.default_rng(0).permutation(NUM_ROBOTS)
+SILENCE, NO_DRAW = np.arange(NUM_ROBOTS), np.ones(NUM_ROBOTS)
+RADIO = radio_of(paper("stationary"))  # decodes up to 250 m in silence
+
+
+def buffers_of(position_m, now=5.0):
+    """All know where all are, since t = 1, and observe themselves now."""
+    buffers = empty_buffers(1, NUM_ROBOTS)
+    buffers.timestamp[...] = 1.0
+    buffers.timestamp[0, SILENCE, SILENCE] = now
+    buffers.position_m[...] = position_m
+    return buffers
+
+
+def row(apart_m=200.0):
+    return buffers_of(np.stack([apart_m * np.arange(NUM_ROBOTS), np.zeros(NUM_ROBOTS)], axis=1))
+
+
+def begun(buffers):
+    """A team in its first frame."""
+    team = SotdmaTeam(ORDER, Belief(radio=RADIO))
+    in_turn = SILENCE == 3
+    for slot in (0, FIRST - 1):
+        transmits = team.transmits(slot, in_turn, buffers, 0, SILENCE, NO_DRAW)
+        np.testing.assert_array_equal(transmits, in_turn)
+    assert team.takes_turns
+    team.transmits(FIRST, in_turn, buffers, 0, SILENCE, NO_DRAW)
+    assert not team.takes_turns
+    return team
+
+
+@pytest.mark.parametrize(
+    ("num_robots", "num_slots"), [(2, 2), (5, 5), (10, 10), (20, 14), (40, 20), (80, 29)]
+)
+def test_frames_grow_with_the_root_of_the_team_and_are_never_longer_than_a_round(
+    num_robots, num_slots
+):
+    assert frame_slots(num_robots) == num_slots
+
+
+def test_everyone_chooses_once_in_four_frames_but_not_in_the_first():
+    team = begun(row())
+    assert team._rule.num_slots == 11
+    assert [team._choosers(slot) for slot in range(11)] == [[]] * 11
+    choosers = [i for slot in range(44, 88) for i in team._choosers(slot)]
+    assert choosers == ORDER.tolist()
+    lately = team._chose_lately(88)
+    assert lately[:, 0].tolist()[-12:] == ORDER.tolist()
+    assert np.all((np.diff(lately[:, 1]) >= 0) & (lately[1:, 1] < 88))
+    assert lately[0, 1] >= 88 - 48
+
+
+def test_robots_that_believe_the_same_work_out_the_same_first_slots():
+    """The one that believes otherwise may work out others; all own the slots of their own table."""
+    buffers = row()
+    buffers.position_m[0, 5] = buffers.position_m[0, 5, ::-1]
+    team = begun(buffers)
+    slots = team._table.slots
+    others = np.delete(SILENCE, 5)
+    assert np.all(slots[others] == slots[0])
+    for slot in range(FIRST + 1, FIRST + 11):
+        transmits = team.transmits(slot, SILENCE < 0, buffers, 0, SILENCE, NO_DRAW)
+        np.testing.assert_array_equal(transmits, np.diagonal(slots) == slot - FIRST)
+        np.testing.assert_array_equal(team._table.sent == slot - FIRST, transmits)
+
+
+def test_robots_in_need_contend_where_nobody_owns_the_slot():
+    """Robots 200 m apart in a row hear their neighbours; all but robots 0 and 1 heard of both of
+    theirs a slot ago. Of those in need, the draw picks some."""
+    buffers = row()
+    slot = FIRST + 15  # the first of no frame
+    assert place_of(15, begun(buffers)._rule) == NO_PLACE
+    now = (slot + 1) / 2
+    buffers.timestamp[0] = np.where(np.abs(SILENCE[:, None] - SILENCE) <= 1, now - 0.5, 1.0)
+    lost = now - math.ceil(3.0 * 11) / 2 - 1.0  # a bit more than three frames of 11 slots
+    buffers.timestamp[0, 0, 1] = buffers.timestamp[0, 1, 0] = lost
+    for draw, expected in ((0.39, [0, 1]), (0.41, [])):
+        transmits = begun(row()).transmits(
+            slot, SILENCE < 0, buffers, 0, SILENCE, np.full(NUM_ROBOTS, draw)
+        )
+        assert np.flatnonzero(transmits).tolist() == expected

@@ -1,58 +1,57 @@
-"""What robots remember, by hand: times are in windows, and slot s ends at (s + 1) / 2."""
+"""What robots remember, by hand: slots count from the start of the first frame."""
 
 import numpy as np
 import pytest
 
+from swarm_mj.policies.sotdma.frame import Rule
 from swarm_mj.policies.sotdma.slot_table import (
     LONG_AGO,
     NO_PLACE,
-    Frames,
-    is_in_need,
+    are_in_need,
+    empty_table,
     marks,
     place_of,
     read_packets,
     read_slots,
-    slot_table,
 )
 
-FRAMES = Frames(first_slot=10, num_slots=3, contention_every=4)
+RULE = Rule(threshold=1.0, num_slots=3, contention_every=4)
 
 
 def memory():
     """Of three robots that believe that robot k transmits in slot k."""
-    return slot_table(np.tile(np.arange(3), (3, 1)), 3)
+    return empty_table(np.tile(np.arange(3), (3, 1)), 3)
 
 
 def test_every_fourth_slot_is_of_no_frame_and_the_others_count_on():
     no = NO_PLACE
-    places = [place_of(slot, FRAMES) for slot in range(10, 22)]
+    places = [place_of(slot, RULE) for slot in range(12)]
     assert places == [0, 1, 2, no, 0, 1, 2, no, 0, 1, 2, no]
-    frames = Frames(first_slot=0, num_slots=5, contention_every=3)
-    assert [place_of(slot, frames) for slot in range(9)] == [0, 1, no, 2, 3, no, 4, 0, no]
+    rule = Rule(threshold=1.0, num_slots=5, contention_every=3)
+    assert [place_of(slot, rule) for slot in range(9)] == [0, 1, no, 2, 3, no, 4, 0, no]
 
 
 def test_t_tells_a_teammates_slot():
-    """Robot 2 transmitted in slot 15, the second of a frame; robot 1 before there were frames;
-    slot 17 is of no frame, so it tells nothing; older news changes nothing, nor does one's own T.
-    """
+    """Robot 2 transmitted in slot 5, the second of a frame; robot 1 before there were frames; slot
+    7 is of no frame, so it tells nothing; older news changes nothing, nor does one's own T."""
     table = memory()
-    timestamp = np.zeros((3, 3))
-    timestamp[0] = 8.5, 5.0, 8.0  # ends of slots 16, 9 and 15
-    read_slots(table, timestamp, FRAMES)
+    known = np.full((3, 3), -1)
+    known[0] = 6, -1, 5
+    read_slots(table, known, RULE)
     assert table.slots[0].tolist() == [0, 1, 1]
-    assert table.announced[0].tolist() == [LONG_AGO, LONG_AGO, 15]
-    for end in (7.0, 9.0):
-        timestamp[0, 2] = end
-        read_slots(table, timestamp, FRAMES)
+    assert table.announced[0].tolist() == [LONG_AGO, LONG_AGO, 5]
+    for slot in (3, 7):
+        known[0, 2] = slot
+        read_slots(table, known, RULE)
         assert table.slots[0, 2] == 1
-        assert table.announced[0, 2] == 15
+        assert table.announced[0, 2] == 5
 
 
 def hear(table, slot, sender, known_until, passed_by):
     """Robot 0 decodes a packet that says what its sender knows of it: T, and P."""
-    timestamp, parent = np.zeros((3, 3)), np.full((3, 3), -1)
-    timestamp[sender, 0], parent[sender, 0] = (known_until + 1) / 2, passed_by
-    read_packets(table, np.array([sender, 1, 2]), timestamp, parent, slot, FRAMES)
+    known, parent = np.full((3, 3), -1), np.full((3, 3), -1)
+    known[sender, 0], parent[sender, 0] = known_until, passed_by
+    read_packets(table, np.array([sender, 1, 2]), known, parent, slot)
 
 
 def test_a_packet_tells_whether_its_sender_decoded_ones_own():
@@ -85,7 +84,7 @@ def test_misses_are_counted_up_to_a_hundred():
     assert table.missed[0, 0, 1] == 100
 
 
-@pytest.mark.parametrize(("sent", "place"), [(9, 0), (14, NO_PLACE), (15, 0)])
+@pytest.mark.parametrize(("sent", "place"), [(-1, 0), (14, NO_PLACE), (15, 0)])
 def test_a_packet_says_nothing_of_what_was_sent_in_no_frame_or_just_now(sent, place):
     table = memory()
     table.sent[0], table.sent_place[0] = sent, place
@@ -102,23 +101,26 @@ def test_a_slot_is_marked_that_was_missed_more_often_than_by_chance(share, enoug
     table = memory()
     table.missed[0, :2, 1:] = [[enough - 1, enough], [enough, enough]]
     table.missed_at[0, :2], table.outbound_delivery_ratio[0] = [50, 29], share
-    is_marked = marks(table, 0, 0.1, 30)
+    is_marked = marks(table, 0, 50, Rule(1.0, 2, min_miss_probability=0.1, marked_slots=20))
     assert is_marked[:2, 1:].tolist() == [[False, True], [False, False]]
 
 
 def test_a_robot_is_in_need_that_lost_a_neighbour_or_is_lost_to_one():
-    """At slot 40, with a patience of 6 slots: robot 1 is the neighbour of robot 0."""
-    table, near = memory(), np.array([False, True, False])
+    """At slot 40, with a patience of 6 slots, and 12 until it is gone: robot 1 is the neighbour of
+    robot 0."""
+    table, near = memory(), np.zeros((3, 3), dtype=bool)
+    near[0, 1] = True
+    rule = Rule(threshold=1.0, num_slots=3, need_frames=2.0, lost_frames=4.0)
 
     def needs(heard_of_slot, is_near=near):
-        timestamp = np.array([20.0, (heard_of_slot + 1) / 2, 0.0])
-        return is_in_need(table, 0, timestamp, is_near, 40, 6.0, 12.0)
+        known = np.full((3, 3), 39)
+        known[0, 1] = heard_of_slot
+        in_need = are_in_need(table, known, is_near, 40, rule)
+        assert not np.any(in_need[1:])
+        return in_need[0]
 
-    assert needs(33)
-    assert needs(28)
-    assert not needs(27)  # it is gone
-    assert not needs(34)
-    assert not needs(33, np.zeros(3, dtype=bool))
+    assert [needs(slot) for slot in (34, 33, 28, 27)] == [False, True, True, False]
+    assert not needs(33, np.zeros((3, 3), dtype=bool))
     table.decoded[0, 1], table.got_through[0, 1] = 38, 31
     assert needs(38)
     table.got_through[0, 1] = 32

@@ -1,0 +1,172 @@
+"""The greedy oracle: a scheduler that knows all buffers and positions at every moment.
+
+A team could not fly it; it shows how low the age of information can go. The pair of sender and
+recipient is added that most raises the gain of the whole window, interference and responses
+included, until none does. The gain is the sum over receivers i and subjects k of the rise of
+T^{i,k}: the fall of the age of information times N² (Eq. 10).
+
+Over uncertain links a packet decodes with a probability, and timestamps are expected ones. Index
+order: `i` sends, `j` receives. Times are in slots, float32, which keeps them exact for 8 million
+windows.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int
+
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.policies.policy import CentralisedPolicy
+from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.timestamps import merge_expected, observe_own, rise
+from swarm_mj.protocol.window import SLOTS_PER_WINDOW
+from swarm_mj.radio.free_space import FreeSpaceRadio
+from swarm_mj.radio.links import Links, air_of, listen
+from swarm_mj.radio.mission_radio import TrueLinks
+from swarm_mj.radio.reception import NOBODY
+from swarm_mj.system.compiled import compiled
+
+
+class GreedyOracle(CentralisedPolicy):
+    """Adds pairs while the age that the window removes grows: myopic, and not optimal.
+
+    Centralised: it sees all buffers and all true positions. It addresses no robot that sends, even
+    where the authors' code would let that robot hear.
+    """
+
+    uses = "all buffers, all true positions and the true channel except its fades, at every moment"
+
+    def __init__(self, radio: FreeSpaceRadio) -> None:
+        """Prepare the policy for a radio, which is true unless the policy is informed otherwise."""
+        self._truth = TrueLinks(radio=radio)
+
+    def inform(self, truth: TrueLinks) -> None:
+        """Plan with the true channel from now on."""
+        self._truth = truth
+
+    def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
+        """Return the window's schedule; robots move before they talk, which it does not foresee."""
+        timestamp = (SLOTS_PER_WINDOW * views.buffers.timestamp).astype(np.float32)
+        windows = [
+            greedy_window(
+                timestamp[b],
+                SLOTS_PER_WINDOW * float(views.now[b]),
+                self._truth.links(states.position_m[b], b),
+            )
+            for b in range(len(timestamp))
+        ]
+        return np.stack(windows)
+
+
+@compiled()
+def greedy_window(
+    timestamp: Float32[np.ndarray, "N N"], now: float, links: Links
+) -> Int[np.ndarray, "N"]:
+    """Return the recipient of every robot; itself is silence. T and t are before the window."""
+    num_robots = timestamp.shape[0]
+    sent = timestamp.copy()
+    observe_own(sent, now + 1.0)
+    gains = packet_gains(sent, links)
+    recipient = np.arange(num_robots)
+    gain = 0.0
+    while True:
+        # A new pair changes the interference at all receivers, so every candidate is valued anew.
+        value = window_gains(sent, gains, now, links, recipient)
+        pair = np.argmax(value)
+        i, r = pair // num_robots, pair % num_robots
+        if value[i, r] <= gain:
+            return recipient
+        gain = value[i, r]
+        recipient[i] = r
+
+
+@compiled()
+def packet_gains(sent: Float32[np.ndarray, "N N"], links: Links) -> Float[np.ndarray, "N N"]:
+    """Return what j gains from i's packet [slots]; 0 where it is never received."""
+    num_robots = sent.shape[0]
+    gains = np.zeros((num_robots, num_robots))
+    for i in range(num_robots):
+        for j in range(num_robots):
+            if links.received_mw[i, j] > 0.0:
+                gains[i, j] = _gain(sent[i], sent[j])
+    return gains
+
+
+@compiled()
+def window_gains(
+    sent: Float32[np.ndarray, "N N"],
+    gains: Float[np.ndarray, "N N"],
+    now: float,
+    links: Links,
+    recipient: Int[np.ndarray, "N"],
+) -> Float[np.ndarray, "N N"]:
+    """Return the gain of the whole window when i also addresses r; -inf where it cannot.
+
+    Neither robot of a new pair may send or be addressed already: a robot that sends hears nothing.
+    Of all r that do not decode i, hence do not answer, one stands for all: a broadcast. Packets of
+    the first slot hold `sent`, and are worth `packet_gains`.
+    """
+    num_robots = sent.shape[0]
+    is_silent = recipient == np.arange(num_robots)
+    is_free = is_silent.copy()
+    for i in range(num_robots):
+        if not is_silent[i]:
+            is_free[recipient[i]] = False
+    air = air_of(links, ~is_silent)
+    value = np.full((num_robots, num_robots), -np.inf)
+    after = np.empty_like(sent)
+    heard, probability = np.arange(num_robots), np.zeros(num_robots)
+    for i in range(num_robots):
+        if is_free[i]:
+            listen(links, air, i, is_silent, heard, probability)
+            gain = 0.0
+            for j in range(num_robots):
+                gain += probability[j] * gains[heard[j], j]
+            merge_expected(sent, heard, probability, after)
+            observe_own(after, now + SLOTS_PER_WINDOW)
+            _add_responses(links, i, recipient, is_free, heard, probability, after, gain, value[i])
+    return value
+
+
+@compiled()
+def _add_responses(
+    links: Links,
+    i: int,
+    recipient: Int[np.ndarray, "N"],
+    is_free: Bool[np.ndarray, "N"],
+    heard: Int[np.ndarray, "N"],
+    probability: Float[np.ndarray, "N"],
+    after: Float32[np.ndarray, "N N"],
+    gain: float,
+    value: Float[np.ndarray, "N"],
+) -> None:
+    """Fill `value[r]`: the gain of the first slot and of the responses if r is i's recipient."""
+    num_robots = recipient.shape[0]
+    answers = np.zeros(num_robots, dtype=np.bool_)  # who may decode a packet addressed to it
+    for j in range(num_robots):
+        answers[j] = heard[j] != j and recipient[heard[j]] == j
+    air, listens = air_of(links, answers), ~answers
+    answerer, answer_probability = np.arange(num_robots), np.zeros(num_robots)
+    has_broadcast = False
+    for r in range(num_robots):
+        decodes = heard[r] == i
+        if r != i and is_free[r] and (decodes or not has_broadcast):
+            has_broadcast |= not decodes
+            also = r if decodes else NOBODY
+            listen(links, air, also, listens, answerer, answer_probability)
+            total = gain
+            for j in range(num_robots):
+                if answer_probability[j] > 0.0:
+                    # A response is only sent if the request was decoded.
+                    is_sent = probability[answerer[j]]
+                    total += answer_probability[j] * is_sent * _gain(after[answerer[j]], after[j])
+            value[r] = total
+
+
+# Adding in any order lets the compiler use its vectors. Whole slots add up exactly; expected ones
+# to rounding.
+@compiled(fastmath={"reassoc", "nnan", "nsz"})
+def _gain(newer: Float32[np.ndarray, "N"], older: Float32[np.ndarray, "N"]) -> float:
+    """Return the rise of T from one row to another, summed over subjects."""
+    total = np.float32(0.0)
+    for k in range(older.shape[0]):
+        total += rise(newer[k], older[k])
+    return float(total)

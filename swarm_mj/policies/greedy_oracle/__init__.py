@@ -1,1 +1,0 @@
-"""The greedy oracle: a schedule by a centre that knows everything."""
