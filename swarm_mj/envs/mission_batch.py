@@ -73,6 +73,7 @@ class MissionBatch:
         self.seeds = list(seeds)
         self.last_window = last_window or self.mission.num_windows
         self.costs: WindowCosts | None = None  # of the last window
+        self.recipients: list[np.ndarray] = []  # window by window: flown again, they lead here
         self._extractor.start(self.num_missions, self.mission.num_robots)
         self._see()
         check_width(self.features, self._extractor, self.graphs)
@@ -106,6 +107,7 @@ class MissionBatch:
             windows = f"its {self.last_window} windows"
             raise ValueError(f"the mission is over after {windows}; call reset()")
         self.costs = self.flown.step_with_recipients(recipient)
+        self.recipients.append(recipient.astype(np.int16))
         self._see()
         return self.costs
 

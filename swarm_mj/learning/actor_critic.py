@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import Any
 
 import torch
-from gymnasium import spaces
 from jaxtyping import Float, Int
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.type_aliases import PyTorchObs, Schedule
@@ -25,17 +24,9 @@ class GnnActorCritic(ActorCriticPolicy):
     scalar per robot, of its own node; the authors' code sums those of all nodes of all graphs.
     """
 
-    def __init__(
-        self,
-        observation_space: spaces.Space,
-        action_space: spaces.Space,
-        lr_schedule: Schedule,
-        *,
-        training: Training,
-        **others: Any,
-    ) -> None:
+    def __init__(self, *given: Any, training: Training, **others: Any) -> None:
         self._training, self._shape = training, training.network
-        super().__init__(observation_space, action_space, lr_schedule, **others)
+        super().__init__(*given, **others)  # spaces and the rate's schedule come from PPO
 
     def _build(self, lr_schedule: Schedule) -> None:
         num_outputs = self._shape.num_outputs + self._training.shares_trunk

@@ -21,7 +21,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from torch import Tensor
 
 from swarm_mj.learning.actor_critic import GnnActorCritic
-from swarm_mj.learning.graph_vec_env import ActionHistory, env_of
+from swarm_mj.learning.graph_vec_env import env_of
 from swarm_mj.learning.held_out import HeldOut
 from swarm_mj.learning.run_folder import Progress
 from swarm_mj.learning.selection import NUM_BEST, Amount, Count, candidates
@@ -68,7 +68,7 @@ def save(
 ) -> None:
     """Write a checkpoint, between rollouts; raises OSError if the file cannot be written."""
     name, keys, *rest = np.random.get_state()  # noqa: NPY002 - PPO shuffles minibatches with it
-    env, batches, histories = model.get_env(), env_of(model).batches, env_of(model).histories
+    env, batches = model.get_env(), env_of(model).batches
     is_normalised = isinstance(env, VecNormalize)
     moments = [env.ret_rms.mean, env.ret_rms.var, env.ret_rms.count] if is_normalised else None
     is_cuda = model.device.type == "cuda"
@@ -80,11 +80,11 @@ def save(
         "num_timesteps": model.num_timesteps,
         "num_updates": model._n_updates,
         "episode_starts": torch.tensor(model._last_episode_starts),
-        "seeds": [each.seeds for each in histories],
-        "last_windows": [each.last_window for each in histories],
+        "seeds": [batch.seeds for batch in batches],
+        "last_windows": [batch.last_window for batch in batches],
         "recipients": {
-            n: torch.tensor(np.array(each.recipients, np.int16).reshape(-1, *batch.shape))
-            for n, (batch, each) in enumerate(zip(batches, histories, strict=True))
+            n: torch.tensor(np.array(batch.recipients, np.int16).reshape(-1, *batch.shape))
+            for n, batch in enumerate(batches)
         },
         "reward_moments": moments and [float(each) for each in moments],
         "returns": torch.tensor(env.returns) if is_normalised else torch.zeros(0),
@@ -225,10 +225,9 @@ def _restore(
     policy.load_state_dict(state["weights"])
     policy.optimizer.load_state_dict(policy.optimizer.state_dict() | {"state": state["adam"]})
     model.num_timesteps, model._n_updates = counters.num_timesteps, counters.num_updates
-    model._last_obs = env_of(model).replay(
-        ActionHistory(seeds, last, [*state["recipients"][n].numpy()])
-        for n, (seeds, last) in enumerate(zip(counters.seeds, counters.last_windows, strict=True))
-    )
+    recipients = [state["recipients"][n].numpy() for n in range(len(counters.seeds))]
+    begun = counters.seeds, counters.last_windows
+    model._last_obs = env_of(model).replay(*begun, recipients)
     model._last_episode_starts = state["episode_starts"].numpy()
     if isinstance(env, VecNormalize) and counters.reward_moments is not None:
         for name, value in zip(("mean", "var", "count"), counters.reward_moments, strict=True):

@@ -3,13 +3,13 @@
 Batches are staggered, so that every rollout holds windows from all parts of a mission.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from jaxtyping import Bool, Int
+from jaxtyping import Bool
 from stable_baselines3 import PPO
 
 from swarm_mj.envs.mission_batch import (
@@ -22,14 +22,6 @@ from swarm_mj.envs.vec_env import SwarmVecEnv
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.graphs import Graphs
 from swarm_mj.protocol.buffers import NO_PARENT
-
-
-class ActionHistory(NamedTuple):
-    """How a batch came to where it is: replayed, it leads to the same state."""
-
-    seeds: list[int]  # of the missions under way
-    last_window: int  # when they end [windows]
-    recipients: list[Int[np.ndarray, "B N"]]  # window by window
 
 
 class GraphVecEnv(SwarmVecEnv):
@@ -53,7 +45,6 @@ class GraphVecEnv(SwarmVecEnv):
         for n, batch in enumerate(self.batches):
             last_window = training.mission.num_windows * (n + 1) // len(self.batches)
             batch.restart(self._draw_seeds(batch), max(1, last_window))
-        self._recipients: list[list[np.ndarray]] = [[] for _ in self.batches]
         sizes = [batch.shape[1] for batch in self.batches for _ in range(batch.num_missions)]
         self._owner = np.concatenate([np.arange(size, dtype=np.int32) for size in sizes])[:, None]
         self._is_robot = np.arange(self.num_nodes) < np.array(sizes)[:, None]
@@ -70,36 +61,27 @@ class GraphVecEnv(SwarmVecEnv):
         """Missions, and so team decisions a window."""
         return sum(batch.num_missions for batch in self.batches)
 
-    @property
-    def histories(self) -> list[ActionHistory]:
-        """The way of each batch to its present state."""
-        return [
-            ActionHistory(batch.seeds, batch.last_window, recipients)
-            for batch, recipients in zip(self.batches, self._recipients, strict=True)
-        ]
-
     def reset(self) -> Observation:
         """Start the missions under way over; others would shift the seeds of all that follow."""
-        return self.replay([each._replace(recipients=[]) for each in self.histories])
-
-    def replay(self, histories: Iterable[ActionHistory]) -> Observation:
-        """Go to the end of histories, one a batch; return the observation there."""
-        for n, (batch, history) in enumerate(zip(self.batches, histories, strict=True)):
-            batch.restart(history.seeds, history.last_window)
-            for recipient in history.recipients:
-                batch.fly(recipient.astype(np.int64))
-            self._recipients[n] = list(history.recipients)
+        for batch in self.batches:
+            batch.restart(batch.seeds, batch.last_window)
         return self._observe()
 
-    def step_async(self, actions: np.ndarray) -> None:
-        """Take the actions, and note them in the histories."""
-        super().step_async(actions)
-        for batch, envs, recipients in zip(self.batches, self._envs, self._recipients, strict=True):
-            recipient = actions[envs].reshape(batch.num_missions, -1)
-            recipients.append(recipient[:, : batch.mission.num_robots].astype(np.int16))
+    def replay(
+        self,
+        seeds: Sequence[list[int]],
+        last_windows: Sequence[int],
+        recipients: Sequence[np.ndarray],  # [window, mission, robot]
+    ) -> Observation:
+        """Begin missions, batch by batch, and fly them as recorded; return what is seen then."""
+        begun = zip(self.batches, seeds, last_windows, recipients, strict=True)
+        for batch, its_seeds, last_window, flown in begun:
+            batch.restart(its_seeds, last_window)
+            for recipient in flown.astype(np.int64):
+                batch.fly(recipient)
+        return self._observe()
 
     def _begin(self, n: int) -> None:
-        self._recipients[n] = []
         self.batches[n].restart(self._draw_seeds(self.batches[n]))
 
     def _draw_seeds(self, batch: MissionBatch) -> list[int]:

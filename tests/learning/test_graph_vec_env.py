@@ -102,18 +102,17 @@ def test_a_robots_reward_is_its_credit_per_pair():
     env, rng = env_of("robot", (3, 5)), np.random.default_rng(2)
     env.reset()
     for _ in range(3):
-        before = env.histories
-        before = [each._replace(recipients=list(each.recipients)) for each in before]
+        before = [(batch.seeds, [*batch.recipients]) for batch in env.batches]
         actions = drawn(env, rng)
         _, reward, _, _ = env.step(actions)
     by_hand, last = [], np.split(actions, [6, 16, 22])
-    for batch, history, recipient in zip(env.batches, before, last, strict=True):
+    for batch, (seeds, flown), recipient in zip(env.batches, before, last, strict=True):
         size = batch.mission.num_robots
         recipient = recipient.reshape(2, size)
 
-        def known(last_recipient, batch=batch, history=history):
-            swarm = Swarm(batch.mission, history.seeds)
-            for each in [*history.recipients, last_recipient]:
+        def known(last_recipient, batch=batch, seeds=seeds, flown=flown):
+            swarm = Swarm(batch.mission, seeds)
+            for each in [*flown, last_recipient]:
                 swarm.step_with_recipients(each.astype(int))
             return swarm.buffers.timestamp.sum(axis=(1, 2))
 
@@ -184,7 +183,7 @@ def test_every_mission_has_its_own_seed_that_is_not_held_out(sizes):
     assert [batch.mission.num_robots for batch in env.batches] == [*sizes] * (4 // len(sizes))
     seen = []
     for _ in range(2 * WINDOWS + 3):
-        seen += [each.seeds for each in env.histories if each.seeds not in seen]
+        seen += [batch.seeds for batch in env.batches if batch.seeds not in seen]
         env.step(drawn(env, rng))
     drawn_seeds = [seed for seeds in seen for seed in seeds]
     assert len(drawn_seeds) == len(set(drawn_seeds)) == 2 * (4 + 4 + 4)

@@ -21,35 +21,18 @@ from swarm_mj.mission import PRESETS
 # III-C, and the authors' code for what the text leaves open. Their minibatches are of 32, which
 # takes a misspelt key to, and their value loss has an extra 1/2.
 TEAM = {
-    "learning_rate": 1e-4,
-    "n_envs": 32,
-    "n_steps": 4,
-    "n_epochs": 4,
-    "gamma": 0.99,
-    "gae_lambda": 0.95,
-    "clip_range": 0.1,
-    "clip_range_vf": 0.1,
-    "ent_coef": 1e-6,
-    "max_grad_norm": 0.5,
-    "normalize_advantage": True,
+    **{"learning_rate": 1e-4, "n_envs": 32, "n_steps": 4, "n_epochs": 4, "gamma": 0.99},
+    **{"gae_lambda": 0.95, "clip_range": 0.1, "clip_range_vf": 0.1, "ent_coef": 1e-6},
+    **{"max_grad_norm": 0.5, "normalize_advantage": True},
 }
 GIVEN = {
     ("team", "paper"): {**TEAM, "batch_size": 64, "vf_coef": 0.5},
     ("team", "reference"): {**TEAM, "batch_size": 32, "vf_coef": 0.25},
     # Credit per robot is the package's own: 16 missions of 5 robots, credits as they are.
     ("robot", "paper"): {
-        "learning_rate": 1e-3,
-        "n_envs": 16 * 5,
-        "n_steps": 32,
-        "batch_size": 16 * 5 * 32 // 10,
-        "n_epochs": 2,
-        "gamma": 0.0,
-        "gae_lambda": 0.9,
-        "clip_range": 0.2,
-        "clip_range_vf": None,
-        "ent_coef": 0.002,
-        "vf_coef": 0.5,
-        "max_grad_norm": 0.5,
+        **{"learning_rate": 1e-3, "n_envs": 16 * 5, "n_steps": 32, "batch_size": 16 * 5 * 32 // 10},
+        **{"n_epochs": 2, "gamma": 0.0, "gae_lambda": 0.9, "clip_range": 0.2},
+        **{"clip_range_vf": None, "ent_coef": 0.002, "vf_coef": 0.5, "max_grad_norm": 0.5},
         "normalize_advantage": False,
     },
 }

@@ -49,10 +49,8 @@ def decisions(policy, seeds, mission=MISSION):
 def logits_of(policy, graphs, silence_logit):
     """The logits of two missions of seven robots, from the network itself."""
     output = policy._network(torch.tensor(graphs.node), torch.tensor(graphs.parent).long())
-    owner, may_address = torch.tensor([*range(7), *range(7)]), torch.tensor(graphs.may_address)
-    has_turn = torch.tensor(graphs.has_turn)
-    logits = recipient_logits(output, owner, may_address, silence_logit, has_turn)
-    return logits.detach().numpy()
+    rules = torch.tensor(graphs.may_address), silence_logit, torch.tensor(graphs.has_turn)
+    return recipient_logits(output, torch.arange(7).repeat(2), *rules).detach().numpy()
 
 
 @pytest.mark.parametrize("outputs", [1, 2])
