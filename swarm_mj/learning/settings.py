@@ -9,7 +9,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, is_own_set, num_features
 from swarm_mj.policies.policy_config import GnnShape, check_fit
-from swarm_mj.system.fields import FieldOf, check, check_value, setting
+from swarm_mj.system.fields import check, check_value, setting
 
 CreditAssignment = Literal["robot", "team"]  # per robot, per team
 Reward = Literal["aoi", "velocity-variance"]  # the cost whose negative a team is paid
@@ -20,18 +20,6 @@ EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as sp
 MAX_ROBOTS = 200  # a team decision takes robots² nodes
 
 
-def _share(default: float) -> FieldOf:
-    return setting(default, low=0.0, high=1.0)
-
-
-def _positive(default: float) -> FieldOf:
-    return setting(default, low=1e-12, high=1e6)
-
-
-def _count(default: int, most: int) -> FieldOf:
-    return setting(default, low=1, high=most)
-
-
 @dataclass(frozen=True, kw_only=True)
 class PpoSettings:
     """PPO, in stable-baselines3's terms; the defaults are those of credit per robot."""
@@ -39,22 +27,22 @@ class PpoSettings:
     learning_rate: float = setting(
         1e-3, "of Adam, at the start", label="learning rate", low=1e-9, high=1.0
     )
-    decay: float = _share(0.95)  # of the learning rate ...
-    decay_steps: int = _count(200, 10**9)  # ... in this many optimiser steps ...
-    least_share: float = _share(0.1)  # ... but not below this share of it
-    num_steps: int = _count(32, 100_000)  # windows of each mission in a rollout
-    num_minibatches: int = _count(10, 10**6)  # that a rollout is shared out to
-    num_epochs: int = _count(2, 1000)  # passes over a rollout
+    decay: float = setting(0.95, low=0.0, high=1.0)  # of the learning rate ...
+    decay_steps: int = setting(200, low=1, high=10**9)  # ... in this many optimiser steps ...
+    least_share: float = setting(0.1, low=0.0, high=1.0)  # ... but not below this share of it
+    num_steps: int = setting(32, low=1, high=100_000)  # windows of each mission in a rollout
+    num_minibatches: int = setting(10, low=1, high=10**6)  # that a rollout is shared out to
+    num_epochs: int = setting(2, low=1, high=1000)  # passes over a rollout
     discount: float = setting(
         0.0, "gamma; 0: a packet's credit is that of its own window alone", low=0.0, high=1.0
     )
-    gae_lambda: float = _share(0.9)
-    clip: float = _positive(0.2)  # of the probability ratio
+    gae_lambda: float = setting(0.9, low=0.0, high=1.0)
+    clip: float = setting(0.2, low=1e-12, high=1e6)  # of the probability ratio
     clips_value: bool = False  # by the same number
     entropy: float = setting(0.002, "weight of the entropy bonus", low=0.0, high=10.0)
-    value: float = _share(0.5)  # weight of the value's squared error
-    max_gradient_norm: float = _positive(0.5)
-    adam_epsilon: float = _positive(1e-6)
+    value: float = setting(0.5, low=0.0, high=1.0)  # weight of the value's squared error
+    max_gradient_norm: float = setting(0.5, low=1e-12, high=1e6)
+    adam_epsilon: float = setting(1e-6, low=1e-12, high=1e6)
 
     def __post_init__(self) -> None:
         check(self)
@@ -118,7 +106,7 @@ class Training:
     )
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)
-    groups: int = _count(4, 4096)  # of missions that end at different times
+    groups: int = setting(4, low=1, high=4096)  # of missions that end at different times
     seed: int = setting(0, "the same seed is the same policy", low=0, high=2**63 - 1)
     evaluate_every: int = setting(
         10_000,

@@ -6,7 +6,7 @@ entry, JSON, of the format, its version, the kind of the network, the config and
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -179,7 +179,14 @@ def _config_of(text: str) -> GnnConfig | MlpConfig:
 
 def _check_tensors(config: GnnConfig | MlpConfig, path: Path, tensors: Weights) -> None:
     """Raise ValueError unless these are a network's tensors, single-precision and finite."""
-    shapes = _shapes(config, path)
+    if isinstance(config, MlpConfig):
+        shapes = config.network.tensors()
+    else:
+        need("torch", f"policy {path}", "fly another")
+        from swarm_mj.policies.gnn.fast import empty_network
+
+        empty = empty_network(config.network).state_dict()
+        shapes = {name: tuple(tensor.shape) for name, tensor in empty.items()}
     for name in sorted(shapes.keys() ^ tensors.keys()):
         known = "lacks the" if name in shapes else "has an unknown"
         raise ValueError(f"it {known} tensor {name:.80}")
@@ -192,12 +199,3 @@ def _check_tensors(config: GnnConfig | MlpConfig, path: Path, tensors: Weights) 
             raise ValueError(f"tensor {name} must be {wanted}, not {given}")
         if not np.all(np.isfinite(tensor)):
             raise ValueError(f"tensor {name} has numbers that are not finite")
-
-
-def _shapes(config: GnnConfig | MlpConfig, path: Path) -> Mapping[str, tuple[int, ...]]:
-    if isinstance(config, MlpConfig):
-        return config.network.tensors()
-    need("torch", f"policy {path}", "fly another")
-    from swarm_mj.policies.gnn.fast import empty_network
-
-    return {n: tuple(t.shape) for n, t in empty_network(config.network).state_dict().items()}
