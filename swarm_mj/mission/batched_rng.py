@@ -18,12 +18,9 @@ class Started(Protocol):
     """A component that draws or remembers, and so must know when missions begin."""
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator], /) -> None:
-        """Forget earlier missions.
+        """Forget earlier missions; there is one generator per mission, the component's own.
 
-        Args:
-            num_robots: N.
-            rngs: One generator per mission, the component's own. To give a mission the same course
-                in any batch, draw for mission b from the b-th alone.
+        To give a mission the same course in any batch, draw for mission b from the b-th alone.
         """
         ...
 

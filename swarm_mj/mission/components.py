@@ -112,9 +112,7 @@ def is_ours(component: object) -> bool:
 def load(kind: str, name: str) -> Any:  # noqa: ANN401 - whatever has that name
     """Return what a user's `module:Name` names; the current folder is searched first.
 
-    Args:
-        kind: What it is to be, such as "channel", for messages.
-        name: As typed.
+    `kind` says for messages what it is to be, such as "channel".
 
     Raises:
         ValueError: The name has another form, leads nowhere, or the module cannot be imported.

@@ -37,12 +37,8 @@ def gather_connected(
 ) -> int:
     """Flood the disk graph from one robot; return how many are reached, the first one included.
 
-    Args:
-        position_m: Positions [m].
-        range_m: Two robots at most this far apart are neighbours [m].
-        first: Where the flood begins.
-        is_met: Robots that it need not reach; those reached are added in place.
-        members: Filled with those reached.
+    Two robots at most `range_m` apart are neighbours. Those reached fill `members`, and are added
+    to `is_met`, whose robots need not be reached.
     """
     members[0] = first
     is_met[first] = True
@@ -59,21 +55,16 @@ def gather_connected(
     return num_members
 
 
+@compiled()
 def spanning_tree(position_m: Float[np.ndarray, "B N 2"]) -> Int[np.ndarray, "B N"]:
     """Return each robot's parent in the Euclidean minimum spanning tree, or `ROOT`."""
-    parent = np.empty(position_m.shape[:2], dtype=np.int64)
-    _grow_and_peel(position_m, parent)
-    return parent
-
-
-@compiled()
-def _grow_and_peel(position_m: Float[np.ndarray, "B N 2"], parent: Int[np.ndarray, "B N"]) -> None:
-    num_missions, num_robots = parent.shape
-    is_edge = np.empty((num_robots, num_robots), dtype=np.bool_)
+    num_missions, num_robots = position_m.shape[:2]
+    parent = np.empty((num_missions, num_robots), dtype=np.int64)
     for b in range(num_missions):
-        is_edge[:] = False
+        is_edge = np.zeros((num_robots, num_robots), dtype=np.bool_)
         _grow(position_m[b], is_edge)
         _peel(is_edge, parent[b])
+    return parent
 
 
 @compiled()

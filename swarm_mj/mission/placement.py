@@ -44,16 +44,11 @@ def connected_positions(
 ) -> Float[np.ndarray, "N 2"]:
     """Return positions uniform in the area at which the team is connected [m] (IV-B).
 
-    Args:
-        num_robots: N.
-        half_side_m: Positions lie within plus or minus this [m].
-        range_m: Range of the disk graph [m].
-        rng: Where the positions are drawn from.
-        largest_part_at: Which robots are in the largest connected part under the team's own
-            channel; None asks whether the disk graph is connected.
-        is_blocked_at: Which robots cannot be there; those are drawn anew.
-        keeps_largest: Whether only robots outside the largest part are drawn anew, not the whole
-            team: between obstacles hardly any team is connected that is drawn at once.
+    Positions lie within plus or minus `half_side_m`. By default the disk graph must be connected;
+    `largest_part_at` says who is in the largest connected part under the team's own channel. Robots
+    that `is_blocked_at` names cannot be there and are drawn anew. With `keeps_largest` only robots
+    outside the largest part are drawn anew, not the whole team: between obstacles hardly any team
+    is connected that is drawn at once.
 
     Raises:
         ValueError: All draws were disconnected, or the area has hardly any free space.

@@ -9,13 +9,10 @@ from swarm_mj.mission.specification import OPEN, Mission, Task
 
 
 def paper(task: Task = "flocking", **overrides: Any) -> Mission:
-    """Return the paper's text, taken literally.
+    """Return the paper's text, taken literally, with any fields of `Mission` overridden.
 
-    Args:
-        task: What the robots do; a flock has no boundary unless `overrides` give it one.
-        **overrides: Any field of `Mission`. In an arena with obstacles physics are `contact` and
-            flocks have a boundary, unless they say otherwise; where robots collide, physics are
-            `contact`, too.
+    Unless overridden, a flock has no boundary. In an arena with obstacles it has one, and physics
+    are `contact`, as where robots collide.
 
     Raises:
         ValueError: A value is outside its range.

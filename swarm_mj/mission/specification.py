@@ -35,23 +35,23 @@ KNOWABLE = (NOTHING, *get_args(Grant))
 NEW = "not the paper's"  # the source of what the paper has not
 
 
-def _quantity(
+def _number(
     default: float | int,
     label: str,
     unit: str,
-    source: str,
     low: float,
     high: float,
     help: str = "",
+    **about: str,
 ) -> FieldOf:
-    """Return a number of the mission: name in words, unit, source, range; with help, an option."""
-    return setting(default, help, label=label, unit=unit, source=source, low=low, high=high)
+    """Return a number: name in words, unit, range; with help, an option. By default of IV-B."""
+    limits = {"unit": unit, "low": low, "high": high}
+    return setting(default, help, label=label, **limits, **{"source": "IV-B"} | about)
 
 
 def _radio(default: float, label: str, unit: str, low: float, high: float, help: str) -> FieldOf:
     """Return a number of the channel beyond free space, an option under its own heading."""
-    limits = {"unit": unit, "low": low, "high": high}
-    return setting(default, help, group=CHANNEL, label=label, source=NEW, **limits)
+    return _number(default, label, unit, low, high, help, group=CHANNEL, source=NEW)
 
 
 def _choice(
@@ -82,27 +82,25 @@ class Mission:
         "paper", "preset", "IV-B", Preset, "the paper's text or code, or an arena with its channel"
     )
     task: Task = _choice("flocking", "task", "IV", Task, "what the robots do")
-    num_robots: int = _quantity(
-        40, "number of robots", "robots", "IV-B", 2.0, 1000.0, "size of the team"
+    num_robots: int = _number(40, "number of robots", "robots", 2.0, 1000.0, "size of the team")
+    density_per_km2: float = _number(40.0, "density", "robots/km²", 0.1, 10_000.0)
+    range_ratio: float = _number(
+        0.25, "range ratio", "of 1 km", 0.01, 10.0, "range of a packet in silence"
     )
-    density_per_km2: float = _quantity(40.0, "density", "robots/km²", "IV-B", 0.1, 10_000.0)
-    range_ratio: float = _quantity(
-        0.25, "range ratio", "of 1 km", "IV-B", 0.01, 10.0, "range of a packet in silence"
+    velocity_ratio: float = _number(
+        0.15, "velocity ratio", "of 1 km in 50 s", 0.001, 5.0, "per axis; 0.15 is 3 m/s"
     )
-    velocity_ratio: float = _quantity(
-        0.15, "velocity ratio", "of 1 km in 50 s", "IV-B", 0.001, 5.0, "per axis; 0.15 is 3 m/s"
-    )
-    max_acceleration_mps2: float = _quantity(20.0, "A_max", "m/s²", "IV-B", 0.01, 1000.0)
-    window_s: float = _quantity(0.1, "window", "s", "IV-B", 0.01, 10.0)
-    num_windows: int = _quantity(
-        500, "number of windows", "windows", "IV-B", 1.0, 100_000.0, "length, in windows of 100 ms"
+    max_acceleration_mps2: float = _number(20.0, "A_max", "m/s²", 0.01, 1000.0)
+    window_s: float = _number(0.1, "window", "s", 0.01, 10.0)
+    num_windows: int = _number(
+        500, "number of windows", "windows", 1.0, 100_000.0, "length, in windows of 100 ms"
     )
     # The paper writes "1 dBm", but a threshold on a ratio is a ratio: 1 dB.
-    sinr_threshold_db: float = _quantity(1.0, "SINR threshold", "dB", "IV-B", -30.0, 60.0)
-    noise_dbm: float = _quantity(-50.0, "noise power", "dBm", "IV-B", -200.0, 50.0)
-    frequency_hz: float = _quantity(2.4e9, "centre frequency", "Hz", "IV-B", 1e6, 1e12)
-    failure_fraction: float = _quantity(
-        0.0, "failure fraction", "of the team", NEW, 0.0, 0.9, "robots that fail half-way"
+    sinr_threshold_db: float = _number(1.0, "SINR threshold", "dB", -30.0, 60.0)
+    noise_dbm: float = _number(-50.0, "noise power", "dBm", -200.0, 50.0)
+    frequency_hz: float = _number(2.4e9, "centre frequency", "Hz", 1e6, 1e12)
+    failure_fraction: float = _number(
+        0.0, "failure fraction", "of the team", 0.0, 0.9, "robots that fail half-way", source=NEW
     )
     arena: str = setting(
         OPEN,

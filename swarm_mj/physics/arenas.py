@@ -51,10 +51,8 @@ def arena_of(mission: Mission) -> Arena | None:
         raise ValueError(f"arena {name} is a directory; name an MJCF file in it")
     if Path(name).suffix or os.sep in name:
         raise ValueError(f"arena {name}: there is no such file")
-    raise ValueError(
-        f"arena must be one of {', '.join(ARENAS)}, or an MJCF file, not {name!r}"
-        f"{did_you_mean(name, ARENAS)}"
-    )
+    known = f"one of {', '.join(ARENAS)}, or an MJCF file"
+    raise ValueError(f"arena must be {known}, not {name!r}{did_you_mean(name, ARENAS)}")
 
 
 def notes_on(mission: Mission) -> list[str]:
@@ -122,9 +120,8 @@ def _from_file(spec: MjSpec, mission: Mission) -> None:
     idle = idle_obstacles(model, _reach_m(mission))
     if len(idle) == num_obstacles:
         name, where = next(iter(idle.items()))
-        raise ValueError(
-            f"arena {mission.arena}: no obstacle can do anything; {name} stands {where}"
-        )
+        said = f"no obstacle can do anything; {name} stands {where}"
+        raise ValueError(f"arena {mission.arena}: {said}")
     spec.nuser_geom = max(spec.nuser_geom, theirs.nuser_geom)  # or their losses would be cut off
     spec.attach(theirs, frame=spec.worldbody.add_frame(), prefix="arena/")
 
@@ -146,8 +143,7 @@ def _read(file: str) -> MjSpec:
 
 
 def _refused(file: str, error: ValueError) -> ValueError:
-    said = " ".join(str(error).split())
-    return ValueError(f"arena {file}: {said}")
+    return ValueError(f"arena {file}: {' '.join(str(error).split())}")
 
 
 def _reach_m(mission: Mission) -> float:
@@ -168,13 +164,8 @@ def _why_none(theirs: MjSpec) -> str:
 
 
 def _add(
-    spec: MjSpec,
-    material: str,
-    shape: str,
-    centre_m: tuple[float, float],
-    size_m: tuple[float, float],
+    spec: MjSpec, material: str, shape: str, centre_m: tuple[float, ...], size_m: tuple[float, ...]
 ) -> None:
-    """Add an upright obstacle."""
     if spec.material(material) is None:
         spec.add_material(name=material, rgba=COLOURS[material])
     spec.worldbody.add_geom(

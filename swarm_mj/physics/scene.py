@@ -49,17 +49,11 @@ def num_substeps(mission: Mission) -> int:
 def compose(
     mission: Mission, start: RobotStates | None = None, *, scene: Scene | None = None
 ) -> MjSpec:
-    """Return the arena at the mission's size with its N robots, ready to compile.
+    """Return the editable model of the arena at the mission's size with its N robots.
 
-    Args:
-        mission: Number of robots, area, bounds and physics.
-        start: Initial states of the first mission, for a file to look at in a viewer. Without it,
-            all robots stand at the origin until `Physics.place` moves them.
-        scene: Changes the arena with the robots in it. Its geoms stop robots in `contact` physics
-            only, because `exact` physics has no collisions.
-
-    Returns:
-        The editable model; with a start, also its keyframe `start`.
+    A start, of the first mission, is for viewers, and is also the keyframe `start`. Without it, all
+    robots stand at the origin until `Physics.place` moves them. A scene changes the arena with the
+    robots in it; its geoms stop robots in `contact` physics only, as `exact` has no collisions.
 
     Raises:
         ValueError: The scene added, took away or renamed joints or actuators.
@@ -140,19 +134,14 @@ def _scale_arena(spec: MjSpec, mission: Mission) -> None:
     repeats = mission.side_m * SQUARES_PER_M
     spec.material("floor").texrepeat = [repeats, repeats]
     spec.camera("top").pos = [0.0, 0.0, CAMERA_HEIGHT_PER_SIDE * mission.side_m]
-    across = half + 2 * WALL_THICKNESS_M
+    centre, across = half + WALL_THICKNESS_M, half + 2 * WALL_THICKNESS_M
     for name, x, y in (("east", 1, 0), ("west", -1, 0), ("north", 0, 1), ("south", 0, -1)):
         wall = spec.geom(f"wall_{name}")
         if not mission.has_walls:
             spec.delete(wall)
             continue
-        centre = half + WALL_THICKNESS_M
         wall.pos = [x * centre, y * centre, WALL_HEIGHT_M]
-        wall.size = [
-            WALL_THICKNESS_M if x else across,
-            WALL_THICKNESS_M if y else across,
-            WALL_HEIGHT_M,
-        ]
+        wall.size = [*(WALL_THICKNESS_M if axis else across for axis in (x, y)), WALL_HEIGHT_M]
 
 
 def _fit_robot(robot: MjSpec, mission: Mission) -> None:

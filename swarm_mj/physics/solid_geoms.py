@@ -6,7 +6,6 @@ A static geom of group `OBSTACLE_GROUP` is an obstacle. Its penetration loss is 
 """
 
 import numpy as np
-from jaxtyping import Float
 from mujoco._functions import mj_kinematics
 from mujoco._structs import MjData, MjModel
 
@@ -73,7 +72,8 @@ def idle_obstacles(model: MjModel, reach_m: float) -> dict[str, str]:
     """
     found, idle = obstacles_of(model), {}
     for o, g in enumerate(obstacle_geoms(model)):
-        half_m = np.abs(found.rotation[o]) @ _half_sides_m(int(found.kind[o]), found.size_m[o])
+        # Of the box around it that MuJoCo keeps, in the obstacle's frame; a ball may be narrower.
+        half_m = np.abs(found.rotation[o]) @ model.geom_aabb[g, 3:]
         half_m = np.minimum(half_m, found.reach_m[o])
         name = f"geom {model.geom(g).name or f'number {g}'}"
         off_m = np.abs(found.centre_m[o] - [0.0, 0.0, ROBOT_HEIGHT_M]) - half_m
@@ -83,18 +83,6 @@ def idle_obstacles(model: MjModel, reach_m: float) -> dict[str, str]:
             side = "above" if found.centre_m[o, 2] > ROBOT_HEIGHT_M else "below"
             idle[name] = f"{side} the robots, which are {ROBOT_HEIGHT_M:g} m above the floor"
     return idle
-
-
-def _half_sides_m(kind: int, size_m: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
-    """Return half the sides of the box around an obstacle, in its own frame [m]."""
-    radius_m, length_m = size_m[0], size_m[1]
-    if kind == SPHERE:
-        return np.full(3, radius_m)
-    if kind == CAPSULE:
-        return np.array([radius_m, radius_m, radius_m + length_m])
-    if kind == CYLINDER:
-        return np.array([radius_m, radius_m, length_m])
-    return size_m
 
 
 def loss_db_of(model: MjModel, g: int) -> float:
@@ -109,8 +97,6 @@ def loss_db_of(model: MjModel, g: int) -> float:
     if model.nuser_geom > 0 and model.geom_user[g, 0] != 0.0:  # 0 where a geom has none
         loss_db = float(model.geom_user[g, 0])
     if not (np.isfinite(loss_db) and loss_db >= 0.0):
-        name = model.geom(g).name or f"number {g}"
-        raise ValueError(
-            f"the penetration loss of geom {name} must be 0 dB or more, not {loss_db:g}"
-        )
+        geom = f"geom {model.geom(g).name or f'number {g}'}"
+        raise ValueError(f"the penetration loss of {geom} must be 0 dB or more, not {loss_db:g}")
     return loss_db

@@ -46,9 +46,8 @@ class Physics:
         except ValueError as error:  # MuJoCo's, in several lines
             if scene is None:
                 raise
-            raise ValueError(
-                f"the scene does not compile: {' '.join(str(error).split())}"
-            ) from error
+            said = " ".join(str(error).split())
+            raise ValueError(f"the scene does not compile: {said}") from error
         self._batch = batch.Batch(self._model, num_missions, num_threads)
         shape = (num_missions, mission.num_robots, 2)
         self._qpos = self._batch.bind("qpos").reshape(shape)
@@ -93,10 +92,7 @@ class Physics:
         self._states = replace(self._states, is_active=is_active)
 
     def step(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> RobotStates:
-        """Move all robots through one window (Eq. 15).
-
-        Args:
-            acceleration_mps2: u, clipped to plus or minus A_max [m/s²].
+        """Move all robots through one window, with u clipped to plus or minus A_max (Eq. 15).
 
         Raises:
             ValueError: There is not one finite acceleration per robot.
@@ -112,10 +108,8 @@ class Physics:
         """Raise ValueError unless there is one finite vector per robot."""
         expected = self._states.position_m.shape
         if np.shape(given) != expected:
-            raise ValueError(
-                f"{what} must have shape {expected}, missions by robots by axes, "
-                f"not {np.shape(given)}"
-            )
+            shape = f"{expected}, missions by robots by axes"
+            raise ValueError(f"{what} must have shape {shape}, not {np.shape(given)}")
         first = _first_not_finite(given)
         if first >= 0:
             b, i, _ = np.unravel_index(first, expected)
@@ -126,20 +120,10 @@ class Physics:
 
     def _step_exact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
         self._batch.step()
-        position_m, velocity_mps = _kick(
-            self._qpos,
-            self._qvel,
-            self._ctrl,
-            acceleration_mps2,
-            self._mission.window_s,
-            self._mission.max_acceleration_mps2,
-            self._mission.max_velocity_mps,
-            self._mission.half_side_m,
-            self._wall,
-        )
-        self._states = RobotStates(
-            position_m=position_m, velocity_mps=velocity_mps, is_active=self._states.is_active
-        )
+        mission, worlds = self._mission, (self._qpos, self._qvel, self._ctrl)
+        limits = mission.max_acceleration_mps2, mission.max_velocity_mps, mission.half_side_m
+        moved = _kick(*worlds, acceleration_mps2, mission.window_s, *limits, self._wall)
+        self._states = replace(self._states, position_m=moved[0], velocity_mps=moved[1])
 
     def _step_contact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
         if self._rests and not np.any(self._qvel) and not np.any(acceleration_mps2):

@@ -27,15 +27,10 @@ KNOWN = np.zeros((0, 0))  # instead of curves: powers are known but for the posi
 
 
 def decode_curves(rician_k: float = NO_FADING, success: float = 1.0) -> Curves:
-    """Return the probability that a packet decodes.
+    """Return the probability that a packet decodes, if one of enough power does with `success`.
 
-    Args:
-        rician_k: Of the fades, linear; 0 is Rayleigh [1].
-        success: Probability that a packet of enough power decodes at all [1].
-
-    Returns:
-        It, for standard deviations of the believed power from 0 to `MAX_STD_DB`, and for ratios r
-        of the SINR to the threshold from 0 to infinity, evenly spaced in r / (1 + r).
+    Rows are standard deviations of the believed power from 0 to `MAX_STD_DB`. Columns are ratios r
+    of the SINR to the threshold from 0 to infinity, evenly spaced in r / (1 + r).
     """
     share = np.arange(NUM_RATIOS + 1) / NUM_RATIOS
     with np.errstate(divide="ignore"):
@@ -74,21 +69,12 @@ def _fade_exceeds(margin_db: Float[np.ndarray, "M"], rician_k: float) -> Float[n
     if rician_k > MANY:
         z = (np.sqrt(least) - 1.0) * math.sqrt(2.0 * rician_k)
         return np.array([0.5 * math.erfc(value / math.sqrt(2.0)) for value in z.tolist()])
-    return _rician_exceeds(least, rician_k)
-
-
-def _rician_exceeds(least: Float[np.ndarray, "M"], rician_k: float) -> Float[np.ndarray, "M"]:
-    """Return the Marcum Q function Q_1, as a mixture of Poisson's distributions."""
+    # The Marcum Q function Q_1, as a mixture of Poisson's distributions.
     count = np.arange(int(rician_k + 12.0 * math.sqrt(rician_k) + 30.0))
     log_factorial = np.array([math.lgamma(n + 1.0) for n in count.tolist()])
-    of_sight = np.exp(-rician_k + _times_log(count, rician_k) - log_factorial)
+    no_sight = np.where(count == 0, 0.0, -np.inf)  # as 0^0 is 1
+    log_power = count * math.log(rician_k) if rician_k > 0.0 else no_sight
+    of_sight = np.exp(-rician_k + log_power - log_factorial)
     y = ((1.0 + rician_k) * least)[:, None]
     of_scatter = np.exp(-y + count * np.log(y) - log_factorial)
     return np.cumsum(of_scatter, axis=1) @ of_sight
-
-
-def _times_log(count: np.ndarray, value: float) -> np.ndarray:
-    """Return the logarithms of the powers of a value that may be 0, whose power 0 is 1."""
-    if value == 0.0:
-        return np.where(count == 0, 0.0, -np.inf)
-    return count * math.log(value)

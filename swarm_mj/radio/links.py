@@ -50,12 +50,8 @@ def links_between(
 ) -> Links:
     """Return the links between robots at believed positions.
 
-    Args:
-        radio: The mission's.
-        position_m: Where the robots are believed to be [m].
-        spread_m: Standard deviation of that belief; None: the positions are true [m].
-        is_known: Who is believed to be anywhere; None: everyone. The others hear nothing and are
-            not heard.
+    Each belief has a standard deviation `spread_m`; None: the positions are true. Robots that are
+    not known to be anywhere hear nothing and are not heard; None: everyone is known.
     """
     apart_m = position_m[:, None] - position_m[None, :]
     distance_m = np.maximum(np.sqrt(np.sum(apart_m**2, axis=2)), MIN_DISTANCE_M)

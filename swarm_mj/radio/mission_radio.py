@@ -121,11 +121,8 @@ def mission_radio(
 ) -> MissionRadio:
     """Return a mission's channel, belief and truth.
 
-    Args:
-        mission: Its numbers, and what it grants.
-        obstacles: Of its scene.
-        own: A user's channel in place of the mission's. Belief stays that of the mission, and truth
-            is free space: nothing else is known of such a channel.
+    A user's own channel takes the place of the mission's. Belief stays that of the mission, and
+    truth is free space: nothing else is known of such a channel.
     """
     radio = radio_of(mission)
     law, reception, shadowing_db = _law(mission, radio), _reception(mission), mission.shadowing_db
@@ -137,9 +134,7 @@ def mission_radio(
             shadowing_db=shadowing_db,
             shadowing_distance_m=mission.shadowing_distance_m,
         )
-    truth = TrueLinks(
-        radio=radio, channel=channel if isinstance(channel, ComposedChannel) else None
-    )
+    composed = channel if isinstance(channel, ComposedChannel) else None
     known = obstacles if mission.grants("map") else NO_OBSTACLES
     belief = Belief(radio=radio)
     if mission.beyond_free_space and mission.grants("statistics"):
@@ -148,7 +143,7 @@ def mission_radio(
     elif len(known.kind) > 0:
         everyone_mw = np.full(mission.num_robots, radio.received_at_1_m_mw)
         belief = Belief(radio=radio, law=PowerLaw(everyone_mw, obstacles=known))
-    return MissionRadio(channel, belief, truth)
+    return MissionRadio(channel, belief, TrueLinks(radio=radio, channel=composed))
 
 
 def by_robot(mission: Mission, default_mw: float) -> Float[np.ndarray, "N"]:

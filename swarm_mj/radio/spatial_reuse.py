@@ -87,15 +87,14 @@ def write_joined(
             if believes_as_the_last(believed_m[b], is_known[b], i):
                 has_joined[b, i] = has_joined[b, i - 1]
                 continue
-            belief = _Belief(believed_m[b, i], at_1_m, FREE_SPACE, threshold)
-            slot = _silent_slot(num_robots)
+            has_joined[b, i] = 0.0
             if is_known[b, i, owner]:
-                _join(owner, belief, slot)
+                belief = _Belief(believed_m[b, i], at_1_m, FREE_SPACE, threshold)
                 unknown = np.flatnonzero(~is_known[b, i][asked])
                 num_asked = unknown[0] if len(unknown) > 0 else num_robots
-                _join_in_turn(asked[:num_asked], NOBODY, belief, slot, None, b)
-            for k in range(num_robots):
-                has_joined[b, i, k] = slot.is_sender[k]
+                is_sender = _senders(owner, asked[:num_asked], NOBODY, belief, None, b)
+                for k in range(num_robots):
+                    has_joined[b, i, k] = is_sender[k]
 
 
 @compiled()
@@ -126,14 +125,10 @@ def keep_joined(
 ) -> None:
     """Leave those among the senders who send by the rule and their own beliefs.
 
-    Args:
-        believed_m: Where robot i believes the others to be [m].
-        order: In which the robots take turns.
-        turn: Whose turn it is, by place in the order, mod N.
-        range_m: Distance at which a lone transmission just decodes [m].
-        threshold: Least SINR that decodes, linear [1].
-        is_sending: Who may send; overwritten by who does. The owner of the turn always does.
-        known: Powers by the law that all believe in, written in place; None is free space.
+    Robots take turns in this order, whose place `turn` (mod N) owns the slot, and sends in any
+    case. Robot i believes the others to be in places [b, i]. A lone transmission just decodes at
+    the range, with an SINR of the threshold, linear [1]. Known powers are by the law that all
+    believe in, and written in place; None is free space.
     """
     num_missions, num_robots = order.shape
     at_1_m = threshold * range_m * range_m
@@ -144,7 +139,7 @@ def keep_joined(
             if i != owner and is_sending[b, i]:
                 power = FREE_SPACE if known is None else _powers_for(believed_m[b, i], known, b)
                 belief = _Belief(believed_m[b, i], at_1_m, power, threshold)
-                is_sending[b, i] = _joins(i, owner, asked, belief, known, b)
+                is_sending[b, i] = _senders(owner, asked, i, belief, known, b)[i]
         is_sending[b, owner] = True
 
 
@@ -155,37 +150,25 @@ def _asked(order: Int[np.ndarray, "N"], turn: int) -> Int[np.ndarray, "N"]:
 
 
 @compiled()
-def _joins(
-    i: int,
+def _senders(
     owner: int,
-    asked: Int[np.ndarray, "N"],
-    belief: _Belief,
-    known: KnownPowers | None,
-    b: int,
-) -> bool:
-    """Return whether robot i joins the owner of the turn, by the rule and its own beliefs."""
-    slot = _silent_slot(asked.shape[0])
-    if known is not None:
-        _compute(owner, known, b)
-        _compute(i, known, b)
-    _join(owner, belief, slot)
-    # A robot that may not join the owner alone may not join it with others either.
-    if not _may_join(i, belief, slot):
-        return False
-    _join_in_turn(asked, i, belief, slot, known, b)
-    return slot.is_sender[i]
-
-
-@compiled()
-def _join_in_turn(
     asked: Int[np.ndarray, "A"],
     last: int,
     belief: _Belief,
-    slot: _Slot,
     known: KnownPowers | None,
     b: int,
-) -> None:
-    """Let robots join, one after the other, up to the `last`."""
+) -> Bool[np.ndarray, "N"]:
+    """Return who sends: the owner of the turn, and who joins it up to the `last` that is asked."""
+    num_robots = belief.believed_m.shape[0]
+    is_sender = np.zeros(num_robots, dtype=np.bool_)
+    slot = _Slot(is_sender, np.zeros(num_robots), np.zeros(num_robots))
+    if known is not None:
+        _compute(owner, known, b)
+        _compute(last, known, b)
+    _join(owner, belief, slot)
+    # A robot that may not join the owner alone may not join it with others either.
+    if last != NOBODY and not _may_join(last, belief, slot):
+        return is_sender
     for k in asked:
         # A sender that is asked again may not join either: nobody would gain by it.
         if known is not None and slot.signal[k] == 0.0:
@@ -194,6 +177,7 @@ def _join_in_turn(
             _join(k, belief, slot)
         if k == last:
             break
+    return is_sender
 
 
 @compiled()
@@ -213,11 +197,6 @@ def _compute(k: int, known: KnownPowers, b: int) -> None:
     if not known.is_done[b, k]:
         write_powers(k, known.believed_m[b], known.law, known.power[b, k])
         known.is_done[b, k] = True
-
-
-@compiled()
-def _silent_slot(num_robots: int) -> _Slot:
-    return _Slot(np.zeros(num_robots, dtype=np.bool_), np.zeros(num_robots), np.zeros(num_robots))
 
 
 @compiled()

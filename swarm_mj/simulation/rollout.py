@@ -55,12 +55,8 @@ class Summary:
 def rollout(swarm: Swarm, policy: Policy | None = None) -> Iterator[WindowRecord]:
     """Fly the missions, one window at a time, for the caller to watch, record or break off.
 
-    Args:
-        swarm: At the start of its missions.
-        policy: Is started; None is the one that was started already.
-
-    Yields:
-        The costs of each window; the swarm stands at the end of that window.
+    The policy is started; None is the one that was started already. When a window's costs are
+    yielded, the swarm stands at the end of that window.
 
     Raises:
         ValueError: The swarm has flown already, or no policy was started.
@@ -77,10 +73,7 @@ def rollout(swarm: Swarm, policy: Policy | None = None) -> Iterator[WindowRecord
 
 
 def summarise(flown: Iterable[WindowRecord]) -> Summary:
-    """Return the costs of the windows flown.
-
-    Args:
-        flown: One or more windows, in order; `rollout` itself will do.
+    """Return the costs of the windows flown, in order; `rollout` itself will do.
 
     Raises:
         ValueError: No window was flown.

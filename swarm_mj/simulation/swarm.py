@@ -17,12 +17,7 @@ from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
 from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
-from swarm_mj.protocol.buffers import (
-    Buffers,
-    empty_buffers,
-    grant_start,
-    observe_self,
-)
+from swarm_mj.protocol.buffers import Buffers, empty_buffers, grant_start, observe_self
 from swarm_mj.protocol.checks import check_robots
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
 from swarm_mj.protocol.local_views import LocalViews
@@ -54,16 +49,11 @@ class Swarm:
         scene: str | Scene | None = None,
         num_threads: int = 1,
     ) -> None:
-        """Place the robots and start all missions.
+        """Place the robots and start all missions, each from its own seed.
 
-        Args:
-            mission: The numbers of every mission.
-            seeds: One per mission; its length is B.
-            channel: Who decodes whom, as an object or `module:Name`, like the next two; the
-                mission's own unless given.
-            controller: What drives the robots; that of the mission's task unless given.
-            scene: Adds obstacles to the arena, which all missions share; none unless given.
-            num_threads: MuJoCo's own.
+        Channel, controller and scene are objects or `module:Name`; unless given, they are the
+        mission's own, and no obstacles are added. All missions share a scene. The threads are
+        MuJoCo's.
 
         Raises:
             ValueError: No seed, a negative one, no connected team could be drawn, or the scene
@@ -80,20 +70,17 @@ class Swarm:
         self.scene = own.scene
         self._physics = Physics(mission, len(seeds), scene=own.scene, num_threads=num_threads)
         self._obstacles = self._physics.obstacles
-        radio = mission_radio(mission, self._obstacles, own.channel)
-        self.channel, self.belief, self._truth = radio
-        self.controller: Controller = (
-            controller_of(mission) if own.controller is None else own.controller
+        self.channel, self.belief, self._truth = mission_radio(
+            mission, self._obstacles, own.channel
         )
+        is_tasks = own.controller is None
+        self.controller: Controller = controller_of(mission) if is_tasks else own.controller
         self._costed = costed(self.controller)
         self._num_missions = len(seeds)
         self.restart(seeds)
 
     def restart(self, seeds: Sequence[int]) -> None:
-        """Start all missions anew; a policy must then be started, too.
-
-        Args:
-            seeds: One per mission, as many as before.
+        """Start all missions anew, as many as before; a policy must then be started, too.
 
         Raises:
             ValueError: Not as many seeds, a negative one, or no connected team could be drawn.
@@ -126,12 +113,13 @@ class Swarm:
         mission, channel = self.mission, self.channel
         has_obstacles = len(self._obstacles.kind) > 0
         is_asked = isinstance(channel, ComposedChannel)
+        connects = partial(channel.largest_part, mission=b) if is_asked else None
         return connected_positions(
             mission.num_robots,
             mission.half_side_m,
             mission.range_m,
             rng,
-            partial(channel.largest_part, mission=b) if is_asked else None,
+            connects,
             self._is_blocked if has_obstacles or mission.collide else None,
             keeps_largest=has_obstacles,
         )
@@ -196,8 +184,7 @@ class Swarm:
     def step(self, policy: Policy | None = None) -> WindowCosts:
         """Fly one window: the policy decides, the robots move, then they talk.
 
-        Args:
-            policy: Is started if it is new to these missions; None is the one that was started.
+        A policy that is new to these missions is started; None is the one that was started.
 
         Raises:
             ValueError: No policy was started.
@@ -208,10 +195,7 @@ class Swarm:
         return self._play(self.policy.window(self.mission), self.decide)
 
     def step_with_recipients(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
-        """Fly one window of Alg. 1 with these recipients.
-
-        Args:
-            recipient: Whom each robot addresses; itself is silence.
+        """Fly one window of Alg. 1 with these recipients; itself is silence.
 
         Raises:
             ValueError: A recipient is no robot, or there is not one per robot; nothing has moved.
@@ -233,9 +217,8 @@ class Swarm:
         def decide_after(phases: tuple[Phase, ...]) -> np.ndarray:
             if phases:  # a later slot is decided by its own clock, and knows the earlier one
                 self.phases, self.now = phases, start + len(phases) * SLOT_WINDOWS
-            recipient = np.asarray(decide())
-            shape = self.buffers.shape
-            check_robots("recipient", recipient, shape, may_broadcast=window.is_broadcast)
+            recipient, may_broadcast = np.asarray(decide()), window.is_broadcast
+            check_robots("recipient", recipient, self.buffers.shape, may_broadcast=may_broadcast)
             return recipient
 
         survivors, is_due = self._survivors, start[0] >= self.mission.failure_window
@@ -243,14 +226,8 @@ class Swarm:
             self._physics.deactivate(survivors)
         self.phases = window(self.buffers, decide_after, self.move, self.channel, start)
         self.now = start + 1.0
-        return window_costs(
-            self.buffers,
-            self.states,
-            self.phases,
-            self.now,
-            is_broadcast=window.is_broadcast,
-            task_cost=self._task_cost(),
-        )
+        flown, cost = (self.buffers, self.states, self.phases, self.now), self._task_cost()
+        return window_costs(*flown, is_broadcast=window.is_broadcast, task_cost=cost)
 
     def _task_cost(self) -> TaskCost | None:
         """Return what the task costs now, where the controller has a cost."""

@@ -30,20 +30,6 @@ def test_a_mission_sees_what_its_generator_alone_gives(draw, alone, shape):
             assert (drawn[t, b] == alone(rng, shape)).all()
 
 
-@pytest.mark.parametrize("draw", [uniform, normal])
-def test_the_missions_beside_it_do_not_matter(draw):
-    together = take(Stream(generators(SEEDS), draw, (3,)))
-    reversed_ = take(Stream(generators(SEEDS[::-1]), draw, (3,)))
-    assert (together == reversed_[:, ::-1]).all()
-    for b, seed in enumerate(SEEDS):
-        assert (together[:, [b]] == take(Stream(generators([seed]), draw, (3,)))).all()
-
-
-def test_no_number_comes_twice():
-    drawn = take(Stream(generators([0, 1]), uniform, (4,)))
-    assert len(np.unique(drawn)) == drawn.size
-
-
 def test_the_laws_of_the_draws():
     rng = np.random.default_rng(0)
     flat, bell = uniform(rng, (200, 200)), normal(rng, (200, 200))

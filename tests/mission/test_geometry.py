@@ -13,7 +13,6 @@ from swarm_mj.mission.geometry import (
     gather_connected,
     overlaps_earlier,
     spanning_tree,
-    squared_distance,
 )
 
 # On a line, 10 m apart but for a gap, as robots 3, 0, 4, 1, 2: the middle one is robot 4.
@@ -23,10 +22,6 @@ LINE_PARENT = [4, 4, 1, 0, ROOT]
 
 def teams_of(seed, num_robots, num_missions=1):
     return np.random.default_rng(seed).uniform(-500, 500, size=(num_missions, num_robots, 2))
-
-
-def test_a_distance_by_hand():
-    assert squared_distance(np.array([[1.0, 1.0], [4.0, 5.0]]), 0, 1) == 25.0
 
 
 @given(seed=st.integers(0, 2**32 - 1), num_robots=st.integers(1, 30))
@@ -83,17 +78,6 @@ def test_iv_c_root_is_a_centre_of_the_tree(seed, num_robots):
         while parent[reached] != ROOT:
             reached, hops = parent[reached], hops + 1
             assert hops <= radius
-
-
-def test_iv_c_every_mission_has_its_own_tree():
-    teams_m = teams_of(0, 12, num_missions=4)
-    alone = np.concatenate([spanning_tree(teams_m[b : b + 1]) for b in range(4)])
-    np.testing.assert_array_equal(spanning_tree(teams_m), alone)
-
-
-def test_iv_c_robots_at_one_place_still_form_a_tree():
-    (parent,) = spanning_tree(np.zeros((1, 6, 2)))
-    assert nx.is_tree(graph_of(parent))
 
 
 def test_who_overlaps_a_robot_before_it():

@@ -30,18 +30,12 @@ def algebraic_connectivity(graph):
 
 # Integers make the boundary case, two robots at exactly the range, exact.
 @given(position_m=points, range_m=st.integers(1, 9))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_connected_as_the_algebraic_connectivity_says(position_m, range_m):
     connected = is_connected(np.array(position_m, dtype=float), float(range_m))
     graph = disk_graph(position_m, range_m)
     assert connected == nx.is_connected(graph)
     assert connected == (algebraic_connectivity(graph) > 1e-10)
-
-
-def test_the_range_itself_is_in_range():
-    pair = np.array([[0.0, 0.0], [150.0, 200.0]])
-    assert is_connected(pair, 250.0)
-    assert not is_connected(pair, 249.999)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from swarm_mj.mission import PAPERS, PRESETS, WORLDS, paper, reference
+from swarm_mj.mission import PRESETS, WORLDS, paper, reference
 from swarm_mj.mission.presets import where_flown
 from swarm_mj.physics.solid_geoms import LOSS_DB
 from swarm_mj.radio.free_space import path_loss_db
@@ -40,13 +40,6 @@ def test_only_a_flock_flies_without_walls(preset):
     assert not preset("flocking").has_walls
     assert preset("flocking", boundary="reflect").has_walls
     assert not preset("random-walk", boundary="none").has_walls
-
-
-def test_presets_go_by_name():
-    assert PRESETS["paper"]("stationary") == paper("stationary")
-    assert PRESETS["reference"]("stationary") == reference("stationary")
-    assert set(PAPERS) == {"paper", "reference"}
-    assert set(PRESETS) == {"paper", "reference", "indoor", "urban", "open-field"}
 
 
 OTHER = {

@@ -26,10 +26,6 @@ def obstacles(mission):
     return obstacles_of(compose(mission).compile())
 
 
-def test_the_open_arena_is_the_papers():
-    assert len(obstacles(paper()).kind) == 0
-
-
 @pytest.mark.parametrize(("arena", "num"), [("blocks", 25), ("forest", 100)])
 def test_40_robots_have_so_many_obstacles_on_their_square_kilometre(arena, num):
     assert len(obstacles(paper(arena=arena)).kind) == num

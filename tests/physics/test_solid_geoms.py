@@ -64,8 +64,3 @@ def test_a_mesh_is_the_box_around_it():
     assert found.kind.tolist() == [BOX]
     np.testing.assert_allclose(off.min(axis=0), -found.size_m[0], atol=1e-6)
     np.testing.assert_allclose(off.max(axis=0), found.size_m[0], atol=1e-6)
-
-
-def test_a_scene_without_obstacles_has_none():
-    found = obstacles_of(compiled("<geom size='1'/>"))
-    assert all(len(part) == 0 for part in found)

@@ -71,28 +71,19 @@ def assert_same_states(one, other):
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
-def test_eq15_exact_with_mirror_walls(ratio):
-    off_m, off_mps, num_hits = worst_deviation(crowded(velocity_ratio=ratio), "mirror")
-    assert num_hits > 50
-    assert off_m < 1e-9
-    assert off_mps < 1e-9
-
-
-@pytest.mark.parametrize("ratio", RATIOS)
-def test_eq15_exact_with_the_reference_presets_walls(ratio):
-    """The authors' code puts a robot that crossed the wall onto it, and flips its velocity."""
-    mission = crowded(preset=reference, velocity_ratio=ratio)
-    off_m, off_mps, num_hits = worst_deviation(mission, "clip")
-    assert num_hits > 50
-    assert off_m < 1e-9
-    assert off_mps < 1e-9
-
-
-@pytest.mark.parametrize("ratio", RATIOS)
-@pytest.mark.parametrize("preset", [paper, reference])
-def test_eq15_exact_in_the_open(ratio, preset):
-    mission = crowded(preset=preset, velocity_ratio=ratio, boundary="none")
-    off_m, off_mps, _ = worst_deviation(mission, "open")
+@pytest.mark.parametrize(
+    ("at_wall", "fields"),
+    [
+        ("mirror", {}),
+        ("clip", {"preset": reference}),  # onto the wall that it crossed
+        ("open", {"boundary": "none"}),
+        ("open", {"preset": reference, "boundary": "none"}),
+    ],
+)
+def test_eq15_exact(at_wall, fields, ratio):
+    mission = crowded(velocity_ratio=ratio, **fields)
+    off_m, off_mps, num_hits = worst_deviation(mission, at_wall)
+    assert num_hits > 50 or at_wall == "open"
     assert off_m < 1e-9
     assert off_mps < 1e-9
 
@@ -106,19 +97,6 @@ def test_eq15_position_moves_with_the_old_velocity():
     np.testing.assert_allclose(first.velocity_mps, 2.0, rtol=1e-12)
     np.testing.assert_allclose(second.position_m, 0.3, rtol=1e-12)
     np.testing.assert_allclose(second.velocity_mps, 3.0, rtol=1e-12)
-
-
-@pytest.mark.parametrize("axis", [0, 1])
-@pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_iv_a_wall_mirrors_one_axis(axis, side):
-    """By hand: at 3 m/s, from 0.1 m before a wall at 50 m to 0.2 m before it, on the way back."""
-    p, v = np.zeros((1, NUM_ROBOTS, 2)), np.zeros((1, NUM_ROBOTS, 2))
-    p[..., axis], v[..., axis] = side * 49.9, side * 3.0
-    (body,) = flown(crowded(), p, v, [np.zeros_like(p)])
-    np.testing.assert_allclose(body.position_m[..., axis], side * 49.8, rtol=1e-12)
-    np.testing.assert_allclose(body.velocity_mps[..., axis], side * -3.0, rtol=1e-12)
-    np.testing.assert_array_equal(body.position_m[..., 1 - axis], 0.0)
-    np.testing.assert_array_equal(body.velocity_mps[..., 1 - axis], 0.0)
 
 
 class NoSteps:
@@ -156,21 +134,6 @@ def test_acceleration_that_is_not_finite_changes_nothing(physics, value):
     assert worlds.states is states[-1]
     states += [worlds.step(u) for u in wanted[3:]]
     assert_same_states(states, flown(mission, p, v, wanted))
-
-
-@pytest.mark.parametrize("physics", MODES)
-def test_worlds_are_independent(physics):
-    """Each mission alone flies as it does beside the others, bit by bit."""
-    mission = crowded(physics)
-    p, v, wanted = drawn(mission, 50)
-    together = flown(mission, p, v, wanted)
-    for b in range(0, NUM_MISSIONS, 2):
-        alone = flown(mission, p[b : b + 1], v[b : b + 1], wanted[:, b : b + 1])
-        beside = [
-            RobotStates(position_m=s.position_m[b : b + 1], velocity_mps=s.velocity_mps[b : b + 1])
-            for s in together
-        ]
-        assert_same_states(alone, beside)
 
 
 @pytest.mark.parametrize("physics", MODES)
@@ -267,23 +230,6 @@ def test_eq15_contact_deviates_by_the_shape_of_the_window_only(ratio):
         assert np.abs(lag_m).max() <= limit_m + 1e-9
 
 
-@pytest.mark.parametrize("ratio", RATIOS)
-def test_eq15_contact_deviation_is_bounded_until_the_first_wall(ratio):
-    mission = crowded("contact", velocity_ratio=ratio)
-    p, v, wanted = drawn(mission, 500)
-    limit_m = 2 * mission.max_velocity_mps * 0.1 * 11 / 20
-    # Where neither path can have crossed the wall at 50 m, not even within the window.
-    inside_m = 50.0 - limit_m - mission.max_velocity_mps * 0.1
-    is_untouched = np.abs(p) < inside_m
-    num_compared = 0
-    for u, body in zip(wanted, flown(mission, p, v, wanted), strict=True):
-        p, v, _ = eq15(mission, p, v, u, "mirror")
-        is_untouched &= np.abs(p) < inside_m
-        assert np.abs(body.position_m - p)[is_untouched].max(initial=0.0) <= limit_m + 1e-9
-        num_compared += is_untouched.sum()
-    assert num_compared > 1000
-
-
 def wall_across(spec, _mission):
     spec.worldbody.add_geom(name="across", type=mjtGeom.mjGEOM_BOX, size=[5.0, 500.0, 5.0])
 
@@ -324,11 +270,6 @@ def collided(*states):
     for _ in range(20):
         after = worlds.step(np.zeros((1, len(states), 2)))
     return after.velocity_mps[0], now[0, :, 2:]
-
-
-def test_robots_of_equal_mass_that_meet_head_on_exchange_their_velocities():
-    after, _ = collided((0.0, 0.0, 2.0, 0.0), (4.0, 0.0, -1.0, 0.0))
-    np.testing.assert_allclose(after, [[-1.0, 0.0], [2.0, 0.0]], atol=1e-3)
 
 
 def test_a_collision_keeps_momentum_and_energy_and_what_is_across():

@@ -11,7 +11,6 @@ from swarm_mj.mission.placement import draw_survivors
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.buffers import Buffers, empty_buffers
-from swarm_mj.protocol.costs import mean_hops
 from swarm_mj.protocol.window import transmit, window
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.rollout import rollout
@@ -135,25 +134,6 @@ def test_who_is_off_learns_nothing_and_is_heard_by_nobody(preset, name):
         before = copies(swarm.buffers)
     assert num_heard > 20
     assert num_lost > 0  # nobody was told: some go on addressing them
-
-
-@pytest.mark.parametrize("name", ["mst", "random-flooding"])
-def test_costs_are_those_of_who_is_active(name):
-    """Eq. 10, Eq. 17 and hops at the end of each window, by plain loops."""
-    for swarm, flown in flight(small("flocking"), name):
-        if flown is None:
-            continue
-        is_active = swarm.states.is_active
-        for b in range(len(SEEDS)):
-            on = [i for i in range(8) if is_active is None or is_active[b, i]]
-            timestamp = swarm.buffers.timestamp[b]
-            ages = [swarm.now[b] - timestamp[i, j] for i in on for j in on]
-            assert flown.costs.age_windows[b] == pytest.approx(sum(ages) / len(on) ** 2)
-            assert flown.costs.is_complete[b] == all(timestamp[i, j] > 0 for i in on for j in on)
-            velocity_mps = swarm.states.velocity_mps[b, on]
-            variance = sum(np.sum((v - velocity_mps.mean(axis=0)) ** 2) for v in velocity_mps)
-            assert flown.costs.velocity_variance_m2ps2[b] == pytest.approx(variance / len(on))
-        np.testing.assert_array_equal(flown.hops, mean_hops(swarm.buffers, swarm.states.is_active))
 
 
 @pytest.mark.parametrize("name", POLICIES)

@@ -1,4 +1,3 @@
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -123,12 +122,6 @@ def test_flight_is_the_missions_windows_step_by_step():
         np.testing.assert_array_equal(window.costs.age_windows, costs.age_windows)
         np.testing.assert_array_equal(window.hops, mean_hops(by_hand.buffers))
     assert num_flown == 12
-
-
-def test_flight_can_be_broken_off():
-    swarm, policy = small_flight()
-    assert len(list(itertools.islice(rollout(swarm, policy), 5))) == 5
-    np.testing.assert_array_equal(swarm.now, 5.0)
 
 
 def test_windows_of_a_flight_keep_their_costs():

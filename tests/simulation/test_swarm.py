@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from channels import to_nobody
 
-from swarm_mj.control.motion import initial_velocity
 from swarm_mj.mission import paper, reference
 from swarm_mj.mission.placement import is_connected
 from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy, DecentralisedPolicy
@@ -67,12 +66,6 @@ def test_a_mission_depends_on_its_seed_alone(name, task, preset, physics):
     assert not np.array_equal(alone[0], restarted[0])
 
 
-def test_missions_side_by_side_differ():
-    swarm = Swarm(small(), [1, 2, 1])
-    np.testing.assert_array_equal(swarm.states.position_m[0], swarm.states.position_m[2])
-    assert not np.any(swarm.states.position_m[0] == swarm.states.position_m[1])
-
-
 @pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize("physics", MODES)
 def test_every_policy_meets_the_same_missions(preset, physics):
@@ -101,29 +94,6 @@ class Silent(DecentralisedPolicy):
 
     def recipients(self, views):
         return views.silence.copy()
-
-
-def test_policy_draws_apart_from_placement_and_motion():
-    """Over 400 seeds, their first numbers have nothing to do with each other.
-
-    From one state they would be equal: so the policy's generator is asked for what placement draws
-    first, a uniform number, and for what the walk draws first, a normal one.
-    """
-    num_missions = 400
-    mission = paper(
-        "random-walk", num_robots=2, range_ratio=10.0, velocity_ratio=5.0, boundary="none"
-    )
-    swarm, policy = Swarm(mission, list(range(num_missions))), Silent()
-    placed, start_mps = swarm.states.position_m[:, 0, 0], swarm.states.velocity_mps
-    swarm.start(policy)
-    by_policy = [rng.random() for rng in policy.rngs]
-    swarm.move()
-    walked = (swarm.states.velocity_mps - start_mps)[:, 0, 0]
-    swarm.restart(list(range(num_missions)))
-    swarm.start(policy)
-    by_policy_normal = [rng.standard_normal() for rng in policy.rngs]
-    correlation = np.corrcoef([placed, walked, by_policy, by_policy_normal])
-    assert np.abs(correlation[:2, 2:]).max() < 4 / num_missions**0.5
 
 
 def test_iv_b_start_is_connected_inside_and_known_to_nobody_else():
@@ -218,16 +188,6 @@ class Script(DecentralisedPolicy):
         return next(self._recipients)
 
 
-class ScriptTwice(BroadcastPolicy):
-    """Reads off a list who transmits, twice per window."""
-
-    def __init__(self, transmitters):
-        self._transmitters = iter(transmitters)
-
-    def transmits(self, views):
-        return views.silence == next(self._transmitters)
-
-
 @pytest.mark.parametrize("preset", PRESETS)
 def test_exchange_is_a_window_of_a_policy_that_chose_these_recipients(preset):
     mission = small("random-walk", preset)
@@ -241,23 +201,6 @@ def test_exchange_is_a_window_of_a_policy_that_chose_these_recipients(preset):
         np.testing.assert_array_equal(given.phases[0].recipient, recipient)
         assert_same(vars(given.buffers).values(), vars(chosen.buffers).values())
         np.testing.assert_array_equal(given.states.position_m, chosen.states.position_m)
-
-
-@pytest.mark.parametrize("physics", MODES)
-def test_iv_a_a_flock_can_be_walled_in(physics):
-    """At 20 m/s for 30 s a flock of 450 m by 450 m leaves its area, unless given a boundary."""
-    farthest_m = {}
-    for boundary in ("reflect", "none"):
-        mission = small(physics=physics, boundary=boundary)
-        swarm, policy = Swarm(mission, [1, 2]), make_policy("round-robin", mission)
-        reached_m = [0.0]
-        for _ in range(300):
-            swarm.step(policy)
-            reached_m.append(np.abs(swarm.states.position_m).max())
-        farthest_m[boundary] = max(reached_m)
-    half_side_m = 500.0 * (8 / 40) ** 0.5
-    assert farthest_m["reflect"] <= half_side_m + 0.5  # the radius of a body
-    assert farthest_m["none"] > half_side_m + 50.0
 
 
 def silence_of(num_missions, num_robots):
@@ -286,20 +229,6 @@ def test_alg1_exchange_by_hand():
     assert costs.age_windows[0] == pytest.approx(1.0 - timestamp.mean())
 
 
-def test_iv_c_flooding_by_hand():
-    """Robot 0 sends, then robot 1: the second packet passes the first one's news on, unanswered."""
-    mission = small("random-walk", range_ratio=10.0)
-    swarm = Swarm(mission, [1])
-    costs = swarm.step(ScriptTwice([0, 1]))
-    timestamp = np.diag(np.full(8, 1.0))
-    timestamp[1:, 0] = 0.5
-    timestamp[[0, *range(2, 8)], 1] = 1.0
-    np.testing.assert_array_equal(swarm.buffers.timestamp[0], timestamp)
-    assert not np.any(swarm.buffers.last_attempt)  # a broadcast has no addressee
-    assert costs.packets.sent == costs.packets.heard == 2
-    assert costs.packets.receptions == 7 + 7
-
-
 @pytest.mark.parametrize(("preset", "own_attempt"), [(paper, 0.0), (reference, 0.5)])
 def test_eq7_silence_is_an_attempt_in_the_reference_preset_only(preset, own_attempt):
     swarm = Swarm(small(preset=preset), [1])
@@ -322,35 +251,6 @@ def test_eq6_channel_is_exchangeable():
     assert np.all(swarm.buffers.timestamp[:, np.arange(8) != 5, 5] == 0.5)
     is_own_or_5 = np.eye(8, dtype=bool) | (np.arange(8) == 5)
     np.testing.assert_array_equal(swarm.buffers.is_known, np.stack([is_own_or_5] * 2))
-
-
-@pytest.mark.parametrize("preset", PRESETS)
-def test_eq16_a_robot_does_not_react_to_one_it_has_not_heard(preset, monkeypatch):
-    """Two flocks that differ in robot 7's velocity alone, and nobody hears robot 7."""
-
-    def all_but_7_hear_0(position_m, recipient):
-        heard = to_nobody(position_m, recipient)
-        heard[:, 1:7] = np.where(recipient[:, :1] != 0, 0, heard[:, 1:7])
-        return heard
-
-    def with_a_slower_robot_7(mission, rng):
-        velocity_mps = initial_velocity(mission, rng)
-        velocity_mps[7] /= 2.0
-        return velocity_mps
-
-    ends = []
-    for start_of in (initial_velocity, with_a_slower_robot_7):
-        monkeypatch.setattr("swarm_mj.simulation.swarm.initial_velocity", start_of)
-        swarm = Swarm(small(preset=preset), [1, 2], channel=all_but_7_hear_0)
-        start_mps = swarm.states.velocity_mps
-        for _ in range(NUM_WINDOWS):
-            recipient = silence_of(2, 8).copy()
-            recipient[:, 0] = 1
-            swarm.step_with_recipients(recipient)
-        ends.append(swarm.states.velocity_mps)
-    assert np.all(start_mps[:, 1:7] != ends[0][:, 1:7])  # they did react to robot 0
-    np.testing.assert_array_equal(ends[0][:, :7], ends[1][:, :7])
-    assert np.all(ends[0][:, 7] != ends[1][:, 7])
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -532,13 +432,6 @@ def test_policies_are_told_of_the_channel_by_their_kind_before_they_start(known,
     assert not robots.had_begun
     swarm.step(centre)
     assert centre.told.channel is swarm.channel
-
-
-def test_a_users_channel_is_told_to_nobody():
-    swarm, centre = Swarm(small("stationary"), [1], channel=to_nobody), ToldTheTruth()
-    swarm.step(centre)
-    assert centre.told.channel is None
-    assert swarm.belief.law is None
 
 
 def test_a_policy_must_be_started_first():
