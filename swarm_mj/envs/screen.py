@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from swarm_mj.envs.mission_batch import MissionBatch
-from swarm_mj.replay.footage import contents_of
+from swarm_mj.replay.footage import footage_now
 from swarm_mj.replay.rendering.scene import SceneRenderer
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class Screen:
             from swarm_mj.replay.rendering.viewer import SceneViewer
 
             self._viewer = SceneViewer(batch.mission, scene=batch.flown.scene)
-        self._viewer.show(contents_of(batch.flown))
+        self._viewer.show(footage_now(batch.flown))
         time.sleep(max(0.0, self._shown_s + batch.mission.window_s - time.monotonic()))
         self._shown_s = time.monotonic()
 
@@ -55,10 +55,10 @@ class Screen:
         """
         if self.mode != "rgb_array":
             return None
-        contents = contents_of(batch.flown, index)
+        footage = footage_now(batch.flown, index)
         if self._renderer is None:
             self._renderer = SceneRenderer(batch.mission, WIDTH, HEIGHT, scene=batch.flown.scene)
-        return self._renderer.frame(contents)
+        return self._renderer.frame(footage)
 
     def close(self) -> None:
         """Give back what pictures took."""

@@ -1,6 +1,6 @@
 """Beside the map: the ego robot's tree, the age matrix, the radio's state lanes, and plots."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from swarm_mj.mission.geometry import ROOT, spanning_tree
 from swarm_mj.replay import palette
 from swarm_mj.replay.mismatch import LinkMismatch
-from swarm_mj.replay.packets import PacketLinks, is_other, transmitters
+from swarm_mj.replay.packets import is_other, transmitters
 from swarm_mj.replay.palette import Colour
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog
@@ -39,33 +39,36 @@ def dendrogram(
     parent: Int[np.ndarray, "T N"], is_known: Bool[np.ndarray, "T N"], root: int
 ) -> Float[np.ndarray, "T N 2"]:
     """Place robots by depth [hops] and height, 0 to 1, in the root's tree P; nan if unknown."""
-    place = np.full((*parent.shape, 2), np.nan)
-    is_child = is_known & (np.arange(parent.shape[1]) != root)
-    for parents, known, its in zip(parent.tolist(), is_child, place, strict=True):
-        _place(parents, np.flatnonzero(known).tolist(), root, its)
-    return place
+    found = np.full((*parent.shape, 2), np.nan)
+    for parents, known, place in zip(parent.tolist(), is_known, found, strict=True):
+        others = (k for k in reversed(np.flatnonzero(known).tolist()) if k != root)
+        order, children = walk(parents, others, root)
+        place[root, 0] = 0.0
+        for j in order[1:]:
+            place[j, 0] = place[parents[j], 0] + 1.0
+        leaves = [j for j in order if j not in children]
+        place[leaves, 1] = np.linspace(0.0, 1.0, len(leaves)) if len(leaves) > 1 else 0.5
+        for j in reversed(order):  # a parent stands amid its children, which come before it
+            if j in children:
+                place[j, 1] = np.mean(place[children[j], 1])
+    return found
 
 
-def _place(
-    parent: Sequence[int], known: Sequence[int], root: int, place: Float[np.ndarray, "N 2"]
-) -> None:
-    """Walk depth first, so that subtrees stay together; a parent stands amid its children."""
+def walk(
+    parent: Sequence[int], robots: Iterable[int], root: int
+) -> tuple[list[int], dict[int, list[int]]]:
+    """Return the root and robots in depth-first order, so that subtrees stay together.
+
+    Also return the robots' children, of whom the last comes first in the order.
+    """
     children: dict[int, list[int]] = {}
-    for k in known:
+    for k in robots:
         children.setdefault(parent[k], []).append(k)
-    depth, order, stack = {root: 0.0}, [], [root]
+    order, stack = [], [root]
     while stack:
-        j = stack.pop()
-        order.append(j)
-        stack.extend(reversed(children.get(j, [])))
-        depth.update((k, depth[j] + 1.0) for k in children.get(j, []))
-    leaves = [j for j in order if j not in children]
-    height = {j: float(rank) for rank, j in enumerate(leaves)}
-    for j in reversed(order):  # children before parents
-        if j in children:
-            height[j] = sum(height[k] for k in children[j]) / len(children[j])
-    for j in order:
-        place[j] = (depth[j], height[j] / (len(leaves) - 1) if len(leaves) > 1 else 0.5)
+        order.append(stack.pop())
+        stack.extend(children.get(order[-1], []))
+    return order, children
 
 
 def draw_age_matrix(out: RerunLog, full_scale: float) -> None:
@@ -74,7 +77,8 @@ def draw_age_matrix(out: RerunLog, full_scale: float) -> None:
     So neighbours stand together, and clusters show as blocks.
     """
     log = out.log
-    order = walk(spanning_tree(log.position_m[:1])[0])
+    parent = spanning_tree(log.position_m[:1])[0].tolist()
+    order = walk(parent, range(len(parent)), ROOT)[0][1:]
     ages = np.minimum(log.age[:, order][:, :, order], full_scale).astype(np.float16)
     # Reversed, so that bright is fresh as on the map.
     out.fixed("ages", rr.Tensor.from_fields(value_range=[full_scale, 0.0]))
@@ -86,21 +90,12 @@ def draw_age_matrix(out: RerunLog, full_scale: float) -> None:
     out.timed("ages", [rr.ComponentColumn(name, rr.AnyBatchValue(name, column))], log.age_window)
 
 
-def walk(parent: Int[np.ndarray, "N"]) -> Int[np.ndarray, "N"]:
-    """Return robots in the order of a depth-first walk from the tree's root."""
-    stack = [int(np.flatnonzero(parent == ROOT)[0])]
-    order: list[int] = []
-    while stack:
-        order.append(stack.pop())
-        stack.extend(np.flatnonzero(parent == order[-1]).tolist())
-    return np.array(order)
-
-
 def draw_states(out: RerunLog) -> None:
     """Draw a lane per robot: what it did with the radio, logged when it changes."""
     states, state = radio_states(out.log)
     names = np.array(list(states))
     colours = np.array(list(states.values()), dtype=np.uint8)
+    # Silence is hidden: lanes would otherwise be full of it.
     configuration = rr.StateConfiguration(
         values=names, labels=names, visible=names != "silent", colors=colours
     )
@@ -145,102 +140,102 @@ class PlotCurve(NamedTuple):
     name: str
     colour: Colour
     values: np.ndarray
-    std: np.ndarray | None = None
+    std: np.ndarray | float = 0.0  # the half width of a band around it
     window: np.ndarray | None = None  # of each value; None: all of the log's
     is_hidden: bool = False  # it would dwarf the others; the viewer can show it
 
 
-class Plot(NamedTuple):
-    """Curves over the mission on a common axis."""
+def plots(log: Log) -> dict[str, list[PlotCurve]]:
+    """Return the plots of age, packets, mismatched links and the task's cost, as far as apply.
 
-    name: str  # says what the curves are: a legend would cover them
-    curves: list[PlotCurve]
-
-
-def plots(log: Log, packets: dict[str, PacketLinks]) -> list[Plot]:
-    """Return the plots of age, packets, mismatched links and the task's cost, as far as apply."""
+    Their names say what the curves are: a legend would cover them.
+    """
     own = f"r{log.ego}"
-    ages = [
-        PlotCurve("age/mean", "team, mean ± std", palette.MEAN_AGE, log.age_mean, log.age_std),
-        PlotCurve("age/worst", "worst pair", palette.WORST_AGE, log.age_max, is_hidden=True),
-        PlotCurve("age/ego", f"{own}, mean", palette.EGO, np.mean(log.ego_age, axis=1)),
-    ]
-    found = [Plot(f"Age of information [windows]: team ± std (green), {own} (white)", ages)]
-    found.append(_packet_plot(log, packets))
-    if log.mismatch is not None:
-        found.append(_mismatch_plot(log, log.mismatch))
-    if (cost := log.task_cost) is not None:
-        found.append(_cost_plot(cost.name, cost.unit, cost.value))
-    elif log.has_motion:
-        found.append(_cost_plot("velocity variance", "m²/s²", log.velocity_variance_m2ps2))
-    return found
-
-
-def _packet_plot(log: Log, packets: dict[str, PacketLinks]) -> Plot:
+    found = {
+        f"Age of information [windows]: team ± std (green), {own} (white)": [
+            PlotCurve("age/mean", "team, mean ± std", palette.MEAN_AGE, log.age_mean, log.age_std),
+            PlotCurve("age/worst", "worst pair", palette.WORST_AGE, log.age_max, is_hidden=True),
+            PlotCurve("age/ego", f"{own}, mean", palette.EGO, np.mean(log.ego_age, axis=1)),
+        ]
+    }
+    counts, named = packet_counts(log), "delivered (green), lost (orange), answered (blue)"
     if log.is_broadcast:
-        sent, heard = broadcast_counts(log)
-        counts = {"sent": (palette.SENT, sent), "heard": (palette.BROADCAST, heard)}
         named = "sent (grey), heard by anyone (blue)"
-    else:
-        fates = ("delivered", "lost", "overheard", "answered")
-        num = len(log.window)
-        counts = {
-            fate: (getattr(palette, fate.upper()), np.bincount(packets[fate].row, minlength=num))
-            for fate in fates
-        }
-        named = "delivered (green), lost (orange), answered (blue)"
-    curves = [
+    found[f"Packets in {RATE_WINDOWS} windows: {named}"] = [
         PlotCurve(f"radio/{name}", name, colour, rate(count), is_hidden=name == "overheard")
         for name, (colour, count) in counts.items()
     ]
-    return Plot(f"Packets in {RATE_WINDOWS} windows: {named}", curves)
+    if log.mismatch is not None:
+        named = "believed, too weak (red); works, unbelieved (green); cut off (white)"
+        found[f"Share [%]: {named}"] = _mismatch_curves(log, log.mismatch)
+    name, unit, cost = "velocity variance", "m²/s²", log.velocity_variance_m2ps2
+    if log.task_cost is not None:
+        name, unit, cost = log.task_cost.name, log.task_cost.unit, log.task_cost.value
+    if log.task_cost is not None or log.has_motion:
+        title = f"{name[:1].upper()}{name[1:]} [{unit}]"
+        found[title] = [PlotCurve("task/cost", name, palette.VARIANCE, cost)]
+    return found
 
 
-def broadcast_counts(log: Log) -> tuple[Int[np.ndarray, "T"], Int[np.ndarray, "T"]]:
-    """Count the broadcasts sent in each window, and those that any robot decoded."""
+def packet_counts(log: Log) -> dict[str, tuple[Colour, Int[np.ndarray, "T"]]]:
+    """Return the colours and each window's numbers of packets by fate.
+
+    Broadcasts are sent, and heard if any robot decoded them.
+    """
+    if not log.is_broadcast:
+        fates = ("delivered", "lost", "overheard", "answered")
+        num = len(log.window)
+        return {
+            fate: (
+                getattr(palette, fate.upper()),
+                np.bincount(log.packets[fate].row, minlength=num),
+            )
+            for fate in fates
+        }
     row, phase, hearer = np.nonzero(is_other(log.heard))
     is_heard = np.zeros(log.heard.shape, dtype=bool)
     is_heard[row, phase, log.heard[row, phase, hearer]] = True
-    return np.sum(is_other(log.recipient), axis=(1, 2)), np.sum(is_heard, axis=(1, 2))
+    sent, heard = (np.sum(each, axis=(1, 2)) for each in (is_other(log.recipient), is_heard))
+    return {"sent": (palette.SENT, sent), "heard": (palette.BROADCAST, heard)}
 
 
-def _mismatch_plot(log: Log, mismatch: LinkMismatch) -> Plot:
-    at = mismatch.window - log.window[0]
-    num = {
-        kind: np.bincount(links.row, minlength=len(at)) for kind, links in mismatch.by_kind.items()
-    }
-    none = np.zeros(len(log.window), dtype=int)
-    num_believed = (none if log.num_believed is None else log.num_believed)[at]
-    num_working = (none if log.num_working is None else log.num_working)[at]
-    num_others, num_cut_off = np.sum(log.is_on[at], axis=1) - 1, np.sum(log.is_cut_off[at], axis=1)
+def _mismatch_curves(log: Log, mismatch: LinkMismatch) -> list[PlotCurve]:
+    at, none = mismatch.window - log.window[0], np.zeros(len(log.window), dtype=int)
+    is_too_weak, row = mismatch.links["is_too_weak"], mismatch.links["row"]
+    num_weak, num_works = (
+        np.bincount(row[which], minlength=len(at)) for which in (is_too_weak, ~is_too_weak)
+    )
+    believed, working = (
+        (none if num is None else num)[at] for num in (log.num_believed, log.num_working)
+    )
+    others, cut_off = np.sum(log.is_on[at], axis=1) - 1, np.sum(log.is_cut_off[at], axis=1)
     shares = {
-        "believed, too weak": (palette.TOO_WEAK, num["too_weak"], num_believed),
-        "works, unbelieved": (palette.UNBELIEVED, num["unbelieved"], num_working),
-        f"cut off from r{log.ego}": (palette.EGO, num_cut_off, num_others),
+        "believed, too weak": (palette.TOO_WEAK, num_weak, believed),
+        "works, unbelieved": (palette.UNBELIEVED, num_works, working),
+        f"cut off from r{log.ego}": (palette.EGO, cut_off, others),
     }
-    curves = []
-    for name, (colour, part, of) in shares.items():
-        percent, path = 100.0 * part / np.maximum(1, of), "world/" + name.replace(" ", "_")
-        curves.append(PlotCurve(path, name, colour, percent, window=mismatch.window))
-    named = "believed, too weak (red); works, unbelieved (green); cut off (white)"
-    return Plot(f"Share [%]: {named}", curves)
+    return [
+        PlotCurve(
+            "world/" + name.replace(" ", "_"),
+            name,
+            colour,
+            100.0 * part / np.maximum(1, of),
+            window=mismatch.window,
+        )
+        for name, (colour, part, of) in shares.items()
+    ]
 
 
-def _cost_plot(name: str, unit: str, value: Float[np.ndarray, "T"]) -> Plot:
-    title = f"{name[:1].upper()}{name[1:]} [{unit}]"
-    return Plot(title, [PlotCurve("task/cost", name, palette.VARIANCE, value)])
-
-
-def draw_plots(out: RerunLog, shown: Sequence[Plot]) -> None:
+def draw_plots(out: RerunLog, shown: dict[str, list[PlotCurve]]) -> None:
     """Draw the curves of all plots."""
-    for curve in (curve for plot in shown for curve in plot.curves):
+    for curve in (curve for curves in shown.values() for curve in curves):
         path, style = f"plots/{curve.path}", {"colors": [curve.colour], "names": [curve.name]}
-        if curve.std is not None:
-            out.fixed(path, rr.Measurements.from_fields(widths=[2.0], **style))
-            columns = rr.Measurements.columns(values=curve.values, variances=curve.std**2)
-        else:
+        if isinstance(curve.std, float):
             out.fixed(path, rr.SeriesLines(widths=[1.6], **style))
             columns = rr.Scalars.columns(scalars=curve.values)
+        else:
+            out.fixed(path, rr.Measurements.from_fields(widths=[2.0], **style))
+            columns = rr.Measurements.columns(values=curve.values, variances=curve.std**2)
         out.timed(path, columns, curve.window)
 
 

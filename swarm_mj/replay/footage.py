@@ -1,21 +1,31 @@
 """The footage of a mission for pictures and videos, window by window, kept in replays."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Int16, UInt8
+from jaxtyping import Bool, Float, Int, Int16, Shaped, UInt8
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components, components_in
 from swarm_mj.physics.scene import Scene
 from swarm_mj.replay import palette
-from swarm_mj.replay.mismatch import LinkMismatch, coloured_lines, radio_snapshot
-from swarm_mj.replay.packets import PacketSegments, fates, packet_segments
-from swarm_mj.replay.recorder import Log
+from swarm_mj.replay.mismatch import (
+    NO_MISMATCH,
+    PIECES,
+    LinkMismatch,
+    by_kind,
+    divided,
+    ends,
+    of_robot,
+    shades,
+)
+from swarm_mj.replay.packets import PacketSegments, packet_segments
+from swarm_mj.replay.recorder import Log, Recorder
 from swarm_mj.simulation.swarm import Swarm
 
 NEAR = 1.5  # times the area: robots that stay within it are shown around the area
+AS_RECORDED = ("window", "position_m", "velocity_mps", "is_on", "is_cut_off", "age_mean", "scene")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +55,16 @@ def frame(position_m: Float[np.ndarray, "T N 2"], half_side_m: float) -> Ground:
     return Ground(centre_m=(low_m + high_m) / 2.0, reach_m=float(np.max(high_m - low_m)) / 2.0)
 
 
+def filmed_ground(position_m: Float[np.ndarray, "T N 2"], mission: Mission) -> Ground:
+    """Return the part of the ground that videos show: of an open area, where robots ever are."""
+    whole = frame(position_m, mission.half_side_m)
+    if whole.moves or mission.has_walls:
+        return whole
+    low_m, high_m = (end(position_m, axis=(0, 1)) for end in (np.min, np.max))
+    centre_m = np.tile((low_m + high_m) / 2.0, (len(position_m), 1))
+    return Ground(centre_m=centre_m, reach_m=max(1.0, float(np.max(high_m - low_m)) / 2.0))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Facts:
     """The constants of a mission."""
@@ -66,24 +86,6 @@ class Facts:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contents:
-    """One moment's N robots, L packets, S lines of mismatched links, and the ground shown."""
-
-    position_m: Float[np.ndarray, "N 2"]  # p [m]
-    velocity_mps: Float[np.ndarray, "N 2"]  # v; only its direction is drawn
-    colour: UInt8[np.ndarray, "N 3"]
-    observer: int  # the robot that is drawn larger
-    start_m: Float[np.ndarray, "L 2"]  # where packets begin and end [m]
-    end_m: Float[np.ndarray, "L 2"]
-    packet_colour: UInt8[np.ndarray, "L 3"]
-    lines_m: Float[np.ndarray, "S 2 2"]  # mismatched links, from start to end [m]
-    line_colour: UInt8[np.ndarray, "S 3"]
-    is_cut_off: Bool[np.ndarray, "N"]  # whether it can exchange no packets with the observer
-    centre_m: Float[np.ndarray, "2"]  # of the square [m]
-    reach_m: float  # half its side [m]
-
-
-@dataclass(frozen=True, kw_only=True)
 class Footage:
     """T windows of N robots."""
 
@@ -96,62 +98,49 @@ class Footage:
     segments: dict[str, PacketSegments]  # packets by their fate, in the order of drawing
     age_mean: Float[np.ndarray, "T"]  # Eq. 10 [windows]
     is_cut_off: Bool[np.ndarray, "T N"]  # whether it can exchange no packets with the observer
-    mismatch: LinkMismatch | None = None  # None in free space
+    ground: Ground  # that pictures show
+    mismatch: LinkMismatch = NO_MISMATCH
     scene: Scene | None = None  # what changed the arena; files have its name only
 
-    @cached_property
-    def frame(self) -> Ground:
-        """The part of the ground that is shown: of an open area, only where robots ever are."""
-        mission = self.facts.mission
-        whole = frame(self.position_m, mission.half_side_m)
-        if whole.moves or mission.has_walls:
-            return whole
-        low_m, high_m = (end(self.position_m, axis=(0, 1)) for end in (np.min, np.max))
-        centre_m = np.tile((low_m + high_m) / 2.0, (len(self.window), 1))
-        return Ground(centre_m=centre_m, reach_m=max(1.0, float(np.max(high_m - low_m)) / 2.0))
+    def colours(self, row: int) -> UInt8[np.ndarray, "N 3"]:
+        """Return the robots' colours in one window, counted from 0."""
+        facts = self.facts
+        age, is_on = self.age[row], self.is_on[row]
+        return palette.robot_colours(age, facts.full_scale, is_on, facts.observer)
 
-    def contents(self, row: int, full_scale: float | None = None) -> Contents:
-        """Return a moment's picture: the window, from 0, by a scale of ages [windows]."""
-        position_m, age, facts = self.position_m[row], self.age[row], self.facts
-        starts, ends = [np.zeros((0, 2))], [np.zeros((0, 2))]
-        colours = [np.zeros((0, 3), dtype=np.uint8)]
-        # The fates are in the order of drawing, so that what matters more covers the rest.
+    def packets(self, row: int) -> Iterator[tuple[np.ndarray, np.ndarray, palette.Colour]]:
+        """Yield one window's starts [L 2] and ends [L 2] of packets [m], and their colour.
+
+        The fates are in the order of drawing, so that what matters more covers the rest.
+        """
         for fate, drawn in self.segments.items():
-            first, last = np.searchsorted(drawn.row, [row, row + 1])
-            starts.append(drawn.start_m[first:last])
-            ends.append(drawn.end_m[first:last])
-            colour = np.array(palette.PACKETS[fate][0], dtype=np.uint8)
-            colours.append(np.tile(colour, (last - first, 1)))
-        lines_m, line_colour = coloured_lines(self.mismatch_at(row), position_m, facts.observer)
-        scale = facts.full_scale if full_scale is None else full_scale
-        return Contents(
-            position_m=position_m,
-            velocity_mps=self.velocity_mps[row],
-            colour=palette.robot_colours(
-                np.nan_to_num(age), scale, ~np.isnan(age), self.is_on[row], facts.observer
-            ),
-            observer=facts.observer,
-            start_m=np.concatenate(starts),
-            end_m=np.concatenate(ends),
-            packet_colour=np.concatenate(colours),
-            lines_m=lines_m,
-            line_colour=line_colour,
-            is_cut_off=self.is_cut_off[row],
-            centre_m=self.frame.centre_m[row],
-            reach_m=self.frame.reach_m,
-        )
+            its = slice(*np.searchsorted(drawn.row, [row, row + 1]))
+            yield drawn.start_m[its], drawn.end_m[its], palette.PACKETS[fate][0]
 
-    def mismatch_at(self, row: int) -> LinkMismatch | None:
-        """Return the links that differ from the belief in one window, counted from 0."""
-        return None if self.mismatch is None else self.mismatch.at(int(self.window[row]))
+    def links(self, row: int) -> Shaped[np.ndarray, "K"]:
+        """Return the links that are shown in one window: of those too weak, the observer's only.
+
+        In a city, all of them together would not show which robots each one joins.
+        """
+        links = self.mismatch.at(int(self.window[row]))
+        return links[of_robot(links, self.facts.observer) | ~links["is_too_weak"]]
+
+    def mismatch_lines(
+        self, row: int
+    ) -> tuple[Float[np.ndarray, "S 2 2"], UInt8[np.ndarray, "S 3"]]:
+        """Return the lines of one window's links [m], and their colours."""
+        lines_m, colours = [], []
+        for kind, links in by_kind(self.links(row)).items():
+            lines_m.append(divided(ends(links, self.position_m, row), PIECES[kind]))
+            colours.append(np.repeat(shades(kind, links), len(PIECES[kind]), axis=0))
+        return np.concatenate(lines_m), np.concatenate(colours)
 
     def shortfalls(self, row: int) -> tuple[Int16[np.ndarray, "K"], Int16[np.ndarray, "K"]]:
         """Return the robots whose links with the observer are too weak, and the margins [dB]."""
-        if (links := self.mismatch_at(row)) is None:
-            return np.zeros(0, np.int16), np.zeros(0, np.int16)
-        own = self.facts.observer
-        links = links.chosen(links.is_too_weak & links.of_robot(own))
-        return np.where(links.sender == own, links.receiver, links.sender), links.margin_db
+        links, own = self.links(row), self.facts.observer
+        links = links[links["is_too_weak"]]
+        is_sender = links["sender"] == own
+        return np.where(is_sender, links["receiver"], links["sender"]), links["margin_db"]
 
 
 def footage_of(
@@ -169,73 +158,30 @@ def footage_of(
     )
     return Footage(
         facts=facts,
-        window=log.window,
-        position_m=log.position_m,
-        velocity_mps=log.velocity_mps,
         age=log.known_age,
-        is_on=log.is_on,
         segments=packet_segments(log.packets, log.position_m),
-        age_mean=log.age_mean,
-        is_cut_off=log.is_cut_off,
-        mismatch=log.mismatch,
-        scene=log.scene,
+        ground=filmed_ground(log.position_m, mission),
+        mismatch=log.mismatch or NO_MISMATCH,
+        **{name: getattr(log, name) for name in AS_RECORDED},
     )
 
 
-def contents_of(
-    swarm: Swarm,
-    index: int = 0,
-    *,
-    observer: int = 0,
-    full_scale: float | None = None,
-) -> Contents:
-    """Return a picture of one of a swarm's missions now, with the window just flown.
+def footage_now(
+    swarm: Swarm, index: int = 0, *, observer: int = 0, full_scale: float | None = None
+) -> Footage:
+    """Return one of a swarm's missions as it is now, with the packets of the window just flown.
 
     Robots are coloured by what the observer knows of them, darkest from an age of `full_scale`
     windows on: the number of robots unless given, a round in which everyone has its turn. Raise
     ValueError if there is no such mission or robot.
     """
-    mission, states, buffers = swarm.mission, swarm.states, swarm.buffers
-    num = mission.num_robots
-    for what, value, end in (("index", index, len(swarm.now)), ("observer", observer, num)):
-        if not 0 <= value < end:
-            raise ValueError(f"{what} must be from 0 to {end - 1}, not {value}")
-    # A copy: the swarm writes its arrays in place, and the picture may be drawn later.
-    position_m = states.position_m[index].copy()
-    is_on = np.ones(num, bool) if states.is_active is None else states.is_active[index]
-    age = swarm.now[index] - buffers.timestamp[index, observer]
-    seen = radio_snapshot(swarm, index)
-    is_apart = np.zeros(num, bool) if seen is None else seen.group != seen.group[observer]
-    footage = Footage(
-        facts=Facts(
-            mission=mission,
-            policy="",
-            seed=0,
-            observer=observer,
-            is_broadcast=swarm.is_broadcast,
-            full_scale=full_scale or float(num),
-        ),
-        window=np.array([1]),
-        position_m=position_m[None],
-        velocity_mps=states.velocity_mps[[index]],
-        age=np.where(buffers.is_known[index, observer], age, np.nan)[None],
-        is_on=is_on[None],
-        segments=_last_packets(swarm, index),
-        age_mean=np.zeros(1),
-        is_cut_off=(is_on & is_on[observer] & is_apart)[None],
-        mismatch=None if seen is None else seen.mismatch,
-    )
+    if not 0 <= index < len(swarm.now):
+        raise ValueError(f"index must be from 0 to {len(swarm.now) - 1}, not {index}")
+    mission, recorder = swarm.mission, Recorder(swarm, ego=observer, index=index)
+    recorder.add()
+    seen = footage_of(recorder.log(), mission, "", 0)
+    facts = replace(seen.facts, full_scale=full_scale or float(mission.num_robots))
     # As wide wherever the team is: a live picture does not know where it will fly.
-    square = frame(footage.position_m, mission.half_side_m)
-    reach_m = max(mission.half_side_m, square.reach_m)
-    return replace(footage.contents(0), centre_m=square.centre_m[0], reach_m=reach_m)
-
-
-def _last_packets(swarm: Swarm, index: int) -> dict[str, PacketSegments]:
-    """Return the packets of one mission's last window; before the first one there are none."""
-    if not swarm.phases:
-        return {}
-    recipient = np.stack([[phase.recipient[index] for phase in swarm.phases]])
-    heard = np.stack([[phase.heard[index] for phase in swarm.phases]])
-    packets = fates(recipient, heard, is_broadcast=swarm.is_broadcast)
-    return packet_segments(packets, swarm.states.position_m[[index]])
+    ground = frame(seen.position_m, mission.half_side_m)
+    ground = replace(ground, reach_m=max(mission.half_side_m, ground.reach_m))
+    return replace(seen, facts=facts, ground=ground)

@@ -1,21 +1,33 @@
-"""The replay's layout: which view shows what, stored in the file as rerun's blueprint."""
+"""The replay's layout, stored as rerun's blueprint, and the map's legend: rerun has none."""
 
-from collections.abc import Sequence
+import itertools
+import re
 from typing import Any
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from swarm_mj.replay import legend, palette
-from swarm_mj.replay.arena import square_m
-from swarm_mj.replay.charts import TREE_HEIGHT, TREE_WIDTH, Plot
+from swarm_mj.replay import palette
+from swarm_mj.replay.charts import TREE_HEIGHT, TREE_WIDTH, PlotCurve
 from swarm_mj.replay.footage import Ground
+from swarm_mj.replay.mismatch import PIECES, WHOLE, by_kind
 from swarm_mj.replay.recorder import Log
-from swarm_mj.replay.rerun_log import TIMELINE
+from swarm_mj.replay.rerun_log import LAYERS, TIMELINE, RerunLog
+from swarm_mj.replay.stage import square_m
 
 WINDOWS_PER_SECOND = 30.0  # windows of 100 ms: three times as fast as the mission
 MARGIN = 1.06  # of the map, around what it must show
+
+WIDTH = 100.0  # of the legend's view, in units of its own, y down
+LEFT, RAMP = 4.0, 31.0  # where the ramp of ages begins, and how long it is
+COLUMN, ROW = 14.2, 8.4  # from one sample to the next, to the right of the ramp
+SAMPLE = 5.0  # the length of a sample
+RADII = {"radio/range": 2.0, "belief/ring": 0.8}  # of sampled rings
+LAST = 5.1  # the height of the last row, with its texts
+LINE = 1.9  # of a text's second line, which they have beyond free space only
+BELOW = 2.6  # from a sample to its text
+NUM_SHADES = 60
 
 
 class Layout(rrb.Blueprint):
@@ -31,19 +43,40 @@ class Layout(rrb.Blueprint):
         del self._stream
 
 
-def layout(log: Log, frame: Ground, shown: Sequence[Plot]) -> Layout:
+def layout(log: Log, frame: Ground, shown: dict[str, list[PlotCurve]]) -> Layout:
     """Return the blueprint: tabs of the mission, its scene, and the radio of every robot."""
     reach, follows = MARGIN * frame.reach_m, ", follows the team" if frame.moves else ""
-    name = f"Map, squares of {square_m(frame):g} m{follows}"
+    name, height = f"Map, squares of {square_m(frame):g} m{follows}", legend_height(log)
     ground = _drawing("/", name, (-reach, reach), (-reach, reach), contents=["/arena/**"])
-    height = legend.height(log)
-    samples = _drawing("/legend", "Legend", (0.0, legend.WIDTH), (-3.5, height), titlebar=False)
-    charts = [_tree_and_ages(log), *map(_plot, shown)]
+    samples = _drawing("/legend", "Legend", (0.0, WIDTH), (-3.5, height), titlebar=False)
+    across, up = ((-0.05 * size, 1.05 * size) for size in (TREE_WIDTH, TREE_HEIGHT))
+    ages = rrb.TensorView(
+        origin="/ages",
+        name="Age of information, all pairs",
+        scalar_mapping=rrb.TensorScalarMapping(colormap="Viridis", mag_filter="Nearest"),
+        view_fit="Fill",
+    )
+    tree_and_ages = rrb.Horizontal(
+        _drawing("/tree", f"Tree of r{log.ego}, in hops", across, up), ages
+    )
+    charts = [_plot(name, curves) for name, curves in shown.items()]
     mission = rrb.Horizontal(
-        rrb.Vertical(ground, samples, row_shares=[4, height / legend.TWO_ROWS]),
-        rrb.Vertical(*charts, row_shares=[4, *[3] * (len(charts) - 1)]),
+        rrb.Vertical(ground, samples, row_shares=[4, height / (ROW + LAST)]),
+        rrb.Vertical(tree_and_ages, *charts, row_shares=[4, *[3] * len(charts)]),
         column_shares=[11, 10],
         name="Mission",
+    )
+    scene = rrb.Spatial3DView(
+        origin="/",
+        contents=["/scene/**"],
+        name="Scene in 3-D, colours as on the map",
+        background=palette.BACKGROUND,
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(
+            position=(0.0, -1.35 * frame.reach_m, 1.75 * frame.reach_m),
+            look_target=(0.0, -0.12 * frame.reach_m, 0.0),
+            eye_up=(0.0, 0.0, 1.0),
+        ),
     )
     radio = rrb.Horizontal(
         rrb.StateTimelineView(origin="/state", name="Radio of every robot"),
@@ -51,11 +84,10 @@ def layout(log: Log, frame: Ground, shown: Sequence[Plot]) -> Layout:
         column_shares=[3, 1],
         name="Radio",
     )
+    time = {"timeline": TIMELINE, "fps": WINDOWS_PER_SECOND, "loop_mode": "all"}
     return Layout(
-        rrb.Tabs(mission, _space(frame), radio, active_tab=0),
-        rrb.TimePanel(
-            state="collapsed", timeline=TIMELINE, fps=WINDOWS_PER_SECOND, loop_mode="all"
-        ),
+        rrb.Tabs(mission, scene, radio, active_tab=0),
+        rrb.TimePanel(state="collapsed", **time),
         collapse_panels=True,
         auto_views=False,
     )
@@ -75,53 +107,90 @@ def _drawing(
     )
 
 
-def _space(frame: Ground) -> rrb.Spatial3DView:
-    reach = frame.reach_m
-    eye = rrb.EyeControls3D(
-        position=(0.0, -1.35 * reach, 1.75 * reach),
-        look_target=(0.0, -0.12 * reach, 0.0),
-        eye_up=(0.0, 0.0, 1.0),
-    )
-    return rrb.Spatial3DView(
-        origin="/",
-        contents=["/scene/**"],
-        name="Scene in 3-D, colours as on the map",
-        background=palette.BACKGROUND,
-        line_grid=False,
-        eye_controls=eye,
-    )
-
-
-def _tree_and_ages(log: Log) -> rrb.Horizontal:
-    """Return the ego robot's tree next to the ages of all pairs."""
-    width, height = ((-0.05 * size, 1.05 * size) for size in (TREE_WIDTH, TREE_HEIGHT))
-    matrix = rrb.TensorView(
-        origin="/ages",
-        name="Age of information, all pairs",
-        scalar_mapping=rrb.TensorScalarMapping(colormap="Viridis", mag_filter="Nearest"),
-        view_fit="Fill",
-    )
-    return rrb.Horizontal(_drawing("/tree", f"Tree of r{log.ego}, in hops", width, height), matrix)
-
-
-def _plot(plot: Plot) -> rrb.TimeSeriesView:
+def _plot(name: str, curves: list[PlotCurve]) -> rrb.TimeSeriesView:
     hidden: dict[Any, Any] = {
         f"/plots/{curve.path}": rrb.EntityBehavior(visible=False)
-        for curve in plot.curves
+        for curve in curves
         if curve.is_hidden
     }
-    top = palette.nice_top(
-        max(
-            float(np.max(curve.values if curve.std is None else curve.values + curve.std))
-            for curve in plot.curves
-            if not curve.is_hidden
-        )
-    )
+    seen = (curve.values + curve.std for curve in curves if not curve.is_hidden)
+    top = palette.nice_top(max(float(np.max(each)) for each in seen))
     return rrb.TimeSeriesView(
         overrides=hidden,
         axis_y=rrb.ScalarAxis(range=(0.0, 1.06 * top)),  # so that both ends have numbers
-        origin=f"/plots/{plot.curves[0].path.split('/')[0]}",
-        name=plot.name,
+        origin=f"/plots/{curves[0].path.split('/')[0]}",
+        name=name,
         plot_legend=rrb.PlotLegend(visible=False),  # it would cover curves; the name says the same
         background=rrb.archetypes.PlotBackground(color=palette.PLOT, show_grid=False),
     )
+
+
+def draw_legend(out: RerunLog, full_scale: float) -> None:
+    """Draw the ramp of ages, to `full_scale` [windows], and samples of what the map shows."""
+    edges = LEFT + np.linspace(0.0, RAMP, NUM_SHADES + 1)
+    strips = [[(a, 0.0), (b, 0.0)] for a, b in itertools.pairwise(edges)]
+    colours = palette.age_colours(np.linspace(0.0, full_scale, NUM_SHADES), full_scale)
+    out.fixed("legend/ramp", rr.LineStrips2D(strips, colors=colours, radii=-5.0))
+    texts = ["0", f"{full_scale / 2:g}", f"{full_scale:g} windows"]
+    _write(out, "legend/ages", texts, [(LEFT + at * RAMP, BELOW) for at in (0.0, 0.5, 0.95)])
+    about = f"age of what r{out.log.ego} knows"
+    _write(out, "legend/about_ages", [about], [(LEFT + 0.5 * RAMP, ROW)])
+    for row, samples in enumerate(_samples(out.log)):
+        for column, (text, layer) in enumerate(samples.items()):
+            x, y = LEFT + RAMP + (column + 0.9) * COLUMN, row * _row_height(out.log)
+            path = "legend/" + re.sub(r"\W", "_", text)
+            _draw_sample(out, path, layer, x, y)
+            _write(out, f"{path}/text", [text], [(x, y + BELOW)])
+
+
+def legend_height(log: Log) -> float:
+    """Return the height of the legend's view."""
+    return len(_samples(log)) * _row_height(log) - ROW + LAST
+
+
+def _row_height(log: Log) -> float:
+    return ROW if log.mismatch is None else ROW + LINE
+
+
+def _samples(log: Log) -> list[dict[str, str]]:
+    """Return rows of texts with their layers: the radio, what else is shown, mismatched links."""
+    own, mismatch = f"r{log.ego}", log.mismatch
+    others = {"heading": "heading", f"{own}'s belief": "belief/ring"} if log.has_motion else {}
+    others[f"{own}'s tree"] = "tree"
+    # Beyond free space, the circle is what the range would be.
+    reach = {"radio range" if mismatch is None else "range in\nfree space": "radio/range"}
+    if log.is_broadcast:
+        packets = {"transmits": "radio/transmitter", "is heard by": "radio/heard"}
+        rows = [packets | reach, others]
+    else:
+        fates = ("delivered", "lost", "answered", "overheard")
+        rows = [{fate: f"radio/{fate}" for fate in fates}, others | reach]
+    if mismatch is None:
+        return rows
+    texts = {"too_weak": "believed,\ntoo weak", "unbelieved": "works,\nunbelieved"}
+    found = {kind for kind, links in by_kind(mismatch.links).items() if len(links) > 0}
+    row = {text: f"world/{kind}" for kind, text in texts.items() if kind in found}
+    if np.any(log.is_cut_off):
+        row[f"cut off\nfrom {own}"] = "world/cut_off"
+    return [*rows, row] if row else rows
+
+
+def _draw_sample(out: RerunLog, path: str, name: str, x: float, y: float) -> None:
+    """Draw a layer's line, arrow, ring or point around a place."""
+    layer, radius, kind = LAYERS[f"arena/{name}"], RADII.get(name, 0.0), name.split("/")[-1]
+    share = palette.LOST_SHARE if name == "radio/lost" else 1.0
+    way = x + SAMPLE * (PIECES.get(kind, WHOLE) - 0.5)
+    shapes = {
+        rr.LineStrips2D: {"strips": [[(a, y), (b, y)] for a, b in way]},
+        rr.Arrows2D: {"origins": [(x - SAMPLE / 2, y)], "vectors": [(share * SAMPLE, 0.0)]},
+        rr.Ellipses2D: {"centers": [(x, y)], "half_sizes": [(radius, radius)]},
+        rr.Points2D: {"positions": [(x, y)]},
+    }
+    colour = {"colors": [palette.MISMATCH[kind]]} if kind in palette.MISMATCH else {}
+    out.fixed(path, layer.kind.from_fields(**layer.style, **colour, **shapes[layer.kind]))
+
+
+def _write(out: RerunLog, path: str, texts: list[str], places: list[tuple[float, float]]) -> None:
+    """Write texts as the labels of invisible points."""
+    style = {"show_labels": True, "radii": -0.1, "colors": [palette.TEXT]}
+    out.fixed(path, rr.Points2D.from_fields(positions=places, labels=texts, **style))

@@ -1,6 +1,6 @@
 """Packets of recorded windows: what became of each, and where it is drawn."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -11,13 +11,16 @@ SEGMENTS = 6  # straight pieces of an arc
 RISE = 0.22  # of an arc's top, by its span
 
 
-@dataclass(frozen=True, kw_only=True)
-class PacketLinks:
+class PacketLinks(NamedTuple):
     """L packets with the same fate, sorted by window."""
 
     row: Int[np.ndarray, "L"]  # the window, 0 to T - 1
     sender: Int[np.ndarray, "L"]
     receiver: Int[np.ndarray, "L"]
+
+    def chosen(self, which: Bool[np.ndarray, "L"]) -> "PacketLinks":
+        """Return some of the packets."""
+        return PacketLinks(*(column[which] for column in self))
 
     def ends(
         self, position_m: Float[np.ndarray, "T N 2"]
@@ -26,8 +29,7 @@ class PacketLinks:
         return position_m[self.row, self.sender], position_m[self.row, self.receiver]
 
 
-@dataclass(frozen=True, kw_only=True)
-class PacketSegments:
+class PacketSegments(NamedTuple):
     """L packets with the same fate as they are drawn, sorted by window."""
 
     row: Int[np.ndarray, "L"]
@@ -49,20 +51,20 @@ def fates(
     # A robot decodes at most one packet in a phase, so `heard` has every reception once.
     row, phase, hearer = np.nonzero(is_other(heard))
     speaker = heard[row, phase, hearer]
-    received = (row, speaker, hearer)
+    received = PacketLinks(row, speaker, hearer)
     if is_broadcast:
-        return {"heard": _chosen(received, np.ones(len(row), dtype=bool))}
+        return {"heard": received}
     is_overheard = recipient[row, phase, speaker] != hearer
     row, phase, sender = np.nonzero(is_other(recipient))
     receiver = recipient[row, phase, sender]
-    is_decoded = heard[row, phase, receiver] == sender
-    sent, is_request = (row, sender, receiver), phase == 0
+    is_decoded, is_request = heard[row, phase, receiver] == sender, phase == 0
+    sent = PacketLinks(row, sender, receiver)
     return {
-        "delivered": _chosen(sent, is_request & is_decoded),
-        "lost": _chosen(sent, is_request & ~is_decoded),
-        "overheard": _chosen(received, is_overheard),
-        "answered": _chosen(sent, ~is_request & is_decoded),
-        "unanswered": _chosen(sent, ~is_request & ~is_decoded),
+        "delivered": sent.chosen(is_request & is_decoded),
+        "lost": sent.chosen(is_request & ~is_decoded),
+        "overheard": received.chosen(is_overheard),
+        "answered": sent.chosen(~is_request & is_decoded),
+        "unanswered": sent.chosen(~is_request & ~is_decoded),
     }
 
 
@@ -86,8 +88,14 @@ def packet_segments(
     for fate in (fate for fate in palette.PACKETS if fate in packets):
         start_m, end_m = packets[fate].ends(position_m)
         end_m = start_m + palette.PACKETS[fate][1] * (end_m - start_m)
-        segments[fate] = PacketSegments(row=packets[fate].row, start_m=start_m, end_m=end_m)
+        segments[fate] = PacketSegments(packets[fate].row, start_m, end_m)
     return segments
+
+
+def lifted(at_m: Float[np.ndarray, "*S 2"], height_m: float) -> Float[np.ndarray, "*S 3"]:
+    """Return points at a height above the ground [m]."""
+    width = [(0, 0)] * (at_m.ndim - 1) + [(0, 1)]
+    return np.pad(at_m, width, constant_values=height_m)
 
 
 def arcs(
@@ -100,8 +108,3 @@ def arcs(
     height_m = base_m + 4.0 * RISE * span_m[:, None] * share * (1.0 - share)
     ground_m = start_m[:, None] + share[:, None] * (end_m - start_m)[:, None]
     return np.concatenate([ground_m, height_m[..., None]], axis=2)
-
-
-def _chosen(packets: tuple[np.ndarray, ...], which: Bool[np.ndarray, "P"]) -> PacketLinks:
-    row, sender, receiver = (column[which] for column in packets)
-    return PacketLinks(row=row, sender=sender, receiver=receiver)

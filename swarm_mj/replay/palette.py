@@ -71,32 +71,25 @@ _STALEST = 0.10  # the darkest end of viridis would vanish on the background
 
 
 def age_colours(
-    age_windows: Float[np.ndarray, "*S"], full_scale: float, is_known: Bool[np.ndarray, "*S"]
+    age_windows: Float[np.ndarray, "*S"], full_scale: float
 ) -> UInt8[np.ndarray, "*S 3"]:
-    """RGB of ages: bright yellow is fresh, dark violet is `full_scale` or older, grey unknown."""
-    freshness = 1.0 - (1.0 - _STALEST) * np.clip(age_windows / full_scale, 0.0, 1.0)
-    place = freshness * (len(_VIRIDIS) - 1)
+    """RGB of ages: yellow is fresh, dark violet is `full_scale` or older, grey is unknown (nan)."""
+    share = np.clip(np.nan_to_num(age_windows) / full_scale, 0.0, 1.0)
+    place = (1.0 - (1.0 - _STALEST) * share) * (len(_VIRIDIS) - 1)
     steps = np.arange(len(_VIRIDIS))
     rgb = np.stack([np.interp(place, steps, _VIRIDIS[:, c]) for c in range(3)], axis=-1)
-    rgb[~is_known] = UNKNOWN
+    rgb[np.isnan(age_windows)] = UNKNOWN
     return rgb.astype(np.uint8)
-
-
-def ramp(full_scale: float, num_shades: int) -> UInt8[np.ndarray, "S 3"]:
-    """Return the colours of ages from 0 to `full_scale`, for a legend."""
-    ages = np.linspace(0.0, full_scale, num_shades)
-    return age_colours(ages, full_scale, np.ones(num_shades, dtype=bool))
 
 
 def robot_colours(
     age_windows: Float[np.ndarray, "*T N"],
     full_scale: float,
-    is_known: Bool[np.ndarray, "*T N"],
     is_on: Bool[np.ndarray, "*T N"],
     ego: int,
 ) -> UInt8[np.ndarray, "*T N 3"]:
     """RGB of robots by the age of what the ego robot knows of them; it is white, dark ones off."""
-    colours = age_colours(age_windows, full_scale, is_known)
+    colours = age_colours(age_windows, full_scale)
     colours[..., ego, :] = EGO
     return np.where(is_on[..., None], colours, np.array(SWITCHED_OFF, np.uint8))
 

@@ -15,8 +15,8 @@ from jaxtyping import Float, Int
 from rerun.chunk import RrdReader
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.footage import Facts, Footage
-from swarm_mj.replay.mismatch import LinkMismatch, by_row
+from swarm_mj.replay.footage import Facts, Footage, filmed_ground
+from swarm_mj.replay.mismatch import LINK, NO_MISMATCH, NUMBERS, LinkMismatch
 from swarm_mj.replay.packets import SEGMENTS, PacketSegments
 from swarm_mj.replay.rerun_log import TIMELINE
 from swarm_mj.system.reading import open_file, read_json
@@ -87,23 +87,25 @@ def read_footage(path: Path) -> Footage:
         facts, columns = read_json(text, Facts), _columns(path)
         age = _numbers(columns["/scene/robots age"]).reshape(-1, facts.mission.num_robots)
         position_m = _numbers(columns["/scene/robots Cylinders3D:centers"])
+        position_m = position_m.reshape(*age.shape, 3)[..., :2]
         # Teams at rest have no headings, and in free space no robot is cut off.
-        ends, cut_off = np.zeros((*age.shape, 6)), np.zeros(age.shape)
+        headings, cut_off = np.zeros((*age.shape, 6)), np.zeros(age.shape)
         if (lines := columns.get("/scene/heading LineStrips3D:strips")) is not None:
-            ends = _numbers(lines).reshape(ends.shape)
+            headings = _numbers(lines).reshape(headings.shape)
         if (flags := columns.get("/scene/robots is_cut_off")) is not None:
             cut_off = _numbers(flags).reshape(age.shape)
         return Footage(
             facts=facts,
             window=_windows(columns, "/scene/robots"),
-            position_m=position_m.reshape(*age.shape, 3)[..., :2],
-            velocity_mps=ends[..., 3:5] - ends[..., :2],
+            position_m=position_m,
+            velocity_mps=headings[..., 3:5] - headings[..., :2],
             age=age,
             is_cut_off=cut_off > 0.0,
             mismatch=_mismatch(columns),
             is_on=_numbers(columns["/scene/robots is_on"]).reshape(age.shape) > 0.0,
             segments=_segments(columns),
             age_mean=_numbers(columns["/plots/age/mean Measurements:values"]),
+            ground=filmed_ground(position_m, facts.mission),
         )
     except (KeyError, ValueError, pa.ArrowException) as error:
         raise ValueError(
@@ -113,7 +115,6 @@ def read_footage(path: Path) -> Footage:
 
 
 def _columns(path: Path) -> Columns:
-    """Read what a video shows, each component in the order of its windows."""
     # In one pass: each reader decodes the file anew.
     found: dict[str, list[pa.Table]] = {}
     shown = ["/scene/**", "/plots/age/mean"]
@@ -133,28 +134,24 @@ def _segments(columns: Columns) -> dict[str, PacketSegments]:
     for fate in palette.PACKETS:
         if (strips := columns.get(f"/scene/packets/{fate} LineStrips3D:strips")) is not None:
             points_m = _numbers(strips).reshape(-1, SEGMENTS + 1, 3)
-            start_m, end_m = points_m[:, 0, :2], points_m[:, -1, :2]
-            segments[fate] = PacketSegments(row=_rows(strips), start_m=start_m, end_m=end_m)
+            segments[fate] = PacketSegments(_rows(strips), points_m[:, 0, :2], points_m[:, -1, :2])
     return segments
 
 
-def _mismatch(columns: Columns) -> LinkMismatch | None:
-    """Return links on which channel and belief differ, of missions beyond free space."""
-    entities = {kind: f"/scene/world/{kind}" for kind in palette.MISMATCH}
-    if not all(f"{entity} margin_db" in columns for entity in entities.values()):
-        return None
-    names, kinds = ("sender", "receiver", "loss_db", "margin_db"), []
-    for kind, entity in entities.items():
-        row = _rows(columns[f"{entity} sender"])
-        kinds.append(
-            LinkMismatch(
-                window=_windows(columns, entity),
-                row=row,
-                is_too_weak=np.full(len(row), kind == "too_weak"),
-                **{name: _numbers(columns[f"{entity} {name}"]).astype(np.int16) for name in names},
-            )
-        )
-    return by_row(kinds)
+def _mismatch(columns: Columns) -> LinkMismatch:
+    """Return the mismatched links, of which missions in free space have none."""
+    window, found = NO_MISMATCH.window, [NO_MISMATCH.links]
+    for kind in palette.MISMATCH:
+        entity = f"/scene/world/{kind}"
+        if f"{entity} margin_db" in columns:
+            window, row = _windows(columns, entity), _rows(columns[f"{entity} sender"])
+            links = np.zeros(len(row), LINK)
+            links["row"], links["is_too_weak"] = row, kind == "too_weak"
+            for name in NUMBERS:
+                links[name] = _numbers(columns[f"{entity} {name}"])
+            found.append(links)
+    links = np.concatenate(found)
+    return LinkMismatch(window, links[np.argsort(links["row"], kind="stable")])
 
 
 def _rows(column: pa.Array) -> Int[np.ndarray, "L"]:

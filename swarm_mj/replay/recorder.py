@@ -1,6 +1,7 @@
 """The record of a flight for its replay: one mission's windows as plain arrays."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from numbers import Integral
 
 import numpy as np
@@ -10,7 +11,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.costs import TaskCost
-from swarm_mj.replay.mismatch import LinkMismatch, joined, radio_snapshot, stride_of
+from swarm_mj.replay.mismatch import LinkMismatch, radio_snapshot, stride_of
 from swarm_mj.replay.packets import PacketLinks, fates
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.simulation.swarm import Swarm
@@ -53,7 +54,7 @@ class Log:
     num_working: Int[np.ndarray, "T"] | None = None  # links whose packets decode but for fades
     mismatch: LinkMismatch | None = None  # all four are None in free space
 
-    @property
+    @cached_property
     def packets(self) -> dict[str, PacketLinks]:
         """All packets by their fate."""
         return fates(self.recipient, self.heard, is_broadcast=self.is_broadcast)
@@ -88,54 +89,64 @@ class Log:
 
 
 class Recorder:
-    """Copies what a replay shows from the swarm's first mission, window by window."""
+    """Copies what a replay shows from one of a swarm's missions, window by window."""
 
-    def __init__(self, swarm: Swarm, *, ego: int = 0) -> None:
+    def __init__(self, swarm: Swarm, *, ego: int = 0, index: int = 0) -> None:
         """Prepare the record of what the ego robot knows; raise ValueError if there is none."""
         num_robots = swarm.mission.num_robots
         if not isinstance(ego, Integral) or not 0 <= ego < num_robots:
             raise ValueError(f"observer must be from 0 to {num_robots - 1}, not {ego!r}")
         matrices_bytes = AGE_BYTES * num_robots**2 * swarm.mission.num_windows
         self._stride = max(1, int(np.ceil(matrices_bytes / MAX_AGE_MATRIX_BYTES)))
-        self._swarm = swarm
-        self._ego = ego
+        self._radio_stride = stride_of(swarm, self._stride)
+        self._swarm, self._ego, self._index = swarm, ego, index
         self._rows: list[dict[str, np.ndarray]] = []
         self._age: list[np.ndarray] = []
         self._task_costs: list[TaskCost] = []
-        self._radio_stride = stride_of(swarm, self._stride)
-        self._mismatches: list[LinkMismatch] = []
+        self._links: list[np.ndarray] = []  # that differ, of each snapshot
         self._radio: dict[str, object] = {}  # of the last snapshot, which stands until the next
 
-    def add(self, flown: WindowRecord) -> None:
-        """Record the window that was just flown."""
-        buffers, states, phases = self._swarm.buffers, self._swarm.states, self._swarm.phases
-        age = self._swarm.now[0] - buffers.timestamp[0]
-        num_robots = len(age)
-        is_on = np.ones(num_robots, bool) if states.is_active is None else states.is_active[0]
+    def add(self, flown: WindowRecord | None = None) -> None:
+        """Record the window that was just flown, if any, with its costs, if they are known."""
+        buffers, states, index, own = (
+            self._swarm.buffers,
+            self._swarm.states,
+            self._index,
+            self._ego,
+        )
+        age = self._swarm.now[index] - buffers.timestamp[index]
+        num_robots, costs = len(age), None if flown is None else flown.costs
+        is_on = np.ones(num_robots, bool) if states.is_active is None else states.is_active[index]
         others = age[is_on[:, None] & is_on & ~np.eye(num_robots, dtype=bool)]
-        own = self._ego
         if len(self._rows) % self._stride == 0:
             self._age.append(age.astype(np.float32))
         is_due = len(self._rows) % self._radio_stride == 0
-        if is_due and (seen := radio_snapshot(self._swarm)) is not None:
-            self._mismatches.append(seen.mismatch)
-            self._radio = {name: value for name, value in vars(seen).items() if name != "mismatch"}
-        if flown.costs.task_cost is not None:
-            self._task_costs.append(flown.costs.task_cost)
+        if is_due and (seen := radio_snapshot(self._swarm, index)) is not None:
+            self._radio = seen._asdict()
+            del self._radio["links"]
+            seen.links["row"] = len(self._links)
+            self._links.append(seen.links)
+        if costs is not None and costs.task_cost is not None:
+            self._task_costs.append(costs.task_cost)
+        silence = np.tile(np.arange(num_robots), (2, 1))  # of a mission that has not begun
+        recipient = [phase.recipient[index] for phase in self._swarm.phases] or silence
+        heard = [phase.heard[index] for phase in self._swarm.phases] or silence
         shown = {
-            "position_m": states.position_m[0],
-            "velocity_mps": states.velocity_mps[0],
-            "recipient": [phase.recipient[0] for phase in phases],
-            "heard": [phase.heard[0] for phase in phases],
+            "position_m": states.position_m[index],
+            "velocity_mps": states.velocity_mps[index],
+            "recipient": recipient,
+            "heard": heard,
             "is_on": is_on,
-            "is_known": buffers.is_known[0, own],
-            "believed_m": buffers.position_m[0, own],
+            "is_known": buffers.is_known[index, own],
+            "believed_m": buffers.position_m[index, own],
             "ego_age": age[own],
-            "parent": buffers.parent[0, own],
-            "age_mean": flown.costs.age_windows[0],
+            "parent": buffers.parent[index, own],
+            "age_mean": np.nan if costs is None else costs.age_windows[index],
             "age_std": np.std(others),
             "age_max": np.max(others),
-            "velocity_variance_m2ps2": flown.costs.velocity_variance_m2ps2[0],
+            "velocity_variance_m2ps2": np.nan
+            if costs is None
+            else costs.velocity_variance_m2ps2[index],
             **self._radio,
         }
         # Copies: the swarm writes its arrays in place, and a view would keep a whole matrix. The
@@ -146,8 +157,7 @@ class Recorder:
     def num_bytes(self) -> int:
         """The memory taken so far; every window takes the same."""
         row = sum(value.nbytes for value in self._rows[0].values()) if self._rows else 0
-        links = sum(array.nbytes for each in self._mismatches for array in vars(each).values())
-        return len(self._rows) * row + sum(age.nbytes for age in self._age) + links
+        return len(self._rows) * row + sum(each.nbytes for each in (*self._age, *self._links))
 
     def log(self) -> Log:
         """Return everything recorded so far; raise ValueError if that is nothing."""
@@ -157,8 +167,8 @@ class Recorder:
         window = np.arange(1, len(self._rows) + 1)
         age_window, seen = window[:: self._stride], window[:: self._radio_stride]
         # An interrupt within `add` leaves one matrix, snapshot or cost too many.
-        costs = self._task_costs[: len(window)]
-        value = np.array([cost.value[0] for cost in costs])
+        costs, links = self._task_costs[: len(window)], self._links[: len(seen)]
+        value = np.array([cost.value[self._index] for cost in costs])
         return Log(
             ego=self._ego,
             window=window,
@@ -167,7 +177,7 @@ class Recorder:
             age_window=age_window,
             age=np.stack(self._age[: len(age_window)]),
             task_cost=replace(costs[0], value=value) if costs else None,
-            mismatch=joined(self._mismatches[: len(seen)], seen) if self._mismatches else None,
+            mismatch=LinkMismatch(seen, np.concatenate(links)) if links else None,
             **columns,
         )
 

@@ -5,21 +5,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import rerun as rr
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Shaped
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Ground
-from swarm_mj.replay.mismatch import LinkMismatch, shades
+from swarm_mj.replay.mismatch import NUMBERS, LinkMismatch, shades
 from swarm_mj.replay.palette import Colour, dim
 from swarm_mj.replay.recorder import Log
 
 TIMELINE = "window"
-LINK_NUMBERS = ("sender", "receiver", "loss_db", "margin_db")  # of mismatched links, kept in files
-
-
-def screen(points: float) -> float:
-    """Return a radius in points of the screen, which rerun marks as negative."""
-    return -points
 
 
 class EntityStyle(NamedTuple):
@@ -36,7 +30,7 @@ class EntityStyle(NamedTuple):
         radii = "line_radii" if self.kind is rr.Ellipses2D else "radii"
         order = {} if self.order is None else {"draw_order": self.order}
         colours = {} if self.colour is None else {"colors": [self.colour]}
-        return {radii: screen(self.width), **order, **colours}
+        return {radii: -self.width, **order, **colours}  # rerun takes negative radii as points
 
 
 LAYERS = {
@@ -85,10 +79,8 @@ class RerunLog:
     def __init__(
         self, recording: rr.RecordingStream, log: Log, frame: Ground, window_s: float
     ) -> None:
-        self._recording = recording
-        self._window_s = window_s
-        self.log = log
-        self.frame = frame
+        self._recording, self._window_s = recording, window_s
+        self.log, self.frame = log, frame
 
     def fixed(self, path: str, *archetypes: Any) -> None:
         """Write what never changes. It would hide the same component written in time."""
@@ -109,6 +101,17 @@ class RerunLog:
         ]
         self._recording.send_columns(path, indexes=times, columns=list(columns))
 
+    def things(
+        self, path: str, columns: rr.ComponentColumnList, row: Int[np.ndarray, "L"] | None = None
+    ) -> None:
+        """Write things of any number in each window.
+
+        `row` is the log's window of each thing, ascending; None: each window has all robots.
+        """
+        num = np.full(len(self.log.window), self.log.is_on.shape[1])
+        per_window = num if row is None else np.bincount(row, minlength=len(num))
+        self.timed(path, columns.partition(per_window))
+
     def fixed_layer(self, path: str, **fields: Any) -> None:
         """Write things of a layer that never change, by the fields of the layer's archetype."""
         layer = LAYERS[path]
@@ -117,21 +120,9 @@ class RerunLog:
     def layer(
         self, path: str, row: Int[np.ndarray, "L"] | None = None, **columns: np.ndarray
     ) -> None:
-        """Write things of a layer that change, by the fields of the layer's archetype.
-
-        `row` is the log's window of each thing, ascending; None: each window has all robots.
-        """
+        """Write things of a layer that change, by its archetype's fields; `row` as for `things`."""
         self.fixed_layer(path)
-        self.timed(path, self.partitioned(LAYERS[path].kind.columns(**columns), row))
-
-    def partitioned(
-        self, columns: rr.ComponentColumnList, row: Int[np.ndarray, "L"] | None = None
-    ) -> rr.ComponentColumnList:
-        """Divide columns by the windows of their things; `row` as for `layer`."""
-        num_windows = len(self.log.window)
-        if row is None:
-            return columns.partition([self.log.is_on.shape[1]] * num_windows)
-        return columns.partition(np.bincount(row, minlength=num_windows))
+        self.things(path, LAYERS[path].kind.columns(**columns), row)
 
     def lines(
         self,
@@ -140,32 +131,28 @@ class RerunLog:
         end: Float[np.ndarray, "L A"],
         row: Int[np.ndarray, "L"] | None = None,
     ) -> None:
-        """Write straight lines; `row` as for `layer`."""
+        """Write straight lines; `row` as for `things`."""
         self.layer(path, row, strips=np.stack([start, end], axis=1))
 
     def rings(
-        self,
-        path: str,
-        centre: Float[np.ndarray, "L 2"],
-        radius_m: float,
-        row: Int[np.ndarray, "L"] | None = None,
+        self, path: str, centre: Float[np.ndarray, "L 2"], radius_m: float, row: np.ndarray
     ) -> None:
-        """Write circles; `row` as for `layer`."""
+        """Write circles; `row` as for `things`."""
         self.layer(path, row, centers=centre, half_sizes=np.full(centre.shape, radius_m))
 
     def mismatch_lines(
-        self, path: str, kind: str, links: LinkMismatch, lines_m: Float[np.ndarray, "L 2 A"]
+        self,
+        path: str,
+        links: Shaped[np.ndarray, "L"],
+        lines_m: Float[np.ndarray, "L 2 A"],
+        mismatch: LinkMismatch,
     ) -> None:
         """Write a line for each of these links; those who click on one read its numbers."""
         self.fixed_layer(path)
-        per_snapshot = np.bincount(links.row, minlength=len(links.window))
-        columns = LAYERS[path].kind.columns(strips=lines_m, colors=shades(kind, links))
-        numbers = rr.AnyValues.columns(**{name: getattr(links, name) for name in LINK_NUMBERS})
+        per_snapshot = np.bincount(links["row"], minlength=len(mismatch.window))
+        colours = shades(path.rsplit("/")[-1], links)
+        columns = LAYERS[path].kind.columns(strips=lines_m, colors=colours)
+        values: dict[str, Any] = {name: links[name] for name in NUMBERS}
+        numbers = rr.AnyValues.columns(**values)
         parts = (part for each in (columns, numbers) for part in each.partition(per_snapshot))
-        self.timed(path, parts, links.window)
-
-
-def lifted(at_m: Float[np.ndarray, "*S 2"], height_m: float) -> Float[np.ndarray, "*S 3"]:
-    """Return points at a height above the ground [m]."""
-    width = [(0, 0)] * (at_m.ndim - 1) + [(0, 1)]
-    return np.pad(at_m, width, constant_values=height_m)
+        self.timed(path, parts, mismatch.window)

@@ -23,12 +23,14 @@ def quiet_environment() -> dict[str, str]:
     return kept | {"CI": "true", "ALL_PROXY": NOWHERE}
 
 
-def view_command(*paths: Path) -> list[str]:
-    """Return the command that opens replays in a window.
+def has_display() -> bool:
+    """Tell whether the environment names a screen for windows."""
+    is_named = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return not sys.platform.startswith("linux") or bool(is_named)
 
-    Raises:
-        ValueError: There is no display to open a window on.
-    """
+
+def view_command(*paths: Path) -> list[str]:
+    """Return the command that opens replays in a window; raise ValueError without a display."""
     if not has_display():
         raise ValueError(
             "there is no display (DISPLAY and WAYLAND_DISPLAY are unset); use "
@@ -37,19 +39,11 @@ def view_command(*paths: Path) -> list[str]:
     return [*VIEWER, *map(str, paths)]
 
 
-def has_display() -> bool:
-    """Tell whether the environment names a screen for windows."""
-    is_named = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    return not sys.platform.startswith("linux") or bool(is_named)
-
-
 def serve_command(*paths: Path) -> tuple[list[str], str]:
     """Return the command that serves replays to this machine's browsers, and the address."""
     data_port, page_port = free_ports(2)
-    command = [
-        *(*VIEWER, "--serve-web", "--bind", LOOPBACK),
-        *("--port", str(data_port), "--web-viewer-port", str(page_port), *map(str, paths)),
-    ]
+    ports = ["--port", str(data_port), "--web-viewer-port", str(page_port)]
+    command = [*VIEWER, "--serve-web", "--bind", LOOPBACK, *ports, *map(str, paths)]
     source = f"rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{data_port}%2Fproxy"
     # As in a notebook, the page counts no users.
     return command, f"http://{LOOPBACK}:{page_port}/?url={source}&notebook=1"
@@ -67,7 +61,6 @@ def run(command: list[str]) -> int:
 def free_ports(number: int) -> list[int]:
     """Return ports of this machine that no process listens on."""
     with ExitStack() as stack:
-        sockets = [stack.enter_context(socket.socket()) for _ in range(number)]
-        for each in sockets:
-            each.bind((LOOPBACK, 0))
-        return [each.getsockname()[1] for each in sockets]
+        # All are open at once, so that no port is found twice.
+        servers = [stack.enter_context(socket.create_server((LOOPBACK, 0))) for _ in range(number)]
+        return [server.getsockname()[1] for server in servers]

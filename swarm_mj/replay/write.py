@@ -12,18 +12,16 @@ import rerun_bindings as bindings
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import components_in
-from swarm_mj.physics.solid_geoms import obstacles_of
 from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 from swarm_mj.replay import charts, palette
-from swarm_mj.replay.arena import draw_map
 from swarm_mj.replay.footage import Footage, footage_of, frame
-from swarm_mj.replay.layout import layout
-from swarm_mj.replay.legend import draw_legend
-from swarm_mj.replay.packets import PacketLinks, is_other
+from swarm_mj.replay.layout import draw_legend, layout
+from swarm_mj.replay.packets import is_other
 from swarm_mj.replay.read import FACTS, with_digest
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog
-from swarm_mj.replay.space import draw_space, stage
+from swarm_mj.replay.stage import draw_stage
+from swarm_mj.replay.team import draw_team
 from swarm_mj.system.atomic import write_bytes
 
 APPLICATION = "swarm_mj"
@@ -43,10 +41,9 @@ def write_replay(log: Log, mission: Mission, config: Mapping[str, Any], path: Pa
 
 def _recorded(log: Log, mission: Mission, config: Mapping[str, Any], name: str) -> bytes:
     rr.set_strict_mode(True)  # bad data raises; otherwise a column is silently missing
-    packets, own = log.packets, components_in(config)
     policy, seed = config.get("policy") or "", config.get("seed", 0)
-    footage = footage_of(log, mission, policy, seed, own)
-    shown, plotted = frame(log.position_m, mission.half_side_m), charts.plots(log, packets)
+    footage = footage_of(log, mission, policy, seed, components_in(config))
+    shown, plotted = frame(log.position_m, mission.half_side_m), charts.plots(log)
     with rr.RecordingStream(APPLICATION, send_properties=False) as recording:
         stream = recording.binary_stream()
         laid_out = layout(log, shown, plotted)
@@ -57,37 +54,30 @@ def _recorded(log: Log, mission: Mission, config: Mapping[str, Any], name: str) 
         recording.send_recording_name(name)
         recording.send_property("mission", rr.AnyValues(drop_untyped_nones=True, **config))
         recording.send_property(FACTS, rr.AnyValues(json=json.dumps(asdict(footage.facts))))
-        draw(RerunLog(recording, log, shown, mission.window_s), footage, packets, plotted)
-        said = {**config, **_sent(log, mission, config)}
-        lines = [f"- **{key}**: {value}" for key, value in said.items()]
-        about = "\n".join([f"# {name}", *lines])
-        recording.log("about", rr.TextDocument(about, media_type="text/markdown"), static=True)
+        out = RerunLog(recording, log, shown, mission.window_s)
+        draw(out, footage)
+        charts.draw_plots(out, plotted)
+        said = dict(config)
+        if config.get("packet_bytes") is not None:
+            bits = BITS_PER_BYTE * config["packet_bytes"] * np.sum(is_other(log.recipient))
+            rate = bits / (len(log.window) * mission.window_s)
+            said["sent by the team"] = bits_per_second(rate)
+        about = "\n".join([f"# {name}", *(f"- **{key}**: {value}" for key, value in said.items())])
+        out.fixed("about", rr.TextDocument(about, media_type="text/markdown"))
     return stream.read() or b""
 
 
-def _sent(log: Log, mission: Mission, config: Mapping[str, Any]) -> dict[str, str]:
-    """Return the team's bit rate, if a packet's size is known."""
-    if config.get("packet_bytes") is None:
-        return {}
-    bits = BITS_PER_BYTE * config["packet_bytes"] * np.sum(is_other(log.recipient))
-    return {"sent by the team": bits_per_second(bits / (len(log.window) * mission.window_s))}
-
-
-def draw(
-    out: RerunLog, footage: Footage, packets: dict[str, PacketLinks], plotted: list[charts.Plot]
-) -> None:
-    """Draw every layer of a replay; `packets` by their fate."""
-    log, mission, full_scale = out.log, footage.facts.mission, footage.facts.full_scale
+def draw(out: RerunLog, footage: Footage) -> None:
+    """Draw every layer of a replay but the plots."""
+    log, full_scale = out.log, footage.facts.full_scale
     colours, known = (  # the tree also shows robots that are off
-        palette.robot_colours(log.ego_age, full_scale, log.is_known, is_on, log.ego)
+        palette.robot_colours(log.known_age, full_scale, is_on, log.ego)
         for is_on in (log.is_on, np.ones_like(log.is_on))
     )
-    model = stage(out, mission)
     # First, for rerun takes the type of "loss_db" from its first use, and obstacles' is no integer.
-    draw_space(out, model, footage.segments, colours)
-    draw_map(out, mission, packets, colours, obstacles_of(model))
+    draw_stage(out, footage.facts.mission)
+    draw_team(out, footage, colours)
     draw_legend(out, full_scale)
     charts.draw_tree(out, known)
     charts.draw_age_matrix(out, full_scale)
-    charts.draw_plots(out, plotted)
     charts.draw_states(out)

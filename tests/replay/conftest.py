@@ -27,77 +27,46 @@ class Recorded:
         return np.array([getattr(packets, fate)[0] for packets in self.packets])
 
 
-def record(policy_name, probability, *, task="flocking", **overrides):
-    settings = {"num_robots": 12, "num_windows": 30, "boundary": "reflect"} | overrides
-    mission = paper(task, **settings)
-    swarm = Swarm(mission, [5])
-    policy = make_policy(policy_name, mission, probability)
-    recorder = Recorder(swarm, ego=4)
-    packets = []
-    for window in rollout(swarm, policy):
-        recorder.add(window)
-        packets.append(window.costs.packets)
-    return Recorded(recorder.log(), mission, packets)
+WALK = {"task": "random-walk", "velocity_ratio": 0.6, "num_robots": 14}
+FLIGHTS = {
+    "two_way": ("mst", 0.3, {}),  # Alg. 1, busy enough that packets of all fates occur
+    "flooded": ("random-flooding", 0.2, {}),  # windows of two transmissions
+    "still": ("mst", 0.3, {"task": "stationary"}),
+    "failing": ("mst", 0.3, {"failure_fraction": 0.25}),  # 3 of 12 robots, after 15 windows
+    # Robots that run between city blocks, under shadowing: some get cut off from the others.
+    "blocked": ("random-flooding", 0.2, {"arena": "blocks", "shadowing_db": 6.0, **WALK}),
+    "long": ("mst", 0.3, {"num_robots": 40, "num_windows": 500, "boundary": "none"}),
+}
 
 
-@pytest.fixture(scope="session")
-def long():
-    """A busy flight of the default size."""
-    return record("mst", 0.3, num_robots=40, num_windows=500, boundary="none")
+def flown(name):
+    @pytest.fixture(scope="session", name=name)
+    def flight():
+        policy_name, probability, its = FLIGHTS[name]
+        settings = {"num_robots": 12, "num_windows": 30, "boundary": "reflect", **its}
+        mission = paper(settings.pop("task", "flocking"), **settings)
+        swarm = Swarm(mission, [5])
+        recorder, packets = Recorder(swarm, ego=4), []
+        for window in rollout(swarm, make_policy(policy_name, mission, probability)):
+            recorder.add(window)
+            packets.append(window.costs.packets)
+        return Recorded(recorder.log(), mission, packets)
+
+    return flight
 
 
-@pytest.fixture(scope="session")
-def two_way():
-    """Windows of Alg. 1, busy enough that packets of all fates occur."""
-    return record("mst", 0.3)
+def written(name, flight, **config):
+    @pytest.fixture(scope="session", name=name)
+    def replay(request, tmp_path_factory):
+        recorded, path = request.getfixturevalue(flight), tmp_path_factory.mktemp("r") / "a.rrd"
+        write_replay(recorded.log, recorded.mission, {"seed": 5, **config}, path)
+        return path
+
+    return replay
 
 
-@pytest.fixture(scope="session")
-def flooded():
-    """Windows of two transmissions."""
-    return record("random-flooding", 0.2)
-
-
-@pytest.fixture(scope="session")
-def still():
-    """A team at rest."""
-    return record("mst", 0.3, task="stationary")
-
-
-@pytest.fixture(scope="session")
-def failing():
-    """Of 12 robots 3 are switched off after 15 of 30 windows."""
-    return record("mst", 0.3, failure_fraction=0.25)
-
-
-@pytest.fixture(scope="session")
-def blocked():
-    """Robots that run between city blocks, under shadowing: some get cut off from the others."""
-    walk = {"task": "random-walk", "velocity_ratio": 0.6, "num_robots": 14}
-    return record("random-flooding", 0.2, arena="blocks", shadowing_db=6.0, **walk)
-
-
-def written(recorded, folder, **config):
-    path = folder.mktemp("replays") / "mission.rrd"
-    write_replay(recorded.log, recorded.mission, {"seed": 5, **config}, path)
-    return path
-
-
-@pytest.fixture(scope="session")
-def replay(two_way, tmp_path_factory):
-    return written(two_way, tmp_path_factory, policy="mst", ratio=0.25)
-
-
-@pytest.fixture(scope="session")
-def flood_replay(flooded, tmp_path_factory):
-    return written(flooded, tmp_path_factory)
-
-
-@pytest.fixture(scope="session")
-def blocked_replay(blocked, tmp_path_factory):
-    return written(blocked, tmp_path_factory)
-
-
-@pytest.fixture(scope="session")
-def still_replay(still, tmp_path_factory):
-    return written(still, tmp_path_factory)
+two_way, flooded, still, failing, blocked, long = map(flown, FLIGHTS)
+replay = written("replay", "two_way", policy="mst", ratio=0.25)
+flood_replay = written("flood_replay", "flooded")
+blocked_replay = written("blocked_replay", "blocked")
+still_replay = written("still_replay", "still")

@@ -9,17 +9,30 @@ def entities(path):
     return {chunk.entity_path for chunk in RrdReader(path).stream()}
 
 
-def column(path, entity, component):
-    """The one timed chunk of an entity: a component's rows as nested lists."""
+def _values(path, entity, component, is_static):
+    """A component's rows in the one chunk that has them."""
     chunks = RrdReader(path).stream().filter(content=entity)
-    batches = [chunk.to_record_batch() for chunk in chunks if not chunk.is_static]
+    batches = [chunk.to_record_batch() for chunk in chunks if chunk.is_static == is_static]
     (batch,) = (batch for batch in batches if component in batch.schema.names)
     return batch.column(component)
 
 
+def column(path, entity, component):
+    """A component that changes: rows as nested lists."""
+    return _values(path, entity, component, False)
+
+
+def static(path, entity, component):
+    """A component that never changes."""
+    return np.array(_values(path, entity, component, True).to_pylist()).ravel()
+
+
 def rows(path, entity, component, *shape):
-    """A component with the same number of values in each window."""
-    return column(path, entity, component).flatten().flatten().to_numpy().reshape(-1, *shape)
+    """A component's values in all windows, in this shape."""
+    values = column(path, entity, component)
+    while hasattr(values, "flatten") and hasattr(values.type, "value_type"):
+        values = values.flatten()
+    return values.to_numpy(zero_copy_only=False).reshape(-1, *shape)
 
 
 def counts(path, entity, component):
@@ -27,21 +40,7 @@ def counts(path, entity, component):
     return np.diff(column(path, entity, component).offsets.to_numpy())
 
 
-def static(path, entity, component):
-    """A component that never changes."""
-    chunks = RrdReader(path).stream().filter(content=entity)
-    batches = (chunk.to_record_batch() for chunk in chunks if chunk.is_static)
-    (value,) = (batch.column(component) for batch in batches if component in batch.schema.names)
-    return np.array(value.to_pylist()).ravel()
-
-
-def rows_of_strips(path, entity):
-    """Straight lines as [start, end] pairs, all windows in a row."""
-    lines = column(path, entity, "LineStrips2D:strips").flatten()
-    return lines.flatten().flatten().to_numpy().reshape(-1, 2, 2)
-
-
 def colours(path, entity, component, num):
     """RGB of `num` things in each window."""
-    rgba = column(path, entity, component).flatten().to_numpy()
+    rgba = rows(path, entity, component)
     return np.stack([(rgba >> shift) & 255 for shift in (24, 16, 8)], axis=-1).reshape(-1, num, 3)

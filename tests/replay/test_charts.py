@@ -2,48 +2,50 @@
 
 import numpy as np
 import pytest
-from reading import column, rows_of_strips
+from reading import column, rows, static
 
 from swarm_mj.mission.geometry import spanning_tree
-from swarm_mj.replay.charts import broadcast_counts, dendrogram, plots, radio_states, rate, walk
+from swarm_mj.replay.charts import dendrogram, plots, radio_states, rate, walk
 
 
 def test_a_walk_visits_everyone_once_and_children_after_parents(two_way):
-    parent = spanning_tree(two_way.log.position_m[:1])[0]
-    order = walk(parent).tolist()
-    assert sorted(order) == list(range(len(parent)))
+    parent = spanning_tree(two_way.log.position_m[:1])[0].tolist()
+    order = walk(parent, range(12), -1)[0][1:]
+    assert sorted(order) == list(range(12))
     for j, k in enumerate(parent):
-        if k >= 0:
-            assert order.index(k) < order.index(j)
+        assert k < 0 or order.index(k) < order.index(j)
 
 
-def test_states_follow_a_plain_reading_of_the_log(two_way):
-    log = two_way.log
+@pytest.mark.parametrize("flight", ["two_way", "flooded"])
+def test_states_follow_a_plain_reading_of_the_log(flight, request):
+    log = request.getfixturevalue(flight).log
     states, state = radio_states(log)
     names = list(states)
-    for t in range(len(log.window)):
-        for i in range(log.recipient.shape[2]):
-            (to, _), (first, second) = log.recipient[t, :, i], log.heard[t, :, i]
-            expected = "silent"
-            if first != i or second != i:
-                expected = "overhears"
-            if log.recipient[t, 1, i] != i:
-                expected = "answers"
-            if to != i:
-                expected = "delivers" if log.heard[t, 0, to] == i else "is lost"
-            assert names[state[t, i]] == expected
-
-
-def test_a_broadcasting_robot_transmits_hears_or_is_silent(flooded):
-    log = flooded.log
-    states, state = radio_states(log)
-    names = list(states)
-    assert len(names) == 3
+    assert len(names) == (3 if log.is_broadcast else 5)
     for t, i in np.ndindex(len(log.window), 12):
-        expected = "hears" if np.any(log.heard[t, :, i] != i) else "silent"
-        if np.any(log.recipient[t, :, i] != i):
-            expected = "transmits"
+        is_heard, (to, answered) = np.any(log.heard[t, :, i] != i), log.recipient[t, :, i]
+        if log.is_broadcast:
+            expected = "hears" if is_heard else "silent"
+            expected = "transmits" if to != i or answered != i else expected
+        elif to != i:
+            expected = "delivers" if log.heard[t, 0, to] == i else "is lost"
+        else:
+            expected = "overhears" if is_heard else "silent"
+            expected = "answers" if answered != i else expected
         assert names[state[t, i]] == expected
+
+
+def test_lanes_show_all_states_but_silence(replay):
+    names, shown = (
+        static(replay, "/state/r000", f"StateConfiguration:{of}") for of in ("values", "visible")
+    )
+    assert dict(zip(names.tolist(), shown.tolist(), strict=True)) == {
+        "silent": False,
+        "overhears": True,
+        "answers": True,
+        "is lost": True,
+        "delivers": True,
+    }
 
 
 def test_rows_of_the_matrix_own_and_columns_are_owned(replay, two_way):
@@ -63,7 +65,7 @@ def test_rows_of_the_matrix_own_and_columns_are_owned(replay, two_way):
 
 
 def test_the_tree_s_lines_join_nodes_a_hop_apart(replay, two_way):
-    strips = rows_of_strips(replay, "/tree/edges")
+    strips = rows(replay, "/tree/edges", "LineStrips2D:strips", 2, 2)
     known = two_way.log.is_known & (np.arange(12) != two_way.log.ego)
     assert len(strips) == np.sum(known)
     hop = np.unique(np.round(strips[:, 1, 0] - strips[:, 0, 0], 3))
@@ -115,16 +117,10 @@ def test_the_rate_counts_the_last_ten_windows():
 )
 def test_the_packet_plot_counts_as_the_costs_do(flight, names, request):
     recorded = request.getfixturevalue(flight)
-    curves = plots(recorded.log, recorded.log.packets)[1].curves
+    _, curves, *_ = plots(recorded.log).values()
     assert [curve.path for curve in curves] == [f"radio/{name}" for name in names]
     for curve, name in zip(curves, names, strict=True):
         np.testing.assert_array_equal(curve.values, rate(recorded.counted(name).astype(int)))
-
-
-def test_broadcasts_are_as_many_as_the_costs_count(flooded):
-    sent, heard = broadcast_counts(flooded.log)
-    np.testing.assert_array_equal(sent, flooded.counted("sent"))
-    np.testing.assert_array_equal(heard, flooded.counted("heard"))
 
 
 def test_the_plot_of_the_world_has_shares_of_links_and_robots(blocked, blocked_replay):
@@ -132,17 +128,17 @@ def test_the_plot_of_the_world_has_shares_of_links_and_robots(blocked, blocked_r
     expected = {"believed, too weak": [], "works, unbelieved": [], "cut off from r4": []}
     weak, works, cut_off = expected.values()
     for window in log.mismatch.window.tolist():
-        where, seen = log.position_m[window - 1], log.mismatch.at(window)
+        where, is_weak = log.position_m[window - 1], log.mismatch.at(window)["is_too_weak"]
         num_near = sum(
             np.linalg.norm(where[i] - where[j]) <= 250.0 for i in range(14) for j in range(i)
         )
-        num_weak = seen.is_too_weak.tolist().count(True)
-        num_extra = len(seen.row) - num_weak
+        num_weak = is_weak.tolist().count(True)
+        num_extra = len(is_weak) - num_weak
         weak.append(100.0 * num_weak / num_near)
         works.append(100.0 * num_extra / (num_near - num_weak + num_extra))
         team = log.group[window - 1].tolist()
         cut_off.append(100.0 * sum(of != team[4] for of in team) / 13)
-    shares = {curve.name: curve.values for curve in plots(log, log.packets)[2].curves}
+    shares = {curve.name: curve.values for curve in list(plots(log).values())[2]}
     for name, values in expected.items():
         np.testing.assert_allclose(shares[name], values)
     shown = column(blocked_replay, "/plots/world/cut_off_from_r4", "Scalars:scalars")

@@ -1,7 +1,22 @@
-"""The replay's layout, read back from the file."""
+"""The layout and the legend, read back: they name all that a mission has, and nothing else."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
+from reading import entities, static
 from rerun.chunk import RrdReader
+
+from swarm_mj.replay.layout import WIDTH, legend_height
+from swarm_mj.replay.mismatch import NO_MISMATCH
+from swarm_mj.replay.write import write_replay
+
+ADDRESSED = {"delivered", "lost", "answered", "overheard"}
+BROADCAST = {"transmits", "is heard by"}
+ALWAYS = {"radio range", "r4's tree"}
+MOVING = {"heading", "r4's belief"}
+BEYOND = MOVING | {"r4's tree", "range in\nfree space"}  # of free space
+MISMATCH = {"believed,\ntoo weak", "works,\nunbelieved", "cut off\nfrom r4"}
 
 EVERYWHERE = {
     "Map, squares of 100 m",
@@ -17,6 +32,26 @@ OF_ADDRESSED = "Packets in 10 windows: delivered (green), lost (orange), answere
 OF_BROADCASTS = "Packets in 10 windows: sent (grey), heard by anyone (blue)"
 OF_FLOCKS = "Velocity variance [m²/s²]"
 OF_WORLDS = "Share [%]: believed, too weak (red); works, unbelieved (green); cut off (white)"
+
+FLIGHTS = {  # by replay: the flight, its legend's texts and the plots beyond those of all
+    "replay": ("two_way", ADDRESSED | ALWAYS | MOVING, {OF_ADDRESSED, OF_FLOCKS}),
+    "flood_replay": ("flooded", BROADCAST | ALWAYS | MOVING, {OF_BROADCASTS, OF_FLOCKS}),
+    "still_replay": ("still", ADDRESSED | ALWAYS, {OF_ADDRESSED}),
+    "blocked_replay": (
+        "blocked",
+        BROADCAST | BEYOND | MISMATCH,
+        {OF_BROADCASTS, OF_FLOCKS, OF_WORLDS},
+    ),
+}
+
+
+def labels(path):
+    """The legend's entities of texts."""
+    return [e for e in entities(path) if e.startswith("/legend/") and e.endswith("/text")]
+
+
+def texts(path):
+    return {str(text) for of in labels(path) for text in static(path, of, "Points2D:labels")}
 
 
 def views(path):
@@ -34,18 +69,22 @@ def views(path):
             yield kind, name, {path.rsplit("/")[-1] for path in batches if path.startswith(entity)}
 
 
-@pytest.mark.parametrize(
-    ("replay_name", "names"),
-    [
-        ("replay", {OF_ADDRESSED, OF_FLOCKS}),
-        ("flood_replay", {OF_BROADCASTS, OF_FLOCKS}),
-        ("still_replay", {OF_ADDRESSED}),
-        ("blocked_replay", {OF_BROADCASTS, OF_FLOCKS, OF_WORLDS}),
-    ],
-)
-def test_views_are_of_what_the_mission_has(replay_name, names, request):
-    shown = views(request.getfixturevalue(replay_name))
-    assert {name for _, name, _ in shown} == EVERYWHERE | names
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_legend_and_views_name_what_the_mission_has(name, request):
+    path, (flight, expected, plots) = request.getfixturevalue(name), FLIGHTS[name]
+    assert {name for _, name, _ in views(path)} == EVERYWHERE | plots
+    assert texts(path) == expected
+    places = np.array([static(path, of, "Points2D:positions") for of in labels(path)])
+    height = legend_height(request.getfixturevalue(flight).log)
+    assert np.all((places > 0.0) & (places < [WIDTH, height]))
+    assert len(np.unique(places, axis=0)) == len(expected)
+
+
+def test_no_mismatch_is_named_where_packets_only_fade(blocked, tmp_path):
+    none = NO_MISMATCH._replace(window=blocked.log.mismatch.window)
+    log = replace(blocked.log, mismatch=none, group=np.zeros_like(blocked.log.group))
+    write_replay(log, blocked.mission, {"seed": 5}, tmp_path / "a.rrd")
+    assert texts(tmp_path / "a.rrd") == BROADCAST | BEYOND
 
 
 def test_the_look_does_not_depend_on_the_viewer_s_theme(replay):
@@ -54,3 +93,23 @@ def test_the_look_does_not_depend_on_the_viewer_s_theme(replay):
             assert "Background" in said, name
         if kind == "TimeSeries":
             assert {"PlotBackground", "ScalarAxis", "PlotLegend"} <= said, name
+
+
+def test_the_ramp_says_whose_knowledge_and_where_it_ends(replay, two_way):
+    about = static(replay, "/legend/about_ages", "Points2D:labels")
+    assert about.tolist() == ["age of what r4 knows"]
+    first, _, last = static(replay, "/legend/ages", "Points2D:labels")
+    end, unit = last.split()
+    assert (first, unit) == ("0", "windows")
+    assert np.mean(two_way.log.age <= float(end)) >= 0.95
+
+
+@pytest.mark.parametrize(
+    ("name", "entity", "component"),
+    [
+        ("radio_range", "/arena/radio/range", "Ellipses2D:colors"),
+        ("r4_s_tree", "/arena/tree", "LineStrips2D:colors"),
+    ],
+)
+def test_samples_wear_the_colours_of_the_map(replay, name, entity, component):
+    assert static(replay, f"/legend/{name}", component) == static(replay, entity, component)

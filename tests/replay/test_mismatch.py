@@ -9,38 +9,19 @@ from mujoco import mjtGeom
 
 from swarm_mj.mission import paper
 from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP
-from swarm_mj.replay import palette
 from swarm_mj.replay.mismatch import (
     DASHES,
     EVERY,
-    WHOLE,
+    LINK,
     LinkMismatch,
-    by_row,
-    coloured_lines,
-    joined,
-    mismatch_lines,
+    by_kind,
+    divided,
+    ends,
     radio_snapshot,
     shades,
     stride_of,
 )
 from swarm_mj.simulation.swarm import Swarm
-
-WHERE = np.array([[0.0, 0.0], [100.0, 0.0], [0.0, 50.0]])
-
-
-def links(*pairs, row=None):
-    """Links between pairs of robots; those of robot 0 and 1 are too weak."""
-    sender, receiver = np.array(pairs, dtype=np.int16).T
-    return LinkMismatch(
-        window=np.arange(2),
-        row=np.zeros(len(pairs), dtype=int) if row is None else np.array(row),
-        sender=sender,
-        receiver=receiver,
-        is_too_weak=np.array([set(pair) == {0, 1} for pair in pairs]),
-        loss_db=np.zeros(len(pairs), dtype=np.int16),
-        margin_db=np.zeros(len(pairs), dtype=np.int16),
-    )
-
 
 CITY = {"arena": "blocks", "shadowing_db": 6.0, "num_robots": 14, "high_power_fraction": 0.3}
 WALL_DB = 3.0
@@ -72,11 +53,10 @@ def test_surprises_are_where_lone_packets_and_the_range_disagree(index):
         for j in range(14):
             if i != j and decodes[i, j] != is_near[i, j] and (j, i) not in expected:
                 expected[i, j] = bool(is_near[i, j])
-    found = seen.mismatch
-    pairs = zip(found.sender.tolist(), found.receiver.tolist(), strict=True)
-    assert dict(zip(pairs, found.is_too_weak.tolist(), strict=True)) == expected
+    found = {(i, j): weak for _, i, j, _, _, weak in seen.links.tolist()}
+    assert found == expected
     assert set(expected.values()) == {True, False}
-    assert np.all((found.margin_db < 0) == found.is_too_weak)
+    assert np.all((seen.links["margin_db"] < 0) == seen.links["is_too_weak"])
     together = networkx.strongly_connected_components(networkx.DiGraph(decodes.astype(int)))
     assert {frozenset(np.flatnonzero(seen.group == g).tolist()) for g in set(seen.group)} == set(
         map(frozenset, together)
@@ -86,10 +66,8 @@ def test_surprises_are_where_lone_packets_and_the_range_disagree(index):
 def test_what_was_told_before_the_mission_does_not_surprise():
     told = {"arena": "blocks", "num_robots": 14, "high_power_fraction": 0.3, "path_loss": "two-ray"}
     for known, surprises in (("nothing", True), ("map", True), ("map,statistics", False)):
-        seen = radio_snapshot(
-            Swarm(paper("random-walk", **told, prior_knowledge=known), [3])
-        ).mismatch
-        assert (len(seen.row) > 0) == surprises
+        seen = radio_snapshot(Swarm(paper("random-walk", **told, prior_knowledge=known), [3]))
+        assert (len(seen.links) > 0) == surprises
 
 
 def wall(spec, _mission):
@@ -106,28 +84,26 @@ def test_losses_behind_a_wall_by_hand():
     """88.0 dB over 250 m in free space, where the margin is 0; a wall takes 3 dB more."""
     swarm = Swarm(paper("stationary", num_robots=20), [1], scene=wall)
     where, distance_m = swarm.states.position_m[0], apart_m(swarm, 0)
-    found, expected = radio_snapshot(swarm).mismatch, {}
+    expected = {}
     for i in range(20):
         for j in range(i + 1, 20):
             is_behind = where[i, 0] * where[j, 0] < 0.0
             margin_db = 20.0 * np.log10(250.0 / distance_m[i, j]) - WALL_DB * is_behind
             if distance_m[i, j] <= 250.0 and margin_db < 0.0:
-                expected[i, j] = round(88.013 - margin_db), int(np.floor(margin_db))
+                expected[i, j] = [round(88.013 - margin_db), int(np.floor(margin_db))]
     assert len(expected) > 0
-    numbers = zip(found.loss_db.tolist(), found.margin_db.tolist(), strict=True)
-    pairs = zip(found.sender.tolist(), found.receiver.tolist(), strict=True)
-    assert dict(zip(pairs, numbers, strict=True)) == expected
+    found = radio_snapshot(swarm).links.tolist()
+    assert {(i, j): numbers for _, i, j, *numbers, _ in found} == expected
 
 
 def test_a_strong_radio_surprises_in_its_own_direction_only():
     mission = paper("stationary", num_robots=12, high_power_fraction=0.5, high_power_db=3.0)
-    found = radio_snapshot(Swarm(mission, [2])).mismatch
-    assert not np.any(found.is_too_weak)
-    assert np.all(found.sender < 6)
-    assert len(found.sender) > 0
-    is_one_way = found.receiver >= 6
+    found = radio_snapshot(Swarm(mission, [2])).links
+    assert not np.any(found["is_too_weak"])
+    assert np.all(found["sender"] < 6)
+    is_one_way = found["receiver"] >= 6
     assert set(is_one_way.tolist()) == {True, False}
-    assert np.all(found.sender[~is_one_way] < found.receiver[~is_one_way])
+    assert np.all((found["sender"] < found["receiver"])[~is_one_way])
 
 
 def test_free_space_and_a_channel_of_one_s_own_cannot_surprise():
@@ -135,7 +111,7 @@ def test_free_space_and_a_channel_of_one_s_own_cannot_surprise():
     assert radio_snapshot(Swarm(mission, [0])) is None
     assert radio_snapshot(Swarm(mission, [0], channel=lambda _, recipient: recipient)) is None
     faded = radio_snapshot(Swarm(replace(mission, fading="rayleigh", erasure=0.2), [0]))
-    assert len(faded.mismatch.row) == 0
+    assert len(faded.links) == 0
     assert np.all(faded.group == 0)
 
 
@@ -143,7 +119,7 @@ def test_robots_that_are_off_have_no_links():
     swarm = Swarm(paper("stationary", **CITY), [3])
     swarm._physics.deactivate(np.arange(14)[None] != 5)
     seen = radio_snapshot(swarm)
-    assert not np.any((seen.mismatch.sender == 5) | (seen.mismatch.receiver == 5))
+    assert not np.any((seen.links["sender"] == 5) | (seen.links["receiver"] == 5))
     assert np.sum(seen.group == 5) == 1
 
 
@@ -170,47 +146,36 @@ def test_a_fast_team_is_looked_at_more_often():
     assert (stride_of(slow), stride_of(slow, 9), stride_of(fast)) == (EVERY, 9, 2)
 
 
+LINKS = np.array([(0, 0, 1, 90, -1, True), (2, 0, 2, 90, 5, False)], LINK)
+
+
 def test_each_snapshot_stands_for_the_windows_until_the_next_one():
-    one = replace(links((0, 1)), window=np.array([1]))
-    none = one.chosen(np.s_[:0])
-    seen = joined([one, none, one], np.array([1, 6, 11]))
-    found = [len(seen.at(window).row) for window in (1, 5, 6, 10, 11, 99)]
+    seen = LinkMismatch(np.array([1, 6, 11]), LINKS)
+    found = [len(seen.at(window)) for window in (1, 5, 6, 10, 11, 99)]
     assert found == [1, 1, 0, 0, 1, 1]
-    assert by_row([seen, seen]).row.tolist() == [0, 0, 2, 2]
+    assert {kind: its["receiver"].tolist() for kind, its in by_kind(LINKS).items()} == {
+        "unbelieved": [2],
+        "too_weak": [1],
+    }
 
 
 def test_dashes_lead_from_robot_to_robot_as_long_as_one_another():
     """Four dashes of 3 units with three gaps of 2 between them: a line of 18 units."""
-    lines, link = mismatch_lines(links((0, 1)), 0.18 * WHERE[None], DASHES)
-    ends = [[(0, 0), (3, 0)], [(5, 0), (8, 0)], [(10, 0), (13, 0)], [(15, 0), (18, 0)]]
-    np.testing.assert_allclose(lines, ends, atol=1e-12)
-    assert link.tolist() == [0, 0, 0, 0]
+    lines = divided(np.array([[[0.0, 0.0], [18.0, 0.0]]]), DASHES)
+    expected = [[(0, 0), (3, 0)], [(5, 0), (8, 0)], [(10, 0), (13, 0)], [(15, 0), (18, 0)]]
+    np.testing.assert_allclose(lines, expected, atol=1e-12)
 
 
-def test_a_link_is_where_its_robots_are_at_its_look():
-    moved = np.stack([WHERE, WHERE + 7.0])
-    lines, link = mismatch_lines(links((1, 2), (1, 2), row=[0, 1]), moved, WHOLE)
-    np.testing.assert_allclose(lines, [[(100, 0), (0, 50)], [(107, 7), (7, 57)]])
-    assert link.tolist() == [0, 1]
-
-
-def test_all_kinds_at_once_each_in_its_colour():
-    lines, colour = coloured_lines(links((0, 1), (0, 2), row=[4, 4]), WHERE, observer=1)
-    weak = [int(0.85 * c) for c in palette.TOO_WEAK]
-    assert colour.tolist() == [list(palette.MISMATCH["unbelieved"]), weak, weak, weak, weak]
-    np.testing.assert_allclose(lines[0], [(0, 0), (0, 50)])
-
-
-def test_at_once_only_the_observer_s_links_are_too_weak():
-    """Robot 2 has none of that kind."""
-    for observer, num_lines in ((0, 5), (1, 5), (2, 1)):
-        lines, _ = coloured_lines(links((0, 1), (0, 2)), WHERE, observer)
-        assert len(lines) == num_lines
+def test_a_link_is_where_its_robots_are():
+    where = np.array([[0.0, 0.0], [100.0, 0.0], [0.0, 50.0]]) + 7.0 * np.arange(3)[:, None, None]
+    lines = ends(LINKS, where, LINKS["row"])
+    np.testing.assert_array_equal(lines, [[(0, 0), (100, 0)], [(14, 14), (14, 64)]])
+    np.testing.assert_array_equal(ends(LINKS[:1], where, 1), [[(7, 7), (107, 7)]])
 
 
 def test_the_more_is_missing_the_darker():
-    found = links((0, 1), (0, 1), (0, 1), (0, 1))
-    found.margin_db[:] = (-1, -15, -30, -99)
+    found = np.zeros(4, LINK)
+    found["margin_db"] = (-1, -15, -30, -99)
     brightness = shades("too_weak", found).astype(int).sum(axis=1)
     assert np.all(np.diff(brightness[:3]) < 0)
     assert brightness[2] == brightness[3]

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from swarm_mj.replay.packets import RISE, SEGMENTS, arcs, packet_segments, transmitters
-from swarm_mj.replay.palette import LOST_SHARE
 
 
 @pytest.mark.parametrize(
@@ -24,15 +23,13 @@ def test_links_are_as_many_as_the_costs_count(flight, fate, counted, request):
 
 
 def test_a_broadcast_leads_to_each_robot_that_decoded_it(flooded):
-    log, links = flooded.log, flooded.log.packets["heard"]
+    log = flooded.log
     expected = [
         (t, log.heard[t, slot, hearer], hearer)
-        for t in range(len(log.window))
-        for slot in (0, 1)
-        for hearer in range(12)
+        for t, slot, hearer in np.ndindex(len(log.window), 2, 12)
         if log.heard[t, slot, hearer] != hearer
     ]
-    assert list(zip(links.row, links.sender, links.receiver, strict=True)) == expected
+    assert list(zip(*log.packets["heard"], strict=True)) == expected
 
 
 @pytest.mark.parametrize(("flight", "slots"), [("two_way", (0,)), ("flooded", (0, 1))])
@@ -45,34 +42,26 @@ def test_transmitters_are_who_speaks_without_being_asked(flight, slots, request)
 
 def test_answers_heard_or_not_are_the_delivered_requests_turned_round(two_way):
     links = two_way.log.packets
-    delivered = links["delivered"]
-    requests = set(zip(delivered.row, delivered.sender, delivered.receiver, strict=True))
+    requests = set(zip(*links["delivered"], strict=True))
     answers = {
         (row, receiver, sender)
         for fate in ("answered", "unanswered")
-        for row, sender, receiver in zip(
-            links[fate].row, links[fate].sender, links[fate].receiver, strict=True
-        )
+        for row, sender, receiver in zip(*links[fate], strict=True)
     }
     assert answers == requests
 
 
-def test_segments_are_in_the_order_of_drawing(two_way, flooded):
-    segments = packet_segments(two_way.log.packets, two_way.log.position_m)
+def test_segments_are_in_the_order_of_drawing_and_lost_ones_stop_short(two_way, flooded):
+    log = two_way.log
+    segments = packet_segments(log.packets, log.position_m)
     assert list(segments) == ["overheard", "unanswered", "lost", "delivered", "answered"]
+    for fate, (row, start_m, end_m) in segments.items():
+        share, links = 0.6 if fate in ("lost", "unanswered") else 1.0, log.packets[fate]
+        start, end = (log.position_m[row, robot] for robot in (links.sender, links.receiver))
+        np.testing.assert_array_equal(row, links.row)
+        np.testing.assert_allclose(start_m, start)
+        np.testing.assert_allclose(end_m, share * end + (1.0 - share) * start)
     assert list(packet_segments(flooded.log.packets, flooded.log.position_m)) == ["heard"]
-
-
-def test_a_lost_packet_stops_short_and_a_delivered_one_arrives(two_way):
-    log, packets = two_way.log, two_way.log.packets
-    for fate in packets:
-        share = LOST_SHARE if fate in ("lost", "unanswered") else 1.0
-        links, drawn = packets[fate], packet_segments(packets, log.position_m)[fate]
-        start = log.position_m[links.row, links.sender]
-        end = log.position_m[links.row, links.receiver]
-        np.testing.assert_array_equal(drawn.row, links.row)
-        np.testing.assert_allclose(drawn.start_m, start)
-        np.testing.assert_allclose(drawn.end_m, share * end + (1.0 - share) * start)
 
 
 def test_an_arc_starts_and_ends_at_its_ends_and_is_highest_in_the_middle():

@@ -6,24 +6,18 @@ import pytest
 from swarm_mj.replay import palette
 
 
-def brightness(rgb):
-    """Luma (ITU-R BT.601)."""
-    return rgb @ np.array([0.299, 0.587, 0.114])
-
-
 def test_fresh_is_viridis_brightest_and_unknown_is_grey():
-    ages = np.array([0.0, 30.0])
-    rgb = palette.age_colours(ages, 100.0, np.array([True, False]))
+    rgb = palette.age_colours(np.array([0.0, np.nan]), 100.0)
     assert tuple(rgb[0]) == (253, 231, 37)
     assert tuple(rgb[1]) == palette.UNKNOWN
 
 
 def test_older_is_darker_until_the_scale_ends():
-    ages = np.linspace(0.0, 100.0, 50)
-    rgb = palette.age_colours(ages, 100.0, np.ones(50, dtype=bool)).astype(float)
-    assert np.all(np.diff(brightness(rgb)) < 0)
-    beyond = palette.age_colours(np.array([100.0, 1e6]), 100.0, np.ones(2, dtype=bool))
-    assert tuple(beyond[0]) == tuple(beyond[1])
+    rgb = palette.age_colours(np.linspace(0.0, 100.0, 50), 100.0).astype(float)
+    luma = rgb @ np.array([0.299, 0.587, 0.114])  # ITU-R BT.601
+    assert np.all(np.diff(luma) < 0)
+    at_end, beyond = palette.age_colours(np.array([100.0, 1e6]), 100.0)
+    assert tuple(beyond) == tuple(at_end)
 
 
 @pytest.mark.parametrize(

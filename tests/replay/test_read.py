@@ -1,14 +1,21 @@
 """Whole replays pass, others are refused with their reason; rerun passes over the digest."""
 
 import hashlib
-import shutil
 import warnings
 
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from swarm_mj.replay.read import SEAL_BYTES, check_replay, has_digest, windows, with_digest
+from swarm_mj.replay.read import (
+    SEAL_BYTES,
+    check_replay,
+    has_digest,
+    read_footage,
+    windows,
+    with_digest,
+)
+from swarm_mj.replay.write import write_replay
 
 
 def test_windows_are_the_flight_s(replay, two_way):
@@ -40,8 +47,11 @@ def test_a_complaint_names_the_file_and_the_way_out(tmp_path, name, complaint):
         check_replay(tmp_path / name)
 
 
-def test_a_copy_is_as_good(replay, tmp_path):
-    check_replay(shutil.copy(replay, tmp_path / "copy.rrd"))
+def test_a_replay_without_facts_is_refused_in_one_line(two_way, tmp_path, monkeypatch):
+    monkeypatch.setattr("swarm_mj.replay.write.FACTS", "other")
+    write_replay(two_way.log, two_way.mission, {"seed": 5}, tmp_path / "old.rrd")
+    with pytest.raises(ValueError, match=r"old\.rrd does not hold .*; record it again"):
+        read_footage(tmp_path / "old.rrd")
 
 
 @pytest.fixture

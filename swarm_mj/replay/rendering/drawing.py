@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from functools import cache
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from jaxtyping import Float, Int, Int16
-from PIL import Image, ImageFont
+from PIL import ImageFont
 from PIL.ImageDraw import ImageDraw
 
 from swarm_mj.mission.presets import where_flown
@@ -24,6 +24,8 @@ TAG = 2  # of dark ground around a number [pixels]
 LABELS_FIRST = 1000  # a number covers up to this many robots rather than another number
 ROOM, STEP = 3.7, 1.1  # for a legend's samples, and from one to the next [of the text's size]
 
+Font: TypeAlias = ImageFont.FreeTypeFont | ImageFont.ImageFont
+
 
 class Box(NamedTuple):
     """A part of the picture [pixels]."""
@@ -33,26 +35,11 @@ class Box(NamedTuple):
     right: int
     bottom: int
 
-    @property
-    def width(self) -> int:
-        """From left to right."""
-        return self.right - self.left
-
-    @property
-    def height(self) -> int:
-        """From top to bottom."""
-        return self.bottom - self.top
-
 
 @cache
-def font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+def font(size: float) -> Font:
     """Return Pillow's own font, in pixels."""
     return ImageFont.load_default(round(size))
-
-
-def blank(width: int, height: int) -> Image.Image:
-    """Return an empty picture."""
-    return Image.new("RGB", (width, height), palette.BACKGROUND)
 
 
 def draw_title(
@@ -77,16 +64,16 @@ def draw_title(
         draw.text((right, below + size), text, palette.TOO_WEAK, small, anchor="ra")
 
 
-def draw_legend(
-    draw: ImageDraw, footages: Sequence[Footage], full_scale: float, box: Box, size: int
-) -> None:
+def draw_legend(draw: ImageDraw, footages: Sequence[Footage], box: Box, size: int) -> None:
     """Draw the ramp of ages, and the meaning of the packets' colours."""
     small, observers = font(0.8 * size), _observers(footages)
+    full_scale, width = footages[0].facts.full_scale, box.right - box.left
     text = f"colour: age of what {observers} (white) knows"
     draw.text((box.left, box.top), text, palette.TEXT, small)
     y, high = box.top + 1.25 * size, 0.55 * size
     edges = np.linspace(box.left, box.right, NUM_SHADES + 1)
-    for k, colour in enumerate(palette.ramp(full_scale, NUM_SHADES).tolist()):
+    ages = np.linspace(0.0, full_scale, NUM_SHADES)
+    for k, colour in enumerate(palette.age_colours(ages, full_scale).tolist()):
         draw.rectangle((edges[k], y, edges[k + 1], y + high), tuple(colour))
     y += 1.3 * high
     draw.text((box.left, y), "0", palette.SENT, small)
@@ -96,7 +83,7 @@ def draw_legend(
     step = min(STEP, ROOM / ((len(samples) + 1) // 2)) * size
     small = font(min(0.8 * size, 0.9 * step))
     for k, (text, colour) in enumerate(samples.items()):
-        x, line = box.left + (k % 2) * box.width / 2, round(y + 1.3 * size) + step * (k // 2)
+        x, line = box.left + (k % 2) * width / 2, round(y + 1.3 * size) + step * (k // 2)
         if text == SHORTFALL:
             _draw_tag(draw, "dB", x, line, small)
         else:
@@ -118,8 +105,7 @@ def _samples(footages: Sequence[Footage], observers: str) -> dict[str, Colour]:
     if not all(each.facts.is_broadcast for each in footages):
         samples |= {"delivered": palette.DELIVERED, "lost": palette.LOST}
         samples |= {"answered": palette.ANSWERED, "overheard": palette.OVERHEARD}
-    links = [each.mismatch.is_too_weak for each in footages if each.mismatch is not None]
-    is_too_weak = np.concatenate([np.zeros(0, dtype=bool), *links])
+    is_too_weak = np.concatenate([each.mismatch.links["is_too_weak"] for each in footages])
     if np.any(is_too_weak):
         samples[f"{observers}'s link, too weak"] = palette.MISMATCH["too_weak"]
     if not np.all(is_too_weak):
@@ -150,12 +136,7 @@ def draw_shortfalls(
 ) -> None:
     """Write by how much links are too weak, each next to the robot at its far end.
 
-    Args:
-        draw: The picture.
-        robots: All robots' places in it [pixels].
-        others: The robots at the far ends.
-        margin_db: Of their links [dB].
-        size: Of the text [pixels].
+    `robots` are all robots' places in the picture, `others` those at the far ends [pixels].
     """
     small, shown = font(0.75 * size), np.zeros((0, 4))
     on_robots = np.hstack([robots - 0.4 * size, robots + 0.4 * size])
@@ -183,13 +164,7 @@ def _num_overlaps(
     return np.sum(np.all(overlaps, axis=2), axis=1)
 
 
-def _draw_tag(
-    draw: ImageDraw,
-    text: str,
-    x: float,
-    y: float,
-    small: ImageFont.FreeTypeFont | ImageFont.ImageFont,
-) -> None:
+def _draw_tag(draw: ImageDraw, text: str, x: float, y: float, small: Font) -> None:
     """Draw a text on a dark ground, so that it is read before anything."""
     left, top, right, bottom = draw.textbbox((x, y), text, small)
     draw.rectangle((left - TAG, top - TAG, right + TAG, bottom + TAG), palette.BACKGROUND)
@@ -201,28 +176,27 @@ class AgePlot:
 
     def __init__(self, footages: Sequence[Footage], box: Box, size: int) -> None:
         """Prepare the curves, as points of the picture."""
-        self._box, self._size = box, size
-        self._inner = inner = Box(
-            box.left + 2 * size, round(box.top + 1.4 * size), box.right, box.bottom - size
-        )
+        self._footages, self._box, self._size = footages, box, size
+        left, top = box.left + 2 * size, round(box.top + 1.4 * size)
+        self._inner = inner = Box(left, top, box.right, box.bottom - size)
         seconds = [each.window * each.facts.mission.window_s for each in footages]
         self._end_s = max(float(each[-1]) for each in seconds)
         self._top = palette.nice_top(max(float(np.max(each.age_mean)) for each in footages))
-        xs = [inner.left + inner.width * each / self._end_s for each in seconds]
-        ys = [inner.bottom - inner.height * each.age_mean / self._top for each in footages]
-        pairs = zip(xs, ys, strict=True)
-        self._curves = [list(zip(x.tolist(), y.tolist(), strict=True)) for x, y in pairs]
-        # Two missions' columns could not be told apart.
-        self._cut_off = footages[0] if len(footages) == 1 else None
+        self._curves: list[list[tuple[float, float]]] = []
+        for each, at_s in zip(footages, seconds, strict=True):
+            x = inner.left + (inner.right - inner.left) * at_s / self._end_s
+            y = inner.bottom - (inner.bottom - inner.top) * each.age_mean / self._top
+            self._curves.append(list(zip(x.tolist(), y.tolist(), strict=True)))
 
     def draw_axes(self, draw: ImageDraw) -> None:
         """Draw what does not change: title, numbers, and the whole curves, faintly."""
-        small, inner = font(0.8 * self._size), self._inner
+        small, inner, footages = font(0.8 * self._size), self._inner, self._footages
         title = "mean age of information [windows]"
         draw.rectangle(inner, palette.GRID)
-        if self._cut_off is not None and np.any(self._cut_off.is_cut_off):
-            title += f"; red: robots cut off from {_observers([self._cut_off])}, full height 100 %"
-            self._draw_cut_off(draw, self._cut_off)
+        # Two missions' columns could not be told apart.
+        if len(footages) == 1 and np.any(footages[0].is_cut_off):
+            title += f"; red: robots cut off from {_observers(footages)}, full height 100 %"
+            self._draw_cut_off(draw, footages[0])
         draw.text((inner.left, self._box.top), title, palette.TEXT, small)
         for y, value in ((inner.top, f"{self._top:g}"), (inner.bottom, "0")):
             draw.text((inner.left - 4, y), value, palette.SENT, small, anchor="rm")
@@ -247,6 +221,6 @@ class AgePlot:
         left, inner = float(self._inner.left), self._inner
         for (right, _), part in zip(self._curves[0], share.tolist(), strict=True):
             if part > 0.0:
-                top = inner.bottom - part * inner.height
+                top = inner.bottom - part * (inner.bottom - inner.top)
                 draw.rectangle((left, top, right, inner.bottom), dim(palette.CUT_OFF, SHADE))
             left = right

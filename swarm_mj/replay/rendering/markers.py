@@ -4,7 +4,7 @@ The camera looks down on a square of ground from the south.
 """
 
 import itertools
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -13,8 +13,8 @@ from mujoco._functions import mjv_connector, mjv_initGeom
 from mujoco._structs import MjvCamera, MjvGeom, MjvScene
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.footage import Contents
-from swarm_mj.replay.packets import SEGMENTS, arcs
+from swarm_mj.replay.footage import Footage, Ground
+from swarm_mj.replay.packets import SEGMENTS, arcs, lifted
 
 ELEVATION_DEG = 55.0  # of the camera above the ground: 90 would look straight down
 FOV_Y_DEG = 32.0  # a long lens: what is near is hardly larger than what is far
@@ -34,8 +34,7 @@ LINES_PER_ROBOT = 40  # mismatched links; of very dense teams, some are left out
 GEOMS_PER_ROBOT = 3 + 4 * SEGMENTS + LINES_PER_ROBOT
 
 
-@dataclass(frozen=True, kw_only=True)
-class Camera:
+class Camera(NamedTuple):
     """A perspective camera, north up; its picture has square pixels."""
 
     target_m: Float[np.ndarray, "2"]  # the point on the ground that is in the middle [m]
@@ -61,15 +60,15 @@ class Camera:
         free.distance, free.azimuth, free.elevation = self.distance_m, 90.0, -ELEVATION_DEG
 
 
-def look_at(centre_m: Float[np.ndarray, "2"], reach_m: float, width: int, height: int) -> Camera:
-    """Return the camera whose picture of this size [pixels] shows a square of ground [m]."""
+def look_at(ground: Ground, row: int, width: int, height: int) -> Camera:
+    """Return the camera whose picture of this size [pixels] shows the ground in one window."""
+    reach_m = ground.reach_m
     corners = reach_m * np.array([[x, y, 0.0] for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
     # The near edge is seen under a wider angle than the far one: the target moves towards it.
     south_m = np.array([0.0, SHIFT * reach_m])
     across, up, ahead = _axes(corners + np.append(south_m, 0.0))
     needed = np.maximum(np.abs(across) * height / width, np.abs(up)) / (MARGIN * TAN) - ahead
-    distance_m = float(np.max(needed))
-    return Camera(target_m=centre_m - south_m, distance_m=distance_m, width=width, height=height)
+    return Camera(ground.centre_m[row] - south_m, float(np.max(needed)), width, height)
 
 
 def _axes(point_m: Float[np.ndarray, "K 3"]) -> Float[np.ndarray, "3 K"]:
@@ -78,49 +77,58 @@ def _axes(point_m: Float[np.ndarray, "K 3"]) -> Float[np.ndarray, "3 K"]:
     return np.stack([x, SIN * y + COS * z, COS * y - SIN * z])
 
 
-def draw_markers(scene: MjvScene, contents: Contents, camera: Camera) -> None:
-    """Add robots, packets and mismatched links to a scene with `GEOMS_PER_ROBOT` to spare."""
-    enlarged = max(1.0, SMALLEST / camera.height)
-    picture_m, line_pixels = enlarged * camera.pixel_m * camera.height, LINE * camera.height
-    line_pixels *= enlarged
-    _draw_robots(scene, contents, picture_m, line_pixels)
-    lifted = arcs(contents.start_m, contents.end_m, ROBOT * picture_m)
-    for points, colour in zip(lifted, contents.packet_colour, strict=True):
-        for start, end in itertools.pairwise(points):
-            _add_line(scene, start, end, colour, line_pixels)
+def draw_markers(scene: MjvScene, footage: Footage, row: int, camera: Camera) -> None:
+    """Add one window's robots, packets and links to a scene with `GEOMS_PER_ROBOT` to spare."""
+    picture_m = max(camera.height, SMALLEST) * camera.pixel_m
+    line_pixels = LINE * max(camera.height, SMALLEST)
+    _draw_robots(scene, footage, row, picture_m, line_pixels)
+    for start_m, end_m, colour in footage.packets(row):
+        for points in arcs(start_m, end_m, ROBOT * picture_m):
+            for start, end in itertools.pairwise(points):
+                _add_line(scene, start, end, colour, line_pixels)
     # Last, for of very dense teams there is no room for all; robots and packets go first.
     room = scene.maxgeom - scene.ngeom
-    height_m = ROBOT_HEIGHT * ROBOT * picture_m
-    lines_m = np.pad(contents.lines_m, ((0, 0), (0, 0), (0, 1)), constant_values=height_m)
-    for (start, end), colour in zip(lines_m[:room], contents.line_colour[:room], strict=True):
+    lines_m, colours = footage.mismatch_lines(row)
+    lines_m = lifted(lines_m, ROBOT_HEIGHT * ROBOT * picture_m)
+    for (start, end), colour in zip(lines_m[:room], colours[:room], strict=True):
         _add_line(scene, start, end, colour, line_pixels)
 
 
-def _draw_robots(scene: MjvScene, contents: Contents, picture_m: float, line_pixels: float) -> None:
-    """Draw a disc for each robot, as large on the picture whatever the area; and its heading."""
-    speed = np.linalg.norm(contents.velocity_mps, axis=1, keepdims=True)
-    way_m = HEADING * picture_m * contents.velocity_mps / np.maximum(speed, 1e-9)
-    for i, (where, way) in enumerate(zip(contents.position_m, way_m, strict=True)):
-        radius_m = (OBSERVER if i == contents.observer else ROBOT) * picture_m
+def _draw_robots(
+    scene: MjvScene, footage: Footage, row: int, picture_m: float, line_pixels: float
+) -> None:
+    velocity_mps, colours = footage.velocity_mps[row], footage.colours(row)
+    speed = np.linalg.norm(velocity_mps, axis=1, keepdims=True)
+    way_m = HEADING * picture_m * velocity_mps / np.maximum(speed, 1e-9)
+    for i, (where, way) in enumerate(zip(footage.position_m[row], way_m, strict=True)):
+        radius_m = (OBSERVER if i == footage.facts.observer else ROBOT) * picture_m
         height_m = ROBOT_HEIGHT * radius_m
-        _add_disc(scene, np.append(where, height_m), radius_m, radius_m, contents.colour[i])
-        if contents.is_cut_off[i]:
-            flat_m, colour = HALO_HEIGHT * radius_m, np.array(palette.CUT_OFF)
-            _add_disc(scene, np.append(where, flat_m), HALO * radius_m, flat_m, colour)
+        _add_disc(scene, np.append(where, height_m), radius_m, radius_m, colours[i])
+        if footage.is_cut_off[row, i]:
+            flat_m = HALO_HEIGHT * radius_m
+            _add_disc(scene, np.append(where, flat_m), HALO * radius_m, flat_m, palette.CUT_OFF)
         if np.any(way):
             start, end = np.append(where, height_m), np.append(where + way, height_m)
-            _add_line(scene, start, end, np.array(palette.HEADING), line_pixels)
+            _add_line(scene, start, end, palette.HEADING, line_pixels)
 
 
 def _add_disc(
-    scene: MjvScene, where: np.ndarray, radius_m: float, half_m: float, colour: np.ndarray
+    scene: MjvScene,
+    where: np.ndarray,
+    radius_m: float,
+    half_m: float,
+    colour: np.ndarray | palette.Colour,
 ) -> None:
     size, kind = np.array([radius_m, half_m, 0.0]), mjtGeom.mjGEOM_CYLINDER.value
     mjv_initGeom(_next_geom(scene), kind, size, where, NO_TURN, _rgba(colour))
 
 
 def _add_line(
-    scene: MjvScene, start: np.ndarray, end: np.ndarray, colour: np.ndarray, pixels: float
+    scene: MjvScene,
+    start: np.ndarray,
+    end: np.ndarray,
+    colour: np.ndarray | palette.Colour,
+    pixels: float,
 ) -> None:
     geom, kind = _next_geom(scene), mjtGeom.mjGEOM_LINE.value
     mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), NO_TURN, _rgba(colour))
@@ -132,5 +140,5 @@ def _next_geom(scene: MjvScene) -> MjvGeom:
     return scene.geoms[scene.ngeom - 1]
 
 
-def _rgba(colour: np.ndarray) -> Float[np.ndarray, "4"]:
-    return np.append(colour / 255.0, 1.0).astype(np.float32)
+def _rgba(colour: np.ndarray | palette.Colour) -> Float[np.ndarray, "4"]:
+    return np.append(np.asarray(colour) / 255.0, 1.0).astype(np.float32)

@@ -45,10 +45,9 @@ def unusable(error: Exception) -> OSError:
 
 
 def check_choice() -> str:
-    """Return MUJOCO_GL in lower case; MuJoCo cannot even be imported with a name it lacks.
+    """Return MUJOCO_GL in lower case; raise ValueError if MuJoCo has no such back end.
 
-    Raises:
-        ValueError: It has no such back end.
+    With such a name, MuJoCo could not even be imported.
     """
     chosen = os.environ.get(CHOICE, "").lower().strip()
     if chosen and chosen not in (*NAMES, *ON, *OFF):
@@ -62,28 +61,26 @@ def check_choice() -> str:
 def backend() -> str:
     """Return the back end in use: the one that MUJOCO_GL names, or else the first that works here.
 
-    What works is found once and written to MUJOCO_GL.
-
-    Raises:
-        OSError: None works, or MUJOCO_GL says that there is to be none.
+    What works is found once and written to MUJOCO_GL. Raise OSError if none works, or MUJOCO_GL
+    says that there is to be none.
     """
     named = check_choice()
     if named in OFF:
         raise OSError(f"{CHOICE}={named} switches rendering off; unset it")
     if named in ("", *ON):
-        named = _first_that_works()
+        named = "cgl" if sys.platform == "darwin" else _first_that_works()
     os.environ[CHOICE] = "glfw" if named == "glx" else named
     return os.environ[CHOICE]
 
 
 def _first_that_works() -> str:
-    if sys.platform == "darwin":
-        return "cgl"
-    settled = _settled()
+    # What PyOpenGL draws by in this process, if it is loaded, cannot change. dm_control's viewer
+    # loads it without a choice. Without a screen it then takes GLX, and EGL finds no display in
+    # this process any more, although it does in a fresh one.
+    loaded: Any = sys.modules.get("OpenGL.platform")
+    settled = loaded and type(loaded.PLATFORM).__name__.removesuffix("Platform").lower()
     preset = settled or os.environ.get(PYOPENGL, "").lower()
-    candidates = sorted(
-        WITHOUT_SCREEN, key=lambda name: name != preset
-    )  # stable: EGL before OSMesa
+    candidates = sorted(WITHOUT_SCREEN, key=lambda name: name != preset)  # EGL before OSMesa
     found = next(filter(_works, candidates), None)
     if found is None:
         raise OSError(f"neither EGL nor OSMesa works here; {WAY_OUT}")
@@ -97,18 +94,7 @@ def _first_that_works() -> str:
     return found
 
 
-def _settled() -> str | None:
-    """Return what PyOpenGL draws by in this process, if it is loaded: it cannot change.
-
-    dm_control's viewer loads it without a choice. Without a screen it then takes GLX, and EGL finds
-    no display in this process any more, although it does in a fresh one.
-    """
-    platform: Any = sys.modules.get("OpenGL.platform")
-    return platform and type(platform.PLATFORM).__name__.removesuffix("Platform").lower()
-
-
 def _works(name: str) -> bool:
-    """Return whether a back end makes a context, in a process of its own."""
     command = [*PYTHON, "-c", TRIAL.format(name)]
     environment = {**os.environ, CHOICE: name, PYOPENGL: name}
     with (

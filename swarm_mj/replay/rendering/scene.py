@@ -20,7 +20,7 @@ from mujoco._structs import MjData, MjModel, MjrRect, MjvCamera, MjvOption, MjvS
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.physics.solid_geoms import obstacle_geoms
-from swarm_mj.replay.footage import Contents
+from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.rendering.markers import (
     FOV_Y_DEG,
     GEOMS_PER_ROBOT,
@@ -59,8 +59,7 @@ class SceneRenderer:
         for what, pixels in (("width", width), ("height", height)):
             if not 16 <= pixels <= MAX_PIXELS:
                 raise ValueError(f"{what} must be from 16 to {MAX_PIXELS} pixels, not {pixels}")
-        self._width, self._height = width, height
-        self._mission = mission
+        self._size, self._mission = (width, height), mission
         self._model = pictured(mission, scene, width, height)
         self._data = MjData(self._model)
         self._floor = mj_name2id(self._model, mjtObj.mjOBJ_GEOM.value, "floor")
@@ -79,25 +78,33 @@ class SceneRenderer:
         self._is_open = True
         atexit.register(_close, ref(self))  # before the back end ends, which registered earlier
 
-    def camera(self, contents: Contents) -> Camera:
-        """Return the camera by which a picture of these contents is seen."""
-        return look_at(contents.centre_m, contents.reach_m, self._width, self._height)
+    def camera(self, footage: Footage, row: int = 0) -> Camera:
+        """Return the camera by which a window's picture is seen."""
+        return look_at(footage.ground, row, *self._size)
 
-    def frame(self, contents: Contents) -> UInt8[np.ndarray, "H W 3"]:
-        """Return the picture, RGB, its first row on top; ValueError for another team size."""
-        if len(contents.position_m) != self._mission.num_robots:
-            raise ValueError(
-                f"contents must have {self._mission.num_robots} robots, "
-                f"not {len(contents.position_m)}"
-            )
-        self._place(contents)
-        camera, free = self.camera(contents), MjvCamera()
+    def frame(self, footage: Footage, row: int = 0) -> UInt8[np.ndarray, "H W 3"]:
+        """Return the picture of a window, counted from 0: RGB, its first row on top.
+
+        Raises:
+            ValueError: The footage is of another team size.
+        """
+        num, (width, height) = footage.position_m.shape[1], self._size
+        if num != self._mission.num_robots:
+            raise ValueError(f"footage must have {self._mission.num_robots} robots, not {num}")
+        data, camera, free = self._data, self.camera(footage, row), MjvCamera()
+        data.qpos[:] = footage.position_m[row].ravel()
+        mj_kinematics(self._model, data)
+        mj_comPos(self._model, data)
+        mj_camlight(self._model, data)
+        if not self._mission.has_walls and self._floor >= 0:
+            # By whole tiles, so that the pattern stands still under a team that flies on.
+            tiles = np.round(footage.ground.centre_m[row] / TILE_M)
+            data.geom_xpos[self._floor, :2] = tiles * TILE_M
         camera.aim(free)
         everything = mjtCatBit.mjCAT_ALL.value
-        mjv_updateScene(self._model, self._data, self._options, None, free, everything, self._scene)
-        draw_markers(self._scene, contents, camera)
-        picture = np.empty((self._height, self._width, 3), dtype=np.uint8)
-        whole = MjrRect(0, 0, self._width, self._height)
+        mjv_updateScene(self._model, data, self._options, None, free, everything, self._scene)
+        draw_markers(self._scene, footage, row, camera)
+        picture, whole = np.empty((height, width, 3), np.uint8), MjrRect(0, 0, width, height)
         self._opengl.make_current()  # there may be other renderers
         mjr_render(whole, self._scene, self._context)
         mjr_readPixels(picture, None, whole, self._context)
@@ -117,17 +124,6 @@ class SceneRenderer:
 
     def __exit__(self, *error: object) -> None:
         self.close()
-
-    def _place(self, contents: Contents) -> None:
-        """Put the robots' bodies, and an open area's floor, where they are seen."""
-        self._data.qpos[:] = contents.position_m.ravel()
-        mj_kinematics(self._model, self._data)
-        mj_comPos(self._model, self._data)
-        mj_camlight(self._model, self._data)
-        if not self._mission.has_walls and self._floor >= 0:
-            # By whole tiles, so that the pattern stands still under a team that flies on.
-            whole_tiles_m = np.round(contents.centre_m / TILE_M) * TILE_M
-            self._data.geom_xpos[self._floor, :2] = whole_tiles_m
 
 
 def _close(renderer: "ref[SceneRenderer]") -> None:
@@ -154,11 +150,6 @@ def pictured(mission: Mission, scene: Scene | None, width: int, height: int) -> 
         if geom.name == "floor" and not mission.has_walls:
             geom.size = [half_m, half_m, half_m / 10.0]  # drawn in 20 by 20 pieces
     model = spec.compile()
-    _light(model, width, height)
-    return model
-
-
-def _light(model: MjModel, width: int, height: int) -> None:
     visual = model.vis
     visual.global_.offwidth, visual.global_.offheight = width, height
     visual.global_.fovy = FOV_Y_DEG
@@ -170,3 +161,4 @@ def _light(model: MjModel, width: int, height: int) -> None:
         material = model.geom_matid[g]
         colour = model.geom_rgba[g] if material < 0 else model.mat_rgba[material]
         colour[3] = min(colour[3], OBSTACLE_OPACITY)
+    return model

@@ -37,8 +37,7 @@ DEFAULTS = {".mp4": VideoStyle(), GIF: VideoStyle(width=830, height=520, fps=15)
 def fitted(style: VideoStyle, suffix: str) -> VideoStyle:
     """Adapt a style to a kind of file: a GIF's pictures last whole hundredths of a second.
 
-    Raises:
-        ValueError: A GIF cannot show so many pictures per second.
+    Raise ValueError for more pictures per second than a GIF can show.
     """
     if suffix != GIF:
         return style

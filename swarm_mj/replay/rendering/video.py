@@ -7,20 +7,21 @@ import io
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from fractions import Fraction
 
 import av
 import numpy as np
-from jaxtyping import Int, UInt8
+from jaxtyping import UInt8
 from PIL import Image, ImageDraw
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
+from swarm_mj.replay.packets import lifted
 from swarm_mj.replay.rendering.drawing import (
     CURVES,
     AgePlot,
     Box,
-    blank,
     draw_legend,
     draw_shortfalls,
     draw_title,
@@ -52,29 +53,31 @@ class Movie(ExitStack):
         super().__init__()
         if not 1 <= len(footages) <= MAX_MISSIONS:
             raise ValueError(f"a video shows 1 or {MAX_MISSIONS} missions, not {len(footages)}")
-        self._footages, self._num_frames = footages, style.num_frames
         # One scale for both: by it the fresher team is seen in full, and the other is older still.
-        self._full_scale = min(each.facts.full_scale for each in footages)
-        width, height = style.width, style.height
+        scale = min(each.facts.full_scale for each in footages)
+        self._footages = [
+            replace(each, facts=replace(each.facts, full_scale=scale)) for each in footages
+        ]
+        self._num_frames, width, height = style.num_frames, style.width, style.height
         bottom = height - round(STRIP * height)
         edges = np.linspace(0, width, len(footages) + 1).round().astype(int).tolist()
         self._boxes = [Box(left, 0, right, bottom) for left, right in itertools.pairwise(edges)]
-        self._text = max(9, round(min(TEXT * height, 0.05 * self._boxes[0].width)))
+        self._text = max(9, round(min(TEXT * height, 0.05 * self._boxes[0].right)))
         pad = self._text // 2
         middle, top = pad + round(LEGEND * width), bottom + pad
         legend = Box(pad, top, middle - 2 * pad, height - pad)
         right = Box(middle, top, width - 2 * pad, height - pad)
         self._plot = AgePlot(footages, right, self._text)
-        self._empty = blank(width, height)
+        self._empty = Image.new("RGB", (width, height), palette.BACKGROUND)
         draw = ImageDraw.Draw(self._empty)
-        draw_legend(draw, footages, self._full_scale, legend, self._text)
+        draw_legend(draw, self._footages, legend, self._text)
         self._plot.draw_axes(draw)
         with ExitStack() as opened:  # closes the first renderer if the second does not start
             self._renderers = [
                 opened.enter_context(
-                    SceneRenderer(each.facts.mission, box.width, box.height, scene=each.scene)
+                    SceneRenderer(each.facts.mission, right - left, bottom, scene=each.scene)
                 )
-                for each, box in zip(footages, self._boxes, strict=True)
+                for each, (left, _, right, _) in zip(footages, self._boxes, strict=True)
             ]
             self.push(opened.pop_all())
 
@@ -82,9 +85,10 @@ class Movie(ExitStack):
         return self._num_frames
 
     def __iter__(self) -> Iterator[Picture]:
-        rows = [self._rows(each) for each in self._footages]
-        for number in range(len(self)):
-            yield self.picture([int(each[number]) for each in rows])
+        lengths = [len(each.window) for each in self._footages]
+        rows = np.linspace(0, max(lengths) - 1, len(self)).round().astype(int).tolist()
+        for row in rows:  # a mission that is over stands still
+            yield self.picture([min(row, length - 1) for length in lengths])
 
     def picture(self, rows: Sequence[int]) -> Picture:
         """Return the picture of these windows, one of each mission, from 0."""
@@ -92,22 +96,15 @@ class Movie(ExitStack):
         draw = ImageDraw.Draw(picture)
         parts = zip(self._footages, rows, self._boxes, self._renderers, CURVES, strict=False)
         for footage, row, box, renderer, curve in parts:
-            contents = footage.contents(row, self._full_scale)
-            picture.paste(Image.fromarray(renderer.frame(contents)), (box.left, box.top))
+            picture.paste(Image.fromarray(renderer.frame(footage, row)), (box.left, box.top))
             draw_title(draw, footage, row, box, self._text, curve)
-            ground_m = np.pad(contents.position_m, ((0, 0), (0, 1)))
-            robots = renderer.camera(contents).pixels(ground_m) + np.array([box.left, box.top])
+            ground_m = lifted(footage.position_m[row], 0.0)
+            robots = renderer.camera(footage, row).pixels(ground_m) + np.array(box[:2])
             draw_shortfalls(draw, robots, *footage.shortfalls(row), self._text)
         for box in self._boxes[1:]:
             draw.line((box.left, 0, box.left, box.bottom), palette.BACKGROUND, SEAM)
         self._plot.draw_until(draw, rows)
         return np.asarray(picture)
-
-    def _rows(self, footage: Footage) -> Int[np.ndarray, "F"]:
-        """Return the window of each picture; a mission that is over stands still."""
-        longest = max(len(each.window) for each in self._footages)
-        rows = np.linspace(0, longest - 1, len(self)).round().astype(int)
-        return np.minimum(rows, len(footage.window) - 1)
 
 
 def make_video(
@@ -157,8 +154,17 @@ def encode_mp4(pictures: Iterable[Picture], style: VideoStyle) -> bytes:
 
 
 def encode_gif(pictures: Iterable[Picture], style: VideoStyle, samples: Sequence[Picture]) -> bytes:
-    """Return a GIF that starts over and over; its colours are those of the samples."""
-    colours = _colours(samples)
+    """Return a GIF that starts over and over; its colours are those of the samples.
+
+    What fills little of a picture, such as lost packets, has its colour, too.
+    """
+    pixels = np.concatenate([sample.reshape(-1, 3) for sample in samples]).astype(np.int32)
+    packed, counts = np.unique(pixels @ (1 << 16, 1 << 8, 1), return_counts=True)
+    # By the roots of their numbers, so that the dark ground does not take all of them.
+    repeated = np.repeat(packed, np.ceil(np.sqrt(counts)).astype(int))
+    rgb = np.stack([repeated >> shift & 255 for shift in (16, 8, 0)], axis=-1)
+    montage = Image.fromarray(rgb[None].astype(np.uint8))
+    colours = montage.quantize(NUM_COLOURS, method=Image.Quantize.MEDIANCUT)
     images = (
         Image.fromarray(picture).quantize(palette=colours, dither=Image.Dither.NONE)
         for picture in pictures
@@ -167,14 +173,3 @@ def encode_gif(pictures: Iterable[Picture], style: VideoStyle, samples: Sequence
     first, lasts_ms = next(images), round(1000.0 / style.fps)
     first.save(content, "gif", save_all=True, append_images=images, duration=lasts_ms, loop=0)
     return content.getvalue()
-
-
-def _colours(samples: Sequence[Picture]) -> Image.Image:
-    """Return the palette; what fills little of a picture, such as lost packets, is in it, too."""
-    pixels = np.concatenate([sample.reshape(-1, 3) for sample in samples]).astype(np.int32)
-    packed, counts = np.unique(pixels @ (1 << 16, 1 << 8, 1), return_counts=True)
-    # By the roots of their numbers, so that the dark ground does not take all of them.
-    repeated = np.repeat(packed, np.ceil(np.sqrt(counts)).astype(int))
-    rgb = np.stack([repeated >> shift & 255 for shift in (16, 8, 0)], axis=-1)
-    montage = Image.fromarray(rgb[None].astype(np.uint8))
-    return montage.quantize(NUM_COLOURS, method=Image.Quantize.MEDIANCUT)

@@ -10,7 +10,7 @@ from mujoco._structs import MjData
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene
-from swarm_mj.replay.footage import Contents
+from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.rendering.markers import draw_markers, look_at
 from swarm_mj.replay.rendering.scene import BEACONS, pictured
 
@@ -44,20 +44,20 @@ class SceneViewer:
         self._markers = markers
         self._is_aimed = False
 
-    def show(self, contents: Contents) -> None:
+    def show(self, footage: Footage) -> None:
         """Show this from now on."""
         if not self._window.is_running():
             return
-        camera = look_at(contents.centre_m, contents.reach_m, *SIZE)
+        camera = look_at(footage.ground, 0, *SIZE)
         with self._window.lock():
             if not self._is_aimed:  # from then on it is the user's
                 camera.aim(self._window.cam)
                 self._window.opt.geomgroup[BEACONS] = 0
                 self._is_aimed = True
-            self._data.qpos[:] = contents.position_m.ravel()
+            self._data.qpos[:] = footage.position_m[0].ravel()
             mj_forward(self._model, self._data)
             self._markers.ngeom = 0
-            draw_markers(self._markers, contents, camera)
+            draw_markers(self._markers, footage, 0, camera)
         self._window.sync()
 
     def close(self) -> None:

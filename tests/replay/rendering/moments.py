@@ -2,28 +2,30 @@
 
 import numpy as np
 
-from swarm_mj.replay.footage import Contents
+from swarm_mj.mission import paper
+from swarm_mj.replay.footage import Facts, Footage, Ground
+from swarm_mj.replay.packets import PacketSegments
 
-GREEN = (0, 205, 145)
+GREEN = (39, 173, 129)  # of viridis, at 5 of its 8 steps: what is fresh by 0.625
+AGE = (1.0 - 0.625) / 0.9 * 10.0  # of which robots are as green [windows]
 
 
-def moment(position_m, links=(), *, observer=0, reach_m=500.0):
-    """Green robots at rest, the observer white, and green links between robots."""
-    where = np.array(position_m, dtype=float)
-    colour = np.tile(np.array(GREEN, dtype=np.uint8), (len(where), 1))
-    colour[observer] = 255
+def moment(position_m, links=(), *, observer=0, reach_m=500.0, num_windows=1, **facts):
+    """Green robots at rest, the observer white, and green packets between robots."""
+    where = np.tile(np.array(position_m, dtype=float), (num_windows, 1, 1))
     start, end = (np.array([pair[k] for pair in links], dtype=int) for k in (0, 1))
-    return Contents(
+    own = {"policy": "mst", "seed": 3, "is_broadcast": False, "full_scale": 10.0, **facts}
+    mission = paper("stationary", num_robots=where.shape[1])
+    delivered = PacketSegments(np.zeros(len(start), int), where[0, start], where[0, end])
+    return Footage(
+        facts=Facts(mission=mission, observer=observer, **own),
+        window=np.arange(1, num_windows + 1),
         position_m=where,
         velocity_mps=np.zeros_like(where),
-        colour=colour,
-        observer=observer,
-        start_m=where[start],
-        end_m=where[end],
-        packet_colour=np.tile(np.array(GREEN, dtype=np.uint8), (len(start), 1)),
-        lines_m=np.zeros((0, 2, 2)),
-        line_colour=np.zeros((0, 3), dtype=np.uint8),
-        is_cut_off=np.zeros(len(where), dtype=bool),
-        centre_m=np.zeros(2),
-        reach_m=reach_m,
+        age=np.full(where.shape[:2], AGE),
+        is_on=np.ones(where.shape[:2], dtype=bool),
+        segments={"delivered": delivered},
+        age_mean=np.ones(num_windows),
+        is_cut_off=np.zeros(where.shape[:2], dtype=bool),
+        ground=Ground(centre_m=np.zeros((num_windows, 2)), reach_m=reach_m),
     )

@@ -4,17 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PIL import ImageDraw
+from moments import moment
+from PIL import Image, ImageDraw
 
-from swarm_mj.mission import paper
 from swarm_mj.replay import palette
-from swarm_mj.replay.footage import Facts, Footage
-from swarm_mj.replay.mismatch import LinkMismatch
+from swarm_mj.replay.mismatch import LINK, LinkMismatch
 from swarm_mj.replay.rendering.drawing import (
     SHADE,
     AgePlot,
     Box,
-    blank,
     draw_legend,
     draw_shortfalls,
     draw_title,
@@ -23,33 +21,17 @@ from swarm_mj.replay.rendering.drawing import (
 BOX = Box(20, 10, 380, 150)
 
 
-def footage(age_mean, *, is_broadcast=False):
-    """A mission whose team stands still."""
-    num = len(age_mean)
-    facts = Facts(
-        mission=paper("stationary", num_robots=2),
-        policy="mst",
-        seed=3,
-        observer=0,
-        is_broadcast=is_broadcast,
-        full_scale=10.0,
-    )
-    return Footage(
-        facts=facts,
-        window=np.arange(1, num + 1),
-        position_m=np.zeros((num, 2, 2)),
-        velocity_mps=np.zeros((num, 2, 2)),
-        age=np.zeros((num, 2)),
-        is_on=np.ones((num, 2), dtype=bool),
-        segments={},
-        age_mean=np.array(age_mean, dtype=float),
-        is_cut_off=np.zeros((num, 2), dtype=bool),
+def footage(age_mean, **facts):
+    """A mission whose team of two stands still."""
+    where = [(0.0, 0.0), (0.0, 0.0)]
+    return replace(
+        moment(where, num_windows=len(age_mean), **facts), age_mean=np.array(age_mean, dtype=float)
     )
 
 
 def drawn(draw, *arguments):
     """A dark picture of 400 by 160 pixels after something was drawn on it."""
-    picture = blank(400, 160)
+    picture = Image.new("RGB", (400, 160), palette.BACKGROUND)
     draw(ImageDraw.Draw(picture), *arguments)
     return picture
 
@@ -74,7 +56,7 @@ def test_the_legend_names_what_is_drawn_only():
     samples = {}
     for is_broadcast in (True, False):
         seen = footage([1.0], is_broadcast=is_broadcast)
-        picture = samples[is_broadcast] = drawn(draw_legend, [seen], 10.0, BOX, 12)
+        picture = samples[is_broadcast] = drawn(draw_legend, [seen], BOX, 12)
         assert np.any(has(picture, palette.UNKNOWN))
         assert np.any(has(picture, (253, 231, 37)))  # the ramp's fresh end
     assert np.any(has(samples[False], palette.LOST))
@@ -83,24 +65,15 @@ def test_the_legend_names_what_is_drawn_only():
 
 def with_one_too_weak(seen):
     """The same footage, in which robot 1 is cut off from robot 0 as their link is too weak."""
-    number = np.zeros(1, dtype=np.int16)
-    link = LinkMismatch(
-        window=np.array([1]),
-        row=np.zeros(1, dtype=int),
-        sender=number,
-        receiver=number + 1,
-        is_too_weak=np.ones(1, dtype=bool),
-        loss_db=number + 99,
-        margin_db=number - 11,
-    )
+    links = LinkMismatch(np.array([1]), np.array([(0, 0, 1, 99, -11, True)], LINK))
     is_cut_off = np.tile([False, True], (len(seen.window), 1))
-    return replace(seen, mismatch=link, is_cut_off=is_cut_off)
+    return replace(seen, mismatch=links, is_cut_off=is_cut_off)
 
 
 def test_the_legend_names_links_that_surprise_if_there_are_any():
     found = []
     for seen in (footage([1.0]), with_one_too_weak(footage([1.0]))):
-        picture = drawn(draw_legend, [seen], 10.0, BOX, 12)
+        picture = drawn(draw_legend, [seen], BOX, 12)
         colours = (palette.MISMATCH["too_weak"], palette.CUT_OFF, palette.MISMATCH["unbelieved"])
         found.append([bool(np.any(has(picture, colour, 0))) for colour in colours])
     assert found == [[False] * 3, [True, True, False]]
@@ -115,7 +88,7 @@ def test_the_plot_has_columns_for_who_is_cut_off():
         heights.append(np.sum(np.any(has(picture, red, 0), axis=1)))
     none, whole = heights
     assert none == 0
-    inner = BOX.height - 10 - 14
+    inner = BOX.bottom - BOX.top - 10 - 14
     assert abs(whole - inner) <= 2
 
 
@@ -145,20 +118,21 @@ def test_shortfalls_do_not_cover_each_other():
 
 
 def test_a_shortfall_stands_on_dark_ground():
-    picture = blank(400, 160)
-    draw = ImageDraw.Draw(picture)
-    draw.rectangle((0, 0, 400, 160), (255, 255, 255))
+    picture = Image.new("RGB", (400, 160), "white")
     one = np.array([0], dtype=np.int16)
-    draw_shortfalls(draw, np.array([[200.0, 80.0]]), one, one - 9, 12)
+    draw_shortfalls(ImageDraw.Draw(picture), np.array([[200.0, 80.0]]), one, one - 9, 12)
     rows, columns = np.nonzero(has(picture, palette.TOO_WEAK, 60))
     around = np.asarray(picture)[rows.min() - 1, columns.min() : columns.max()]
     assert np.all(around == palette.BACKGROUND)
 
 
+TOP = Box(0, 0, 400, 160)
+
+
 def test_the_title_counts_who_is_cut_off():
     is_red = []
     for seen in (footage([1.0]), with_one_too_weak(footage([1.0]))):
-        picture = drawn(draw_title, seen, 0, Box(0, 0, 400, 160), 12, (0, 255, 0))
+        picture = drawn(draw_title, seen, 0, TOP, 12, (0, 255, 0))
         is_red.append(bool(np.any(has(picture, palette.TOO_WEAK, 20))))
     assert is_red == [False, True]
 
@@ -175,9 +149,7 @@ def test_the_title_stays_in_its_part_of_the_picture():
 def test_a_title_has_a_line_for_each_part_of_ones_own():
     lowest = []
     for parts in ({}, {"channel": "my:Radio"}, {"channel": "my:Radio", "scene": "my:walls"}):
-        seen = footage([1.0])
-        seen = replace(seen, facts=replace(seen.facts, **parts))
-        picture = drawn(draw_title, seen, 0, Box(0, 0, 400, 160), 12, (255, 0, 0))
+        picture = drawn(draw_title, footage([1.0], **parts), 0, TOP, 12, (255, 0, 0))
         rows, _ = np.nonzero(~has(picture, palette.BACKGROUND))
         lowest.append(rows.max())
     assert np.all(np.diff(lowest) >= 8)

@@ -8,15 +8,16 @@ import pytest
 from moments import moment
 
 from swarm_mj.replay import palette
+from swarm_mj.replay.footage import Ground
+from swarm_mj.replay.mismatch import LINK, LinkMismatch
 from swarm_mj.replay.packets import SEGMENTS
 from swarm_mj.replay.rendering.markers import FOV_Y_DEG, draw_markers, look_at
 
 
-def drawn(contents):
+def drawn(footage):
     scene = mujoco.MjvScene(mujoco.MjModel.from_xml_string("<mujoco/>"), 100)
     scene.ngeom = 0
-    camera = look_at(contents.centre_m, contents.reach_m, 640, 480)
-    draw_markers(scene, contents, camera)
+    draw_markers(scene, footage, 0, look_at(footage.ground, 0, 640, 480))
     return [scene.geoms[k] for k in range(scene.ngeom)]
 
 
@@ -29,9 +30,9 @@ def test_the_observer_is_the_largest_and_white():
 
 
 def test_a_robot_that_is_cut_off_has_a_flat_red_halo():
-    contents = moment([(0.0, 0.0), (100.0, 0.0)])
-    contents.is_cut_off[1] = True
-    _, robot, halo = drawn(contents)
+    seen = moment([(0.0, 0.0), (100.0, 0.0)])
+    seen.is_cut_off[0, 1] = True
+    _, robot, halo = drawn(seen)
     np.testing.assert_allclose(halo.pos[:2], (100, 0))
     np.testing.assert_allclose(halo.rgba[:3] * 255.0, palette.CUT_OFF)
     assert halo.size[0] > robot.size[0]
@@ -39,26 +40,25 @@ def test_a_robot_that_is_cut_off_has_a_flat_red_halo():
 
 
 def test_links_that_surprise_are_drawn_until_there_is_no_room():
-    contents = moment([(0.0, 0.0), (100.0, 0.0)])
+    seen = moment([(0.0, 0.0), (100.0, 0.0)])
     for num in (3, 500):
-        lines = np.tile([[(0.0, 0.0), (100.0, 0.0)]], (num, 1, 1))
-        colour = np.tile(np.array([[255, 0, 0]], np.uint8), (num, 1))
-        geoms = drawn(replace(contents, lines_m=lines, line_colour=colour))
+        links = np.array([(0, 0, 1, 90, 5, False)] * num, LINK)
+        geoms = drawn(replace(seen, mismatch=LinkMismatch(np.array([1]), links)))
         assert len(geoms) == min(2 + num, 100)
-        np.testing.assert_array_equal(geoms[-1].rgba, (1, 0, 0, 1))
+        np.testing.assert_allclose(geoms[-1].rgba[:3] * 255.0, palette.UNBELIEVED)
 
 
 def test_a_packet_is_an_arc_of_lines_and_a_heading_one_more():
-    contents = moment([(0.0, 0.0), (100.0, 0.0)], [(0, 1)])
-    assert len(drawn(contents)) == 2 + SEGMENTS
-    contents.velocity_mps[0] = (3.0, 0.0)
-    assert len(drawn(contents)) == 3 + SEGMENTS
+    seen = moment([(0.0, 0.0), (100.0, 0.0)], [(0, 1)])
+    assert len(drawn(seen)) == 2 + SEGMENTS
+    seen.velocity_mps[0, 0] = (3.0, 0.0)
+    assert len(drawn(seen)) == 3 + SEGMENTS
 
 
 @pytest.mark.parametrize(("width", "height"), [(1280, 720), (400, 400), (300, 900)])
 def test_the_whole_square_is_seen_and_fills_the_picture(width, height):
     centre, reach = np.array([250.0, -100.0]), 700.0
-    camera = look_at(centre, reach, width, height)
+    camera = look_at(Ground(centre_m=centre[None], reach_m=reach), 0, width, height)
     corners = np.array([[x, y, 0.0] for x in (-reach, reach) for y in (-reach, reach)])
     seen = camera.pixels(corners + np.append(centre, 0.0))
     assert np.all(seen >= 0.0)
@@ -68,7 +68,7 @@ def test_the_whole_square_is_seen_and_fills_the_picture(width, height):
 
 
 def test_the_target_is_in_the_middle_north_is_up_and_a_pixel_as_large_as_the_lens_says():
-    camera = look_at(np.zeros(2), 100.0, 640, 480)
+    camera = look_at(Ground(centre_m=np.zeros((1, 2)), reach_m=100.0), 0, 640, 480)
     middle = np.append(camera.target_m, 0.0)
     at, east, north, above = camera.pixels(middle + np.vstack([np.zeros(3), np.eye(3)]))
     np.testing.assert_allclose(at, [320, 240])

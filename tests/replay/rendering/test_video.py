@@ -15,6 +15,7 @@ from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import footage_of
+from swarm_mj.replay.mismatch import NO_MISMATCH
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.rendering.style import VideoStyle
 from swarm_mj.replay.rendering.video import Movie, encode_gif, encode_mp4, make_video
@@ -108,7 +109,8 @@ def test_links_that_surprise_and_their_shortfalls_are_seen():
     mission = paper("random-walk", num_robots=10, num_windows=6, arena="blocks", shadowing_db=6.0)
     city = flown("tdma", mission)
     assert len(city.shortfalls(5)[1]) > 0
-    without = replace(city, mismatch=None, is_cut_off=np.zeros_like(city.is_cut_off))
+    is_cut_off = np.zeros_like(city.is_cut_off)
+    without = replace(city, mismatch=NO_MISMATCH, is_cut_off=is_cut_off)
     num_red = []
     for footage in (city, without):
         with Movie([footage], STYLE) as movie:

@@ -1,52 +1,46 @@
-"""The scene in three dimensions, read back from the file, against the flight and MuJoCo's model."""
+"""What stands still, read back from the file, against the mission and MuJoCo's model."""
 
 from dataclasses import replace
 
 import mujoco
 import numpy as np
+import pytest
 import rerun as rr
 from mujoco import mjtGeom
-from reading import column, counts, entities, rows, static
+from reading import entities, static
 from rerun.chunk import RrdReader
 
-from swarm_mj.replay.packets import SEGMENTS
-from swarm_mj.replay.space import FLOOR_M, static_geoms
+from swarm_mj.physics.arenas import BLOCK_M
+from swarm_mj.physics.solid_geoms import obstacles_of
+from swarm_mj.replay.footage import Ground
+from swarm_mj.replay.stage import FLOOR_M, filling, footprints, square_m, static_geoms
 from swarm_mj.replay.write import write_replay
 
 
-def test_bodies_stand_where_the_robots_are(replay, two_way):
-    where = rows(replay, "/scene/robots", "Cylinders3D:centers", 12, 3)
-    np.testing.assert_allclose(where[..., :2], two_way.log.position_m, rtol=1e-6, atol=1e-4)
-    assert np.all(where[..., 2] > 0.0)
-    radii = static(replay, "/scene/robots", "Cylinders3D:radii")
-    assert (len(radii), np.argmax(radii)) == (12, two_way.log.ego)
-    on_map = column(replay, "/arena/robots", "Points2D:colors").flatten().to_numpy()
-    in_space = column(replay, "/scene/robots", "Cylinders3D:colors").flatten().to_numpy()
-    np.testing.assert_array_equal(in_space, on_map)
-
-
-def test_a_window_s_arcs_are_its_packets(replay, two_way):
-    links, position_m = two_way.log.packets["delivered"], two_way.log.position_m
-    entity, component = "/scene/packets/delivered", "LineStrips3D:strips"
-    per_window = counts(replay, entity, component)
-    np.testing.assert_array_equal(per_window, two_way.counted("delivered"))
-    points = column(replay, entity, component).flatten().flatten().flatten()
-    points = points.to_numpy().reshape(-1, SEGMENTS + 1, 3)
-    for at, robot in ((0, links.sender), (-1, links.receiver)):
-        where = position_m[links.row, robot]
-        np.testing.assert_allclose(points[:, at, :2], where, rtol=1e-5, atol=1e-2)
-    assert np.all(points[:, SEGMENTS // 2, 2] > points[:, 0, 2])
-
-
-def test_walls_and_floor_are_the_model_s(replay, two_way):
+def test_walls_and_floor_are_the_model_s_and_north_is_up(replay, two_way):
     half = two_way.mission.half_side_m
     east = static(replay, "/scene/area/wall_east", "Boxes3D:half_sizes")
     np.testing.assert_allclose(east, [2.0, half + 4.0, 5.0], rtol=1e-6)
     floor = static(replay, "/scene/area/floor", "Boxes3D:half_sizes")
     np.testing.assert_allclose(floor[:2], half)
+    north_up = [1, 0, 0, 0, -1, 0, 0, 0, 1]
+    np.testing.assert_array_equal(static(replay, "/arena", "Transform3D:mat3x3"), north_up)
 
 
-def test_pointing_at_an_obstacle_shows_its_loss(blocked_replay):
+@pytest.mark.parametrize(
+    ("reach_m", "way_m", "square"), [(500.0, 0.0, 100.0), (500.0, 4e3, 100.0), (500.0, 9e3, 1e3)]
+)
+def test_squares_are_few_enough_to_be_seen(reach_m, way_m, square):
+    centre_m = np.array([[0.0, 0.0], [way_m, 0.0]])
+    assert square_m(Ground(centre_m=centre_m, reach_m=reach_m)) == square
+
+
+def test_the_city_s_blocks_are_on_the_map_and_say_their_loss(blocked, blocked_replay):
+    """14 robots have a side of 592 m: three blocks of 110 m by three."""
+    strips = static(blocked_replay, "/arena/world/obstacle", "LineStrips2D:strips")
+    outlines = np.array(strips.tolist()).reshape(9, 5, 2)
+    np.testing.assert_allclose(np.ptp(outlines, axis=1), BLOCK_M, rtol=1e-5)
+    assert np.abs(outlines).max() < blocked.mission.half_side_m
     blocks = {path for path in entities(blocked_replay) if path.startswith("/scene/area/geom")}
     assert len(blocks) == 9
     assert {float(static(blocked_replay, path, "loss_db")[0]) for path in blocks} == {25.0}
@@ -58,7 +52,6 @@ def test_a_scene_of_one_s_own_is_drawn_whatever_its_geoms(two_way, tmp_path):
     def town(spec, _mission):
         add = spec.worldbody.add_geom
         add(name="house", type=mjtGeom.mjGEOM_BOX, pos=[50, 60, 10], size=[5, 6, 10])
-        add(name="ball", type=mjtGeom.mjGEOM_SPHERE, pos=[0, 0, 4], size=[4, 0, 0])
         add(name="pipe", type=mjtGeom.mjGEOM_CAPSULE, pos=[9, 9, 2], size=[2, 7, 0], quat=turned)
         add(name="tower", type=mjtGeom.mjGEOM_CYLINDER, pos=[1, 2, 8], size=[3, 8, 0])
         spec.add_mesh(name="tent", uservert=[0, 0, 0, 8, 0, 0, 0, 8, 0, 0, 0, 8])
@@ -73,15 +66,11 @@ def test_a_scene_of_one_s_own_is_drawn_whatever_its_geoms(two_way, tmp_path):
         if name.split(":")[-1] in ("half_sizes", "lengths")
     }
     walls = {f"wall_{side}": "Boxes3D" for side in ("east", "west", "north", "south")}
-    solids = {"floor": "Boxes3D", "house": "Boxes3D", "camp": "Boxes3D", "ball": "Ellipsoids3D"}
+    solids = {"floor": "Boxes3D", "house": "Boxes3D", "camp": "Boxes3D"}
     assert kinds == walls | solids | {"pipe": "Capsules3D", "tower": "Cylinders3D"}
     start = static(path, "/scene/area/pipe", "Capsules3D:translations")
     np.testing.assert_allclose(start, [2.0, 9.0, 2.0], atol=1e-6)  # 7 m west of its middle
     assert np.all(static(path, "/scene/area/camp", "Boxes3D:half_sizes") > 0.0)
-
-
-def test_a_team_at_rest_has_no_headings(still_replay):
-    assert {"/scene/robots", "/scene/heading"} & entities(still_replay) == {"/scene/robots"}
 
 
 SCENE = """
@@ -111,3 +100,59 @@ def test_geoms_that_never_move_are_drawn_where_they_stand_and_obstacles_of_glass
     mode = rr.components.FillMode
     glass, solid = mode.TransparentFillMajorWireframe.value, mode.Solid.value
     assert [numbers(name, "fill_mode")[0] for name in solids] == [glass, solid, solid, solid]
+
+
+def outlines(geom):
+    scene = f"<mujoco><worldbody><geom group='1' {geom}/></worldbody></mujoco>"
+    return footprints(obstacles_of(mujoco.MjModel.from_xml_string(scene)), 1.0)
+
+
+def outline(geom):
+    (found,) = outlines(geom)
+    np.testing.assert_array_equal(found[0], found[-1])
+    return found[:-1]
+
+
+ROOT_18 = np.sqrt(18.0)
+
+
+@pytest.mark.parametrize(
+    ("geom", "corners"),
+    [
+        ("size='3 2 5' pos='10 20 5'", [(7, 18), (7, 22), (13, 18), (13, 22)]),
+        ("size='3 3 5' euler='0 0 45'", [(-ROOT_18, 0), (0, -ROOT_18), (0, ROOT_18), (ROOT_18, 0)]),
+    ],
+)
+def test_a_box_is_its_rectangle(geom, corners):
+    found = sorted(map(tuple, outline(f"type='box' {geom}").round(9).tolist()))
+    np.testing.assert_allclose(found, corners, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "geom",
+    [
+        "type='cylinder' size='4 5'",
+        "type='capsule' size='4 5'",
+        "type='sphere' size='5' pos='0 0 -2'",  # cut 3 m above its middle
+        "type='ellipsoid' size='4 4 9' pos='0 0 1'",
+    ],
+)
+def test_round_things_are_circles_of_4_m(geom):
+    corners = outline(geom)
+    np.testing.assert_allclose(np.linalg.norm(corners, axis=1), 4.0, rtol=0.03)
+    x, y = corners.T
+    area = 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
+    np.testing.assert_allclose(area, np.pi * 4.0**2, rtol=0.07)
+
+
+@pytest.mark.parametrize("z", [-9.0, 9.0])
+def test_obstacles_above_or_below_the_antennas_are_in_no_way(z):
+    assert outlines(f"type='box' size='3 3 3' pos='0 0 {z}'") == []
+
+
+def test_lines_fill_an_outline():
+    corners = outline("type='box' size='3 2 5' euler='0 0 30'")
+    lines = filling(np.concatenate([corners, corners[:1]]), 0.05)
+    high_m = np.ptp(corners[:, 1]) / len(lines)
+    assert high_m <= 0.05
+    assert sum(b[0] - a[0] for a, b in lines) * high_m == pytest.approx(24.0, rel=0.01)

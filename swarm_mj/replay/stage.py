@@ -1,0 +1,209 @@
+"""The still things of a replay, on the map and in 3-D: the ground, walls and obstacles."""
+
+import itertools
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from jaxtyping import Float, UInt8
+from mujoco._enums import mjtTextureRole
+from mujoco._functions import mj_kinematics, mju_mat2Quat
+from mujoco._structs import MjData, MjModel
+from scipy.spatial import ConvexHull
+
+from swarm_mj.mission import Mission
+from swarm_mj.physics.scene import compose
+from swarm_mj.physics.solid_geoms import loss_db_of, obstacle_geoms, obstacles_of
+from swarm_mj.physics.state import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    ELLIPSOID,
+    ROBOT_HEIGHT_M,
+    SPHERE,
+    Obstacles,
+)
+from swarm_mj.replay.footage import Ground
+from swarm_mj.replay.packets import lifted
+from swarm_mj.replay.rerun_log import LAYERS, RerunLog
+
+SQUARE_M = 100.0
+MAX_SQUARES = 60  # across the ground; more would be too small to see
+GRID_M = 0.2  # above the floor
+FILL_SHARE = 0.008  # of half the map's width: between the lines that fill an obstacle
+CORNERS = 24  # of a circle
+LATITUDES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 9)  # of a ball's circles
+MIRROR = np.diag([1.0, -1.0, 1.0])  # rerun's 2D views have y down, the map has it up
+PLANE = 0  # as MuJoCo numbers it
+FLOOR_M = 0.5  # half the thickness of a drawn plane: rerun has solids only
+GLASS = "transparentfillmajorwireframe"  # obstacles hide no robot
+FAR_M = 1e4  # half the side of a plane that has no end
+
+
+def draw_stage(out: RerunLog, mission: Mission) -> None:
+    """Draw the area, its walls and its obstacles, on the map and in 3-D."""
+    model = stage(out, mission)
+    _draw_ground(out, mission)
+    for name, solid in static_geoms(model).items():
+        out.fixed(f"scene/area/{name}", solid)
+    for g in obstacle_geoms(model):  # for those who click on one
+        out.fixed(f"scene/area/{name_of(model, g)}", rr.AnyValues(loss_db=loss_db_of(model, g)))
+    # On the map, where they are in the way of the antennas.
+    if outlines := footprints(obstacles_of(model), ROBOT_HEIGHT_M):
+        path, apart_m = "arena/world/filling", FILL_SHARE * out.frame.reach_m
+        lines = [line for outline in outlines for line in filling(outline, apart_m)]
+        # The width is in metres, since rerun fills no areas.
+        style: dict[str, Any] = LAYERS[path].style | {"radii": 0.55 * apart_m}
+        out.fixed(path, rr.LineStrips2D.from_fields(strips=lines, **style))
+        out.fixed_layer("arena/world/obstacle", strips=outlines)
+
+
+def stage(out: RerunLog, mission: Mission) -> MjModel:
+    """Compile MuJoCo's scene as it is drawn."""
+    spec = compose(mission, scene=out.log.scene)
+    if not mission.has_walls:
+        # An open area's floor is as large as what is ever seen.
+        low, high = (end(out.frame.centre_m, axis=0) for end in (np.min, np.max))
+        for geom in (geom for geom in spec.geoms if geom.name == "floor"):
+            geom.pos = [*(low + high) / 2.0, 0.0]
+            geom.size = [*(high - low) / 2.0 + 1.5 * out.frame.reach_m, 1.0]
+    return spec.compile()
+
+
+def _draw_ground(out: RerunLog, mission: Mission) -> None:
+    """Draw the floor's grid in both views, and the area's outline on the map, y up."""
+    if out.frame.moves:
+        away = lifted(-out.frame.centre_m, 0.0)
+        out.timed("scene", rr.Transform3D.columns(translation=away))
+        # rerun shows a timed transform whole or not at all, so the mirror is repeated.
+        mirrors = np.tile(MIRROR, (len(away), 1, 1))
+        out.timed("arena", rr.Transform3D.columns(translation=away @ MIRROR, mat3x3=mirrors))
+    else:
+        out.fixed("arena", rr.Transform3D(mat3x3=MIRROR))
+    strips, half = grid(out.frame), mission.half_side_m
+    out.fixed_layer("arena/area/grid", strips=strips)
+    out.fixed_layer("scene/grid", strips=lifted(np.array(strips), GRID_M))
+    outline = [(-half, -half), (half, -half), (half, half), (-half, half), (-half, -half)]
+    name = "walls" if mission.has_walls else "outline"
+    out.fixed_layer(f"arena/area/{name}", strips=[outline])
+
+
+def square_m(frame: Ground) -> float:
+    """Return the side of the grid's squares: 100 m, or a power of ten more for a large ground."""
+    across_m = 2.0 * frame.reach_m + float(np.max(np.ptp(frame.centre_m, axis=0)))
+    return SQUARE_M * 10.0 ** max(0, int(np.ceil(np.log10(across_m / SQUARE_M / MAX_SQUARES))))
+
+
+def grid(frame: Ground) -> list[list[tuple[float, float]]]:
+    """Return lines at whole squares, over all the ground that the map ever shows."""
+    square = square_m(frame)
+    x_low, y_low = np.floor((np.min(frame.centre_m, axis=0) - frame.reach_m) / square)
+    x_high, y_high = np.ceil((np.max(frame.centre_m, axis=0) + frame.reach_m) / square)
+    xs, ys = np.arange(x_low, x_high + 1) * square, np.arange(y_low, y_high + 1) * square
+    return [[(x, ys[0]), (x, ys[-1])] for x in xs] + [[(xs[0], y), (xs[-1], y)] for y in ys]
+
+
+def footprints(obstacles: Obstacles, height_m: float) -> list[Float[np.ndarray, "K 2"]]:
+    """Return the outline of each obstacle that reaches this height, once round [m]."""
+    outlines = []
+    for kind, centre_m, rotation, size_m in zip(*obstacles[:4], strict=True):
+        points_m = _surface(int(kind), size_m) @ rotation.T + centre_m
+        # The outline is the hull of where lines from the points above to those below pass.
+        is_above = points_m[:, 2] > height_m
+        above, below = points_m[is_above][:, None], points_m[~is_above][None]
+        share = (above[..., 2:] - height_m) / (above[..., 2:] - below[..., 2:])
+        cut = (above + share * (below - above))[..., :2].reshape(-1, 2)
+        if len(cut) > 2:
+            corners = cut[ConvexHull(cut).vertices]
+            outlines.append(np.concatenate([corners, corners[:1]]))
+    return outlines
+
+
+def filling(
+    outline_m: Float[np.ndarray, "K 2"], apart_m: float
+) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    """Return lines from west to east, so far apart, that fill an outline [m]."""
+    y_low, y_high = np.min(outline_m[:, 1]), np.max(outline_m[:, 1])
+    num = max(1, int(np.ceil((y_high - y_low) / apart_m)))
+    lines = []
+    for y in y_low + (np.arange(num) + 0.5) * (y_high - y_low) / num:
+        xs = [
+            a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+            for a, b in itertools.pairwise(outline_m.tolist())
+            if min(a[1], b[1]) <= y < max(a[1], b[1])
+        ]
+        lines.append(((min(xs), y), (max(xs), y)))
+    return lines
+
+
+def _surface(kind: int, size_m: Float[np.ndarray, "3"]) -> Float[np.ndarray, "K 3"]:
+    """Return points whose convex hull is the obstacle, in its own frame [m]."""
+    if kind == BOX:
+        return size_m * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    angle = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(CORNERS)], axis=1)
+    ball = np.concatenate([np.cos(at) * circle + (0.0, 0.0, np.sin(at)) for at in LATITUDES])
+    if kind in (CYLINDER, CAPSULE):
+        half = np.array([0.0, 0.0, size_m[1]])
+        disc = size_m[0] * (circle if kind == CYLINDER else ball)
+        return np.concatenate([disc - half, disc + half])
+    return ball * (size_m if np.all(size_m > 0.0) else size_m[0])
+
+
+def static_geoms(model: MjModel) -> dict[str, rr.AsComponents]:
+    """Return what stands still in a scene by its geom's name: the arena, and whatever was added.
+
+    Meshes and fields of heights are drawn as the boxes around them.
+    """
+    data = MjData(model)
+    mj_kinematics(model, data)
+    stands_still = model.body_weldid[model.geom_bodyid] == 0
+    return {
+        name_of(model, g): _drawn(model, data, g) for g in np.flatnonzero(stands_still).tolist()
+    }
+
+
+def name_of(model: MjModel, g: int) -> str:
+    """Return a geom's name, made up if it has none."""
+    return model.geom(g).name or f"geom{g}"
+
+
+def _drawn(model: MjModel, data: MjData, g: int) -> rr.AsComponents:
+    quaternion = np.empty(4)
+    mju_mat2Quat(quaternion, data.geom_xmat[g])
+    style: dict[str, Any] = {
+        "colors": [_colour(model, g)],
+        "quaternions": [rr.Quaternion(xyzw=np.roll(quaternion, -1))],
+        "fill_mode": GLASS if g in obstacle_geoms(model) else "solid",
+    }
+    kind, size, place = model.geom_type[g], model.geom_size[g], data.geom_xpos[g]
+    rotation = data.geom_xmat[g].reshape(3, 3)
+    if kind in (SPHERE, ELLIPSOID):
+        half = size if np.all(size > 0.0) else np.full(3, size[0])  # a sphere's has one number
+        return rr.Ellipsoids3D(half_sizes=[half], centers=[place], **style)
+    if kind in (CYLINDER, CAPSULE):
+        style |= {"radii": [size[0]], "lengths": [2.0 * size[1]]}
+        if kind == CYLINDER:
+            return rr.Cylinders3D(centers=[place], **style)
+        # Rerun's capsule begins at its place, MuJoCo's has its middle there.
+        return rr.Capsules3D(translations=[place - size[1] * rotation[:, 2]], **style)
+    if kind == PLANE:  # a plate whose upper face is the plane; sizes of 0 are without end
+        half = [*np.where(size[:2] > 0.0, size[:2], FAR_M), FLOOR_M]
+        return rr.Boxes3D(half_sizes=[half], centers=[place - FLOOR_M * rotation[:, 2]], **style)
+    middle, half = np.split(model.geom_aabb[g], 2)
+    return rr.Boxes3D(half_sizes=[half], centers=[place + rotation @ middle], **style)
+
+
+def _colour(model: MjModel, g: int) -> UInt8[np.ndarray, "3"]:
+    """Return a geom's colour, or its material's, or the mean of its texture."""
+    material = int(model.geom_matid[g])
+    if material < 0:
+        return (255.0 * model.geom_rgba[g, :3]).astype(np.uint8)
+    rgb = np.array(model.mat_rgba[material, :3])
+    texture = int(model.mat_texid[material, mjtTextureRole.mjTEXROLE_RGB.value])
+    if texture >= 0 and model.tex_nchannel[texture] == 3:
+        start = int(model.tex_adr[texture])
+        size = 3 * int(model.tex_width[texture] * model.tex_height[texture])
+        pixels = model.tex_data[start : start + size].reshape(-1, 3)
+        rgb = rgb * np.mean(pixels, axis=0) / 255.0
+    return (255.0 * rgb).astype(np.uint8)

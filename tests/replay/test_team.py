@@ -1,0 +1,185 @@
+"""Robots, packets and links on the map and in 3-D, read back, against the flight they show."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from reading import colours, column, counts, entities, rows, static
+
+from swarm_mj.replay import palette
+from swarm_mj.replay.packets import SEGMENTS
+from swarm_mj.replay.write import write_replay
+
+CLOSE = {"rtol": 1e-5, "atol": 1e-2}  # of float32
+
+
+def lines(path, entity):
+    """Straight lines as [start, end] pairs, all windows in a row."""
+    return rows(path, entity, "LineStrips2D:strips", 2, 2)
+
+
+def test_robots_stand_where_they_are_on_the_map_and_in_space(replay, two_way):
+    on_map = rows(replay, "/arena/robots", "Points2D:positions", 12, 2)
+    in_space = rows(replay, "/scene/robots", "Cylinders3D:centers", 12, 3)
+    np.testing.assert_allclose(on_map, two_way.log.position_m, rtol=1e-6, atol=1e-4)
+    np.testing.assert_array_equal(in_space[..., :2], on_map)
+    assert np.all(in_space[..., 2] > 0.0)
+    radii = static(replay, "/scene/robots", "Cylinders3D:radii")
+    assert (len(radii), np.argmax(radii)) == (12, two_way.log.ego)
+
+
+def test_robots_wear_the_colour_of_their_age(replay, two_way):
+    log, shown = two_way.log, colours(replay, "/arena/robots", "Points2D:colors", 12)
+    others = np.arange(12) != log.ego
+    assert np.all(shown[:, log.ego] == 255)
+    assert np.all(shown[~log.is_known] == palette.UNKNOWN)
+    assert np.all(shown[log.is_known & (log.ego_age == 0.0) & others] == (253, 231, 37))
+    in_space = colours(replay, "/scene/robots", "Cylinders3D:colors", 12)
+    np.testing.assert_array_equal(in_space, shown)
+
+
+def test_robots_that_are_off_are_dark(failing, tmp_path):
+    write_replay(failing.log, failing.mission, {"seed": 5}, tmp_path / "off.rrd")
+    shown = colours(tmp_path / "off.rrd", "/arena/robots", "Points2D:colors", 12)
+    is_dark = np.all(shown == palette.SWITCHED_OFF, axis=-1)
+    np.testing.assert_array_equal(is_dark, ~failing.log.is_on)
+    assert np.sum(is_dark, axis=1).tolist() == [0] * 15 + [3] * 15
+
+
+@pytest.mark.parametrize(("fate", "share"), [("delivered", 1.0), ("lost", 0.6)])
+def test_arrows_are_the_packets_counted_and_lost_ones_stop_short(replay, two_way, fate, share):
+    links, entity = two_way.log.packets[fate], f"/arena/radio/{fate}"
+    shown = counts(replay, entity, "Arrows2D:vectors")
+    np.testing.assert_array_equal(shown, two_way.counted(fate))
+    start, end = links.ends(two_way.log.position_m)
+    origins, vectors = (rows(replay, entity, f"Arrows2D:{of}", 2) for of in ("origins", "vectors"))
+    np.testing.assert_allclose(origins, start, **CLOSE)
+    np.testing.assert_allclose(vectors, share * (end - start), **CLOSE)
+
+
+def test_an_answer_stands_to_the_left_of_its_way(replay, two_way):
+    links, entity = two_way.log.packets["answered"], "/arena/radio/answered"
+    start, end = links.ends(two_way.log.position_m)
+    aside = rows(replay, entity, "Arrows2D:origins", 2) - start
+    way = (end - start) / np.linalg.norm(end - start, axis=1, keepdims=True)
+    left = way[:, 0] * aside[:, 1] - way[:, 1] * aside[:, 0]
+    np.testing.assert_allclose(left, left[0], atol=1e-2)
+    assert left[0] > 1.0
+
+
+def test_a_window_s_arcs_are_its_packets(replay, two_way):
+    entity, component = "/scene/packets/delivered", "LineStrips3D:strips"
+    per_window = counts(replay, entity, component)
+    np.testing.assert_array_equal(per_window, two_way.counted("delivered"))
+    points = rows(replay, entity, component, SEGMENTS + 1, 3)
+    ends = two_way.log.packets["delivered"].ends(two_way.log.position_m)
+    for at, where in zip((0, -1), ends, strict=True):
+        np.testing.assert_allclose(points[:, at, :2], where, **CLOSE)
+    assert np.all(points[:, SEGMENTS // 2, 2] > points[:, 0, 2])
+
+
+def test_broadcasts_lead_from_marked_transmitters_to_hearers(flood_replay, flooded):
+    log = flooded.log
+    ends = np.stack(log.packets["heard"].ends(log.position_m), axis=1)
+    np.testing.assert_allclose(lines(flood_replay, "/arena/radio/heard"), ends, **CLOSE)
+    row, sender = np.nonzero(np.any(log.recipient != np.arange(12), axis=1))
+    entity, component = "/arena/radio/transmitter", "Points2D:positions"
+    marked = rows(flood_replay, entity, component, 2)
+    np.testing.assert_allclose(marked, log.position_m[row, sender], **CLOSE)
+    per_window = counts(flood_replay, entity, component)
+    np.testing.assert_array_equal(per_window, np.bincount(row, minlength=30))
+
+
+def test_circles_have_the_range_and_stand_around_transmitters(replay, two_way):
+    log, entity = two_way.log, "/arena/radio/range"
+    assert set(rows(replay, entity, "Ellipses2D:half_sizes")) == {250.0}
+    row, sender = np.nonzero(log.recipient[:, 0] != np.arange(12))
+    per_window = counts(replay, entity, "Ellipses2D:centers")
+    np.testing.assert_array_equal(per_window, np.bincount(row, minlength=30))
+    centres = rows(replay, entity, "Ellipses2D:centers", 2)
+    np.testing.assert_allclose(centres, log.position_m[row, sender], **CLOSE)
+
+
+def test_rings_are_where_the_observer_believes_the_others(replay, two_way):
+    log, entity = two_way.log, "/arena/belief/ring"
+    shown = log.is_known & (np.arange(12) != log.ego)
+    per_window = counts(replay, entity, "Ellipses2D:centers")
+    np.testing.assert_array_equal(per_window, np.sum(shown, axis=1))
+    centres = rows(replay, entity, "Ellipses2D:centers", 2)
+    np.testing.assert_allclose(centres, log.believed_m[shown], **CLOSE)
+
+
+def test_headings_have_one_length_and_the_direction_of_flight(replay, two_way):
+    strips = lines(replay, "/arena/heading")
+    way = strips[:, 1] - strips[:, 0]
+    length = np.linalg.norm(way, axis=1)
+    np.testing.assert_allclose(length, length[0], rtol=1e-2)
+    velocity = two_way.log.velocity_mps.reshape(-1, 2)
+    along = np.sum(way * velocity, axis=1) / length / np.linalg.norm(velocity, axis=1)
+    np.testing.assert_allclose(along, 1.0, atol=1e-3)
+
+
+def test_trails_end_at_the_robots_and_start_at_most_150_windows_ago(replay, two_way):
+    trails = rows(replay, "/arena/trail", "LineStrips2D:strips", 12, 11, 2)
+    where = two_way.log.position_m
+    np.testing.assert_allclose(trails[:, :, 0], where[::5], **CLOSE)
+    np.testing.assert_allclose(trails[-1, :, 1], where[25 - 15], **CLOSE)
+    np.testing.assert_allclose(trails[-1, :, -1], where[0], **CLOSE)
+
+
+def test_the_tree_on_the_map_joins_parents_and_children(replay, two_way):
+    log = two_way.log
+    row, child = np.nonzero(log.is_known & (np.arange(12) != log.ego))
+    ends = [log.position_m[row, robot] for robot in (log.parent[row, child], child)]
+    np.testing.assert_allclose(lines(replay, "/arena/tree"), np.stack(ends, axis=1), **CLOSE)
+
+
+@pytest.mark.parametrize(("kind", "dashes"), [("too_weak", 4), ("unbelieved", 1)])
+@pytest.mark.parametrize(("view", "axes"), [("arena", 2), ("scene", 3)])
+def test_lines_are_the_mismatched_links(blocked, blocked_replay, kind, dashes, view, axes):
+    (window, links), pieces = blocked.log.mismatch, dashes if view == "arena" else 1
+    links = links[links["is_too_weak"] == (kind == "too_weak")]
+    start_m = blocked.log.position_m[window[links["row"]] - 1, links["sender"]]
+    entity, component = f"/{view}/world/{kind}", f"LineStrips{axes}D:strips"
+    expected = pieces * np.bincount(links["row"], minlength=len(window))
+    np.testing.assert_array_equal(counts(blocked_replay, entity, component), expected)
+    shown = rows(blocked_replay, entity, component, 2, axes)[::pieces]
+    np.testing.assert_allclose(shown[:, 0, :2], start_m, atol=1e-3)
+    margins = column(blocked_replay, entity, "margin_db").flatten().to_numpy()
+    np.testing.assert_array_equal(margins[::pieces], links["margin_db"])
+
+
+def test_halos_are_around_the_robots_that_are_cut_off(blocked, blocked_replay):
+    log = blocked.log
+    is_apart = np.array([[of != team[log.ego] for of in team] for team in log.group])
+    assert 0 < np.sum(is_apart) < is_apart.size
+    on_map = rows(blocked_replay, "/arena/world/cut_off", "Points2D:positions", 2)
+    in_space = rows(blocked_replay, "/scene/world/cut_off", "Cylinders3D:centers", 3)[:, :2]
+    for shown in (on_map, in_space):
+        np.testing.assert_allclose(shown, log.position_m[is_apart], **CLOSE)
+
+
+def test_what_a_mission_lacks_is_not_drawn(replay, still_replay, flood_replay):
+    """Free space has no mismatch, a team at rest no motion, and a broadcast no verdict."""
+    assert not any("/world/" in entity for entity in entities(replay))
+    found = entities(still_replay)
+    moving = {"/arena/heading", "/scene/heading", "/arena/trail", "/arena/belief/ring"}
+    assert not found & moving
+    assert not any(path.startswith("/plots/task") for path in found)
+    assert {"/arena/tree", "/arena/radio/delivered", "/scene/robots"} <= found
+    radio = {path for path in entities(flood_replay) if "/radio/" in path and "legend" not in path}
+    shown = {"/arena/radio/heard", "/arena/radio/range", "/arena/radio/transmitter"}
+    assert radio == shown | {"/plots/radio/heard", "/plots/radio/sent"}
+
+
+def test_a_map_that_follows_the_team_keeps_it_in_the_middle(two_way, tmp_path):
+    """North stays up: what is shown of p is p - c with y turned round."""
+    drift = np.linspace(0.0, 9e3, 30)[:, None, None] * np.array([1.0, 0.5])
+    log, far = replace(two_way.log, position_m=two_way.log.position_m + drift), tmp_path / "far.rrd"
+    write_replay(log, two_way.mission, {"seed": 5}, far)
+    north_up = [[1, 0, 0, 0, -1, 0, 0, 0, 1]] * 30
+    np.testing.assert_array_equal(rows(far, "/arena", "Transform3D:mat3x3", 9), north_up)
+    shift = rows(far, "/arena", "Transform3D:translation", 3)[:, None, :2]
+    shown = log.position_m * (1.0, -1.0) + shift
+    middle = (shown.min(axis=1) + shown.max(axis=1)) / 2.0
+    np.testing.assert_allclose(middle, 0.0, atol=1e-3)
