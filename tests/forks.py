@@ -34,6 +34,11 @@ for line in sys.stdin:
 """
 
 
+def files(folder):
+    """The files in a folder and below it, by their names there."""
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
 class Forks:
     """A process that has the package loaded, and forks itself for each program."""
 

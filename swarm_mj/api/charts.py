@@ -1,7 +1,7 @@
 """Charts of flights and evaluations: one mission over time, and policies below each other."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -14,6 +14,9 @@ from swarm_mj.evaluation.figures.style import FAINT, escape_mathtext, look_of, s
 from swarm_mj.evaluation.results import Result
 from swarm_mj.mission.components import components_in
 
+if TYPE_CHECKING:  # which imports this to draw
+    from swarm_mj.api.run import Run
+
 Course = Float[np.ndarray, "T"]
 
 WIDTH_IN, PANEL_IN, ROW_IN, HEAD_IN = 7.5, 2.1, 0.32, 1.1
@@ -22,39 +25,24 @@ MIN_SHARE = 1e-6  # of the largest velocity variance that is drawn
 LABELS = {"aoi": "age of information\n[windows]", "velocity_variance": "velocity variance\n[m²/s²]"}
 
 
-def draw_flight(
-    columns: Mapping[str, Course],
-    title: str,
-    policy: str,
-    window_s: float,
-    task_cost: tuple[str, str] | None,
-) -> Figure:
-    """Return a chart of a mission's costs over its windows.
-
-    Args:
-        columns: As `Run.columns` returns them.
-        title: Of the figure.
-        policy: Its name, which decides the colour.
-        window_s: A window's length [s].
-        task_cost: Name and unit of the task's cost, if it has one.
-    """
-    colour = look_of(policy).colour
-    own_cost = None if task_cost is None or task_cost[0] == Flocking.cost_name else task_cost
-    moves = bool(np.any(columns["velocity_variance"]))
+def draw_flight(run: "Run") -> Figure:
+    """Return a chart of a mission's costs over its windows, in the policy's colour."""
+    columns, colour = run.columns(), look_of(run.config["policy"]).colour
+    cost = run.windows[0].costs.task_cost
+    own_cost = None if cost is None or cost.name == Flocking.cost_name else cost
+    number = 2 if own_cost or np.any(columns["velocity_variance"]) else 1
     with styled():
-        number = 2 if own_cost or moves else 1
-        figure, axes = _axes(number, 1, HEAD_IN + number * PANEL_IN, sharex=True)
+        figure, axes = _axes(run.title, number, 1, HEAD_IN + number * PANEL_IN, sharex=True)
         for each in axes:
             each.margins(x=0.01)
-        _set_title(figure, title)
         _draw_age(axes[0], columns, colour)
         if own_cost:
             axes[1].plot(columns["window"], columns["task_cost"], color=colour)
-            axes[1].set_ylabel("{}\n[{}]".format(*own_cost))
+            axes[1].set_ylabel(f"{own_cost.name}\n[{own_cost.unit}]")
             axes[1].set_ylim(bottom=0.0)
-        elif moves:
+        elif number == 2:
             _draw_variance(axes[1], columns, colour)
-        axes[-1].set_xlabel(f"window of {window_s:g} s")
+        axes[-1].set_xlabel(f"window of {run.mission.window_s:g} s")
     return _kept(figure)
 
 
@@ -62,10 +50,11 @@ def draw_evaluation(results: Sequence[Result]) -> Figure:
     """Return a chart of policies, the lowest age first; of flocks, with velocity variances."""
     shown = sorted(results, key=lambda result: result.aoi_mean)
     first, costs = shown[0], list(LABELS)[: 2 if shown[0].task == "flocking" else 1]
+    about = f"{first.task}, {first.num_robots} robots, {first.episodes} missions from seed "
+    title = f"{about}{first.seed}{components_in(vars(first)).title}"
     with styled():
-        figure, axes = _axes(1, len(costs), HEAD_IN + ROW_IN * len(shown), sharey=True)
-        about = f"{first.task}, {first.num_robots} robots, {first.episodes} missions from seed "
-        _set_title(figure, f"{about}{first.seed}{components_in(vars(first)).title}")
+        size_in = HEAD_IN + ROW_IN * len(shown)
+        figure, axes = _axes(title, 1, len(costs), size_in, sharey=True)
         for each, cost in zip(axes, costs, strict=True):
             for place, result in enumerate(shown):
                 _draw_mean(each, place, result, cost)
@@ -103,16 +92,13 @@ def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:
     axes.plot(mean, place, color=look.colour, marker=look.marker, markersize=look.size + 2.0)
 
 
-def _axes(rows: int, columns: int, height_in: float, **how: Any) -> tuple[Figure, list[Axes]]:
-    size = (WIDTH_IN, height_in)
-    figure, axes = plt.subplots(
-        rows, columns, squeeze=False, layout="constrained", figsize=size, **how
-    )
-    return figure, list(axes.flat)
-
-
-def _set_title(figure: Figure, title: str) -> None:
+def _axes(
+    title: str, rows: int, columns: int, height_in: float, **how: Any
+) -> tuple[Figure, list[Axes]]:
+    how |= {"squeeze": False, "layout": "constrained", "figsize": (WIDTH_IN, height_in)}
+    figure, axes = plt.subplots(rows, columns, **how)
     figure.suptitle(escape_mathtext(title), x=0.01, ha="left", fontsize=TITLE_PT)
+    return figure, list(axes.flat)
 
 
 def _kept(figure: Figure) -> Figure:

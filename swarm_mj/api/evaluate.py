@@ -6,19 +6,19 @@ from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any
 
-from swarm_mj.api.estimates import study_needs
 from swarm_mj.api.fly import mission_of, names_of
-from swarm_mj.api.metrics import Metrics
+from swarm_mj.api.run import Metrics
 from swarm_mj.evaluation.batch import BatchCosts
-from swarm_mj.evaluation.results import COLUMNS, write_csv
+from swarm_mj.evaluation.results import COLUMNS, Result, write_csv
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study, fly_study
 from swarm_mj.evaluation.summary import Evaluated, summarise, write_evaluated
 from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components
-from swarm_mj.policies.registry import listed, normalised
+from swarm_mj.policies.registry import is_learned, listed, normalised
+from swarm_mj.system import needs
 from swarm_mj.system.fields import check_value, name_of
-from swarm_mj.system.needs import check_fits, memory_errors
+from swarm_mj.system.needs import Needs, check_fits, memory_errors
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
 from swarm_mj.system.progress import AFTER_S, quiet_console
@@ -46,7 +46,7 @@ class Evaluation:
 
     def __repr__(self) -> str:
         """Return the table that `swarm-mj evaluate` prints."""
-        return results_text([each.result for each in self.results])
+        return results_text(self._rows)
 
     def _repr_html_(self) -> str:
         """Return the main columns of `to_dataframe`, for notebooks."""
@@ -59,16 +59,18 @@ class Evaluation:
 
         The names are the columns of `swarm-mj evaluate --csv`.
         """
-        rows = (asdict(each.result) for each in self.results)
-        return Metrics({row["policy"]: Metrics(row) for row in rows})
+        return Metrics({each.policy: Metrics(asdict(each)) for each in self._rows})
+
+    @property
+    def _rows(self) -> list[Result]:
+        return [each.result for each in self.results]
 
     def to_dataframe(self, *, by_mission: bool = False) -> "DataFrame":
-        """One row per policy, with the columns of `swarm-mj evaluate --csv`.
+        """Return one row per policy, with the columns of `swarm-mj evaluate --csv`.
 
-        Args:
-            by_mission: Whether to have one row per policy and mission instead: `policy`, `seed`,
-                `aoi` [windows], `velocity_variance` [m²/s²], and `task_cost` where the task has one
-                (`summary[policy].task_cost_name` says which).
+        By mission, return one row per policy and mission instead: `policy`, `seed`, `aoi`
+        [windows], `velocity_variance` [m²/s²], and `task_cost` where the task has one
+        (`summary[policy].task_cost_name` says which).
 
         Raises:
             ModuleNotFoundError: pandas is not installed.
@@ -79,22 +81,20 @@ class Evaluation:
         if not by_mission:
             others = [name for name in COLUMNS if name not in (*FIRST, *LAST)]
             columns = [*FIRST, *others, *LAST]
-            return DataFrame([asdict(each.result) for each in self.results], columns=columns)
-        return DataFrame(
-            [
-                {"policy": each.result.policy, "seed": each.result.seed + index, "aoi": aoi}
-                | {"velocity_variance": each.velocity_variance[index]}
-                | ({} if each.task_cost is None else {"task_cost": each.task_cost[index]})
-                for each in self.results
-                for index, aoi in enumerate(each.aoi)
-            ]
-        )
+            return DataFrame([asdict(each) for each in self._rows], columns=columns)
+        rows = [
+            {"policy": each.result.policy, "seed": each.result.seed + index, "aoi": aoi}
+            | {"velocity_variance": each.velocity_variance[index]}
+            | ({} if each.task_cost is None else {"task_cost": each.task_cost[index]})
+            for each in self.results
+            for index, aoi in enumerate(each.aoi)
+        ]
+        return DataFrame(rows)
 
     def plot(self) -> "Figure":
-        """Draws the age of information of each policy, lowest first, with its 95 % interval.
+        """Draw the age of information of each policy, lowest first, with its 95 % interval.
 
-        Returns:
-            A matplotlib figure, as of `Run.plot`.
+        The figure is one of matplotlib, as of `Run.plot`.
 
         Raises:
             ModuleNotFoundError: matplotlib is not installed.
@@ -102,16 +102,12 @@ class Evaluation:
         need("matplotlib", "a chart")
         from swarm_mj.api.charts import draw_evaluation
 
-        return draw_evaluation([each.result for each in self.results])
+        return draw_evaluation(self._rows)
 
     def save(self, path: str | Path) -> Path:
-        """Write what `swarm-mj evaluate` does, replacing the file if it exists.
+        """Write what `swarm-mj evaluate` does, replacing the file if it exists; return the path.
 
-        Args:
-            path: Ends in .csv, one row per policy, or .json, with what each mission cost.
-
-        Returns:
-            The path.
+        It ends in .csv, one row per policy, or .json, with what each mission cost.
 
         Raises:
             ValueError: The name has another ending.
@@ -120,7 +116,7 @@ class Evaluation:
         path = Path(path)
         check_outputs(Output("the file", path, ".csv|.json"))
         if path.suffix.lower() == ".csv":
-            write_csv(path, [each.result for each in self.results])
+            write_csv(path, self._rows)
         else:
             write_evaluated(path, self.results)
         return path
@@ -173,9 +169,9 @@ def evaluate(
     """
     need("scipy", "an evaluation")
     mission = mission_of(evaluate, task, mission_fields)
-    for kind, name in (("channel", channel), ("controller", controller), ("scene", scene)):
+    components = {"channel": channel, "controller": controller, "scene": scene}
+    for kind, name in components.items():
         _check_named(kind, name)
-    components = Components(channel=channel, controller=controller, scene=scene)
     check_value(Processes.__dataclass_fields__["jobs"], num_jobs, "num_jobs")
     check_value(Study.__dataclass_fields__["episodes"], num_missions, "num_missions")
     study = Study(
@@ -187,7 +183,7 @@ def evaluate(
         is_deterministic=is_deterministic,
         baseline=baseline,
         features=names_of(features),
-        components=components,
+        components=Components(**components),
     )
     way_out = "choose fewer num_jobs, num_robots, num_windows or num_missions"
     check_fits(study_needs(study, num_jobs), None, way_out, is_forced=False, way_on="")
@@ -195,6 +191,25 @@ def evaluate(
     with memory_errors():
         fly_study(study, costs, num_jobs, None, quiet_console(), after_s=AFTER_S)
     return Evaluation(mission=mission, results=summarise(study, costs, study.header()))
+
+
+def study_needs(study: Study, num_jobs: int) -> Needs:
+    """Return the memory and disk of a study: a batch in each process, and the results of all."""
+    batches = study.batches
+    largest = max(
+        needs.missions_memory(
+            batch.mission.num_robots, len(batch.seeds), is_learned=is_learned(batch.policy)
+        )
+        for batch in batches
+    )
+    torch = needs.OF_TORCH if any(map(is_learned, study.policies)) else 0.0
+    ages = sum(2 * batch.mission.num_windows + 1 for batch in batches)  # counts
+    missions = study.episodes * len(study.pairs)
+    return Needs(
+        memory=min(num_jobs, len(batches)) * largest + 50.0 * ages + 1000.0 * missions,
+        addresses=needs.ADDRESSES + torch,
+        file=5.0 * ages + 300.0 * missions,
+    )
 
 
 def _check_named(kind: str, part: object) -> None:

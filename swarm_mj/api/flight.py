@@ -12,18 +12,18 @@ from dataclasses import asdict, replace
 from typing import Any, NamedTuple
 
 from swarm_mj.api.flight_table import flight_numbers
-from swarm_mj.api.metrics import Metrics
-from swarm_mj.api.run import Run
+from swarm_mj.api.run import Metrics, Run
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components
 from swarm_mj.physics.arenas import ARENAS
-from swarm_mj.policies.registry import is_own_policy, is_stored, make_policy
-from swarm_mj.replay.recorder import Log, Recorder, replay_memory
+from swarm_mj.policies.registry import is_learned, is_own_policy, is_stored, make_policy
+from swarm_mj.replay.recorder import Recorder, replay_file, replay_memory
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system import needs
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.interrupt import deferred_interrupt
-from swarm_mj.system.needs import free_memory, in_gb, memory_errors
+from swarm_mj.system.needs import Needs, free_memory, in_gb, memory_errors
 from swarm_mj.system.progress import WorkBar
 from swarm_mj.system.provenance import commit, version
 
@@ -41,16 +41,25 @@ class Flown(NamedTuple):
     wall_s: float
 
 
+def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:
+    """Return the memory and disk that a flight takes."""
+    memory = needs.missions_memory(mission.num_robots, 1, is_learned=is_learned(policy))
+    addresses = needs.ADDRESSES + (needs.OF_TORCH if is_learned(policy) else 0.0)
+    if not is_recorded:
+        return Needs(memory=memory, addresses=addresses)
+    return Needs(
+        memory=memory + replay_memory(mission, mission.num_windows),
+        addresses=addresses + needs.OF_RERUN,
+        file=replay_file(mission),
+    )
+
+
 def fly_swarm(
     swarm: Swarm, recorder: Recorder | None, bar: WorkBar, *, way_on: str | None
 ) -> Flown:
-    """Fly a swarm's missions.
+    """Fly a swarm, its policy started, from the first window to the last.
 
-    Args:
-        swarm: At the start of its missions, its policy started.
-        recorder: Takes each window, if there is one.
-        bar: Shows the progress.
-        way_on: How to fly on when memory runs short, for the message; None flies on regardless.
+    `way_on` ends the message that memory ran short; None flies on regardless.
 
     Raises:
         ValueError: As `rollout` does.
@@ -85,20 +94,12 @@ def compile_ahead(
 ) -> None:
     """Fly a small mission of this kind, beyond half-way, so that compiling is not timed.
 
-    Args:
-        mission: The one that is to be flown.
-        policy_name: As it is given to `make_policy`.
-        on_window: Called after each window.
-        **how: The other arguments of `make_policy`.
+    Name and `how` are arguments of `make_policy`; `on_window` is called after each window.
     """
     # A stored policy may be for teams of one size, and a file's arena does not shrink.
     is_bound = is_stored(policy_name) or mission.arena not in ARENAS
-    smallest = replace(
-        mission,
-        num_robots=mission.num_robots if is_bound else 3,
-        range_ratio=10.0,
-        num_windows=COMPILING_WINDOWS,
-    )
+    robots = mission.num_robots if is_bound else 3
+    smallest = replace(mission, num_robots=robots, range_ratio=10.0, num_windows=COMPILING_WINDOWS)
     if is_own_policy(policy_name):  # which may be made for one mission only
         policy_name, how = "tdma", {}
     for _ in rollout(Swarm(smallest, [0]), make_policy(policy_name, smallest, **how)):
@@ -106,14 +107,7 @@ def compile_ahead(
 
 
 def run_of(
-    swarm: Swarm,
-    flown: Flown,
-    *,
-    name: str,
-    seed: int,
-    observer: int,
-    components: Components,
-    log: Log | None = None,
+    swarm: Swarm, flown: Flown, *, name: str, seed: int, observer: int, components: Components
 ) -> Run:
     """Return a swarm's mission, flown, as a `Run`; the config is everything that makes it again."""
     mission, policy = swarm.mission, swarm.policy
@@ -130,8 +124,9 @@ def run_of(
     }
     numbers = flight_numbers(mission, policy, summarise(flown.windows))
     numbers |= {"wall_seconds": flown.wall_s, "interrupted": flown.code != DONE}
-    windows = tuple(flown.windows)
-    return Run(mission=mission, config=config, summary=Metrics(numbers), windows=windows, log=log)
+    return Run(
+        mission=mission, config=config, summary=Metrics(numbers), windows=tuple(flown.windows)
+    )
 
 
 def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | None:

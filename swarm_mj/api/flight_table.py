@@ -55,12 +55,14 @@ def flight_title(mission: Mission, policy: str, seed: int) -> str:
 
 def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> dict[str, str]:
     """Return the rows of a flight's table, at most 16, from its `flight_numbers`."""
-    hops, num_off = numbers["hops_mean"], mission.num_failures
+    hops, complete = numbers["hops_mean"], numbers["complete_window"]
     payload, rate = numbers["payload"], BITS_PER_BYTE * numbers["bytes_per_second"]
     rows = {
         f"windows of {mission.window_s:g} s flown": f"{numbers['num_windows']} in {wall_s:.2f} s",
         "age of information, mean": _windows(numbers["aoi_mean"], mission, 2),
-        "everyone had heard of everyone": _windows(numbers["complete_window"], mission, 0, "after"),
+        "everyone had heard of everyone": (
+            "never" if complete is None else f"after {_windows(complete, mission, 0)}"
+        ),
         "radio hops that news travelled, mean": f"{hops:.2f}" if hops else "-",
         **_packets(numbers),
         "packets carry": "the sender's buffer" + (f" and {payload}" * (payload != "none")),
@@ -68,8 +70,8 @@ def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> 
         "who decides": CENTRE if numbers["is_centralised"] else "each robot by itself",
         **_task_costs(mission, numbers),
     }
-    if num_off:
-        rows["robots switched off half-way"] = f"{num_off}; not counted from then on"
+    if mission.num_failures:
+        rows["robots switched off half-way"] = f"{mission.num_failures}; not counted from then on"
     return rows
 
 
@@ -103,13 +105,11 @@ def _number(name: str, value: Any) -> Any:  # noqa: ANN401 - of a summary's fiel
     return int(number) if is_count else number
 
 
-def _windows(value: float | int | None, mission: Mission, digits: int, word: str = "") -> str:
-    """Return a time in windows and in seconds, or that it never came."""
-    if value is None:
-        return "never"
+def _windows(value: float | int, mission: Mission, digits: int) -> str:
+    """Return a time in windows and in seconds."""
     number = f"{value:.{digits}f}"
     windows = "window" if number == "1" else "windows"
-    return f"{word} {number} {windows} ({value * mission.window_s:.2g} s)".strip()
+    return f"{number} {windows} ({value * mission.window_s:.2g} s)"
 
 
 def _packets(numbers: Mapping[str, Any]) -> dict[str, str]:

@@ -3,12 +3,11 @@
 import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.api.estimates import flight_needs
-from swarm_mj.api.flight import COMPILING_WINDOWS, compile_ahead, fly_swarm, run_of
+from swarm_mj.api import flight
 from swarm_mj.api.run import Run
 from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission, make_mission
@@ -67,34 +66,29 @@ def fly(
         KeyboardInterrupt: Ctrl-C was pressed before the first window was flown.
     """
     mission = mission_of(fly, task, mission_fields)
-    how: dict[str, Any] = {"probability": probability, "is_deterministic": is_deterministic}
-    how["features"] = names_of(features)
+    how = {"probability": probability, "is_deterministic": is_deterministic}
+    how |= {"features": names_of(features)}
     chosen, name = _policy_of(policy, mission, how)
     check_used(how["features"], [chosen])
     components = Components(channel=channel, controller=controller, scene=scene)
     way_out = "choose fewer num_robots or num_windows" + (", or record=False" if record else "")
-    needs = flight_needs(mission, name, is_recorded=record)
+    needs = flight.flight_needs(mission, name, is_recorded=record)
     check_fits(needs, None, way_out, is_forced=False, way_on="")
     swarm = Swarm(mission, [seed], **components.given)
     swarm.start(chosen)
     recorder = Recorder(swarm, ego=observer) if record else None
-    with quiet_bar("Compiling", COMPILING_WINDOWS, "windows") as compiling:
+    with quiet_bar("Compiling", flight.COMPILING_WINDOWS, "windows") as compiling:
         like = "tdma" if isinstance(policy, Policy) else name  # an object flies only once
-        compile_ahead(mission, like, compiling.advance, **how)
+        flight.compile_ahead(mission, like, compiling.advance, **how)
     bar = quiet_bar("Flying", mission.num_windows, "windows")
-    flown = fly_swarm(swarm, recorder, bar, way_on="")
+    flown = flight.fly_swarm(swarm, recorder, bar, way_on="")
     if flown.code != DONE:
         kept = f"{len(flown.windows)} of {mission.num_windows} windows; these are kept"
         warnings.warn(f"{flown.ending} after {kept}", stacklevel=2)
-    return run_of(
-        swarm,
-        flown,
-        name=name,
-        seed=seed,
-        observer=observer,
-        components=components,
-        log=recorder.log() if recorder else None,
+    run = flight.run_of(
+        swarm, flown, name=name, seed=seed, observer=observer, components=components
     )
+    return replace(run, log=recorder.log()) if recorder else run
 
 
 def names_of(features: str | Sequence[str]) -> tuple[str, ...]:
@@ -105,12 +99,9 @@ def names_of(features: str | Sequence[str]) -> tuple[str, ...]:
 def mission_of(
     function: Callable[..., Any], task: str | Mission | None, mission_fields: Mapping[str, Any]
 ) -> Mission:
-    """Return the mission that a function's arguments name.
+    """Return the mission that a function's arguments name: a task's, or a finished one.
 
-    Args:
-        function: Any of its keywords may have been meant by an unknown field.
-        task: The robots' task by name, or the mission itself. None is the default.
-        mission_fields: Other fields of the mission.
+    A field that is unknown may have been meant for any keyword of the function.
 
     Raises:
         ValueError: A value is unknown or out of range.

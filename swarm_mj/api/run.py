@@ -1,7 +1,7 @@
 """The result of `swarm_mj.fly`: numbers, a table, a chart, files, a video."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
@@ -12,14 +12,13 @@ from jaxtyping import Float
 from rich.table import Table
 
 from swarm_mj.api.flight_table import flight_rows, flight_title, window_columns
-from swarm_mj.api.metrics import Metrics
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import components_in
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rendering.style import DEFAULTS, default_seconds, fitted
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.system.atomic import write_bytes, write_csv, write_json
-from swarm_mj.system.fields import as_typed
+from swarm_mj.system.fields import as_typed, did_you_mean
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
 from swarm_mj.system.progress import is_notebook, quiet_bar
@@ -39,6 +38,28 @@ ELSEWHERE = (
 ENDINGS = ".rrd|.mp4|.gif|.json|.csv"  # of files that hold a run
 
 
+class Metrics(dict[str, Any]):
+    """A dictionary whose keys are attributes as well."""
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any value
+        if name not in self:
+            raise AttributeError(f"there is no {name!r} here{did_you_mean(name, self)}")
+        return self[name]
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self]
+
+    def __repr__(self) -> str:
+        """Return a line for each name; metrics within metrics are indented."""
+        width = max(map(len, self), default=0)
+        lines = []
+        for name, value in self.items():
+            shown = f"{value:.6g}" if isinstance(value, float) else str(value)
+            nested = f"{name}\n  " + shown.replace("\n", "\n  ")
+            lines.append(nested if isinstance(value, Metrics) else f"{name:{width}}  {shown}")
+        return "\n".join(lines)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Run:
     """One mission flown.
@@ -56,7 +77,7 @@ class Run:
     config: Mapping[str, Any]
     summary: Metrics
     windows: Sequence[WindowRecord]
-    log: Log | None
+    log: Log | None = None
 
     def __repr__(self) -> str:
         age, window_s = self.summary.aoi_mean, self.mission.window_s
@@ -67,11 +88,9 @@ class Run:
 
     def _repr_html_(self) -> str:
         """Return the numbers as a table, for notebooks."""
-        left = "style='text-align:left'"
-        lines = "".join(
-            f"<tr><th {left}>{escape(name)}</th><td {left}>{escape(value)}</td></tr>"
-            for name, value in self._rows.items()
-        )
+        left, lines = "style='text-align:left'", ""
+        for name, value in self._rows.items():
+            lines += f"<tr><th {left}>{escape(name)}</th><td {left}>{escape(value)}</td></tr>"
         return f"<table><caption>{escape(self.title)}</caption>{lines}</table>"
 
     def table(self) -> Table:
@@ -88,12 +107,6 @@ class Run:
         title = flight_title(self.mission, self.config["policy"], self.config["seed"])
         return title + components_in(self.config).title
 
-    @property
-    def task_cost(self) -> tuple[str, str] | None:
-        """The name of the task's cost, such as a formation error, and its unit; None without."""
-        cost = self.windows[0].costs.task_cost
-        return None if cost is None else (cost.name, cost.unit)
-
     def columns(self) -> dict[str, Float[np.ndarray, "T"]]:
         """Return the flight window by window, column by column: all that `to_dataframe` has."""
         worst = None if self.log is None else self.log.age_max
@@ -102,12 +115,11 @@ class Run:
     def to_dataframe(self) -> "DataFrame":
         """Return one row per window, at its end; what is not defined for the policy is nan.
 
-        Returns:
-            A pandas table with the columns `window` (1 is the first), `seconds`, `aoi` (age of
-            information, mean over pairs of robots [windows]), `aoi_worst` (the worst pair's, if the
-            flight was recorded), `velocity_variance` [m²/s²], `task_cost` (where the task has one;
-            `summary.task_cost_name` names it), `hops` (mean over all known teammates),
-            `is_complete` (every robot knows every other) and `packets_...` in that window.
+        The columns are `window` (1 is the first), `seconds`, `aoi` (age of information, mean over
+        pairs of robots [windows]), `aoi_worst` (the worst pair's, if the flight was recorded),
+        `velocity_variance` [m²/s²], `task_cost` (where the task has one; `summary.task_cost_name`
+        names it), `hops` (mean over all known teammates), `is_complete` (every robot knows every
+        other) and `packets_...` in that window.
 
         Raises:
             ModuleNotFoundError: pandas is not installed.
@@ -120,11 +132,8 @@ class Run:
     def plot(self) -> "Figure":
         """Draw the age of information over time and, below, the task's cost.
 
-        Of flocks and random walks that is the velocity variance.
-
-        Returns:
-            A matplotlib figure; a notebook shows it where it is the cell's result, `savefig` keeps
-            it, and `matplotlib.pyplot.show()` opens it in a window.
+        Of flocks and random walks that is the velocity variance. A notebook shows the figure where
+        it is the cell's result, `savefig` keeps it, and `matplotlib.pyplot.show()` opens a window.
 
         Raises:
             ModuleNotFoundError: matplotlib is not installed.
@@ -132,8 +141,7 @@ class Run:
         need("matplotlib", "a chart")
         from swarm_mj.api.charts import draw_flight
 
-        window_s, policy = self.mission.window_s, self.config["policy"]
-        return draw_flight(self.columns(), self.title, policy, window_s, self.task_cost)
+        return draw_flight(self)
 
     def show(self) -> None:
         """Play the flight as a video, in a notebook; elsewhere, say how to see it.
@@ -170,14 +178,10 @@ class Run:
         return {"config": dict(self.config), **self.summary, "replay": written}
 
     def save(self, path: str | Path) -> Path:
-        """Write the flight, replacing the file if it exists.
+        """Write the flight, replacing the file if it exists; return the path.
 
-        Args:
-            path: By its ending, a replay for `swarm-mj replay` (.rrd), a video (.mp4, .gif), the
-                summary as `swarm-mj fly --json` writes it (.json), or one row per window (.csv).
-
-        Returns:
-            The path.
+        By its ending, a replay for `swarm-mj replay` (.rrd), a video (.mp4, .gif), the summary as
+        `swarm-mj fly --json` writes it (.json), or one row per window (.csv).
 
         Raises:
             ValueError: The name has another ending, or nothing was recorded that it would show.
@@ -192,7 +196,9 @@ class Run:
             case ".json":
                 write_json(path, self.report())
             case ".csv":
-                self._write_columns(path)
+                columns = {name: values.tolist() for name, values in self.columns().items()}
+                rows = zip(*columns.values(), strict=True)
+                write_csv(path, list(columns), (_cells(columns, row) for row in rows))
             case ending:
                 write_bytes(path, self._film(ending))
         return path
@@ -221,11 +227,8 @@ class Run:
         config = {name: value for name, value in self.config.items() if value is not None}
         write_replay(log, self.mission, config, path)
 
-    def _write_columns(self, path: Path) -> None:
-        columns = {name: values.tolist() for name, values in self.columns().items()}
-        rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
-        texts = (
-            {name: None if math.isnan(value) else as_typed(value) for name, value in row.items()}
-            for row in rows
-        )
-        write_csv(path, list(columns), texts)
+
+def _cells(names: Iterable[str], row: Iterable[float]) -> dict[str, str | None]:
+    """Return a row of a file; nan is an empty cell."""
+    pairs = zip(names, row, strict=True)
+    return {name: None if math.isnan(value) else as_typed(value) for name, value in pairs}

@@ -1,20 +1,12 @@
-"""`swarm-mj bench`: how fast the simulation and evaluations are on this machine."""
+"""`swarm-mj bench`: how fast the simulation and its parts are on this machine."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.cli.benchmark.simulation import (
-    PLAIN_STEP,
-    Row,
-    evaluation_rows,
-    plain_step_us,
-    simulation_rows,
-    world_rows,
-)
+from swarm_mj.cli import bench_simulation as simulation
 from swarm_mj.system.fields import setting
 from swarm_mj.system.terminal import plain_console, tell_cores
 
@@ -49,19 +41,22 @@ def run(options: BenchOptions) -> int:
     """Run the command; return its exit code."""
     tell_cores(options.jobs if options.episodes else 1)
     tell_cores(options.threads, "threads")
+    tables, steps_us = [], []
     with Console(stderr=True).status("Measuring ...") as status:
-        tables = list(_measure(options, status.update))
-        steps_us = [row.value for each in tables for row in each.rows if row.name == PLAIN_STEP]
-        steps_us.append(plain_step_us(options.seconds / 4))
+        for title, head, columns in _measure(options, status.update):
+            rows = [row for column in columns for row in column]
+            steps_us += [row.value for row in rows if row.name == simulation.PLAIN_STEP]
+            tables.append(_table(title, head, columns))
+        steps_us.append(simulation.plain_step_us(options.seconds / 4))
     console = Console(highlight=False)
-    for each in tables:
-        console.print(each.drawn())
+    for table in tables:
+        console.print(table)
     plain_console().print(f"{LEGEND}\n{noise(steps_us)}")
     return 0
 
 
 def noise(steps_us: Sequence[float]) -> str:
-    """How far one number wanders that should always be the same."""
+    """Return how far one number wanders that should always be the same."""
     least, most = min(steps_us), max(steps_us)
     spread = most / least - 1.0
     busy = "; the machine was busy, so measure again when it is not" if spread > BUSY else ""
@@ -71,46 +66,41 @@ def noise(steps_us: Sequence[float]) -> str:
     )
 
 
-class _Measured(NamedTuple):
-    """A table: rows of the same names, each with a value from every column."""
-
-    title: str
-    columns: Sequence[Sequence[Row]]
-    head: Sequence[str] = ("", "")
-
-    @property
-    def rows(self) -> Iterator[Row]:
-        return (row for column in self.columns for row in column)
-
-    def drawn(self) -> Table:
-        table = Table(title=self.title, title_justify="left", show_header=any(self.head))
-        for index, name in enumerate(self.head):
-            table.add_column(name, justify="right" if index else "left")
-        for rows in zip(*self.columns, strict=True):
-            values = (row.form.format(row.value) for row in rows)
-            table.add_row(rows[0].name, *values, end_section=rows[0].ends_section)
-        return table
+def _table(title: str, head: Sequence[str], columns: Sequence[Sequence[simulation.Row]]) -> Table:
+    """Return a table; its columns have rows of the same names."""
+    table = Table(title=title, title_justify="left", show_header=any(head))
+    for index, name in enumerate(head):
+        table.add_column(name, justify="right" if index else "left")
+    for rows in zip(*columns, strict=True):
+        values = (row.form.format(row.value) for row in rows)
+        table.add_row(rows[0].name, *values, end_section=rows[0].ends_section)
+    return table
 
 
-def _measure(options: BenchOptions, say: Callable[[str], None]) -> Iterator[_Measured]:
-    columns = []
+def _measure(
+    options: BenchOptions, say: Callable[[str], None]
+) -> Iterator[tuple[str, Sequence[str], list[list[simulation.Row]]]]:
+    """Yield each table's title, head and columns."""
+    seconds, episodes, columns = options.seconds, options.episodes, []
     for num_missions in options.missions:
         say(f"Measuring with {num_missions} side by side ...")
-        rows = simulation_rows(num_missions, num_threads=options.threads, seconds=options.seconds)
-        columns.append(list(rows))
+        columns.append(list(simulation.simulation_rows(num_missions, options.threads, seconds)))
     head = ("missions side by side", *map(str, options.missions))
-    yield _Measured("Simulation: 40 robots walk at random, policy round-robin", columns, head)
+    yield "Simulation: 40 robots walk at random, policy round-robin", head, columns
     say("Measuring obstacles and fading ...")
-    rows = world_rows(WORLD_MISSIONS, seconds=options.seconds)
-    yield _Measured(f"World: one window of one of {WORLD_MISSIONS} such missions", [list(rows)])
-    if options.episodes:
-        say(f"Measuring an evaluation of {options.episodes} missions ...")
-        rows = evaluation_rows(options.episodes, num_jobs=options.jobs, seconds=options.seconds)
-        title = f"Evaluation: {options.episodes} random walks of 40 robots, 500 windows each"
-        yield _Measured(title, [list(rows)])
+    title = f"World: one window of one of {WORLD_MISSIONS} such missions"
+    yield title, ("", ""), [list(simulation.world_rows(WORLD_MISSIONS, seconds))]
+    if episodes:
+        say(f"Measuring an evaluation of {episodes} missions ...")
+        title = f"Evaluation: {episodes} random walks of 40 robots, 500 windows each"
+        yield (
+            title,
+            ("", ""),
+            [list(simulation.evaluation_rows(episodes, options.jobs, seconds))],
+        )
     if not options.no_learning:
         say("Measuring networks and training (a minute or two) ...")
-        from swarm_mj.cli.benchmark import learning  # torch takes its time to import
+        from swarm_mj.cli import bench_learning  # torch takes its time to import
 
-        rows = learning.learning_rows(threads=options.threads, seconds=options.seconds)
-        yield _Measured("Learning: 40 robots at rest", [list(rows)])
+        rows = bench_learning.learning_rows(threads=options.threads, seconds=seconds)
+        yield "Learning: 40 robots at rest", ("", ""), [list(rows)]

@@ -5,7 +5,7 @@ import os
 import platform
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from importlib import metadata
@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 from packaging.requirements import Requirement
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from swarm_mj.radio import reception
 from swarm_mj.system.atomic import check_writable
@@ -29,12 +29,14 @@ from swarm_mj.system.processes import PYTHON, running
 from swarm_mj.system.provenance import commit, version
 from swarm_mj.system.terminal import num_cores, plain_console
 
+State = Literal["ok", "absent", "broken"]  # absent: flying does without; broken: nothing flies
 MARKS = {"ok": "ok", "absent": "-", "broken": "BROKEN"}
 PACKAGE = "swarm_mj"
 LITTLE_MEMORY = 2 * 10**9  # a flight with its replay takes half a gigabyte, a training two
 LITTLE_DISK = 10**9
 LONGEST_S = 120.0  # of a trial; the first flight of an installation compiles for half a minute
 MAX_LETTERS = 400  # of what a trial complains, cut between words
+RENDERING, VIEWER = "rendering without a display", "rerun's viewer"  # headings
 
 RENDER = """
 import mujoco
@@ -52,9 +54,6 @@ assert main("fly --task stationary --policy tdma --robots 3 --windows 5 --range-
             "--no-record".split()) == 0
 print("yes")
 """
-
-
-State = Literal["ok", "absent", "broken"]  # absent: flying does without; broken: nothing flies
 
 
 class Finding(NamedTuple):
@@ -77,7 +76,6 @@ class Trial(NamedTuple):
     state: State = "absent"  # if it fails
 
 
-RENDERING = "rendering without a display"
 TRIALS = (
     Trial("flying", "three robots fly", FLIGHT, "see what `swarm-mj fly` says", "broken"),
     Trial(RENDERING, "MUJOCO_GL=egl", RENDER, "needs a graphics driver with EGL; or use osmesa"),
@@ -111,40 +109,36 @@ def run(options: DoctorOptions) -> int:
 def packages() -> Iterator[Finding]:
     """Find this version, each package that an installation brings, then each extra as a whole."""
     at = f", commit {commit()}" if commit() else ""
-    yield Finding("swarm_mj", "version", "ok", version() + at)
     on = f"{platform.python_version()} on {platform.platform()}"
+    yield Finding("swarm_mj", "version", "ok", version() + at)
     yield Finding("swarm_mj", "Python", "ok", on)
     asked = [Requirement(text) for text in metadata.requires(PACKAGE) or ()]
     brought = [each for each in asked if each.marker is None or each.marker.evaluate({"extra": ""})]
     for each in brought:
-        mend = f"pip install '{each.name}{each.specifier}'"
-        state = "broken" if each.name in CORE else "absent"
-        yield _installed(each.name, [each], "flying" if each.name in CORE else "", mend, state)
+        is_core, mend = each.name in CORE, f"pip install '{each.name}{each.specifier}'"
+        if (found := _packages(each.name, [each], mend)).state != "ok" and is_core:
+            found = found._replace(state="broken", found=f"{found.found}; flying needs it")
+        yield found
     for extra in metadata.metadata(PACKAGE).get_all("Provides-Extra") or ():
         own = [each for each in asked if each.marker and each.marker.evaluate({"extra": extra})]
         own = [each for each in own if each not in brought and each.name != PACKAGE]
-        yield _installed(f"extra {extra}", own, "", f"pip install '{PACKAGE}[{extra}]'", "absent")
+        yield _packages(f"extra {extra}", own, f"pip install '{PACKAGE}[{extra}]'")
 
 
-def _installed(name: str, asked: list[Requirement], need: str, mend: str, state: State) -> Finding:
+def _packages(name: str, asked: Sequence[Requirement], mend: str) -> Finding:
     """Find whether packages are installed in the versions asked for."""
-    problems = list(filter(None, map(_problem, asked)))
+    problems, found = [], "installed"
+    for each in asked:
+        try:
+            found = metadata.version(each.name)
+        except metadata.PackageNotFoundError:
+            problems.append(f"{each.name} is not installed")
+        else:
+            if not each.specifier.contains(found, prereleases=True):
+                problems.append(f"{each.name} {found} is not {each.specifier}")
     if problems:
-        needed = f"; {need} needs it" if need else ""
-        return Finding("packages", name, state, ", ".join(problems) + needed, mend)
-    found = metadata.version(name) if name == asked[0].name else "installed"
-    return Finding("packages", name, "ok", found)
-
-
-def _problem(requirement: Requirement) -> str | None:
-    """Return what is wrong with a package as it is installed, if anything is."""
-    name = requirement.name
-    try:
-        found = metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return f"{name} is not installed"
-    fits = requirement.specifier.contains(found, prereleases=True)
-    return None if fits else f"{name} {found} is not {requirement.specifier}"
+        return Finding("packages", name, "absent", ", ".join(problems), mend)
+    return Finding("packages", name, "ok", found if name == asked[0].name else "installed")
 
 
 def tried() -> Iterator[Finding]:
@@ -157,7 +151,7 @@ def tried() -> Iterator[Finding]:
         for trial in TRIALS:
             said = stack.enter_context(tempfile.TemporaryFile("w+"))
             variable, _, value = trial.name.partition("=")
-            environment = {**os.environ, **({variable: value} if value else {})}
+            environment = os.environ | ({variable: value} if value else {})
             environment.pop("PYOPENGL_PLATFORM", None)  # it may bind all to one back end
             process = running([*PYTHON, "-c", trial.program], environment=environment, output=said)
             under_way.append((trial, stack.enter_context(process), said))
@@ -168,10 +162,8 @@ def tried() -> Iterator[Finding]:
                 said.seek(0)
                 last = (said.read().strip().splitlines() or ["it said nothing"])[-1]
                 found = shorten(last, MAX_LETTERS, placeholder=" ...")
-            if code == 0:
-                yield Finding(trial.group, trial.name, "ok", found)
-            else:
-                yield Finding(trial.group, trial.name, trial.state, found, trial.mend)
+            failed = Finding(trial.group, trial.name, trial.state, found, trial.mend)
+            yield failed._replace(state="ok", mend="") if code == 0 else failed
 
 
 def machine() -> Iterator[Finding]:
@@ -186,12 +178,14 @@ def machine() -> Iterator[Finding]:
     ):
         less = "" if free >= little else f", less than {in_gb(little)}"
         yield Finding("room", name, "absent" if less else "ok", f"{in_gb(free)}{less}", mend)
-    group, names = "rerun's viewer", ("DISPLAY", "WAYLAND_DISPLAY")
-    found = [f"{name}={os.environ[name]}" for name in names if os.environ.get(name)]
+    names = [name for name in ("DISPLAY", "WAYLAND_DISPLAY") if os.environ.get(name)]
+    found = ", ".join(f"{name}={os.environ[name]}" for name in names)
     if found or not sys.platform.startswith("linux"):
-        yield Finding(group, "display", "ok", ", ".join(found) or sys.platform)
+        yield Finding(VIEWER, "display", "ok", found or sys.platform)
     else:
-        yield Finding(group, "display", "absent", "none", "`swarm-mj replay --web FILE` needs none")
+        yield Finding(
+            VIEWER, "display", "absent", "none", "`swarm-mj replay --web FILE` needs none"
+        )
 
 
 def _compiled_code() -> Finding:
@@ -212,9 +206,7 @@ def _print(found: list[Finding], *, works: bool) -> None:
     """Print a table by groups, then what to do, then whether flying works."""
     groups = list(dict.fromkeys(each.group for each in found))
     in_groups = sorted(found, key=lambda each: groups.index(each.group))
-    table = Table(show_header=False)
-    for _ in range(3):
-        table.add_column(overflow="fold")
+    table = Table(*3 * [Column(overflow="fold")], show_header=False)
     for group, findings in groupby(in_groups, lambda each: each.group):
         table.add_row(f"[bold]{group}[/bold]")
         for each in findings:

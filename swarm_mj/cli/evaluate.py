@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from rich.console import Console
 
-from swarm_mj.api.estimates import study_needs
+from swarm_mj.api.evaluate import study_needs
 from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_missions
 from swarm_mj.evaluation import progress
 from swarm_mj.evaluation.batch import BatchCosts
@@ -66,9 +66,7 @@ class EvaluateOptions(PolicyOptions):
             regimes=self.missions,
             episodes=self.episodes,
             seed=self.seed,
-            probability=self.probability,
-            is_deterministic=self.is_deterministic,
-            features=self.features,
+            **self.how,
             components=self.components,
             baseline=None if self.baseline is None else flown.get(self.baseline, self.baseline),
         )
@@ -105,9 +103,9 @@ def _evaluate(options: EvaluateOptions, study: Study, kept: Path | None) -> int:
             fly_study(study, costs, options.jobs, keep, console)
     except (KeyboardInterrupt, MemoryError) as error:
         is_memory = isinstance(error, MemoryError)
+        ending = "Out of memory" if is_memory else "Interrupted"
         hint = "the same command with --resume continues" if kept else "nothing was kept"
         flown, total = num_flown(study, costs), study.episodes * len(study.pairs)
-        ending = "Out of memory" if is_memory else "Interrupted"
         console.print(f"{ending} after {flown} of {total} missions; {hint}.")
         return FAILED if is_memory else INTERRUPTED
     with deferred_interrupt():

@@ -6,16 +6,17 @@ from pathlib import Path
 
 from rich.console import Console
 
-from swarm_mj.api.estimates import figures_needs
 from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS, RESULT_FIGURES
 from swarm_mj.evaluation.results import Result, read_results
 from swarm_mj.mission.components import components_in
 from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.policies.registry import stored_policies
 from swarm_mj.system.fields import setting
-from swarm_mj.system.needs import YES, check_fits
+from swarm_mj.system.needs import LIBRARIES, YES, Needs, check_fits
 from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.terminal import plain_console
+
+FLOCKS = f"the mission flown for {FLOCK}"  # a heading of the help
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,10 +35,8 @@ class FiguresOptions:
     format: tuple[str, ...] = setting(("svg", "png"), "of the files", choices=FORMATS)
     force: bool = setting(False, "replace existing figures")
     yes: bool = setting(False, YES)
-    flock_policy: str = setting(
-        "mst", "who talks to whom in it", metavar="POLICY", group=f"the mission flown for {FLOCK}"
-    )
-    flock_seed: int = setting(1, "its seed", group=f"the mission flown for {FLOCK}")
+    flock_policy: str = setting("mst", "who talks to whom in it", metavar="POLICY", group=FLOCKS)
+    flock_seed: int = setting(1, "its seed", group=FLOCKS)
 
 
 def run(options: FiguresOptions) -> int:
@@ -78,6 +77,12 @@ def run(options: FiguresOptions) -> int:
     return 0
 
 
+def figures_needs(results: tuple[Path, ...], num_files: int) -> Needs:
+    """Return what drawing takes: the results as objects, and pictures of 1 MB at most."""
+    read = sum(path.stat().st_size for path in results if path.is_file())
+    return Needs(memory=2.0 * LIBRARIES + 10.0 * read, file=1e6 * num_files)
+
+
 def _papers(path: Path) -> list[Result]:
     """Read a file's results; raise ValueError for those that the paper's values do not fit."""
     results = read_results(path)
@@ -85,15 +90,18 @@ def _papers(path: Path) -> list[Result]:
         beyond = {
             **components_in(vars(result)).names,
             "radio": result.radio,
-            "arena": result.arena if result.arena != OPEN else "",
-            "prior knowledge": result.prior_knowledge if result.prior_knowledge != NOTHING else "",
+            "arena": None if result.arena == OPEN else result.arena,
+            "prior knowledge": None
+            if result.prior_knowledge == NOTHING
+            else result.prior_knowledge,
         }
-        for kind, name in ((kind, name) for kind, name in beyond.items() if name):
-            raise ValueError(
-                f"figures compare with the paper's values, but row {row} of {path} was flown with "
-                f"the {kind} {name}; leave such rows out, or chart them with "
-                f"`swarm_mj.evaluate(...).plot()` in Python"
-            )
+        for kind, name in beyond.items():
+            if name:
+                raise ValueError(
+                    f"figures compare with the paper's values, but row {row} of {path} was flown "
+                    f"with the {kind} {name}; leave such rows out, or chart them with "
+                    f"`swarm_mj.evaluate(...).plot()` in Python"
+                )
     return results
 
 

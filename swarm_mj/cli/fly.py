@@ -3,6 +3,7 @@
 import os
 import shlex
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -10,22 +11,12 @@ from typing import ClassVar
 
 from rich.console import Console
 
-from swarm_mj.api.estimates import flight_needs
-from swarm_mj.api.flight import Flown, compile_ahead, fly_swarm, run_of
-from swarm_mj.api.run import Run
+from swarm_mj.api.flight import Flown, compile_ahead, flight_needs, fly_swarm, run_of
 from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, one_mission
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import notes_on
+from swarm_mj.policies import registry
 from swarm_mj.policies.policy_config import SUFFIX
-from swarm_mj.policies.registry import (
-    check_used,
-    flown_name,
-    is_stored,
-    make_policy,
-    normalised,
-    stored_policies,
-    with_payload,
-)
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.view import has_display, view_command
 from swarm_mj.replay.view import run as run_viewer
@@ -57,7 +48,7 @@ class FlyOptions(PolicyOptions):
     policy: str = setting(
         "planner",
         f"{NAMES}, a directory with a learned policy, or module:Name of your own",
-        convert=normalised,
+        convert=registry.normalised,
     )
     seed: int = setting(1, "the same seed is the same mission")
     mission: Mission = one_mission()
@@ -75,8 +66,8 @@ class FlyOptions(PolicyOptions):
 def run(options: FlyOptions) -> int:
     """Run the command; return its exit code."""
     mission = options.mission
-    (asked,) = with_payload([options.policy], options.payload)
-    name = flown_name(asked, mission)
+    (asked,) = registry.with_payload([options.policy], options.payload)
+    name = registry.flown_name(asked, mission)
     options = replace(options, policy=name)
     path = _replay_path(options)
     if path:
@@ -84,12 +75,11 @@ def run(options: FlyOptions) -> int:
     needs = flight_needs(mission, name, is_recorded=path is not None)
     way_out = "choose fewer --robots or --windows" + (", or --no-record" if path else "")
     check_fits(needs, path, way_out, is_forced=options.yes)
-    policy = make_policy(name, mission, **options.how)
+    policy = registry.make_policy(name, mission, **options.how)
     components = options.components.made(mission)
-    check_used(options.features, [policy])
+    registry.check_used(options.features, [policy])
     console, ego = Console(stderr=True, highlight=False), options.observer
-    preparing = console.status("Preparing the swarm (compiles once, then it is cached) ...")
-    with preparing:
+    with console.status("Preparing the swarm (compiles once, then it is cached) ..."):
         compile_ahead(mission, name, **options.how)
         swarm = Swarm(mission, [options.seed], **components.given)
         swarm.start(policy)
@@ -100,24 +90,17 @@ def run(options: FlyOptions) -> int:
     way_on = None if options.yes else "; --yes flies on all the same"
     flown = fly_swarm(swarm, recorder, bar, way_on=way_on)
     given = {"seed": options.seed, "observer": ego, "components": options.components}
-    with deferred_interrupt():
+    with deferred_interrupt(), ExitStack() as stack:
         run = run_of(swarm, flown, name=name, **given)
-        try:  # a file may fail; the table is printed all the same
-            with console.status("Writing ..."):
-                _write(run, options.json, path, recorder)
-        finally:
-            plain_console().print(run.table())
-    return _ended(options, path, flown, console)
-
-
-def _write(run: Run, summary: Path | None, path: Path | None, recorder: Recorder | None) -> None:
-    """Write both files, the replay even if the summary fails."""
-    try:
-        if summary:
-            write_json(summary, run.report(path))
-    finally:
+        # The stack unwinds in reverse: the replay is written even if the summary fails, and the
+        # table is printed in any case.
+        stack.callback(lambda: plain_console().print(run.table()))
+        stack.enter_context(console.status("Writing ..."))
         if path and recorder:
-            replace(run, log=recorder.log()).save(path)
+            stack.callback(lambda: replace(run, log=recorder.log()).save(path))
+        if options.json:
+            write_json(options.json, run.report(path))
+    return _ended(options, path, flown, console)
 
 
 def _ended(options: FlyOptions, path: Path | None, flown: Flown, console: Console) -> int:
@@ -155,7 +138,7 @@ def _replay_path(options: FlyOptions) -> Path | None:
     check_outputs(
         Output(what, path, ".rrd", way_out),
         Output("--json", options.json, ".json"),
-        inputs=stored_policies([options.policy]),
+        inputs=registry.stored_policies([options.policy]),
         must_be_new=not options.force,
     )
     if options.view and path:
@@ -172,7 +155,7 @@ def _fresh_name(options: FlyOptions) -> Path:
 
 def _short(policy: str) -> str:
     """Return a policy's name without the path: `x` of runs/x/policy.safetensors and of runs/x."""
-    if not is_stored(policy):
+    if not registry.is_stored(policy):
         return policy.replace(" --", "-").replace(" ", "-").replace(":", "-")
     path = Path(policy.removesuffix(SUFFIX)).resolve()
     return path.parent.name if path.name == "policy" else path.name

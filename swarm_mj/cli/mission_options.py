@@ -6,14 +6,14 @@ from functools import partial
 from itertools import product
 from typing import Any
 
-from swarm_mj.cli.options import Option, flag_of, nested
+from swarm_mj.cli.options import flags_of, nested, nested_option
 from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper
 from swarm_mj.mission.components import GROUP, SHOWN_AS, Components
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
 from swarm_mj.system.fields import FieldOf, as_typed, kind_of, setting
 
-NAMED = tuple(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes the other
-NAMES = f"who talks when (`swarm-mj policies` says more): {', '.join(NAMED)}"
+NAMED = ", ".join(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes it
+NAMES = f"who talks when (`swarm-mj policies` says more): {NAMED}"
 OTHERS = "directories or .safetensors files of learned policies, or module:Name of your own"
 HEADING = "policies"
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]
@@ -61,12 +61,9 @@ class PolicyOptions(Components):
 
     @property
     def how(self) -> dict[str, Any]:
-        """Arguments of `make_policy`, but for the policy's name and the mission."""
-        return {
-            "probability": self.probability,
-            "is_deterministic": self.is_deterministic,
-            "features": self.features,
-        }
+        """Arguments of `make_policy` and `Study`, but for the policy's name and the mission."""
+        names = ("probability", "is_deterministic", "features")
+        return {name: getattr(self, name) for name in names}
 
 
 def one_mission() -> FieldOf:
@@ -84,21 +81,16 @@ def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
 
     The last field's values vary fastest; raises ValueError if one is unknown or out of range.
     """
-    swept = {spec.name: place for spec in SPECS if (place := f"mission.{spec.name}") in given}
-    values = [given[place] for place in swept.values()]
-    values = [dict.fromkeys(v) if isinstance(v, tuple) else [v] for v in values]
+    swept = {spec.name: given[p] for spec in SPECS if (p := f"mission.{spec.name}") in given}
+    values = [dict.fromkeys(v) if isinstance(v, tuple) else [v] for v in swept.values()]
     missions = [make_mission(**dict(zip(swept, each, strict=True))) for each in product(*values)]
     check_in_use(swept, missions)
     return tuple(missions)
 
 
 def check_in_use(given: Collection[str], missions: Sequence[Mission]) -> None:
-    """Pass if every field of the channel that was given counts in some mission.
-
-    Raises:
-        ValueError: One does not, for lack of another that switches it on.
-    """
-    flags = {spec.name: flag_of(spec) for spec in SPECS}
+    """Raise ValueError for a field given that counts in no mission: another must switch it on."""
+    flags = {spec.name: flags_of(spec)[0] for spec in SPECS}
     for name, (switch, value) in NEEDED.items():
         states = [getattr(mission, switch) for mission in missions]
         if name in given and not any(s == value if value else s > 0.0 for s in states):
@@ -114,24 +106,23 @@ def mission_flags(mission: Mission) -> str:
     usual = replace(PRESETS[mission.preset](mission.task), preset=Mission().preset)
     named = {spec: getattr(mission, spec.name) for spec in SPECS}
     return " ".join(
-        flag_of(spec) if value is True else f"{flag_of(spec)} {as_typed(value)}"
+        flags_of(spec)[0] if value is True else f"{flags_of(spec)[0]} {as_typed(value)}"
         for spec, value in named.items()
         if spec.name == "task" or value != getattr(usual, spec.name)
     )
 
 
-def _mission_options(*, is_many: bool = False) -> Iterator[Option]:
+def _mission_options(*, is_many: bool = False) -> Iterator[Field[Any]]:
     heading = "missions: each takes several values; those multiply" if is_many else "mission"
     for spec in SPECS:
-        own = spec.metadata.get("group", heading)
-        yield Option(spec, f"mission.{spec.name}", own, _default_of(spec), is_many=is_many)
+        about = {"group": heading, **spec.metadata, "shown": _default_of(spec), "is_many": is_many}
+        yield nested_option(spec, f"mission.{spec.name}", **about)
 
 
 def _default_of(spec: Field[Any]) -> str:
     """Return a mission's default; where it depends on the task, the flock's and the others'."""
-    flocks, others = (
-        as_typed(getattr(paper(task), spec.name)) for task in ("flocking", "stationary")
-    )
+    tasks = ("flocking", "stationary")
+    flocks, others = (as_typed(getattr(paper(task), spec.name)) for task in tasks)
     if spec.name == "task":
         return f"{flocks}; {PRESETS[next(iter(WORLDS))]().task} under {', '.join(WORLDS)}"
     if flocks == others:

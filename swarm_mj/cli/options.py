@@ -11,7 +11,8 @@ from copy import copy
 from dataclasses import MISSING, Field, field, fields
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn, TypeVar, get_origin
+from types import MappingProxyType
+from typing import Any, NoReturn, TypeVar, get_origin
 
 from swarm_mj.system.exit_codes import BAD_INPUT
 from swarm_mj.system.fields import (
@@ -29,17 +30,6 @@ T = TypeVar("T")
 MANY = 10**9  # from here on, the end of a range is only there to catch slips
 METAVARS: dict[Any, str] = {int: "N", float: "X", str: "NAME", Path: "FILE"}
 BIT_RATES = {"k": 1e3, "m": 1e6, "g": 1e9}  # the factor of a letter behind a number
-
-
-class Option(NamedTuple):
-    """A field as an option of a command line."""
-
-    spec: Field[Any]
-    dest: str  # the name of its value among those parsed; absent if the option was not given
-    heading: str = ""  # in the help
-    default: str = ""  # as the help shows it
-    is_many: bool = False  # whether it takes several values, after one flag or several
-    is_required: bool = False
 
 
 class Parser(argparse.ArgumentParser):
@@ -75,10 +65,21 @@ class _Formatter(argparse.HelpFormatter):
 
 
 def nested(
-    options: Callable[[], Iterable[Option]], build: Callable[[dict[str, Any]], Any]
+    options: Callable[[], Iterable[Field[Any]]], build: Callable[[dict[str, Any]], Any]
 ) -> FieldOf:
     """Return a field that several options fill; `build` makes its value of all values given."""
     return field(metadata={"options": options, "build": build})
+
+
+def nested_option(spec: Field[Any], place: str, **about: Any) -> Field[Any]:
+    """Return a field of a nested dataclass as an option; its value is parsed as `place`.
+
+    What is said `about` it goes before the field's own metadata; `is_many` has it take several
+    values, after one flag or several.
+    """
+    option = copy(spec)
+    option.metadata = MappingProxyType({**spec.metadata, "place": place, **about})
+    return option
 
 
 def parse_options(kind: type[T], arguments: Sequence[str], prog: str, summary: str) -> T:
@@ -94,24 +95,16 @@ def parse_options(kind: type[T], arguments: Sequence[str], prog: str, summary: s
     parsed = vars(_parser_of(kind, prog, summary).known(arguments))
     given: dict[str, Any] = {"typed": tuple(arguments)}
     given |= {name: tuple(x) if isinstance(x, list) else x for name, x in parsed.items()}
-    values: dict[str, Any] = {}
-    for spec in fields(kind):  # pyright: ignore[reportArgumentType]
-        if "build" in spec.metadata:
-            values[spec.name] = spec.metadata["build"](given)
-        elif spec.name in given:
-            values[spec.name] = given[spec.name]
-    options = kind(**values)
+    specs = fields(kind)  # pyright: ignore[reportArgumentType]
+    values = {spec.name: given[spec.name] for spec in specs if spec.name in given}
+    built = (spec for spec in specs if "build" in spec.metadata)
+    options = kind(**values, **{spec.name: spec.metadata["build"](given) for spec in built})
     check(options)
     return options
 
 
-def flag_of(spec: Field[Any]) -> str:
-    """Return the flag of a field: `--windows` of `num_windows`."""
-    return flags_of(spec)[0]
-
-
 def flags_of(spec: Field[Any]) -> tuple[str, ...]:
-    """Return the flag of a field, and then the flags that it had in earlier releases."""
+    """Return the flag of a field, `--windows` of `num_windows`, then those of earlier releases."""
     name = spec.name.removeprefix("num_").removeprefix("is_")
     former = (old for old, present in FORMER_NAMES.items() if present == spec.name)
     flags = ["--" + each.replace("_", "-") for each in (name, *former)]
@@ -133,9 +126,9 @@ def _check_names(arguments: Sequence[str]) -> None:
 
 def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
     options = list(_options_of(kind))
-    positional = [spec for spec, *_ in options if spec.metadata.get("is_positional")]
+    positional = [spec for spec in options if spec.metadata.get("is_positional")]
     needed = [_metavar(s) if s.default is MISSING else f"[{_metavar(s)}]" for s in positional]
-    needed += [f"{flag_of(each.spec)} {_metavar(each.spec)}" for each in options if each[-1]]
+    needed += [f"{flags_of(spec)[0]} {_metavar(spec)}" for spec in options if _is_required(spec)]
     parser = Parser(
         prog=prog,
         usage=" ".join([prog, *needed, "[OPTIONS]"]),
@@ -144,56 +137,58 @@ def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
         formatter_class=partial(_Formatter, max_help_position=26),
         argument_default=argparse.SUPPRESS,
     )
-    headings = {each.heading for each in options}
     groups: dict[str, Any] = {"": parser}
-    for option in options:
-        if option.heading in headings - groups.keys():
-            groups[option.heading] = parser.add_argument_group(option.heading)
-        _add(groups[option.heading], option)
+    for spec in options:
+        heading = spec.metadata.get("group", "")
+        if heading not in groups:
+            groups[heading] = parser.add_argument_group(heading)
+        _add(groups[heading], spec)
     return parser
 
 
-def _options_of(kind: type[Any]) -> Iterator[Option]:
-    """Yield the options of a command's dataclass: of its fields, and of those nested in them."""
+def _options_of(kind: type[Any]) -> Iterator[Field[Any]]:
+    """Yield the options of a command's dataclass: its fields, and those nested in them."""
     for spec in fields(kind):
-        about = spec.metadata
-        if "options" in about:
-            yield from about["options"]()
-        elif "help" in about:
-            has_default = not any(spec.default is each for each in (MISSING, None, False, ()))
-            default = about.get("shown", as_typed(spec.default) if has_default else "")
-            is_required = spec.default is MISSING and not about.get("is_positional")
-            heading = about.get("group", "")
-            yield Option(spec, spec.name, heading, default, is_required=is_required)
+        if "options" in spec.metadata:
+            yield from spec.metadata["options"]()
+        elif "help" in spec.metadata:
+            yield spec
 
 
-def _add(group: argparse._ActionsContainer, option: Option) -> None:
-    spec, kind, about = option.spec, kind_of(option.spec), option.spec.metadata
-    how: dict[str, Any] = {"help": _help(spec, option.default)}
+def _is_required(spec: Field[Any]) -> bool:
+    is_own = not {"place", "is_positional"} & spec.metadata.keys()  # what is nested has a default
+    return is_own and spec.default is MISSING
+
+
+def _add(group: argparse._ActionsContainer, spec: Field[Any]) -> None:
+    kind, about = kind_of(spec), spec.metadata
+    place = about.get("place", spec.name)
+    how: dict[str, Any] = {"help": _help(spec)}
     if kind is bool:
-        group.add_argument(*flags_of(spec), dest=option.dest, action="store_true", **how)
+        group.add_argument(*flags_of(spec), dest=place, action="store_true", **how)
         return
     convert = about.get("convert") or CONVERT.get(about.get("unit")) or CONVERT.get(kind, kind)
     how |= {"type": convert, "metavar": _metavar(spec)}
-    if option.is_many or get_origin(spec.type) is tuple:
+    if about.get("is_many") or get_origin(spec.type) is tuple:
         how |= {"nargs": "+", "action": "extend"}
     if not about.get("is_positional"):
-        group.add_argument(*flags_of(spec), dest=option.dest, required=option.is_required, **how)
+        group.add_argument(*flags_of(spec), dest=place, required=_is_required(spec), **how)
         return
     if spec.default is not MISSING:
         how["nargs"] = "?"
-    group.add_argument(option.dest, **how)
+    group.add_argument(place, **how)
 
 
-def _help(spec: Field[Any], default: str) -> str:
+def _help(spec: Field[Any]) -> str:
     """Return meaning, choices, unit, range and default."""
-    about = spec.metadata
-    text = about["help"]
+    about, text = spec.metadata, spec.metadata["help"]
     if "choices" in about:
         text += f": {', '.join(about['choices'])}"
     if "low" in about:
         has_end = about["high"] < MANY
         text += f", {range_of(spec)}" if has_end else f", {about['low']} or more"
+    has_default = not any(spec.default is each for each in (MISSING, None, False, ()))
+    default = about.get("shown", as_typed(spec.default) if has_default else "")
     return (text + (f" (default: {default})" if default else "")).replace("%", "%%")
 
 

@@ -98,16 +98,14 @@ def _print_all(facts: list[dict[str, Any]], mission: Mission) -> None:
     console = Console(highlight=False)
     for is_centralised, heading in HEADINGS.items():
         table = Table("policy", heading, "packets\ncarry", "window", show_lines=True)
-        for each in facts:
-            if each["is_centralised"] == is_centralised:
-                name, p = each["name"].replace(" --", "\n  --"), each["probability"]
-                name += "" if p is None else f"\n  p = {as_typed(p)}"
-                carried = "\n".join((*_carried(each), f"{each['packet_bytes']:,} bytes"))
-                table.add_row(name, each["uses"], carried, each["window"])
+        for each in (each for each in facts if each["is_centralised"] == is_centralised):
+            name, p = each["name"].replace(" --", "\n  --"), each["probability"]
+            name += "" if p is None else f"\n  p = {as_typed(p)}"
+            carried = "\n".join((*_carried(each), f"{each['packet_bytes']:,} bytes"))
+            table.add_row(name, each["uses"], carried, each["window"])
         console.print(table)
-    plain = plain_console()
-    plain.print(f"{LEGEND} {_described(mission)}.")
-    plain.print(f"\nMore of one:  {this_command()} policies NAME")
+    more = f"\nMore of one:  {this_command()} policies NAME"
+    plain_console().print(f"{LEGEND} {_described(mission)}.\n{more}")
 
 
 def _print_one(each: dict[str, Any], mission: Mission) -> None:
@@ -129,10 +127,9 @@ def _print_one(each: dict[str, Any], mission: Mission) -> None:
         step = f"{field['step']:.3g} {field['unit']}" if "step" in field else ""
         packet.add_row(field["name"], str(field["bits"]), f"{field['count']:,}", step)
     Console(highlight=False).print(named_values(each["name"], rows), packet)
-    console = plain_console()
-    console.print(each["description"])
     policy = each["name"] if each["name"] in POLICIES else shlex.quote(each["name"])
-    console.print(f"\nFly it:  {this_command()} fly --policy {policy} {mission_flags(mission)}")
+    fly = f"{this_command()} fly --policy {policy} {mission_flags(mission)}"
+    plain_console().print(f"{each['description']}\n\nFly it:  {fly}")
 
 
 def _carried(each: dict[str, Any]) -> tuple[str, ...]:

@@ -9,15 +9,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from swarm_mj.mission.components import SHOWN_AS, Components, is_own
-from swarm_mj.replay.rendering.style import (
-    DEFAULTS,
-    LONGEST_S,
-    MAX_MISSIONS,
-    VideoStyle,
-    default_seconds,
-    fitted,
-    video_needs,
-)
+from swarm_mj.replay.rendering import style as styles
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
 from swarm_mj.system.atomic import write_bytes
@@ -61,7 +53,7 @@ class ReplayOptions:
         unit="s",
         low=0.1,
         high=600.0,
-        shown=f"the mission's own time, {LONGEST_S:g} at most",
+        shown=f"the mission's own time, {styles.LONGEST_S:g} at most",
     )
     fps: int | None = setting(
         None,
@@ -104,14 +96,16 @@ def run(options: ReplayOptions) -> int:
 def _make_video(options: ReplayOptions, video: Path) -> int:
     if options.web:
         raise ValueError("--web is not allowed with --video; leave one out")
-    if len(options.file) > MAX_MISSIONS:
-        raise ValueError(f"a video shows 1 or {MAX_MISSIONS} replays, not {len(options.file)}")
+    if len(options.file) > styles.MAX_MISSIONS:
+        raise ValueError(
+            f"a video shows 1 or {styles.MAX_MISSIONS} replays, not {len(options.file)}"
+        )
     check_outputs(
         Output("video", video, SUFFIXES), inputs=options.file, must_be_new=not options.force
     )
     suffix = video.suffix.lower()
     style = _style(options, suffix)
-    needs = video_needs(style.width, style.height, style.num_frames, suffix)
+    needs = styles.video_needs(style.width, style.height, style.num_frames, suffix)
     check_fits(needs, video, "choose a smaller --size or fewer --seconds", is_forced=options.yes)
     for module in ("av", "PIL", "rerun"):
         need(module, "a video")
@@ -120,7 +114,7 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
 
     with Console(stderr=True, highlight=False).status("Reading ..."):
         footages = [_in_scene(read_footage(file), options.scene) for file in options.file]
-    style = replace(style, seconds=options.seconds or default_seconds(footages))
+    style = replace(style, seconds=options.seconds or styles.default_seconds(footages))
     with WorkBar("Rendering", style.num_frames, "pictures") as bar:
         content = make_video(footages, suffix, style, bar.advance)
     write_bytes(video, content)
@@ -132,9 +126,9 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
     return 0
 
 
-def _style(options: ReplayOptions, suffix: str) -> VideoStyle:
+def _style(options: ReplayOptions, suffix: str) -> styles.VideoStyle:
     """Return the style asked for; raise ValueError for what the kind of file cannot have."""
-    style = DEFAULTS[suffix]
+    style = styles.DEFAULTS[suffix]
     if options.size:
         match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", options.size)
         width, height = (int(number) for number in match.groups()) if match else (0, 0)
@@ -146,7 +140,7 @@ def _style(options: ReplayOptions, suffix: str) -> VideoStyle:
             raise ValueError(f"size of an MP4 must be even numbers, not {options.size}")
         style = replace(style, width=width, height=height)
     seconds, fps = options.seconds or style.seconds, options.fps or style.fps
-    return fitted(replace(style, seconds=seconds, fps=fps), suffix)
+    return styles.fitted(replace(style, seconds=seconds, fps=fps), suffix)
 
 
 def _in_scene(footage: "Footage", scene: str | None) -> "Footage":

@@ -35,10 +35,10 @@ def run(options: SceneOptions) -> int:
     spec = compose(mission, start=swarm.states, scene=swarm.scene)
     spec.compile()
     write_text(options.out, spec.to_xml())
-    console = plain_console()
-    side = f"{mission.side_m:.0f} m"
-    console.print(f"Wrote {options.out}: {mission.num_robots} robots on {side} by {side}")
-    file = shlex.quote(str(options.out))
-    console.print("The viewer opens on their start; Load key also gives them their velocities.")
-    console.print(f"Open it:  {this_command('python')} -m mujoco.viewer --mjcf={file}")
+    side, file = f"{mission.side_m:.0f} m", shlex.quote(str(options.out))
+    plain_console().print(
+        f"Wrote {options.out}: {mission.num_robots} robots on {side} by {side}\n"
+        "The viewer opens on their start; Load key also gives them their velocities.\n"
+        f"Open it:  {this_command('python')} -m mujoco.viewer --mjcf={file}"
+    )
     return 0

@@ -7,30 +7,13 @@ from typing import Any, ClassVar
 
 from rich.console import Console
 
+from swarm_mj.cli import train_settings
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
 from swarm_mj.cli.train_report import Watch, has_stopped_early, report, verdicts
-from swarm_mj.cli.train_settings import (
-    asked_settings,
-    given_settings,
-    load_own,
-    own_names,
-    refuse_others,
-    setting_options,
-)
+from swarm_mj.learning import run_folder
 from swarm_mj.learning.estimates import training_needs
-from swarm_mj.learning.run_folder import (
-    BUDGETS,
-    CHECKPOINT,
-    CURVE,
-    PATIENCE,
-    SETTINGS,
-    Limits,
-    Progress,
-    TrainingRun,
-    check_new,
-    read_run,
-)
+from swarm_mj.learning.run_folder import Limits, Progress, TrainingRun
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.stored import POLICY, read_policy
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
@@ -59,7 +42,7 @@ class TrainOptions:
     replay_every: int | None = same_as(Limits, "replay_every")
     init: Path | None = setting(None, "begin with a stored policy", metavar="POLICY")
     yes: bool = setting(False, YES)
-    settings: dict[str, Any] = nested(setting_options, given_settings)
+    settings: dict[str, Any] = nested(train_settings.setting_options, train_settings.given_settings)
     typed: tuple[str, ...] = ()
 
 
@@ -97,7 +80,8 @@ def _asked_run(options: TrainOptions) -> TrainingRun:
     """Return the run that the options ask for; raise ValueError before anything is written."""
     run = _begun_run(options) if options.resume else _new_run(options)
     run = replace(run, limits=asked_limits(run.limits, options))
-    written = (Output("run", options.out / name) for name in (SETTINGS, CHECKPOINT, CURVE, POLICY))
+    names = (run_folder.SETTINGS, run_folder.CHECKPOINT, run_folder.CURVE, POLICY)
+    written = (Output("run", options.out / name) for name in names)
     check_outputs(*written, inputs=[options.init] if options.init else [])
     needs, way_out = training_needs(run.training, run.limits), "choose fewer --missions or --robots"
     check_fits(needs, options.out, way_out, is_forced=options.yes)
@@ -105,20 +89,20 @@ def _asked_run(options: TrainOptions) -> TrainingRun:
 
 
 def _begun_run(options: TrainOptions) -> TrainingRun:
-    run = read_run(options.out, own_names(options.settings))
+    run = run_folder.read_run(options.out, train_settings.own_names(options.settings))
     if options.init is not None:
         raise ValueError(f"{options.out} has begun, so --init {options.init} is too late")
-    refuse_others(options.settings, run.training, f"the run in {options.out}")
-    load_own(run.training.features, run.training)
+    train_settings.refuse_others(options.settings, run.training, f"the run in {options.out}")
+    train_settings.load_own(run.training.features, run.training)
     return run
 
 
 def _new_run(options: TrainOptions) -> TrainingRun:
-    check_new(options.out)
-    init = options.init
-    training = asked_settings(options.settings, read_policy(init)[1] if init else None, init)
+    run_folder.check_new(options.out)
+    init, given = options.init, options.settings
+    training = train_settings.asked_settings(given, read_policy(init)[1] if init else None, init)
     credit = training.credit_assignment
-    limits = Limits(decisions=BUDGETS[credit], patience=PATIENCE[credit])
+    limits = Limits(decisions=run_folder.BUDGETS[credit], patience=run_folder.PATIENCE[credit])
     command = shlex.join(["swarm-mj", "train", *options.typed])
     return TrainingRun(training=training, limits=limits, command=command, init=init)
 
@@ -153,12 +137,12 @@ def _print(out: Path, asked: TrainingRun, progress: Progress, *, is_over: bool) 
         "Go on:": _resume_command(out, training, more),
     }
     if progress.best is not None:
-        name, policy = this_command(), shlex.quote(str(out / POLICY))
+        flown = f"--policy {shlex.quote(str(out / POLICY))}"
         flags = mission_flags(replace(training.mission, num_robots=training.robots[0]))
         flags += f" {training.own_options}" if training.own else ""
         fly = {
-            "Fly:": f"{name} fly --policy {policy} {flags}",
-            "Evaluate:": f"{name} evaluate --policy {policy} tdma {flags}",
+            "Fly:": f"{this_command()} fly {flown} {flags}",
+            "Evaluate:": f"{this_command()} evaluate {flown} tdma {flags}",
         }
         commands = fly | commands
     for label, line in commands.items():

@@ -44,7 +44,8 @@ class Watch(WorkBar):
         """Show a status; return whether to go on."""
         if self._start is None:
             self._start, self._num_rows = status, len(status.progress.curve)
-        self._print_new_row(status)
+        if len(status.progress.curve) > self._num_rows:
+            self._print_row(status.progress)
         self.what = status.what
         self.text = _text(status, self._start, self._run.limits)
         self.move_to(share_done(status, self._run.limits))
@@ -59,12 +60,9 @@ class Watch(WorkBar):
         # Asked at every redrawing, so Ctrl-C shows before the run reports again.
         return "Finishing" if self._is_interrupted() else self.what
 
-    def _print_new_row(self, status: Status) -> None:
-        curve = status.progress.curve
-        if len(curve) == self._num_rows:
-            return
-        self._num_rows, row = len(curve), curve[-1]
-        note = "  best so far" if row is status.progress.best else ""
+    def _print_row(self, progress: Progress) -> None:
+        self._num_rows, row = len(progress.curve), progress.curve[-1]
+        note = "  best so far" if row is progress.best else ""
         notes = {ORACLE: f" ({_oracle_missions(self._run)})"}
         ages = reference_ages(row).items()
         others = "".join(f"  {name} {age:.2f}{notes.get(name, '')}" for name, age in ages)
@@ -83,10 +81,9 @@ def share_done(status: Status, limits: Limits) -> float:
 def minutes_left(status: Status, start: Status, limits: Limits) -> float | None:
     """Return the minutes until the first limit, at the speed since `start`; None if unknown."""
     left = [limits.minutes - status.minutes] if limits.minutes else []
-    made = status.decisions - start.decisions
+    made, minutes = status.decisions - start.decisions, status.minutes - start.minutes
     if limits.decisions and made:
-        minutes_each = (status.minutes - start.minutes) / made
-        left.append(minutes_each * (limits.decisions - status.decisions))
+        left.append(minutes / made * (limits.decisions - status.decisions))
     return max(0.0, min(left)) if left else None
 
 

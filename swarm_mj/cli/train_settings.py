@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.cli.mission_options import check_in_use
-from swarm_mj.cli.options import Option, flag_of
+from swarm_mj.cli.options import flags_of, nested_option
 from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission, make_mission
 from swarm_mj.mission.components import GROUP, Components, is_own
@@ -27,20 +27,19 @@ PARTS = {  # the dataclasses of settings and their headings in the help, by thei
     "components.": (Components, GROUP),
     "mission.": (Mission, "missions"),
 }
-NOT_TRAINED = ("num_robots",)  # team sizes are the run's own
 SPECS: dict[str, Field[Any]] = {
     f"{part}{spec.name}": spec
     for part, (owner, _) in PARTS.items()
     for spec in fields(owner)
-    if "help" in spec.metadata and not (owner is Mission and spec.name in NOT_TRAINED)
+    if "help" in spec.metadata and spec.name != "num_robots"  # team sizes are the run's own
 }
 
 
-def setting_options() -> Iterator[Option]:
+def setting_options() -> Iterator[Field[Any]]:
     """Yield the settings as options, under a heading for each part of the settings."""
     for place, spec in SPECS.items():
         _, heading = PARTS[place.removesuffix(spec.name)]
-        yield Option(spec, place, heading, _usual(place))
+        yield nested_option(spec, place, group=heading, shown=_usual(place))
 
 
 def given_settings(given: dict[str, Any]) -> dict[str, Any]:
@@ -54,17 +53,13 @@ def asked_settings(
 ) -> Training:
     """Return the settings of a new run: the usual ones of its credit, changed by those given.
 
-    Args:
-        given: The settings that were given, by their places.
-        init: The configuration of the policy that the run begins with.
-        init_path: The file of that policy.
+    These are by their places; `init` is the policy that the run begins with.
 
     Raises:
         ValueError: A value is unknown or outside its range, or contradicts another.
     """
-    own, network = _part("", given), _part("network.", given)
+    own, network, asked = (_part(name, given) for name in ("", "network", "mission"))
     sizes = own.get("robots", (Mission().num_robots,))
-    asked = _part("mission.", given)
     mission = make_mission(**{"task": "stationary", "num_robots": sizes[0]} | asked)
     check_in_use(asked, [mission])
     training = usual_settings(own.get("credit_assignment", "robot"), mission, sizes)
@@ -75,8 +70,8 @@ def asked_settings(
         refuse_others(shape, training, f"the policy {init_path}")
         check_named(init.features, own_names(given), f"policy {init_path}")
     missions = _missions(own.get("missions"), training.missions, len(sizes))
-    training = replace(training, missions=missions)  # before the rest, for its errors
-    training = replace(training, components=Components(**_part("components.", given)))
+    components = Components(**_part("components", given))
+    training = replace(training, missions=missions, components=components)
     load_own(own.get("features", training.features), training)
     if "features" in own:
         network["num_features"] = num_features(own["features"])
@@ -86,7 +81,7 @@ def asked_settings(
         training,
         groups=min(able, key=lambda n: (abs(n - Training.groups), -n), default=1),
         network=replace(training.network, **network),
-        ppo=replace(training.ppo, **_part("ppo.", given)),
+        ppo=replace(training.ppo, **_part("ppo", given)),
         **own,
     )
     for size in training.robots:
@@ -101,11 +96,8 @@ def asked_settings(
 
 def own_names(given: dict[str, Any]) -> list[str]:
     """Return the names of custom components and features among settings that were given."""
-    return [
-        value
-        for place, value in given.items()
-        if place.startswith(("features", "components.")) and is_own(value)
-    ]
+    may_be = [x for place, x in given.items() if place.startswith(("features", "components."))]
+    return [value for value in may_be if is_own(value)]
 
 
 def load_own(features: str, training: Training) -> None:
@@ -118,20 +110,16 @@ def load_own(features: str, training: Training) -> None:
 def refuse_others(given: dict[str, Any], training: Training, whose: str) -> None:
     """Raise ValueError if a setting contradicts a run, or the policy that it begins with."""
     for place, value in given.items():
-        stored = _at(training, place)
+        stored = attrgetter(place)(training)
         if value != stored:
-            typed = f"{flag_of(SPECS[place])} {as_typed(value)}"
+            typed = f"{flags_of(SPECS[place])[0]} {as_typed(value)}"
             raise ValueError(f"{typed} is not what {whose} has, {as_typed(stored)}; leave it out")
 
 
 def _part(part: str, given: dict[str, Any]) -> dict[str, Any]:
     """Return the given settings of one part, by their names."""
-    places = (place for place in given if place.rpartition(".")[0] == part.rstrip("."))
-    return {place.rpartition(".")[2]: given[place] for place in places}
-
-
-def _at(settings: object, place: str) -> object:
-    return attrgetter(place)(settings)
+    places = {place: place.rpartition(".") for place in given}
+    return {name: given[place] for place, (owner, _, name) in places.items() if owner == part}
 
 
 def _missions(asked: int | None, usual: int, num_sizes: int) -> int:
@@ -141,10 +129,8 @@ def _missions(asked: int | None, usual: int, num_sizes: int) -> int:
     if asked % num_sizes:
         fewer = asked // num_sizes * num_sizes
         ways = ", ".join(str(n) for n in (fewer, fewer + num_sizes) if n > 0)
-        raise ValueError(
-            f"missions must be a multiple of the {num_sizes} team sizes, such as {ways}, not "
-            f"{asked}"
-        )
+        needed = f"missions must be a multiple of the {num_sizes} team sizes, such as {ways}"
+        raise ValueError(f"{needed}, not {asked}")
     return asked
 
 
@@ -152,12 +138,10 @@ def _usual(place: str) -> str:
     """Return the default as text: per robot and, where it differs, per team."""
     if "shown" in SPECS[place].metadata:
         return SPECS[place].metadata["shown"]
-    shown = []
+    shown, value_of = [], attrgetter(place)
     for credit in ("robot", "team"):
         missions = (PRESETS["paper"]("stationary"), PRESETS["reference"]("flocking"))
-        usual, other = (
-            _at(usual_settings(credit, each, (each.num_robots,)), place) for each in missions
-        )
+        usual, other = (value_of(usual_settings(credit, each, (40,))) for each in missions)
         depends = usual != other and place not in ("mission.preset", "mission.task")
         shown.append("the preset's own" if depends else as_typed(usual))
     robot, team = shown

@@ -28,9 +28,14 @@ def test_a_flight_is_drawn_window_by_window():
     assert variance.get_yscale() == "log"
 
 
-def test_a_team_at_rest_has_no_velocities_and_what_was_not_recorded_no_worst_pair():
-    (age,) = swarm_mj.fly("stationary", policy="tdma", record=False, **SHORT).plot().axes
-    assert len(age.lines) == 1
+def test_a_team_at_rest_has_no_velocities_and_a_notebook_shows_its_chart_once(monkeypatch):
+    run = swarm_mj.fly("stationary", policy="tdma", record=False, **SHORT)
+    (age,) = run.plot().axes
+    assert len(age.lines) == 1  # what was not recorded has no worst pair
+    assert len(plt.get_fignums()) == 1
+    monkeypatch.setattr(plt, "get_backend", lambda: "module://matplotlib_inline.backend_inline")
+    run.plot()
+    assert len(plt.get_fignums()) == 1
 
 
 def test_a_task_with_a_cost_of_its_own_shows_that():
@@ -44,30 +49,17 @@ def test_a_task_with_a_cost_of_its_own_shows_that():
 def test_policies_stand_below_each_other_the_lowest_age_first():
     found = swarm_mj.evaluate(["round-robin", "tdma"], "random-walk", num_missions=4, **SHORT)
     (axes,) = found.plot().axes
-    by_age = sorted(found.results, key=lambda each: each.result.aoi_mean)
-    labels = [charts.look_of(each.result.policy).label for each in by_age]
+    by_age = sorted((each.result for each in found.results), key=lambda each: each.aoi_mean)
+    labels = [charts.look_of(each.policy).label for each in by_age]
     assert [label.get_text() for label in axes.get_yticklabels()] == labels
-    assert [line.get_xdata()[0] for line in axes.lines] == [r.result.aoi_mean for r in by_age]
+    assert [line.get_xdata()[0] for line in axes.lines] == [each.aoi_mean for each in by_age]
     assert len(axes.collections) == 2  # intervals
+    flown = replace(by_age[0], channel="my$:Radio", scene="my:walls")
+    title = charts.draw_evaluation([flown]).get_suptitle()
+    assert title.endswith(r"from seed 1000, channel my\$:Radio, scene my:walls")
 
 
 def test_one_mission_has_no_interval_and_flocks_have_velocities():
     age, variance = swarm_mj.evaluate("tdma", num_missions=1, **SHORT).plot().axes
     assert len(age.collections) == 0
     assert len(variance.lines) == 1
-
-
-def test_a_notebook_shows_a_chart_once(monkeypatch):
-    run = swarm_mj.fly("stationary", policy="tdma", **SHORT)
-    run.plot()
-    assert len(plt.get_fignums()) == 1
-    monkeypatch.setattr(plt, "get_backend", lambda: "module://matplotlib_inline.backend_inline")
-    run.plot()
-    assert len(plt.get_fignums()) == 1
-
-
-def test_parts_of_ones_own_stand_in_the_title():
-    found = swarm_mj.evaluate("tdma", "stationary", num_missions=1, **SHORT).results[0].result
-    flown = replace(found, channel="my$:Radio", scene="my:walls")
-    title = charts.draw_evaluation([flown]).get_suptitle()
-    assert title.endswith(r"from seed 1000, channel my\$:Radio, scene my:walls")

@@ -9,7 +9,10 @@ import swarm_mj
 from swarm_mj.api import evaluate as module
 from swarm_mj.cli import main
 from swarm_mj.evaluation.results import COLUMNS
+from swarm_mj.evaluation.study import Study
+from swarm_mj.mission import paper
 from swarm_mj.policies.registry import POLICIES
+from swarm_mj.system.needs import LIBRARIES
 
 SHORT = {"num_robots": 6, "num_windows": 20, "range_ratio": 0.5}
 OPTIONS = ("--robots", "6", "--windows", "20", "--range-ratio", "0.5")
@@ -74,29 +77,21 @@ def test_it_shows_itself_as_the_table(found, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "keywords", "complaint"),
+    ("policy", "keywords", "complaint"),
     [
-        (["tdmaa"], {}, "did you mean tdma?"),
+        ("tdmaa", {}, "did you mean tdma?"),
         ([], {}, "an evaluation needs at least 1 policy"),
-        (
-            ["tdma"],
-            {"num_mission": 3},
-            "swarm_mj.evaluate has no 'num_mission'; did you mean num_missions?",
-        ),
-        (
-            ["tdma"],
-            {"num_missions": 0},
-            "num_missions must be a whole number from 1 to 100000, not 0",
-        ),
-        (["tdma"], {"seed": 2**64}, "the last of 100 missions included"),
-        (["gnn"], {"features": "mine:Feat"}, "on the features mine:Feat; leave them out"),
-        (["tdma"], {"num_jobs": 0}, "num_jobs must be a whole number from 1 to 256, not 0"),
-        (["tdma"], {"baseline": "mst"}, "baseline must be one of the policies evaluated"),
+        ("tdma", {"num_mission": 3}, "evaluate has no 'num_mission'; did you mean num_missions?"),
+        ("tdma", {"num_missions": 0}, "num_missions must be a whole number from 1 to 100000, not"),
+        ("tdma", {"seed": 2**64}, "the last of 100 missions included"),
+        ("gnn", {"features": "mine:Feat"}, "on the features mine:Feat; leave them out"),
+        ("tdma", {"num_jobs": 0}, "num_jobs must be a whole number from 1 to 256, not 0"),
+        ("tdma", {"baseline": "mst"}, "baseline must be one of the policies evaluated"),
     ],
 )
-def test_what_is_wrong_is_told(arguments, keywords, complaint):
+def test_what_is_wrong_is_told(policy, keywords, complaint):
     with pytest.raises((TypeError, ValueError)) as refused:
-        swarm_mj.evaluate(arguments, **keywords)
+        swarm_mj.evaluate(policy, **keywords)
     assert complaint in str(refused.value)
 
 
@@ -107,9 +102,8 @@ def test_other_endings_are_refused(found, tmp_path):
 
 def test_what_is_not_installed_is_told_before_the_work(monkeypatch):
     monkeypatch.setattr("swarm_mj.system.packages.find_spec", lambda _module: None)
-    with pytest.raises(
-        ModuleNotFoundError, match=r"an evaluation needs scipy, .* pip install 'scipy"
-    ):
+    words = r"an evaluation needs scipy, .* pip install 'scipy"
+    with pytest.raises(ModuleNotFoundError, match=words):
         module.evaluate("tdma", num_missions=1, **SHORT)
 
 
@@ -118,3 +112,20 @@ def test_a_table_begins_with_what_one_looks_for(found):
     assert columns[:4] == ["policy", "num_robots", "aoi_mean", "aoi_sem"]
     assert columns[-3:] == ["aoi_ci_low", "aoi_ci_high", "packets_per_window"]
     assert sorted(columns) == sorted(COLUMNS)
+
+
+def test_a_study_has_a_batch_in_each_process_while_batches_last():
+    regimes = (paper("stationary", num_robots=100), paper("stationary", num_robots=10))
+    study = Study(policies=("tdma", "gossip"), regimes=regimes, episodes=50)
+    one, two, many = (module.study_needs(study, jobs).memory for jobs in (1, 2, 256))
+    each = two - one
+    assert each == pytest.approx(LIBRARIES + 100 * 25 * 100**2)
+    assert many == pytest.approx(one + 7 * each)  # 2 regimes, 2 policies, 2 batches of 25
+
+
+def test_a_studys_files_grow_with_its_missions():
+    regimes = (paper("stationary", num_windows=100_000),)
+    studies = (Study(policies=("tdma",), regimes=regimes, episodes=n) for n in (25, 25_000))
+    few, many = (module.study_needs(study, 1).file for study in studies)
+    assert many == pytest.approx(1000 * few)
+    assert many > 5e8

@@ -14,41 +14,21 @@ from swarm_mj.simulation.rollout import Summary
 from swarm_mj.system.terminal import named_values
 
 NAN = np.array([np.nan])
-BROADCAST = {
-    "packets_sent": 200.0,
-    "packets_transmitted": 200.0,
-    "packets_heard": 150.0,
-    "hearers_per_packet": 2.5,
-}
-ADDRESSED = {
-    "packets_sent": 200.0,
-    "packets_transmitted": 250.0,
-    "packets_attempted": 200.0,
-    "packets_delivered": 50.0,
-    "packets_lost": 150.0,
-    "packets_answered": 40.0,
-    "packets_overheard": 600.0,
-}
+BROADCAST = {"packets_sent": 200.0, "packets_transmitted": 200.0, "packets_heard": 150.0}
+BROADCAST |= {"hearers_per_packet": 2.5}
+ADDRESSED = {"packets_sent": 200.0, "packets_transmitted": 250.0, "packets_attempted": 200.0}
+ADDRESSED |= {"packets_delivered": 50.0, "packets_lost": 150.0, "packets_answered": 40.0}
+ADDRESSED |= {"packets_overheard": 600.0}
+KNOWN = {"aoi_mean": 12.5, "hops_mean": 3.0, "complete_window": 70.0}
+KNOWN |= {"velocity_variance_mean": 0.5, "velocity_variance_first": 4.0}
+KNOWN |= {"velocity_variance_last": 0.002}
 
 
 def summary(**numbers):
     """100 windows; whatever is not given does not apply."""
-    known = {
-        "aoi_mean": 12.5,
-        "velocity_variance_mean": 0.5,
-        "velocity_variance_first": 4.0,
-        "velocity_variance_last": 0.002,
-        "hops_mean": 3.0,
-        "complete_window": 70.0,
-    } | numbers
-    return Summary(
-        num_windows=100,
-        **{
-            name: np.array([known[name]]) if name in known else NAN
-            for name in Summary.__dataclass_fields__
-            if name != "num_windows" and not name.startswith("task_cost")
-        },
-    )
+    names = [name for name in Summary.__dataclass_fields__ if not name.startswith("task_cost")]
+    given = {name: np.array([x]) for name, x in (KNOWN | numbers).items()}
+    return Summary(**(dict.fromkeys(names, NAN) | given | {"num_windows": 100}))
 
 
 def shown(policy_name, task, its):
@@ -56,10 +36,9 @@ def shown(policy_name, task, its):
     mission = paper(task, num_robots=6)
     policy = make_policy(policy_name, mission)
     rows = flight_rows(mission, flight_numbers(mission, policy, its), 1.5)
-    table = named_values("a title", rows, caption=AGE)
     console = Console(width=80, highlight=False)
     with console.capture() as printed:
-        console.print(table)
+        console.print(named_values("a title", rows, caption=AGE))
     text = printed.get()
     assert max(map(len, text.splitlines())) <= 80
     cells = [line.split("│")[1:3] for line in text.splitlines() if "│" in line]
@@ -67,121 +46,126 @@ def shown(policy_name, task, its):
     return {name.strip(): value.strip() for name, value in cells}, text
 
 
-def test_broadcasts_are_sent_and_heard():
-    rows, text = shown("planner", "flocking", summary(**BROADCAST))
-    assert rows["packets broadcast"] == "200 (2.0 a window)"
-    assert rows["heard by at least one robot"] == "150 (75%)"
-    assert rows["robots that heard a packet, mean"] == "2.50"
-    assert not any(word in text for word in ("lost", "delivered", "answered", "overheard"))
+SILENT = dict.fromkeys(("packets_sent", "packets_transmitted", "packets_heard"), 0.0)
+ROWS = [  # policy, task, numbers, and the rows that they make
+    (
+        *("planner", "flocking", BROADCAST),
+        {
+            "packets broadcast": "200 (2.0 a window)",
+            "heard by at least one robot": "150 (75%)",
+            "robots that heard a packet, mean": "2.50",
+            "age of information, mean": "12.50 windows (1.2 s)",
+            "everyone had heard of everyone": "after 70 windows (7 s)",
+            "flock agreed: under 1% is left": "yes, under 0.1%",
+        },
+    ),
+    (
+        *("mst", "flocking", ADDRESSED),
+        {
+            "packets sent, each to one robot": "200 (2.0 a window)",
+            "delivered": "50 (25%)",
+            "lost": "150 (75%)",
+            "answered, and the answer heard": "40 (20%)",
+            "overheard by other robots": "600 times",
+            # Header 3 and 6 entries of 9 are 57 bytes; 250 of them in 10 s are 11.4 kbit/s.
+            "bytes each; sent by the team": "57; 11.4 kbit/s",
+        },
+    ),
+    (
+        *("tdma", "flocking", SILENT | {"complete_window": np.nan}),
+        {
+            "packets broadcast": "0 (0.0 a window)",
+            "heard by at least one robot": "0",
+            "robots that heard a packet, mean": "-",
+            "everyone had heard of everyone": "never",
+        },
+    ),
+    (
+        *("tdma", "flocking", BROADCAST | {"complete_window": 1.0}),
+        {"everyone had heard of everyone": "after 1 window (0.1 s)"},
+    ),
+    (
+        *("tdma", "flocking", BROADCAST | {"velocity_variance_last": 0.02}),
+        {"flock agreed: under 1% is left": "yes, 0.5%"},
+    ),
+    (
+        *("tdma", "flocking", BROADCAST | {"velocity_variance_last": 1.0}),
+        {"flock agreed: under 1% is left": "no, 25.0%"},
+    ),
+    (
+        *("tdma", "random-walk", BROADCAST),
+        {"first to last window": "4.0000 to 0.0020 m²/s²"},
+    ),
+    (
+        *("planner", "stationary", BROADCAST),
+        {
+            "packets carry": "the sender's buffer and links",
+            "who decides": "each robot by itself",
+        },
+    ),
+    (*(WITHOUT_PAYLOAD, "stationary", BROADCAST), {"packets carry": "the sender's buffer"}),
+    (
+        *("round-robin", "stationary", BROADCAST),
+        {"who decides": "a centre that is told where all are"},
+    ),
+]
 
 
-def test_addressed_packets_are_delivered_or_lost():
-    rows, text = shown("mst", "flocking", summary(**ADDRESSED))
-    assert rows["packets sent, each to one robot"] == "200 (2.0 a window)"
-    assert rows["delivered"] == "50 (25%)"
-    assert rows["lost"] == "150 (75%)"
-    assert rows["answered, and the answer heard"] == "40 (20%)"
-    assert rows["overheard by other robots"] == "600 times"
-    assert "at least one" not in text
-
-
-def test_bytes_are_those_of_all_packets_on_the_air():
-    """Six robots: header 3 and 6 entries of 9 are 57 bytes; 250 of them in 10 s are 11.4 kbit/s."""
-    rows, _ = shown("mst", "flocking", summary(**ADDRESSED))
-    assert rows["bytes each; sent by the team"] == "57; 11.4 kbit/s"
-    numbers = flight_numbers(paper(num_robots=6), make_policy("mst", paper()), summary(**ADDRESSED))
-    assert (numbers["packet_bytes"], numbers["bytes_per_second"]) == (57, 57 * 25.0)
-
-
-def test_nothing_sent_has_no_shares():
-    silent = {"packets_sent": 0.0, "packets_transmitted": 0.0, "packets_heard": 0.0}
-    rows, _ = shown("tdma", "flocking", summary(**silent, complete_window=np.nan))
-    assert rows["packets broadcast"] == "0 (0.0 a window)"
-    assert rows["heard by at least one robot"] == "0"
-    assert rows["robots that heard a packet, mean"] == "-"
-    assert rows["everyone had heard of everyone"] == "never"
-
-
-@pytest.mark.parametrize(
-    ("policy", "carried", "decider"),
-    [
-        ("planner", "the sender's buffer and links", "each robot by itself"),
-        (WITHOUT_PAYLOAD, "the sender's buffer", "each robot by itself"),
-        ("round-robin", "the sender's buffer", "a centre that is told where all are"),
-    ],
-)
-def test_what_packets_carry_and_who_decides(policy, carried, decider):
-    rows, _ = shown(policy, "stationary", summary(**BROADCAST))
-    assert rows["packets carry"] == carried
-    assert rows["who decides"] == decider
-
-
-def test_one_window_is_no_windows():
-    rows, _ = shown("tdma", "flocking", summary(**BROADCAST, complete_window=1.0))
-    assert rows["everyone had heard of everyone"] == "after 1 window (0.1 s)"
-
-
-def test_ages_are_told_in_windows_and_seconds_and_explained():
-    rows, text = shown("tdma", "flocking", summary(**BROADCAST))
-    assert rows["age of information, mean"] == "12.50 windows (1.2 s)"
-    assert rows["everyone had heard of everyone"] == "after 70 windows (7 s)"
+@pytest.mark.parametrize(("policy", "task", "numbers", "rows"), ROWS)
+def test_rows_say_what_the_numbers_do(policy, task, numbers, rows):
+    table, text = shown(policy, task, summary(**numbers))
+    assert {name: table[name] for name in rows} == rows
     assert "how old a robot's news of another is" in text
-
-
-@pytest.mark.parametrize(
-    ("last", "verdict"), [(0.002, "yes, under 0.1%"), (0.02, "yes, 0.5%"), (1.0, "no, 25.0%")]
-)
-def test_whether_a_flock_agreed(last, verdict):
-    rows, _ = shown("tdma", "flocking", summary(**BROADCAST, velocity_variance_last=last))
-    assert rows["flock agreed: under 1% is left"] == verdict
-
-
-def test_velocities_are_those_of_moving_teams_and_agreement_that_of_flocks():
-    at_rest, _ = shown("tdma", "stationary", summary(**BROADCAST))
-    walking, _ = shown("tdma", "random-walk", summary(**BROADCAST))
-    assert not any("veloc" in name for name in at_rest)
-    assert walking["first to last window"] == "4.0000 to 0.0020 m²/s²"
-    assert not any("agreed" in name for name in walking)
+    is_addressed = "packets_attempted" in numbers
+    assert all((word in text) == is_addressed for word in ("delivered", "lost", "overheard"))
+    assert ("at least one" in text) != is_addressed
+    assert ("agreed" in text) == (task == "flocking")
+    assert ("velocity" in text) == (task != "stationary")
 
 
 def test_numbers_for_a_file():
     numbers = flight_numbers(paper(), make_policy("planner", paper()), summary(**BROADCAST))
-    assert numbers["packets_sent"] == 200
-    assert numbers["packets_lost"] is None
+    assert (numbers["packets_sent"], numbers["packets_lost"]) == (200, None)
     assert numbers["velocity_variance_left"] == pytest.approx(0.0005)
     assert (numbers["payload"], numbers["is_centralised"]) == ("snapshots", False)
     still = summary(**ADDRESSED, velocity_variance_first=0.0, velocity_variance_last=0.0)
-    numbers = flight_numbers(paper(), make_policy("mst", paper()), still)
+    numbers = flight_numbers(paper(num_robots=6), make_policy("mst", paper()), still)
     assert numbers["velocity_variance_left"] is None
     assert (numbers["payload"], numbers["is_centralised"]) == ("none", True)
+    assert (numbers["packet_bytes"], numbers["bytes_per_second"]) == (57, 57 * 25.0)
 
 
 def test_a_task_with_a_cost_of_its_own_shows_that_instead_of_velocities():
-    its = replace(
-        summary(**ADDRESSED),
-        task_cost_name="formation error",
-        task_cost_unit="m",
-        task_cost_mean=np.array([200.0]),
-        task_cost_first=np.array([300.25]),
-        task_cost_last=np.array([100.5]),
-    )
-    rows, text = shown("mst", "formation", its)
+    costs = {"mean": 200.0, "first": 300.25, "last": 100.5}
+    its = {f"task_cost_{name}": np.array([cost]) for name, cost in costs.items()}
+    named = {"task_cost_name": "formation error", "task_cost_unit": "m"}
+    rows, text = shown("mst", "formation", replace(summary(**ADDRESSED), **named, **its))
     assert rows["formation error, mean"] == "200.00 m"
     assert rows["first to last window"] == "300.25 to 100.50 m"
     assert "velocity" not in text
 
 
-def test_the_title_names_the_arena_and_what_the_channel_adds():
-    assert flight_title(paper("flocking"), "tdma", 3) == "flocking, tdma, 40 robots, seed 3"
-    title = flight_title(paper("stationary", failure_fraction=0.5), "mst", 7)
-    assert title == "stationary, mst, 40 robots, 50% of them off half-way, seed 7"
-    title = flight_title(paper("random-walk", collide=True), "tdma", 3)
-    assert title == "random-walk, tdma, 40 robots that collide, seed 3"
-    mission = paper("random-walk", arena="blocks", fading="rayleigh", prior_knowledge="map")
-    title = flight_title(mission, "tdma", 3)
-    assert title == "random-walk, tdma, 40 robots, seed 3, arena blocks, fading rayleigh, known map"
-    title = flight_title(paper("flocking", bit_rate=250e3), "tdma", 3)
-    assert title == "flocking, tdma, 40 robots, seed 3, 250 kbit/s"
+@pytest.mark.parametrize(
+    ("mission", "title"),
+    [
+        (paper("flocking"), "flocking, tdma, 40 robots, seed 3"),
+        (
+            paper("stationary", failure_fraction=0.5),
+            "stationary, tdma, 40 robots, 50% of them off half-way, seed 3",
+        ),
+        (paper("random-walk", collide=True), "random-walk, tdma, 40 robots that collide, seed 3"),
+        (
+            paper("random-walk", arena="blocks", fading="rayleigh", prior_knowledge="map"),
+            "random-walk, tdma, 40 robots, seed 3, arena blocks, fading rayleigh, known map",
+        ),
+        (paper("flocking", bit_rate=250e3), "flocking, tdma, 40 robots, seed 3, 250 kbit/s"),
+    ],
+)
+def test_the_title_names_the_arena_and_what_the_channel_adds(mission, title):
+    assert flight_title(mission, "tdma", 3) == title
+
+
+FREE = {"path_loss": "free-space", "shadowing_db": 0.0}
 
 
 @pytest.mark.parametrize(
@@ -191,8 +175,8 @@ def test_the_title_names_the_arena_and_what_the_channel_adds():
         ({"num_robots": 40, "fading": "rician"}, ""),
         ({"arena": "forest"}, ", arena forest"),
         ({"arena": "open"}, ", arena open"),
-        ({"path_loss": "free-space", "shadowing_db": 0.0}, ", fading rician, rician_k 8"),
-        ({"path_loss": "free-space", "shadowing_db": 0.0, "fading": "none"}, ", free space"),
+        (FREE, ", fading rician, rician_k 8"),
+        (FREE | {"fading": "none"}, ", free space"),
     ],
 )
 def test_the_title_names_a_world_and_what_was_changed_in_it(given, said):

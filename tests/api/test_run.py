@@ -1,7 +1,9 @@
 """What a flight gives back, against plain loops over its windows and the files of the replay."""
 
+import copy
 import csv
 import json
+import pickle
 import sys
 from types import SimpleNamespace
 
@@ -10,6 +12,7 @@ import pytest
 
 import swarm_mj
 from swarm_mj.api.flight import Flown, run_of
+from swarm_mj.api.run import Metrics
 from swarm_mj.mission import paper
 from swarm_mj.mission.components import Components
 from swarm_mj.policies.registry import make_policy
@@ -45,12 +48,8 @@ def test_the_table_has_a_row_per_window(run):
     assert first == run.summary.complete_window
 
 
-def test_the_worst_age_is_that_of_the_recorded_matrices(run):
-    table = run.to_dataframe()
-    assert list(table.aoi_worst) == [matrix.max() for matrix in run.log.age]
-
-
-def test_without_a_record_the_worst_age_is_not_known(unrecorded):
+def test_the_worst_age_is_that_of_the_recorded_matrices(run, unrecorded):
+    assert list(run.to_dataframe().aoi_worst) == [matrix.max() for matrix in run.log.age]
     assert unrecorded.log is None
     assert "aoi_worst" not in unrecorded.to_dataframe()
 
@@ -80,9 +79,8 @@ def test_a_summary_is_saved_and_replaced(run, tmp_path):
 
 
 def test_other_endings_and_what_was_not_recorded_are_refused(run, unrecorded, tmp_path):
-    with pytest.raises(
-        ValueError, match=r"must be named \*.rrd or \*.mp4 or \*.gif or \*.json or \*.csv, not"
-    ):
+    endings = r"must be named \*.rrd or \*.mp4 or \*.gif or \*.json or \*.csv, not"
+    with pytest.raises(ValueError, match=endings):
         run.save(tmp_path / "a.mp3")
     with pytest.raises(ValueError, match="fly with record=True"):
         unrecorded.save(tmp_path / "a.rrd")
@@ -147,14 +145,33 @@ def test_a_notebook_plays_it(monkeypatch):
     assert video.mimetype == "video/mp4"
 
 
-def test_elsewhere_nothing_opens(monkeypatch, capsys):
+def test_elsewhere_nothing_opens_and_what_was_not_recorded_cannot_be_shown(
+    unrecorded, monkeypatch, capsys
+):
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: None))
-    swarm_mj.fly("stationary", policy="tdma", record=False, **TINY).show()
+    unrecorded.show()
     assert "run.save('flight.mp4') writes the video" in capsys.readouterr().out
-
-
-def test_what_was_not_recorded_cannot_be_shown(monkeypatch):
     monkeypatch.setattr("swarm_mj.api.run.is_notebook", lambda: True)
-    run = swarm_mj.fly("stationary", policy="tdma", record=False, **TINY)
     with pytest.raises(ValueError, match="fly with record=True"):
-        run.show()
+        unrecorded.show()
+
+
+METRICS = Metrics({"aoi_mean": 10.123456789, "packets_lost": None, "of one": Metrics({"n": 3})})
+
+
+def test_metrics_are_attributes_and_keys_copied_and_pickled():
+    assert METRICS.aoi_mean == METRICS["aoi_mean"] == 10.123456789
+    assert dict(METRICS) == {"aoi_mean": 10.123456789, "packets_lost": None, "of one": {"n": 3}}
+    assert {"aoi_mean", "packets_lost"} <= set(dir(METRICS))
+    assert pickle.loads(pickle.dumps(METRICS)) == copy.deepcopy(METRICS) == METRICS
+
+
+def test_metrics_are_shown_a_line_each():
+    assert repr(METRICS) == "aoi_mean      10.1235\npackets_lost  None\nof one\n  n  3"
+    assert repr(Metrics({})) == ""
+
+
+def test_a_slip_in_a_metrics_name_is_told_with_the_one_that_was_meant():
+    with pytest.raises(AttributeError, match="there is no 'aoi_meen' here; did you mean aoi_mean"):
+        _ = METRICS.aoi_meen
+    assert not hasattr(METRICS, "nothing_like_it")

@@ -1,6 +1,7 @@
 """Runs the command line as its users do."""
 
 import pytest
+from forks import files
 
 
 @pytest.fixture
@@ -9,5 +10,20 @@ def swarm_mj(forks, tmp_path):
 
     def run(*arguments):
         return forks.run(tmp_path, "swarm_mj", *arguments)
+
+    return run
+
+
+@pytest.fixture
+def refusal(swarm_mj, tmp_path):
+    """Runs what is refused, in one line, without a trace of work; returns the line."""
+
+    def run(*arguments):
+        before = files(tmp_path)
+        done = swarm_mj(*arguments)
+        assert (done.returncode, done.stdout) == (2, ""), done.stderr
+        assert files(tmp_path) == before
+        (line,) = done.stderr.strip().splitlines()
+        return line
 
     return run

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from forks import files
 
 from swarm_mj.cli import fly, main, parse
 from swarm_mj.mission import paper
@@ -23,10 +24,6 @@ from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 
 SHORT = ("--windows", "20", "--robots", "6", "--range-ratio", "0.5")
-
-
-def files(folder):
-    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
 def test_the_default_flight_leaves_a_replay_of_the_default_mission(swarm_mj, tmp_path):
@@ -48,22 +45,17 @@ def test_a_summary_is_what_the_library_computes(swarm_mj, tmp_path):
     assert files(tmp_path) == ["out/summary.json"]
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     mission = paper("random-walk", num_robots=6, num_windows=20, range_ratio=0.5)
-    expected = summarise(
-        list(rollout(Swarm(mission, [7]), make_policy("random-flooding", mission, 0.2)))
-    )
-    assert summary["aoi_mean"] == expected.aoi_mean[0]
-    assert summary["velocity_variance_mean"] == expected.velocity_variance_mean[0]
-    for name in ("packets_sent", "packets_heard", "hearers_per_packet"):
+    policy = make_policy("random-flooding", mission, 0.2)
+    expected = summarise(list(rollout(Swarm(mission, [7]), policy)))
+    for name in ("aoi_mean", "velocity_variance_mean", "packets_sent", "packets_heard"):
         assert summary[name] == getattr(expected, name)[0] > 0
     for fate in ("attempted", "delivered", "lost", "overheard", "answered"):
         assert summary[f"packets_{fate}"] is None  # a broadcast has no addressee
-    assert summary["config"]["num_robots"] == 6
-    assert summary["config"]["seed"] == 7
-    assert summary["config"]["probability"] == 0.2
+    config = {"num_robots": 6, "seed": 7, "probability": 0.2}
+    assert {name: summary["config"][name] for name in config} == config
     assert summary["config"]["version"]
     assert summary["wall_seconds"] > 0
-    assert summary["interrupted"] is False
-    assert summary["replay"] is None
+    assert (summary["interrupted"], summary["replay"]) == (False, None)
 
 
 @pytest.mark.parametrize("task", ["stationary", "random-walk", "flocking"])
@@ -109,45 +101,26 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("options", REFUSED)
-def test_bad_input_is_one_clear_line_and_leaves_nothing(swarm_mj, tmp_path, options):
-    done = swarm_mj("fly", *options.split())
-    assert done.returncode == 2
-    assert REFUSED[options] in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
-    assert done.stdout == ""
-    assert files(tmp_path) == []
+def test_bad_input_is_one_clear_line_and_leaves_nothing(refusal, options):
+    assert REFUSED[options] in refusal("fly", *options.split())
 
 
-def test_an_output_below_a_file_is_refused_before_the_flight(swarm_mj, tmp_path):
-    (tmp_path / "file").write_text("kept")
-    done = swarm_mj("fly", *SHORT, "--record", "file/a.rrd")
-    assert done.returncode == 2
-    assert "cannot be written" in done.stderr
-    assert (tmp_path / "file").read_text() == "kept"
+def test_an_output_below_a_file_is_refused_before_the_flight(refusal, tmp_path):
+    (tmp_path / "replays").write_text("kept")
+    assert "cannot be written" in refusal("fly", *SHORT, "--record", "replays/a.rrd")
+    line = refusal("fly", *SHORT)  # a replay that nobody named has a way out
+    assert "error: the replay replays/flocking-planner-seed1-" in line
+    assert line.endswith("name another place with --record, or leave it out with --no-record")
+    assert (tmp_path / "replays").read_text() == "kept"
 
 
-def test_a_replay_that_nobody_named_has_a_way_out(swarm_mj, tmp_path):
-    (tmp_path / "replays").write_text("a file")
-    done = swarm_mj("fly", *SHORT)
-    assert done.returncode == 2
-    assert "error: the replay replays/flocking-planner-seed1-" in done.stderr
-    assert done.stderr.endswith(
-        "name another place with --record, or leave it out with --no-record\n"
-    )
-    assert files(tmp_path) == ["replays"]
-
-
-def test_odd_names_are_kept_and_quoted(swarm_mj, tmp_path):
-    done = swarm_mj("fly", *SHORT, "--record", "a [red] b.rrd")
+def test_odd_names_are_kept_and_the_summary_names_the_tuned_probability(swarm_mj, tmp_path):
+    """Not that of the tiny mission which is flown ahead to compile."""
+    outputs = ("--record", "a [red] b.rrd", "--json", "s.json")
+    done = swarm_mj("fly", *SHORT, "--policy", "mst", "--observer", 2, *outputs)
     assert done.returncode == 0, done.stderr
     assert "'a [red] b.rrd'\n" in done.stdout
-    assert files(tmp_path) == ["a [red] b.rrd"]
-
-
-def test_the_summary_names_the_tuned_probability(swarm_mj, tmp_path):
-    """Not that of the tiny mission which is flown ahead to compile."""
-    options = ("--policy", "mst", "--observer", 2)
-    swarm_mj("fly", *SHORT, *options, "--no-record", "--json", "s.json")
+    assert files(tmp_path) == ["a [red] b.rrd", "s.json"]
     config = json.loads((tmp_path / "s.json").read_text())["config"]
     mission = paper("flocking", num_robots=6, range_ratio=0.5)
     assert config["probability"] == tuned_probability("mst", mission)
@@ -155,13 +128,11 @@ def test_the_summary_names_the_tuned_probability(swarm_mj, tmp_path):
 
 
 @pytest.mark.parametrize(("flag", "name"), [("--record", "a.rrd"), ("--json", "a.json")])
-def test_an_existing_file_needs_force(swarm_mj, tmp_path, flag, name):
+def test_an_existing_file_needs_force(swarm_mj, refusal, tmp_path, flag, name):
     path = tmp_path / name
     path.write_text("precious")
-    refused = swarm_mj("fly", *SHORT, flag, path)
-    assert refused.returncode == 2
-    assert f"{flag} {path} exists; name another, or replace it with --force" in refused.stderr
-    assert files(tmp_path) == [name]
+    line = refusal("fly", *SHORT, flag, path)
+    assert f"{flag} {path} exists; name another, or replace it with --force" in line
     assert path.read_text() == "precious"
     assert swarm_mj("fly", *SHORT, flag, path, "--force").returncode == 0
     check_replay(path) if flag == "--record" else json.loads(path.read_text())
@@ -216,16 +187,11 @@ sys.exit(main(sys.argv[1:]))
 
 
 def test_ctrl_c_leaves_a_readable_replay_of_what_was_flown(tmp_path):
+    outputs = ["--record", "cut.rrd", "--json", "cut.json"]
     flight = subprocess.Popen(
-        [
-            *(sys.executable, "-c", FLY_AND_TELL, "fly", "--windows", "100000", "--seed", "3"),
-            *("--record", "cut.rrd", "--json", "cut.json"),
-        ],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+        [sys.executable, "-c", FLY_AND_TELL, "fly", "--windows", "100000", "--seed", "3", *outputs],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
     while flight.poll() is None and not (tmp_path / "under-way").exists():
         time.sleep(0.01)
     flight.send_signal(signal.SIGINT)
@@ -235,11 +201,10 @@ def test_ctrl_c_leaves_a_readable_replay_of_what_was_flown(tmp_path):
     np.testing.assert_array_equal(flown, np.arange(1, len(flown) + 1))
     assert 40 < len(flown) < 100_000
     assert f"Interrupted after {len(flown)} of 100000 windows" in errors
-    summary = json.loads((tmp_path / "cut.json").read_text())
-    assert summary["interrupted"] is True
-    assert summary["num_windows"] == len(flown)
-    assert files(tmp_path) == ["cut.json", "cut.rrd", "under-way"]
     assert f"{len(flown)} in" in output
+    summary = json.loads((tmp_path / "cut.json").read_text())
+    assert (summary["interrupted"], summary["num_windows"]) == (True, len(flown))
+    assert files(tmp_path) == ["cut.json", "cut.rrd", "under-way"]
 
 
 @pytest.mark.parametrize("lost", ["a.rrd", "a.json"])
@@ -248,9 +213,8 @@ def test_a_file_that_fails_takes_nothing_else_with_it(tmp_path, monkeypatch, cap
         raise OSError(f"{lost} could not be written: No space left on device")
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(
-        *{"a.rrd": (write, "write_replay"), "a.json": (fly, "write_json")}[lost], fails
-    )
+    places = {"a.rrd": (write, "write_replay"), "a.json": (fly, "write_json")}
+    monkeypatch.setattr(*places[lost], fails)
     assert main(["fly", *SHORT, "--record", "a.rrd", "--json", "a.json"]) == 1
     assert files(tmp_path) == sorted({"a.json", "a.rrd"} - {lost})
     said = capsys.readouterr()

@@ -48,26 +48,20 @@ def test_json_says_of_every_policy_what_it_is(capsys):
         assert listed[name]["probability"] == tuned_probability(name, MISSION)
 
 
-@pytest.mark.parametrize(
-    ("robots", "bytes_of"), [(40, {"planner": 7263}), (80, {"planner": 27318})]
-)
-def test_every_policy_says_what_its_packets_weigh(capsys, robots, bytes_of):
+@pytest.mark.parametrize(("robots", "planners"), [(40, 7263), (80, 27318)])
+def test_every_policy_says_what_its_packets_weigh(capsys, robots, planners):
     """A packet's table of fields adds up to its bytes."""
-    listed = json.loads(printed(capsys, "--json", "--robots", str(robots)))
-    for each in listed:
-        buffer_bytes = 1 + 1 + robots // 8 + 9 * robots
-        assert each["packet_bytes"] == bytes_of.get(each["name"], buffer_bytes), each["name"]
+    buffers = 1 + 1 + robots // 8 + 9 * robots
+    for each in json.loads(printed(capsys, "--json", "--robots", str(robots))):
+        expected = planners if each["name"] == "planner" else buffers
+        assert each["packet_bytes"] == expected, each["name"]
         bits = sum(field["bits"] * field["count"] for field in each["packet_fields"])
         assert math.ceil(bits / 8) == each["packet_bytes"]
 
 
-def test_a_policy_s_packet_is_that_of_the_bit_rate_named(capsys):
+def test_packets_and_probabilities_are_those_of_the_mission_named(capsys):
     """Of 367 bytes a slot holds 250, as many entries as fit."""
-    shown = printed(capsys, "gossip", "--bit-rate", "40k")
-    assert "250 bytes" in shown
-
-
-def test_probabilities_are_those_of_the_mission_named(capsys):
+    assert "250 bytes" in printed(capsys, "gossip", "--bit-rate", "40k")
     named = json.loads(printed(capsys, "aloha", "--json", "--task", "stationary", "--robots", "80"))
     assert named["probability"] == tuned_probability("aloha", paper("stationary", num_robots=80))
 
@@ -81,22 +75,16 @@ def test_the_table_fits_and_has_every_policy(capsys, monkeypatch):
     assert f"p = {tuned_probability('mst', MISSION):g}" in shown
 
 
-def test_one_policy_is_explained_with_the_way_to_fly_it(capsys):
+def test_one_policy_is_explained_with_the_way_to_fly_it(capsys, here):
     shown = printed(capsys, "spatial-tdma", "--task", "stationary")
     assert "positions in its buffer" in shown
     assert "TDMA in which robots far enough" in shown
     assert "fly --policy spatial-tdma --task stationary" in shown
-
-
-def test_a_learned_policy_of_ones_own_is_explained_too(capsys, here):
     save_tiny(here / "mine", "local")
     shown = " ".join(printed(capsys, "mine").replace("│", " ").split())
     assert "its buffer, and the packets it sent and received, by a trained graph" in shown
     assert "receptive_field" in shown
     assert "fly --policy mine" in shown
-
-
-def test_an_unknown_policy_is_refused(capsys):
     assert main(["policies", "nobody"]) == 2
     assert "nobody" in capsys.readouterr().err
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from forks import files
 
 from swarm_mj.cli import main
 from swarm_mj.learning.callback import TrainingCallback
@@ -24,10 +25,6 @@ def train(*arguments):
     """Runs the command in this process, in the folder that it is in."""
     torch.set_num_threads(1)
     return main(["train", *map(str, arguments)])
-
-
-def files(folder):
-    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +137,7 @@ def test_ctrl_c_while_it_is_being_prepared_leaves_nothing(here, monkeypatch, cap
     def interrupted(*_arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("swarm_mj.cli.train.asked_settings", interrupted)
+    monkeypatch.setattr("swarm_mj.cli.train_settings.asked_settings", interrupted)
     assert train("--out", "r", *SMALL) == 130
     assert "interrupted" in capsys.readouterr().err
     assert files(here) == []
@@ -159,12 +156,11 @@ def test_limits_are_kept_and_may_be_moved(here, capsys):
     capsys.readouterr()
 
 
-def test_a_run_begins_with_a_policy_and_its_network(whole, here, capsys):
+def test_a_run_begins_with_a_policy_and_its_network(whole, here):
     """Which has 4 wide layers, whatever the usual ones are."""
     policy = whole[0] / "runs" / "whole"
     assert train("--out", "r", *MISSIONS, "--held-out", 2, "--init", policy, "--budget", 1) == 0
     assert read_policy(here / "r")[0].shape.latent == 4
-    capsys.readouterr()
 
 
 @pytest.mark.usefixtures("here")
@@ -175,17 +171,12 @@ def test_arm_team_trains_a_flock_for_its_velocities(capsys):
 
 
 def test_missions_of_several_sizes_are_shared_out_evenly(here, capsys):
-    several = ("--robots", 3, 4, 5, "--windows", 12, "--range-ratio", 1, "--latent", 4)
-    assert train("--out", "r", *several, "--held-out", 1, "--budget", 1) == 0
-    training = read_run(here / "r").training
-    assert (training.robots, training.missions, training.groups) == ((3, 4, 5), 18, 3)
-    assert "stationary, 3, 4, 5 robots" in capsys.readouterr().out
-
-
-@pytest.mark.usefixtures("here")
-def test_a_path_with_odd_letters_is_kept_and_quoted(capsys):
+    """In a folder of odd letters, which is kept and quoted."""
     out = Path("runs") / "a [red] b"
-    assert train("--out", out, *SMALL, "--budget", 1) == 0
+    several = ("--robots", 3, 4, 5, "--windows", 12, "--range-ratio", 1, "--latent", 4)
+    assert train("--out", out, *several, "--held-out", 1, "--budget", 1) == 0
+    training = read_run(here / out).training
+    assert (training.robots, training.missions, training.groups) == ((3, 4, 5), 18, 3)
     printed = capsys.readouterr().out
+    assert "runs/a [red] b: credit per robot, stationary, 3, 4, 5 robots" in printed
     assert "train --out 'runs/a [red] b' --resume" in printed
-    assert "runs/a [red] b: credit per robot" in printed

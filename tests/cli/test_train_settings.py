@@ -8,9 +8,9 @@ import pytest
 from tiny_policies import tiny_config, tiny_network
 
 from swarm_mj.cli import main, parse
-from swarm_mj.cli.train import BUDGETS, asked_limits
+from swarm_mj.cli.train import asked_limits
 from swarm_mj.cli.train_settings import asked_settings, refuse_others
-from swarm_mj.learning.run_folder import Limits
+from swarm_mj.learning.run_folder import BUDGETS, Limits
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import paper
 
@@ -31,9 +31,7 @@ def asked(*arguments):
 def test_the_defaults_that_the_help_shows_are_the_usual_settings(capsys):
     main(["train", "--help"])
     shown = " ".join(capsys.readouterr().out.split())
-    robot, team = (
-        usual_settings(credit, paper("stationary"), (40,)) for credit in ("robot", "team")
-    )
+    robot, team = (usual_settings(each, paper("stationary"), (40,)) for each in ("robot", "team"))
     for text in (
         f"is applied, 0 to 16 (default: {robot.network.receptive_field}, team: 5)",
         f"width of every layer, 1 to 1024 (default: {robot.network.latent}, team: 64)",
@@ -90,17 +88,11 @@ def test_every_option_reaches_its_setting_and_no_other(option, value, place):
         assert changed == (replace(usual, **{owner: part}) if owner else part)
 
 
-def test_features_bring_the_networks_inputs_along():
+def test_features_bring_the_networks_inputs_along_and_presets_the_papers_way():
     training = asked("--features", "paper")
     assert (training.features, training.network.num_features) == ("paper", 8)
-
-
-def test_the_linear_variant_is_asked_for_by_its_flag():
     assert asked("--linear").network.is_linear
     assert not asked().network.is_linear
-
-
-def test_the_preset_decides_the_papers_way():
     code = asked("--credit", "team", "--preset", "reference")
     assert (code.features, code.network.num_outputs, code.sums_nodes) == ("reference", 2, True)
     assert code.mission.half_duplex == "eavesdroppers"
@@ -111,7 +103,7 @@ def test_the_preset_decides_the_papers_way():
     [((10,), 16, 4), ((10, 20), 16, 4), ((10, 20, 40), 18, 3), ((2, 3, 4, 5, 6), 20, 5)],
 )
 def test_sizes_share_the_missions_evenly(sizes, missions, groups):
-    training = asked("--robots", *sizes)
+    training = asked("--robots", *sizes, sizes[0])  # which counts once
     assert (training.robots, training.missions, training.groups) == (sizes, missions, groups)
 
 
@@ -120,10 +112,6 @@ def test_sizes_share_the_missions_evenly(sizes, missions, groups):
 )
 def test_groups_are_as_near_to_four_as_the_missions_allow(missions, groups):
     assert asked("--missions", missions).groups == groups
-
-
-def test_a_size_counts_once():
-    assert asked("--robots", 10, 20, 10).robots == (10, 20)
 
 
 def test_a_policy_to_begin_with_brings_its_network():
@@ -142,22 +130,19 @@ def test_a_run_that_goes_on_has_its_own_settings():
         refuse_others(given("--credit", "team"), training, "the run")
 
 
+NEW, STORED = Limits(decisions=BUDGETS["robot"]), Limits(decisions=5, minutes=1.0, replay_every=3)
+
+
 @pytest.mark.parametrize(
-    ("asked", "decisions", "minutes"),
+    ("stored", "asked", "limits"),
     [
-        ((), 200_000, None),
-        (("--budget", 5), 5, None),
-        (("--minutes", 2.0), None, 2.0),
-        (("--budget", 5, "--minutes", 2.0), 5, 2.0),
+        (NEW, (), Limits(decisions=200_000)),
+        (NEW, ("--budget", 5), Limits(decisions=5)),
+        (NEW, ("--minutes", 2.0), Limits(minutes=2.0)),
+        (NEW, ("--budget", 5, "--minutes", 2.0), Limits(decisions=5, minutes=2.0)),
+        (STORED, (), STORED),
+        (STORED, ("--minutes", 2.0, "--replay-every", 9), Limits(minutes=2.0, replay_every=9)),
     ],
 )
-def test_a_new_run_stops_as_asked_or_by_the_usual_budget(asked, decisions, minutes):
-    limits = asked_limits(Limits(decisions=BUDGETS["robot"]), options(*asked))
-    assert (limits.decisions, limits.minutes) == (decisions, minutes)
-
-
-def test_a_run_that_goes_on_stops_as_before_or_as_asked_now():
-    stored = Limits(decisions=5, minutes=1.0, replay_every=3)
-    assert asked_limits(stored, options()) == stored
-    moved = asked_limits(stored, options("--minutes", 2.0, "--replay-every", 9))
-    assert moved == Limits(decisions=None, minutes=2.0, replay_every=9)
+def test_a_run_stops_as_before_or_as_asked_now(stored, asked, limits):
+    assert asked_limits(stored, options(*asked)) == limits

@@ -1,7 +1,6 @@
-"""How fast the simulation is: windows per second, whole and in parts, beside plain MuJoCo steps.
+"""How fast the simulation is: windows per second, whole and in parts, and what evaluations take.
 
-And how long an evaluation takes, the oracle, and a robot that plans. A loop of plain mj_steps in
-the same run is the yardstick.
+The yardstick is a plain mj_step in the same run. A measurement takes about the seconds it is given.
 """
 
 import time
@@ -37,14 +36,14 @@ from swarm_mj.protocol.window import channel_at, window
 from swarm_mj.radio.mission_radio import Belief, radio_of
 from swarm_mj.simulation.swarm import Swarm
 
-ORACLE_EPISODES = 4  # it takes its time
+ORACLE_EPISODES = 4  # at most: it takes its time
 REPETITIONS = 7  # of each measurement; their median counts, for machines are shared
 MISSION = paper("random-walk")
-DENSE = replace(MISSION, range_ratio=1.0)
-PLAN_SIZES = (40, 80, 200)  # robots
 REGULAR_EPOCH = 3  # the planner's first that is not shorter than all others
-
-
+PLANS = {  # one robot's plan for an epoch
+    f"planner, {n} robots: one robot's plan": replace(MISSION, num_robots=n) for n in (40, 80, 200)
+}
+PLANS["planner, 40 robots that hear 1 km far"] = replace(MISSION, range_ratio=1.0)
 PLAIN_STEP = "one plain MuJoCo step of 40 robots"  # measured again and again
 IN_STEPS = "  that is so many plain MuJoCo steps"
 
@@ -58,12 +57,10 @@ class Row(NamedTuple):
     ends_section: bool = False
 
 
-def simulation_rows(
-    num_missions: int, *, num_threads: int = 1, seconds: float = 2.0
-) -> Iterator[Row]:
+def simulation_rows(num_missions: int, num_threads: int, seconds: float) -> Iterator[Row]:
     """Time random walks of 40 robots with round robin, B side by side, per window of one mission.
 
-    The threads are MuJoCo's own; each measurement takes about so many seconds.
+    The threads are MuJoCo's own.
     """
     swarm = Swarm(MISSION, range(num_missions), num_threads=num_threads)
     policy = RoundRobin()
@@ -73,7 +70,7 @@ def simulation_rows(
     request, response = swarm.phases
     phases, channel = (request, response), channel_at(swarm.channel, swarm.now)
     parts = {
-        "  the policy decides": lambda: swarm.decide(),
+        "  the policy decides": swarm.decide,
         "  MuJoCo moves the robots": swarm.move,
         "  the radio delivers, buffers merge": talking(swarm, recipient),
         "  costs are measured": lambda: window_costs(
@@ -92,11 +89,10 @@ def simulation_rows(
         yield Row(name, microseconds(part, seconds / 4) / num_missions)
 
 
-def world_rows(num_missions: int, *, seconds: float = 2.0) -> Iterator[Row]:
+def world_rows(num_missions: int, seconds: float) -> Iterator[Row]:
     """Time the same walks where there is more than free space, per window of one mission.
 
-    The two sides of a ratio are measured in turn, so that a machine's moods reach both; each
-    measurement takes about so many seconds.
+    The two sides of a ratio are measured in turn, so that a machine's moods reach both.
     """
 
     def window_us(scene: Scene | None = None, **world: Any) -> tuple[float, float]:
@@ -110,8 +106,8 @@ def world_rows(num_missions: int, *, seconds: float = 2.0) -> Iterator[Row]:
     yield Row("free space", exact_us)
     yield Row("Rayleigh fading", faded_us)
     yield Row("  times free space", faded_us / exact_us, "{:.2f}", ends_section=True)
-    (plain_us, plain_move_us) = window_us(physics="contact")
-    (among_us, among_move_us) = window_us(twenty_blocks, physics="contact")
+    plain_us, plain_move_us = window_us(physics="contact")
+    among_us, among_move_us = window_us(twenty_blocks, physics="contact")
     yield Row("free space, contact physics", plain_us)
     yield Row("  of these, MuJoCo moves the robots", plain_move_us)
     yield Row("20 obstacles, contact physics", among_us)
@@ -120,48 +116,43 @@ def world_rows(num_missions: int, *, seconds: float = 2.0) -> Iterator[Row]:
 
 
 def twenty_blocks(spec: MjSpec, mission: Mission) -> None:
-    """Return a scene: five rows of four city blocks, as in arena `blocks`."""
+    """Add five rows of four city blocks to a scene, as in arena `blocks`."""
+    half_m = [BLOCK_M / 2.0, BLOCK_M / 2.0, HALF_HEIGHT_M]
     for x, y in product(np.linspace(-0.4, 0.4, 5), np.linspace(-0.375, 0.375, 4)):
-        spec.worldbody.add_geom(
-            type=mjtGeom.mjGEOM_BOX,
-            pos=[x * mission.side_m, y * mission.side_m, HALF_HEIGHT_M],
-            size=[BLOCK_M / 2.0, BLOCK_M / 2.0, HALF_HEIGHT_M],
-            group=OBSTACLE_GROUP,
-        )
+        place_m = [x * mission.side_m, y * mission.side_m, HALF_HEIGHT_M]
+        box = {"type": mjtGeom.mjGEOM_BOX, "group": OBSTACLE_GROUP}
+        spec.worldbody.add_geom(pos=place_m, size=half_m, **box)
 
 
-def evaluation_rows(num_episodes: int, *, num_jobs: int = 2, seconds: float = 2.0) -> Iterator[Row]:
+def evaluation_rows(num_episodes: int, num_jobs: int, seconds: float) -> Iterator[Row]:
     """Time an evaluation of the paper's baselines, the oracle, and a robot's plans of an epoch.
 
-    The jobs share the baselines' missions, and starting them counts; the oracle flies at most
-    `ORACLE_EPISODES`. The other measurements take about so many seconds, four times over.
+    The jobs share the baselines' missions, and starting them counts.
     """
     for policy in (*BASELINES, "greedy-oracle"):  # compiles, if it never has
         _flying_s(policy, num_episodes=1, mission=replace(MISSION, num_windows=1))
     baselines_s = _flying_s(*BASELINES, num_episodes=num_episodes, num_jobs=num_jobs)
     step_us = plain_step_us(seconds / 4)
-    num_windows = len(BASELINES) * num_episodes * MISSION.num_windows
+    window_us = 1e6 * baselines_s / (len(BASELINES) * num_episodes * MISSION.num_windows)
     yield Row(f"{', '.join(BASELINES)}, --jobs {num_jobs}", baselines_s, "{:.1f} s")
-    window_us = 1e6 * baselines_s / num_windows
     yield Row("  one window of one mission, with start-up", window_us)
     yield Row(IN_STEPS, window_us / step_us, "{:.2f}")
     num_oracles = min(num_episodes, ORACLE_EPISODES)
     oracle_s = _flying_s("greedy-oracle", num_episodes=num_oracles)
     yield Row("greedy-oracle, one mission", oracle_s / num_oracles, "{:.2f} s")
-    for size in PLAN_SIZES:
-        plan_ms = microseconds(_planning(replace(MISSION, num_robots=size)), seconds / 4) / 1000.0
-        num_halves = 2 * epoch_windows(REGULAR_EPOCH, size, PlannerSettings())
-        yield Row(f"planner, {size} robots: one robot's plan", plan_ms, "{:.1f} ms")
-        yield Row("  for each of its slots of 50 ms", plan_ms / num_halves, "{:.2f} ms")
-    dense_ms = microseconds(_planning(DENSE), seconds / 4) / 1000.0
-    yield Row("planner, 40 robots that hear 1 km far", dense_ms, "{:.1f} ms")
+    for name, mission in PLANS.items():
+        plan_ms = microseconds(_planning(mission), seconds / 4) / 1000.0
+        yield Row(name, plan_ms, "{:.1f} ms")
+        if mission.range_ratio == MISSION.range_ratio:
+            num_halves = 2 * _epoch_windows(mission)
+            yield Row("  for each of its slots of 50 ms", plan_ms / num_halves, "{:.2f} ms")
     yield Row(PLAIN_STEP, step_us)
 
 
 def _flying_s(
     *policies: str, num_episodes: int, num_jobs: int = 1, mission: Mission = MISSION
 ) -> float:
-    """Wall time of an evaluation's missions [s]."""
+    """Return the wall time of an evaluation's missions [s]."""
     study = Study(policies=policies, regimes=(mission,), episodes=num_episodes)
     start_s = time.perf_counter()
     for _ in run_jobs(fly_batch, study.batches, num_jobs):
@@ -169,25 +160,21 @@ def _flying_s(
     return time.perf_counter() - start_s
 
 
+def _epoch_windows(mission: Mission) -> int:
+    return epoch_windows(REGULAR_EPOCH, mission.num_robots, PlannerSettings())
+
+
 def _planning(mission: Mission) -> Callable[[], object]:
-    """One robot's plan for an epoch, from what it knows after four rounds of TDMA."""
-    swarm = Swarm(mission, [0])
-    tdma = make_policy("tdma", mission)
-    num_windows = epoch_windows(REGULAR_EPOCH, mission.num_robots, PlannerSettings())
+    """Return one robot's plan for an epoch, from what it knows after four rounds of TDMA."""
+    swarm, tdma = Swarm(mission, [0]), make_policy("tdma", mission)
     for _ in range(2 * mission.num_robots):
         swarm.step(tdma)
-    buffers, now = swarm.buffers, float(swarm.now[0])
-    belief, settings = Belief(radio=radio_of(mission)), PlannerSettings()
+    buffers, now, settings = swarm.buffers, float(swarm.now[0]), PlannerSettings()
+    num_windows = _epoch_windows(mission)
+    belief, seen = Belief(radio=radio_of(mission)), replace(settings, fresh_rounds=10.0)
 
     def plan() -> object:
-        snapshots = take_snapshots(
-            buffers,
-            0,
-            now,
-            mission.window_s,
-            num_windows / 2.0,
-            replace(settings, fresh_rounds=10.0),
-        )
+        snapshots = take_snapshots(buffers, 0, now, mission.window_s, num_windows / 2.0, seen)
         is_free = np.ones(2 * num_windows, dtype=bool)
         timestamp = buffers.timestamp[0]
         return epoch_plan(belief, settings, snapshots, 0, timestamp, now, is_free).outcome()
@@ -196,7 +183,7 @@ def _planning(mission: Mission) -> Callable[[], object]:
 
 
 def talking(swarm: Swarm, recipient: Int[np.ndarray, "B N"]) -> Callable[[], object]:
-    """Repeats the radio's part of a window, on the swarm's own clock.
+    """Return what repeats the radio's part of a window, on the swarm's own clock.
 
     The clock must run on: packets would hold nothing new otherwise. It must also be the swarm's,
     because a buffer that holds entries from the future takes none that is older, so that parents
@@ -211,19 +198,14 @@ def talking(swarm: Swarm, recipient: Int[np.ndarray, "B N"]) -> Callable[[], obj
 
 
 def plain_step_us(seconds: float) -> float:
-    """One mj_step of the scene of 40 robots, in about so many seconds [µs]."""
-    return microseconds(_plain_steps(MISSION), seconds)
-
-
-def _plain_steps(mission: Mission) -> Callable[[], None]:
-    """One mj_step of the mission's scene."""
-    model = compose(mission).compile()
+    """Time one mj_step of the scene of 40 robots [µs]."""
+    model = compose(MISSION).compile()
     data = MjData(model)
-    return lambda: mj_step(model, data)
+    return microseconds(lambda: mj_step(model, data), seconds)
 
 
 def microseconds(call: Callable[[], object], seconds: float) -> float:
-    """Median time of a call, after one that is not timed, in about so many seconds [µs]."""
+    """Return the median time of a call, after one that is not timed [µs]."""
     call()
     num_calls = max(1, int(seconds / REPETITIONS / max(timeit(call, number=1), 1e-7)))
     return 1e6 * float(np.median(repeat(call, number=num_calls, repeat=REPETITIONS))) / num_calls

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarm_mj.cli.benchmark.simulation import (
+from swarm_mj.cli.bench_simulation import (
     IN_STEPS,
     PLAIN_STEP,
     evaluation_rows,
@@ -21,7 +21,7 @@ from swarm_mj.simulation.swarm import Swarm
 
 
 def test_a_timing_is_consistent():
-    rows = {row.name: row.value for row in simulation_rows(2, seconds=0.05)}
+    rows = {row.name: row.value for row in simulation_rows(2, 1, 0.05)}
     assert all(value > 0 for value in rows.values())
     window_us = rows["time of one window of one mission"]
     assert rows["windows simulated per second"] == pytest.approx(1e6 / window_us)
@@ -30,7 +30,7 @@ def test_a_timing_is_consistent():
 
 
 def test_worlds_are_timed_against_free_space_in_the_same_physics():
-    rows = {row.name: row.value for row in world_rows(2, seconds=0.05)}
+    rows = {row.name: row.value for row in world_rows(2, 0.05)}
     assert all(value > 0 for value in rows.values())
     fading = rows["Rayleigh fading"] / rows["free space"]
     assert rows["  times free space"] == pytest.approx(fading)
@@ -47,7 +47,7 @@ def test_twenty_blocks_are_obstacles():
 
 @pytest.mark.slow
 def test_an_evaluations_timing_is_consistent():
-    rows = {row.name: row.value for row in evaluation_rows(2, num_jobs=1, seconds=0.05)}
+    rows = {row.name: row.value for row in evaluation_rows(2, 1, 0.05)}
     assert all(value > 0 for value in rows.values())
     baselines_s = rows["random-flooding, round-robin, mst, --jobs 1"]
     window_us = 1e6 * baselines_s / (3 * 2 * 500)  # three baselines, 500 windows each

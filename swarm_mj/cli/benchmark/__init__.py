@@ -1,1 +1,0 @@
-"""How fast the simulation, the policies and the training are."""

@@ -1,0 +1,17 @@
+"""The learning bench measures what it says; how fast is not tested, for machines are shared."""
+
+from swarm_mj.cli.bench_learning import learning_rows
+
+
+def test_networks_are_timed_alone_and_by_the_batch_and_both_kinds_of_credit_train():
+    rows = list(learning_rows(num_robots=4, seconds=0.05))
+    for first, missions in ((0, "1 mission"), (3, "32 missions")):
+        forward, layers, backward = rows[first : first + 3]
+        assert forward.name == f"the paper's network, {missions}: team decisions"
+        assert 0.0 < backward.value < forward.value
+        assert layers.value > 1.0
+    named = {row.name: row.value for row in rows}
+    for name in ("--credit robot", "--credit team"):
+        assert named[f"train {name}: team decisions"] > 0.0
+    for whose in ("--credit robot", "the paper"):
+        assert named[f"one robot's decision, network of {whose}"] > 0.0
