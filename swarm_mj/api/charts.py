@@ -41,7 +41,12 @@ def draw_flight(run: "Run") -> Figure:
             axes[1].set_ylabel(f"{own_cost.name}\n[{own_cost.unit}]")
             axes[1].set_ylim(bottom=0.0)
         elif number == 2:
-            _draw_variance(axes[1], columns, colour)
+            variance = columns["velocity_variance"]
+            axes[1].semilogy(columns["window"], variance, color=colour)
+            axes[1].set_ylabel(LABELS["velocity_variance"])
+            # Far below its largest value the variance of a converged flock is rounding noise.
+            least = max(float(np.min(variance)), MIN_SHARE * float(np.max(variance)))
+            axes[1].set_ylim(bottom=least / 2.0)
         axes[-1].set_xlabel(f"window of {run.mission.window_s:g} s")
     return _kept(figure)
 
@@ -73,14 +78,6 @@ def _draw_age(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
     axes.set_ylabel(LABELS["aoi"])
     axes.set_ylim(bottom=0.0)
     axes.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
-
-
-def _draw_variance(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
-    # Below a millionth of its largest value the variance of a converged flock is rounding noise.
-    variance = columns["velocity_variance"]
-    axes.semilogy(columns["window"], variance, color=colour)
-    axes.set_ylabel(LABELS["velocity_variance"])
-    axes.set_ylim(bottom=max(float(np.min(variance)), MIN_SHARE * float(np.max(variance))) / 2.0)
 
 
 def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:

@@ -1,7 +1,7 @@
 """The result of `swarm_mj.fly`: numbers, a table, a chart, files, a video."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
@@ -192,13 +192,18 @@ class Run:
         check_outputs(Output("the file", path, ENDINGS))
         match path.suffix.lower():
             case ".rrd":
-                self._write_replay(path)
+                log = self._recorded()
+                need("rerun", "a replay")
+                from swarm_mj.replay.write import write_replay  # rerun takes its time to import
+
+                config = {name: value for name, value in self.config.items() if value is not None}
+                write_replay(log, self.mission, config, path)
             case ".json":
                 write_json(path, self.report())
             case ".csv":
-                columns = {name: values.tolist() for name, values in self.columns().items()}
-                rows = zip(*columns.values(), strict=True)
-                write_csv(path, list(columns), (_cells(columns, row) for row in rows))
+                cells = {name: list(map(_cell, x.tolist())) for name, x in self.columns().items()}
+                rows = zip(*cells.values(), strict=True)
+                write_csv(path, list(cells), (dict(zip(cells, row, strict=True)) for row in rows))
             case ending:
                 write_bytes(path, self._film(ending))
         return path
@@ -219,16 +224,6 @@ class Run:
         with quiet_bar("Drawing", style.num_frames, "pictures") as bar:
             return make_video([footage], ending, style, bar.advance)
 
-    def _write_replay(self, path: Path) -> None:
-        log = self._recorded()
-        need("rerun", "a replay")
-        from swarm_mj.replay.write import write_replay  # rerun takes its time to import
 
-        config = {name: value for name, value in self.config.items() if value is not None}
-        write_replay(log, self.mission, config, path)
-
-
-def _cells(names: Iterable[str], row: Iterable[float]) -> dict[str, str | None]:
-    """Return a row of a file; nan is an empty cell."""
-    pairs = zip(names, row, strict=True)
-    return {name: None if math.isnan(value) else as_typed(value) for name, value in pairs}
+def _cell(value: float) -> str | None:
+    return None if math.isnan(value) else as_typed(value)

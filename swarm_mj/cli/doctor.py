@@ -206,7 +206,7 @@ def _print(found: list[Finding], *, works: bool) -> None:
     """Print a table by groups, then what to do, then whether flying works."""
     groups = list(dict.fromkeys(each.group for each in found))
     in_groups = sorted(found, key=lambda each: groups.index(each.group))
-    table = Table(*3 * [Column(overflow="fold")], show_header=False)
+    table = Table(*(Column(overflow="fold") for _ in range(3)), show_header=False)
     for group, findings in groupby(in_groups, lambda each: each.group):
         table.add_row(f"[bold]{group}[/bold]")
         for each in findings:

@@ -147,15 +147,14 @@ def _replay_path(options: FlyOptions) -> Path | None:
 
 
 def _fresh_name(options: FlyOptions) -> Path:
-    """Return a name of this process's own, for flights that start in the same second."""
+    """Return a name of this process's own, for flights that start in the same second.
+
+    Of a learned policy it has the file's name without the path: `x` of runs/x/policy.safetensors
+    and of runs/x.
+    """
+    policy = options.policy.replace(" --", "-").replace(" ", "-").replace(":", "-")
+    if registry.is_stored(options.policy):
+        path = Path(options.policy.removesuffix(SUFFIX)).resolve()
+        policy = path.parent.name if path.name == "policy" else path.name
     when = f"{datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}"
-    task, policy = options.mission.task, _short(options.policy)
-    return REPLAYS / f"{task}-{policy}-seed{options.seed}-{when}.rrd"
-
-
-def _short(policy: str) -> str:
-    """Return a policy's name without the path: `x` of runs/x/policy.safetensors and of runs/x."""
-    if not registry.is_stored(policy):
-        return policy.replace(" --", "-").replace(" ", "-").replace(":", "-")
-    path = Path(policy.removesuffix(SUFFIX)).resolve()
-    return path.parent.name if path.name == "policy" else path.name
+    return REPLAYS / f"{options.mission.task}-{policy}-seed{options.seed}-{when}.rrd"

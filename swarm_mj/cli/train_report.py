@@ -6,15 +6,9 @@ from datetime import timedelta
 
 from rich.console import Console
 
+from swarm_mj.learning import selection
 from swarm_mj.learning.run_folder import Limits, Progress, Status, TrainingRun
-from swarm_mj.learning.selection import (
-    ORACLE,
-    ORACLE_ROBOTS,
-    REFERENCES,
-    column,
-    has_stalled,
-    reference_missions,
-)
+from swarm_mj.learning.selection import ORACLE, REFERENCES
 from swarm_mj.system.progress import WorkBar
 
 FINISHING = "finishing this rollout, then all is kept; Ctrl-C again breaks off at once"
@@ -45,7 +39,8 @@ class Watch(WorkBar):
         if self._start is None:
             self._start, self._num_rows = status, len(status.progress.curve)
         if len(status.progress.curve) > self._num_rows:
-            self._print_row(status.progress)
+            self._num_rows = len(status.progress.curve)
+            self._console.print(_row(self._run, status.progress))
         self.what = status.what
         self.text = _text(status, self._start, self._run.limits)
         self.move_to(share_done(status, self._run.limits))
@@ -59,17 +54,6 @@ class Watch(WorkBar):
         """The words before the bar, as they are drawn now."""
         # Asked at every redrawing, so Ctrl-C shows before the run reports again.
         return "Finishing" if self._is_interrupted() else self.what
-
-    def _print_row(self, progress: Progress) -> None:
-        self._num_rows, row = len(progress.curve), progress.curve[-1]
-        note = "  best so far" if row is progress.best else ""
-        notes = {ORACLE: f" ({_oracle_missions(self._run)})"}
-        ages = reference_ages(row).items()
-        others = "".join(f"  {name} {age:.2f}{notes.get(name, '')}" for name, age in ages)
-        self._console.print(
-            f"{row['decisions']:>11,.0f} decisions {row['minutes']:7.1f} min   "
-            f"held-out age {age_of(row)}{note:13}{others}"
-        )
 
 
 def share_done(status: Status, limits: Limits) -> float:
@@ -87,17 +71,6 @@ def minutes_left(status: Status, start: Status, limits: Limits) -> float | None:
     return max(0.0, min(left)) if left else None
 
 
-def age_of(row: dict[str, float]) -> str:
-    """Return a held-out age of information, with its standard error if it has one [windows]."""
-    return f"{row['aoi']:.2f}" + (f" ± {row['aoi_sem']:.2f}" if "aoi_sem" in row else "")
-
-
-def reference_ages(row: dict[str, float]) -> dict[str, float]:
-    """Return the ages of reference policies that were flown on the same missions [windows]."""
-    ages = {name: row.get(column("aoi", name)) for name in REFERENCES}
-    return {name: age for name, age in ages.items() if age is not None}
-
-
 def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
     """Return rows for the closing table: the policy kept, and others on the same missions."""
     best, choice = progress.best, progress.choice
@@ -108,10 +81,10 @@ def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
         decisions = "untrained" if best is first else f"after {best['decisions']:,.0f} decisions"
         rows = {
             "missions": f"{run.training.held_out} of each team size, which chose the policy",
-            "policy kept": f"{age_of(best)} windows, {decisions}",
-            NAMES["first"]: f"{age_of(first)} windows",
+            "policy kept": f"{_age(best)} windows, {decisions}",
+            NAMES["first"]: f"{_age(first)} windows",
         }
-        others = {name: f"{age:.2f} windows" for name, age in reference_ages(best).items()}
+        others = {name: f"{age:.2f} windows" for name, age in _reference_ages(best).items()}
     else:
         kept = _amount(run, choice.kept.mean, choice.kept.sem)
         rows = {
@@ -123,11 +96,11 @@ def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
         known = f"; {REFERENCES[name]}" if name in REFERENCES else ""
         rows[NAMES.get(name, name)] = cost + known
     # The oracle flies few missions, those of evaluations only.
-    if (age := reference_ages(first).get(ORACLE)) is not None:
+    if (age := _reference_ages(first).get(ORACLE)) is not None:
         missions = f"on {_oracle_missions(run)} of the evaluations"
         rows[ORACLE] = f"{age:.2f} windows, {missions}; {REFERENCES[ORACLE]}"
-    elif max(run.training.robots) > ORACLE_ROBOTS:
-        rows[ORACLE] = f"not flown: it would take long with more than {ORACLE_ROBOTS} robots"
+    elif max(run.training.robots) > (most := selection.ORACLE_ROBOTS):
+        rows[ORACLE] = f"not flown: it would take long with more than {most} robots"
     return rows
 
 
@@ -159,10 +132,22 @@ def has_stopped_early(run: TrainingRun, progress: Progress) -> bool:
     """Return whether a run stopped because it no longer learned, and not at its budget."""
     limits = run.limits
     is_left = limits.decisions is None or progress.decisions < limits.decisions
-    return is_left and has_stalled(progress.curve, limits.patience)
+    return is_left and selection.has_stalled(progress.curve, limits.patience)
+
+
+def _row(run: TrainingRun, progress: Progress) -> str:
+    """Return the line of the last evaluation."""
+    row = progress.curve[-1]
+    note = "  best so far" if row is progress.best else ""
+    notes = {ORACLE: f" ({_oracle_missions(run)})"}
+    ages = _reference_ages(row).items()
+    others = "".join(f"  {name} {age:.2f}{notes.get(name, '')}" for name, age in ages)
+    when = f"{row['decisions']:>11,.0f} decisions {row['minutes']:7.1f} min"
+    return f"{when}   held-out age {_age(row)}{note:13}{others}"
 
 
 def _text(status: Status, start: Status, limits: Limits) -> str:
+    """Return the words behind the bar."""
     parts = [f"{status.decisions:,} decisions"]
     if status.evaluated is not None:
         parts.append(f"missions {status.evaluated:.0%}")
@@ -178,10 +163,21 @@ def _text(status: Status, start: Status, limits: Limits) -> str:
     return ", ".join(parts)
 
 
+def _age(row: dict[str, float]) -> str:
+    """Return a held-out age of information, with its standard error if it has one [windows]."""
+    return f"{row['aoi']:.2f}" + (f" ± {row['aoi_sem']:.2f}" if "aoi_sem" in row else "")
+
+
+def _reference_ages(row: dict[str, float]) -> dict[str, float]:
+    """Return the ages of reference policies that were flown on the same missions [windows]."""
+    columns = {name: selection.column("aoi", name) for name in REFERENCES}
+    return {name: row[column] for name, column in columns.items() if row.get(column) is not None}
+
+
 def _oracle_missions(run: TrainingRun) -> str:
     """Return how many of the evaluations' missions of each team size the oracle has flown."""
     held_out = run.training.held_out
-    number = reference_missions(run.training).get(ORACLE, held_out)  # an old run flew all
+    number = selection.reference_missions(run.training).get(ORACLE, held_out)  # an old run flew all
     return f"{number} of {held_out} missions"
 
 

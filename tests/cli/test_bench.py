@@ -8,10 +8,9 @@ from swarm_mj.cli.bench_simulation import Row
 
 
 @pytest.mark.slow
-def test_bench_prints_the_whole_and_its_parts(swarm_mj):
+def test_bench_prints_the_whole_and_its_parts(succeed):
     short = ("--seconds", 0.1, "--episodes", 1, "--no-learning")
-    done = swarm_mj("bench", "--missions", 1, 3, *short)
-    assert done.returncode == 0, done.stderr
+    done = succeed("bench", "--missions", 1, 3, *short)
     for row in ("windows simulated per second", "plain MuJoCo step", "radio delivers", "decides"):
         assert row in done.stdout
     for row in ("Evaluation: 1 random walks", "round-robin, mst, --jobs 2", "greedy-oracle"):
@@ -40,9 +39,6 @@ def test_noise_is_the_spread_of_what_should_be_the_same():
 
 REFUSED = {
     "--missions 0": "missions must be a whole number from 1 to 10000, not 0",
-    "--threads 0": "threads must be a whole number from 1 to 256, not 0",
-    "--episodes -1": "episodes must be a whole number from 0 to 10000, not -1",
-    "--jobs 0": "jobs must be a whole number from 1 to 256, not 0",
     "--seconds nan": "seconds must be a number from 0.1 to 600 [s], not nan",
 }
 

@@ -81,9 +81,8 @@ def test_results_are_what_the_library_computes(whole):
         assert {name: row[name] for name in COLUMNS} == {n: getattr(result, n) for n in COLUMNS}
 
 
-def test_two_jobs_end_in_the_same_files(swarm_mj, tmp_path, whole):
-    done = swarm_mj("evaluate", *TWO_POLICIES, *BOTH, "--jobs", 2)
-    assert done.returncode == 0, done.stderr
+def test_two_jobs_end_in_the_same_files(succeed, tmp_path, whole):
+    succeed("evaluate", *TWO_POLICIES, *BOTH, "--jobs", 2)
     same_files(tmp_path, whole)
 
 
@@ -135,13 +134,13 @@ def test_ctrl_c_keeps_what_was_flown_and_resuming_ends_in_the_same_files(
 
 
 def test_a_killed_evaluation_resumes_even_if_its_last_line_was_cut(
-    swarm_mj, evaluate_and_end, tmp_path, whole
+    succeed, evaluate_and_end, tmp_path, whole
 ):
     done = evaluate_and_end(tmp_path, signal.SIGKILL, 2, *TWO_POLICIES, *BOTH)
     assert done.returncode == -signal.SIGKILL
     path = tmp_path / "r.json.progress"
     path.write_bytes(path.read_bytes()[:-9])
-    assert swarm_mj("evaluate", *TWO_POLICIES, *BOTH, "--resume").returncode == 0
+    succeed("evaluate", *TWO_POLICIES, *BOTH, "--resume")
     same_files(tmp_path, whole)
 
 
@@ -153,7 +152,7 @@ def test_resuming_flies_only_what_is_left(evaluate_and_end, tmp_path):
 
 
 def test_progress_needs_a_word_on_what_to_do_with_it(
-    evaluate_and_end, swarm_mj, refusal, tmp_path, whole
+    evaluate_and_end, succeed, refusal, tmp_path, whole
 ):
     evaluate_and_end(tmp_path, signal.SIGKILL, 1, *TWO_POLICIES, *BOTH)
     kept = (tmp_path / "r.json.progress").read_bytes()
@@ -162,12 +161,12 @@ def test_progress_needs_a_word_on_what_to_do_with_it(
     line = refusal("evaluate", *TWO_POLICIES, *BOTH, "--resume", "--seed", 1)
     assert "its seed is 1000, not 1; repeat that one" in line
     assert (tmp_path / "r.json.progress").read_bytes() == kept
-    assert swarm_mj("evaluate", *TWO_POLICIES, *BOTH, "--force").returncode == 0
+    succeed("evaluate", *TWO_POLICIES, *BOTH, "--force")
     same_files(tmp_path, whole)
 
 
-def test_resuming_what_never_began_begins_it(swarm_mj, tmp_path, whole):
-    assert swarm_mj("evaluate", *TWO_POLICIES, *BOTH, "--resume").returncode == 0
+def test_resuming_what_never_began_begins_it(succeed, tmp_path, whole):
+    succeed("evaluate", *TWO_POLICIES, *BOTH, "--resume")
     same_files(tmp_path, whole)
 
 
@@ -175,14 +174,13 @@ FAIL = ("--failure-fraction", "0", "0.4", "--policy", "mst", "--episodes", "3")
 
 
 def test_robots_that_fail_are_another_regime_in_results_and_progress(
-    evaluate_and_end, swarm_mj, refusal, tmp_path
+    evaluate_and_end, succeed, refusal, tmp_path
 ):
     evaluate_and_end(tmp_path, signal.SIGKILL, 1, *SMALL, *FAIL, *BOTH)
     alike = ("--failure-fraction", "0", "0.2", *FAIL[3:])
     line = refusal("evaluate", *SMALL, *alike, *BOTH, "--resume")
     assert "its failure_fraction is 0.4, not 0.2; repeat that one" in line
-    done = swarm_mj("evaluate", *SMALL, *FAIL, *BOTH, "--resume")
-    assert done.returncode == 0, done.stderr
+    done = succeed("evaluate", *SMALL, *FAIL, *BOTH, "--resume")
     said = " ".join(done.stdout.split())
     assert "12 windows of exact physics, 40% of the robots off half-way" in said
     results = read_results(tmp_path / "r.csv")
@@ -197,7 +195,7 @@ def test_robots_that_fail_are_another_regime_in_results_and_progress(
 
 
 @pytest.mark.parametrize("output", ["json", "csv"])
-def test_existing_results_need_force(swarm_mj, refusal, tmp_path, output):
+def test_existing_results_need_force(succeed, refusal, tmp_path, output):
     """One mission of one window has results, too."""
     path = tmp_path / "out" / f"r.{output}"
     short = ("--robots", 5, "--windows", 1, "--range-ratio", 0.5, "--episodes", 1)
@@ -206,8 +204,7 @@ def test_existing_results_need_force(swarm_mj, refusal, tmp_path, output):
     path.write_text("precious")
     assert "--force" in refusal(*arguments)
     assert path.read_text() == "precious"
-    done = swarm_mj(*arguments, "--force")
-    assert done.returncode == 0, done.stderr
+    done = succeed(*arguments, "--force")
     assert "lower bound (connectivity)" in done.stdout
     assert files(tmp_path) == [f"out/r.{output}"]
     if output == "csv":
@@ -216,17 +213,12 @@ def test_existing_results_need_force(swarm_mj, refusal, tmp_path, output):
 
 REFUSED = {
     "--episodes 0": "episodes must be a whole number from 1 to 100000, not 0",
-    "--jobs 0": "jobs must be a whole number from 1 to 256, not 0",
     "--robots 10 1": "a whole number from 2 to 1000 [robots], not 1",
-    "--failure-fraction 0.95": "must be a number from 0 to 0.9 [of the team], not 0.95",
-    "--preset mine": "must be one of paper, reference, indoor, urban, open-field, not 'mine'",
-    "--policy magic": "policy must be one of",
     "--baseline magic": "baseline must be one of the policies evaluated",
-    "--range-ratio 0.02 --csv r.csv --jobs 2": "too sparse",
+    "--range-ratio 0.02 --jobs 2": "too sparse",
     "--resume": "--resume needs the --json or --csv",
     "--csv r.json --json ./r.json": "same file",
     "--json o.json --csv o.json.progress": "--csv must be named *.csv, not o.json",
-    "--csv .": "--csv . is a folder; name a file",
 }
 
 

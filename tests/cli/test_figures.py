@@ -23,9 +23,8 @@ def results(tmp_path):
     return "all.csv"
 
 
-def test_every_figure_is_drawn_as_vectors_and_as_pixels(swarm_mj, tmp_path, results):
-    done = swarm_mj("figures", results, "--out", "pictures")
-    assert done.returncode == 0, done.stderr
+def test_every_figure_is_drawn_as_vectors_and_as_pixels(succeed, tmp_path, results):
+    done = succeed("figures", results, "--out", "pictures")
     names = [f"fig{n}.{kind}" for n in range(2, 7) for kind in ("png", "svg")]
     assert sorted(path.name for path in (tmp_path / "pictures").iterdir()) == names
     for name in names:
@@ -35,18 +34,17 @@ def test_every_figure_is_drawn_as_vectors_and_as_pixels(swarm_mj, tmp_path, resu
         picture.verify()
 
 
-def test_only_what_is_asked_for_of_several_files_as_of_one(swarm_mj, tmp_path):
+def test_only_what_is_asked_for_of_several_files_as_of_one(succeed, tmp_path):
     write_csv(tmp_path / "one.csv", EVERYTHING[:3])
     write_csv(tmp_path / "other.csv", EVERYTHING[3:])
     draw = ("figures", "one.csv", "other.csv", "--figure", "fig5", "--out", "a/b")
-    done = swarm_mj(*draw, "--format", "pdf", "svg", "pdf")
-    assert done.returncode == 0, done.stderr
+    succeed(*draw, "--format", "pdf", "svg", "pdf")
     written = sorted(path.name for path in (tmp_path / "a" / "b").iterdir())
     assert written == ["fig5.pdf", "fig5.svg"]
 
 
 def test_nothing_is_overwritten_unasked_and_nothing_written_when_one_is_in_the_way(
-    swarm_mj, refusal, tmp_path, results
+    succeed, refusal, tmp_path, results
 ):
     (tmp_path / "fig5.png").write_text("mine")
     draw = ("figures", results, "--out", ".", "--figure", "fig4", "fig5")
@@ -54,7 +52,7 @@ def test_nothing_is_overwritten_unasked_and_nothing_written_when_one_is_in_the_w
     assert "fig5.png exists" in line
     assert "--force" in line
     assert (tmp_path / "fig5.png").read_text() == "mine"
-    assert swarm_mj(*draw, "--force").returncode == 0
+    succeed(*draw, "--force")
     assert (tmp_path / "fig5.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -66,10 +64,9 @@ def test_a_figure_without_points_is_named_with_its_command_and_none_is_written(r
     assert " greedy-oracle --task flocking --preset reference" in line
 
 
-def test_unasked_figures_without_points_are_left_out_unless_all_are(swarm_mj, refusal, tmp_path):
+def test_unasked_figures_without_points_are_left_out_unless_all_are(succeed, refusal, tmp_path):
     write_csv(tmp_path / "rest.csv", [one for one in EVERYTHING if one.task == "stationary"])
-    done = swarm_mj("figures", "rest.csv", "--out", ".", "--format", "svg")
-    assert done.returncode == 0, done.stderr
+    done = succeed("figures", "rest.csv", "--out", ".", "--format", "svg")
     assert "Wrote fig2.svg fig3.svg fig4.svg" in done.stdout
     assert "Left out fig5, fig6: the results hold no point of them" in done.stdout
     assert len(list(tmp_path.glob("*.svg"))) == 3

@@ -26,9 +26,8 @@ from swarm_mj.simulation.swarm import Swarm
 SHORT = ("--windows", "20", "--robots", "6", "--range-ratio", "0.5")
 
 
-def test_the_default_flight_leaves_a_replay_of_the_default_mission(swarm_mj, tmp_path):
-    done = swarm_mj("fly")
-    assert done.returncode == 0, done.stderr
+def test_the_default_flight_leaves_a_replay_of_the_default_mission(succeed, tmp_path):
+    done = succeed("fly")
     (replay,) = (tmp_path / "replays").iterdir()
     assert re.search(rf"replay (--web )?replays/{re.escape(replay.name)}\n", done.stdout)
     assert "flocking, planner, 40 robots" in done.stdout
@@ -36,12 +35,11 @@ def test_the_default_flight_leaves_a_replay_of_the_default_mission(swarm_mj, tmp
     assert replay.stat().st_size < 5e6
 
 
-def test_a_summary_is_what_the_library_computes(swarm_mj, tmp_path):
-    done = swarm_mj(
+def test_a_summary_is_what_the_library_computes(succeed, tmp_path):
+    succeed(
         "fly", *SHORT, "--task", "random-walk", "--policy", "random-flooding", "--seed", 7,
         "--probability", 0.2, "--no-record", "--json", "out/summary.json",
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
     assert files(tmp_path) == ["out/summary.json"]
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     mission = paper("random-walk", num_robots=6, num_windows=20, range_ratio=0.5)
@@ -60,27 +58,16 @@ def test_a_summary_is_what_the_library_computes(swarm_mj, tmp_path):
 
 @pytest.mark.parametrize("task", ["stationary", "random-walk", "flocking"])
 @pytest.mark.parametrize("preset", ["paper", "reference"])
-def test_every_task_and_preset_flies(swarm_mj, tmp_path, task, preset):
-    done = swarm_mj("fly", *SHORT, "--task", task, "--preset", preset, "--record", "a.rrd")
-    assert done.returncode == 0, done.stderr
+def test_every_task_and_preset_flies(succeed, tmp_path, task, preset):
+    succeed("fly", *SHORT, "--task", task, "--preset", preset, "--record", "a.rrd")
     assert len(windows(tmp_path / "a.rrd")) == 20
 
 
 REFUSED = {
     "--robots 1": "a whole number from 2 to 1000 [robots], not 1",
-    "--robots -4": "not -4",
-    "--robots 123456789": "from 2 to 1000",
     "--robots many": "argument --robots: invalid int value: 'many'",
-    "--windows 0": "a whole number from 1 to 100000 [windows], not 0",
     "--range-ratio 0": "range ratio must be a number from 0.01 to 10 [of 1 km], not 0",
-    "--range-ratio nan": "not nan",
-    "--velocity-ratio inf": "velocity ratio must be a number from 0.001 to 5",
-    "--failure-fraction 1": "must be a number from 0 to 0.9 [of the team], not 1",
-    "--task swim": "task must be one of stationary, random-walk, flocking, formation, coverage,",
     "--policy magic": "policy must be one of random-flooding, round-robin, mst",
-    "--preset mine": "must be one of paper, reference, indoor, urban, open-field, not 'mine'",
-    "--physics quantum": "physics must be one of exact, contact, not 'quantum'",
-    "--boundary torus": "boundary must be one of reflect, none, not 'torus'",
     "--policy mst --probability 1.5": "probability must be a number from 0 to 1, not 1.5",
     "--policy round-robin --probability 0.1": "takes no transmission probability",
     "--seed -1": "not [-1]",
@@ -89,12 +76,10 @@ REFUSED = {
     "--range-ratio 0.02": "too sparse",
     "--record replay.txt": "must be named *.rrd",
     "--json .": "--json . is a folder; name a file",
-    "--json summary": "--json must be named *.json, not summary",
     "--record a.rrd --json ./a.rrd": "same file",
     "--no-record --view": "--view needs a replay",
     "--no-record --record a.rrd": "not allowed with",
     "--bit-rate fast": "argument --bit-rate: name bits per second, 250k, 1M or none",
-    "--bit-rate 0": "bit rate must be a number from 1 to 1e+12 [bit/s], not 0",
     "--policy tdma --bit-rate 2k": "16 bytes for a single entry, but a slot holds 12 bytes at",
     "--wings 2": "unrecognized arguments: --wings 2",
 }
@@ -114,11 +99,10 @@ def test_an_output_below_a_file_is_refused_before_the_flight(refusal, tmp_path):
     assert (tmp_path / "replays").read_text() == "kept"
 
 
-def test_odd_names_are_kept_and_the_summary_names_the_tuned_probability(swarm_mj, tmp_path):
+def test_odd_names_are_kept_and_the_summary_names_the_tuned_probability(succeed, tmp_path):
     """Not that of the tiny mission which is flown ahead to compile."""
     outputs = ("--record", "a [red] b.rrd", "--json", "s.json")
-    done = swarm_mj("fly", *SHORT, "--policy", "mst", "--observer", 2, *outputs)
-    assert done.returncode == 0, done.stderr
+    done = succeed("fly", *SHORT, "--policy", "mst", "--observer", 2, *outputs)
     assert "'a [red] b.rrd'\n" in done.stdout
     assert files(tmp_path) == ["a [red] b.rrd", "s.json"]
     config = json.loads((tmp_path / "s.json").read_text())["config"]
@@ -128,13 +112,13 @@ def test_odd_names_are_kept_and_the_summary_names_the_tuned_probability(swarm_mj
 
 
 @pytest.mark.parametrize(("flag", "name"), [("--record", "a.rrd"), ("--json", "a.json")])
-def test_an_existing_file_needs_force(swarm_mj, refusal, tmp_path, flag, name):
+def test_an_existing_file_needs_force(succeed, refusal, tmp_path, flag, name):
     path = tmp_path / name
     path.write_text("precious")
     line = refusal("fly", *SHORT, flag, path)
     assert f"{flag} {path} exists; name another, or replace it with --force" in line
     assert path.read_text() == "precious"
-    assert swarm_mj("fly", *SHORT, flag, path, "--force").returncode == 0
+    succeed("fly", *SHORT, flag, path, "--force")
     check_replay(path) if flag == "--record" else json.loads(path.read_text())
 
 

@@ -1,21 +1,32 @@
-"""Parts of one's own on the command line, by module:Name."""
+"""Parts of one's own on the command line, by module:Name: flown, evaluated, trained with.
+
+What a user names is loaded, and nothing else.
+"""
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
+from swarm_mj.policies.stored import read_weights, save_weights
 from swarm_mj.simulation.swarm import Swarm
 
 SMALL = ("--task", "random-walk", "--robots", 5, "--windows", 10, "--range-ratio", 0.5)
 PARTS = """
+from pathlib import Path
+
 import numpy as np
 from swarm_mj.mission.batched_rng import Stream, uniform
+from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.radio.mission_radio import radio_of
+
+with Path("imported.txt").open("a") as file:
+    file.write("once more\\n")
 
 class Coin(BroadcastPolicy):
     def start(self, num_robots, rngs):
@@ -44,6 +55,21 @@ def pillar(spec, mission):
 
 def breaks(buffers, states):
     raise RuntimeError("out of order")
+
+class Ages(FeatureExtractor):
+    names = ("age", "is oneself")
+    def graphs(self, views):
+        buffers, num = views.buffers, views.num_robots
+        rows = (-1, num)
+        age = (views.now[:, None, None] - buffers.timestamp) / self._mission.num_windows
+        own = np.broadcast_to(np.eye(num), age.shape)
+        node = np.stack([age, own], axis=-1).astype(np.float32).reshape(*rows, 2)
+        return Graphs(
+            node=node,
+            parent=buffers.parent.reshape(rows),
+            may_address=np.ones((len(node), num), dtype=bool),
+            has_turn=np.zeros(len(node), dtype=bool),
+        )
 """
 ALL = ("--channel", "my_parts:Lossy", "--controller", "my_parts:Rest", "--scene", "my_parts:pillar")
 
@@ -51,12 +77,12 @@ ALL = ("--channel", "my_parts:Lossy", "--controller", "my_parts:Rest", "--scene"
 @pytest.fixture(autouse=True)
 def _parts(tmp_path):
     (tmp_path / "my_parts.py").write_text(PARTS)
+    (tmp_path / "imported.txt").touch()
 
 
-def test_a_flight_with_parts_of_ones_own(swarm_mj, tmp_path):
+def test_a_flight_with_parts_of_ones_own(swarm_mj, succeed, tmp_path):
     fly = ("fly", *SMALL, "--policy", "my_parts:Coin", *ALL)
-    done = swarm_mj(*fly, "--json", "a.json", "--record", "a.rrd")
-    assert done.returncode == 0, done.stderr
+    done = succeed(*fly, "--json", "a.json", "--record", "a.rrd")
     assert "channel my_parts:Lossy" in done.stdout
     assert "mean speed" in done.stdout
     flown = json.loads((tmp_path / "a.json").read_text())
@@ -69,11 +95,10 @@ def test_a_flight_with_parts_of_ones_own(swarm_mj, tmp_path):
     assert json.loads((tmp_path / "b.json").read_text())["aoi_mean"] == flown["aoi_mean"]
 
 
-def test_an_evaluation_makes_them_in_every_process_and_says_which(swarm_mj, tmp_path):
+def test_an_evaluation_makes_them_in_every_process_and_says_which(succeed, tmp_path):
     evaluate = ("evaluate", *SMALL, *ALL, "--policy", "my_parts:Coin", "mst", "--episodes", 30)
     for name, jobs in (("one", 1), ("two", 2)):
-        done = swarm_mj(*evaluate, "--jobs", jobs, "--csv", f"{name}.csv")
-        assert done.returncode == 0, done.stderr
+        done = succeed(*evaluate, "--jobs", jobs, "--csv", f"{name}.csv")
     assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
     with (tmp_path / "one.csv").open() as file:
         coin, _ = csv.DictReader(file)
@@ -97,9 +122,8 @@ def test_an_evaluation_goes_on_with_the_same_parts_only(refusal, swarm_mj, tmp_p
     assert "is of another evaluation" in refusal(*evaluate, *channel, *breaking, "--resume")
 
 
-def test_the_scene_is_in_the_file(swarm_mj, tmp_path):
-    done = swarm_mj("scene", "--robots", 3, "--scene", "my_parts:pillar")
-    assert done.returncode == 0, done.stderr
+def test_the_scene_is_in_the_file(succeed, tmp_path):
+    succeed("scene", "--robots", 3, "--scene", "my_parts:pillar")
     assert 'name="pillar"' in (tmp_path / "scene.xml").read_text()
 
 
@@ -133,3 +157,96 @@ def test_a_channel_of_ones_own_gives_a_mission_the_same_course_beside_any_other(
         policy = make_policy("my_parts_too:Coin", mission)
         ages.append([swarm.step(policy).age_windows[seeds.index(3)] for _ in range(150)])
     np.testing.assert_array_equal(*ages)
+
+
+TRAIN = ("train", "--robots", 5, "--windows", 20, "--range-ratio", 0.6, "--missions", 4)
+TRAIN = (*TRAIN, "--held-out", 2, "--evaluate-every", 256, "--latent", 6, "--depth", 2)
+OWN = ("--channel", "my_parts:Lossy", "--features", "my_parts:Ages")
+
+
+@pytest.fixture(scope="module")
+def trained(forks, tmp_path_factory):
+    """A folder with the parts, a run that was trained with them, and half of such a run."""
+    folder = tmp_path_factory.mktemp("own")
+    (folder / "my_parts.py").write_text(PARTS)
+    for out, budget in (("run", 256), ("w", 512)):
+        done = forks.run(folder, "swarm_mj", *TRAIN, *OWN, "--out", out, "--budget", budget)
+        assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture
+def typed(forks, trained):
+    """Runs `swarm-mj` there; also says whether the parts were imported."""
+
+    def run(*arguments):
+        (trained / "imported.txt").unlink(missing_ok=True)
+        done = forks.run(trained, "swarm_mj", *arguments)
+        return done, (trained / "imported.txt").exists()
+
+    return run
+
+
+def test_a_run_goes_on_bit_for_bit_if_its_parts_are_named_again(typed, trained):
+    done, was_imported = typed("train", "--out", "run", "--resume", "--budget", 512)
+    assert done.returncode == 2
+    assert not was_imported
+    assert "--features my_parts:Ages --channel my_parts:Lossy again" in done.stderr
+    done, _ = typed("train", "--out", "run", "--resume", "--budget", 512, *OWN)
+    assert done.returncode == 0, done.stderr
+    curves = []
+    for name in ("run", "w"):
+        with (trained / name / "curve.csv").open() as file:
+            rows = list(csv.DictReader(file))
+        timed = [column for column in rows[0] if "minutes" in column or "per_s" in column]
+        curves.append([row | dict.fromkeys(timed, "") for row in rows])
+    assert curves[0] == curves[1]
+    (ours, config), (its, _) = (read_weights(trained / name) for name in ("run", "w"))
+    assert all(np.array_equal(ours[name], its[name]) for name in ours)
+    assert (config.features, config.network.num_features) == ("my_parts:Ages", 2)
+
+
+FLY = ("fly", "--policy", "w", "--robots", 5, "--windows", 10, "--no-record")
+
+
+def test_a_policys_features_are_loaded_only_if_its_user_names_them(typed):
+    done, was_imported = typed(*FLY)
+    assert done.returncode == 2
+    assert not was_imported
+    assert "add --features my_parts:Ages" in done.stderr
+    done, was_imported = typed(*FLY, "--features", "my_parts:Ages")
+    assert done.returncode == 0, done.stderr
+    assert was_imported
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (*FLY, "--features", "my_parts:Other"),
+        ("evaluate", "--policy", "w", "--robots", 5, "--episodes", 1),
+        ("train", "--init", "w", "--out", "next", "--robots", 5),
+        ("policies", "w"),
+    ],
+)
+def test_a_folder_never_names_what_is_imported(typed, arguments):
+    done, was_imported = typed(*arguments)
+    assert done.returncode == 2
+    assert not was_imported
+    assert done.stderr.count("error:") == 1
+
+
+def test_an_evaluation_loads_them_in_every_process(typed):
+    done, _ = typed(
+        *("evaluate", "--policy", "w", "tdma", "--features", "my_parts:Ages"),
+        *("--robots", 5, "--windows", 10, "--episodes", 2, "--jobs", 2),
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_class_that_has_changed_does_not_fit_the_network(typed, trained):
+    (trained / "my_other.py").write_text(PARTS.replace('"is oneself")', '"is oneself", "third")'))
+    weights, config = read_weights(trained / "w")
+    save_weights(trained / "other", weights, replace(config, features="my_other:Ages"))
+    done, _ = typed("fly", "--policy", "./other", *FLY[3:], "--features", "my_other:Ages")
+    assert done.returncode == 2
+    assert "was trained on 2 features, and my_other:Ages now has 3" in done.stderr

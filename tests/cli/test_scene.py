@@ -9,9 +9,8 @@ from swarm_mj.simulation.swarm import Swarm
 
 
 @pytest.mark.parametrize("seed", [1, 5])
-def test_scene_writes_a_model_that_mujoco_opens_at_the_start_that_fly_has(swarm_mj, tmp_path, seed):
-    done = swarm_mj("scene", "--task", "random-walk", "--seed", seed, "--out", "scene.xml")
-    assert done.returncode == 0, done.stderr
+def test_scene_writes_a_model_that_mujoco_opens_at_the_start_that_fly_has(succeed, tmp_path, seed):
+    done = succeed("scene", "--task", "random-walk", "--seed", seed, "--out", "scene.xml")
     assert "40 robots" in done.stdout
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))
     assert model.nq == model.nv == model.nu == 80
@@ -22,11 +21,11 @@ def test_scene_writes_a_model_that_mujoco_opens_at_the_start_that_fly_has(swarm_
     np.testing.assert_allclose(model.key_qvel[0].reshape(40, 2), flown.velocity_mps[0], atol=1e-5)
 
 
-def test_scene_does_not_replace_a_file_unasked(swarm_mj, refusal, tmp_path):
+def test_scene_does_not_replace_a_file_unasked(succeed, refusal, tmp_path):
     (tmp_path / "scene.xml").write_text("mine")
     assert "scene.xml exists" in refusal("scene")
     assert (tmp_path / "scene.xml").read_text() == "mine"
-    assert swarm_mj("scene", "--force", "--robots", 3).returncode == 0
+    succeed("scene", "--force", "--robots", 3)
 
 
 def test_scene_refuses_bad_input(refusal):

@@ -179,7 +179,7 @@ def test_every_new_evaluation_is_a_line_and_those_of_earlier_sessions_are_not():
     better = ROW | {"decisions": 3000.0, "aoi": 25.0, "objective": 0.5}
     better |= {"aoi_spatial_tdma": 21.0, "aoi_greedy_oracle": 12.0}
     curves = ([ROW], [ROW, worse], [ROW, worse], [ROW, worse, better])
-    statuses = [status(1_000 * n, n, curve) for n, curve in enumerate(curves, start=1)]
+    statuses = [status(1_000 * n, float(n), curve) for n, curve in enumerate(curves, start=1)]
     shown, answers, _ = heard_by(lambda: False, statuses)
     first, second = (" ".join(line.split()) for line in shown.splitlines())
     assert first == "2,000 decisions 0.5 min held-out age 35.00 ± 0.25"
