@@ -10,7 +10,7 @@ from functools import reduce, wraps
 
 from beartype import beartype
 
-CHECKED_CALLS = 10  # of each function in a test
+CHECKED_CALLS = 3  # of each function in a test
 
 _calls = Counter()  # in this test, by function; of arguments and of results apart
 _over = []  # the functions that are no longer checked in this test

@@ -86,22 +86,21 @@ class DoubleBroadcast:
         now: Float[np.ndarray, "B"],
     ) -> tuple[Phase, Phase]:
         """Play one window; arguments as in `RequestResponse`."""
+        recipient = self._addressed(decide(()))
+        states, t, noted = move(), now + SLOT_WINDOWS, self.silence_is_attempt
+        first = transmit(buffers, states, recipient, channel, t, silence_is_attempt=noted)
 
-        def broadcast(states: RobotStates, recipient: np.ndarray, slot: int) -> Phase:
-            if self.needs_addressees:
-                next_identity = (np.arange(recipient.shape[1]) + 1) % recipient.shape[1]
-                recipient = np.where(recipient == BROADCAST, next_identity, recipient)
-            t, noted = now + slot * SLOT_WINDOWS, self.silence_is_attempt
-            return transmit(buffers, states, recipient, channel, t, silence_is_attempt=noted)
-
-        recipient = decide(())
-        states = move()
-        first = broadcast(states, recipient, 1)
-
-        recipient = decide((first,))
+        recipient = self._addressed(decide((first,)))
         if self.moves_each_slot:
             states = move()
-        return first, broadcast(states, recipient, 2)
+        t = now + 2.0 * SLOT_WINDOWS
+        return first, transmit(buffers, states, recipient, channel, t, silence_is_attempt=noted)
+
+    def _addressed(self, recipient: Int[np.ndarray, "B N"]) -> Int[np.ndarray, "B N"]:
+        if not self.needs_addressees:
+            return recipient
+        next_identity = (np.arange(recipient.shape[1]) + 1) % recipient.shape[1]
+        return np.where(recipient == BROADCAST, next_identity, recipient)
 
 
 WindowProtocol = RequestResponse | DoubleBroadcast  # a policy chooses one

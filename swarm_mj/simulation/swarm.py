@@ -212,15 +212,7 @@ class Swarm:
     ) -> WindowCosts:
         """Fly one window of this protocol."""
         start, self.is_broadcast = self.now, window.is_broadcast
-
-        # Annotated in plain types: those of jaxtyping would be made anew in every window.
-        def decide_after(phases: tuple[Phase, ...]) -> np.ndarray:
-            if phases:  # a later slot is decided by its own clock, and knows the earlier one
-                self.phases, self.now = phases, start + len(phases) * SLOT_WINDOWS
-            recipient, may_broadcast = np.asarray(decide()), window.is_broadcast
-            check_robots("recipient", recipient, self.buffers.shape, may_broadcast=may_broadcast)
-            return recipient
-
+        decide_after = partial(self._decide_after, decide, window.is_broadcast, start)
         survivors, is_due = self._survivors, start[0] >= self.mission.failure_window
         if survivors is not None and is_due and self.states.is_active is None:
             self._physics.deactivate(survivors)
@@ -228,6 +220,21 @@ class Swarm:
         self.now = start + 1.0
         flown, cost = (self.buffers, self.states, self.phases, self.now), self._task_cost()
         return window_costs(*flown, is_broadcast=window.is_broadcast, task_cost=cost)
+
+    # Not within `_play`: tests, which check types, would wrap it anew in every window.
+    def _decide_after(
+        self,
+        decide: Callable[[], Int[np.ndarray, "B N"]],
+        may_broadcast: bool,
+        start: Float[np.ndarray, "B"],
+        phases: tuple[Phase, ...],
+    ) -> np.ndarray:
+        """Return the recipients in the slot after these."""
+        if phases:  # a later slot is decided by its own clock, and knows the earlier one
+            self.phases, self.now = phases, start + len(phases) * SLOT_WINDOWS
+        recipient = np.asarray(decide())
+        check_robots("recipient", recipient, self.buffers.shape, may_broadcast=may_broadcast)
+        return recipient
 
     def _task_cost(self) -> TaskCost | None:
         """Return what the task costs now, where the controller has a cost."""
