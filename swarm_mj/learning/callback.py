@@ -1,5 +1,6 @@
-"""PPO's callback during a run: held-out evaluations, the best policy, checkpoints, replays."""
+"""A session of a run: PPO's loop, held-out evaluations, the best policy, checkpoints, replays."""
 
+import math
 import time
 from dataclasses import asdict
 from functools import partial
@@ -35,11 +36,11 @@ OPTIMISER = (
 
 
 class Stopped(Exception):  # noqa: N818 - nothing went wrong
-    """Stopped by a limit or the caller; state saved."""
+    """Ends an evaluation that the listener does not wait for."""
 
 
 class TrainingCallback(BaseCallback):
-    """One session of a run; PPO calls it, and waits for it between rollouts."""
+    """One session of a run; PPO calls it after every window of a rollout."""
 
     def __init__(
         self,
@@ -70,12 +71,21 @@ class TrainingCallback(BaseCallback):
         """Minutes of all sessions so far."""
         return self._progress.minutes + (time.monotonic() - self._counted_s) / 60.0
 
-    def _on_rollout_start(self) -> None:
-        is_last = self._is_time() or not self._goes_on
-        # Less --patience may end a run between evaluations: the last weights are judged first.
-        self.between_rollouts(is_last=is_last or self._has_stalled())
-        if is_last or not self._goes_on or self._has_stalled():
-            raise Stopped
+    def learn(self) -> None:
+        """Alternate rollouts and PPO's passes over them until a limit, or the listener, ends it."""
+        model, budget = self._ppo, self._limits.decisions or math.inf
+        model._setup_learn(0, self, reset_num_timesteps=model.num_timesteps == 0)
+        # PPO's own loop knows no minutes and no stall, and would dump its logs by itself.
+        while True:
+            is_last = self.decisions >= budget or self._is_time() or not self._goes_on
+            # Less --patience may end a run between evaluations: the last weights are judged first.
+            self.between_rollouts(is_last=is_last or self._has_stalled())
+            if is_last or not self._goes_on or self._has_stalled():
+                return
+            env = model.get_env()
+            assert env is not None
+            model.collect_rollouts(env, self, model.rollout_buffer, model.n_steps)
+            model.train()
 
     def _has_stalled(self) -> bool:
         return selection.has_stalled(self._progress.curve, self._limits.patience)

@@ -1,6 +1,5 @@
 """The training run (III-C): PPO's loop from an empty folder or a checkpoint to a stored policy."""
 
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +8,11 @@ from stable_baselines3.common.logger import configure
 
 from swarm_mj.learning import checkpoint, run_folder
 from swarm_mj.learning.actor_critic import GnnActorCritic
-from swarm_mj.learning.callback import Stopped, TrainingCallback
-from swarm_mj.learning.graph_vec_env import env_of
+from swarm_mj.learning.callback import TrainingCallback
 from swarm_mj.learning.ppo import make_model
-from swarm_mj.learning.run_folder import CHECKPOINT, INIT, SETTINGS, Limits, Progress, TrainingRun
+from swarm_mj.learning.run_folder import CHECKPOINT, INIT, SETTINGS, Progress, TrainingRun
 from swarm_mj.policies.stored import read_policy, save_policy
 from swarm_mj.system.outputs import owned
-
-NO_BUDGET = 10**15  # team decisions
 
 
 def train(
@@ -42,26 +38,11 @@ def train(
         model.set_logger(configure(str(folder / run_folder.TENSORBOARD), ["tensorboard"]))
         callback = TrainingCallback(model, run, folder, progress, networks, rng, listener)
         try:
-            with suppress(Stopped):
-                _learn(model, run.limits, callback)
+            callback.learn()
             callback.choose()
         finally:
             model.logger.close()
     return progress
-
-
-def _learn(model: PPO, limits: Limits, callback: TrainingCallback) -> None:
-    env = env_of(model)
-    wanted = -(-(limits.decisions or NO_BUDGET) // env.num_teams) * env.num_envs
-    if wanted > model.num_timesteps:
-        model.learn(
-            wanted - model.num_timesteps,
-            callback=callback,
-            log_interval=NO_BUDGET,  # the callback dumps, with team decisions on the axis
-            reset_num_timesteps=model.num_timesteps == 0,
-        )
-    callback.init_callback(model)
-    callback.between_rollouts(is_last=True)
 
 
 def _begun(
