@@ -136,21 +136,17 @@ def padded(graphs: Sequence[Graphs], num_nodes: int) -> Observation:
 
     Their R rows have M = `num_nodes` nodes, at least as many as the batches'; `has_turn` is [R, 1].
     """
-
-    def rows_of(name: str, fill: int, dtype: type) -> np.ndarray:
-        parts = [getattr(each, name) for each in graphs]
-        for n, part in enumerate(parts):
-            if part.shape[1] < num_nodes:
-                width = [(0, 0), (0, num_nodes - part.shape[1]), (0, 0)][: part.ndim]
-                parts[n] = np.pad(part, width, constant_values=fill)
-        return np.concatenate(parts, dtype=dtype)
-
-    return {
-        "node": rows_of("node", 0, np.float32),
-        "parent": rows_of("parent", NO_PARENT, np.int32),
-        "may_address": rows_of("may_address", False, np.bool_),
-        "has_turn": np.concatenate([each.has_turn for each in graphs])[:, None],
+    ends = np.cumsum([len(each.parent) for each in graphs]).tolist()
+    joined = {
+        "node": np.zeros((ends[-1], num_nodes, graphs[0].node.shape[2]), np.float32),
+        "parent": np.full((ends[-1], num_nodes), NO_PARENT, np.int32),
+        "may_address": np.zeros((ends[-1], num_nodes), np.bool_),
     }
+    for each, end in zip(graphs, ends, strict=True):
+        for name, rows in joined.items():
+            part = getattr(each, name)
+            rows[end - len(part) : end, : part.shape[1]] = part
+    return {**joined, "has_turn": np.concatenate([each.has_turn for each in graphs])[:, None]}
 
 
 def _make_batches(training: Training) -> list[MissionBatch]:
