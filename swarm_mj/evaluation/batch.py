@@ -1,16 +1,18 @@
 """A batch of missions: one policy in one regime, flown side by side, and what each cost."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.evaluation.lower_bound import ConnectivityFloor
+from swarm_mj.evaluation.lower_bound import share_connected
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components, one_line_each
 from swarm_mj.policies.policy import Parameters, Policy
 from swarm_mj.policies.registry import make_policy
+from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.window import SLOT_WINDOWS
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import radio_of
@@ -33,7 +35,7 @@ class Batch:
     components: Components = Components()  # by name, as they are made in other processes
     parameters: Parameters | None = None  # what it must have, where that is known
     mission: Mission
-    seeds: tuple[int, ...] = ()  # one per mission
+    seeds: Sequence[int] = ()  # one per mission
 
     def made(self) -> Policy:
         """Make the batch's policy."""
@@ -77,68 +79,51 @@ def fly_batch(batch: Batch) -> BatchCosts:
         raise ValueError(
             f"policy {batch.policy} has changed since the evaluation began; evaluate a copy of it"
         )
-    tally = Tally(swarm)
-    for flown in rollout(swarm, policy):
-        tally.add(flown)
-    return tally.costs()
+    return costs_of(swarm, rollout(swarm, policy))
 
 
-class Tally:
-    """Adds up what missions cost while they are flown.
+def costs_of(swarm: Swarm, flown: Iterable[WindowRecord]) -> BatchCosts:
+    """Add up what a swarm's missions cost while all their windows are flown.
 
     Sums run window by window, so they round alike whatever the number of missions.
     """
-
-    def __init__(self, swarm: Swarm) -> None:
-        """Start at nothing; the swarm is at the start of its missions."""
-        mission, num_missions = swarm.mission, len(swarm.now)
-        self._swarm = swarm
-        self._floor: ConnectivityFloor | None = None  # it uses the mission's own range
-        if isinstance(swarm.channel, FreeSpaceRadio) and swarm.channel == radio_of(mission):
-            self._floor = ConnectivityFloor(num_missions, mission.num_robots, mission.range_m)
-        self._num_steady = mission.num_windows - mission.num_windows // 2
-        sums = (*MEANS, "aoi_steady", "aoi_floor", *TOTALS)
-        self._sums = {name: np.zeros(num_missions) for name in sums}
-        self._task_cost, self._last_task_cost = np.full((2, num_missions), np.nan)
-        self._complete = np.full(num_missions, np.inf)
-        self._ages = np.zeros(round(mission.num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
-
-    def add(self, flown: WindowRecord) -> None:
-        """Add a window; the swarm stands at its end."""
-        swarm, costs, states = self._swarm, flown.costs, self._swarm.states
+    mission, shape = swarm.mission, swarm.states.position_m.shape[:2]
+    num_windows, num_steady = mission.num_windows, mission.num_windows - mission.num_windows // 2
+    # The floor is by the mission's own range, which other channels need not have.
+    has_floor = isinstance(swarm.channel, FreeSpaceRadio) and swarm.channel == radio_of(mission)
+    shared = np.full_like(swarm.buffers.timestamp, NEVER)
+    names = (*MEANS, "aoi_steady", "aoi_floor", "task_cost", *TOTALS)
+    sums = {name: np.zeros(shape[0]) for name in names}
+    complete, last_task_cost = np.full(shape[0], np.inf), np.full(shape[0], np.nan)
+    ages = np.zeros(round(num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
+    for window in flown:
+        costs, states, now = window.costs, swarm.states, swarm.now
         # Always an array, so that the loops below are compiled for one kind of arguments.
-        is_active = np.ones(states.position_m.shape[:2], dtype=np.bool_)
-        if states.is_active is not None:
-            is_active = states.is_active
-        is_steady = swarm.now[0] > swarm.mission.num_windows - self._num_steady
-        self._sums["aoi"] += costs.age_windows
-        self._sums["aoi_steady"] += costs.age_windows * is_steady
-        self._sums["velocity_variance"] += costs.velocity_variance_m2ps2
-        self._sums["hops"] += flown.hops
-        floor = self._floor.next(states.position_m, swarm.now, is_active) if self._floor else np.nan
-        self._sums["aoi_floor"] += floor
-        for name in TOTALS:
-            self._sums[name] += getattr(costs.packets, name)
-        if costs.task_cost is not None:
-            self._last_task_cost = costs.task_cost.value
-            self._task_cost = np.nan_to_num(self._task_cost) + costs.task_cost.value
-        complete = np.where(costs.is_complete, swarm.now, np.inf)
-        np.minimum(self._complete, complete, out=self._complete)
-        count_ages(swarm.buffers.timestamp, swarm.now, self._ages, is_active)
-
-    def costs(self) -> BatchCosts:
-        """Return what the missions cost, all windows of them flown."""
-        sums, num_windows = self._sums, self._swarm.mission.num_windows
-        own: dict[str, Any] = {f"packets_{name}": _known(sums[name], int) for name in TOTALS}
-        own |= {name: _known(sums[name] / num_windows, float) for name in (*MEANS, "aoi_floor")}
-        return BatchCosts(
-            **own,
-            aoi_steady=(sums["aoi_steady"] / self._num_steady).tolist(),
-            task_cost=_known(self._task_cost / num_windows, float),
-            task_cost_last=_known(self._last_task_cost, float),
-            complete_window=_known(self._complete, int),
-            ages=self._ages.tolist(),
+        is_on = np.ones(shape, np.bool_) if states.is_active is None else states.is_active
+        sums["aoi"] += costs.age_windows
+        sums["aoi_steady"] += costs.age_windows * (now[0] > num_windows - num_steady)
+        sums["aoi_floor"] += (
+            share_connected(shared, states.position_m, mission.range_m, now, is_on)
+            if has_floor
+            else np.nan
         )
+        sums["velocity_variance"] += costs.velocity_variance_m2ps2
+        sums["hops"] += window.hops
+        last_task_cost = costs.task_cost.value if costs.task_cost else last_task_cost
+        sums["task_cost"] += last_task_cost
+        for name in TOTALS:
+            sums[name] += getattr(costs.packets, name)
+        complete = np.minimum(complete, np.where(costs.is_complete, now, np.inf))
+        count_ages(swarm.buffers.timestamp, now, ages, is_on)
+    means = (*MEANS, "aoi_floor", "task_cost")
+    own: dict[str, Any] = {f"packets_{name}": _known(sums[name], int) for name in TOTALS}
+    return BatchCosts(
+        **own | {name: _known(sums[name] / num_windows, float) for name in means},
+        aoi_steady=(sums["aoi_steady"] / num_steady).tolist(),
+        task_cost_last=_known(last_task_cost, float),
+        complete_window=_known(complete, int),
+        ages=ages.tolist(),
+    )
 
 
 def _known(costs: Float[np.ndarray, "B"], kind: type) -> list[Any]:

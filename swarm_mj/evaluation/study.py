@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -104,14 +104,11 @@ class Study:
     def batches(self) -> tuple[Batch, ...]:
         """All the work, pair by pair, in the order of the seeds."""
         seeds = range(self.seed, self.seed + self.episodes)
+        parts = [seeds[start : start + BATCH_SIZE] for start in range(0, len(seeds), BATCH_SIZE)]
         return tuple(
-            replace(
-                self._batch(policy, regime),
-                parameters=self.parameters[regime, policy],
-                seeds=tuple(seeds[start : start + BATCH_SIZE]),
-            )
+            self._batch(policy, regime, parameters=self.parameters[regime, policy], seeds=part)
             for regime, policy in self.pairs
-            for start in range(0, self.episodes, BATCH_SIZE)
+            for part in parts
         )
 
     @cached_property
@@ -125,7 +122,7 @@ class Study:
         made.packet(regime)
         return made
 
-    def _batch(self, policy: str, regime: Mission) -> Batch:
+    def _batch(self, policy: str, regime: Mission, **work: Any) -> Batch:
         return Batch(
             policy=policy,
             probability=self.probability,
@@ -133,6 +130,7 @@ class Study:
             features=self.features,
             components=self.components,
             mission=regime,
+            **work,
         )
 
     def task_cost(self, regime: Mission) -> tuple[str, str] | None:

@@ -22,11 +22,60 @@ NUM_WINDOWS, NUM_ROBOTS = 40, 6
 BUFFERS = ("timestamp", "position_m", "velocity_mps", "parent", "last_attempt")
 
 
-class Flown:
+def begun(env, seed=None, **options):
+    env.reset(seed=seed, **options)
+    return env
+
+
+def in_parallel(env, recipient):
+    rewards = set(env.step({agent: recipient[int(agent[6:])] for agent in env.agents})[1].values())
+    assert len(rewards) == 1  # a team is paid alike
+    return rewards.pop()
+
+
+def by_name(mission, seed):
+    """In Gymnasium's registry, in all of its wrappers."""
+    register_environments()
+    return begun(gymnasium.make("swarm_mj/Flocking-v0", mission=mission), seed)
+
+
+def through_dm_control(mission, seed):
+    environment = make_environment(mission, seed)
+    environment.reset()
+    return environment
+
+
+# How to begin a mission, to play a window for its reward, and to find its swarm.
+SINGLE = {
+    "gymnasium": (
+        lambda mission, seed: begun(SwarmEnv(mission), seed),
+        lambda env, recipient: env.step(recipient)[1],
+        lambda env: env.batch.swarm,
+    ),
+    "by name": (
+        by_name,
+        lambda env, recipient: env.step(recipient)[1],
+        lambda env: env.unwrapped.batch.swarm,
+    ),
+    "pettingzoo": (
+        lambda mission, seed: begun(parallel_env(mission), seed),
+        in_parallel,
+        lambda env: env.batch.swarm,
+    ),
+    "dm_control": (
+        through_dm_control,
+        lambda env, recipient: env.step(recipient).reward,
+        lambda env: env.physics.swarm,
+    ),
+}
+
+
+class Singles:
     """Missions of one environment each."""
 
-    def __init__(self, mission):
-        self.envs = [self.make(mission, seed) for seed in SEEDS]
+    def __init__(self, mission, face):
+        make, self.play, self.swarm = SINGLE[face]
+        self.envs = [make(mission, seed) for seed in SEEDS]
 
     def step(self, recipient):
         return [self.play(env, each) for env, each in zip(self.envs, recipient, strict=True)]
@@ -35,90 +84,25 @@ class Flown:
         return [(self.swarm(env), 0) for env in self.envs]
 
 
-class Single(Flown):
-    def make(self, mission, seed):
-        env = SwarmEnv(mission)
-        env.reset(seed=seed)
-        return env
-
-    def play(self, env, recipient):
-        return env.step(recipient)[1]
-
-    def swarm(self, env):
-        return env.unwrapped.batch.swarm
-
-
-class Made(Single):
-    """By its name in Gymnasium's registry, in all of its wrappers."""
-
-    def make(self, mission, seed):
-        register_environments()
-        env = gymnasium.make("swarm_mj/Flocking-v0", mission=mission)
-        env.reset(seed=seed)
-        return env
-
-
-class Parallel(Flown):
-    def make(self, mission, seed):
-        env = parallel_env(mission)
-        env.reset(seed=seed)
-        return env
-
-    def play(self, env, recipient):
-        actions = {agent: recipient[int(agent[6:])] for agent in env.agents}
-        rewards = set(env.step(actions)[1].values())
-        assert len(rewards) == 1  # a team is paid alike
-        return rewards.pop()
-
-    def swarm(self, env):
-        return env.batch.swarm
-
-
-class DmControl(Flown):
-    def make(self, mission, seed):
-        env = make_environment(mission, seed)
-        env.reset()
-        return env
-
-    def play(self, env, recipient):
-        return env.step(recipient).reward
-
-    def swarm(self, env):
-        return env.physics.swarm
-
-
 class Vector:
-    def __init__(self, mission):
-        self.env = SwarmVectorEnv(2, mission)
-        self.env.reset(seed=SEEDS[0])
+    """Missions of one environment, which begin together or each in a group of its own."""
+
+    def __init__(self, mission, face):
+        self.env = begun(SwarmVectorEnv(2, mission), SEEDS[0])
+        if face == "vector, masked":
+            options = {"reset_mask": np.array([False, True])}
+            begun(self.env, list(SEEDS), options=options)
 
     def step(self, recipient):
         return self.env.step(recipient)[1]
 
     def swarms(self):
-        (group,) = self.env._groups
-        return [(group.batch.swarm, 0), (group.batch.swarm, 1)]
+        return [(group.batch.swarm, row) for group in self.env._groups for row in group.rows]
 
 
-class MaskedVector(Vector):
-    """Missions that began at different times, each in a group of its own."""
-
-    def __init__(self, mission):
-        self.env = SwarmVectorEnv(2, mission)
-        self.env.reset(seed=SEEDS[0])
-        mask = np.array([False, True])
-        self.env.reset(seed=list(SEEDS), options={"reset_mask": mask})
-
-    def swarms(self):
-        groups = self.env._groups
-        return [(g.batch.swarm, row) for g in groups for row in g.rows]
-
-
-class Sb3Robots:
-    agent = "robot"
-
-    def __init__(self, mission):
-        self.env = make_vec_env(mission, 2, seed=SEEDS[0], agent=self.agent)
+class Sb3:
+    def __init__(self, mission, face):
+        self.env = make_vec_env(mission, 2, seed=SEEDS[0], agent=face.partition(" ")[2])
         self.env.reset()
 
     def step(self, recipient):
@@ -126,27 +110,23 @@ class Sb3Robots:
         return reward.reshape(2, -1)[:, 0]
 
     def swarms(self):
-        swarm = self.env.batches[0].swarm
-        return [(swarm, 0), (swarm, 1)]
+        return [(self.env.batches[0].swarm, row) for row in (0, 1)]
 
 
-class Sb3Teams(Sb3Robots):
-    agent = "team"
-
-
-FACES = [Single, Made, Parallel, DmControl, Vector, MaskedVector, Sb3Robots, Sb3Teams]
+FACES = dict.fromkeys(SINGLE, Singles)
+FACES |= {"vector": Vector, "vector, masked": Vector, "sb3 robot": Sb3, "sb3 team": Sb3}
 
 
 @pytest.mark.parametrize("numbers", [{}, {"failure_fraction": 0.3, "physics": "contact"}])
 @pytest.mark.parametrize("face", FACES)
 def test_every_face_flies_the_same_missions(face, numbers):
     mission = paper("flocking", num_robots=NUM_ROBOTS, range_ratio=0.4, num_windows=50, **numbers)
-    flown, swarm = face(mission), Swarm(mission, SEEDS)
+    flown, swarm = FACES[face](mission, face), Swarm(mission, SEEDS)
     shape = (NUM_WINDOWS, 2, NUM_ROBOTS)
     for recipient in np.random.default_rng(2).integers(0, NUM_ROBOTS, shape):
         reward = flown.step(recipient)
         costs = swarm.step_with_recipients(recipient)
-        exact = np.float32 if isinstance(flown, Sb3Robots) else np.float64
+        exact = np.float32 if isinstance(flown, Sb3) else np.float64
         np.testing.assert_array_equal(reward, -costs.age_windows.astype(exact))
         for b, (other, row) in enumerate(flown.swarms()):
             for name in BUFFERS:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarm_mj.evaluation.batch import TOTALS, Batch, Tally, count_ages, fly_batch
-from swarm_mj.evaluation.lower_bound import ConnectivityFloor
+from swarm_mj.evaluation.batch import TOTALS, Batch, costs_of, count_ages, fly_batch
+from swarm_mj.evaluation.lower_bound import share_connected
 from swarm_mj.mission import paper
 from swarm_mj.mission.placement import is_connected
 from swarm_mj.policies.registry import make_policy
@@ -70,9 +70,9 @@ def test_the_floor_is_the_age_that_falling_apart_leaves():
 
 def test_the_floor_is_that_of_the_robots_that_are_on():
     mission = small("stationary", num_robots=12, failure_fraction=0.6)
-    swarm, by_hand = Swarm(mission, SEEDS), ConnectivityFloor(3, 12, mission.range_m)
+    swarm, known, range_m = Swarm(mission, SEEDS), np.zeros((3, 12, 12)), mission.range_m
     floors = [
-        by_hand.next(swarm.states.position_m, swarm.now, active(swarm))
+        share_connected(known, swarm.states.position_m, range_m, swarm.now, active(swarm))
         for _ in rollout(swarm, make_policy("mst", mission))
     ]
     floor = fly_batch(batch(mission)).aoi_floor
@@ -116,7 +116,5 @@ def test_over_a_custom_channel_there_is_no_floor():
         (lambda *given: radio(*given), [None]),
     ):
         swarm = Swarm(mission, [1], channel=channel)
-        tally = Tally(swarm)
-        for flown in rollout(swarm, make_policy("mst", mission)):
-            tally.add(flown)
-        assert tally.costs().aoi_floor == expected
+        costs = costs_of(swarm, rollout(swarm, make_policy("mst", mission)))
+        assert costs.aoi_floor == expected

@@ -20,25 +20,13 @@ def some_result(policy, aoi_mean, **overrides):
 
 
 NOTHING = {spec.name: None for spec in fields(Result) if type(None) in get_args(spec.type)}
-LARGEST = {
-    "aoi_sem": 12.345,
-    "aoi_ci_low": 100.001,
-    "aoi_ci_high": 222.222,
-    "aoi_median": 123.456,
-    "aoi_p95": 234.567,
-    "aoi_difference_mean": -123.456,
-    "aoi_difference_ci_low": -222.222,
-    "aoi_difference_ci_high": -111.111,
-    "velocity_variance_mean": 12.3456,
-    "packets_per_window": 79.987,
-    "packet_bytes": 164_283,
-    "bytes_per_second": 11_111_111.1,
-    "heard_ratio": 1.0,
-    "hearers_per_packet": 39.125,
-    "payload": "snapshots",
-    "published_aoi_mean": 115.7268,
-    "published_aoi_sem": 12.964,
-}
+LARGEST = dict.fromkeys(("aoi_sem", "published_aoi_sem", "velocity_variance_mean"), 12.345)
+LARGEST |= dict.fromkeys(("aoi_median", "aoi_p95", "published_aoi_mean"), 115.7268)
+LARGEST |= {"aoi_ci_low": 100.001, "aoi_ci_high": 222.222}
+LARGEST |= {"packet_bytes": 164_283, "bytes_per_second": 11_111_111.1, "payload": "snapshots"}
+LARGEST |= {"heard_ratio": 1.0, "packets_per_window": 79.987, "hearers_per_packet": 39.125}
+LARGEST |= {"aoi_difference_mean": -123.456}
+LARGEST |= {"aoi_difference_ci_low": -222.222, "aoi_difference_ci_high": -111.111}
 
 
 @pytest.fixture
@@ -62,7 +50,7 @@ def test_the_largest_numbers_are_whole_at_100_columns(printed, columns):
     assert max(map(len, lines)) <= 100
     text = "\n".join(lines)
     assert "…" not in text
-    for number in ("123.46 ± 12.35", "100.00, 222.22", "-222.22, -111.11", "115.73 ± 12.96"):
+    for number in ("123.46 ± 12.35", "100.00, 222.22", "-222.22, -111.11", "115.73 ± 12.35"):
         assert number in text
 
 

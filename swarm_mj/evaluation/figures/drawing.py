@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 from scipy.optimize import isotonic_regression
 
-from swarm_mj.evaluation.figures.contents import Panel, ResultFigure, Scale
+from swarm_mj.evaluation.figures.contents import Panel, ResultFigure
 from swarm_mj.evaluation.figures.curves import Curve, budgets, curves, results_of
 from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, look_of, styled, write_caption
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
@@ -57,6 +57,7 @@ def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
             _set_axes(axes, figure, panel, its)
             for curve in its:
                 _draw_curve(axes, curve)
+            axes.autoscale_view()  # or else the names would be placed by the limits before
             name_ends(axes, its)
         grid[-1, 0].set_xlabel(figure.x_label)
         _head(drawing, figure, found, height_in)
@@ -107,13 +108,10 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
 
 
 def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, its: Sequence[Curve]) -> None:
-    """Set scales, limits and ticks, which the names of curves depend on."""
+    """Set scales, margins and ticks, which the names of curves depend on."""
     axes.set(xscale=figure.x_scale, yscale=panel.scale)
+    axes.margins(0.03, HEADROOM)
     x = np.concatenate([curve.x for curve in its])
-    y = np.concatenate([curve.mean + way * curve.sem for curve in its for way in (-1.0, 0.0, 1.0)])
-    y = y[(y > 0.0) if panel.scale == "log" else np.isfinite(y)]
-    axes.set_xlim(*_widened(x, 0.03, figure.x_scale))
-    axes.set_ylim(*_widened(y, HEADROOM, panel.scale))
     axes.xaxis.set_major_locator(FixedLocator(np.unique(x).tolist()))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter(PLAIN)
@@ -122,15 +120,6 @@ def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, its: Sequence[Curv
         axes.yaxis.set_minor_locator(NullLocator())
         axes.yaxis.set_major_formatter(PLAIN)
     axes.set_title(panel.label)
-
-
-def _widened(values: Float[np.ndarray, "V"], share: float, scale: Scale) -> tuple[float, float]:
-    """Return limits that leave a share of the axis free at either end."""
-    low, high = float(np.min(values)), float(np.max(values))
-    if scale == "log":
-        factor = (high / low) ** share
-        return low / factor, high * factor
-    return low - share * (high - low), high + share * (high - low)
 
 
 def _head(

@@ -37,11 +37,6 @@ class Snapshot(NamedTuple):
         """The distance of each robot's velocity from the team's mean."""
         return np.linalg.norm(self.velocity_mps - np.mean(self.velocity_mps, axis=0), axis=1)
 
-    @property
-    def variance_m2ps2(self) -> float:
-        """The team's velocity variance."""
-        return float(velocity_variance(self.velocity_mps[None])[0])
-
 
 def fly_flock(mission: Mission, policy_name: str, seed: int) -> tuple[Snapshot, Snapshot]:
     """Fly a mission; return the team before its first window and after its last.
@@ -105,7 +100,7 @@ def _draw(axes: Axes, mission: Mission, team: Snapshot, colours: ScalarMappable)
     )
     key_mps = float(f"{fastest_mps:.1g}")
     axes.quiverkey(arrows, 0.8, 1.11, key_mps, f"{key_mps:g} m/s", labelpos="E", color=FAINT)
-    variance = _power(team.variance_m2ps2)
+    variance = _power(float(velocity_variance(team.velocity_mps[None])[0]))
     axes.set_title(f"after {team.time_s:g} s\nvelocity variance {variance} m²/s²")
     axes.set_xlabel("x [km]")
 

@@ -31,7 +31,6 @@ def test_disagreement_is_the_distance_from_the_mean_velocity():
     mean = sum(start.velocity_mps) / 6
     apart = [np.hypot(*(velocity - mean)) for velocity in start.velocity_mps]
     np.testing.assert_allclose(start.disagreement_mps, apart)
-    assert start.variance_m2ps2 == pytest.approx(np.mean(np.square(apart)))
 
 
 def test_arrows_stand_at_the_robots_and_point_where_they_go():
