@@ -9,8 +9,7 @@ import copy
 import numpy as np
 
 from swarm_mj.mission import paper
-from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.protocol.window import Phase
+from swarm_mj.protocol.window import LocalViews, Phase
 from swarm_mj.simulation.swarm import Swarm
 
 NUM_ROBOTS, NUM_WINDOWS, SEEDS = 7, 60, (3, 4)

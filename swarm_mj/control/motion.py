@@ -132,10 +132,8 @@ def flocking(
     other than 0 in the buffer (`moving`, the authors' code). The robot itself is in it; while F is
     empty the acceleration is 0.
     """
-    acceleration = np.zeros_like(velocity_mps)
     is_counted = None if flocking_set == "moving" else buffers.is_known
-    _mean_difference(is_counted, buffers.velocity_mps, velocity_mps, acceleration)
-    return acceleration
+    return _mean_difference(is_counted, buffers.velocity_mps, velocity_mps)
 
 
 @compiled()
@@ -143,9 +141,9 @@ def _mean_difference(
     is_counted: Bool[np.ndarray, "B N N"] | None,
     known_mps: Float[np.ndarray, "B N N 2"],
     velocity_mps: Float[np.ndarray, "B N 2"],
-    acceleration: Float[np.ndarray, "B N 2"],
-) -> None:
+) -> Float[np.ndarray, "B N 2"]:
     num_missions, num_robots = known_mps.shape[:2]
+    acceleration = np.zeros_like(velocity_mps)
     for b in range(num_missions):
         for i in range(num_robots):
             for axis in range(2):
@@ -157,3 +155,4 @@ def _mean_difference(
                         num_counted += 1
                 if num_counted:
                     acceleration[b, i, axis] = total / num_counted
+    return acceleration

@@ -2,7 +2,7 @@
 
 from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.policies.registry import POLICIES, make_policy
-from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import LocalViews
 
 __all__ = [
     "POLICIES",

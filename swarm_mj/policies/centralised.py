@@ -9,7 +9,7 @@ from swarm_mj.mission.geometry import ROOT, spanning_tree
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.policy import CentralisedPolicy
 from swarm_mj.policies.random_access import RandomTransmission
-from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import LocalViews
 
 
 class RoundRobin(CentralisedPolicy):

@@ -15,7 +15,7 @@ from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.policy import DecentralisedPolicy, Parameters
 from swarm_mj.policies.policy_config import MlpShape, Weights
-from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.system.compiled import compiled
 
 IMPOSSIBLE = -1e9  # the logit of a recipient that may not be addressed; finite, so that 0 p stays 0

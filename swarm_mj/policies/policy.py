@@ -9,9 +9,8 @@ from jaxtyping import Bool, Int
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST
-from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.packets import Packet, PacketField, fitting, packet_of
-from swarm_mj.protocol.window import DoubleBroadcast, RequestResponse, WindowProtocol
+from swarm_mj.protocol.window import DoubleBroadcast, LocalViews, RequestResponse, WindowProtocol
 from swarm_mj.radio.mission_radio import Belief, TrueLinks
 from swarm_mj.system.fields import name_of
 

@@ -13,8 +13,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.policies.policy import BroadcastPolicy, Parameters, Policy
-from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.protocol.window import DoubleBroadcast, WindowProtocol
+from swarm_mj.protocol.window import DoubleBroadcast, LocalViews, WindowProtocol
 from swarm_mj.system.compiled import compiled
 
 

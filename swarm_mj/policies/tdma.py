@@ -9,8 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.policies.policy import BroadcastPolicy
-from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.protocol.window import SLOT_WINDOWS
+from swarm_mj.protocol.window import SLOT_WINDOWS, LocalViews
 from swarm_mj.radio.mission_radio import Belief
 from swarm_mj.radio.power_law import PowerLaw
 from swarm_mj.radio.spatial_reuse import keep_joined, known_powers

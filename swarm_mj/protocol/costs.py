@@ -61,19 +61,16 @@ def velocity_variance(
     velocity_mps: Float[np.ndarray, "B N 2"], is_active: Bool[np.ndarray, "B N"] | None = None
 ) -> Float[np.ndarray, "B"]:
     """Return the velocity variance of the active team, per mission [m²/s²] (Eq. 17)."""
-    num_missions, num_robots = velocity_mps.shape[:2]
-    variance = np.empty(num_missions)
-    for b in range(num_missions):
-        total = 0.0
-        num_active = num_robots if is_active is None else is_active[b].sum()
+    variance = np.empty(velocity_mps.shape[0])
+    for b in range(velocity_mps.shape[0]):
+        active_mps = velocity_mps[b] if is_active is None else velocity_mps[b][is_active[b]]
+        total, num_active = 0.0, active_mps.shape[0]
         for axis in range(2):
             mean = 0.0
-            for i in range(num_robots):
-                if is_active is None or is_active[b, i]:
-                    mean += velocity_mps[b, i, axis] / num_active
-            for i in range(num_robots):
-                if is_active is None or is_active[b, i]:
-                    total += (velocity_mps[b, i, axis] - mean) ** 2
+            for i in range(num_active):
+                mean += active_mps[i, axis] / num_active
+            for i in range(num_active):
+                total += (active_mps[i, axis] - mean) ** 2
         variance[b] = total / num_active
     return variance
 
@@ -166,20 +163,14 @@ def _mean_age(
     now: Float[np.ndarray, "B"],
     is_active: Bool[np.ndarray, "B N"] | None,
 ) -> tuple[Float[np.ndarray, "B"], Bool[np.ndarray, "B"]]:
-    num_missions, num_robots = timestamp.shape[:2]
-    age, is_complete = np.empty(num_missions), np.empty(num_missions, dtype=np.bool_)
-    for b in range(num_missions):
-        total = 0.0
-        num_unknown = 0
-        num_active = num_robots if is_active is None else is_active[b].sum()
-        for i in range(num_robots):
-            if is_active is not None and not is_active[b, i]:
-                continue
-            for j in range(num_robots):
-                if is_active is not None and not is_active[b, j]:
-                    continue
-                total += timestamp[b, i, j]
-                num_unknown += timestamp[b, i, j] <= NEVER
+    age, is_complete = np.empty(len(now)), np.empty(len(now), dtype=np.bool_)
+    for b in range(len(now)):
+        active = timestamp[b] if is_active is None else timestamp[b][is_active[b]][:, is_active[b]]
+        total, num_unknown, num_active = 0.0, 0, active.shape[0]
+        for i in range(num_active):
+            for j in range(num_active):
+                total += active[i, j]
+                num_unknown += active[i, j] <= NEVER
         age[b] = now[b] - total / (num_active * num_active)
         is_complete[b] = num_unknown == 0
     return age, is_complete

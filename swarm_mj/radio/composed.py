@@ -12,11 +12,21 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt64
 
 from swarm_mj.physics.state import ROBOT_HEIGHT_M
-from swarm_mj.radio.fading import NO_FADING, fade, is_in_burst, keyed_uniform, link_key, mixed
+from swarm_mj.radio.fading import (
+    NO_FADING,
+    Waves,
+    draw_waves,
+    fade,
+    follow_robots,
+    is_in_burst,
+    keyed_uniform,
+    link_key,
+    mixed,
+    shadow,
+)
 from swarm_mj.radio.obstruction import obstruct
 from swarm_mj.radio.power_law import PowerLaw, write_path_loss
 from swarm_mj.radio.reception import Air, decoded, incoming_at, silent_air, transmit
-from swarm_mj.radio.shadowing import Waves, draw_waves, follow_robots, shadow
 from swarm_mj.system.compiled import compiled
 
 _FADES, _ERASURES, _BURSTS = np.uint64(1), np.uint64(2), np.uint64(3)  # what a key is used for

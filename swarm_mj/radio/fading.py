@@ -1,16 +1,26 @@
-"""Randomness from slot to slot: fast fading of every link, erasures, and bursts of losses.
+"""Random channels: fast fading, bursts of losses, and log-normal shadowing.
 
-Numbers are drawn by counter: each is a function of a mission's key, the slot, the sender and the
-receiver, not of the order of asking. So a fade does not depend on the missions in the same batch,
-and a slot that is played again meets the same fades. The hash is SplitMix64's finaliser (Steele,
-Lea, Flood 2014), applied once per number taken in. A fade holds for a whole slot and is the same in
-both directions (block fading, reciprocal).
+Fades and bursts are drawn by counter: each number is a function of a mission's key, the slot, the
+sender and the receiver, not of the order of asking. So a fade does not depend on the missions in
+the same batch, and a slot that is played again meets the same fades. The hash is SplitMix64's
+finaliser (Steele, Lea, Flood 2014), applied once per number taken in. A fade holds for a whole slot
+and is the same in both directions (block fading, reciprocal).
+
+Shadowing of links whose two ends both move is correlated in space: Wang, Tameh, Nix: Joint
+shadowing process in urban peer-to-peer radio channels, IEEE Transactions on Vehicular Technology 57
+(2008). It is a sum of sinusoids of the four coordinates of a link's ends. When one end moves by d,
+its correlation falls as exp(-d / d_corr) (Gudmundson 1991), and independently so for the other end.
+Both orders of the ends are added, which makes links the same in both directions.
 """
 
 import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float, Float32
 
+from swarm_mj.radio.free_space import DB_PER_NEPER
 from swarm_mj.system.compiled import compiled
 
 NO_LINE_OF_SIGHT = 0.0  # K of Rayleigh fading, linear
@@ -20,6 +30,8 @@ _WEYL = np.uint64(0x9E3779B97F4A7C15)  # SplitMix64's increment: 2^64 over the g
 _MIX_1, _MIX_2 = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 _S27, _S30, _S31, _S11 = np.uint64(27), np.uint64(30), np.uint64(31), np.uint64(11)
 _UNIT = 2.0**-53
+NUM_WAVES = 64
+STEPS_PER_CORRELATION = 10.0  # places within that share of d_corr count as one
 
 
 @compiled()
@@ -83,3 +95,87 @@ def is_in_burst(key: np.uint64, slot: int, begin: float, end: float) -> bool:
         if u >= 1.0 - end:
             return False
     return keyed_uniform(mixed(key, np.uint64(0))) < begin / (begin + end)
+
+
+class Waves(NamedTuple):
+    """The sinusoids of every mission, and their values where its robots are."""
+
+    first_end: Float[np.ndarray, "B W 2"]  # angular wave numbers [rad/m]
+    other_end: Float[np.ndarray, "B W 2"]  # [rad/m]
+    phase: Float[np.ndarray, "B W"]  # counted to the other end [rad]
+    place: Float[np.ndarray, "B N 2"]  # of each robot, in steps; nan before it has one
+    ends: Float32[np.ndarray, "B N 4 W"]  # cosine and sine at the first end, and at the other
+    step_m: float  # places are rounded to multiples of this
+    std_db: float
+
+
+def draw_waves(
+    std_db: float, correlation_m: float, num_robots: int, rngs: Sequence[np.random.Generator]
+) -> Waves:
+    """Draw every mission's own shadowing, from one generator each.
+
+    Losses have a standard deviation of `std_db`, and `correlation_m` is d_corr. The spectrum of
+    exp(-d / d_corr) in the plane has wave numbers k with the distribution
+    1 - 1 / sqrt(1 + (k d_corr)^2), in all directions alike.
+    """
+
+    def wave_numbers(rng: np.random.Generator) -> Float[np.ndarray, "W 2"]:
+        uniform, angle = rng.random(NUM_WAVES), rng.uniform(0.0, 2.0 * np.pi, NUM_WAVES)
+        number = np.sqrt(1.0 / (1.0 - uniform) ** 2 - 1.0) / correlation_m
+        return number[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+    drawn = [
+        (wave_numbers(rng), wave_numbers(rng), rng.uniform(0.0, 2.0 * np.pi, NUM_WAVES))
+        for rng in rngs
+    ]
+    return Waves(
+        *(np.stack(each) for each in zip(*drawn, strict=True)),
+        place=np.full((len(rngs), num_robots, 2), np.nan),
+        ends=np.empty((len(rngs), num_robots, 4, NUM_WAVES), dtype=np.float32),
+        step_m=correlation_m / STEPS_PER_CORRELATION,
+        std_db=std_db,
+    )
+
+
+@compiled()
+def follow_robots(waves: Waves, b: int, position_m: Float[np.ndarray, "N 2"]) -> None:
+    """Bring the ends of mission b's waves to where its robots are.
+
+    Cosines and sines cost more than all else here, so they are computed once for each place.
+    """
+    for i in range(position_m.shape[0]):
+        x = np.floor(position_m[i, 0] / waves.step_m + 0.5)
+        y = np.floor(position_m[i, 1] / waves.step_m + 0.5)
+        if x != waves.place[b, i, 0] or y != waves.place[b, i, 1]:
+            waves.place[b, i, 0], waves.place[b, i, 1] = x, y
+            _set_ends(x * waves.step_m, y * waves.step_m, waves, b, waves.ends[b, i])
+
+
+@compiled()
+def _set_ends(
+    x_m: float, y_m: float, waves: Waves, b: int, ends: Float32[np.ndarray, "4 W"]
+) -> None:
+    """Fill `ends` with the cosines and sines of mission b's waves in this place."""
+    first_end, other_end, phase = waves.first_end[b], waves.other_end[b], waves.phase[b]
+    for w in range(phase.shape[0]):
+        first = first_end[w, 0] * x_m + first_end[w, 1] * y_m
+        other = other_end[w, 0] * x_m + other_end[w, 1] * y_m + phase[w]
+        ends[0, w], ends[1, w] = math.cos(first), math.sin(first)
+        ends[2, w], ends[3, w] = math.cos(other), math.sin(other)
+
+
+@compiled()
+def shadow(waves: Waves, b: int, i: int, power: Float[np.ndarray, "N"]) -> None:
+    """Multiply the power of i's packets at every robot of mission b by what shadowing leaves."""
+    for j in range(power.shape[0]):
+        power[j] *= np.exp(_neper(waves.ends[b, i], waves.ends[b, j], waves.std_db))
+
+
+# Adding in any order lets the compiler use its vectors; shadowing is random in the last digit, too.
+@compiled(fastmath={"reassoc", "nnan", "nsz"})
+def _neper(a: Float32[np.ndarray, "4 W"], b: Float32[np.ndarray, "4 W"], std_db: float) -> float:
+    """Return the loss between two ends as an exponent of e of the power [1]; its sign is either."""
+    total = np.float32(0.0)
+    for w in range(a.shape[1]):
+        total += a[0, w] * b[2, w] - a[1, w] * b[3, w] + b[0, w] * a[2, w] - b[1, w] * a[3, w]
+    return float(total) * std_db / math.sqrt(a.shape[1]) / DB_PER_NEPER

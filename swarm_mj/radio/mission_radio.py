@@ -15,7 +15,6 @@ from jaxtyping import Bool, Float
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import Obstacles
 from swarm_mj.radio.composed import ComposedChannel, Reception
-from swarm_mj.radio.decode_curves import KNOWN, Curves, decode_curves
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.free_space import (
     Channel,
@@ -24,7 +23,7 @@ from swarm_mj.radio.free_space import (
     from_db,
     transmit_power_dbm,
 )
-from swarm_mj.radio.links import Links, doubtful, links_between
+from swarm_mj.radio.links import KNOWN, Curves, Links, decode_curves, doubtful, links_between
 from swarm_mj.radio.power_law import (
     FREE_SPACE_EXPONENT,
     NO_OBSTACLES,

@@ -20,9 +20,14 @@ from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Pol
 from swarm_mj.protocol.buffers import Buffers, empty_buffers, grant_start, observe_self
 from swarm_mj.protocol.checks import check_robots
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
-from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.packets import fitting, packet_of, with_room
-from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, RequestResponse, WindowProtocol
+from swarm_mj.protocol.window import (
+    SLOT_WINDOWS,
+    LocalViews,
+    Phase,
+    RequestResponse,
+    WindowProtocol,
+)
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.radio.mission_radio import mission_radio

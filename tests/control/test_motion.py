@@ -81,12 +81,6 @@ def test_iv_a_random_walk_draws_apart_for_every_robot_axis_and_window():
     np.testing.assert_allclose(correlation, np.eye(len(correlation)), atol=5 / math.sqrt(3000))
 
 
-def test_random_walk_of_a_mission_does_not_depend_on_its_neighbours():
-    mission = paper("random-walk", num_robots=4)
-    together = walked(mission, 3, 100)
-    np.testing.assert_array_equal(together[:, :1], walked(mission, 1, 100))
-
-
 def mean_difference(buffers, velocity_mps, counts):
     """Eq. 16 in words: over those who count, the mean of their velocity less one's own."""
     num_missions, num_robots = velocity_mps.shape[:2]
@@ -116,13 +110,6 @@ def test_eq16_reference_counts_who_moves(seed):
     buffers, velocity_mps = overheard_team(seed)
     expected = mean_difference(buffers, velocity_mps, lambda _, velocity: velocity != 0.0)
     np.testing.assert_allclose(flocking(buffers, velocity_mps, "moving"), expected, atol=1e-12)
-
-
-@pytest.mark.parametrize("flocking_set", FLOCKING_SETS)
-def test_eq16_who_knows_nobody_keeps_its_velocity(flocking_set):
-    velocity_mps = np.random.default_rng(0).normal(size=(2, 5, 2))
-    u = flocking(empty_buffers(2, 5), velocity_mps, flocking_set)
-    np.testing.assert_array_equal(u, 0.0)
 
 
 @pytest.mark.parametrize("preset", [paper, reference])

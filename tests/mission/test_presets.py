@@ -42,26 +42,6 @@ def test_only_a_flock_flies_without_walls(preset):
     assert not preset("random-walk", boundary="none").has_walls
 
 
-OTHER = {
-    "num_robots": 12,
-    "range_ratio": 0.5,
-    "max_acceleration_mps2": 5.0,
-    "wall_hit": "mirror",
-    "half_duplex": "strict",
-    "flocking_set": "heard",
-    "silence_is_attempt": False,
-    "moves_each_transmission": False,
-    "tree_recomputed": True,
-    "tree_root_transmits": False,
-}
-
-
-@pytest.mark.parametrize("preset", [paper, reference])
-@pytest.mark.parametrize("name", OTHER)
-def test_any_field_can_be_overridden(preset, name):
-    assert getattr(preset("stationary", **{name: OTHER[name]}), name) == OTHER[name]
-
-
 @pytest.mark.parametrize("preset", [paper, reference])
 def test_robots_that_collide_fly_in_contact_physics(preset):
     assert preset(collide=True).physics == "contact"

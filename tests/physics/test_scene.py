@@ -2,7 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from swarm_mj.mission import Mission, paper
+from swarm_mj.mission import paper
 from swarm_mj.physics.scene import compose, num_substeps, timestep_s
 from swarm_mj.physics.state import ROBOT_RADIUS_M, RobotStates
 from swarm_mj.system.packages import asset
@@ -22,18 +22,6 @@ def compiled(num_robots, physics="exact", boundary="reflect", **numbers):
 
 def geom_names(model):
     return {model.geom(g).name for g in range(model.ngeom)}
-
-
-def test_robot_file_has_the_papers_numbers():
-    """IV-B: 3 m/s, 20 m/s² and 100 ms stand in robot.xml too, and are `Mission`'s defaults."""
-    model = mujoco.MjModel.from_xml_path(str(asset("robot.xml")))
-    mission = Mission()
-    np.testing.assert_allclose(model.actuator_ctrlrange, [[-3.0, 3.0]] * 2)
-    np.testing.assert_allclose(model.actuator_forcerange, [[-20.0, 20.0]] * 2)
-    assert mission.max_velocity_mps == pytest.approx(model.actuator_ctrlrange[0, 1])
-    assert mission.max_acceleration_mps2 == pytest.approx(model.actuator_forcerange[0, 1])
-    assert mission.window_s == pytest.approx(model.opt.timestep)
-    np.testing.assert_allclose(model.actuator_gainprm[:, 0], 1.0 / 0.1)  # mass over timestep
 
 
 def test_assets_alone_equal_the_default_scene():
@@ -67,35 +55,6 @@ def test_composed_team_is_n_point_masses_in_the_plane(num_robots, physics):
             assert model.actuator(f"r{i}/v{joint}").trnid[0] == model.joint(f"r{i}/{joint}").id
             np.testing.assert_array_equal(model.joint(f"r{i}/{joint}").axis, np.eye(3)[axis])
     assert np.all(model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE)
-
-
-@pytest.mark.parametrize("ratio", [0.05, 1.0])
-def test_exact_scene_is_a_bounded_velocity_servo(ratio):
-    """V_max = ratio x 1000 m / 50 s; one window's step; kv = mass / step reaches the set point."""
-    model = compiled(10, velocity_ratio=ratio, max_acceleration_mps2=7.0)
-    limit_mps = ratio * 20.0
-    np.testing.assert_allclose(model.actuator_ctrlrange, [[-limit_mps, limit_mps]] * 20)
-    np.testing.assert_allclose(model.actuator_forcerange, [[-7.0, 7.0]] * 20)
-    np.testing.assert_allclose(model.actuator_gainprm[:, 0], 10.0)
-    np.testing.assert_allclose(model.actuator_biasprm[:, 2], -10.0)
-    assert np.all(model.actuator_ctrllimited)
-    assert np.all(model.actuator_forcelimited)
-    assert model.opt.timestep == pytest.approx(0.1)
-    assert model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER
-    assert not np.any(model.jnt_limited)
-
-
-@pytest.mark.parametrize("num_robots", HALF_SIDE_M)
-def test_contact_scene_is_a_bounded_force_between_limits(num_robots):
-    model = compiled(num_robots, "contact", max_acceleration_mps2=7.0)
-    np.testing.assert_allclose(model.actuator_forcerange, [[-7.0, 7.0]] * 2 * num_robots)
-    np.testing.assert_allclose(model.actuator_gainprm[:, 0], 1.0)
-    np.testing.assert_array_equal(model.actuator_biasprm, 0.0)
-    assert model.opt.timestep == pytest.approx(0.01)
-    assert model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER
-    half_m = HALF_SIDE_M[num_robots]
-    assert np.all(model.jnt_limited)
-    np.testing.assert_allclose(model.jnt_range, [[-half_m, half_m]] * 2 * num_robots)
 
 
 @pytest.mark.parametrize("num_robots", HALF_SIDE_M)

@@ -2,8 +2,6 @@
 
 import mujoco
 import numpy as np
-import pytest
-from jaxtyping import TypeCheckError
 
 from swarm_mj.physics import state
 from swarm_mj.physics.state import RobotStates
@@ -24,21 +22,6 @@ def test_everyone_is_active_unless_it_is_said_who_is():
     assert observed() == [[4.0, 4.0, 4.0], [7.0, 7.0, 7.0]]
     is_active = np.array([[True, False, True], [False, False, True]])
     assert observed(is_active=is_active) == [[4.0, 0.0, 4.0], [0.0, 0.0, 7.0]]
-
-
-@pytest.mark.parametrize(
-    "other",
-    [
-        {"velocity_mps": np.zeros((2, 4, 2))},  # of another team
-        {"velocity_mps": np.zeros((1, 3, 2))},  # of fewer missions
-        {"position_m": np.zeros((2, 3, 3))},  # in space
-        {"is_active": np.ones((3, 2), dtype=bool)},  # robots first
-        {"is_active": np.ones((2, 3))},  # a number
-    ],
-)
-def test_all_is_of_the_same_robots_in_the_plane(other):
-    with pytest.raises(TypeCheckError):
-        RobotStates(**({"position_m": PLACES, "velocity_mps": PLACES} | other))
 
 
 def test_kinds_of_obstacles_are_numbered_as_in_mujoco():

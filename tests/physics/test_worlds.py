@@ -88,17 +88,6 @@ def test_eq15_exact(at_wall, fields, ratio):
     assert off_mps < 1e-9
 
 
-def test_eq15_position_moves_with_the_old_velocity():
-    """By hand: (0, 1 m/s) at 10 m/s² for 100 ms is (0.1 m, 2 m/s), then (0.3 m, 3 m/s)."""
-    mission = paper("random-walk", num_robots=2)
-    u = np.full((1, 2, 2), 10.0)
-    first, second = flown(mission, np.zeros((1, 2, 2)), np.ones((1, 2, 2)), [u, u])
-    np.testing.assert_allclose(first.position_m, 0.1, rtol=1e-12)
-    np.testing.assert_allclose(first.velocity_mps, 2.0, rtol=1e-12)
-    np.testing.assert_allclose(second.position_m, 0.3, rtol=1e-12)
-    np.testing.assert_allclose(second.velocity_mps, 3.0, rtol=1e-12)
-
-
 class NoSteps:
     """Stands in for MuJoCo's worlds and does not step them."""
 

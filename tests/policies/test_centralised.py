@@ -8,7 +8,7 @@ import pytest
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.centralised import MinimumSpanningTree, RoundRobin
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import LocalViews
 
 
 def decided(policy, position_m, window=0):

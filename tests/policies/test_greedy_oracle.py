@@ -18,9 +18,8 @@ from swarm_mj.policies.greedy_oracle import (
 from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.radio.decode_curves import KNOWN
-from swarm_mj.radio.links import Links, links_between
+from swarm_mj.protocol.window import LocalViews
+from swarm_mj.radio.links import KNOWN, Links, links_between
 from swarm_mj.radio.mission_radio import TrueLinks, mission_radio, radio_of
 from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm

@@ -12,7 +12,7 @@ from swarm_mj.mission import paper, reference
 from swarm_mj.policies.random_access import Aloha, InnovationGossip, RandomFlooding, num_contenders
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import BROADCAST, empty_buffers
-from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.simulation.swarm import Swarm
 
 NUM_ROBOTS, RANGE_M = 6, 250.0

@@ -12,8 +12,7 @@ from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tdma import SpatialTdma, Tdma
 from swarm_mj.protocol.buffers import BROADCAST, empty_buffers
-from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.protocol.window import SLOT_WINDOWS
+from swarm_mj.protocol.window import SLOT_WINDOWS, LocalViews
 from swarm_mj.simulation.swarm import Swarm
 
 NUM_ROBOTS = 6

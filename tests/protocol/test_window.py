@@ -1,8 +1,6 @@
 """The protocol against Fig. 1, hand examples, and Alg. 1 played with dictionaries."""
 
-import copy
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,10 +8,12 @@ from channels import to_everyone, to_nobody, to_the_addressee, unreliable
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from swarm_mj.mission import paper
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST, empty_buffers, merge, observe_self, record_attempt
 from swarm_mj.protocol.window import (
     DoubleBroadcast,
+    LocalViews,
     Phase,
     RequestResponse,
     channel_at,
@@ -21,6 +21,7 @@ from swarm_mj.protocol.window import (
     transmit,
     window,
 )
+from swarm_mj.simulation.swarm import Swarm
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -44,19 +45,6 @@ def some_mission(seed, num_windows, num_robots, num_missions):
         silent = rng.random((num_missions, num_robots)) < 0.5
         recipients.append(np.where(silent, np.arange(num_robots), anybody))
     return states, recipients
-
-
-def play(num_windows, num_robots, num_missions, seed, *, senders_listen):
-    """Runs windows; yields the buffers before and after, the phases, and the start of each."""
-    states, recipients = some_mission(seed, num_windows, num_robots, num_missions)
-    channel = unreliable(seed, senders_listen=senders_listen)
-    buffers = empty_buffers(num_missions, num_robots)
-    now = np.zeros(num_missions)
-    for body, recipient in zip(states, recipients, strict=True):
-        before = copy.deepcopy(buffers)
-        phases = window(buffers, body, recipient, channel, now)
-        yield SimpleNamespace(before=before, after=buffers, phases=phases, now=now)
-        now = now + 1
 
 
 class Robot:
@@ -241,36 +229,6 @@ def test_inactive_robots_neither_send_nor_decode_nor_observe():
     assert buffers.last_attempt[0].tolist() == [[0.0, 0.0, 0.5], [0.0] * 3, [0.0] * 3]
 
 
-@given(seed=seeds, senders_listen=st.booleans())
-@settings(max_examples=30)
-def test_the_clock_moves_by_halves_and_nothing_is_from_the_future(seed, senders_listen):
-    for step in play(10, 5, 2, seed, senders_listen=senders_listen):
-        end = (step.now + 1)[:, None, None]
-        age = end - step.after.timestamp
-        assert (age >= 0).all()
-        assert (2 * age % 1 == 0).all()
-        assert (np.diagonal(age, axis1=1, axis2=2) == 0).all()
-        assert (step.after.timestamp >= step.before.timestamp).all()
-        # Attempts are made in the first half of a window only: responses are none (Eq. 7).
-        since_attempt = end - step.after.last_attempt
-        is_new = step.after.last_attempt != step.before.last_attempt
-        assert (since_attempt[is_new] == 0.5).all()
-
-
-@given(seed=seeds, senders_listen=st.booleans())
-def test_parents_form_a_tree_rooted_at_oneself(seed, senders_listen):
-    for step in play(12, 6, 2, seed, senders_listen=senders_listen):
-        parent, is_known = step.after.parent, step.after.is_known
-        for b, i, j in np.argwhere(is_known):
-            chain = [j]
-            while chain[-1] != i:
-                chain.append(parent[b, i, chain[-1]])
-                assert is_known[b, i, chain[-1]]
-                assert len(chain) <= 6, f"a cycle: {chain}"
-        assert (parent[~is_known] == -1).all()
-        assert (np.diagonal(parent, axis1=1, axis2=2) == -1).all()
-
-
 def test_the_channel_gets_the_true_positions_and_everyones_recipients():
     asked = []
 
@@ -286,16 +244,6 @@ def test_the_channel_gets_the_true_positions_and_everyones_recipients():
         assert (recipient == phase.recipient).all()
         assert (phase.heard == to_the_addressee(None, recipient)).all()
     assert (asked[0][1] == recipients[0]).all()
-
-
-@pytest.mark.parametrize("start", [[0.0, 0.0], [0.0, 41.0]])
-def test_missions_have_clocks_of_their_own(start):
-    buffers = empty_buffers(2, 2)
-    recipient = np.array([[1, 1], [0, 0]])
-    window(buffers, standing(2, 2), recipient, to_the_addressee, np.array(start))
-    a, b = start
-    assert buffers.timestamp[0].tolist() == [[a + 1, a + 1], [a + 0.5, a + 1]]
-    assert buffers.timestamp[1].tolist() == [[b + 1, b + 0.5], [b + 1, b + 1]]
 
 
 class Schedule:
@@ -322,3 +270,31 @@ def test_rows_of_a_varying_channel_may_be_any_missions():
     channel = Schedule()
     channel_at(channel, np.array([0.5, 0.5, 1.0]), np.array([1, 0, 1]))
     assert channel.asked == [([0, 0, 1], [1, 0, 1])]
+
+
+def views_of(num_missions, num_robots):
+    buffers = empty_buffers(num_missions, num_robots)
+    return LocalViews(buffers=buffers, now=np.zeros(num_missions), phases=())
+
+
+@pytest.mark.parametrize(("num_missions", "num_robots"), [(2, 8), (3, 8), (2, 5)])
+def test_alg1_silence_is_addressing_oneself(num_missions, num_robots):
+    views = views_of(num_missions, num_robots)
+    assert views.num_robots == num_robots
+    np.testing.assert_array_equal(views.silence, [range(num_robots)] * num_missions)
+
+
+def test_silence_cannot_be_written():
+    """All views of a shape share it, so a policy that wrote it would silence or wake others."""
+    with pytest.raises(ValueError, match="read-only"):
+        views_of(2, 3).silence[0, 1] = 0
+    np.testing.assert_array_equal(views_of(2, 3).silence, [[0, 1, 2]] * 2)
+
+
+def test_a_swarms_view_changes_with_the_next_window_and_not_by_hand():
+    swarm = Swarm(paper("stationary", num_robots=3), [1])
+    views = swarm.views
+    swarm.step_with_recipients(views.silence)
+    np.testing.assert_array_equal(np.diagonal(views.buffers.timestamp[0]), [1.0, 1.0, 1.0])
+    with pytest.raises(ValueError, match="read-only"):
+        views.buffers.timestamp[0, 0, 1] = 9.0

@@ -119,17 +119,6 @@ def test_power_at_a_metre_is_eqs_1_and_2():
     assert radio().received_at_1_m_mw == pytest.approx(10**-0.10412)
 
 
-@pytest.mark.parametrize("range_m", [1.0, 250.0, 8000.0])
-@pytest.mark.parametrize("threshold_db", [-20.0, 1.0, 30.0])
-@pytest.mark.parametrize("angle", [0.0, 1.0, 4.0])
-def test_the_range_is_exact_in_silence(range_m, threshold_db, angle):
-    channel = radio(range_m=range_m, threshold_db=threshold_db)
-    towards = np.array([math.cos(angle), math.sin(angle)])
-    start = np.array([3.0, -2.0])
-    for distance_m, decoded in [(range_m * (1 - 1e-9), 0), (range_m * (1 + 1e-9), 1)]:
-        assert alone(channel, [start, start + distance_m * towards], [1, 1]) == [0, decoded]
-
-
 def test_eq3_interference_by_hand():
     # Robots 0 and 3 send, robot 1 listens between them. A sender at 250 m is 1.2589 times the
     # noise, so the noise is worth one at 250 m · sqrt(1.2589) = 280.5 m, and robot 0 decodes at
@@ -165,13 +154,6 @@ def test_below_0_db_the_nearest_packet_that_clears_the_threshold_wins(seed, num_
         nearest[j] = min(i, rival, key=lambda k: math.dist(position_m[0, k], position_m[0, j]))
     heard = radio(threshold_db=-10.0)(position_m, recipient)[0]
     assert {j: i for j, i in enumerate(heard) if i != j} == nearest
-
-
-def test_several_packets_can_clear_a_threshold_below_0_db():
-    position_m, recipient = [[0, 0], [100, 0], [210, 0]], [1, 1, 1]
-    both = packets_above_threshold(position_m, recipient, False, POWER_DBM - 11.0, -10.0)
-    assert both == {(0, 1), (2, 1)}
-    assert alone(radio(threshold_db=-10.0), position_m, recipient) == [0, 0, 2]
 
 
 def test_the_codes_rule_lets_a_sending_recipient_hear():
@@ -219,21 +201,6 @@ def test_missions_side_by_side_do_not_hear_each_other(seed, eavesdroppers):
     heard = channel(position_m, recipient)
     for b in range(4):
         assert (heard[[b]] == channel(position_m[[b]], recipient[[b]])).all()
-
-
-def test_the_random_scenes_hold_what_matters():
-    # Of 100 scenes, many have packets that decode, that collide, that others overhear, and that
-    # a recipient decodes while it sends itself.
-    decoded = collided = overheard = both_ways = 0
-    for seed in range(100):
-        position_m, recipient = scene(seed, 3 + seed % 6)
-        heard = radio(eavesdroppers=True)(position_m, recipient)[0]
-        for i, j in enumerate(recipient[0]):
-            decoded += j != i and heard[j] == i
-            collided += j != i and heard[j] != i
-            both_ways += j != i and heard[j] == i and recipient[0, j] != j
-        overheard += sum(i != j and recipient[0, i] != j for j, i in enumerate(heard))
-    assert min(decoded, collided, overheard, both_ways) >= 20
 
 
 def test_below_0_db_a_sender_hears_the_strongest_packet_meant_for_it():

@@ -144,15 +144,6 @@ def test_every_policy_flies_on(name, preset):
     assert np.all(np.isfinite(flown.costs.age_windows))
 
 
-def test_missions_side_by_side_are_the_missions_one_by_one():
-    mission = small()
-    *_, (together, flown) = flight(mission, "mst")
-    swarm = Swarm(mission, SEEDS[1:2])
-    *_, last = rollout(swarm, make_policy("mst", mission, 0.4))
-    np.testing.assert_array_equal(swarm.states.is_active[0], together.states.is_active[1])
-    assert last.costs.age_windows[0] == flown.costs.age_windows[1]
-
-
 def test_a_restart_switches_everyone_on():
     mission = small()
     *_, (swarm, flown) = flight(mission, "mst")

@@ -178,31 +178,6 @@ def test_iv_b_flooding_moves_twice_in_the_reference_preset_only(physics, preset,
     np.testing.assert_array_equal(swarm.now, 10.0)
 
 
-class Script(DecentralisedPolicy):
-    """Reads its decisions off a list."""
-
-    def __init__(self, recipients):
-        self._recipients = iter(recipients)
-
-    def recipients(self, views):  # noqa: ARG002 - a DecentralisedPolicy
-        return next(self._recipients)
-
-
-@pytest.mark.parametrize("preset", PRESETS)
-def test_exchange_is_a_window_of_a_policy_that_chose_these_recipients(preset):
-    mission = small("random-walk", preset)
-    rng = np.random.default_rng(0)
-    recipients = [rng.integers(0, 8, size=(2, 8)) for _ in range(6)]
-    given, chosen = Swarm(mission, [1, 2]), Swarm(mission, [1, 2])
-    script = Script(recipients)
-    for recipient in recipients:
-        by_hand, by_policy = given.step_with_recipients(recipient), chosen.step(script)
-        np.testing.assert_array_equal(by_hand.age_windows, by_policy.age_windows)
-        np.testing.assert_array_equal(given.phases[0].recipient, recipient)
-        assert_same(vars(given.buffers).values(), vars(chosen.buffers).values())
-        np.testing.assert_array_equal(given.states.position_m, chosen.states.position_m)
-
-
 def silence_of(num_missions, num_robots):
     return np.tile(np.arange(num_robots), (num_missions, 1))
 

@@ -14,7 +14,7 @@ from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.gnn.packet_memory import Memory, empty_memory, log_age, logarithm, remember
 from swarm_mj.protocol.buffers import NEVER
-from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.free_space import from_db
 from swarm_mj.radio.spatial_reuse import believes_as_the_last, write_joined
 from swarm_mj.system.compiled import compiled

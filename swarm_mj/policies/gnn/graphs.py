@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Float32, Int, Shaped
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 from swarm_mj.protocol.buffers import Buffers
-from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.system.compiled import compiled
 
 REFERENCE_WINDOWS = 500.0  # what the authors' code divides times by, whatever the mission [windows]

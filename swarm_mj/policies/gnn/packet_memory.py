@@ -11,9 +11,8 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from swarm_mj.protocol.buffers import NEVER
-from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.timestamps import merge_timestamps, observe_own
-from swarm_mj.protocol.window import SLOT_WINDOWS
+from swarm_mj.protocol.window import SLOT_WINDOWS, LocalViews
 from swarm_mj.system.compiled import compiled
 
 LONG_WINDOWS = 500.0  # ages count by their logarithm, up to 1 at this one [windows]

@@ -26,9 +26,8 @@ from swarm_mj.policies.planner.link_evidence import (
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import NUM_SENT
 from swarm_mj.protocol.packets import PacketField, bits_for, identity, times
-from swarm_mj.radio.decode_curves import Curves, decode_curves, probability_at
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
-from swarm_mj.radio.links import Links, doubtful
+from swarm_mj.radio.links import Curves, Links, decode_curves, doubtful, probability_at
 
 EXCESS_DB = np.arange(-30.0, 18.1, 3.0)  # the values that are distinguished
 ERASURES = (0.0, 0.15, 0.3, 0.45)

@@ -37,7 +37,6 @@ from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import Snapshots, better, snapshot_fields, take_snapshots
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.protocol.buffers import NEVER, Buffers
-from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.packets import (
     PacketField,
     bits_per_second,
@@ -46,7 +45,7 @@ from swarm_mj.protocol.packets import (
     packet_of,
     slot_bytes,
 )
-from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW
+from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW, LocalViews
 from swarm_mj.radio.mission_radio import Belief, radio_of
 
 

@@ -34,9 +34,8 @@ from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import better, snapshot_fields
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.tdma import SpatialTdma
-from swarm_mj.protocol.local_views import LocalViews
 from swarm_mj.protocol.packets import PacketField, fits, packet_of
-from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW
+from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW, LocalViews
 from swarm_mj.radio.links import Links
 from swarm_mj.radio.mission_radio import Belief, radio_of
 

@@ -25,8 +25,7 @@ from swarm_mj.policies.sotdma.frame import Rule, chosen, first_slots, frame_slot
 from swarm_mj.policies.sotdma.slot_table import NO_PLACE, SlotTable, place_of
 from swarm_mj.policies.tdma import SpatialTdma, draw_order, slot_of
 from swarm_mj.protocol.buffers import Buffers
-from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.protocol.window import SLOTS_PER_WINDOW
+from swarm_mj.protocol.window import SLOTS_PER_WINDOW, LocalViews
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import Belief
 from swarm_mj.radio.power_law import powers_between, write_powers

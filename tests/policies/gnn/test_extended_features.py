@@ -13,8 +13,7 @@ from mixed_missions import NUM_ROBOTS, SEEDS, flown, mixed_views, renamed
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures, write_turns
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.protocol.window import Phase
+from swarm_mj.protocol.window import LocalViews, Phase
 
 MISSION = paper("stationary", num_robots=4)
 OBSERVER = 1  # the robot whose row is looked at

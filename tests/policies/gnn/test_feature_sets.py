@@ -8,7 +8,7 @@ from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatu
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, make_extractor, num_features
 from swarm_mj.policies.gnn.graphs import PaperFeatures, ReferenceFeatures
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import LocalViews
 
 
 @pytest.mark.parametrize(

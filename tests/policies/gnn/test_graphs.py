@@ -8,7 +8,7 @@ from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, make_extractor
 from swarm_mj.policies.gnn.graphs import PaperFeatures, ReferenceFeatures
 from swarm_mj.policies.random_access import RandomFlooding
 from swarm_mj.protocol.buffers import NO_PARENT, empty_buffers
-from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.simulation.swarm import Swarm
 
 # 4 robots at 40 per km²: a side of sqrt(0.1) km; 200 windows of 0.1 s: 20 s.

@@ -8,7 +8,7 @@ from mixed_missions import NUM_ROBOTS, NUM_WINDOWS, SEEDS, mixed_views, random_r
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.gnn.packet_memory import empty_memory, log_age, remember
-from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.swarm import Swarm
 

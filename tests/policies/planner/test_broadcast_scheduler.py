@@ -13,8 +13,7 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.planner.broadcast_scheduler import Lookahead, Weights, schedule
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.window import SLOT_WINDOWS, transmit
-from swarm_mj.radio.decode_curves import KNOWN
-from swarm_mj.radio.links import Links, links_between
+from swarm_mj.radio.links import KNOWN, Links, links_between
 from swarm_mj.radio.mission_radio import radio_of
 
 seeds = st.integers(0, 2**32 - 1)

@@ -15,8 +15,7 @@ from swarm_mj.policies.planner.link_evidence import (
     Evidence,
     observe,
 )
-from swarm_mj.radio.decode_curves import KNOWN
-from swarm_mj.radio.links import Links
+from swarm_mj.radio.links import KNOWN, Links
 
 KINDS = (2, 4, NUM_BINS)  # whether decoded, the sender of four, the bin
 NOISE_MW, THRESHOLD = 1.0, 10.0  # so a packet of 10 mW has a margin of 0 dB in silence

@@ -26,8 +26,7 @@ from swarm_mj.policies.planner.plan import (
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import take_snapshots
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.radio.decode_curves import decode_curves
-from swarm_mj.radio.links import doubtful, links_between, lone_probabilities
+from swarm_mj.radio.links import decode_curves, doubtful, links_between, lone_probabilities
 from swarm_mj.radio.mission_radio import Belief, radio_of
 
 seeds = st.integers(0, 2**32 - 1)

@@ -8,7 +8,7 @@ from swarm_mj.mission import paper, reference
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tdma import Tdma
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.swarm import Swarm
 

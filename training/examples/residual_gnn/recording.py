@@ -11,8 +11,7 @@ from residual_gnn.features import Seen
 from residual_gnn.policy import Decision, ResidualPolicy, ticks
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.protocol.buffers import BROADCAST
-from swarm_mj.protocol.local_views import LocalViews
-from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW, channel_at
+from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW, LocalViews, channel_at
 from swarm_mj.simulation.swarm import Swarm
 
 LIKELY = 0.02  # whoever may do otherwise than the rule with more is always learned from

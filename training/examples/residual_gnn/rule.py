@@ -9,7 +9,7 @@ from jaxtyping import Bool, Int, Int16
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.tdma import draw_order, slot_of
-from swarm_mj.protocol.local_views import LocalViews
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import Belief
 
