@@ -2,17 +2,14 @@
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from jaxtyping import UInt8
 
 from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.replay.footage import footage_now
-from swarm_mj.replay.rendering.scene import SceneRenderer
-
-if TYPE_CHECKING:
-    from swarm_mj.replay.rendering.viewer import SceneViewer
+from swarm_mj.replay.rendering.scene import SceneRenderer, SceneViewer
 
 MODES = ("rgb_array", "human")
 RENDERING: dict[str, Any] = {"render_modes": list(MODES), "render_fps": 10}  # 100 ms a window
@@ -38,9 +35,7 @@ class Screen:
         """Show the first mission, in the mode "human"; raises OSError without a display."""
         if self.mode != "human":
             return
-        if self._viewer is None:  # its module looks for a display when imported
-            from swarm_mj.replay.rendering.viewer import SceneViewer
-
+        if self._viewer is None:
             self._viewer = SceneViewer(batch.mission, scene=batch.flown.scene)
         self._viewer.show(footage_now(batch.flown))
         time.sleep(max(0.0, self._shown_s + batch.mission.window_s - time.monotonic()))

@@ -17,7 +17,6 @@ from swarm_mj.replay.mismatch import (
     by_kind,
     divided,
     ends,
-    of_robot,
     shades,
 )
 from swarm_mj.replay.packets import PacketSegments, packet_segments
@@ -41,28 +40,26 @@ class Ground:
         return bool(np.any(self.centre_m))
 
 
-def frame(position_m: Float[np.ndarray, "T N 2"], half_side_m: float) -> Ground:
+def frame(
+    position_m: Float[np.ndarray, "T N 2"], half_side_m: float, *, is_tight: bool = False
+) -> Ground:
     """Return the smallest square that holds the area and all ways, or else all robots at any time.
 
-    It follows the team if robots go far beyond the area, which is centred on the origin.
+    It follows the team if robots go far beyond the area, which is centred on the origin. A tight
+    one holds all ways only, if it does not follow.
     """
     farthest_m = float(np.max(np.abs(position_m)))
-    if farthest_m <= NEAR * half_side_m:
+    if moves := farthest_m > NEAR * half_side_m:
+        is_tight = True
+    if not is_tight:
         centre_m = np.zeros((len(position_m), 2))
         return Ground(centre_m=centre_m, reach_m=max(half_side_m, farthest_m))
-    low_m, high_m = np.min(position_m, axis=1), np.max(position_m, axis=1)
+    axis = 1 if moves else (0, 1)
+    low_m, high_m = (end(position_m, axis=axis, keepdims=True) for end in (np.min, np.max))
     # Of constant size all the same: a changing scale would look like motion.
-    return Ground(centre_m=(low_m + high_m) / 2.0, reach_m=float(np.max(high_m - low_m)) / 2.0)
-
-
-def filmed_ground(position_m: Float[np.ndarray, "T N 2"], mission: Mission) -> Ground:
-    """Return the part of the ground that videos show: of an open area, where robots ever are."""
-    whole = frame(position_m, mission.half_side_m)
-    if whole.moves or mission.has_walls:
-        return whole
-    low_m, high_m = (end(position_m, axis=(0, 1)) for end in (np.min, np.max))
-    centre_m = np.tile((low_m + high_m) / 2.0, (len(position_m), 1))
-    return Ground(centre_m=centre_m, reach_m=max(1.0, float(np.max(high_m - low_m)) / 2.0))
+    reach_m = max(0.0 if moves else 1.0, float(np.max(high_m - low_m)) / 2.0)
+    centre_m = np.broadcast_to((low_m + high_m)[:, 0] / 2.0, (len(position_m), 2))
+    return Ground(centre_m=centre_m, reach_m=reach_m)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +120,8 @@ class Footage:
         In a city, all of them together would not show which robots each one joins.
         """
         links = self.mismatch.at(int(self.window[row]))
-        return links[of_robot(links, self.facts.observer) | ~links["is_too_weak"]]
+        is_own = [links[end] == self.facts.observer for end in ("sender", "receiver")]
+        return links[np.any(is_own, axis=0) | ~links["is_too_weak"]]
 
     def mismatch_lines(
         self, row: int
@@ -160,7 +158,7 @@ def footage_of(
         facts=facts,
         age=log.known_age,
         segments=packet_segments(log.packets, log.position_m),
-        ground=filmed_ground(log.position_m, mission),
+        ground=frame(log.position_m, mission.half_side_m, is_tight=not mission.has_walls),
         mismatch=log.mismatch or NO_MISMATCH,
         **{name: getattr(log, name) for name in AS_RECORDED},
     )

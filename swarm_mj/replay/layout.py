@@ -176,7 +176,6 @@ def _samples(log: Log) -> list[dict[str, str]]:
 
 
 def _draw_sample(out: RerunLog, path: str, name: str, x: float, y: float) -> None:
-    """Draw a layer's line, arrow, ring or point around a place."""
     layer, radius, kind = LAYERS[f"arena/{name}"], RADII.get(name, 0.0), name.split("/")[-1]
     share = palette.LOST_SHARE if name == "radio/lost" else 1.0
     way = x + SAMPLE * (PIECES.get(kind, WHOLE) - 0.5)

@@ -7,7 +7,7 @@ fading and losses of single packets are therefore no mismatch.
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Int16, Shaped, UInt8
+from jaxtyping import Float, Int, Int16, Shaped, UInt8
 
 from swarm_mj.radio.composed import ComposedChannel, strong_groups
 from swarm_mj.radio.mission_radio import by_robot, radio_of
@@ -124,8 +124,3 @@ def shades(kind: str, links: Shaped[np.ndarray, "L"]) -> UInt8[np.ndarray, "L 3"
         return np.tile(np.array(palette.MISMATCH[kind], dtype=np.uint8), (len(links), 1))
     shares = np.interp(links["margin_db"], [FAINTEST_DB, 0.0], [FAINTEST, BRIGHTEST])
     return (shares[:, None] * np.array(palette.TOO_WEAK)).astype(np.uint8)
-
-
-def of_robot(links: Shaped[np.ndarray, "L"], i: int) -> Bool[np.ndarray, "L"]:
-    """Tell which links begin or end at a robot."""
-    return (links["sender"] == i) | (links["receiver"] == i)

@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from rerun.chunk import RrdReader
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.footage import Facts, Footage, filmed_ground
+from swarm_mj.replay.footage import Facts, Footage, frame
 from swarm_mj.replay.mismatch import LINK, NO_MISMATCH, NUMBERS, LinkMismatch
 from swarm_mj.replay.packets import SEGMENTS, PacketSegments
 from swarm_mj.replay.rerun_log import TIMELINE
@@ -51,11 +51,9 @@ def _seal(recorded: memoryview) -> bytes:
 
 
 def check_replay(path: Path) -> None:
-    """Pass for a whole replay; rerun may crash over others, so they are kept from it.
+    """Raise ValueError unless this is a file as `write_replay` left it; OSError if the disk fails.
 
-    Raises:
-        ValueError: There is no such file, or it is not as `write_replay` left it.
-        OSError: The disk fails.
+    Rerun may crash over others, so they are kept from it.
     """
     with open_file(path, "replay") as file:
         is_whole = has_digest(file.read())
@@ -74,18 +72,17 @@ def windows(path: Path) -> Int[np.ndarray, "T"]:
 
 
 def read_footage(path: Path) -> Footage:
-    """Return what a video shows of a whole replay.
+    """Return what a video shows of a replay; raise as `check_replay` does.
 
-    Raises:
-        ValueError: The file is no whole replay, or of an earlier version of swarm-mj.
-        OSError: The disk fails.
+    Raise ValueError, too, for replays of earlier versions of swarm-mj.
     """
     check_replay(path)
     try:
         chunks = RrdReader(path).stream().filter(content=f"/__properties/{FACTS}")
         (text,) = (chunk.to_record_batch().column("json")[0].as_py()[0] for chunk in chunks)
         facts, columns = read_json(text, Facts), _columns(path)
-        age = _numbers(columns["/scene/robots age"]).reshape(-1, facts.mission.num_robots)
+        mission = facts.mission
+        age = _numbers(columns["/scene/robots age"]).reshape(-1, mission.num_robots)
         position_m = _numbers(columns["/scene/robots Cylinders3D:centers"])
         position_m = position_m.reshape(*age.shape, 3)[..., :2]
         # Teams at rest have no headings, and in free space no robot is cut off.
@@ -105,7 +102,7 @@ def read_footage(path: Path) -> Footage:
             is_on=_numbers(columns["/scene/robots is_on"]).reshape(age.shape) > 0.0,
             segments=_segments(columns),
             age_mean=_numbers(columns["/plots/age/mean Measurements:values"]),
-            ground=filmed_ground(position_m, facts.mission),
+            ground=frame(position_m, mission.half_side_m, is_tight=not mission.has_walls),
         )
     except (KeyError, ValueError, pa.ArrowException) as error:
         raise ValueError(
@@ -139,7 +136,6 @@ def _segments(columns: Columns) -> dict[str, PacketSegments]:
 
 
 def _mismatch(columns: Columns) -> LinkMismatch:
-    """Return the mismatched links, of which missions in free space have none."""
     window, found = NO_MISMATCH.window, [NO_MISMATCH.links]
     for kind in palette.MISMATCH:
         entity = f"/scene/world/{kind}"
@@ -155,7 +151,7 @@ def _mismatch(columns: Columns) -> LinkMismatch:
 
 
 def _rows(column: pa.Array) -> Int[np.ndarray, "L"]:
-    """Return the window, from 0, of each thing in lists of things."""
+    # The window, from 0, of each thing in lists of things.
     per_window = np.diff(column.offsets.to_numpy())
     return np.repeat(np.arange(len(per_window)), per_window)
 
@@ -166,7 +162,6 @@ def _windows(columns: Columns, entity: str) -> Int[np.ndarray, "T"]:
 
 
 def _numbers(column: pa.Array) -> Float[np.ndarray, "K"]:
-    """Return all numbers of nested lists in one row."""
     while pa.types.is_list(column.type) or pa.types.is_fixed_size_list(column.type):
         column = column.flatten()
     return column.to_numpy(zero_copy_only=False).astype(float)

@@ -42,12 +42,18 @@ FAR_M = 1e4  # half the side of a plane that has no end
 
 def draw_stage(out: RerunLog, mission: Mission) -> None:
     """Draw the area, its walls and its obstacles, on the map and in 3-D."""
-    model = stage(out, mission)
+    spec = compose(mission, scene=out.log.scene)
+    if not mission.has_walls:
+        # An open area's floor is as large as what is ever seen.
+        low, high = (end(out.frame.centre_m, axis=0) for end in (np.min, np.max))
+        for geom in (geom for geom in spec.geoms if geom.name == "floor"):
+            geom.pos = [*(low + high) / 2.0, 0.0]
+            geom.size = [*(high - low) / 2.0 + 1.5 * out.frame.reach_m, 1.0]
+    model = spec.compile()
     _draw_ground(out, mission)
-    for name, solid in static_geoms(model).items():
-        out.fixed(f"scene/area/{name}", solid)
-    for g in obstacle_geoms(model):  # for those who click on one
-        out.fixed(f"scene/area/{name_of(model, g)}", rr.AnyValues(loss_db=loss_db_of(model, g)))
+    for name, parts in static_geoms(model).items():
+        for part in parts:
+            out.fixed(f"scene/area/{name}", part)
     # On the map, where they are in the way of the antennas.
     if outlines := footprints(obstacles_of(model), ROBOT_HEIGHT_M):
         path, apart_m = "arena/world/filling", FILL_SHARE * out.frame.reach_m
@@ -56,18 +62,6 @@ def draw_stage(out: RerunLog, mission: Mission) -> None:
         style: dict[str, Any] = LAYERS[path].style | {"radii": 0.55 * apart_m}
         out.fixed(path, rr.LineStrips2D.from_fields(strips=lines, **style))
         out.fixed_layer("arena/world/obstacle", strips=outlines)
-
-
-def stage(out: RerunLog, mission: Mission) -> MjModel:
-    """Compile MuJoCo's scene as it is drawn."""
-    spec = compose(mission, scene=out.log.scene)
-    if not mission.has_walls:
-        # An open area's floor is as large as what is ever seen.
-        low, high = (end(out.frame.centre_m, axis=0) for end in (np.min, np.max))
-        for geom in (geom for geom in spec.geoms if geom.name == "floor"):
-            geom.pos = [*(low + high) / 2.0, 0.0]
-            geom.size = [*(high - low) / 2.0 + 1.5 * out.frame.reach_m, 1.0]
-    return spec.compile()
 
 
 def _draw_ground(out: RerunLog, mission: Mission) -> None:
@@ -150,31 +144,30 @@ def _surface(kind: int, size_m: Float[np.ndarray, "3"]) -> Float[np.ndarray, "K 
     return ball * (size_m if np.all(size_m > 0.0) else size_m[0])
 
 
-def static_geoms(model: MjModel) -> dict[str, rr.AsComponents]:
+def static_geoms(model: MjModel) -> dict[str, list[rr.AsComponents]]:
     """Return what stands still in a scene by its geom's name: the arena, and whatever was added.
 
-    Meshes and fields of heights are drawn as the boxes around them.
+    Meshes and fields of heights are drawn as the boxes around them. Obstacles have their loss, for
+    those who click on one.
     """
-    data = MjData(model)
+    data, found = MjData(model), {}
     mj_kinematics(model, data)
     stands_still = model.body_weldid[model.geom_bodyid] == 0
-    return {
-        name_of(model, g): _drawn(model, data, g) for g in np.flatnonzero(stands_still).tolist()
-    }
+    obstacles = obstacle_geoms(model)
+    for g in np.flatnonzero(stands_still).tolist():
+        name = model.geom(g).name or f"geom{g}"
+        loss = [rr.AnyValues(loss_db=loss_db_of(model, g))] if g in obstacles else []
+        found[name] = [_drawn(model, data, g, GLASS if g in obstacles else "solid"), *loss]
+    return found
 
 
-def name_of(model: MjModel, g: int) -> str:
-    """Return a geom's name, made up if it has none."""
-    return model.geom(g).name or f"geom{g}"
-
-
-def _drawn(model: MjModel, data: MjData, g: int) -> rr.AsComponents:
+def _drawn(model: MjModel, data: MjData, g: int, fill_mode: str) -> rr.AsComponents:
     quaternion = np.empty(4)
     mju_mat2Quat(quaternion, data.geom_xmat[g])
     style: dict[str, Any] = {
         "colors": [_colour(model, g)],
         "quaternions": [rr.Quaternion(xyzw=np.roll(quaternion, -1))],
-        "fill_mode": GLASS if g in obstacle_geoms(model) else "solid",
+        "fill_mode": fill_mode,
     }
     kind, size, place = model.geom_type[g], model.geom_size[g], data.geom_xpos[g]
     rotation = data.geom_xmat[g].reshape(3, 3)

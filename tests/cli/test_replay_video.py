@@ -25,10 +25,15 @@ def flown(tmp_path_factory):
     folder = tmp_path_factory.mktemp("flown")
     for policy in ("tdma", "mst"):
         arguments = ["fly", "--robots", "5", "--windows", "12", "--range-ratio", "0.5"]
-        assert (
-            main([*arguments, "--policy", policy, "--record", str(folder / f"{policy}.rrd")]) == 0
-        )
+        record = ["--policy", policy, "--record", str(folder / f"{policy}.rrd")]
+        assert main([*arguments, *record]) == 0
     return folder
+
+
+@pytest.fixture
+def tdma(flown):
+    """One of them as an argument."""
+    return str(flown / "tdma.rrd")
 
 
 def shape(path):
@@ -41,9 +46,16 @@ def shape(path):
         return sum(1 for _ in container.decode(video=0)), stream.width, stream.height
 
 
-def test_a_short_mission_lasts_as_long_as_it_did(flown, here, capsys):
+def test_a_short_mission_lasts_as_long_as_it_did_and_replaces_a_video_by_force_only(
+    tdma, here, capsys
+):
     """12 windows of 100 ms at 5 pictures per second."""
-    assert main(["replay", str(flown / "tdma.rrd"), "--video", "a.mp4", *SMALL]) == 0
+    arguments = ["replay", tdma, "--video", "a.mp4", *SMALL]
+    Path("a.mp4").write_text("old")
+    assert main(arguments) == 2
+    assert "exists" in capsys.readouterr().err
+    assert Path("a.mp4").read_text() == "old"
+    assert main([*arguments, "--force"]) == 0
     assert shape(here / "a.mp4") == (6, 160, 160)
     said = capsys.readouterr().out.strip()
     assert said.startswith("Wrote a.mp4: 1.2 s, 6 pictures of 160 by 160, 0.0")
@@ -55,90 +67,63 @@ def test_two_missions_make_one_gif(flown, here):
     assert shape(here / "a.gif") == (10, 160, 160)
 
 
-def test_an_existing_video_is_kept_without_force(flown, here, capsys):
-    Path("a.mp4").write_text("old")
-    arguments = ["replay", str(flown / "tdma.rrd"), "--video", "a.mp4", *SMALL]
-    assert main(arguments) == 2
-    assert "exists" in capsys.readouterr().err
-    assert Path("a.mp4").read_text() == "old"
-    assert main([*arguments, "--force"]) == 0
-    assert shape(here / "a.mp4")[0] == 6
-
-
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["--video", "a.avi"], "video must be named *.mp4 or *.gif, not a.avi"),
+        ("--video a.avi", "video must be named *.mp4 or *.gif, not a.avi"),
+        ("--video a.mp4 --size big", "size must be WIDTHxHEIGHT from 160x160 to 3840x3840"),
+        ("--video a.mp4 --size 161x160", "size of an MP4 must be even"),
+        ("--video a.mp4 --web", "--web is not allowed with --video"),
+        ("--seconds 5", "are of videos; name one by --video"),
+        ("--video a.mp4 --fps 0", "fps"),
+        ("--video a.gif --fps 51", "fps of a GIF must be at most 50, not 51"),
         (
-            ["--video", "a.mp4", "--size", "big"],
-            "size must be WIDTHxHEIGHT from 160x160 to 3840x3840",
+            "--video a.gif --size 3840x3840 --seconds 600 --fps 50",
+            "choose a smaller --size or fewer --seconds",
         ),
-        (["--video", "a.mp4", "--size", "161x160"], "size of an MP4 must be even"),
-        (["--video", "a.mp4", "--web"], "--web is not allowed with --video"),
-        (["--seconds", "5"], "are of videos; name one by --video"),
-        (["--video", "a.mp4", "--fps", "0"], "fps"),
-        (["--video", "a.gif", "--fps", "51"], "fps of a GIF must be at most 50, not 51"),
     ],
 )
-def test_bad_input_is_one_clear_line(flown, here, capsys, arguments, complaint):
-    assert main(["replay", str(flown / "tdma.rrd"), *arguments]) == 2
+def test_bad_input_is_one_clear_line(tdma, here, capsys, arguments, complaint):
+    assert main(["replay", tdma, *arguments.split()]) == 2
     said = capsys.readouterr().err
     assert complaint in said
     assert len(said.strip().splitlines()) == 1
     assert list(here.iterdir()) == []
 
 
-def test_a_damaged_replay_makes_no_video(flown, here, capsys):
-    whole = (flown / "tdma.rrd").read_bytes()
+def test_a_damaged_replay_makes_no_video(tdma, here, capsys):
+    whole = Path(tdma).read_bytes()
     Path("cut.rrd").write_bytes(whole[: len(whole) // 2])
     assert main(["replay", "cut.rrd", "--video", "a.mp4", *SMALL]) == 2
     assert "cut.rrd is no whole replay" in capsys.readouterr().err
     assert [path.name for path in here.iterdir()] == ["cut.rrd"]
 
 
-def test_an_interrupt_leaves_nothing(flown, here, monkeypatch):
+def test_an_interrupt_or_a_lack_of_opengl_leaves_nothing(tdma, here, monkeypatch, capsys):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("swarm_mj.replay.rendering.video.Movie.picture", interrupted)
-    arguments = ["replay", str(flown / "tdma.rrd"), "--video", "a.mp4", *SMALL]
-    assert main(arguments) == 130
-    assert list(here.iterdir()) == []
-
-
-def test_a_video_that_does_not_fit_is_refused_before_the_work(flown, here, capsys):
-    arguments = ["--video", "a.gif", "--size", "3840x3840", "--seconds", "600", "--fps", "50"]
-    assert main(["replay", str(flown / "tdma.rrd"), *arguments]) == 2
-    assert "choose a smaller --size or fewer --seconds" in capsys.readouterr().err
-    assert list(here.iterdir()) == []
-
-
-def test_no_opengl_is_one_line_with_the_way_out(flown, here, monkeypatch, capsys):
+    arguments = ["replay", tdma, "--video", "a.mp4", *SMALL]
+    with monkeypatch.context() as broken:
+        broken.setattr("swarm_mj.replay.rendering.video.Movie.picture", interrupted)
+        assert main(arguments) == 130
     monkeypatch.setenv("MUJOCO_GL", "off")
-    assert main(["replay", str(flown / "tdma.rrd"), "--video", "a.mp4", *SMALL]) == 1
-    said = capsys.readouterr().err
-    assert "MUJOCO_GL=off switches rendering off" in said
+    assert main(arguments) == 1
+    assert "MUJOCO_GL=off switches rendering off" in capsys.readouterr().err
     assert list(here.iterdir()) == []
 
 
-def test_the_first_picture_of_a_process_needs_no_variables(flown, tmp_path):
+def test_the_first_picture_of_a_process_needs_no_variables(tdma, here):
     """MuJoCo is loaded long before a video chooses how to render."""
     code = (
         "import os, mujoco, swarm_mj.cli as cli; assert 'MUJOCO_GL' not in os.environ;"
-        f"raise SystemExit(cli.main(['replay', {str(flown / 'tdma.rrd')!r}, '--video', 'a.mp4',"
-        "'--size', '160x160', '--fps', '5']))"
+        f"raise SystemExit(cli.main(['replay', {tdma!r}, '--video', 'a.mp4', *{SMALL}]))"
     )
     clean = {name: value for name, value in os.environ.items() if "GL" not in name}
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=tmp_path,
-        env=clean,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, env=clean, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert shape(tmp_path / "a.mp4")[0] == 6
+    assert shape(here / "a.mp4")[0] == 6
 
 
 PILLAR = """
@@ -153,8 +138,8 @@ def pillar(spec, mission):
 
 
 @pytest.mark.parametrize("name", ["x[/b]", "line\nbreak", "\x1b[31mred", "long " * 40])
-def test_a_scene_s_name_in_a_file_is_text_and_no_more(flown, capsys, name):
-    footage = read_footage(flown / "tdma.rrd")
+def test_a_scene_s_name_in_a_file_is_text_and_no_more(tdma, capsys, name):
+    footage = read_footage(Path(tdma))
     elsewhere = replace(footage, facts=replace(footage.facts, scene=name))
     assert replay._in_scene(elsewhere, None) is elsewhere
     said = capsys.readouterr().err

@@ -64,15 +64,6 @@ def test_rows_of_the_matrix_own_and_columns_are_owned(replay, two_way):
     assert about in np.sort(matrices[-1].reshape(12, 12).T, axis=1).tolist()
 
 
-def test_the_tree_s_lines_join_nodes_a_hop_apart(replay, two_way):
-    strips = rows(replay, "/tree/edges", "LineStrips2D:strips", 2, 2)
-    known = two_way.log.is_known & (np.arange(12) != two_way.log.ego)
-    assert len(strips) == np.sum(known)
-    hop = np.unique(np.round(strips[:, 1, 0] - strips[:, 0, 0], 3))
-    assert len(hop) == 1
-    assert hop[0] > 0
-
-
 def test_a_small_tree_by_hand():
     # 0 - 1, 0 - 2, 2 - 3, 2 - 4; 5 is unknown. Leaves from the top: 1, 3, 4.
     parent = np.array([[-1, 0, 0, 2, 2, -1]], dtype=np.int32)
@@ -83,14 +74,11 @@ def test_a_small_tree_by_hand():
     np.testing.assert_allclose(place[2, 1], 0.75)  # amid 3 and 4
     np.testing.assert_allclose(place[0, 1], 0.375)  # amid 1 and 2
     assert np.all(np.isnan(place[5]))
+    lone = dendrogram(parent, np.arange(6)[None] == 1, 1)[0]
+    np.testing.assert_array_equal(lone[1], [0.0, 0.5])
 
 
-def test_a_lone_observer_stands_in_the_middle():
-    place = dendrogram(np.full((1, 3), -1, dtype=np.int32), np.array([[False, True, False]]), 1)
-    np.testing.assert_array_equal(place[0, 1], [0.0, 0.5])
-
-
-def test_depth_is_the_number_of_hops_to_the_observer(two_way):
+def test_depth_is_the_number_of_hops_to_the_observer(replay, two_way):
     log = two_way.log
     place = dendrogram(log.parent, log.is_known, log.ego)
     for t in range(len(log.window)):
@@ -102,6 +90,11 @@ def test_depth_is_the_number_of_hops_to_the_observer(two_way):
             assert place[t, j, 0] == hops
     known = place[-1][log.is_known[-1]]
     assert len(np.unique(known, axis=0)) == len(known)  # no two robots share a place
+    strips = rows(replay, "/tree/edges", "LineStrips2D:strips", 2, 2)
+    assert len(strips) == np.sum(log.has_parent)
+    hops = strips[:, 1, 0] - strips[:, 0, 0]
+    np.testing.assert_allclose(hops, hops[0], rtol=1e-4)
+    assert hops[0] > 0.0
 
 
 def test_the_rate_counts_the_last_ten_windows():

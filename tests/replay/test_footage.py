@@ -84,14 +84,6 @@ def test_colours_are_by_age_white_for_the_observer_and_dark_for_the_fallen(faili
     np.testing.assert_array_equal(shown[:, log.ego][log.is_on[:, log.ego]], 255)
 
 
-def test_a_moment_has_the_packets_of_its_window(two_way):
-    footage = footage_of(two_way.log, two_way.mission, "mst", 5)
-    for row in (0, 7, 29):
-        num = {colour: len(start_m) for start_m, _, colour in footage.packets(row)}
-        for fate in ("delivered", "lost", "answered"):
-            assert num[palette.PACKETS[fate][0]] == two_way.counted(fate)[row]
-
-
 def test_an_open_area_is_shown_where_robots_ever_are(two_way):
     footage = footage_of(two_way.log, replace(two_way.mission, boundary="none"), "mst", 5)
     seen, where = footage.ground, two_way.log.position_m

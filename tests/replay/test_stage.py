@@ -86,7 +86,7 @@ SCENE = """
 
 def test_geoms_that_never_move_are_drawn_where_they_stand_and_obstacles_of_glass():
     def numbers(name, field):
-        return np.ravel(getattr(solids[name], field).as_arrow_array().to_pylist()).tolist()
+        return np.ravel(getattr(solids[name][0], field).as_arrow_array().to_pylist()).tolist()
 
     solids = static_geoms(mujoco.MjModel.from_xml_string(SCENE))
     assert solids.keys() == {"box", "floor", "pole", "ball"}

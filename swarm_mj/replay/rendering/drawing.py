@@ -216,7 +216,7 @@ class AgePlot:
             draw.circle(curve[row], radius, colour)
 
     def _draw_cut_off(self, draw: ImageDraw, footage: Footage) -> None:
-        """Draw columns: the share of the others that is cut off from the observer."""
+        # Columns: the share of the others that is cut off from the observer.
         share = np.sum(footage.is_cut_off, axis=1) / (footage.facts.mission.num_robots - 1)
         left, inner = float(self._inner.left), self._inner
         for (right, _), part in zip(self._curves[0], share.tolist(), strict=True):

@@ -1,6 +1,8 @@
-"""Pictures of a mission's scene: MuJoCo draws floor, walls and robots, and packets between them."""
+"""Pictures of a mission's scene, drawn by MuJoCo without a screen, and a window on it."""
 
 import atexit
+import threading
+import warnings
 from weakref import ref
 
 import numpy as np
@@ -10,6 +12,7 @@ from mujoco._errors import FatalError
 from mujoco._functions import (
     mj_camlight,
     mj_comPos,
+    mj_forward,
     mj_kinematics,
     mj_name2id,
     mjv_updateScene,
@@ -38,6 +41,9 @@ GROUND = 10.0  # an open floor's side, by the area's: a team that flies apart ha
 AMBIENT, SUN = 0.5, 0.5
 WALL_OPACITY, OBSTACLE_OPACITY = 0.3, 0.35  # what stands in front hides no robot
 SLICES, STACKS = 14, 5  # of round things
+WINDOW = 1280, 720  # that sizes on the window are meant for [pixels]
+NO_WINDOW = 'the window needs a display; without one, render_mode="rgb_array" draws pictures'
+CLOSING_S = 5.0  # what the window may take to close
 
 
 class SceneRenderer:
@@ -52,9 +58,7 @@ class SceneRenderer:
     ) -> None:
         """Compile the scene, changed by `scene`, for pictures of this size [pixels].
 
-        Raises:
-            ValueError: The size is outside its range.
-            OSError: No OpenGL works here; it says what to install.
+        Raise ValueError for a size outside its range, and OSError if no OpenGL works here.
         """
         for what, pixels in (("width", width), ("height", height)):
             if not 16 <= pixels <= MAX_PIXELS:
@@ -85,8 +89,7 @@ class SceneRenderer:
     def frame(self, footage: Footage, row: int = 0) -> UInt8[np.ndarray, "H W 3"]:
         """Return the picture of a window, counted from 0: RGB, its first row on top.
 
-        Raises:
-            ValueError: The footage is of another team size.
+        Raise ValueError for another team size.
         """
         num, (width, height) = footage.position_m.shape[1], self._size
         if num != self._mission.num_robots:
@@ -162,3 +165,57 @@ def pictured(mission: Mission, scene: Scene | None, width: int, height: int) -> 
         colour = model.geom_rgba[g] if material < 0 else model.mat_rgba[material]
         colour[3] = min(colour[3], OBSTACLE_OPACITY)
     return model
+
+
+class SceneViewer:
+    """MuJoCo's passive viewer, with robots and packets as pictures have them.
+
+    Closing the window ends the view, and nothing else.
+    """
+
+    def __init__(self, mission: Mission, *, scene: Scene | None = None) -> None:
+        """Open the window; raise OSError without a display, or if it is closed already."""
+        import glfw  # both look for a display when they are imported
+        from mujoco import viewer
+
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            if not glfw.init():  # MuJoCo's viewer would wait forever
+                raise OSError(NO_WINDOW)
+        self._model = pictured(mission, scene, *WINDOW)
+        self._data = MjData(self._model)
+        others = set(threading.enumerate())
+        try:
+            self._window = viewer.launch_passive(
+                self._model, self._data, show_left_ui=False, show_right_ui=False
+            )
+        except RuntimeError as error:  # macOS opens windows for `mjpython` only
+            raise OSError(f"{error}; {NO_WINDOW}") from error
+        self._threads = set(threading.enumerate()) - others
+        markers = self._window.user_scn
+        if markers is None:
+            raise OSError("the window was closed before the mission began; open it again")
+        self._markers = markers
+        self._is_aimed = False
+
+    def show(self, footage: Footage) -> None:
+        """Show the footage's first window from now on."""
+        if not self._window.is_running():
+            return
+        camera = look_at(footage.ground, 0, *WINDOW)
+        with self._window.lock():
+            if not self._is_aimed:  # from then on it is the user's
+                camera.aim(self._window.cam)
+                self._window.opt.geomgroup[BEACONS] = 0
+                self._is_aimed = True
+            self._data.qpos[:] = footage.position_m[0].ravel()
+            mj_forward(self._model, self._data)
+            self._markers.ngeom = 0
+            draw_markers(self._markers, footage, 0, camera)
+        self._window.sync()
+
+    def close(self) -> None:
+        """Close the window and wait for its threads: a process that ends earlier may crash."""
+        self._window.close()
+        for thread in self._threads:
+            thread.join(CLOSING_S)

@@ -46,9 +46,7 @@ class Movie(ExitStack):
     def __init__(self, footages: Sequence[Footage], style: VideoStyle) -> None:
         """Prepare everything that does not move, of one mission or of two side by side.
 
-        Raises:
-            ValueError: There are not one or two missions.
-            OSError: No OpenGL works here; it says what to install.
+        Raise ValueError for any other number, and OSError if no OpenGL works here.
         """
         super().__init__()
         if not 1 <= len(footages) <= MAX_MISSIONS:
@@ -116,11 +114,8 @@ def make_video(
     """Return the file of a video of one mission, or of two side by side.
 
     Footages are from `footage_of` or `read_footage`; `on_picture` is called after each picture.
-
-    Raises:
-        ValueError: There are not one or two missions, the suffix is another, or a GIF cannot show
-            so many pictures per second.
-        OSError: No OpenGL works here; it says what to install.
+    Raise ValueError for more missions, another suffix, or more pictures per second than a GIF can
+    show, and OSError if no OpenGL works here.
     """
     if suffix not in DEFAULTS:
         raise ValueError(f"a video is {' or '.join(DEFAULTS)}, not {suffix}")

@@ -70,26 +70,25 @@ def with_one_too_weak(seen):
     return replace(seen, mismatch=links, is_cut_off=is_cut_off)
 
 
-def test_the_legend_names_links_that_surprise_if_there_are_any():
-    found = []
-    for seen in (footage([1.0]), with_one_too_weak(footage([1.0]))):
-        picture = drawn(draw_legend, [seen], BOX, 12)
-        colours = (palette.MISMATCH["too_weak"], palette.CUT_OFF, palette.MISMATCH["unbelieved"])
-        found.append([bool(np.any(has(picture, colour, 0))) for colour in colours])
-    assert found == [[False] * 3, [True, True, False]]
+TOP = Box(0, 0, 400, 160)
 
 
-def test_the_plot_has_columns_for_who_is_cut_off():
-    """Robot 0 is cut off from the only other one: all of the plot's height."""
-    red = palette.dim(palette.CUT_OFF, SHADE)
-    heights = []
+def test_links_too_weak_and_robots_cut_off_are_named_and_counted_if_there_are_any():
+    """Robot 0 is cut off from the only other one: columns as high as the plot."""
+    found, heights = [], []
     for seen in (footage([10.0] * 5), with_one_too_weak(footage([10.0] * 5))):
-        picture = drawn(AgePlot([seen], BOX, 10).draw_axes)
-        heights.append(np.sum(np.any(has(picture, red, 0), axis=1)))
-    none, whole = heights
-    assert none == 0
-    inner = BOX.bottom - BOX.top - 10 - 14
-    assert abs(whole - inner) <= 2
+        legend = drawn(draw_legend, [seen], BOX, 12)
+        colours = (palette.MISMATCH["too_weak"], palette.CUT_OFF, palette.MISMATCH["unbelieved"])
+        named = [bool(np.any(has(legend, colour, 0))) for colour in colours]
+        title = drawn(draw_title, seen, 0, TOP, 12, (0, 255, 0))
+        found.append([*named, bool(np.any(has(title, palette.TOO_WEAK, 20)))])
+        is_red = has(
+            drawn(AgePlot([seen], BOX, 10).draw_axes), palette.dim(palette.CUT_OFF, SHADE), 0
+        )
+        heights.append(np.sum(np.any(is_red, axis=1)))
+    assert found == [[False] * 4, [True, True, False, True]]
+    assert heights[0] == 0
+    assert abs(heights[1] - (BOX.bottom - BOX.top - 10 - 14)) <= 2
 
 
 def said(robots, others):
@@ -124,17 +123,6 @@ def test_a_shortfall_stands_on_dark_ground():
     rows, columns = np.nonzero(has(picture, palette.TOO_WEAK, 60))
     around = np.asarray(picture)[rows.min() - 1, columns.min() : columns.max()]
     assert np.all(around == palette.BACKGROUND)
-
-
-TOP = Box(0, 0, 400, 160)
-
-
-def test_the_title_counts_who_is_cut_off():
-    is_red = []
-    for seen in (footage([1.0]), with_one_too_weak(footage([1.0]))):
-        picture = drawn(draw_title, seen, 0, TOP, 12, (0, 255, 0))
-        is_red.append(bool(np.any(has(picture, palette.TOO_WEAK, 20))))
-    assert is_red == [False, True]
 
 
 def test_the_title_stays_in_its_part_of_the_picture():

@@ -9,11 +9,15 @@ import pytest
 from swarm_mj.cli import main
 from swarm_mj.replay.rendering import opengl
 
+not_on_macos = pytest.mark.skipif(
+    sys.platform == "darwin", reason="Apple's own back end needs no choice"
+)
+
 
 @pytest.fixture(autouse=True)
 def _fresh(monkeypatch):
     monkeypatch.setenv(opengl.CHOICE, "")
-    monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
+    monkeypatch.delenv(opengl.PYOPENGL, raising=False)
     monkeypatch.delitem(sys.modules, "OpenGL.platform", raising=False)
 
 
@@ -26,28 +30,26 @@ def test_a_user_s_choice_is_kept(monkeypatch, chosen, name):
     assert opengl.backend() == name
 
 
-@pytest.mark.skipif(sys.platform == "darwin", reason="Apple's own back end needs no choice")
-@pytest.mark.parametrize(("egl_works", "name"), [(True, "egl"), (False, "osmesa")])
-def test_without_one_the_first_that_works_is_taken(monkeypatch, egl_works, name):
-    monkeypatch.setattr(opengl, "_works", lambda name: egl_works or name == "osmesa")
-    assert opengl.backend() == name
-
-
-@pytest.mark.skipif(sys.platform == "darwin", reason="Apple's own back end needs no choice")
-@pytest.mark.parametrize("preset", ["osmesa", "egl"])
-def test_what_pyopengl_was_told_already_binds_if_it_works(monkeypatch, preset):
+@not_on_macos
+@pytest.mark.parametrize(
+    ("preset", "working", "name"),
+    [
+        ("", "egl osmesa", "egl"),
+        ("", "osmesa", "osmesa"),
+        ("osmesa", "egl osmesa", "osmesa"),  # what PyOpenGL was given binds if it works
+        ("egl", "egl osmesa", "egl"),
+        ("osmesa", "egl", "egl"),
+        ("egl", "osmesa", "osmesa"),
+    ],
+)
+def test_without_one_the_first_that_works_is_taken_once(monkeypatch, preset, working, name):
+    asked = []
     monkeypatch.setenv(opengl.PYOPENGL, preset)
-    monkeypatch.setattr(opengl, "_works", lambda name: name == preset)
-    assert opengl.backend() == preset
-
-
-@pytest.mark.skipif(sys.platform == "darwin", reason="Apple's own back end needs no choice")
-@pytest.mark.parametrize(("preset", "other"), [("osmesa", "egl"), ("egl", "osmesa")])
-def test_what_pyopengl_was_told_does_not_bind_if_it_does_not_work(monkeypatch, preset, other):
-    monkeypatch.setattr(opengl, "_works", lambda name: name == other)
-    monkeypatch.setenv(opengl.PYOPENGL, preset)
-    assert opengl.backend() == other
-    assert opengl.PYOPENGL not in os.environ
+    monkeypatch.setattr(opengl, "_works", lambda each: asked.append(each) or each in working)
+    assert [opengl.backend(), opengl.backend()] == [name, name]
+    assert (asked[-1], len(asked)) == (name, len(set(asked)))
+    assert os.environ[opengl.CHOICE] == name
+    assert os.environ.get(opengl.PYOPENGL, name) in ("", name)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="GLX is X's")
@@ -72,15 +74,6 @@ def test_a_trial_is_quiet_and_runs_nothing_of_the_folder_here(
     assert not trapped.exists()
 
 
-@pytest.mark.skipif(sys.platform == "darwin", reason="Apple's own back end needs no choice")
-def test_it_is_decided_once_for_all_libraries_and_processes(monkeypatch):
-    asked = []
-    monkeypatch.setattr(opengl, "_works", lambda name: bool(asked.append(name)) or name == "osmesa")
-    assert [opengl.backend(), opengl.backend()] == ["osmesa", "osmesa"]
-    assert asked == ["egl", "osmesa"]
-    assert os.environ[opengl.CHOICE] == "osmesa"
-
-
 def test_where_none_works_nothing_is_chosen(monkeypatch):
     """For MuJoCo cannot be imported with a back end that is not there."""
     monkeypatch.setattr(opengl, "_works", lambda _: False)
@@ -90,17 +83,18 @@ def test_where_none_works_nothing_is_chosen(monkeypatch):
     assert os.environ[opengl.CHOICE] == ""
 
 
-def test_no_opengl_is_one_line_with_the_way_out(monkeypatch):
-    monkeypatch.setenv(opengl.CHOICE, "wgl")
-    with pytest.raises(OSError, match=r"wgl does not work here .*apt-get install") as refused:
+@pytest.mark.parametrize(
+    ("chosen", "reason"),
+    [
+        ("wgl", r"wgl does not work here .*apt-get install"),
+        ("off", "MUJOCO_GL=off switches rendering off"),
+    ],
+)
+def test_no_opengl_is_one_line_with_the_way_out(monkeypatch, chosen, reason):
+    monkeypatch.setenv(opengl.CHOICE, chosen)
+    with pytest.raises(OSError, match=reason) as refused:
         opengl.make_context(8, 8)
     assert "\n" not in str(refused.value)
-
-
-def test_rendering_that_is_switched_off_says_so(monkeypatch):
-    monkeypatch.setenv(opengl.CHOICE, "off")
-    with pytest.raises(OSError, match="MUJOCO_GL=off switches rendering off"):
-        opengl.backend()
 
 
 def test_a_back_end_that_does_not_exist_is_told_before_mujoco_is_loaded(monkeypatch, capsys):
