@@ -12,7 +12,6 @@ from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.packets import Packet, PacketField, fitting, packet_of
 from swarm_mj.protocol.window import DoubleBroadcast, LocalViews, RequestResponse, WindowProtocol
 from swarm_mj.radio.mission_radio import Belief, TrueLinks
-from swarm_mj.system.fields import name_of
 
 Parameters = Mapping[str, bool | int | float | str]  # what a policy was made with, by name
 
@@ -45,7 +44,8 @@ class Policy:
         Raises:
             ValueError: A slot does not even hold one entry and the payload.
         """
-        return fitting(packet_of(mission, self.payload_fields(mission)), mission, name_of(self))
+        packet = packet_of(mission, self.payload_fields(mission))
+        return fitting(packet, mission, type(self).__name__)
 
     @property
     def parameters(self) -> Parameters:
@@ -94,9 +94,9 @@ class BroadcastPolicy(DecentralisedPolicy):
         shape = views.silence.shape
         if transmits.shape != shape or transmits.dtype != np.bool_:
             raise ValueError(
-                f"transmits of {name_of(self)} must be True or False for each robot, an array of "
-                f"bool of shape {shape}, missions by robots, not {transmits.dtype} of shape "
-                f"{transmits.shape}"
+                f"transmits of {type(self).__name__} must be True or False for each robot, an "
+                f"array of bool of shape {shape}, missions by robots, not {transmits.dtype} of "
+                f"shape {transmits.shape}"
             )
         return np.where(transmits, BROADCAST, views.silence)
 
