@@ -36,8 +36,7 @@ class GraphVecEnv(SwarmVecEnv):
     def __init__(self, training: Training, rng: np.random.Generator) -> None:
         """Begin missions, whose seeds `rng` draws; the first ones are cut off at different windows.
 
-        Raises:
-            ValueError: The missions cannot be shared out evenly, or a size would have no batch.
+        Raises ValueError if they cannot be shared out evenly, or a size would have no batch.
         """
         self._rng, self._agent_reward = rng, training.reward
         self.agent, self.batches = training.credit_assignment, _make_batches(training)

@@ -20,8 +20,7 @@ SILENT_SHARE = 0.1  # of the silent rows that are learned from
 def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
     """Make PPO over fresh missions (III-C), and the generator that draws their seeds.
 
-    Raises:
-        ValueError: The missions or the minibatches cannot be made of these settings.
+    Raises ValueError if the missions or the minibatches cannot be made of these settings.
     """
     torch.set_num_threads(training.threads)
     rng, ppo, drops = np.random.default_rng(training.seed), training.ppo, training.drops_silence

@@ -24,10 +24,8 @@ def train(
     if it did not get that far. The listener gets a status after every window. The policy that a run
     begins with has the settings' network.
 
-    Raises:
-        ValueError: The missions cannot be made, the folder is another's, the checkpoint is damaged
-            or foreign, or training has diverged.
-        OSError: The folder cannot be written.
+    Raises ValueError if the missions cannot be made, the folder is another's, the checkpoint is
+    damaged or foreign, or training has diverged; OSError if the folder cannot be written.
     """
     check_folder = run_folder.check_begun if is_resumed else run_folder.check_new
     check_folder(folder)

@@ -17,13 +17,9 @@ Parameters = Mapping[str, bool | int | float | str]  # what a policy was made wi
 
 
 class Policy:
-    """A choice of the robot that every robot addresses next, and of the form of a window.
+    """A choice of the robot that every robot addresses next, and of the form of a window."""
 
-    Attributes:
-        uses: The information that each robot decides by, or the centre, in a few words.
-    """
-
-    uses: str = ""
+    uses: str = ""  # the information that each robot decides by, or the centre, in a few words
 
     def window(self, mission: Mission) -> WindowProtocol:
         """Return what the robots do in a window: by Alg. 1 they request, and respond."""
@@ -41,8 +37,7 @@ class Policy:
     def packet(self, mission: Mission) -> Packet:
         """Return what a packet holds: the sender's buffer, or as much of it as a slot has room for.
 
-        Raises:
-            ValueError: A slot does not even hold one entry and the payload.
+        Raises ValueError if a slot does not even hold one entry and the payload.
         """
         packet = packet_of(mission, self.payload_fields(mission))
         return fitting(packet, mission, type(self).__name__)
@@ -87,8 +82,7 @@ class BroadcastPolicy(DecentralisedPolicy):
     def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
         """Return `BROADCAST` for robots that transmit; the others address themselves.
 
-        Raises:
-            ValueError: `transmits`, which may be a user's own, did not return a bool per robot.
+        Raises ValueError if `transmits`, which may be a user's own, is not a bool per robot.
         """
         transmits = np.asarray(self.transmits(views))
         shape = views.silence.shape

@@ -62,7 +62,7 @@ class EdgeSums(torch.autograd.Function):
     ) -> Float[Tensor, "w C"]:
         """Return the sums; all tensors are on a CPU."""
         total = torch.zeros_like(receiver)
-        _sum(as_array(receiver), as_array(sender), as_array(direction), edges, total.numpy())
+        _sum((as_array(receiver), as_array(sender), as_array(direction)), edges, total.numpy())
         ctx.save_for_backward(receiver, sender, direction)
         ctx.edges = edges
         return total
@@ -86,12 +86,9 @@ def as_array(tensor: Tensor) -> np.ndarray:
 
 @compiled()
 def _sum(
-    receiver: Float[np.ndarray, "w C"],
-    sender: Float[np.ndarray, "n C"],
-    direction: Float[np.ndarray, "D C"],
-    edges: WantedEdges,
-    total: Float[np.ndarray, "w C"],
+    given: tuple[np.ndarray, ...], edges: WantedEdges, total: Float[np.ndarray, "w C"]
 ) -> None:
+    receiver, sender, direction = given
     for e in range(len(edges.end)):
         to, start, d = edges.end[e], edges.start[e], edges.direction[e]
         for c in range(total.shape[1]):

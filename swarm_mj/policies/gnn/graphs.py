@@ -77,7 +77,7 @@ class PaperFeatures(FeatureExtractor):
         node["is_oneself"], node["is_known"] = is_oneself, views.buffers.is_known | is_oneself
         per_mps = mission.num_windows * mission.window_s / mission.side_m
         scales = 1.0 / mission.num_windows, 1.0 / mission.side_m, per_mps
-        return _with_state(views.buffers, np.zeros_like(views.now), False, *scales, node)
+        return _with_state(views.buffers, np.zeros_like(views.now), False, scales, node)
 
 
 class ReferenceFeatures(FeatureExtractor):
@@ -97,21 +97,18 @@ class ReferenceFeatures(FeatureExtractor):
         node["zero"] = 0.0
         per_m = 1.0 / MISSION_DISTANCE_M  # and per m/s: they divide velocities by a distance, too
         scales = 1.0 / REFERENCE_WINDOWS, per_m, per_m
-        return _with_state(views.buffers, views.now, True, *scales, node)
+        return _with_state(views.buffers, views.now, True, scales, node)
 
 
 def _with_state(
     buffers: Buffers,
     since: Float[np.ndarray, "B"],
     is_relative: bool,
-    per_window: float,
-    per_m: float,
-    per_mps: float,
+    scales: tuple[float, float, float],  # per window, m and m/s
     node: Shaped[np.ndarray, "B N N"],
 ) -> Graphs:
     """Write what the buffers hold into nodes; their graphs let every robot be addressed."""
     num_missions, num_robots = buffers.shape
-    scales = per_window, per_m, per_mps
     times = buffers.timestamp, buffers.last_attempt
     _write_state(*times, buffers.position_m, buffers.velocity_mps, since, is_relative, scales, node)
     rows = (num_missions * num_robots, num_robots)
