@@ -34,7 +34,7 @@ LAST = ("aoi_ci_low", "aoi_ci_high", "packets_per_window")
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Evaluation:
-    """Costs of policies on the same missions.
+    """Costs of policies on the same missions; tables need pandas, charts matplotlib.
 
     Attributes:
         mission: The missions' numbers.
@@ -71,9 +71,6 @@ class Evaluation:
         By mission, return one row per policy and mission instead: `policy`, `seed`, `aoi`
         [windows], `velocity_variance` [m²/s²], and `task_cost` where the task has one
         (`summary[policy].task_cost_name` says which).
-
-        Raises:
-            ModuleNotFoundError: pandas is not installed.
         """
         need("pandas", "a table")
         from pandas import DataFrame
@@ -95,9 +92,6 @@ class Evaluation:
         """Draw the age of information of each policy, lowest first, with its 95 % interval.
 
         The figure is one of matplotlib, as of `Run.plot`.
-
-        Raises:
-            ModuleNotFoundError: matplotlib is not installed.
         """
         need("matplotlib", "a chart")
         from swarm_mj.api.charts import draw_evaluation

@@ -62,7 +62,7 @@ class Metrics(dict[str, Any]):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Run:
-    """One mission flown.
+    """One mission flown; ModuleNotFoundError says which package a table, chart or file lacks.
 
     Attributes:
         mission: Its numbers.
@@ -120,9 +120,6 @@ class Run:
         `velocity_variance` [m²/s²], `task_cost` (where the task has one; `summary.task_cost_name`
         names it), `hops` (mean over all known teammates), `is_complete` (every robot knows every
         other) and `packets_...` in that window.
-
-        Raises:
-            ModuleNotFoundError: pandas is not installed.
         """
         need("pandas", "a table")
         from pandas import DataFrame
@@ -134,9 +131,6 @@ class Run:
 
         Of flocks and random walks that is the velocity variance. A notebook shows the figure where
         it is the cell's result, `savefig` keeps it, and `matplotlib.pyplot.show()` opens a window.
-
-        Raises:
-            ModuleNotFoundError: matplotlib is not installed.
         """
         need("matplotlib", "a chart")
         from swarm_mj.api.charts import draw_flight
@@ -149,7 +143,6 @@ class Run:
         Raises:
             ValueError: Nothing was recorded that a video shows.
             OSError: No OpenGL works here; it says what to install.
-            ModuleNotFoundError: A package that makes videos is not installed.
         """
         if not is_notebook():
             plain_console().print(ELSEWHERE)
@@ -186,7 +179,6 @@ class Run:
         Raises:
             ValueError: The name has another ending, or nothing was recorded that it would show.
             OSError: The file cannot be written, or no OpenGL works here.
-            ModuleNotFoundError: A package that writes such files is not installed.
         """
         path = Path(path)
         check_outputs(Output("the file", path, ENDINGS))

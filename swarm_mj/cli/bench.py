@@ -93,11 +93,7 @@ def _measure(
     if episodes:
         say(f"Measuring an evaluation of {episodes} missions ...")
         title = f"Evaluation: {episodes} random walks of 40 robots, 500 windows each"
-        yield (
-            title,
-            ("", ""),
-            [list(simulation.evaluation_rows(episodes, options.jobs, seconds))],
-        )
+        yield (title, ("", ""), [list(simulation.evaluation_rows(episodes, options.jobs, seconds))])
     if not options.no_learning:
         say("Measuring networks and training (a minute or two) ...")
         from swarm_mj.cli import bench_learning  # torch takes its time to import

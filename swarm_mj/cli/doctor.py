@@ -37,6 +37,9 @@ LITTLE_DISK = 10**9
 LONGEST_S = 120.0  # of a trial; the first flight of an installation compiles for half a minute
 MAX_LETTERS = 400  # of what a trial complains, cut between words
 RENDERING, VIEWER = "rendering without a display", "rerun's viewer"  # headings
+EGL = "needs a graphics driver with EGL; or use osmesa"
+OSMESA = "Debian and Ubuntu: apt-get install libosmesa6"
+GLFW = "needs a display; else use egl or osmesa"
 
 RENDER = """
 import mujoco
@@ -66,23 +69,15 @@ class Finding(NamedTuple):
     mend: str = ""  # what to do, if it is not ok
 
 
-class Trial(NamedTuple):
-    """A program that ends with 0 if the thing works, and last prints what to say of it."""
-
-    group: str
-    name: str  # if it is VARIABLE=VALUE, the program runs with that
-    program: str
-    mend: str
-    state: State = "absent"  # if it fails
-
-
-TRIALS = (
-    Trial("flying", "three robots fly", FLIGHT, "see what `swarm-mj fly` says", "broken"),
-    Trial(RENDERING, "MUJOCO_GL=egl", RENDER, "needs a graphics driver with EGL; or use osmesa"),
-    Trial(RENDERING, "MUJOCO_GL=osmesa", RENDER, "Debian and Ubuntu: apt-get install libosmesa6"),
-    Trial(RENDERING, "MUJOCO_GL=glfw", RENDER, "needs a display; else use egl or osmesa"),
-    Trial("speed", "torch", TORCH, "learned policies and training need it"),
-)
+# Programs that end with 0 if a thing works, and last print what to say of it, by what is found if
+# they fail. One whose name is VARIABLE=VALUE runs with that.
+TRIALS = {
+    Finding("flying", "three robots fly", "broken", "", "see what `swarm-mj fly` says"): FLIGHT,
+    Finding(RENDERING, "MUJOCO_GL=egl", "absent", "", EGL): RENDER,
+    Finding(RENDERING, "MUJOCO_GL=osmesa", "absent", "", OSMESA): RENDER,
+    Finding(RENDERING, "MUJOCO_GL=glfw", "absent", "", GLFW): RENDER,
+    Finding("speed", "torch", "absent", "", "learned policies and training need it"): TORCH,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,22 +143,22 @@ def tried() -> Iterator[Finding]:
     """
     with ExitStack() as stack:
         under_way = []
-        for trial in TRIALS:
+        for failed, program in TRIALS.items():
             said = stack.enter_context(tempfile.TemporaryFile("w+"))
-            variable, _, value = trial.name.partition("=")
+            variable, _, value = failed.name.partition("=")
             environment = os.environ | ({variable: value} if value else {})
             environment.pop("PYOPENGL_PLATFORM", None)  # it may bind all to one back end
-            process = running([*PYTHON, "-c", trial.program], environment=environment, output=said)
-            under_way.append((trial, stack.enter_context(process), said))
-        for trial, process, said in under_way:
+            process = running([*PYTHON, "-c", program], environment=environment, output=said)
+            under_way.append((failed, stack.enter_context(process), said))
+        for failed, process, said in under_way:
             code, found = None, f"not within {LONGEST_S:g} s"
             with suppress(TimeoutExpired):
                 code = process.wait(LONGEST_S)
                 said.seek(0)
                 last = (said.read().strip().splitlines() or ["it said nothing"])[-1]
                 found = shorten(last, MAX_LETTERS, placeholder=" ...")
-            failed = Finding(trial.group, trial.name, trial.state, found, trial.mend)
-            yield failed._replace(state="ok", mend="") if code == 0 else failed
+            works = {"state": "ok", "mend": ""} if code == 0 else {}
+            yield failed._replace(found=found, **works)
 
 
 def machine() -> Iterator[Finding]:

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from swarm_mj.api.evaluate import study_needs
 from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_missions
+from swarm_mj.cli.options import output_option
 from swarm_mj.evaluation import progress
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.results import write_csv
@@ -26,8 +27,6 @@ from swarm_mj.system.needs import YES, check_fits, memory_errors
 from swarm_mj.system.outputs import Output, check_outputs, owned
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import tell_cores
-
-OUTPUT = "output"  # a heading of the help
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,15 +45,15 @@ class EvaluateOptions(PolicyOptions):
     baseline: str | None = same_as(Study, "baseline")
     jobs: int = same_as(Processes, "jobs")
     missions: tuple[Mission, ...] = several_missions()
-    json: Path | None = setting(
-        None, "write all figures and each mission's costs", group=OUTPUT, metavar="FILE.json"
+    json: Path | None = output_option(
+        None, "write all figures and each mission's costs", metavar="FILE.json"
     )
-    csv: Path | None = setting(
-        None, "write all figures, one row a result", group=OUTPUT, metavar="FILE.csv"
+    csv: Path | None = output_option(
+        None, "write all figures, one row a result", metavar="FILE.csv"
     )
-    force: bool = setting(False, "replace existing results and progress", group=OUTPUT)
-    yes: bool = setting(False, YES, group=OUTPUT)
-    resume: bool = setting(False, "continue where an interruption broke off", group=OUTPUT)
+    force: bool = output_option(False, "replace existing results and progress")
+    yes: bool = output_option(False, YES)
+    resume: bool = output_option(False, "continue where an interruption broke off")
 
     @property
     def study(self) -> Study:

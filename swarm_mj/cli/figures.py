@@ -87,16 +87,13 @@ def _papers(path: Path) -> list[Result]:
     """Read a file's results; raise ValueError for those that the paper's values do not fit."""
     results = read_results(path)
     for row, result in enumerate(results, start=1):
-        beyond = {
-            **components_in(vars(result)).names,
+        beyond = components_in(vars(result)).names | {
             "radio": result.radio,
-            "arena": None if result.arena == OPEN else result.arena,
-            "prior knowledge": None
-            if result.prior_knowledge == NOTHING
-            else result.prior_knowledge,
+            "arena": result.arena,
+            "prior knowledge": result.prior_knowledge,
         }
         for kind, name in beyond.items():
-            if name:
+            if name not in (None, OPEN, NOTHING):
                 raise ValueError(
                     f"figures compare with the paper's values, but row {row} of {path} was flown "
                     f"with the {kind} {name}; leave such rows out, or chart them with "

@@ -13,6 +13,7 @@ from rich.console import Console
 
 from swarm_mj.api.flight import Flown, compile_ahead, flight_needs, fly_swarm, run_of
 from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, one_mission
+from swarm_mj.cli.options import output_option
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import notes_on
 from swarm_mj.policies import registry
@@ -33,7 +34,6 @@ from swarm_mj.system.terminal import plain_console, this_command
 
 REPLAYS = Path("replays")
 OTHERWISE = "name another place with --record, or leave it out with --no-record"
-OUTPUT = "output"  # a heading of the help
 COMPARED = ("planner", "tdma", "random-flooding")  # with what was flown, for a first comparison
 
 
@@ -52,15 +52,15 @@ class FlyOptions(PolicyOptions):
     )
     seed: int = setting(1, "the same seed is the same mission")
     mission: Mission = one_mission()
-    record: Path | None = setting(
-        None, "the replay", group=OUTPUT, metavar="FILE.rrd", shown=f"a fresh name under {REPLAYS}/"
+    record: Path | None = output_option(
+        None, "the replay", metavar="FILE.rrd", shown=f"a fresh name under {REPLAYS}/"
     )
-    no_record: bool = setting(False, "record no replay", group=OUTPUT)
-    json: Path | None = setting(None, "write a summary", group=OUTPUT)
-    force: bool = setting(False, "replace existing files", group=OUTPUT)
-    yes: bool = setting(False, YES, group=OUTPUT)
-    observer: int = setting(0, "the robot whose knowledge the replay shows", group=OUTPUT)
-    view: bool = setting(False, "open the replay afterwards", group=OUTPUT)
+    no_record: bool = output_option(False, "record no replay")
+    json: Path | None = output_option(None, "write a summary")
+    force: bool = output_option(False, "replace existing files")
+    yes: bool = output_option(False, YES)
+    observer: int = output_option(0, "the robot whose knowledge the replay shows")
+    view: bool = output_option(False, "open the replay afterwards")
 
 
 def run(options: FlyOptions) -> int:

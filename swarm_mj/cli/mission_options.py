@@ -15,7 +15,7 @@ from swarm_mj.system.fields import FieldOf, as_typed, kind_of, setting
 NAMED = ", ".join(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes it
 NAMES = f"who talks when (`swarm-mj policies` says more): {NAMED}"
 OTHERS = "directories or .safetensors files of learned policies, or module:Name of your own"
-HEADING = "policies"
+_policy, TUNED = partial(setting, group="policies"), "tuned for the regime"
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]
 # Fields that count only where another has this value, or for None any above 0.
 NEEDED: dict[str, tuple[str, str | None]] = {
@@ -33,22 +33,16 @@ NEEDED: dict[str, tuple[str, str | None]] = {
 class PolicyOptions(Components):
     """Options that change a policy, or what it flies in."""
 
-    probability: float | None = setting(
-        None,
-        "of a transmission, for policies that have one",
-        low=0.0,
-        high=1.0,
-        shown="tuned for the regime",
-        group=HEADING,
+    probability: float | None = _policy(
+        None, "of a transmission, for policies that have one", low=0.0, high=1.0, shown=TUNED
     )
-    is_deterministic: bool = setting(
-        False, "learned policies take the most probable recipient, not a draw", group=HEADING
+    is_deterministic: bool = _policy(
+        False, "learned policies take the most probable recipient, not a draw"
     )
-    payload: str = setting(
-        PAYLOADS[0],
+    payload: str = _policy(
+        "snapshots",
         "what the planner's packets carry beyond the buffers T, M and P",
         choices=PAYLOADS,
-        group=HEADING,
     )
     features: tuple[str, ...] = setting(
         (), "that a learned policy was trained on; give them again", group=GROUP, metavar=SHOWN_AS

@@ -23,12 +23,14 @@ from swarm_mj.system.fields import (
     did_you_mean,
     kind_of,
     range_of,
+    setting,
 )
 
 T = TypeVar("T")
 
 MANY = 10**9  # from here on, the end of a range is only there to catch slips
 METAVARS: dict[Any, str] = {int: "N", float: "X", str: "NAME", Path: "FILE"}
+output_option = partial(setting, group="output")  # under this heading of the help
 BIT_RATES = {"k": 1e3, "m": 1e6, "g": 1e9}  # the factor of a letter behind a number
 
 

@@ -3,6 +3,7 @@
 import re
 import shlex
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from swarm_mj.replay.footage import Footage
 
 VIDEO = "video"  # a heading of the help
+_video = partial(setting, group=VIDEO)
+OWN_TIME, BARE = f"the mission's own time, {styles.LONGEST_S:g} at most", "the bare arena"
 SUFFIXES = ".mp4|.gif"
 PIXELS = (160, 3840)  # of a side
 
@@ -43,35 +46,20 @@ class ReplayOptions:
         "make a video instead, of one mission or of two side by side: FILE.mp4 or FILE.gif",
         group=VIDEO,
     )
-    size: str | None = setting(
-        None, "in pixels", group=VIDEO, metavar="WIDTHxHEIGHT", shown="1280x720; GIF: 830x520"
+    size: str | None = _video(
+        None, "in pixels", metavar="WIDTHxHEIGHT", shown="1280x720; GIF: 830x520"
     )
-    seconds: float | None = setting(
-        None,
-        "in which the whole mission is shown",
-        group=VIDEO,
-        unit="s",
-        low=0.1,
-        high=600.0,
-        shown=f"the mission's own time, {styles.LONGEST_S:g} at most",
+    seconds: float | None = _video(
+        None, "in which the whole mission is shown", unit="s", low=0.1, high=600.0, shown=OWN_TIME
     )
-    fps: int | None = setting(
-        None,
-        "pictures per second, of a GIF 50 at most",
-        group=VIDEO,
-        low=1,
-        high=60,
-        shown="25; GIF: 15",
+    fps: int | None = _video(
+        None, "pictures per second, of a GIF 50 at most", low=1, high=60, shown="25; GIF: 15"
     )
-    scene: str | None = setting(
-        None,
-        "the scene of your own that the mission was flown in",
-        group=VIDEO,
-        metavar=SHOWN_AS,
-        shown="the bare arena",
+    scene: str | None = _video(
+        None, "the scene of your own that the mission was flown in", metavar=SHOWN_AS, shown=BARE
     )
-    force: bool = setting(False, "replace an existing video", group=VIDEO)
-    yes: bool = setting(False, YES, group=VIDEO)
+    force: bool = _video(False, "replace an existing video")
+    yes: bool = _video(False, YES)
 
 
 def run(options: ReplayOptions) -> int:
@@ -150,6 +138,6 @@ def _in_scene(footage: "Footage", scene: str | None) -> "Footage":
         return replace(footage, **Components(scene=scene).made(footage.facts.mission).given)
     if flown_in is not None:
         hint = "; --scene shows it, too." if is_own(flown_in) else "."
-        text = f"The video shows the bare arena. The mission was flown in the scene {flown_in!r}"
+        text = f"The video shows {BARE}. The mission was flown in the scene {flown_in!r}"
         plain_console(is_error=True).print(text + hint)
     return footage

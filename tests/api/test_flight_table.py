@@ -92,16 +92,10 @@ ROWS = [  # policy, task, numbers, and the rows that they make
         *("tdma", "flocking", BROADCAST | {"velocity_variance_last": 1.0}),
         {"flock agreed: under 1% is left": "no, 25.0%"},
     ),
-    (
-        *("tdma", "random-walk", BROADCAST),
-        {"first to last window": "4.0000 to 0.0020 m²/s²"},
-    ),
+    (*("tdma", "random-walk", BROADCAST), {"first to last window": "4.0000 to 0.0020 m²/s²"}),
     (
         *("planner", "stationary", BROADCAST),
-        {
-            "packets carry": "the sender's buffer and links",
-            "who decides": "each robot by itself",
-        },
+        {"packets carry": "the sender's buffer and links", "who decides": "each robot by itself"},
     ),
     (*(WITHOUT_PAYLOAD, "stationary", BROADCAST), {"packets carry": "the sender's buffer"}),
     (

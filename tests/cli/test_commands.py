@@ -31,7 +31,11 @@ def test_nothing_typed_shows_where_to_begin(capsys):
         ("--versoin", "did you mean --version?"),
         ("fly --polcy tdma", "unrecognized arguments: --polcy tdma; did you mean --policy?"),
         ("fly --polcy=tdma", "did you mean --policy?"),
-        ("fly --task flok", "not 'flok'; did you mean flocking?"),
+        (
+            "fly --task flok",
+            "task must be one of stationary, random-walk, flocking, formation, coverage, not "
+            "'flok'; did you mean flocking?",
+        ),
         ("train --out r --credit tem", "did you mean team?"),
     ],
 )

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from swarm_mj.cli import doctor, main
-from swarm_mj.cli.doctor import Finding, Trial, packages, tried
+from swarm_mj.cli.doctor import Finding, packages, tried
 from swarm_mj.radio import reception
 
 SOUND = Finding("speed", "cores", "ok", "2 may be used")
@@ -149,15 +149,15 @@ def test_compiled_code_needs_a_place_that_can_be_written(monkeypatch, tmp_path):
 def test_what_came_of_a_trial(monkeypatch, program, failed, state, found):
     if "sleep" in program:
         monkeypatch.setattr(doctor, "LONGEST_S", 0.3)
-    trial = Trial("group", "SAID=by its variables", program, "mend it", failed)
-    monkeypatch.setattr(doctor, "TRIALS", (trial,))
+    trial = Finding("group", "SAID=by its variables", failed, "", "mend it")
+    monkeypatch.setattr(doctor, "TRIALS", {trial: program})
     mend = "" if state == "ok" else "mend it"
     assert [each[2:] for each in tried()] == [(state, found, mend)]
 
 
 def test_trials_run_nothing_of_the_folder_here(monkeypatch, trapped):
-    trial = Trial("group", "name", "import numpy; print(numpy.pi)", "mend it")
-    monkeypatch.setattr(doctor, "TRIALS", (trial,))
+    trial = Finding("group", "name", "absent", "", "mend it")
+    monkeypatch.setattr(doctor, "TRIALS", {trial: "import numpy; print(numpy.pi)"})
     (outcome,) = tried()
     assert outcome.found.startswith("3.14")
     assert not trapped.exists()

@@ -81,11 +81,6 @@ def test_results_are_what_the_library_computes(whole):
         assert {name: row[name] for name in COLUMNS} == {n: getattr(result, n) for n in COLUMNS}
 
 
-def test_two_jobs_end_in_the_same_files(succeed, tmp_path, whole):
-    succeed("evaluate", *TWO_POLICIES, *BOTH, "--jobs", 2)
-    same_files(tmp_path, whole)
-
-
 # Evaluates as `swarm-mj` does, and ends itself by a signal when so many batches are kept.
 EVALUATE_AND_END = """
 import os, signal, sys
@@ -116,8 +111,7 @@ def evaluate_and_end(forks, tmp_path_factory):
     return run
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
-@pytest.mark.parametrize("count", [1, 3])
+@pytest.mark.parametrize(("jobs", "count"), [(1, 1), (2, 3)])
 def test_ctrl_c_keeps_what_was_flown_and_resuming_ends_in_the_same_files(
     swarm_mj, evaluate_and_end, tmp_path, whole, jobs, count
 ):

@@ -56,13 +56,6 @@ def test_a_summary_is_what_the_library_computes(succeed, tmp_path):
     assert (summary["interrupted"], summary["replay"]) == (False, None)
 
 
-@pytest.mark.parametrize("task", ["stationary", "random-walk", "flocking"])
-@pytest.mark.parametrize("preset", ["paper", "reference"])
-def test_every_task_and_preset_flies(succeed, tmp_path, task, preset):
-    succeed("fly", *SHORT, "--task", task, "--preset", preset, "--record", "a.rrd")
-    assert len(windows(tmp_path / "a.rrd")) == 20
-
-
 REFUSED = {
     "--robots 1": "a whole number from 2 to 1000 [robots], not 1",
     "--robots many": "argument --robots: invalid int value: 'many'",

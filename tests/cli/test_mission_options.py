@@ -124,13 +124,6 @@ def test_flags_leave_out_what_is_as_usual():
     assert mission_flags(paper("stationary", num_robots=9)) == "--task stationary --robots 9"
 
 
-@pytest.mark.parametrize("command", ["fly", "evaluate"])
-def test_unknown_names_are_refused_by_name(refusal, command):
-    """As a process: the type checker of these tests would come first."""
-    tasks = "stationary, random-walk, flocking, formation, coverage"
-    assert f"task must be one of {tasks}, not 'swim'" in refusal(command, "--task", "swim")
-
-
 SWITCHES = {
     "--loss-exponent 3": "--path-loss log-distance",
     "--reference-m 2": "--path-loss log-distance",
@@ -181,15 +174,6 @@ def test_a_policy_flies_as_tuned_unless_it_is_told_otherwise(command):
 def test_what_no_policy_can_do_is_refused(command, typed, complaint):
     with pytest.raises(ValueError, match=complaint):
         parse([command, *typed])
-
-
-@both
-def test_the_help_says_them_under_one_heading(capsys, command):
-    assert main([command, "--help"]) == 0
-    _, _, below = " ".join(capsys.readouterr().out.split()).partition(" policies: ")
-    assert "--probability X of a transmission" in below
-    assert "(default: tuned for the regime)" in below
-    assert "--deterministic learned policies take" in below
 
 
 def test_the_names_are_those_that_can_be_typed():

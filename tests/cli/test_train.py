@@ -1,9 +1,11 @@
 """`swarm-mj train`: what it prints, writes, refuses, and how it goes on."""
 
+import itertools
 import shlex
 import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -78,32 +80,26 @@ def test_the_commands_that_it_prints_work(whole, monkeypatch, capsys, label):
     capsys.readouterr()
 
 
-class SignalsAt:
-    """Sends Ctrl-C in certain windows of the training, or of its evaluations."""
+@contextmanager
+def ctrl_c_at(method, *calls):
+    """Presses Ctrl-C in certain windows of the training, or of its evaluations."""
+    original, count = getattr(TrainingCallback, method), itertools.count(1)
 
-    def __init__(self, monkeypatch, method, *calls):
-        original, count = getattr(TrainingCallback, method), 0
+    def pressing(session, *arguments):
+        if next(count) in calls:
+            signal.raise_signal(signal.SIGINT)
+        return original(session, *arguments)
 
-        def signalling(session, *arguments):
-            nonlocal count
-            count += 1
-            if count in calls:
-                signal.raise_signal(signal.SIGINT)
-            return original(session, *arguments)
-
-        self.before = signal.signal(signal.SIGINT, signal.default_int_handler)
-        monkeypatch.setattr(TrainingCallback, method, signalling)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        signal.signal(signal.SIGINT, self.before)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(TrainingCallback, method, pressing)
+        yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.usefixtures("here")
-def test_ctrl_c_finishes_the_rollout_and_tells_how_to_go_on(monkeypatch, capsys):
-    with monkeypatch.context() as patch, SignalsAt(patch, "_on_step", 40):
+def test_ctrl_c_finishes_the_rollout_and_tells_how_to_go_on(capsys):
+    with ctrl_c_at("_on_step", 40):
         assert train("--out", "r", *SMALL, "--budget", 512) == 130
     printed = capsys.readouterr()
     assert "Interrupted: finishing this rollout, then all is kept; Ctrl-C again" in printed.err
@@ -114,16 +110,16 @@ def test_ctrl_c_finishes_the_rollout_and_tells_how_to_go_on(monkeypatch, capsys)
     assert [line.split()[0] for line in printed.err.splitlines()] == ["256", "384", "512"]
 
 
-def test_ctrl_c_in_an_evaluation_leaves_it_for_later(here, monkeypatch, capsys):
-    with monkeypatch.context() as patch, SignalsAt(patch, "_on_window", 5):
+def test_ctrl_c_in_an_evaluation_leaves_it_for_later(here, capsys):
+    with ctrl_c_at("_on_window", 5):
         assert train("--out", "r", *SMALL, "--budget", 128) == 130
     assert "none yet" in capsys.readouterr().out
     assert train("--out", "r", "--resume") == 0
     assert (here / "r" / "policy.safetensors").exists()
 
 
-def test_a_second_ctrl_c_breaks_off_and_leaves_nothing_half_done(here, monkeypatch, capsys):
-    with monkeypatch.context() as patch, SignalsAt(patch, "_on_step", 40, 45):
+def test_a_second_ctrl_c_breaks_off_and_leaves_nothing_half_done(here, capsys):
+    with ctrl_c_at("_on_step", 40, 45):
         assert train("--out", "r", *SMALL, "--budget", 256) == 130
     printed = capsys.readouterr()
     assert "Broken off; the last checkpoint is kept." in printed.err
@@ -146,8 +142,8 @@ def test_ctrl_c_while_it_is_being_prepared_leaves_nothing(here, monkeypatch, cap
 def test_limits_are_kept_and_may_be_moved(here, capsys):
     train("--out", "r", *SMALL, "--budget", 128)
     train("--out", "r", "--resume", "--budget", 256, "--replay-every", 256)
-    assert read_run(here / "r").limits.decisions == 256
-    assert read_run(here / "r").limits.replay_every == 256
+    limits = read_run(here / "r").limits
+    assert (limits.decisions, limits.replay_every) == (256, 256)
     assert len(list((here / "r" / "replays").iterdir())) == 1 + 1
     train("--out", "r", "--resume", "--minutes", 1e-6)
     limits = read_run(here / "r").limits

@@ -54,6 +54,15 @@ def test_the_largest_numbers_are_whole_at_100_columns(printed, columns):
         assert number in text
 
 
+def test_a_long_name_widens_the_table_and_cuts_no_number(printed):
+    name = "runs/" + 60 * "z"
+    lines = printed([some_result(name, 123.456, task="flocking", **LARGEST)], 100)
+    (row,) = (line for line in lines if line.startswith(name) and "±" in line)
+    assert "…" not in row
+    assert row.split()[1:4] == ["123.46", "±", "12.35"]
+    assert row.split()[-3:] == ["115.73", "±", "12.96"]
+
+
 def test_the_freshest_comes_first_in_each_regime(printed):
     results = [
         some_result("a", 3.0),
