@@ -219,7 +219,6 @@ def _check_named(kind: str, part: object) -> None:
 
 
 def _names(policies: str | Path | Sequence[str | Path]) -> tuple[str, ...]:
-    """Return policies' names, one or several."""
     if not isinstance(policies, str | Path | Iterable):
         raise TypeError(f"policies must be a list of names, not {policies!r:.80}")
     named = [policies] if isinstance(policies, str | Path) else list(policies)

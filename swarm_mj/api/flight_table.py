@@ -106,7 +106,6 @@ def _number(name: str, value: Any) -> Any:  # noqa: ANN401 - of a summary's fiel
 
 
 def _windows(value: float | int, mission: Mission, digits: int) -> str:
-    """Return a time in windows and in seconds."""
     number = f"{value:.{digits}f}"
     windows = "window" if number == "1" else "windows"
     return f"{number} {windows} ({value * mission.window_s:.2g} s)"

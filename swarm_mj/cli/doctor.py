@@ -121,7 +121,6 @@ def packages() -> Iterator[Finding]:
 
 
 def _packages(name: str, asked: Sequence[Requirement], mend: str) -> Finding:
-    """Find whether packages are installed in the versions asked for."""
     problems, found = [], "installed"
     for each in asked:
         try:

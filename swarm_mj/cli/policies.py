@@ -109,7 +109,6 @@ def _print_all(facts: list[dict[str, Any]], mission: Mission) -> None:
 
 
 def _print_one(each: dict[str, Any], mission: Mission) -> None:
-    """Print all of one policy, and how to fly it."""
     rows = {
         "who decides": "a centre" if each["is_centralised"] else "each robot by itself",
         "what it uses": each["uses"] or "it does not say: give its class a text `uses`",

@@ -116,7 +116,6 @@ def asked_limits(limits: Limits, options: TrainOptions) -> Limits:
 
 
 def _print(out: Path, asked: TrainingRun, progress: Progress, *, is_over: bool) -> None:
-    """Print the run's report, and the commands that use its policy."""
     training, console = asked.training, plain_console()
     credit, sizes = training.credit_assignment, ", ".join(map(str, training.robots))
     rows = {

@@ -136,7 +136,6 @@ def has_stopped_early(run: TrainingRun, progress: Progress) -> bool:
 
 
 def _row(run: TrainingRun, progress: Progress) -> str:
-    """Return the line of the last evaluation."""
     row = progress.curve[-1]
     note = "  best so far" if row is progress.best else ""
     notes = {ORACLE: f" ({_oracle_missions(run)})"}
@@ -147,7 +146,6 @@ def _row(run: TrainingRun, progress: Progress) -> str:
 
 
 def _text(status: Status, start: Status, limits: Limits) -> str:
-    """Return the words behind the bar."""
     parts = [f"{status.decisions:,} decisions"]
     if status.evaluated is not None:
         parts.append(f"missions {status.evaluated:.0%}")

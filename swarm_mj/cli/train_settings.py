@@ -117,7 +117,6 @@ def refuse_others(given: dict[str, Any], training: Training, whose: str) -> None
 
 
 def _part(part: str, given: dict[str, Any]) -> dict[str, Any]:
-    """Return the given settings of one part, by their names."""
     places = {place: place.rpartition(".") for place in given}
     return {name: given[place] for place, (owner, _, name) in places.items() if owner == part}
 

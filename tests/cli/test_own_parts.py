@@ -159,8 +159,8 @@ def test_a_channel_of_ones_own_gives_a_mission_the_same_course_beside_any_other(
     np.testing.assert_array_equal(*ages)
 
 
-TRAIN = ("train", "--robots", 5, "--windows", 20, "--range-ratio", 0.6, "--missions", 4)
-TRAIN = (*TRAIN, "--held-out", 2, "--evaluate-every", 256, "--latent", 6, "--depth", 2)
+TRAIN = ("train", "--robots", 5, "--windows", 10, "--range-ratio", 0.6, "--missions", 4)
+TRAIN = (*TRAIN, "--held-out", 2, "--evaluate-every", 128, "--latent", 6, "--depth", 2)
 OWN = ("--channel", "my_parts:Lossy", "--features", "my_parts:Ages")
 
 
@@ -169,7 +169,7 @@ def trained(forks, tmp_path_factory):
     """A folder with the parts, a run that was trained with them, and half of such a run."""
     folder = tmp_path_factory.mktemp("own")
     (folder / "my_parts.py").write_text(PARTS)
-    for out, budget in (("run", 256), ("w", 512)):
+    for out, budget in (("run", 128), ("w", 256)):
         done = forks.run(folder, "swarm_mj", *TRAIN, *OWN, "--out", out, "--budget", budget)
         assert done.returncode == 0, done.stderr
     return folder
@@ -188,11 +188,11 @@ def typed(forks, trained):
 
 
 def test_a_run_goes_on_bit_for_bit_if_its_parts_are_named_again(typed, trained):
-    done, was_imported = typed("train", "--out", "run", "--resume", "--budget", 512)
+    done, was_imported = typed("train", "--out", "run", "--resume", "--budget", 256)
     assert done.returncode == 2
     assert not was_imported
     assert "--features my_parts:Ages --channel my_parts:Lossy again" in done.stderr
-    done, _ = typed("train", "--out", "run", "--resume", "--budget", 512, *OWN)
+    done, _ = typed("train", "--out", "run", "--resume", "--budget", 256, *OWN)
     assert done.returncode == 0, done.stderr
     curves = []
     for name in ("run", "w"):
