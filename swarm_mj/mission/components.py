@@ -178,13 +178,14 @@ def one_line_each() -> Iterator[None]:
     except (KeyboardInterrupt, MemoryError):
         raise
     except Exception as error:
-        frames = [f for f, _ in traceback.walk_tb(error.__traceback__)]
-        for frame in reversed(frames):  # the innermost first, as it raised
-            module = frame.f_globals.get("__name__")
-            if module in _loaded:
-                said = f"{_loaded[module]} raised {_in_a_line(error, module)}"
-                raise ValueError(said) from error
-        raise
+        frames = traceback.walk_tb(error.__traceback__)
+        modules = [frame.f_globals.get("__name__", "") for frame, _ in frames]
+        theirs = [module for module in modules if module in _loaded]
+        if not theirs:
+            raise
+        innermost = theirs[-1]  # as it raised
+        said = f"{_loaded[innermost]} raised {_in_a_line(error, innermost)}"
+        raise ValueError(said) from error
 
 
 def _check_form(kind: str, name: str) -> None:
@@ -228,15 +229,12 @@ def _in_a_line(error: BaseException, module: str) -> str:
     """Return an exception in one line, with the last place in a module that it came through."""
     text = " ".join(str(error).split())[:300]
     said = f"{type(error).__name__}: {text}" if text else type(error).__name__
-    frames = [
-        (frame.f_code.co_filename, line)
-        for frame, line in traceback.walk_tb(error.__traceback__)
-        if frame.f_globals.get("__name__") == module
-    ]
-    if isinstance(error, SyntaxError) or not frames:  # which says where it is itself
+    frames = traceback.walk_tb(error.__traceback__)
+    theirs = [each for each in frames if each[0].f_globals.get("__name__") == module]
+    if isinstance(error, SyntaxError) or not theirs:  # which says where it is itself
         return said
-    file, line = frames[-1]
-    return f"{said} ({os.path.relpath(file)}, line {line})"
+    frame, line = theirs[-1]
+    return f"{said} ({os.path.relpath(frame.f_code.co_filename)}, line {line})"
 
 
 def _is_users(home: str) -> bool:

@@ -33,14 +33,11 @@ def obstruct(
     """
     if obstacles.kind.shape[0] == 0:
         return
-    start, along = np.empty(3), np.empty(3)
-    start[2], along[2] = height_m, 0.0
-    start[:2] = position_m[i]
+    x, y = position_m[i, 0], position_m[i, 1]
     for j in range(position_m.shape[0]):
         if j != i:
-            along[0] = position_m[j, 0] - start[0]
-            along[1] = position_m[j, 1] - start[1]
-            power[j] *= power_through(start, along, obstacles)
+            along_m = (position_m[j, 0] - x, position_m[j, 1] - y, 0.0)
+            power[j] *= power_through((x, y, height_m), along_m, obstacles)
 
 
 @compiled()
@@ -52,22 +49,17 @@ def blocked(
     Their centres are at this height above the floor [m].
     """
     touches = np.zeros(position_m.shape[0], dtype=np.bool_)
-    start, along = np.empty(3), np.zeros(3)
-    start[2] = height_m
     for i in range(position_m.shape[0]):
         for turn in range(4):
             x, y = math.cos(0.25 * math.pi * turn), math.sin(0.25 * math.pi * turn)
-            along[0], along[1] = 2.0 * radius_m * x, 2.0 * radius_m * y
-            start[0] = position_m[i, 0] - radius_m * x
-            start[1] = position_m[i, 1] - radius_m * y
-            touches[i] |= _next_crossed(start, along, 0, obstacles) < obstacles.kind.shape[0]
+            start_m = (position_m[i, 0] - radius_m * x, position_m[i, 1] - radius_m * y, height_m)
+            along_m = (2.0 * radius_m * x, 2.0 * radius_m * y, 0.0)
+            touches[i] |= _next_crossed(start_m, along_m, 0, obstacles) < obstacles.kind.shape[0]
     return touches
 
 
 @compiled()
-def power_through(
-    start_m: Float[np.ndarray, "3"], along_m: Float[np.ndarray, "3"], obstacles: Obstacles
-) -> float:
+def power_through(start_m: Vector, along_m: Vector, obstacles: Obstacles) -> float:
     """Return the share of the power that reaches the end of a line, linear [1]."""
     left = 1.0
     o = _next_crossed(start_m, along_m, 0, obstacles)
@@ -78,17 +70,11 @@ def power_through(
 
 
 @compiled()
-def _next_crossed(
-    start_m: Float[np.ndarray, "3"],
-    along_m: Float[np.ndarray, "3"],
-    first: int,
-    obstacles: Obstacles,
-) -> int:
+def _next_crossed(start_m: Vector, along_m: Vector, first: int, obstacles: Obstacles) -> int:
     """Return the next obstacle that a line crosses, from this one on; their number if none."""
-    # Most obstacles are too far off. Plain numbers show that: views of arrays would cost as much as
-    # all of the arithmetic.
-    start_x, start_y, start_z = start_m[0], start_m[1], start_m[2]
-    along_x, along_y, along_z = along_m[0], along_m[1], along_m[2]
+    # Most obstacles are too far off, which few numbers show.
+    start_x, start_y, start_z = start_m
+    along_x, along_y, along_z = along_m
     length_m2 = along_x * along_x + along_y * along_y + along_z * along_z
     per_m2 = 1.0 / length_m2 if length_m2 > 0.0 else 0.0
     num_obstacles = obstacles.kind.shape[0]
@@ -105,15 +91,13 @@ def _next_crossed(
 
 
 @compiled()
-def _crosses(
-    start_m: Float[np.ndarray, "3"], along_m: Float[np.ndarray, "3"], o: int, obstacles: Obstacles
-) -> bool:
+def _crosses(start_m: Vector, along_m: Vector, o: int, obstacles: Obstacles) -> bool:
     """Return whether a line has a point in common with an obstacle."""
     kind, centre_m, size_m = obstacles.kind[o], obstacles.centre_m[o], obstacles.size_m[o]
     frame = obstacles.rotation[o]
     dx, dy, dz = start_m[0] - centre_m[0], start_m[1] - centre_m[1], start_m[2] - centre_m[2]
     x, y, z = _turned((dx, dy, dz), frame)
-    u, v, w = _turned((along_m[0], along_m[1], along_m[2]), frame)
+    u, v, w = _turned(along_m, frame)
     if kind == BOX:
         part = _within(x, u, size_m[0], (0.0, 1.0))
         part = _within(y, v, size_m[1], part)

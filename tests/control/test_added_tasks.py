@@ -154,12 +154,6 @@ def test_a_robot_moves_to_the_centroid_of_its_cell_by_what_it_heard():
     np.testing.assert_allclose(u[0, 0], expected, atol=1e-9)
 
 
-def test_robots_brake():
-    mission = paper("coverage", num_robots=2)
-    u = Coverage(mission)(empty_buffers(1, 2), states_of(np.zeros((1, 2, 2)), 2.0))
-    np.testing.assert_allclose(u, -2.0 * DAMPING_PER_S, atol=1e-9)
-
-
 def test_who_is_outside_the_area_and_has_no_ground_there_returns():
     mission = paper("coverage", num_robots=2, boundary="none")
     half = mission.half_side_m

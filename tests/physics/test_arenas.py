@@ -64,13 +64,6 @@ def test_arenas_fly_in_contact_physics_and_flocks_have_a_boundary(preset):
         preset("flocking", arena="blocks", physics="exact")
 
 
-def test_an_arena_may_be_a_file(tmp_path):
-    file = tmp_path / "pillar.xml"
-    file.write_text(PILLAR)
-    found = obstacles(paper(arena=str(file)))
-    assert found.size_m[0, :2].tolist() == [20.0, 5.0]
-
-
 def test_losses_of_a_file_are_kept_without_a_word(tmp_path, recwarn):
     file = tmp_path / "pillar.xml"
     file.write_text(PILLAR.replace('group="1"', 'group="1" user="3"'))

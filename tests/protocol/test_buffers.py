@@ -1,7 +1,6 @@
 """The buffers against plain loops over receivers i, senders j and subjects k, and hand examples."""
 
 import copy
-from dataclasses import replace
 
 import numpy as np
 from hypothesis import given, settings
@@ -69,15 +68,6 @@ def merged_by_loops(before, heard):
     return after
 
 
-def renamed(buffers, old_name):
-    """The same knowledge after robot old_name[n] is called n."""
-    new_name = np.argsort(old_name)
-    values = {name: getattr(buffers, name)[:, old_name][:, :, old_name] for name in NAMES}
-    parent = values["parent"]
-    values["parent"] = np.where(parent == NO_PARENT, NO_PARENT, new_name[parent])
-    return replace(buffers, **values)
-
-
 @given(seed=seeds, num_missions=st.integers(1, 3), num_robots=sizes)
 def test_eq5_robots_observe_themselves_and_only_themselves(seed, num_missions, num_robots):
     rng, buffers, _ = case(seed, num_missions, num_robots)
@@ -134,29 +124,6 @@ def test_the_parent_is_the_first_robot_the_news_was_passed_to():
         merge(buffers, np.array([heard]))
     assert buffers.timestamp[0].tolist() == [[1.0, 1.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]]
     assert buffers.parent[0].tolist() == [[-1, 0, 1], [-1, -1, 1], [-1, -1, -1]]
-
-
-@given(seed=seeds, num_robots=sizes)
-def test_renaming_the_robots_renames_what_they_know(seed, num_robots):
-    rng, buffers, heard = case(seed, 2, num_robots)
-    old_name = rng.permutation(num_robots)
-    mirror = renamed(buffers, old_name)
-    merge(mirror, np.argsort(old_name)[heard[:, old_name]])
-    merge(buffers, heard)
-    assert same(mirror, renamed(buffers, old_name))
-
-
-@given(seed=seeds, num_robots=sizes)
-def test_missions_side_by_side_do_not_mix(seed, num_robots):
-    _, buffers, heard = case(seed, 3, num_robots)
-    names = [*NAMES, "is_granted"]
-    rows = [
-        replace(buffers, **{n: getattr(buffers, n)[[b]].copy() for n in names}) for b in range(3)
-    ]
-    merge(buffers, heard)
-    for b, row in enumerate(rows):
-        merge(row, heard[[b]])
-        assert all((getattr(buffers, n)[[b]] == getattr(row, n)).all() for n in NAMES)
 
 
 def test_what_is_granted_of_the_start_is_known_and_as_old_as_the_mission():

@@ -7,10 +7,8 @@ from hypothesis import strategies as st
 
 from swarm_mj.protocol.buffers import empty_buffers, merge
 from swarm_mj.protocol.timestamps import (
-    is_newer,
     merge_expected,
     merge_timestamps,
-    rise,
 )
 
 
@@ -29,13 +27,6 @@ def after_merge(timestamp, heard):
     buffers.timestamp[0] = timestamp
     merge(buffers, heard[None])
     return buffers.timestamp[0]
-
-
-def test_eq8_only_the_strictly_newer_wins():
-    assert is_newer(2.5, 2.0)
-    assert not is_newer(2.0, 2.0)
-    assert not is_newer(1.5, 2.0)
-    assert (rise(2.5, 2.0), rise(2.0, 2.0), rise(1.5, 2.0)) == (0.5, 0.0, 0.0)
 
 
 @given(seed=st.integers(0, 2**32 - 1), num_robots=st.integers(1, 8))

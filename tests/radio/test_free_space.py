@@ -183,26 +183,6 @@ def test_coincident_robots_stay_finite():
     assert alone(radio(eavesdroppers=True), [here, here], [1, 0]) == [1, 0]
 
 
-@given(seed=seeds, num_robots=st.integers(2, 10), eavesdroppers=st.booleans())
-def test_renaming_the_robots_renames_what_they_hear(seed, num_robots, eavesdroppers):
-    channel = radio(eavesdroppers=eavesdroppers)
-    position_m, recipient = scene(seed, num_robots)
-    old_name = np.random.default_rng(seed).permutation(num_robots)
-    new_name = np.argsort(old_name)
-    heard = channel(position_m, recipient)
-    renamed = channel(position_m[:, old_name], new_name[recipient[:, old_name]])
-    assert (renamed == new_name[heard[:, old_name]]).all()
-
-
-@given(seed=seeds, eavesdroppers=st.booleans())
-def test_missions_side_by_side_do_not_hear_each_other(seed, eavesdroppers):
-    channel = radio(eavesdroppers=eavesdroppers)
-    position_m, recipient = scene(seed, 7, num_missions=4)
-    heard = channel(position_m, recipient)
-    for b in range(4):
-        assert (heard[[b]] == channel(position_m[[b]], recipient[[b]])).all()
-
-
 def test_below_0_db_a_sender_hears_the_strongest_packet_meant_for_it():
     """Robot 1 sends; robot 2 is nearer to it but speaks to robot 3, robot 0 speaks to robot 1."""
     position_m = np.array([[[0.0, 0.0], [110.0, 0.0], [210.0, 0.0], [320.0, 0.0]]])

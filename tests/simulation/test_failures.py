@@ -1,18 +1,11 @@
 """Robots that are switched off half-way: who, from when on, and what the others notice of it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from channels import unreliable
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.mission.placement import draw_survivors
-from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.registry import POLICIES, make_policy
-from swarm_mj.protocol.buffers import Buffers, empty_buffers
-from swarm_mj.protocol.window import transmit, window
-from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm, _streams
 
@@ -154,50 +147,3 @@ def test_a_restart_switches_everyone_on():
     *_, last = rollout(swarm, make_policy("mst", mission, 0.4))
     np.testing.assert_array_equal(swarm.states.is_active, was_on)
     np.testing.assert_array_equal(last.costs.age_windows, flown.costs.age_windows)
-
-
-def some_team(rng):
-    """Buffers after some windows with everyone on, and the time."""
-    buffers, now = empty_buffers(2, 7), np.zeros(2)
-    for seed in range(4):
-        channel = unreliable(seed, senders_listen=False)
-        window(buffers, some_states(rng), some_recipients(rng), channel, now)
-        now = now + 1.0
-    return buffers, now
-
-
-def some_states(rng):
-    position_m, velocity_mps = rng.uniform(-300.0, 300.0, (2, 2, 7, 2))
-    return RobotStates(position_m=position_m, velocity_mps=velocity_mps)
-
-
-def some_recipients(rng):
-    """Half of the robots speak, to anyone."""
-    return np.where(rng.random((2, 7)) < 0.5, np.arange(7), rng.integers(0, 7, (2, 7)))
-
-
-@pytest.mark.parametrize("preset", [paper, reference])
-@pytest.mark.parametrize("talk", [window, transmit])
-def test_alg1_the_others_notice_no_more_than_if_they_had_gone_away(preset, talk):
-    """Far out of range and silent: what the others know of each other is the same."""
-    rng = np.random.default_rng(0)
-    channel = radio_of(preset("stationary"))
-    num_news = 0
-    for _ in range(20):
-        buffers, now = some_team(rng)
-        start, apart = buffers.timestamp.copy(), Buffers(**copies(buffers))
-        is_active = np.tile(np.arange(7) % 3 > 0, (2, 1))
-        is_pair = is_active[:, :, None] & is_active[:, None, :]
-        states, recipient = some_states(rng), some_recipients(rng)
-        gone_m = np.where(
-            is_active[..., None], states.position_m, 1e9 * (1 + np.arange(7))[:, None]
-        )
-        gone = RobotStates(position_m=gone_m, velocity_mps=states.velocity_mps)
-        talk(buffers, replace(states, is_active=is_active), recipient, channel, now)
-        talk(apart, gone, np.where(is_active, recipient, np.arange(7)), channel, now)
-        for field, array in vars(apart).items():
-            if array.ndim > 1:  # by robots
-                found = getattr(buffers, field)[is_pair]
-                np.testing.assert_array_equal(found, array[is_pair], err_msg=field)
-        num_news += np.sum((buffers.timestamp > start)[is_pair & ~np.eye(7, dtype=bool)])
-    assert num_news > 20

@@ -157,27 +157,6 @@ def test_policy_decides_before_the_robots_move(preset):
 SilentTwice = partial(RandomFlooding, 0.0)  # nobody ever transmits, twice per window
 
 
-@pytest.mark.parametrize("physics", MODES)
-@pytest.mark.parametrize(
-    ("preset", "policy", "moves"),
-    [
-        (paper, Silent, 1),
-        (paper, SilentTwice, 1),
-        (reference, Silent, 1),
-        (reference, SilentTwice, 2),
-    ],
-)
-def test_iv_b_flooding_moves_twice_in_the_reference_preset_only(physics, preset, policy, moves):
-    """A flock that hears nothing coasts: 10 windows of 0.1 s at v, or 20 of them."""
-    swarm = Swarm(small(preset=preset, physics=physics), [1, 2])
-    start = swarm.states
-    for _ in range(10):
-        swarm.step(policy())
-    travelled_m = swarm.states.position_m - start.position_m
-    np.testing.assert_allclose(travelled_m, moves * 1.0 * start.velocity_mps, rtol=1e-9)
-    np.testing.assert_array_equal(swarm.now, 10.0)
-
-
 def silence_of(num_missions, num_robots):
     return np.tile(np.arange(num_robots), (num_missions, 1))
 
