@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from swarm_mj.mission.geometry import ROOT, spanning_tree
 from swarm_mj.replay import palette
 from swarm_mj.replay.mismatch import LinkMismatch
-from swarm_mj.replay.packets import is_other, transmitters
+from swarm_mj.replay.packets import is_other
 from swarm_mj.replay.palette import Colour
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog
@@ -109,14 +109,12 @@ def draw_states(out: RerunLog) -> None:
 
 
 def radio_states(log: Log) -> tuple[dict[str, Colour], Int[np.ndarray, "T N"]]:
-    """Tell what every robot did with the radio in every window.
+    """Return the radio's states with their colours, and each robot's as an index into them.
 
-    Returns:
-        The states' names and colours, and each robot's state as an index into them; sending goes
-        before answering, answering before hearing.
+    Sending goes before answering, answering before hearing.
     """
     robots = np.arange(log.recipient.shape[2])
-    is_first = transmitters(log.recipient, is_broadcast=log.is_broadcast)
+    is_first = log.is_transmitter
     state = np.where(np.any(log.heard != robots, axis=1), 1, 0)
     states = {"silent": palette.BACKGROUND}
     if log.is_broadcast:

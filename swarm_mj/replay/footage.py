@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Int16, Shaped, UInt8
+from jaxtyping import Bool, Float, Int, Int16, UInt8
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components, components_in
@@ -13,13 +13,15 @@ from swarm_mj.replay import palette
 from swarm_mj.replay.mismatch import (
     NO_MISMATCH,
     PIECES,
+    Lines,
     LinkMismatch,
+    Links,
     by_kind,
     divided,
     ends,
     shades,
 )
-from swarm_mj.replay.packets import PacketSegments, packet_segments
+from swarm_mj.replay.packets import PacketSegments, Positions, packet_segments
 from swarm_mj.replay.recorder import Log, Recorder
 from swarm_mj.simulation.swarm import Swarm
 
@@ -40,18 +42,15 @@ class Ground:
         return bool(np.any(self.centre_m))
 
 
-def frame(
-    position_m: Float[np.ndarray, "T N 2"], half_side_m: float, *, is_tight: bool = False
-) -> Ground:
+def frame(position_m: Positions, half_side_m: float, *, is_tight: bool = False) -> Ground:
     """Return the smallest square that holds the area and all ways, or else all robots at any time.
 
     It follows the team if robots go far beyond the area, which is centred on the origin. A tight
     one holds all ways only, if it does not follow.
     """
     farthest_m = float(np.max(np.abs(position_m)))
-    if moves := farthest_m > NEAR * half_side_m:
-        is_tight = True
-    if not is_tight:
+    moves = farthest_m > NEAR * half_side_m
+    if not moves and not is_tight:
         centre_m = np.zeros((len(position_m), 2))
         return Ground(centre_m=centre_m, reach_m=max(half_side_m, farthest_m))
     axis = 1 if moves else (0, 1)
@@ -88,7 +87,7 @@ class Footage:
 
     facts: Facts
     window: Int[np.ndarray, "T"]  # 1 is the mission's first
-    position_m: Float[np.ndarray, "T N 2"]  # p [m]
+    position_m: Positions  # p
     velocity_mps: Float[np.ndarray, "T N 2"]  # of any length: only its direction is shown
     age: Float[np.ndarray, "T N"]  # of what the observer knows [windows]; nan: nothing
     is_on: Bool[np.ndarray, "T N"]  # whether a robot was switched on
@@ -101,9 +100,8 @@ class Footage:
 
     def colours(self, row: int) -> UInt8[np.ndarray, "N 3"]:
         """Return the robots' colours in one window, counted from 0."""
-        facts = self.facts
-        age, is_on = self.age[row], self.is_on[row]
-        return palette.robot_colours(age, facts.full_scale, is_on, facts.observer)
+        scale, observer = self.facts.full_scale, self.facts.observer
+        return palette.robot_colours(self.age[row], scale, self.is_on[row], observer)
 
     def packets(self, row: int) -> Iterator[tuple[np.ndarray, np.ndarray, palette.Colour]]:
         """Yield one window's starts [L 2] and ends [L 2] of packets [m], and their colour.
@@ -114,7 +112,7 @@ class Footage:
             its = slice(*np.searchsorted(drawn.row, [row, row + 1]))
             yield drawn.start_m[its], drawn.end_m[its], palette.PACKETS[fate][0]
 
-    def links(self, row: int) -> Shaped[np.ndarray, "K"]:
+    def links(self, row: int) -> Links:
         """Return the links that are shown in one window: of those too weak, the observer's only.
 
         In a city, all of them together would not show which robots each one joins.
@@ -123,9 +121,7 @@ class Footage:
         is_own = [links[end] == self.facts.observer for end in ("sender", "receiver")]
         return links[np.any(is_own, axis=0) | ~links["is_too_weak"]]
 
-    def mismatch_lines(
-        self, row: int
-    ) -> tuple[Float[np.ndarray, "S 2 2"], UInt8[np.ndarray, "S 3"]]:
+    def mismatch_lines(self, row: int) -> tuple[Lines, UInt8[np.ndarray, "S 3"]]:
         """Return the lines of one window's links [m], and their colours."""
         lines_m, colours = [], []
         for kind, links in by_kind(self.links(row)).items():

@@ -4,7 +4,7 @@ Policies believe in mean powers: a lone packet decodes if its mean power is abov
 fading and losses of single packets are therefore no mismatch.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from jaxtyping import Float, Int, Int16, Shaped, UInt8
@@ -12,6 +12,7 @@ from jaxtyping import Float, Int, Int16, Shaped, UInt8
 from swarm_mj.radio.composed import ComposedChannel, strong_groups
 from swarm_mj.radio.mission_radio import by_robot, radio_of
 from swarm_mj.replay import palette
+from swarm_mj.replay.packets import Positions
 from swarm_mj.simulation.swarm import Swarm
 
 EVERY = 5  # windows between snapshots; in between, the last one is shown
@@ -33,13 +34,17 @@ NUMBERS = ("sender", "receiver", "loss_db", "margin_db")
 LINK = np.dtype([("row", int), *((name, np.int16) for name in NUMBERS), ("is_too_weak", bool)])
 
 
+Links: TypeAlias = Shaped[np.ndarray, "_"]  # an array of `LINK`
+Lines: TypeAlias = Float[np.ndarray, "_ 2 2"]  # from start to end [m]
+
+
 class LinkMismatch(NamedTuple):
     """The L links that differ in C snapshots, each of which stands until the next."""
 
     window: Int[np.ndarray, "C"]  # of each snapshot; 1 is the mission's first
-    links: Shaped[np.ndarray, "L"]  # `LINK`, with the row of their snapshot, ascending
+    links: Links  # with the row of their snapshot, ascending
 
-    def at(self, window: int) -> Shaped[np.ndarray, "K"]:
+    def at(self, window: int) -> Links:
         """Return the links of the snapshot that stands for a window."""
         row = np.searchsorted(self.window, window, side="right") - 1
         return self.links[self.links["row"] == row]
@@ -52,7 +57,7 @@ class RadioSnapshot(NamedTuple):
     """The mean links of one mission at one moment."""
 
     group: Int16[np.ndarray, "N"]  # the first of the robots that each is connected with
-    links: Shaped[np.ndarray, "L"]  # that differ: `LINK`
+    links: Links  # that differ
     num_believed: int  # links that are believed in, one for both directions
     num_working: int  # links that decode, likewise
 
@@ -96,29 +101,23 @@ def radio_snapshot(swarm: Swarm, index: int = 0) -> RadioSnapshot | None:
     return RadioSnapshot(group, links, num_believed, num_working)
 
 
-def by_kind(links: Shaped[np.ndarray, "L"]) -> dict[str, Shaped[np.ndarray, "_"]]:
+def by_kind(links: Links) -> dict[str, Links]:
     """Sort links: those that decode without belief, and believed ones that are too weak."""
     return {kind: links[links["is_too_weak"] == (kind == "too_weak")] for kind in palette.MISMATCH}
 
 
-def ends(
-    links: Shaped[np.ndarray, "L"],
-    position_m: Float[np.ndarray, "T N 2"],
-    row: int | Int[np.ndarray, "L"],
-) -> Float[np.ndarray, "L 2 2"]:
+def ends(links: Links, position_m: Positions, row: int | Int[np.ndarray, "L"]) -> Lines:
     """Return where links begin and end, by the robots' positions in a window or each one's [m]."""
     return np.stack([position_m[row, links[end]] for end in NUMBERS[:2]], axis=1)
 
 
-def divided(
-    lines_m: Float[np.ndarray, "L 2 2"], pieces: Float[np.ndarray, "P 2"]
-) -> Float[np.ndarray, "S 2 2"]:
+def divided(lines_m: Lines, pieces: Float[np.ndarray, "P 2"]) -> Lines:
     """Divide lines from start to end into pieces, as many of each [m]."""
     start_m, way_m = lines_m[:, None, None, 0], np.diff(lines_m, axis=1)[:, None]
     return (start_m + pieces[None, :, :, None] * way_m).reshape(-1, 2, 2)
 
 
-def shades(kind: str, links: Shaped[np.ndarray, "L"]) -> UInt8[np.ndarray, "L 3"]:
+def shades(kind: str, links: Links) -> UInt8[np.ndarray, "L 3"]:
     """Return the colours of links of one kind: the lower the margin, the darker."""
     if kind != "too_weak":
         return np.tile(np.array(palette.MISMATCH[kind], dtype=np.uint8), (len(links), 1))

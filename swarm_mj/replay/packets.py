@@ -1,11 +1,15 @@
 """Packets of recorded windows: what became of each, and where it is drawn."""
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.replay import palette
+
+Phases: TypeAlias = Int[np.ndarray, "T 2 N"]  # a robot for each one in both phases of windows
+Positions: TypeAlias = Float[np.ndarray, "T N 2"]  # of all robots in each window [m]
+Points: TypeAlias = Float[np.ndarray, "L 2"]  # an end of each packet [m]
 
 SEGMENTS = 6  # straight pieces of an arc
 RISE = 0.22  # of an arc's top, by its span
@@ -22,9 +26,7 @@ class PacketLinks(NamedTuple):
         """Return some of the packets."""
         return PacketLinks(*(column[which] for column in self))
 
-    def ends(
-        self, position_m: Float[np.ndarray, "T N 2"]
-    ) -> tuple[Float[np.ndarray, "L 2"], Float[np.ndarray, "L 2"]]:
+    def ends(self, position_m: Positions) -> tuple[Points, Points]:
         """Return the positions of the senders and of the receivers [m]."""
         return position_m[self.row, self.sender], position_m[self.row, self.receiver]
 
@@ -33,13 +35,11 @@ class PacketSegments(NamedTuple):
     """L packets with the same fate as they are drawn, sorted by window."""
 
     row: Int[np.ndarray, "L"]
-    start_m: Float[np.ndarray, "L 2"]
-    end_m: Float[np.ndarray, "L 2"]
+    start_m: Points
+    end_m: Points
 
 
-def fates(
-    recipient: Int[np.ndarray, "T 2 N"], heard: Int[np.ndarray, "T 2 N"], *, is_broadcast: bool
-) -> dict[str, PacketLinks]:
+def fates(recipient: Phases, heard: Phases, *, is_broadcast: bool) -> dict[str, PacketLinks]:
     """Sort the packets of T windows by their fate.
 
     Addressed packets are delivered, lost, overheard, answered or unanswered. `lost` and
@@ -68,20 +68,13 @@ def fates(
     }
 
 
-def is_other(robot: Int[np.ndarray, "T 2 N"]) -> Bool[np.ndarray, "T 2 N"]:
+def is_other(robot: Phases) -> Bool[np.ndarray, "T 2 N"]:
     """Tell where a robot addresses, or decodes, another one."""
     return robot != np.arange(robot.shape[2])
 
 
-def transmitters(
-    recipient: Int[np.ndarray, "T 2 N"], *, is_broadcast: bool
-) -> Bool[np.ndarray, "T N"]:
-    """Tell who sent a request, or a broadcast in either phase."""
-    return np.any(is_other(recipient)[:, : 2 if is_broadcast else 1], axis=1)
-
-
 def packet_segments(
-    packets: dict[str, PacketLinks], position_m: Float[np.ndarray, "T N 2"]
+    packets: dict[str, PacketLinks], position_m: Positions
 ) -> dict[str, PacketSegments]:
     """Return where packets are drawn, in the order of drawing; lost ones stop on their way."""
     segments = {}
@@ -98,9 +91,7 @@ def lifted(at_m: Float[np.ndarray, "*S 2"], height_m: float) -> Float[np.ndarray
     return np.pad(at_m, width, constant_values=height_m)
 
 
-def arcs(
-    start_m: Float[np.ndarray, "L 2"], end_m: Float[np.ndarray, "L 2"], base_m: float
-) -> Float[np.ndarray, "L P 3"]:
+def arcs(start_m: Points, end_m: Points, base_m: float) -> Float[np.ndarray, "L P 3"]:
     """Return points along parabolas that start and end at `base_m` above the ground [m]."""
     share = np.linspace(0.0, 1.0, SEGMENTS + 1)
     span_m = np.linalg.norm(end_m - start_m, axis=1)

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 Colour: TypeAlias = tuple[int, int, int]
+Ages: TypeAlias = Float[np.ndarray, "*S"]  # [windows]; nan: unknown
 
 BACKGROUND: Colour = (13, 16, 22)
 PLOT: Colour = (48, 54, 67)  # both a light and a dark time cursor are seen on it
@@ -70,9 +71,7 @@ ROUND = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 10.0)
 _STALEST = 0.10  # the darkest end of viridis would vanish on the background
 
 
-def age_colours(
-    age_windows: Float[np.ndarray, "*S"], full_scale: float
-) -> UInt8[np.ndarray, "*S 3"]:
+def age_colours(age_windows: Ages, full_scale: float) -> UInt8[np.ndarray, "*S 3"]:
     """RGB of ages: yellow is fresh, dark violet is `full_scale` or older, grey is unknown (nan)."""
     share = np.clip(np.nan_to_num(age_windows) / full_scale, 0.0, 1.0)
     place = (1.0 - (1.0 - _STALEST) * share) * (len(_VIRIDIS) - 1)
@@ -83,18 +82,15 @@ def age_colours(
 
 
 def robot_colours(
-    age_windows: Float[np.ndarray, "*T N"],
-    full_scale: float,
-    is_on: Bool[np.ndarray, "*T N"],
-    ego: int,
-) -> UInt8[np.ndarray, "*T N 3"]:
+    age_windows: Ages, full_scale: float, is_on: Bool[np.ndarray, "*S"], ego: int
+) -> UInt8[np.ndarray, "*S 3"]:
     """RGB of robots by the age of what the ego robot knows of them; it is white, dark ones off."""
     colours = age_colours(age_windows, full_scale)
     colours[..., ego, :] = EGO
     return np.where(is_on[..., None], colours, np.array(SWITCHED_OFF, np.uint8))
 
 
-def nice_scale(age_windows: Float[np.ndarray, "..."]) -> float:
+def nice_scale(age_windows: Ages) -> float:
     """Return a round number of windows that 19 ages in 20 lie below."""
     # Without the oldest: robots that are hardly ever reached would make all others look alike.
     return nice_top(max(1.0, float(np.percentile(age_windows, 95))))

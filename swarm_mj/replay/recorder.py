@@ -12,7 +12,7 @@ from swarm_mj.physics.scene import Scene
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay.mismatch import LinkMismatch, radio_snapshot, stride_of
-from swarm_mj.replay.packets import PacketLinks, fates
+from swarm_mj.replay.packets import PacketLinks, fates, is_other
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.needs import GB
@@ -58,6 +58,11 @@ class Log:
     def packets(self) -> dict[str, PacketLinks]:
         """All packets by their fate."""
         return fates(self.recipient, self.heard, is_broadcast=self.is_broadcast)
+
+    @property
+    def is_transmitter(self) -> Bool[np.ndarray, "T N"]:
+        """True if a robot sent a request, or a broadcast in either phase."""
+        return np.any(is_other(self.recipient)[:, : 2 if self.is_broadcast else 1], axis=1)
 
     @property
     def has_motion(self) -> bool:
@@ -128,14 +133,13 @@ class Recorder:
             self._links.append(seen.links)
         if costs is not None and costs.task_cost is not None:
             self._task_costs.append(costs.task_cost)
+        phases = self._swarm.phases
         silence = np.tile(np.arange(num_robots), (2, 1))  # of a mission that has not begun
-        recipient = [phase.recipient[index] for phase in self._swarm.phases] or silence
-        heard = [phase.heard[index] for phase in self._swarm.phases] or silence
         shown = {
             "position_m": states.position_m[index],
             "velocity_mps": states.velocity_mps[index],
-            "recipient": recipient,
-            "heard": heard,
+            "recipient": [phase.recipient[index] for phase in phases] or silence,
+            "heard": [phase.heard[index] for phase in phases] or silence,
             "is_on": is_on,
             "is_known": buffers.is_known[index, own],
             "believed_m": buffers.position_m[index, own],

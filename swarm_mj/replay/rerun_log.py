@@ -5,11 +5,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import rerun as rr
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Int
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Ground
-from swarm_mj.replay.mismatch import NUMBERS, LinkMismatch, shades
+from swarm_mj.replay.mismatch import NUMBERS, LinkMismatch, Links, shades
+from swarm_mj.replay.packets import Points
 from swarm_mj.replay.palette import Colour, dim
 from swarm_mj.replay.recorder import Log
 
@@ -87,10 +88,7 @@ class RerunLog:
         self._recording.log(path, *archetypes, static=True)
 
     def timed(
-        self,
-        path: str,
-        columns: Iterable[rr.ComponentColumn],
-        window: Int[np.ndarray, "K"] | None = None,
+        self, path: str, columns: Iterable[rr.ComponentColumn], window: np.ndarray | None = None
     ) -> None:
         """Write one row per window: of the log, or of the windows given."""
         at = self.log.window if window is None else window
@@ -117,42 +115,30 @@ class RerunLog:
         layer = LAYERS[path]
         self.fixed(path, layer.kind.from_fields(**layer.style, **fields))
 
-    def layer(
-        self, path: str, row: Int[np.ndarray, "L"] | None = None, **columns: np.ndarray
-    ) -> None:
+    def layer(self, path: str, row: np.ndarray | None = None, **columns: np.ndarray) -> None:
         """Write things of a layer that change, by its archetype's fields; `row` as for `things`."""
         self.fixed_layer(path)
         self.things(path, LAYERS[path].kind.columns(**columns), row)
 
     def lines(
-        self,
-        path: str,
-        start: Float[np.ndarray, "L A"],
-        end: Float[np.ndarray, "L A"],
-        row: Int[np.ndarray, "L"] | None = None,
+        self, path: str, start: np.ndarray, end: np.ndarray, row: np.ndarray | None = None
     ) -> None:
-        """Write straight lines; `row` as for `things`."""
+        """Write straight lines from start to end, each [L 2] or [L 3]; `row` as for `things`."""
         self.layer(path, row, strips=np.stack([start, end], axis=1))
 
-    def rings(
-        self, path: str, centre: Float[np.ndarray, "L 2"], radius_m: float, row: np.ndarray
-    ) -> None:
+    def rings(self, path: str, centre: Points, radius_m: float, row: np.ndarray) -> None:
         """Write circles; `row` as for `things`."""
         self.layer(path, row, centers=centre, half_sizes=np.full(centre.shape, radius_m))
 
     def mismatch_lines(
-        self,
-        path: str,
-        links: Shaped[np.ndarray, "L"],
-        lines_m: Float[np.ndarray, "L 2 A"],
-        mismatch: LinkMismatch,
+        self, path: str, links: Links, lines_m: Float[np.ndarray, "L 2 A"], of: LinkMismatch
     ) -> None:
         """Write a line for each of these links; those who click on one read its numbers."""
         self.fixed_layer(path)
-        per_snapshot = np.bincount(links["row"], minlength=len(mismatch.window))
+        per_snapshot = np.bincount(links["row"], minlength=len(of.window))
         colours = shades(path.rsplit("/")[-1], links)
         columns = LAYERS[path].kind.columns(strips=lines_m, colors=colours)
         values: dict[str, Any] = {name: links[name] for name in NUMBERS}
         numbers = rr.AnyValues.columns(**values)
         parts = (part for each in (columns, numbers) for part in each.partition(per_snapshot))
-        self.timed(path, parts, mismatch.window)
+        self.timed(path, parts, of.window)

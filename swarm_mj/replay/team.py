@@ -7,7 +7,7 @@ from jaxtyping import UInt8
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.mismatch import PIECES, LinkMismatch, by_kind, divided, ends
-from swarm_mj.replay.packets import PacketLinks, arcs, lifted, transmitters
+from swarm_mj.replay.packets import PacketLinks, arcs, lifted
 from swarm_mj.replay.rerun_log import RerunLog
 
 TRAIL_WINDOWS = 150
@@ -98,7 +98,7 @@ def _draw_motion(out: RerunLog, height_m: float) -> None:
 def _draw_radio(out: RerunLog, packets: dict[str, PacketLinks], range_m: float) -> None:
     """Draw on the map who transmits first, the range in silence around them, and all packets."""
     log = out.log
-    row, sender = np.nonzero(transmitters(log.recipient, is_broadcast=log.is_broadcast))
+    row, sender = np.nonzero(log.is_transmitter)
     where = log.position_m[row, sender]
     out.rings("arena/radio/range", where, range_m, row)
     if log.is_broadcast:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarm_mj.replay.packets import RISE, SEGMENTS, arcs, packet_segments, transmitters
+from swarm_mj.replay.packets import RISE, SEGMENTS, arcs, packet_segments
 
 
 @pytest.mark.parametrize(
@@ -30,14 +30,6 @@ def test_a_broadcast_leads_to_each_robot_that_decoded_it(flooded):
         if log.heard[t, slot, hearer] != hearer
     ]
     assert list(zip(*log.packets["heard"], strict=True)) == expected
-
-
-@pytest.mark.parametrize(("flight", "slots"), [("two_way", (0,)), ("flooded", (0, 1))])
-def test_transmitters_are_who_speaks_without_being_asked(flight, slots, request):
-    log = request.getfixturevalue(flight).log
-    found = transmitters(log.recipient, is_broadcast=log.is_broadcast)
-    for t, i in np.ndindex(len(log.window), 12):
-        assert found[t, i] == any(log.recipient[t, slot, i] != i for slot in slots)
 
 
 def test_answers_heard_or_not_are_the_delivered_requests_turned_round(two_way):

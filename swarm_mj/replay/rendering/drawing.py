@@ -196,7 +196,14 @@ class AgePlot:
         # Two missions' columns could not be told apart.
         if len(footages) == 1 and np.any(footages[0].is_cut_off):
             title += f"; red: robots cut off from {_observers(footages)}, full height 100 %"
-            self._draw_cut_off(draw, footages[0])
+            # Columns: the share of the others that is cut off from the observer.
+            num_others, left = footages[0].facts.mission.num_robots - 1, float(inner.left)
+            share = (np.sum(footages[0].is_cut_off, axis=1) / num_others).tolist()
+            for (right, _), part in zip(self._curves[0], share, strict=True):
+                if part > 0.0:
+                    top = inner.bottom - part * (inner.bottom - inner.top)
+                    draw.rectangle((left, top, right, inner.bottom), dim(palette.CUT_OFF, SHADE))
+                left = right
         draw.text((inner.left, self._box.top), title, palette.TEXT, small)
         for y, value in ((inner.top, f"{self._top:g}"), (inner.bottom, "0")):
             draw.text((inner.left - 4, y), value, palette.SENT, small, anchor="rm")
@@ -214,13 +221,3 @@ class AgePlot:
             if row > 0:
                 draw.line(curve[: row + 1], colour, width, joint="curve")
             draw.circle(curve[row], radius, colour)
-
-    def _draw_cut_off(self, draw: ImageDraw, footage: Footage) -> None:
-        # Columns: the share of the others that is cut off from the observer.
-        share = np.sum(footage.is_cut_off, axis=1) / (footage.facts.mission.num_robots - 1)
-        left, inner = float(self._inner.left), self._inner
-        for (right, _), part in zip(self._curves[0], share.tolist(), strict=True):
-            if part > 0.0:
-                top = inner.bottom - part * (inner.bottom - inner.top)
-                draw.rectangle((left, top, right, inner.bottom), dim(palette.CUT_OFF, SHADE))
-            left = right

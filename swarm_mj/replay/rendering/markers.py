@@ -4,7 +4,7 @@ The camera looks down on a square of ground from the south.
 """
 
 import itertools
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from jaxtyping import Float
@@ -15,6 +15,8 @@ from mujoco._structs import MjvCamera, MjvGeom, MjvScene
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage, Ground
 from swarm_mj.replay.packets import SEGMENTS, arcs, lifted
+
+Shade: TypeAlias = np.ndarray | palette.Colour
 
 ELEVATION_DEG = 55.0  # of the camera above the ground: 90 would look straight down
 FOV_Y_DEG = 32.0  # a long lens: what is near is hardly larger than what is far
@@ -27,7 +29,7 @@ SIN, COS = np.sin(np.deg2rad(ELEVATION_DEG)), np.cos(np.deg2rad(ELEVATION_DEG))
 ROBOT, OBSERVER, HEADING, LINE = 0.0085, 0.0115, 0.022, 0.0025
 SMALLEST = 520  # [pixels] in height: robots are not drawn smaller than on such a picture
 ROBOT_HEIGHT = 0.6  # of a marker, by its radius
-NO_TURN = np.eye(3).ravel()
+NO_TURN, NOWHERE = np.eye(3).ravel(), np.zeros(3)
 HALO, HALO_HEIGHT = 1.7, 0.15  # of a robot that is cut off, by the robot's
 LINES_PER_ROBOT = 40  # mismatched links; of very dense teams, some are left out
 # A disc, a heading, a halo, arcs of all that a window can have, and lines.
@@ -72,7 +74,7 @@ def look_at(ground: Ground, row: int, width: int, height: int) -> Camera:
 
 
 def _axes(point_m: Float[np.ndarray, "K 3"]) -> Float[np.ndarray, "3 K"]:
-    """Return points along the picture's axes from the target: right, up and ahead [m]."""
+    # Along the picture's axes from the target: right, up and ahead.
     x, y, z = point_m.T
     return np.stack([x, SIN * y + COS * z, COS * y - SIN * z])
 
@@ -113,32 +115,22 @@ def _draw_robots(
 
 
 def _add_disc(
-    scene: MjvScene,
-    where: np.ndarray,
-    radius_m: float,
-    half_m: float,
-    colour: np.ndarray | palette.Colour,
+    scene: MjvScene, where: np.ndarray, radius_m: float, half_m: float, colour: Shade
 ) -> None:
-    size, kind = np.array([radius_m, half_m, 0.0]), mjtGeom.mjGEOM_CYLINDER.value
-    mjv_initGeom(_next_geom(scene), kind, size, where, NO_TURN, _rgba(colour))
+    _add(scene, mjtGeom.mjGEOM_CYLINDER, colour, np.array([radius_m, half_m, 0.0]), where)
 
 
 def _add_line(
-    scene: MjvScene,
-    start: np.ndarray,
-    end: np.ndarray,
-    colour: np.ndarray | palette.Colour,
-    pixels: float,
+    scene: MjvScene, start: np.ndarray, end: np.ndarray, colour: Shade, pixels: float
 ) -> None:
-    geom, kind = _next_geom(scene), mjtGeom.mjGEOM_LINE.value
-    mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), NO_TURN, _rgba(colour))
-    mjv_connector(geom, kind, pixels, start, end)
+    kind = mjtGeom.mjGEOM_LINE
+    mjv_connector(_add(scene, kind, colour, NOWHERE, NOWHERE), kind.value, pixels, start, end)
 
 
-def _next_geom(scene: MjvScene) -> MjvGeom:
+def _add(
+    scene: MjvScene, kind: mjtGeom, colour: Shade, size: np.ndarray, where: np.ndarray
+) -> MjvGeom:
     scene.ngeom += 1
-    return scene.geoms[scene.ngeom - 1]
-
-
-def _rgba(colour: np.ndarray | palette.Colour) -> Float[np.ndarray, "4"]:
-    return np.append(np.asarray(colour) / 255.0, 1.0).astype(np.float32)
+    geom, rgba = scene.geoms[scene.ngeom - 1], np.append(np.asarray(colour) / 255.0, 1.0)
+    mjv_initGeom(geom, kind.value, size, where, NO_TURN, rgba.astype(np.float32))
+    return geom
