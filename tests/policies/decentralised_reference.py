@@ -231,6 +231,41 @@ def is_near(row, k, place_m, reach_m):
     return seen[k] > 0.0 and np.hypot(*(position_m[k] - place_m)) < reach_m
 
 
+PLANNED = {}  # by exactly what plans follow from, which spares working them out for every robot
+
+
+def planned(links, settings, num_slots):
+    """Who transmits in each slot, in one go, in a team that knows nothing at first."""
+    key = (*(np.asarray(of).tobytes() for of in links), num_slots)
+    if key not in PLANNED:
+        num_robots = len(links.received_mw)
+        transmits = np.zeros((num_slots, num_robots), dtype=bool)
+        nothing = np.zeros((num_robots, num_robots), dtype=np.float32)
+        weights = heuristic_weights(links, settings)
+        lookahead = lookahead_of(num_robots, is_certain=not links.is_doubtful, settings=settings)
+        free = np.ones(num_slots + lookahead.depth, dtype=bool)
+        schedule(nothing, 0.0, links, weights, lookahead, free, transmits)
+        PLANNED[key] = transmits
+    return PLANNED[key]
+
+
+def cut_off(mission, robots, windows, *, is_mute=True, is_deaf=True):
+    """The mission's radio, but in these windows no other robot hears these, nor they any other."""
+    radio, is_cut, num_calls = radio_of(mission), np.zeros(mission.num_robots, dtype=bool), 0
+    is_cut[robots] = True
+
+    def channel(position_m, recipient):
+        nonlocal num_calls
+        window, num_calls = num_calls // 2, num_calls + 1
+        heard = radio(position_m, recipient)
+        if window in windows:
+            is_lost = (is_cut[heard] & ~is_cut & is_mute) | (~is_cut[heard] & is_cut & is_deaf)
+            heard = np.where(is_lost, np.arange(mission.num_robots), heard)
+        return heard
+
+    return channel
+
+
 def transmitters(swarm, policy, num_windows):
     """Flies on; who transmitted in each slot [slot, mission, robot]."""
     slots = []
@@ -342,20 +377,11 @@ class PlannedApart(BroadcastPolicy):
             transmits = bool(in_turn[0, i])
             if all(seen > 0.0) and not velocity_mps.any():
                 if i not in self.plans:
-                    self.plans[i] = self.planned(position_m)
+                    links = links_between(radio_of(self.mission), position_m)
+                    self.plans[i] = planned(links, SETTINGS, 120)
                 transmits = bool(self.plans[i][slot, i])
             assert decided[0, i] == transmits, (slot, i)
         return decided
-
-    def planned(self, position_m):
-        """Who transmits in each of the mission's first 120 slots, planned in one go."""
-        num_robots, links = len(position_m), links_between(radio_of(self.mission), position_m)
-        transmits = np.zeros((120, num_robots), dtype=bool)
-        nothing = np.zeros((num_robots, num_robots), dtype=np.float32)
-        weights = heuristic_weights(links, SETTINGS)
-        lookahead = lookahead_of(num_robots, is_certain=True, settings=SETTINGS)
-        schedule(nothing, 0.0, links, weights, lookahead, np.ones(200, dtype=bool), transmits)
-        return transmits
 
     def fly(self, num_windows):
         """Flies on."""

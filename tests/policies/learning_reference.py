@@ -10,11 +10,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from decentralised_reference import rows
+from decentralised_reference import planned, rows
 
-from swarm_mj.policies.planner.broadcast_scheduler import schedule
 from swarm_mj.policies.planner.link_tables import LAWS, LinkTable, corrected, fit, link_fields
-from swarm_mj.policies.planner.plan import heuristic_weights, lookahead_of
 from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import BroadcastPolicy
@@ -44,24 +42,6 @@ def learner(mission, settings=SHORT):
 def rounded(field, values):
     """Numbers as they arrive in a field of a packet."""
     return field.low + field.step * field.codes(values)
-
-
-PLANNED = {}  # by exactly what plans follow from, which spares working them out for every robot
-
-
-def planned(links, settings, num_slots):
-    """Who transmits in each slot, in one go, in a team that knows nothing at first."""
-    key = (*(np.asarray(of).tobytes() for of in links), num_slots)
-    if key not in PLANNED:
-        num_robots = len(links.received_mw)
-        transmits = np.zeros((num_slots, num_robots), dtype=bool)
-        nothing = np.zeros((num_robots, num_robots), dtype=np.float32)
-        weights = heuristic_weights(links, settings)
-        lookahead = lookahead_of(num_robots, is_certain=not links.is_doubtful, settings=settings)
-        free = np.ones(num_slots + lookahead.depth, dtype=bool)
-        schedule(nothing, 0.0, links, weights, lookahead, free, transmits)
-        PLANNED[key] = transmits
-    return PLANNED[key]
 
 
 class Told(NamedTuple):

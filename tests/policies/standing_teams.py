@@ -1,7 +1,7 @@
 """Teams that stand still, what they know, and what a window of Alg. 1 would make of it."""
 
+import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -28,6 +28,23 @@ class Team:
         return len(self.position_m)
 
 
+def received(links, speakers, j):
+    """Whom j hears of these, and how probably: Eqs. 3-4, and the law of doubt."""
+    if j in speakers or not speakers:
+        return None, 0.0
+    power_mw = {i: float(links.received_mw[i, j]) for i in speakers}
+    sender = max(power_mw, key=power_mw.__getitem__)
+    others_mw = sum(power for i, power in power_mw.items() if i != sender)
+    ratio = power_mw[sender] / (links.noise_mw + others_mw) / links.threshold
+    distance_over_std = float(links.distance_over_std[sender, j])
+    if power_mw[sender] == 0.0 or math.isinf(distance_over_std):
+        return sender, float(power_mw[sender] > 0.0 and ratio >= 1.0)
+    deviations = (math.sqrt(ratio) - 1.0) * distance_over_std
+    if abs(deviations) > 2.5:
+        return sender, float(deviations > 0.0)
+    return sender, 1.0 / (1.0 + math.exp(-1.702 * deviations))
+
+
 def flooded_team(mission: Mission, seed: int) -> Team:
     """A team of the mission; 0 to 9 windows have passed, in which a fifth of all spoke."""
     rng = np.random.default_rng(seed)
@@ -43,19 +60,6 @@ def flooded_team(mission: Mission, seed: int) -> Team:
     return Team(
         radio=radio, position_m=position_m, timestamp=buffers.timestamp[0], now=float(now[0])
     )
-
-
-def after_windows(team: Team, recipients: Any) -> np.ndarray:
-    """T after each of some windows in a row, by the protocol [window, robot, subject]."""
-    buffers, known = empty_buffers(1, team.num_robots), []
-    buffers.timestamp[0] = team.timestamp
-    states = RobotStates(
-        position_m=team.position_m[None], velocity_mps=np.zeros((1, team.num_robots, 2))
-    )
-    for w, recipient in enumerate(recipients):
-        window(buffers, states, np.array([recipient]), team.radio, np.array([team.now + w]))
-        known.append(buffers.timestamp[0].copy())
-    return np.array(known)
 
 
 def knowledge_after(team: Team, choices: np.ndarray) -> np.ndarray:

@@ -2,14 +2,13 @@
 
 A slot's transmitters are added one by one: always the one whose packet raises the slot's value
 most, while that keeps at least a share of the value before. A share below 1 lets robots far apart
-transmit at the same time, each heard by those near it: less valuable at that moment, but news then
-travels on many ways at once. Looking ahead, several first transmitters are followed for a few
-slots, and the one that leaves the team youngest is taken.
+transmit at once: less valuable at that moment, but news then travels on many ways. Looking ahead,
+several first transmitters are followed for a few slots, and the one that leaves the team youngest
+is taken.
 
 A packet that raises T^{j,k} (Eq. 8) by r has the value r² times a weight of receiver j and subject
-k. Where positions are only believed, a packet decodes with a probability, and timestamps are
-expected ones. Index order: `i` sends, `j` receives. Times are in slots, float32, which keeps them
-exact for 8 million windows.
+k, times the probability that it decodes; timestamps are expected ones. Index order: `i` sends, `j`
+receives. Times are in slots, float32, which keeps them exact for 8 million windows.
 
 The first flight compiles these functions, so there are few, and they write loops where an array
 expression or a sort would take numba seconds to compile.

@@ -70,9 +70,9 @@ class Discovery:
         """Return who transmits: one robot in a window's first slot, those that hear it in the next.
 
         A robot that has just heard a missing one answers, unless another robot near that one comes
-        first. Of the missing that hold this snapshot, one after the other transmits. Row i of
-        `was_fresh` is from the snapshot that i flew by before the last slot, since the call itself
-        may bring a snapshot in which the caller is fresh.
+        first. Of the missing, one after the other transmits, too. Row i of `was_fresh` is from the
+        snapshot that i flew by before the last slot, since the call itself may bring a snapshot in
+        which the caller is fresh.
         """
         everyone = np.arange(len(self._order))
         transmits = np.zeros(len(self._order), dtype=bool)

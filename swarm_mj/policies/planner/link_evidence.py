@@ -31,10 +31,9 @@ def observe(
 ) -> Int[np.ndarray, "N"]:
     """Return the kind of packet that each robot notes of a slot in which it followed one plan.
 
-    Only those note one that listened, and know that all others follow plans, too; nobody else can
-    say what was in the air. They decoded the packets of `heard`, or none: themselves. By the plan,
-    which was made by believed powers of i at j, [i, j], these transmitted. Margins are counted from
-    the links before anything was learned.
+    Only those listen here that know that all others follow plans, too; nobody else can say what was
+    in the air. The plan was made by believed powers of i at j, [i, j]. Margins are counted from the
+    links before anything was learned.
     """
     num_robots = len(heard)
     everyone, is_other = np.arange(num_robots), ~np.eye(num_robots, dtype=bool)

@@ -7,8 +7,10 @@ link's excess follows by Bayes' rule. Packets carry what robots observed, and tw
 that the sender plans by, and the best of the next.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -55,26 +57,19 @@ class LinkTable:
         return not (fades or np.any(self.mean_db) or np.any(self.std_db))
 
 
-class Tables:
-    """The tables of all robots at one time; each is fitted when asked for."""
+class Tables(NamedTuple):
+    """The tables of all robots at one time."""
 
-    def __init__(
-        self, evidence: Evidence, known_until: Int[np.ndarray, "N N"], settings: PlannerSettings
-    ) -> None:
-        """Keep what every robot knew: [j, i] is the last slot of which j knows what i observed.
+    rank: Int[np.ndarray, "N"]  # the best table has rank 0: its owner's knowledge is youngest
+    table: Callable[[int], LinkTable]  # of one robot, fitted when asked for
 
-        The best table, of rank 0, is that of the robot whose knowledge is youngest.
-        """
-        self._evidence, self._known_until, self._settings = evidence, known_until, settings
-        self.rank = np.argsort(np.argsort(-np.sum(known_until, axis=1), kind="stable"))
-        self._tables: dict[int, LinkTable] = {}
 
-    def table(self, owner: int) -> LinkTable:
-        """Return the table of one robot."""
-        if owner not in self._tables:
-            counts = self._evidence.counts(self._known_until[owner])
-            self._tables[owner] = fit(*counts, self._settings)
-        return self._tables[owner]
+def tables_of(
+    evidence: Evidence, known_until: Int[np.ndarray, "N N"], settings: PlannerSettings
+) -> Tables:
+    """Return what follows if [j, i] is the last slot of which j knows what i observed."""
+    rank = np.argsort(np.argsort(-np.sum(known_until, axis=1), kind="stable"))
+    return Tables(rank, cache(lambda owner: fit(*evidence.counts(known_until[owner]), settings)))
 
 
 def fit(decoded: Counts, missed: Counts, settings: PlannerSettings) -> LinkTable:
@@ -150,8 +145,9 @@ def _log_probabilities() -> tuple[Float[np.ndarray, "K F X"], Float[np.ndarray, 
 def _decodes(margin_db: Float[np.ndarray, "K X"]) -> Float[np.ndarray, "K F X"]:
     """Return how probably a packet decodes, by each law."""
     ratios, laws = (10.0 ** (margin_db / 10.0)).tolist(), range(len(LAWS))
-    chances = [[[probability_at(_curves(f), 0, x) for x in row] for f in laws] for row in ratios]
-    return np.array(chances)
+    return np.array(
+        [[[probability_at(_curves(f), 0, x) for x in row] for f in laws] for row in ratios]
+    )
 
 
 @cache
@@ -160,10 +156,8 @@ def _priors() -> Float[np.ndarray, "P X"]:
     is_expected = (EXCESS_DB == 0.0).astype(np.float64)
     is_blocked = (EXCESS_DB < BLOCKED_BELOW_DB).astype(np.float64)
     normal = [np.exp(-0.5 * (EXCESS_DB / spread_db) ** 2) for spread_db in SPREADS_DB[1:]]
-    blocked = [
-        (1.0 - share) * is_expected + share * is_blocked / is_blocked.sum()
-        for share in BLOCKED_SHARES
-    ]
+    num = is_blocked.sum()
+    blocked = [(1.0 - x) * is_expected + x * is_blocked / num for x in BLOCKED_SHARES]
     priors = np.stack([is_expected, *normal, *blocked])
     return priors / priors.sum(axis=1, keepdims=True)
 

@@ -18,7 +18,7 @@ from swarm_mj.radio.links import Links, lone_probabilities
 from swarm_mj.radio.mission_radio import Belief
 from swarm_mj.system.compiled import compiled
 
-CHUNK_SLOTS = 10  # planned at a time; any number gives the same plan
+CHUNK_SLOTS = 10  # planned at a time, whatever is asked for; any number gives the same plan
 
 
 class Plan:
@@ -37,10 +37,9 @@ class Plan:
         now: float = 0.0,
         is_free: Bool[np.ndarray, "P"] | None = None,
     ) -> None:
-        """Prepare a plan that begins with T and t as given [windows].
+        """Prepare a plan that begins with T and t [windows], and ends with the slots, free or not.
 
-        It ends with the slots that may be free or not, and looks as far ahead as on certain links
-        if that is said, or else if its links are certain.
+        It looks as far ahead as on certain links if that is said, or else if its links are.
         """
         num_robots = len(links.received_mw)
         is_certain = not links.is_doubtful if is_certain is None else is_certain
@@ -68,7 +67,6 @@ class Plan:
         return self._timestamp.astype(np.float64) / SLOTS_PER_WINDOW
 
     def _extend(self) -> None:
-        """Compute the next slots: as many whatever is asked for, which plans must not depend on."""
         begin, num_robots = len(self._transmits), len(self._timestamp)
         num_slots = int(min(CHUNK_SLOTS, self._num_slots - begin))
         # Looking ahead reaches beyond these slots, and beyond the plan's end, where all are free.
@@ -97,10 +95,7 @@ def epoch_plan(
     now: float,
     is_free: Bool[np.ndarray, "P"],
 ) -> Plan:
-    """Return the plan of an epoch, which depends on one robot's snapshot and on nothing else.
-
-    T and t are those as the epoch begins, as far as they are known with that snapshot [windows].
-    """
+    """Return the plan of an epoch that begins with T and t [windows], by one robot's snapshot."""
     is_fresh, observed = snapshots.is_fresh[owner], snapshots.timestamp[owner]
     round_windows = max(len(observed), settings.min_round_windows)
     is_gone = now - observed > settings.gone_rounds * round_windows

@@ -1,31 +1,27 @@
 """The common-knowledge planner of teams that move; teams at rest have `resting.py`.
 
-Every robot computes the whole team's schedule, and flies its part.
-
 Identities, the team's size, its area, orders and the clock are common before the mission. Robots
-that also hold the same snapshot of the team therefore agree on a schedule without negotiating. Any
-robot may transmit in every slot, and nobody answers. Time is divided into epochs:
+that also hold the same snapshot of the team therefore agree on a schedule without negotiating: each
+computes the whole team's, and flies its part. Any robot may transmit in every slot, and nobody
+answers. Time is divided into epochs:
 
 1. In the first two, the discovery, robots transmit in turns (`discovery.py`). There is none where
    robots know before the mission where all start.
 2. At the start of every epoch but the first, each robot takes a snapshot of the team from its own
    buffer. Packets carry the best snapshot for the next epoch and the one that the sender flies by.
-   A robot that decodes a better one adopts it and passes it on. The best has most fresh robots,
-   then the least age, then the lower identity. So a connected team soon holds one.
+   A robot that decodes a better one adopts it and passes it on. So a connected team soon holds one.
 3. In the next epoch every robot runs the same scheduler (`broadcast_scheduler.py`) on the best
    snapshot it holds, and transmits when the schedule says so. The timestamps at the start are those
    that the last schedule leads to, so nobody needs to report what it decoded.
 
-Believed positions become uncertain with their age, the more so the more the robots' velocities
-differ. Packets over uncertain links are expected to decode with a probability. A robot that missed
-the best snapshot flies by the best it has, may collide, and still listens. A snapshot that lacks
-robots is not flown by: the discovery goes on, for up to five rounds of N windows or 200 windows.
-After that, and whenever a robot was not heard from for long, every fifth window is left to the
-search for it.
+A robot that missed the best snapshot flies by the best it has, may collide, and still listens. A
+snapshot that lacks robots is not flown by: the discovery goes on for some rounds. After that, and
+whenever a robot was not heard from for long, some windows are left to the search for it.
 """
 
 import math
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool
@@ -50,12 +46,7 @@ from swarm_mj.radio.mission_radio import Belief, radio_of
 
 
 class Planner(BroadcastPolicy):
-    """Every robot plans for the whole team from a snapshot that its teammates hold too.
-
-    Uses the robot's own buffer, the snapshots in the packets that it decoded, its identity, the
-    team's size and area, the clock, the radio's numbers and common orders of turns, and what the
-    mission grants of the channel.
-    """
+    """Every robot plans for the whole team from a snapshot that its teammates hold too."""
 
     uses = (
         "its buffer, the clock, common orders, the area, its prior knowledge of the radio; and "
@@ -68,9 +59,15 @@ class Planner(BroadcastPolicy):
         Raises:
             ValueError: The mission's slots do not hold snapshots.
         """
-        _check_room(mission)
-        self._mission = mission
-        self._settings = PlannerSettings() if settings is None else settings
+        packet = packet_of(mission, snapshot_fields(mission))
+        if mission.bit_rate is not None and not fits(packet, mission):
+            needed = least_bit_rate(packet.num_bytes, mission)
+            raise ValueError(
+                f"packets of planner need {packet.num_bytes:,} bytes, but a slot holds "
+                f"{slot_bytes(mission):,} bytes at {bits_per_second(mission.bit_rate)}; choose a "
+                f"bit rate of {needed:g} or more, or planner --payload none"
+            )
+        self._mission, self._settings = mission, settings or PlannerSettings()
         self._belief = Belief(radio=radio_of(mission))
 
     @property
@@ -171,18 +168,16 @@ class _Team:
         epoch, num_robots = self._epoch + self._num_skipped, len(self._everyone)
         length = epoch_windows(epoch, num_robots, self._settings)
         self._begin, self._end = self._end, self._end + length
+        take = partial(take_snapshots, buffers, b, now, self._window_s, settings=self._settings)
         if is_common:
-            self._upcoming = self._snapshots(buffers, b, now, length / 2.0)
+            self._upcoming = take(windows_ahead=length / 2.0)
             self._will_hold = np.zeros_like(self._everyone)  # all snapshots are the same
         self._current, self._holds = self._upcoming, self._will_hold
         if epoch > 0:
             next_length = epoch_windows(epoch + 1, num_robots, self._settings)
-            self._upcoming = self._snapshots(buffers, b, now, length + next_length / 2.0)
+            self._upcoming = take(windows_ahead=length + next_length / 2.0)
             self._will_hold = self._holds if is_common else self._everyone
             self._planned_by = self._holds
-
-    def _snapshots(self, buffers: Buffers, b: int, now: float, windows_ahead: float) -> Snapshots:
-        return take_snapshots(buffers, b, now, self._window_s, windows_ahead, self._settings)
 
     def _plan(self, current: Snapshots, owner: int) -> Plan:
         """Return the plan that follows from someone's snapshot."""
@@ -221,14 +216,3 @@ def epoch_windows(epoch: int, num_robots: int, settings: PlannerSettings) -> int
         return max(settings.min_epoch_windows, round(settings.epoch_rounds * num_robots))
     rounds = settings.early_epoch_rounds if epoch > 0 else settings.first_epoch_rounds
     return max(settings.min_early_epoch_windows, round(rounds * num_robots))
-
-
-def _check_room(mission: Mission) -> None:
-    packet = packet_of(mission, snapshot_fields(mission))
-    if mission.bit_rate is None or fits(packet, mission):
-        return
-    raise ValueError(
-        f"packets of planner need {packet.num_bytes:,} bytes, but a slot holds "
-        f"{slot_bytes(mission):,} bytes at {bits_per_second(mission.bit_rate)}; choose a bit rate "
-        f"of {least_bit_rate(packet.num_bytes, mission):g} or more, or planner --payload none"
-    )

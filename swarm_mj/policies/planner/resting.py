@@ -1,18 +1,16 @@
 """The planner of teams at rest: robots agree from their buffers, and may learn their links.
 
 Where nobody moves, robots that have heard of all hold the same positions. The plan that follows
-from these positions and the clock is common, whatever else buffers say. So every robot takes its
-turns as in spatial TDMA until it has heard of everyone, and from then on transmits when the plan
-says so. The plan begins with a team that knows nothing when the mission begins, so that it does not
-matter when a robot joins it. Without a payload they keep this plan.
+from these and the clock is common, whatever else buffers say. It begins with a team that knows
+nothing when the mission begins, so that it does not matter when a robot joins it; until then a
+robot takes its turns as in spatial TDMA. Without a payload they keep this plan.
 
 Under a channel that the robots do not know, some of its packets never arrive. With a payload,
 robots note what they decoded and what they missed (`link_evidence.py`), and packets carry these
 counts of all robots, each as old as the rest of what they say of it. At common times every robot
 fits a table of links to what it then knows (`link_tables.py`). Packets carry the best table: that
 of the robot whose knowledge is youngest. At the next common time each robot flies by a plan made
-from the best table that it holds. Where the table says that links are as they were believed, the
-plan goes on.
+from the best table that it holds, or goes on if the table says that links are as believed.
 
 Where robots move, no two buffers hold the same positions for long, and schedules made from them
 would jam each other. A robot that hears of motion does as the planner of moving teams, or, without
@@ -27,7 +25,7 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.planner.link_evidence import NOTHING, Evidence, observe
-from swarm_mj.policies.planner.link_tables import Tables, corrected, link_fields
+from swarm_mj.policies.planner.link_tables import Tables, corrected, link_fields, tables_of
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
@@ -43,12 +41,7 @@ NOT_YET = np.iinfo(np.int64).max
 
 
 class RestingPlanner(BroadcastPolicy):
-    """Every robot that knows where everyone rests plans for the whole team; others take turns.
-
-    Uses the robot's own buffer, its identity, the team's size, the clock, the radio's numbers, what
-    the mission grants of the channel and a common order of turns; and what packets say of links, if
-    it learns.
-    """
+    """Every robot that knows where everyone rests plans for the whole team; others take turns."""
 
     def __init__(
         self, mission: Mission, settings: PlannerSettings, turns: SpatialTdma, *, learns: bool
@@ -59,9 +52,7 @@ class RestingPlanner(BroadcastPolicy):
         planner of moving teams, unless only links fit into packets, as in some large teams.
         """
         self._belief = Belief(radio=radio_of(mission))
-        self._settings = settings
-        self._turns = turns
-        self._learns = learns
+        self._settings, self._turns, self._learns = settings, turns, learns
         is_ready = learns and fits(packet_of(mission, snapshot_fields(mission)), mission)
         self._moving = Planner(mission) if is_ready else None
         self.uses = (
@@ -189,15 +180,15 @@ class _Team:
         kinds = np.full(len(self._everyone), NOTHING)
         for follows, flight, planned in self._followed:
             listens = follows & ~self._transmitted & knows_all
-            noted = observe(listens, heard, planned, flight.expected_mw, flight.prior)
-            kinds = np.where(listens, noted, kinds)
+            believed = flight.expected_mw, flight.prior
+            kinds = np.maximum(kinds, observe(listens, heard, planned, *believed))
         self._evidence.add(kinds)
         if self._current is not None:
             self._holds = better(self._current.rank, self._holds, heard)
         if self._next is not None:
             self._will_hold = better(self._next.rank, self._will_hold, heard)
         if self._are_flown(slot + round(self._settings.spread_rounds * self._round)):
-            self._next = Tables(self._evidence, known_until, self._settings)
+            self._next = tables_of(self._evidence, known_until, self._settings)
             self._will_hold = self._everyone
         if self._are_flown(slot) and self._next is not None:
             self._current, self._holds = self._next, self._will_hold

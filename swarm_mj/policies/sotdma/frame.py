@@ -167,8 +167,8 @@ def first_slots(
         slots[k] = place % rule.num_slots
         if is_known[k]:
             if place >= rule.num_slots:
-                slots[k] = best_slot(frame, k, slots[k], 0.0, no_marks)
-            switch(frame, slots[k], k)
+                slots[k] = best_slot(frame, k, int(slots[k]), 0.0, no_marks)
+            switch(frame, int(slots[k]), k)
     return slots
 
 

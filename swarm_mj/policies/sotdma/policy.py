@@ -5,12 +5,12 @@ announce the slots that they reserve, and choose slots that are free where they 
 needs to announce anything, for T says when a teammate last transmitted, and so which slot is its
 own. So robots agree on who transmits when, however wrong they are about positions.
 
-The mission begins with spatial TDMA. After three rounds everyone works out first slots for all,
-from positions that hardly differ by then. From then on one robot after the other chooses anew: it
-simulates the whole frame, from the positions and slots that it believes in, with itself in each
-slot, and takes the one that keeps the team's information freshest. Neighbours' packets say whether
-they decoded its own; a slot that is missed too often for chance counts as one that they cannot
-hear it in. One slot in sixteen is left to robots that have lost a neighbour.
+The mission begins with spatial TDMA. After some rounds everyone works out first slots for all, from
+positions that hardly differ by then. From then on one robot after the other chooses anew: it
+simulates the whole frame, as it believes it to be, with itself in each slot, and takes the one that
+keeps the team's information freshest. A slot in which neighbours miss its packets too often for
+chance counts as one that they cannot hear it in. Some slots are left to robots that have lost a
+neighbour.
 """
 
 from collections.abc import Sequence
@@ -125,7 +125,10 @@ class SotdmaTeam:
         slot_table.read_packets(table, heard, known, buffers.parent[b], slot - 1)
         slot_table.read_slots(table, known, rule)
         for i in self._choosers(slot):
-            table.slots[i, i] = self._choice(i, slot, table, is_known[i], buffers.position_m[b, i])
+            is_marked, lately = slot_table.marks(table, i, slot, rule), self._chose_lately(slot)
+            power = self._powers(buffers.position_m[b, i], is_known[i])
+            believed = table.slots[i], table.announced[i], is_known[i]
+            table.slots[i, i] = chosen(i, *believed, is_marked, lately, power, rule)
         place = place_of(slot, rule)
         if place == NO_PLACE:
             is_near = is_known & self._is_in_range(buffers.position_m[b])
@@ -135,20 +138,6 @@ class SotdmaTeam:
             transmits = np.diagonal(table.slots) == place
         table.sent[transmits], table.sent_place[transmits] = slot, place
         return transmits
-
-    def _choice(
-        self,
-        i: int,
-        slot: int,
-        table: SlotTable,
-        is_known: Bool[np.ndarray, "N"],
-        position_m: Float[np.ndarray, "N 2"],
-    ) -> int:
-        """Return the slot of the frame that robot i chooses, by what it knows."""
-        is_marked = slot_table.marks(table, i, slot, self._rule)
-        lately, power = self._chose_lately(slot), self._powers(position_m, is_known)
-        believed = table.slots[i], table.announced[i], is_known
-        return chosen(i, *believed, is_marked, lately, power, self._rule)
 
     def _first_slots(
         self, position_m: Float[np.ndarray, "N N 2"], is_known: Bool[np.ndarray, "N N"]

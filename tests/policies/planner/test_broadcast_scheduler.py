@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from standing_teams import flooded_team
+from standing_teams import flooded_team, received
 
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import RobotStates
@@ -58,23 +58,6 @@ def really(team, speaks):
         transmit(buffers, states, recipient, team.radio, now)
         after.append(buffers.timestamp[0].copy())
     return np.array(after)
-
-
-def received(links, speakers, j):
-    """Whom j hears of these, and how probably: Eqs. 3-4, and the law of doubt."""
-    if j in speakers or not speakers:
-        return None, 0.0
-    power_mw = {i: float(links.received_mw[i, j]) for i in speakers}
-    sender = max(power_mw, key=power_mw.__getitem__)
-    others_mw = sum(power for i, power in power_mw.items() if i != sender)
-    ratio = power_mw[sender] / (links.noise_mw + others_mw) / links.threshold
-    distance_over_std = float(links.distance_over_std[sender, j])
-    if power_mw[sender] == 0.0 or math.isinf(distance_over_std):
-        return sender, float(power_mw[sender] > 0.0 and ratio >= 1.0)
-    deviations = (math.sqrt(ratio) - 1.0) * distance_over_std
-    if abs(deviations) > 2.5:
-        return sender, float(deviations > 0.0)
-    return sender, 1.0 / (1.0 + math.exp(-1.702 * deviations))
 
 
 def worth_of(known, links, weights, speakers, receivers=None):

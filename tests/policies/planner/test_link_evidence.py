@@ -81,27 +81,19 @@ def test_packets_that_are_too_weak_are_not_missed_but_may_be_decoded(margin_db, 
     noted = observed([0, 1, 2, 3], [1, 0, 0, 0], power_mw)[1]
     assert noted == ((0, 0, False) if is_missed else None)
     assert observed([0, 0, 2, 3], [1, 0, 0, 0], power_mw)[1] == (0, 0, True)
-
-
-def test_what_is_very_strong_is_in_the_last_bin():
-    assert observed([0, 0, 2, 3], [1, 0, 0, 0], powers(p01=1e9))[1] == (0, NUM_BINS - 1, True)
+    strong_mw = powers(p01=1e9)
+    assert observed([0, 0, 2, 3], [1, 0, 0, 0], strong_mw)[1] == (0, NUM_BINS - 1, True)
 
 
 def test_who_notes_nothing():
-    """Who does not listen to a plan, or anybody when nobody transmits."""
-    power_mw = powers(p01=100.0, p02=100.0, p03=100.0)
-    listens = np.array([False, True, False, False])
-    heard = [0, 0, 0, 0]
-    noted = observed(heard, [1, 0, 0, 0], power_mw, listens=listens)
+    """Who does not listen to a plan, or anybody when nobody transmits. One that should transmit by
+    a plan that it has left misses what the others send."""
+    power_mw, listens = powers(p01=100.0, p02=100.0, p03=100.0), np.arange(4) == 1
+    noted = observed([0, 0, 0, 0], [1, 0, 0, 0], power_mw, listens=listens)
     assert noted == [None, (0, 13, True), None, None]
     assert observed([0, 1, 2, 3], [0, 0, 0, 0], power_mw) == [None] * 4
-
-
-def test_the_plan_s_own_belief_that_the_listener_transmits_does_not_count():
-    """One that should transmit by a plan that it has left misses what the others send."""
-    power_mw = powers(p01=100.0)
-    listens = np.array([False, True, False, False])
-    assert observed([0, 1, 2, 3], [1, 1, 0, 0], power_mw, listens=listens)[1] == (0, 13, False)
+    noted = observed([0, 1, 2, 3], [1, 1, 0, 0], powers(p01=100.0), listens=listens)
+    assert noted[1] == (0, 13, False)
 
 
 def kind_of(is_decoded, i, margin, num_robots):
@@ -127,12 +119,6 @@ def test_counts_are_a_plain_loop_up_to_each_robot_s_slot():
     decoded, missed = evidence.counts(known_until)
     np.testing.assert_array_equal(decoded, expected[1])
     np.testing.assert_array_equal(missed, expected[0])
-
-
-def test_who_observed_nothing_counts_nothing():
-    for counts in Evidence(3).counts(np.full(3, 9)):
-        assert counts.shape == (3, 3, NUM_BINS)
-        assert not counts.any()
 
 
 def test_a_kind_is_noted_255_times_and_no_more():

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import networkx as nx
 import numpy as np
 import pytest
+from decentralised_reference import planned as planned_at_once
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from learning_reference import planned as planned_at_once
 from standing_teams import flooded_team
 
 from swarm_mj.mission import paper
@@ -218,41 +218,18 @@ def as_networkx(graph):
     return plain
 
 
-def line(*position_m, spread_m=None, is_known=None):
-    """Robots in a row."""
-    places = np.array([[x, 0.0] for x in position_m])
-    spread = None if spread_m is None else np.full(len(places), spread_m)
-    return links_between(RADIO, places, spread, is_known)
-
-
 def weights_of(links):
     return heuristic_weights(links, WEIGHING)
 
 
 def test_a_row_of_three_by_hand():
     """Robot 0's news reach robot 2 through robot 1, two hops on; two of three pairs are linked."""
-    weights = weights_of(line(0.0, 200.0, 400.0))
+    row_m = np.array([[0.0, 0.0], [200.0, 0.0], [400.0, 0.0]])
+    weights = weights_of(links_between(RADIO, row_m))
     assert weights.squared_rise[1, 0] == pytest.approx(2.0**0.6)
     assert weights.squared_rise[2, 0] == pytest.approx(2.0**-0.3)
     assert weights.squared_rise[0, 1] == pytest.approx(1.0)
     assert weights.min_share == pytest.approx(0.95 - 0.3 * 2 / 3)
-
-
-def test_the_share_falls_with_links_and_rises_with_doubt_up_to_its_most():
-    sparse, dense = line(0.0, 200.0, 400.0, 600.0), line(0.0, 80.0, 160.0, 240.0)
-    assert weights_of(dense).min_share < weights_of(sparse).min_share
-    shares = [
-        weights_of(line(0.0, 80.0, 160.0, 240.0, spread_m=s)).min_share
-        for s in (0.1, 1.0, 9.0, 99.0)
-    ]
-    assert weights_of(dense).min_share < shares[0] < shares[1] < shares[2]
-    assert shares[3] == 1.05
-
-
-def test_the_share_rises_where_a_robot_is_missing():
-    """Two of three robots are known, and linked: 0.95 less 0.3, and 0.1 more."""
-    weights = weights_of(line(0.0, 100.0, 200.0, is_known=np.array([True, True, False])))
-    assert weights.min_share == pytest.approx(0.95 - 0.3 + 0.1)
 
 
 @given(seed=seeds, num_robots=st.integers(2, 9), is_certain=st.booleans())
@@ -265,37 +242,21 @@ def test_hops_are_the_shortest_ways_of_networkx(seed, num_robots, is_certain):
         assert graph.hops[i].tolist() == pytest.approx(expected)
 
 
-@given(seed=seeds, num_robots=st.integers(2, 8))
-def test_downstream_counts_whom_shortest_ways_lead_to(seed, num_robots):
-    """Of certain links: all shortest ways from k to j, one by one, and who is on them."""
-    graph = graph_of(links_between(*places(num_robots, seed)))
-    plain = as_networkx(graph)
-    expected = np.zeros((num_robots, num_robots))
-    for k in range(num_robots):
-        for j in nx.node_connected_component(plain, k):
-            on_the_way = {i for way in nx.all_shortest_paths(plain, k, j) for i in way}
-            expected[sorted(on_the_way), k] += 1.0
-    assert graph.downstream.tolist() == expected.tolist()
-    for k in range(num_robots):
-        assert graph.downstream[k, k] == len(nx.node_connected_component(plain, k))
-
-
-@given(seed=seeds, num_robots=st.integers(2, 6))
-def test_nearly_shortest_ways_count_too(seed, num_robots):
-    """Of doubtful links: all ways without a turning back that are less than the slack longer."""
-    graph = graph_of(believed(num_robots, seed))
+@given(seed=seeds, num_robots=st.integers(2, 6), is_certain=st.booleans())
+def test_downstream_counts_who_is_on_nearly_shortest_ways(seed, num_robots, is_certain):
+    """All ways without a turning back that are less than the slack longer, one by one."""
+    links = links_between(*places(num_robots, seed)) if is_certain else believed(num_robots, seed)
+    graph = graph_of(links)
     plain = as_networkx(graph)
     expected = np.eye(num_robots)
     for k in range(num_robots):
-        expected[k, k] = len(nx.node_connected_component(plain, k))
-        for j in set(nx.node_connected_component(plain, k)) - {k}:
+        reached = nx.node_connected_component(plain, k)
+        expected[k, k] = len(reached)
+        for j in reached - {k}:
             ways = list(nx.all_simple_paths(plain, k, j))
             lengths = [nx.path_weight(plain, way, "hops") for way in ways]
-            near = [
-                way
-                for way, n in zip(ways, lengths, strict=True)
-                if n < min(lengths) + WEIGHING.slack_hops
-            ]
+            most = min(lengths) + WEIGHING.slack_hops
+            near = [way for way, n in zip(ways, lengths, strict=True) if n < most]
             for i in {i for way in near for i in way} - {k}:
                 expected[i, k] += 1.0
     assert graph.downstream.tolist() == expected.tolist()

@@ -22,6 +22,7 @@ from swarm_mj.radio.power_law import PowerLaw, powers_between
 RADIO = radio_of(paper("stationary"))
 NUM_ROBOTS, NUM_SLOTS, FRAMES = 9, 5, 3
 NOWHERE = -1  # no slot of the frame
+RULE = Rule(RADIO.threshold, NUM_SLOTS, simulated_frames=FRAMES, start_frames=2.0, interference=1.2)
 
 
 def team(seed):
@@ -33,14 +34,7 @@ def team(seed):
 
 def frame_of(power, slots, interference=1.0):
     """A frame in which robot k transmits in `slots[k]`, unless that is `NOWHERE`."""
-    rule = Rule(
-        RADIO.threshold,
-        NUM_SLOTS,
-        interference=interference,
-        simulated_frames=FRAMES,
-        start_frames=2.0,
-    )
-    frame = empty_frame(power, rule)
+    frame = empty_frame(power, RULE._replace(interference=interference))
     for k, slot in enumerate(slots):
         if slot != NOWHERE:
             switch(frame, slot, k)
@@ -113,70 +107,43 @@ def test_the_best_slot_is_the_youngest_of_all_that_were_tried(seed):
     np.testing.assert_array_equal(frame.transmits, before[1])
 
 
-RULE = Rule(threshold=1.25, num_slots=4, simulated_frames=3, start_frames=5.0)
-NO_MARKS = np.zeros((4, 7), dtype=bool)
-EVERYONE = np.ones(7, dtype=bool)
+EVERYONE = np.ones(NUM_ROBOTS, dtype=bool)
+NO_MARKS = np.zeros((NUM_SLOTS, NUM_ROBOTS), dtype=bool)
 NO_CHOICES = np.zeros((0, 2), dtype=np.int64)
 
 
-def powers(seed, is_known=EVERYONE):
-    """Powers of robots in a field of three ranges [noise]."""
-    position = np.random.default_rng(seed).uniform(0.0, 3.0, (7, 2))
-    squared = np.sum((position[:, None] - position) ** 2, axis=2)
-    np.fill_diagonal(squared, np.inf)
-    return 1.25 / squared * is_known * is_known[:, None]
-
-
-def best(power, slots, k, own, min_gain=0.2, is_marked=NO_MARKS):
+def best(power, slots, k, own, min_gain=RULE.min_gain, is_marked=NO_MARKS):
     """The best slot of k beside those who have one."""
-    frame = empty_frame(power, RULE)
-    for j, slot in enumerate(slots):
-        if j != k and slot != NOWHERE:
-            switch(frame, slot, j)
-    return best_slot(frame, k, own, min_gain, is_marked)
+    others = np.where(np.arange(NUM_ROBOTS) == k, NOWHERE, slots)
+    return best_slot(frame_of(power, others, RULE.interference), k, own, min_gain, is_marked)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_the_first_of_the_order_have_a_slot_each_and_the_others_choose_in_turn(seed):
-    order, power = np.random.default_rng(seed).permutation(7), powers(seed)
-    slots = first_slots(order, EVERYONE, power, RULE)
-    assert slots[order[:4]].tolist() == [0, 1, 2, 3]
-    for place in range(4, 7):
-        so_far = np.full(7, NOWHERE)
-        so_far[order[:place]] = slots[order[:place]]
-        assert slots[order[place]] == best(power, so_far, order[place], 0, 0.0)
-
-
-def test_robots_that_are_not_known_have_no_part_in_it():
-    """But they count as in the slots of their places in the order."""
-    order, is_known = np.arange(7), ~np.isin(np.arange(7), [2, 5])
-    slots = first_slots(order, is_known, powers(1, is_known), RULE)
-    assert slots[[0, 1, 2, 3, 5]].tolist() == [0, 1, 2, 3, 1]
-    apart = powers(1)
-    apart[[2, 5]] = apart[:, [2, 5]] = 0.0
-    for k in (4, 6):
-        so_far = [slots[j] if j < k and is_known[j] else NOWHERE for j in range(7)]
-        assert slots[k] == best(apart, so_far, k, 0, 0.0)
+@pytest.mark.parametrize("unknown", [[], [1], [2, 7]])
+def test_the_first_of_the_order_have_a_slot_each_and_the_others_choose_in_turn(unknown):
+    """Robots that are not known have no part in it, but count as in the slots of their places."""
+    is_known = ~np.isin(np.arange(NUM_ROBOTS), unknown)
+    order, power = np.random.default_rng(4).permutation(NUM_ROBOTS), team(4)[1]
+    power = power * is_known * is_known[:, None]
+    slots = first_slots(order, is_known, power, RULE)
+    assert slots[order[:NUM_SLOTS]].tolist() == list(range(NUM_SLOTS))
+    for place in range(NUM_SLOTS, NUM_ROBOTS):
+        k, so_far = order[place], np.full(NUM_ROBOTS, NOWHERE)
+        before = [j for j in order[:place] if is_known[j]]
+        so_far[before] = slots[before]
+        expected = best(power, so_far, k, 0, 0.0) if is_known[k] else place % NUM_SLOTS
+        assert slots[k] == expected
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_robot_takes_the_best_slot_beside_where_it_believes_the_others(seed):
-    power, rng = powers(seed), np.random.default_rng(seed)
-    slots, is_marked = rng.integers(0, 4, 7), rng.random((4, 7)) < 0.3
-    never = np.full(7, -100)
-    choice = chosen(3, slots, never, EVERYONE, is_marked, NO_CHOICES, power, RULE)
-    assert choice == best(power, slots, 3, slots[3], is_marked=is_marked)
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_choices_not_heard_of_are_predicted_in_their_order(seed):
-    """Robots 5 and 1 chose in slots 50 and 52; 6 too, but was heard since; 3 is oneself."""
-    power = powers(seed)
-    slots = np.random.default_rng(seed).integers(0, 4, 7)
-    announced = np.array([0, 51, 0, 0, 0, 49, 54])
-    chose = np.array([(5, 50), (1, 52), (6, 53), (3, 53)])
-    expected = slots.copy()
-    for k in (5, 1):
-        expected[k] = best(power, expected, k, expected[k])
-    choice = chosen(3, slots, announced, EVERYONE, NO_MARKS, chose, power, RULE)
-    assert choice == best(power, expected, 3, slots[3])
+    """Choices not heard of are predicted first, in their order, without marks: robots 5 and 1 chose
+    in slots 50 and 52; 6 too, but was heard since; 3 is oneself."""
+    power, rng = team(seed)[1], np.random.default_rng(seed)
+    slots, is_marked = rng.integers(0, NUM_SLOTS, NUM_ROBOTS), rng.random(NO_MARKS.shape) < 0.3
+    announced = np.array([0, 51, 0, 0, 0, 49, 54, 0, 0])
+    for chose in (NO_CHOICES, np.array([(5, 50), (1, 52), (6, 53), (3, 53)])):
+        expected = slots.copy()
+        for k in chose[:2, 0]:
+            expected[k] = best(power, expected, k, expected[k])
+        choice = chosen(3, slots, announced, EVERYONE, is_marked, chose, power, RULE)
+        assert choice == best(power, expected, 3, slots[3], is_marked=is_marked)
