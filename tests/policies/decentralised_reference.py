@@ -15,7 +15,6 @@ from swarm_mj.policies.planner.plan import heuristic_weights, lookahead_of
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import BroadcastPolicy
-from swarm_mj.policies.registry import make_policy
 from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.swarm import Swarm
@@ -347,43 +346,3 @@ class Witnessed(Flight):
     @property
     def num_taken(self):
         return sum(mind.took_over for mind in self.minds)
-
-
-class PlannedApart(BroadcastPolicy):
-    """A flight of the planner without payload, in which each robot is also asked apart.
-
-    A robot is a function of its own buffer, its identity and the clock: at rest, if it has heard of
-    everyone, it works the schedule out from the mission's first slot, in one go; else it does what
-    spatial TDMA has it do, which its own tests hold to Eq. 9.
-    """
-
-    def __init__(self, mission, seed, *, channel=None):
-        self.policy = make_policy("planner --payload none", mission)
-        self.turns = make_policy("spatial-tdma", mission)
-        self.mission = mission
-        self.swarm = Swarm(mission, [seed], channel=channel)
-        self.plans = {}  # of each robot that has made one
-
-    def start(self, num_robots, rngs):
-        self.turns.start(num_robots, copy.deepcopy(rngs))
-        self.policy.start(num_robots, rngs)
-
-    def transmits(self, views):
-        decided = self.policy.transmits(views)
-        in_turn = self.turns.transmits(views)
-        slot = round(2 * float(views.now[0]))
-        for i in range(views.num_robots):
-            seen, position_m, velocity_mps = rows(views.buffers, i)
-            transmits = bool(in_turn[0, i])
-            if all(seen > 0.0) and not velocity_mps.any():
-                if i not in self.plans:
-                    links = links_between(radio_of(self.mission), position_m)
-                    self.plans[i] = planned(links, SETTINGS, 120)
-                transmits = bool(self.plans[i][slot, i])
-            assert decided[0, i] == transmits, (slot, i)
-        return decided
-
-    def fly(self, num_windows):
-        """Flies on."""
-        for _ in range(num_windows):
-            self.swarm.step(self)

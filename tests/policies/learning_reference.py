@@ -204,10 +204,15 @@ class LearningMind:
 
 
 class LearnedApart(BroadcastPolicy):
-    """A flight of the planner that learns, in which each robot is also asked apart."""
+    """A flight of the planner at rest, in which each robot is also asked apart.
 
-    def __init__(self, mission, seed, *, channel=None, settings=SHORT):
-        self.policy = learner(mission, settings)
+    Without a payload, nobody is told anything, and so none learns.
+    """
+
+    def __init__(self, mission, seed, *, channel=None, settings=SHORT, learns=True):
+        self.learns = learns
+        plain = make_policy("planner --payload none", mission)
+        self.policy = learner(mission, settings) if learns else plain
         self.turns = make_policy("spatial-tdma", mission)
         self.swarm = Swarm(mission, [seed], channel=channel)
         self.minds = [
@@ -224,12 +229,13 @@ class LearnedApart(BroadcastPolicy):
 
     def transmits(self, views):
         decided, in_turn = self.policy.transmits(views), self.turns.transmits(views)
-        if views.phases:
+        if views.phases and self.learns:
             self.converse(views.phases[-1].heard[0].tolist())
         slot = round(2 * float(views.now[0]))
         for i, mind in enumerate(self.minds):
             row = rows(views.buffers, i)
-            self.holds_no_more_than_t_says(mind, row[0])
+            if self.learns:
+                self.holds_no_more_than_t_says(mind, row[0])
             expected = mind.transmits(row, slot, bool(in_turn[0, i]))
             assert decided[0, i] == expected, (slot, i)
         return decided

@@ -89,6 +89,24 @@ def test_orders_differ_from_round_to_round_and_repeat_after_40():
     assert len({str(transmitters) for transmitters in flown[:40]}) > 30
 
 
+@pytest.mark.parametrize(
+    ("apart_m", "knows_first", "knows_bystander", "transmits"),
+    [(149.0, True, False, False), (151.0, True, False, True), (149.0, False, True, True)],
+)
+def test_robots_that_know_one_near_them_that_comes_before_are_silent(
+    apart_m, knows_first, knows_bystander, transmits
+):
+    """Within one and a half ranges, 150 m; the one that comes first transmits whatever it knows."""
+    turns, rng = discovery_of(NUM_ROBOTS, 5.0), np.random.default_rng(0)
+    rng.permutation(NUM_ROBOTS)  # the order of the search
+    first, then, bystander, *_ = rng.permutation(NUM_ROBOTS).tolist()
+    position_m = np.zeros((NUM_ROBOTS, 2))
+    position_m[first] = [0.6 * apart_m, 0.8 * apart_m]
+    known = {first: [then], then: [first] * knows_first + [bystander] * knows_bystander}
+    speaks = turns.transmits(0, at_places(position_m, known), 0)
+    assert (speaks[first], speaks[then]) == (True, transmits)
+
+
 def fresh(*lost):
     return ~np.isin(np.arange(NUM_ROBOTS), lost)
 
