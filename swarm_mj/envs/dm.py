@@ -104,11 +104,7 @@ class SwarmTask(_Task):
         self._next_seed += 1
 
     def before_step(self, action: np.ndarray | Sequence[int], physics: SwarmPhysics) -> None:
-        """Set each robot's recipient; itself is silence.
-
-        Raises:
-            ValueError: The action is not one integer from 0 to N - 1 per robot.
-        """
+        """Set each robot's recipient, itself for silence; raise ValueError for other actions."""
         recipient = np.asarray(action)[np.newaxis]
         check_robots("recipient", recipient, (1, physics.swarm.mission.num_robots))
         physics.recipient = recipient.astype(np.int64)

@@ -34,11 +34,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, Info]:
-        """Begin a mission, whose seed is in `info`. There are no options.
-
-        Raises:
-            ValueError: There is such an option, or no connected team could be drawn.
-        """
+        """Begin a mission, whose seed is in `info`; raise ValueError for any options."""
         check_reset(options or {})
         super().reset(seed=seed, options=options)
         self.batch.restart([next_seed(self.np_random) if seed is None else seed])

@@ -46,12 +46,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        """Take the number of missions, the mission or its task, and options of `make_batch`.
-
-        Raises:
-            ValueError: A value is unknown or out of range.
-            TypeError: An option is unknown.
-        """
+        """Take B, a mission or its task, and options of `make_batch`; raises as that does."""
         modes = {"autoreset_mode": autoreset_mode, "render_mode": render_mode}
         EzPickle.__init__(self, num_envs, mission, **modes, **options)
         check_count("num_envs", num_envs)
@@ -144,11 +139,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         return self._copied(), reward, np.zeros_like(is_over), is_over, infos
 
     def render(self) -> tuple[UInt8[np.ndarray, "H W 3"], ...] | None:
-        """Draw every mission as it is now, in the render mode "rgb_array".
-
-        Raises:
-            OSError: No OpenGL works here; it says what to install.
-        """
+        """Draw all missions, in the mode "rgb_array"; raises OSError without OpenGL."""
         if self.render_mode is None:
             return None
         places = {

@@ -61,11 +61,7 @@ class MissionBatch:
         self.num_features = len(self._extractor.names)  # F
 
     def restart(self, seeds: Sequence[int], last_window: int | None = None) -> None:
-        """Begin the missions of these seeds, to be cut off after `last_window` if that is given.
-
-        Raises:
-            ValueError: There are not B seeds, one is negative, or a team cannot be connected.
-        """
+        """Begin the missions of B seeds, to be cut off after `last_window` if that is given."""
         if self.swarm is None:
             self.swarm = Swarm(self.mission, seeds, **self._components.given)
         else:

@@ -58,11 +58,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, Info]]:
-        """Begin a mission; every agent's info has its seed. Options are ignored.
-
-        Raises:
-            ValueError: No connected team could be drawn.
-        """
+        """Begin a mission, whose seed is in every agent's info; options are ignored."""
         del options
         if seed is not None:
             self._rng, _ = seeding.np_random(seed)
@@ -109,7 +105,6 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         self._screen.close()
 
     def _check_action(self, agent: str, action: object) -> None:
-        """Raise ValueError for unknown agents and missing actions."""
         names = self.possible_agents
         if agent not in self._robot:
             raise ValueError(

@@ -32,7 +32,7 @@ def make_vec_env(
     seed: int | None = None,
     **options: Any,
 ) -> SwarmVecEnv:
-    """Return missions side by side for stable-baselines3, with `action_masks()` for `MaskablePPO`.
+    """Return B missions for stable-baselines3, with `action_masks()` for `MaskablePPO`.
 
     Args:
         mission: The mission, or its task.

@@ -42,12 +42,7 @@ class Screen:
         self._shown_s = time.monotonic()
 
     def picture(self, batch: MissionBatch, index: int = 0) -> UInt8[np.ndarray, "H W 3"] | None:
-        """Draw one of the missions as it is now, in the mode "rgb_array".
-
-        Raises:
-            ValueError: It has not begun.
-            OSError: No OpenGL works here; it says what to install.
-        """
+        """Draw a mission as it is now, in the mode "rgb_array"; raises OSError without OpenGL."""
         if self.mode != "rgb_array":
             return None
         footage = footage_now(batch.flown, index)

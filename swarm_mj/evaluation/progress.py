@@ -23,8 +23,7 @@ MAX_BYTES = 2**32  # four times what 100 000 missions of 40 policies take
 
 @dataclass(frozen=True, kw_only=True)
 class _Flown:
-    """A line of the file but the first."""
-
+    # A line of the file but the first.
     batch: int
     costs: BatchCosts
 

@@ -151,7 +151,6 @@ def write_csv(path: Path, results: Iterable[Result]) -> None:
 
 
 def _result(place: str, row: dict[str, str]) -> Result:
-    """Return one row's result; `place` names the row in messages."""
     present = {FORMER_NAMES.get(name, name): cell for name, cell in row.items()}
     given = (spec for spec in fields(Result) if spec.name in present)
     try:

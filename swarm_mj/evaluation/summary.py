@@ -105,7 +105,6 @@ def merge(batches: Sequence[BatchCosts]) -> Samples:
 
 
 def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
-    """Return the numbers of the mission that a result repeats, the policy and the task's cost."""
     repeated = {name: value for name, value in asdict(regime).items() if name in COLUMNS}
     name, unit = study.task_cost(regime) or (None, None)
     return {
@@ -123,7 +122,6 @@ def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
 
 
 def _costs(costs: Samples) -> dict[str, Any]:
-    """Return costs over missions, and ages over pairs."""
     columns: dict[str, Any] = {}
     for cost in COSTS:
         columns |= {f"{cost}_{name}": value for name, value in spread(costs[cost]).items()}

@@ -44,7 +44,6 @@ def print_results(results: Sequence[Result], **where: Any) -> None:
 
 
 def _regime(result: Result) -> str:
-    """Return a table's title."""
     parts: dict[str, object] = {
         "radio": result.radio,
         "channel": result.channel,
@@ -65,7 +64,6 @@ def _regime(result: Result) -> str:
 
 
 def _table(results: Sequence[Result]) -> Table:
-    """Return a table with two lines a policy, and the columns of the task."""
     of_task = OF_FLOCKS if results[0].task == "flocking" else OF_OTHERS
     columns = COLUMNS | (OF_COSTED if _has_own_cost(results[0]) else of_task)
     table = Table(box=SIMPLE_HEAD, show_edge=False, padding=0)

@@ -82,11 +82,7 @@ def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
 
 
 def curves(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[Curve]:
-    """Return the published curves of a cost (aoi or velocity_variance), then the results' own.
-
-    Raises:
-        ValueError: A cost is not positive.
-    """
+    """Return the published curves of a cost above 0, by its column, then those of the results."""
     drawn = []
     rows = [point for point in points() if (point.figure, point.cost) == (figure.published, cost)]
     for method, its in groupby(rows, key=lambda point: point.policy or point.method):
@@ -107,11 +103,7 @@ def curves(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[C
 
 
 def budgets(results: Sequence[Result]) -> list[int]:
-    """Return the team decisions that trained the policies among results, ascending.
-
-    Raises:
-        ValueError: A result names no such number.
-    """
+    """Return the team decisions of trainings, ascending; raise ValueError for other than numbers."""
     numbers = set()
     for result in results:
         number = _config(result).get("decisions")
@@ -185,6 +177,5 @@ def _check_comparable(figure: ResultFigure, result: Result, first: Result) -> No
 
 
 def _where(figure: ResultFigure, result: Result) -> str:
-    """Return a result's policy and x, for messages."""
     x = _x(figure, result)
     return result.policy if x is None else f"{result.policy} at {figure.x_name} {x:g}"

@@ -34,11 +34,7 @@ PAPERS_BUDGET = "team decisions each, the paper's on 2,000,000 (III-C)"
 
 
 def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
-    """Draw our curves and the published ones.
-
-    Raises:
-        ValueError: The results hold no point of the figure, or cannot be compared.
-    """
+    """Draw our curves and the published ones; raises ValueError as `results_of` and `curves` do."""
     found = results_of(figure, results)
     num_panels = len(figure.panels)
     height_in = TOP_IN + num_panels * PANEL_IN + (num_panels - 1) * GAP_IN + BOTTOM_IN

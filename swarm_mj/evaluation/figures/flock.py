@@ -39,11 +39,7 @@ class Snapshot(NamedTuple):
 
 
 def fly_flock(mission: Mission, policy_name: str, seed: int) -> tuple[Snapshot, Snapshot]:
-    """Fly a mission; return the team before its first window and after its last.
-
-    Raises:
-        ValueError: The policy is none of `POLICIES`, or the seed out of range.
-    """
+    """Return the team before and after a mission; raise ValueError for no policy or no seed."""
     policy, swarm = make_policy(policy_name, mission), Swarm(mission, [seed])
     start = Snapshot(0.0, swarm.states.position_m[0], swarm.states.velocity_mps[0])
     for _ in rollout(swarm, policy):

@@ -89,11 +89,7 @@ def write_caption(figure: Figure, x: float, y: float, text: str) -> None:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure, with its caption in the metadata; the same figure gives the same bytes.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
+    """Write a figure, always the same bytes, with its caption as metadata; raise OSError if not."""
     kind = path.suffix.removeprefix(".")
     field, undated = METADATA[kind]
     [caption] = figure.findobj(lambda artist: artist.get_gid() == CAPTION)
