@@ -62,7 +62,7 @@ class SwarmVecEnv(VecEnv):
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Fly one window; after the last one, others begin. Raises ValueError and moves nothing."""
+        """Fly one window; after the last one, others begin. Bad actions are a ValueError."""
         reward, done = np.zeros(self.num_envs, np.float32), np.zeros(self.num_envs, np.bool_)
         for batch, envs in zip(self.batches, self._envs, strict=True):
             # Teams smaller than the largest one are padded with columns of silence.

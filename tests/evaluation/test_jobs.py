@@ -41,26 +41,16 @@ def surroundings(_piece):
     return {name: os.environ.get(name) for name in SURROUNDINGS}
 
 
-def num_threads(_piece):
-    import torch  # takes its time to import, in every job of every test above
-
-    return torch.get_num_threads()
-
-
 def sleep(piece):
     time.sleep(piece)
 
 
-@pytest.mark.parametrize(("num_jobs", "num_pieces"), [(1, 7), (2, 7), (9, 3)])
+@pytest.mark.parametrize(("num_jobs", "num_pieces"), [(1, 7), (2, 7), (9, 3), (2, 0)])
 def test_every_piece_is_done_once(num_jobs, num_pieces):
     done = dict(run_jobs(square, range(num_pieces), num_jobs))
     assert {index: product for index, (product, _) in done.items()} == {
         index: index**2 for index in range(num_pieces)
     }
-
-
-def test_no_pieces_are_no_work():
-    assert list(run_jobs(square, [], 2)) == []
 
 
 def test_one_job_is_this_process():
@@ -95,10 +85,6 @@ def test_jobs_hear_no_ctrl_c_and_start_no_threads(monkeypatch):
     assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
     assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == set()
     assert dict(os.environ) == before
-
-
-def test_jobs_start_no_threads_of_torchs():
-    assert [threads for _, threads in run_jobs(num_threads, range(2), 2)] == [1, 1]
 
 
 def test_breaking_off_ends_the_jobs_at_once():

@@ -25,11 +25,6 @@ def test_batches_hold_every_seed_of_every_policy_and_regime_once():
     assert len(batches) == 4 * 3
 
 
-def test_the_baseline_is_the_first_policy_unless_named():
-    assert study().compared_to == "mst"
-    assert study(baseline="round-robin").compared_to == "round-robin"
-
-
 def test_one_behaviour_has_one_name_in_each_regime():
     """Without a payload, teams that move fly spatial-tdma: it is shown once, also as baseline."""
     regimes = (SMALL, paper("stationary", num_robots=6))

@@ -103,7 +103,7 @@ def curves(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[C
 
 
 def budgets(results: Sequence[Result]) -> list[int]:
-    """Return the team decisions of trainings, ascending; raise ValueError for other than numbers."""
+    """Return the team decisions of trainings, ascending; raise ValueError for what is no number."""
     numbers = set()
     for result in results:
         number = _config(result).get("decisions")

@@ -13,7 +13,7 @@ from synthetic import everything
 
 from swarm_mj.evaluation.figures.contents import DRAWN, FORMATS, RESULT_FIGURES
 from swarm_mj.evaluation.figures.drawing import draw
-from swarm_mj.evaluation.figures.style import LOOKS, look_of, save, styled
+from swarm_mj.evaluation.figures.style import LOOKS, save, styled
 from swarm_mj.policies.registry import POLICIES
 
 # Linear RGB as it is seen without red or green cones (Viénot, Brettel, Mollon 1999).
@@ -49,10 +49,6 @@ def test_type_is_darker_than_its_curve_in_the_same_hue():
         ink_hue, ink_lightness, _ = colorsys.rgb_to_hls(*look.ink)
         assert ink_hue == pytest.approx(hue)
         assert ink_lightness == pytest.approx(0.7 * lightness)
-
-
-def test_an_unknown_method_goes_under_its_own_name():
-    assert look_of("mine").label == "mine"
 
 
 def test_files_are_whole_and_say_what_their_caption_says(tmp_path):
