@@ -49,8 +49,8 @@ def test_missions_side_by_side_are_decided_apart():
 
 
 def aoi(name, task):
-    mission = paper(task, num_robots=12, num_windows=80)
-    costs = summarise(list(rollout(Swarm(mission, range(6)), make_policy(name, mission))))
+    mission = paper(task, num_robots=12, num_windows=60)
+    costs = summarise(list(rollout(Swarm(mission, range(3)), make_policy(name, mission))))
     return np.mean(costs.aoi_mean)
 
 

@@ -68,7 +68,7 @@ class SelfOrganisedTdma(BroadcastPolicy):
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return who owns the slot, or is in need where nobody does; at first, whose turn it is."""
         slot, transmits = slot_of(views.now), np.zeros(views.silence.shape, dtype=bool)
-        if any(team.takes_turns for team in self._teams):
+        if any(team.table is None for team in self._teams):
             transmits = self._turns.transmits(views)
         heard = views.phases[-1].heard if views.phases else views.silence
         draw = self._uniform.next()
@@ -88,12 +88,7 @@ class SotdmaTeam:
         self._law = belief.law_over_noise(len(order))
         self._rule = Rule(belief.radio.threshold, frame_slots(len(order)))
         self._first_slot: int | None = None  # of the first frame, known from the first decision on
-        self._table: SlotTable | None = None  # there is none before the first frame
-
-    @property
-    def takes_turns(self) -> bool:
-        """True before the first frame."""
-        return self._table is None
+        self.table: SlotTable | None = None  # there is none before the first frame
 
     def transmits(
         self,
@@ -116,12 +111,12 @@ class SotdmaTeam:
         if slot < 0:
             return in_turn
         is_known = buffers.is_known[b] | np.eye(len(self._order), dtype=bool)
-        if self._table is None:
+        if self.table is None:
             slots = self._first_slots(buffers.position_m[b], is_known)
-            self._table = slot_table.empty_table(slots, rule.num_slots)
+            self.table = slot_table.empty_table(slots, rule.num_slots)
         # A robot observes itself as it transmits, so T says in which slot it last did.
         ends = np.rint(SLOTS_PER_WINDOW * buffers.timestamp[b]).astype(np.int64)
-        table, known = self._table, ends - 1 - self._first_slot
+        table, known = self.table, ends - 1 - self._first_slot
         slot_table.read_packets(table, heard, known, buffers.parent[b], slot - 1)
         slot_table.read_slots(table, known, rule)
         for i in self._choosers(slot):

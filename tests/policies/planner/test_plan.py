@@ -3,7 +3,6 @@
 import copy
 import math
 from dataclasses import replace
-from typing import NamedTuple
 
 import networkx as nx
 import numpy as np
@@ -176,46 +175,28 @@ RADIO = radio_of(paper("stationary"))  # decodes up to 250 m in silence
 FAR_M = 5000.0
 
 
-class Graph(NamedTuple):
-    """What the weights follow from."""
+def drawn_links(num_robots, seed, is_certain):
+    """Of a connected team, with some robots carried far away, each by itself.
 
-    probability: np.ndarray
-    hops: np.ndarray
-    downstream: np.ndarray
+    Positions are true, or believed within 5 to 60 m.
+    """
+    rng, mission = np.random.default_rng(seed), paper("stationary", range_ratio=0.2)
+    team = flooded_team(replace(mission, num_robots=num_robots), seed)
+    position_m = team.position_m.copy()
+    for n, i in enumerate(np.flatnonzero(rng.random(num_robots) < 0.15)):
+        position_m[i] += FAR_M * (n + 1)
+    spread_m = None if is_certain else rng.uniform(5.0, 60.0, num_robots)
+    return links_between(team.radio, position_m, spread_m)
 
 
 def graph_of(links):
+    """Expected transmissions, how many robots lie behind each, and the graph as networkx has it:
+    links that count, each as long as packets must be sent until one decodes."""
     probability = lone_probabilities(links)
-    hops = expected_hops(np.where(probability >= WEIGHING.min_probability, probability, 0.0))
-    return Graph(probability, hops, num_downstream(hops, WEIGHING.slack_hops))
-
-
-def places(num_robots, seed):
-    """Of a connected team, with some robots carried far away, each by itself."""
-    mission = paper("stationary", num_robots=num_robots, range_ratio=0.2)
-    team = flooded_team(mission, seed)
-    position_m = team.position_m.copy()
-    for n, i in enumerate(np.flatnonzero(np.random.default_rng(seed).random(num_robots) < 0.15)):
-        position_m[i] += FAR_M * (n + 1)
-    return team.radio, position_m
-
-
-def believed(num_robots, seed):
-    """Links of positions that are believed within 5 to 60 m."""
-    radio, position_m = places(num_robots, seed)
-    spread_m = np.random.default_rng(seed).uniform(5.0, 60.0, num_robots)
-    return links_between(radio, position_m, spread_m)
-
-
-def as_networkx(graph):
-    """The links that count, each as long as packets must be sent until one decodes."""
-    plain = nx.Graph()
-    plain.add_nodes_from(range(len(graph.probability)))
-    for i, j in zip(
-        *np.nonzero(np.triu(graph.probability >= WEIGHING.min_probability)), strict=True
-    ):
-        plain.add_edge(int(i), int(j), hops=1.0 / float(graph.probability[i, j]))
-    return plain
+    probability[probability < WEIGHING.min_probability] = 0.0
+    hops = expected_hops(probability)
+    lengths = np.divide(1.0, probability, out=np.zeros_like(probability), where=probability > 0.0)
+    return hops, num_downstream(hops, WEIGHING.slack_hops), nx.from_numpy_array(lengths)
 
 
 def weights_of(links):
@@ -232,34 +213,26 @@ def test_a_row_of_three_by_hand():
     assert weights.min_share == pytest.approx(0.95 - 0.3 * 2 / 3)
 
 
-@given(seed=seeds, num_robots=st.integers(2, 9), is_certain=st.booleans())
-def test_hops_are_the_shortest_ways_of_networkx(seed, num_robots, is_certain):
-    links = links_between(*places(num_robots, seed)) if is_certain else believed(num_robots, seed)
-    graph = graph_of(links)
-    ways = dict(nx.all_pairs_dijkstra_path_length(as_networkx(graph), weight="hops"))
-    for i in range(num_robots):
-        expected = [ways[i].get(j, math.inf) for j in range(num_robots)]
-        assert graph.hops[i].tolist() == pytest.approx(expected)
-
-
 @given(seed=seeds, num_robots=st.integers(2, 6), is_certain=st.booleans())
-def test_downstream_counts_who_is_on_nearly_shortest_ways(seed, num_robots, is_certain):
+def test_hops_and_who_is_on_nearly_shortest_ways_are_those_of_networkx(
+    seed, num_robots, is_certain
+):
     """All ways without a turning back that are less than the slack longer, one by one."""
-    links = links_between(*places(num_robots, seed)) if is_certain else believed(num_robots, seed)
-    graph = graph_of(links)
-    plain = as_networkx(graph)
-    expected = np.eye(num_robots)
+    hops, downstream, graph = graph_of(drawn_links(num_robots, seed, is_certain))
+    expected, shortest = np.eye(num_robots), np.full((num_robots, num_robots), math.inf)
     for k in range(num_robots):
-        reached = nx.node_connected_component(plain, k)
-        expected[k, k] = len(reached)
+        reached = nx.node_connected_component(graph, k)
+        expected[k, k], shortest[k, k] = len(reached), 0.0
         for j in reached - {k}:
-            ways = list(nx.all_simple_paths(plain, k, j))
-            lengths = [nx.path_weight(plain, way, "hops") for way in ways]
+            ways = list(nx.all_simple_paths(graph, k, j))
+            lengths = [nx.path_weight(graph, way, "weight") for way in ways]
+            shortest[k, j] = min(lengths)
             most = min(lengths) + WEIGHING.slack_hops
             near = [way for way, n in zip(ways, lengths, strict=True) if n < most]
             for i in {i for way in near for i in way} - {k}:
                 expected[i, k] += 1.0
-    assert graph.downstream.tolist() == expected.tolist()
+    np.testing.assert_allclose(hops, shortest)
+    assert downstream.tolist() == expected.tolist()
 
 
 def test_links_that_decode_rarely_are_no_way():
@@ -267,9 +240,8 @@ def test_links_that_decode_rarely_are_no_way():
     for distance_m, is_link in ((285.0, False), (284.0, True)):
         position_m = np.array([[0.0, 0.0], [distance_m, 0.0]])
         links = links_between(RADIO, position_m, np.array([20.0, 0.0]))
-        graph = graph_of(links)
-        assert graph.probability[0, 1] > 0.0
-        assert (graph.hops[0, 1] < math.inf) == is_link
+        assert lone_probabilities(links)[0, 1] > 0.0
+        assert (graph_of(links)[0][0, 1] < math.inf) == is_link
 
 
 def test_the_share_of_a_team_by_hand():
@@ -291,7 +263,7 @@ def test_the_share_of_a_team_by_hand():
 def test_teams_without_links_have_finite_weights(num_robots):
     position_m = FAR_M * np.arange(2.0 * num_robots).reshape(num_robots, 2)
     links = links_between(RADIO, position_m, np.full(num_robots, 5.0))
-    assert graph_of(links).downstream.tolist() == np.eye(num_robots).tolist()
+    assert graph_of(links)[1].tolist() == np.eye(num_robots).tolist()
     weights = weights_of(links)
     assert np.all(np.isfinite(weights.squared_rise))
     assert weights.min_share == 1.05
