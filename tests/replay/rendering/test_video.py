@@ -9,42 +9,29 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from swarm_mj.mission import paper
-from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import footage_of
 from swarm_mj.replay.mismatch import NO_MISMATCH
-from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.rendering.style import VideoStyle
 from swarm_mj.replay.rendering.video import Movie, encode_gif, encode_mp4, make_video
-from swarm_mj.simulation.rollout import rollout
-from swarm_mj.simulation.swarm import Swarm
 
 with_opengl = pytest.mark.usefixtures("opengl")
 MEAN_AGE = np.array(palette.MEAN_AGE, dtype=int)
 STYLE = VideoStyle(width=480, height=320, seconds=1.0, fps=6)
 
 
-def flown(policy_name, mission):
-    swarm = Swarm(mission, [1])
-    policy = make_policy(policy_name, mission)
-    recorder = Recorder(swarm)
-    for window in rollout(swarm, policy):
-        recorder.add(window)
-    return footage_of(recorder.log(), mission, policy_name, 1)
-
-
 @pytest.fixture(scope="module")
-def tdma():
-    return flown("tdma", paper("flocking", num_robots=8, num_windows=20))
+def team(two_way):
+    """30 windows of 12 robots."""
+    return footage_of(two_way.log, two_way.mission, "mst", 5)
 
 
 @with_opengl
-def test_there_are_as_many_pictures_as_asked_for_from_the_first_window_to_the_last(tdma):
-    with Movie([tdma], STYLE) as movie:
+def test_there_are_as_many_pictures_as_asked_for_from_the_first_window_to_the_last(team):
+    with Movie([team], STYLE) as movie:
         pictures = list(movie)
         np.testing.assert_array_equal(pictures[0], movie.picture([0]))
-        np.testing.assert_array_equal(pictures[-1], movie.picture([19]))
+        np.testing.assert_array_equal(pictures[-1], movie.picture([29]))
     assert len(pictures) == len(movie) == 6
     assert all(picture.shape == (320, 480, 3) for picture in pictures)
     for one, next_one in itertools.pairwise(pictures):
@@ -56,10 +43,11 @@ def test_there_are_as_many_pictures_as_asked_for_from_the_first_window_to_the_la
 
 
 @with_opengl
-def test_two_missions_stand_side_by_side_and_the_shorter_one_stops(tdma):
-    """Six pictures of 20 windows: the other mission's twelfth is its last from the fourth on."""
-    mst = flown("mst", paper("flocking", num_robots=8, num_windows=12))
-    with Movie([tdma, mst], STYLE) as movie:
+def test_two_missions_stand_side_by_side_and_the_shorter_one_stops(team):
+    """Six pictures of 30 windows: the other mission's 18th is its last from the fourth on."""
+    kept = {name: its[:18] for name, its in vars(team).items() if isinstance(its, np.ndarray)}
+    shorter = replace(team, **kept)
+    with Movie([team, shorter], STYLE) as movie:
         pictures = list(movie)
     halves = [picture[:240, 250:] for picture in pictures]  # of the second mission, without text
     assert np.any(halves[0] != halves[1])
@@ -69,9 +57,9 @@ def test_two_missions_stand_side_by_side_and_the_shorter_one_stops(tdma):
 
 @with_opengl
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
-def test_a_mission_s_video_has_all_pictures(tdma, suffix):
+def test_a_mission_s_video_has_all_pictures(team, suffix):
     seen = []
-    content = make_video([tdma], suffix, STYLE, lambda: seen.append(1))
+    content = make_video([team], suffix, STYLE, lambda: seen.append(1))
     with av.open(io.BytesIO(content)) as container:
         shapes = [(frame.height, frame.width) for frame in container.decode(video=0)]
     assert shapes == [(320, 480)] * 6
@@ -79,16 +67,15 @@ def test_a_mission_s_video_has_all_pictures(tdma, suffix):
 
 
 @with_opengl
-def test_links_that_surprise_and_their_shortfalls_are_seen():
-    mission = paper("random-walk", num_robots=10, num_windows=6, arena="blocks", shadowing_db=6.0)
-    city = flown("tdma", mission)
-    assert len(city.shortfalls(5)[1]) > 0
+def test_links_that_surprise_and_their_shortfalls_are_seen(blocked):
+    city = footage_of(blocked.log, blocked.mission, "random-flooding", 5)
+    row = max(range(30), key=lambda row: len(city.shortfalls(row)[1]))
     is_cut_off = np.zeros_like(city.is_cut_off)
     without = replace(city, mismatch=NO_MISMATCH, is_cut_off=is_cut_off)
     num_red = []
     for footage in (city, without):
         with Movie([footage], STYLE) as movie:
-            picture = movie.picture([5])[:250].astype(int)
+            picture = movie.picture([row])[:250].astype(int)
         num_red.append(np.sum(picture[..., 0] - picture[..., 1:].max(axis=2) > 60))
     seen, unseen = num_red
     assert seen > 100
@@ -158,8 +145,8 @@ def test_browsers_can_play_an_mp4():
         assert float(stream.duration * stream.time_base) == pytest.approx(1.0)
 
 
-def test_other_files_and_more_missions_are_refused(tdma):
+def test_other_files_and_more_missions_are_refused(team):
     with pytest.raises(ValueError, match=r"a video is \.mp4 or \.gif, not \.avi"):
         make_video([], ".avi")
     with pytest.raises(ValueError, match="a video shows 1 or 2 missions, not 3"):
-        make_video([tdma] * 3)
+        make_video([team] * 3)
