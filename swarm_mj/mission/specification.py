@@ -21,6 +21,7 @@ HalfDuplex = Literal["strict", "eavesdroppers"]
 FlockingSet = Literal["heard", "moving"]
 PathLossLaw = Literal["free-space", "log-distance", "two-ray"]
 FadingLaw = Literal["none", "rayleigh", "rician"]
+Number = float | int
 Grant = Literal["map", "statistics", "start"]  # what robots may know before the mission
 
 # Ratios are fractions of this distance, whatever the team's size (IV-B).
@@ -36,13 +37,7 @@ NEW = "not the paper's"  # the source of what the paper has not
 
 
 def _number(
-    default: float | int,
-    label: str,
-    unit: str,
-    low: float,
-    high: float,
-    help: str = "",
-    **about: str,
+    default: Number, label: str, unit: str, low: float, high: float, help: str = "", **about: str
 ) -> FieldOf:
     """Return a number: name in words, unit, range; with help, an option. By default of IV-B."""
     limits = {"unit": unit, "low": low, "high": high}
