@@ -113,7 +113,7 @@ def evaluate_and_end(forks, tmp_path_factory):
 
 @pytest.mark.parametrize(("jobs", "count"), [(1, 1), (2, 3)])
 def test_ctrl_c_keeps_what_was_flown_and_resuming_ends_in_the_same_files(
-    swarm_mj, evaluate_and_end, tmp_path, whole, jobs, count
+    succeed, evaluate_and_end, tmp_path, whole, jobs, count
 ):
     done = evaluate_and_end(tmp_path, signal.SIGINT, count, *TWO_POLICIES, *BOTH, "--jobs", jobs)
     assert done.returncode == 130, done.stderr
@@ -122,8 +122,7 @@ def test_ctrl_c_keeps_what_was_flown_and_resuming_ends_in_the_same_files(
     assert files(tmp_path) == ["r.json.progress"]
     lines = (tmp_path / "r.json.progress").read_text().splitlines()
     assert len(lines) == 1 + count
-    resumed = swarm_mj("evaluate", *TWO_POLICIES, *BOTH, "--resume", "--jobs", 3 - jobs)
-    assert resumed.returncode == 0, resumed.stderr
+    succeed("evaluate", *TWO_POLICIES, *BOTH, "--resume", "--jobs", 3 - jobs)
     same_files(tmp_path, whole)
 
 

@@ -80,7 +80,7 @@ def _parts(tmp_path):
     (tmp_path / "imported.txt").touch()
 
 
-def test_a_flight_with_parts_of_ones_own(swarm_mj, succeed, tmp_path):
+def test_a_flight_with_parts_of_ones_own(succeed, tmp_path):
     fly = ("fly", *SMALL, "--policy", "my_parts:Coin", *ALL)
     done = succeed(*fly, "--json", "a.json", "--record", "a.rrd")
     assert "channel my_parts:Lossy" in done.stdout
@@ -90,8 +90,7 @@ def test_a_flight_with_parts_of_ones_own(swarm_mj, succeed, tmp_path):
     assert flown["config"]["scene"] == "my_parts:pillar"
     assert flown["task_cost_name"] == "mean speed"
     assert flown["task_cost_last"] == pytest.approx(0.9**9 * flown["task_cost_first"])
-    again = swarm_mj(*fly, "--json", "b.json", "--no-record")
-    assert again.returncode == 0
+    succeed(*fly, "--json", "b.json", "--no-record")
     assert json.loads((tmp_path / "b.json").read_text())["aoi_mean"] == flown["aoi_mean"]
 
 
@@ -177,23 +176,22 @@ def trained(forks, tmp_path_factory):
 
 @pytest.fixture
 def typed(forks, trained):
-    """Runs `swarm-mj` there; also says whether the parts were imported."""
+    """Runs `swarm-mj` there: how it ends, what it complains of, whether parts were imported."""
 
     def run(*arguments):
         (trained / "imported.txt").unlink(missing_ok=True)
         done = forks.run(trained, "swarm_mj", *arguments)
-        return done, (trained / "imported.txt").exists()
+        return done.returncode, done.stderr, (trained / "imported.txt").exists()
 
     return run
 
 
 def test_a_run_goes_on_bit_for_bit_if_its_parts_are_named_again(typed, trained):
-    done, was_imported = typed("train", "--out", "run", "--resume", "--budget", 256)
-    assert done.returncode == 2
-    assert not was_imported
-    assert "--features my_parts:Ages --channel my_parts:Lossy again" in done.stderr
-    done, _ = typed("train", "--out", "run", "--resume", "--budget", 256, *OWN)
-    assert done.returncode == 0, done.stderr
+    code, complaint, was_imported = typed("train", "--out", "run", "--resume", "--budget", 256)
+    assert (code, was_imported) == (2, False)
+    assert "--features my_parts:Ages --channel my_parts:Lossy again" in complaint
+    ended = typed("train", "--out", "run", "--resume", "--budget", 256, *OWN)
+    assert (ended[0], ended[2]) == (0, True), ended
     curves = []
     for name in ("run", "w"):
         with (trained / name / "curve.csv").open() as file:
@@ -210,13 +208,10 @@ FLY = ("fly", "--policy", "w", "--robots", 5, "--windows", 10, "--no-record")
 
 
 def test_a_policys_features_are_loaded_only_if_its_user_names_them(typed):
-    done, was_imported = typed(*FLY)
-    assert done.returncode == 2
-    assert not was_imported
-    assert "add --features my_parts:Ages" in done.stderr
-    done, was_imported = typed(*FLY, "--features", "my_parts:Ages")
-    assert done.returncode == 0, done.stderr
-    assert was_imported
+    code, complaint, was_imported = typed(*FLY)
+    assert (code, was_imported) == (2, False)
+    assert "add --features my_parts:Ages" in complaint
+    assert typed(*FLY, "--features", "my_parts:Ages") == (0, "", True)
 
 
 @pytest.mark.parametrize(
@@ -229,24 +224,24 @@ def test_a_policys_features_are_loaded_only_if_its_user_names_them(typed):
     ],
 )
 def test_a_folder_never_names_what_is_imported(typed, arguments):
-    done, was_imported = typed(*arguments)
-    assert done.returncode == 2
-    assert not was_imported
-    assert done.stderr.count("error:") == 1
+    code, complaint, was_imported = typed(*arguments)
+    assert (code, was_imported) == (2, False)
+    assert complaint.count("error:") == 1
 
 
 def test_an_evaluation_loads_them_in_every_process(typed):
-    done, _ = typed(
+    ended = typed(
         *("evaluate", "--policy", "w", "tdma", "--features", "my_parts:Ages"),
         *("--robots", 5, "--windows", 10, "--episodes", 2, "--jobs", 2),
     )
-    assert done.returncode == 0, done.stderr
+    assert (ended[0], ended[2]) == (0, True), ended
 
 
 def test_a_class_that_has_changed_does_not_fit_the_network(typed, trained):
     (trained / "my_other.py").write_text(PARTS.replace('"is oneself")', '"is oneself", "third")'))
     weights, config = read_weights(trained / "w")
     save_weights(trained / "other", weights, replace(config, features="my_other:Ages"))
-    done, _ = typed("fly", "--policy", "./other", *FLY[3:], "--features", "my_other:Ages")
-    assert done.returncode == 2
-    assert "was trained on 2 features, and my_other:Ages now has 3" in done.stderr
+    options = (*FLY[3:], "--features", "my_other:Ages")
+    code, complaint, _ = typed("fly", "--policy", "./other", *options)
+    assert code == 2
+    assert "was trained on 2 features, and my_other:Ages now has 3" in complaint
