@@ -93,10 +93,7 @@ def end_process() -> NoReturn:
 def script(kind: type[T], run: Callable[[T], int], arguments: Sequence[str] | None = None) -> int:
     """Run a separate program, such as those of `tools/`, as `main` does a command.
 
-    Args:
-        kind: The dataclass of its options; its module's docstring says what it does.
-        run: The action; it returns the exit code.
-        arguments: What was typed after the program's name; None is this process's.
+    `kind` is the dataclass of its options; the docstring of that module says what it does.
     """
     module = sys.modules[kind.__module__]
     name = Path(str(module.__file__)).stem
