@@ -123,7 +123,7 @@ class _Team:
         self._will_hold = everyone  # the owner of the best upcoming snapshot that i has
         self._plans: dict[int, Plan] = {}  # of this epoch, by the owner of the snapshot
         self._planned_by = everyone  # the owner of i's plan when it took its upcoming snapshot
-        self._before: list[Plan | None] = []  # i's plan of the epoch before, by the current one
+        self._before: list[Plan | None] = []  # what i followed in the last epoch
 
     def transmits(self, views: LocalViews, b: int) -> Bool[np.ndarray, "N"]:
         """Return who transmits in this slot of mission b."""

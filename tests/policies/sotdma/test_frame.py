@@ -91,7 +91,7 @@ def test_the_best_slot_is_the_youngest_of_all_that_were_tried(seed):
     slots[4] = NOWHERE
     frame = frame_of(power, slots)
     before = frame.heard.copy(), frame.transmits.copy()
-    is_marked = rng.random((NUM_SLOTS, NUM_ROBOTS)) < 0.3
+    is_marked = rng.random((NUM_SLOTS, NUM_ROBOTS)) < 0.6
     ages = []
     for s in range(NUM_SLOTS):
         heard = frame_of(power, [*slots[:4], s, *slots[5:]]).heard
