@@ -28,8 +28,9 @@ LABELS = {"aoi": "age of information\n[windows]", "velocity_variance": "velocity
 def draw_flight(run: "Run") -> Figure:
     """Return a chart of a mission's costs over its windows, in the policy's colour."""
     columns, colour = run.columns(), look_of(run.config["policy"]).colour
-    cost = run.windows[0].costs.task_cost
-    own_cost = None if cost is None or cost.name == Flocking.cost_name else cost
+    own_cost = run.task_cost
+    if own_cost and own_cost[0] == Flocking.cost_name:
+        own_cost = None
     number = 2 if own_cost or np.any(columns["velocity_variance"]) else 1
     with styled():
         figure, axes = _axes(run.title, number, 1, HEAD_IN + number * PANEL_IN, sharex=True)
@@ -38,7 +39,7 @@ def draw_flight(run: "Run") -> Figure:
         _draw_age(axes[0], columns, colour)
         if own_cost:
             axes[1].plot(columns["window"], columns["task_cost"], color=colour)
-            axes[1].set_ylabel(f"{own_cost.name}\n[{own_cost.unit}]")
+            axes[1].set_ylabel("{}\n[{}]".format(*own_cost))
             axes[1].set_ylim(bottom=0.0)
         elif number == 2:
             variance = columns["velocity_variance"]

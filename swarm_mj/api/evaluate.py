@@ -6,7 +6,7 @@ from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any
 
-from swarm_mj.api.fly import mission_of, names_of
+from swarm_mj.api.fly import mission_of
 from swarm_mj.api.run import Metrics
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.results import COLUMNS, Result, write_csv
@@ -50,15 +50,12 @@ class Evaluation:
 
     def _repr_html_(self) -> str:
         """Return the main columns of `to_dataframe`, for notebooks."""
-        shown = ["aoi_mean", "aoi_sem", "aoi_ci_low", "aoi_ci_high", "packets_per_window"]
+        shown = [*FIRST[2:], *LAST]
         return self.to_dataframe().set_index("policy")[shown].to_html()
 
     @property
     def summary(self) -> Metrics:
-        """Costs by the policy's name: `summary["tdma"].aoi_mean` [windows].
-
-        The names are the columns of `swarm-mj evaluate --csv`.
-        """
+        """Costs by policy, then by column of the CSV: `summary["tdma"].aoi_mean` [windows]."""
         return Metrics({each.policy: Metrics(asdict(each)) for each in self._rows})
 
     @property
@@ -69,8 +66,7 @@ class Evaluation:
         """Return one row per policy, with the columns of `swarm-mj evaluate --csv`.
 
         By mission, return one row per policy and mission instead: `policy`, `seed`, `aoi`
-        [windows], `velocity_variance` [m²/s²], and `task_cost` where the task has one
-        (`summary[policy].task_cost_name` says which).
+        [windows], `velocity_variance` [m²/s²], and `task_cost` where the task has one.
         """
         need("pandas", "a table")
         from pandas import DataFrame
@@ -89,10 +85,7 @@ class Evaluation:
         return DataFrame(rows)
 
     def plot(self) -> "Figure":
-        """Draw the age of information of each policy, lowest first, with its 95 % interval.
-
-        The figure is one of matplotlib, as of `Run.plot`.
-        """
+        """Draw each policy's age of information, lowest first, with its 95 % interval."""
         need("matplotlib", "a chart")
         from swarm_mj.api.charts import draw_evaluation
 
@@ -176,7 +169,7 @@ def evaluate(
         probability=probability,
         is_deterministic=is_deterministic,
         baseline=baseline,
-        features=names_of(features),
+        features=(features,) if isinstance(features, str) else tuple(features),
         components=Components(**components),
     )
     way_out = "choose fewer num_jobs, num_robots, num_windows or num_missions"
@@ -190,12 +183,8 @@ def evaluate(
 def study_needs(study: Study, num_jobs: int) -> Needs:
     """Return the memory and disk of a study: a batch in each process, and the results of all."""
     batches = study.batches
-    largest = max(
-        needs.missions_memory(
-            batch.mission.num_robots, len(batch.seeds), is_learned=is_learned(batch.policy)
-        )
-        for batch in batches
-    )
+    sizes = ((each.mission.num_robots, len(each.seeds), each.policy) for each in batches)
+    largest = max(needs.missions_memory(*n, is_learned=is_learned(name)) for *n, name in sizes)
     torch = needs.OF_TORCH if any(map(is_learned, study.policies)) else 0.0
     ages = sum(2 * batch.mission.num_windows + 1 for batch in batches)  # counts
     missions = study.episodes * len(study.pairs)

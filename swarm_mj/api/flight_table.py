@@ -107,8 +107,7 @@ def _number(name: str, value: Any) -> Any:  # noqa: ANN401 - of a summary's fiel
 
 def _windows(value: float | int, mission: Mission, digits: int) -> str:
     number = f"{value:.{digits}f}"
-    windows = "window" if number == "1" else "windows"
-    return f"{number} {windows} ({value * mission.window_s:.2g} s)"
+    return f"{number} window{'s' * (number != '1')} ({value * mission.window_s:.2g} s)"
 
 
 def _packets(numbers: Mapping[str, Any]) -> dict[str, str]:
@@ -147,7 +146,5 @@ def _cost(
     numbers: Mapping[str, Any], key: str, name: str, unit: str, digits: int
 ) -> dict[str, str]:
     mean, first, last = (f"{numbers[f'{key}_{x}']:.{digits}f}" for x in ("mean", "first", "last"))
-    return {
-        f"{name}, mean": f"{mean} {unit}",
-        "  first to last window": f"{first} to {last} {unit}",
-    }
+    ends = f"{first} to {last} {unit}"
+    return {f"{name}, mean": f"{mean} {unit}", "  first to last window": ends}

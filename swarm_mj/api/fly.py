@@ -1,27 +1,52 @@
-"""`swarm_mj.fly`: one mission from Python, flown as `swarm-mj fly` flies it."""
+"""`swarm_mj.fly`, one mission from Python, and the flight that `swarm-mj fly` shares with it.
 
+A flight ends early without loss: Ctrl-C ends it after a whole window, and so does a lack of memory
+while there is enough to write the windows flown.
+"""
+
+import gc
 import inspect
+import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from contextlib import suppress
+from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from swarm_mj.api import flight
-from swarm_mj.api.run import Run
+from swarm_mj.api.flight_table import flight_numbers
+from swarm_mj.api.run import Metrics, Run
 from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission, make_mission
 from swarm_mj.mission.components import Components
+from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.physics.scene import Scene
+from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
-from swarm_mj.policies.registry import check_used, flown_name, make_policy, normalised
 from swarm_mj.radio.free_space import Channel
-from swarm_mj.replay.recorder import Recorder
+from swarm_mj.replay.recorder import Recorder, replay_file, replay_memory
+from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.exit_codes import DONE
+from swarm_mj.system import needs
+from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import check_kind, check_names
-from swarm_mj.system.needs import check_fits
-from swarm_mj.system.progress import quiet_bar
+from swarm_mj.system.interrupt import deferred_interrupt
+from swarm_mj.system.needs import Needs, check_fits, free_memory, in_gb, memory_errors
+from swarm_mj.system.progress import WorkBar, quiet_bar
+from swarm_mj.system.provenance import commit, version
+
+WINDOWS_BETWEEN_LOOKS = 50  # at the free memory
+COMPILING_WINDOWS = 10  # in which three robots use all that a flight does, schedules included
+SECOND_LOOK_S = 0.5  # memory that others have just freed may still be counted for so long
+
+
+class Flown(NamedTuple):
+    """The windows flown, and how the flight ended."""
+
+    windows: list[WindowRecord]
+    code: int  # an exit code
+    ending: str  # why it ended early; empty if it did not
+    wall_s: float
 
 
 def fly(
@@ -67,33 +92,26 @@ def fly(
     """
     mission = mission_of(fly, task, mission_fields)
     how = {"probability": probability, "is_deterministic": is_deterministic}
-    how |= {"features": names_of(features)}
+    how |= {"features": (features,) if isinstance(features, str) else tuple(features)}
     chosen, name = _policy_of(policy, mission, how)
-    check_used(how["features"], [chosen])
+    registry.check_used(how["features"], [chosen])
     components = Components(channel=channel, controller=controller, scene=scene)
     way_out = "choose fewer num_robots or num_windows" + (", or record=False" if record else "")
-    needs = flight.flight_needs(mission, name, is_recorded=record)
-    check_fits(needs, None, way_out, is_forced=False, way_on="")
+    needed = flight_needs(mission, name, is_recorded=record)
+    check_fits(needed, None, way_out, is_forced=False, way_on="")
     swarm = Swarm(mission, [seed], **components.given)
     swarm.start(chosen)
     recorder = Recorder(swarm, ego=observer) if record else None
-    with quiet_bar("Compiling", flight.COMPILING_WINDOWS, "windows") as compiling:
+    with quiet_bar("Compiling", COMPILING_WINDOWS, "windows") as compiling:
         like = "tdma" if isinstance(policy, Policy) else name  # an object flies only once
-        flight.compile_ahead(mission, like, compiling.advance, **how)
+        compile_ahead(mission, like, compiling.advance, **how)
     bar = quiet_bar("Flying", mission.num_windows, "windows")
-    flown = flight.fly_swarm(swarm, recorder, bar, way_on="")
+    flown = fly_swarm(swarm, recorder, bar, way_on="")
     if flown.code != DONE:
         kept = f"{len(flown.windows)} of {mission.num_windows} windows; these are kept"
         warnings.warn(f"{flown.ending} after {kept}", stacklevel=2)
-    run = flight.run_of(
-        swarm, flown, name=name, seed=seed, observer=observer, components=components
-    )
+    run = run_of(swarm, flown, name=name, seed=seed, observer=observer, components=components)
     return replace(run, log=recorder.log()) if recorder else run
-
-
-def names_of(features: str | Sequence[str]) -> tuple[str, ...]:
-    """Return names of feature extractors, one or several."""
-    return (features,) if isinstance(features, str) else tuple(features)
 
 
 def mission_of(
@@ -101,11 +119,8 @@ def mission_of(
 ) -> Mission:
     """Return the mission that a function's arguments name: a task's, or a finished one.
 
-    A field that is unknown may have been meant for any keyword of the function.
-
-    Raises:
-        ValueError: A value is unknown or out of range.
-        TypeError: A field is none of a mission's, or the mission is complete already.
+    It raises TypeError for a field that no mission has, which may have been meant for any keyword
+    of the function, and for fields beside a finished mission.
     """
     parameters = inspect.signature(function).parameters.values()
     keywords = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY]
@@ -122,16 +137,112 @@ def mission_of(
     return task
 
 
+def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:
+    """Return the memory and disk that a flight takes."""
+    memory = needs.missions_memory(mission.num_robots, 1, is_learned=registry.is_learned(policy))
+    addresses = needs.ADDRESSES + (needs.OF_TORCH if registry.is_learned(policy) else 0.0)
+    if not is_recorded:
+        return Needs(memory=memory, addresses=addresses)
+    return Needs(
+        memory=memory + replay_memory(mission, mission.num_windows),
+        addresses=addresses + needs.OF_RERUN,
+        file=replay_file(mission),
+    )
+
+
+def fly_swarm(
+    swarm: Swarm, recorder: Recorder | None, bar: WorkBar, *, way_on: str | None
+) -> Flown:
+    """Fly a swarm, its policy started, from the first window to the last.
+
+    `way_on` ends the message that memory ran short; None flies on regardless. Raises MemoryError
+    if memory did not suffice for one window, and ValueError as `rollout` does.
+    """
+    flown: list[WindowRecord] = []
+    start_s = time.perf_counter()
+
+    def ended(code: int, ending: str = "") -> Flown:
+        return Flown(flown, code, ending, time.perf_counter() - start_s)
+
+    with suppress(MemoryError), memory_errors(), deferred_interrupt() as is_interrupted, bar:
+        for window in rollout(swarm):
+            if recorder:
+                recorder.add(window)
+            flown.append(window)
+            bar.text = f"age {float(window.costs.age_windows[0]):.1f}"
+            bar.advance()
+            if is_interrupted():
+                return ended(INTERRUPTED, "Interrupted")
+            is_time = way_on is not None and len(flown) % WINDOWS_BETWEEN_LOOKS == 0
+            if recorder and is_time and (short := _shortage(swarm.mission, len(flown), recorder)):
+                return ended(FAILED, f"Memory ran short ({short}{way_on})")
+        return ended(DONE)
+    if not flown:
+        raise MemoryError
+    return ended(FAILED, "Out of memory")
+
+
+def compile_ahead(
+    mission: Mission, policy_name: str, on_window: Callable[[], object] = lambda: None, **how: Any
+) -> None:
+    """Fly a small mission of this kind, beyond half-way, so that compiling is not timed.
+
+    Name and `how` are arguments of `make_policy`; `on_window` is called after each window.
+    """
+    # A stored policy may be for teams of one size, and a file's arena does not shrink.
+    is_bound = registry.is_stored(policy_name) or mission.arena not in ARENAS
+    robots = mission.num_robots if is_bound else 3
+    smallest = replace(mission, num_robots=robots, range_ratio=10.0, num_windows=COMPILING_WINDOWS)
+    if registry.is_own_policy(policy_name):  # which may be made for one mission only
+        policy_name, how = "tdma", {}
+    for _ in rollout(Swarm(smallest, [0]), registry.make_policy(policy_name, smallest, **how)):
+        on_window()
+
+
+def run_of(
+    swarm: Swarm, flown: Flown, *, name: str, seed: int, observer: int, components: Components
+) -> Run:
+    """Return a swarm's mission, flown, as a `Run`; the config is everything that makes it again."""
+    mission, policy = swarm.mission, swarm.policy
+    config = {
+        **asdict(mission),
+        "policy": name,
+        **policy.parameters,
+        "packet_bytes": policy.packet(mission).num_bytes,
+        "seed": seed,
+        "observer": observer,
+        "version": version(),
+        "commit": commit(),
+        **components.names,
+    }
+    numbers = flight_numbers(mission, policy, summarise(flown.windows))
+    numbers |= {"wall_seconds": flown.wall_s, "interrupted": flown.code != DONE}
+    windows = tuple(flown.windows)
+    return Run(mission=mission, config=config, summary=Metrics(numbers), windows=windows)
+
+
 def _policy_of(
     policy: str | Path | Policy, mission: Mission, how: Mapping[str, Any]
 ) -> tuple[Policy, str]:
     """Return a policy and its name: what was given, or its class's."""
     if not isinstance(policy, Policy):
         check_kind("policy", policy, (str, Path), '"planner"')
-        name = flown_name(normalised(str(policy)), mission)
-        return make_policy(name, mission, **how), name
+        name = registry.flown_name(registry.normalised(str(policy)), mission)
+        return registry.make_policy(name, mission, **how), name
     if how["probability"] is not None or how["is_deterministic"]:
         raise TypeError(
             "probability and is_deterministic change policies by name; make it with them"
         )
     return policy, type(policy).__name__
+
+
+def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | None:
+    """Return a message if memory does not suffice to write the replay, at a second look either."""
+    needed = replay_memory(mission, num_windows) - recorder.num_bytes
+    if free_memory() >= needed:
+        return None
+    gc.collect()
+    time.sleep(SECOND_LOOK_S)
+    free = free_memory()
+    short = f"{in_gb(free)} are free, writing the replay takes {in_gb(needed)}"
+    return short if free < needed else None

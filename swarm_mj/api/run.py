@@ -88,10 +88,9 @@ class Run:
 
     def _repr_html_(self) -> str:
         """Return the numbers as a table, for notebooks."""
-        left, lines = "style='text-align:left'", ""
-        for name, value in self._rows.items():
-            lines += f"<tr><th {left}>{escape(name)}</th><td {left}>{escape(value)}</td></tr>"
-        return f"<table><caption>{escape(self.title)}</caption>{lines}</table>"
+        row = "<tr><th style='text-align:left'>{}</th><td style='text-align:left'>{}</td></tr>"
+        rows = (row.format(escape(name), escape(value)) for name, value in self._rows.items())
+        return f"<table><caption>{escape(self.title)}</caption>{''.join(rows)}</table>"
 
     def table(self) -> Table:
         """Return the numbers as a table, for terminals."""
@@ -106,6 +105,12 @@ class Run:
         """Mission, policy, seed and components in a line."""
         title = flight_title(self.mission, self.config["policy"], self.config["seed"])
         return title + components_in(self.config).title
+
+    @property
+    def task_cost(self) -> tuple[str, str] | None:
+        """The name of the task's cost, such as a formation error, and its unit; None without."""
+        cost = self.windows[0].costs.task_cost
+        return None if cost is None else (cost.name, cost.unit)
 
     def columns(self) -> dict[str, Float[np.ndarray, "T"]]:
         """Return the flight window by window, column by column: all that `to_dataframe` has."""
@@ -161,9 +166,8 @@ class Run:
         """
         from swarm_mj.replay.footage import footage_of
 
-        policy, seed = self.config["policy"], self.config["seed"]
-        components = components_in(self.config)
-        return footage_of(self._recorded(), self.mission, policy, seed, components)
+        flown = (self.config["policy"], self.config["seed"], components_in(self.config))
+        return footage_of(self._recorded(), self.mission, *flown)
 
     def report(self, replay: Path | None = None) -> dict[str, Any]:
         """Return config and summary, as `swarm-mj fly --json` writes them."""
@@ -193,9 +197,9 @@ class Run:
             case ".json":
                 write_json(path, self.report())
             case ".csv":
-                cells = {name: list(map(_cell, x.tolist())) for name, x in self.columns().items()}
-                rows = zip(*cells.values(), strict=True)
-                write_csv(path, list(cells), (dict(zip(cells, row, strict=True)) for row in rows))
+                table = {name: map(_cell, x.tolist()) for name, x in self.columns().items()}
+                rows = zip(*table.values(), strict=True)
+                write_csv(path, list(table), (dict(zip(table, row, strict=True)) for row in rows))
             case ending:
                 write_bytes(path, self._film(ending))
         return path

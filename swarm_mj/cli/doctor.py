@@ -36,10 +36,11 @@ LITTLE_MEMORY = 2 * 10**9  # a flight with its replay takes half a gigabyte, a t
 LITTLE_DISK = 10**9
 LONGEST_S = 120.0  # of a trial; the first flight of an installation compiles for half a minute
 MAX_LETTERS = 400  # of what a trial complains, cut between words
-RENDERING, VIEWER = "rendering without a display", "rerun's viewer"  # headings
-EGL = "needs a graphics driver with EGL; or use osmesa"
-OSMESA = "Debian and Ubuntu: apt-get install libosmesa6"
-GLFW = "needs a display; else use egl or osmesa"
+RENDERING = {  # by MuJoCo's back ends, and how to get each
+    "egl": "needs a graphics driver with EGL; or use osmesa",
+    "osmesa": "Debian and Ubuntu: apt-get install libosmesa6",
+    "glfw": "needs a display; else use egl or osmesa",
+}
 
 RENDER = """
 import mujoco
@@ -73,9 +74,10 @@ class Finding(NamedTuple):
 # they fail. One whose name is VARIABLE=VALUE runs with that.
 TRIALS = {
     Finding("flying", "three robots fly", "broken", "", "see what `swarm-mj fly` says"): FLIGHT,
-    Finding(RENDERING, "MUJOCO_GL=egl", "absent", "", EGL): RENDER,
-    Finding(RENDERING, "MUJOCO_GL=osmesa", "absent", "", OSMESA): RENDER,
-    Finding(RENDERING, "MUJOCO_GL=glfw", "absent", "", GLFW): RENDER,
+    **{
+        Finding("rendering without a display", f"MUJOCO_GL={name}", "absent", "", mend): RENDER
+        for name, mend in RENDERING.items()
+    },
     Finding("speed", "torch", "absent", "", "learned policies and training need it"): TORCH,
 }
 
@@ -175,11 +177,10 @@ def machine() -> Iterator[Finding]:
     names = [name for name in ("DISPLAY", "WAYLAND_DISPLAY") if os.environ.get(name)]
     found = ", ".join(f"{name}={os.environ[name]}" for name in names)
     if found or not sys.platform.startswith("linux"):
-        yield Finding(VIEWER, "display", "ok", found or sys.platform)
+        yield Finding("rerun's viewer", "display", "ok", found or sys.platform)
     else:
-        yield Finding(
-            VIEWER, "display", "absent", "none", "`swarm-mj replay --web FILE` needs none"
-        )
+        mend = "`swarm-mj replay --web FILE` needs none"
+        yield Finding("rerun's viewer", "display", "absent", "none", mend)
 
 
 def _compiled_code() -> Finding:

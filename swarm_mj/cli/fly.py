@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from rich.console import Console
 
-from swarm_mj.api.flight import Flown, compile_ahead, flight_needs, fly_swarm, run_of
+from swarm_mj.api.fly import compile_ahead, flight_needs, fly_swarm, run_of
 from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, one_mission
 from swarm_mj.cli.options import output_option
 from swarm_mj.mission import Mission
@@ -72,8 +72,8 @@ def run(options: FlyOptions) -> int:
     path = _replay_path(options)
     if path:
         need("rerun", "a replay", "fly without one: --no-record")
-    needs = flight_needs(mission, name, is_recorded=path is not None)
     way_out = "choose fewer --robots or --windows" + (", or --no-record" if path else "")
+    needs = flight_needs(mission, name, is_recorded=path is not None)
     check_fits(needs, path, way_out, is_forced=options.yes)
     policy = registry.make_policy(name, mission, **options.how)
     components = options.components.made(mission)
@@ -100,15 +100,10 @@ def run(options: FlyOptions) -> int:
             stack.callback(lambda: replace(run, log=recorder.log()).save(path))
         if options.json:
             write_json(options.json, run.report(path))
-    return _ended(options, path, flown, console)
-
-
-def _ended(options: FlyOptions, path: Path | None, flown: Flown, console: Console) -> int:
-    """Print what to do next, and open the viewer if it was asked for; return the exit code."""
     for label, line in _next_commands(options, path):
         plain_console().print(f"{label:18}{line}")
     if flown.code != DONE:
-        number = options.mission.num_windows
+        number = mission.num_windows
         windows = f"{len(flown.windows)} of {number} window{'s' * (number != 1)}"
         console.print(f"{flown.ending} after {windows}.")
         return flown.code

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import swarm_mj
-from swarm_mj.api.flight import Flown, run_of
+from swarm_mj.api.fly import Flown, run_of
 from swarm_mj.api.run import Metrics
 from swarm_mj.mission import paper
 from swarm_mj.mission.components import Components

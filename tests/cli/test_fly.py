@@ -149,7 +149,7 @@ def test_the_next_commands_fit_the_mission_and_the_screen(monkeypatch):
 FLY_AND_TELL = """
 import signal, sys
 from pathlib import Path
-from swarm_mj.api import flight
+from swarm_mj.api import fly as flight
 from swarm_mj.cli import main
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
 windows = flight.rollout

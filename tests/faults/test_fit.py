@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from tries import tries
 
-from swarm_mj.api import flight
+from swarm_mj.api import fly as flight
 from swarm_mj.cli import main
 from swarm_mj.evaluation import study as studies
 from swarm_mj.evaluation.batch import fly_batch
