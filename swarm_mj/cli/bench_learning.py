@@ -72,7 +72,7 @@ def _training_per_s(credit: str, mission: Mission, threads: int, seconds: float)
         groups=1,
         ppo=replace(ppo, num_minibatches=max(1, ppo.num_minibatches // share)),
     )
-    model, _ = make_model(fewer)
+    model = make_model(fewer)
 
     def rollout() -> None:
         model.learn(1, reset_num_timesteps=False, log_interval=10**9)

@@ -12,8 +12,8 @@ from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
 from swarm_mj.cli.train_report import Watch, has_stopped_early, report, verdicts
 from swarm_mj.learning import run_folder
-from swarm_mj.learning.estimates import training_needs
-from swarm_mj.learning.run_folder import Limits, Progress, TrainingRun
+from swarm_mj.learning.run_folder import Limits, TrainingRun
+from swarm_mj.learning.selection import Progress
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.stored import POLICY, read_policy
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
@@ -83,7 +83,10 @@ def _asked_run(options: TrainOptions) -> TrainingRun:
     names = (run_folder.SETTINGS, run_folder.CHECKPOINT, run_folder.CURVE, POLICY)
     written = (Output("run", options.out / name) for name in names)
     check_outputs(*written, inputs=[options.init] if options.init else [])
-    needs, way_out = training_needs(run.training, run.limits), "choose fewer --missions or --robots"
+    needs, way_out = (
+        run_folder.training_needs(run.training, run.limits),
+        "choose fewer --missions or --robots",
+    )
     check_fits(needs, options.out, way_out, is_forced=options.yes)
     return run
 

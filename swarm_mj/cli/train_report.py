@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from datetime import timedelta
 
 from rich.console import Console
 
 from swarm_mj.learning import selection
-from swarm_mj.learning.run_folder import Limits, Progress, Status, TrainingRun
-from swarm_mj.learning.selection import ORACLE, REFERENCES
+from swarm_mj.learning.run_folder import Limits, TrainingRun
+from swarm_mj.learning.selection import ORACLE, REFERENCES, Progress, Status
 from swarm_mj.system.progress import WorkBar
 
 FINISHING = "finishing this rollout, then all is kept; Ctrl-C again breaks off at once"
@@ -25,7 +26,7 @@ class Watch(WorkBar):
         """Prepare the bar; `is_interrupted` says whether Ctrl-C was pressed."""
         super().__init__("Training", 1.0, console=console, shows_time_left=False)
         self._console, self._run, self._is_interrupted = console, run, is_interrupted
-        self._start: Status | None = None  # of this session
+        self._start: Progress | None = None  # of this session
         self._num_rows = 0
         self.has_stopped = False  # whether the run was asked to stop
 
@@ -36,14 +37,15 @@ class Watch(WorkBar):
 
     def __call__(self, status: Status) -> bool:
         """Show a status; return whether to go on."""
+        progress, limits = status.progress, self._run.limits
         if self._start is None:
-            self._start, self._num_rows = status, len(status.progress.curve)
-        if len(status.progress.curve) > self._num_rows:
-            self._num_rows = len(status.progress.curve)
-            self._console.print(_row(self._run, status.progress))
+            self._start, self._num_rows = replace(progress), len(progress.curve)
+        if len(progress.curve) > self._num_rows:
+            self._num_rows = len(progress.curve)
+            self._console.print(_row(self._run, progress))
         self.what = status.what
-        self.text = _text(status, self._start, self._run.limits)
-        self.move_to(share_done(status, self._run.limits))
+        self.text = _text(status, self._start, limits)
+        self.move_to(share_done(progress, limits))
         if self._is_interrupted() and not self.has_stopped:
             self.has_stopped = True
             self._console.print(f"Interrupted: {FINISHING}.")
@@ -56,18 +58,18 @@ class Watch(WorkBar):
         return "Finishing" if self._is_interrupted() else self.what
 
 
-def share_done(status: Status, limits: Limits) -> float:
+def share_done(progress: Progress, limits: Limits) -> float:
     """Return the share of a run that is done, by the limit that it is nearest to."""
-    pairs = ((status.decisions, limits.decisions), (status.minutes, limits.minutes))
+    pairs = ((progress.decisions, limits.decisions), (progress.minutes, limits.minutes))
     return min(1.0, max((done / limit for done, limit in pairs if limit), default=0.0))
 
 
-def minutes_left(status: Status, start: Status, limits: Limits) -> float | None:
+def minutes_left(progress: Progress, start: Progress, limits: Limits) -> float | None:
     """Return the minutes until the first limit, at the speed since `start`; None if unknown."""
-    left = [limits.minutes - status.minutes] if limits.minutes else []
-    made, minutes = status.decisions - start.decisions, status.minutes - start.minutes
+    left = [limits.minutes - progress.minutes] if limits.minutes else []
+    made, minutes = progress.decisions - start.decisions, progress.minutes - start.minutes
     if limits.decisions and made:
-        left.append(minutes / made * (limits.decisions - status.decisions))
+        left.append(minutes / made * (limits.decisions - progress.decisions))
     return max(0.0, min(left)) if left else None
 
 
@@ -132,7 +134,7 @@ def has_stopped_early(run: TrainingRun, progress: Progress) -> bool:
     """Return whether a run stopped because it no longer learned, and not at its budget."""
     limits = run.limits
     is_left = limits.decisions is None or progress.decisions < limits.decisions
-    return is_left and selection.has_stalled(progress.curve, limits.patience)
+    return is_left and progress.has_stalled(limits.patience)
 
 
 def _row(run: TrainingRun, progress: Progress) -> str:
@@ -145,18 +147,19 @@ def _row(run: TrainingRun, progress: Progress) -> str:
     return f"{when}   held-out age {_age(row)}{note:13}{others}"
 
 
-def _text(status: Status, start: Status, limits: Limits) -> str:
-    parts = [f"{status.decisions:,} decisions"]
+def _text(status: Status, start: Progress, limits: Limits) -> str:
+    progress = status.progress
+    parts = [f"{progress.decisions:,} decisions"]
     if status.evaluated is not None:
         parts.append(f"missions {status.evaluated:.0%}")
     elif not math.isnan(status.aoi):
         parts.append(f"age {status.aoi:.1f}")
-    if status.progress.curve:
-        parts.append(f"held out {status.progress.curve[-1]['aoi']:.1f}")
-    made, minutes = status.decisions - start.decisions, status.minutes - start.minutes
+    if progress.curve:
+        parts.append(f"held out {progress.curve[-1]['aoi']:.1f}")
+    made, minutes = progress.decisions - start.decisions, progress.minutes - start.minutes
     if made and minutes:
         parts.append(f"{made / minutes / 60.0:.0f}/s")
-    if (left := minutes_left(status, start, limits)) is not None:
+    if (left := minutes_left(progress, start, limits)) is not None:
         parts.append(f"{timedelta(seconds=round(60.0 * left))} left")
     return ", ".join(parts)
 

@@ -22,9 +22,7 @@ from torch import Tensor
 
 from swarm_mj.learning.actor_critic import GnnActorCritic
 from swarm_mj.learning.graph_vec_env import env_of
-from swarm_mj.learning.held_out import HeldOut
-from swarm_mj.learning.run_folder import Progress
-from swarm_mj.learning.selection import NUM_BEST, Amount, Count, candidates
+from swarm_mj.learning.selection import NUM_BEST, Amount, Count, Progress, candidates
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.system.atomic import write_bytes
@@ -32,7 +30,10 @@ from swarm_mj.system.reading import read_file, read_json, read_plain
 
 CHECKPOINT_VERSION = 4
 SPARE_BYTES = 100_000_000  # the curve's, and what else does not depend on the settings
-IN_A_ROW = {"decisions", "minutes", *(spec.name for spec in fields(HeldOut))} - {"aoi_sem"}
+IN_A_ROW = (  # of the learning curve
+    *("decisions", "minutes", "aoi", "aoi_steady", "velocity_variance", "objective"),
+    *("packets_per_window", "delivery_ratio"),
+)
 
 Networks = dict[int, AggregationGnn]  # of policies that may be kept, by their decisions
 Word = Annotated[int, Meta(ge=0, lt=2**32)]
@@ -59,12 +60,7 @@ class _Counters:
 
 
 def save(
-    path: Path,
-    training: Training,
-    model: PPO,
-    rng: np.random.Generator,  # that draws the missions' seeds
-    progress: Progress,
-    networks: Networks,
+    path: Path, training: Training, model: PPO, progress: Progress, networks: Networks
 ) -> None:
     """Write a checkpoint, between rollouts; raises OSError if the file cannot be written."""
     name, keys, *rest = np.random.get_state()  # noqa: NPY002 - PPO shuffles minibatches with it
@@ -72,37 +68,42 @@ def save(
     is_normalised = isinstance(env, VecNormalize)
     moments = [env.ret_rms.mean, env.ret_rms.var, env.ret_rms.count] if is_normalised else None
     is_cuda = model.device.type == "cuda"
-    state: dict[str, Any] = {
+    state = _tensors(model, networks) | {
         "version": CHECKPOINT_VERSION,
         "training": json.dumps(asdict(training)),
-        "weights": model.policy.state_dict(),
-        "adam": model.policy.optimizer.state_dict()["state"],  # its settings are the training's
         "num_timesteps": model.num_timesteps,
         "num_updates": model._n_updates,
         "episode_starts": torch.tensor(model._last_episode_starts),
         "seeds": [batch.seeds for batch in batches],
         "last_windows": [batch.last_window for batch in batches],
-        "recipients": {
-            n: torch.tensor(np.array(batch.recipients, np.int16).reshape(-1, *batch.shape))
-            for n, batch in enumerate(batches)
-        },
         "reward_moments": moments and [float(each) for each in moments],
-        "returns": torch.tensor(env.returns) if is_normalised else torch.zeros(0),
-        "torch_rng": torch.get_rng_state(),
         "cuda_rng": torch.cuda.get_rng_state(model.device) if is_cuda else None,
         "numpy_rng": [name, np.asarray(keys).tolist(), *rest],
-        "seeds_rng": rng.bit_generator.state,
+        "seeds_rng": env_of(model).rng.bit_generator.state,
         "progress": asdict(progress),
-        "candidates": {at: network.state_dict() for at, network in networks.items()},
     }
     content = io.BytesIO()
     torch.save(state, content)
     write_bytes(path, content.getbuffer())
 
 
-def load(
-    path: Path, training: Training, model: PPO, rng: np.random.Generator
-) -> tuple[Progress, Networks]:
+def _tensors(model: PPO, networks: Networks) -> dict[str, Any]:
+    """Return a run's tensors by their names in checkpoints, but for what a first rollout makes."""
+    env = model.get_env()
+    return {
+        "weights": model.policy.state_dict(),
+        "adam": model.policy.optimizer.state_dict()["state"],  # its settings are the training's
+        "recipients": {
+            n: torch.tensor(np.array(batch.recipients, np.int16).reshape(-1, *batch.shape))
+            for n, batch in enumerate(env_of(model).batches)
+        },
+        "returns": torch.tensor(env.returns if isinstance(env, VecNormalize) else []),
+        "torch_rng": torch.get_rng_state(),
+        "candidates": {at: network.state_dict() for at, network in networks.items()},
+    }
+
+
+def load(path: Path, training: Training, model: PPO) -> tuple[Progress, Networks]:
     """Put a model and its missions back to a checkpoint; return its progress and candidates.
 
     Raises ValueError if the file is damaged, foreign, of another version or of other settings,
@@ -118,16 +119,11 @@ def load(
     try:
         if read_json(state["training"], Training) != training:
             raise ValueError("it was made with other settings than the run's")
-        counters = check_state(state, model)
-        networks = {at: acting_network(model) for at in state["candidates"]}
-        for at, weights in state["candidates"].items():
-            networks[at].load_state_dict(weights)
-        _restore(state, counters, model, rng)
+        return restore(state, model)
     except Exception as error:  # generators of random numbers take states as they please
         reason = (str(error) or type(error).__name__).splitlines()[0][:200]
         said = f"checkpoint {path} is damaged, or another run's ({reason})"
         raise ValueError(f"{said}; begin a new run with another --out") from error
-    return counters.progress, networks
 
 
 def acting_network(model: PPO) -> AggregationGnn:
@@ -136,42 +132,63 @@ def acting_network(model: PPO) -> AggregationGnn:
     return model.policy.acting_network()
 
 
-def check_state(state: Mapping[str, Any], model: PPO) -> _Counters:
-    """Return the counters of a state of a model's run.
+def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
+    """Put a model and its missions back to a state; return the run's progress and candidates.
 
     Raises ValueError if the state is of other shapes, kinds or ranges, and any Exception if a part
     is missing, or of quite another kind.
     """
     counters = read_plain({spec.name: state[spec.name] for spec in fields(_Counters)}, _Counters)
-    curve, env, batches = counters.progress.curve, model.get_env(), env_of(model).batches
-    if not all(math.isfinite(row[name]) for row in curve for name in IN_A_ROW):
+    progress = counters.progress
+    kept = [int(row["decisions"]) for row in candidates(progress.curve)]
+    networks = {at: acting_network(model) for at in kept}
+    _check(state, counters, model, networks)
+    for at, network in networks.items():
+        network.load_state_dict(state["candidates"][at])
+    policy, env = model.policy, model.get_env()
+    policy.load_state_dict(state["weights"])
+    policy.optimizer.load_state_dict(policy.optimizer.state_dict() | {"state": state["adam"]})
+    model.num_timesteps, model._n_updates = counters.num_timesteps, counters.num_updates
+    recipients = [state["recipients"][n].numpy() for n in range(len(counters.seeds))]
+    model._last_obs = env_of(model).replay(counters.seeds, counters.last_windows, recipients)
+    model._last_episode_starts = state["episode_starts"].numpy()
+    if isinstance(env, VecNormalize) and counters.reward_moments is not None:
+        for name, value in zip(("mean", "var", "count"), counters.reward_moments, strict=True):
+            setattr(env.ret_rms, name, value)
+        env.returns = state["returns"].numpy()
+    # Last, as making networks and replaying missions may draw.
+    torch.set_rng_state(state["torch_rng"])
+    if state["cuda_rng"] is not None and model.device.type == "cuda":
+        torch.cuda.set_rng_state(state["cuda_rng"], model.device)
+    np.random.set_state(tuple(state["numpy_rng"]))  # noqa: NPY002 - as in `save`
+    env_of(model).rng.bit_generator.state = state["seeds_rng"]
+    return progress, networks
+
+
+def _check(state: Mapping[str, Any], counters: _Counters, model: PPO, networks: Networks) -> None:
+    """Raise ValueError unless a state is as one of this model's would be, in range and finite."""
+    if not all(math.isfinite(row[name]) for row in counters.progress.curve for name in IN_A_ROW):
         raise ValueError("its curve has numbers that are not finite")
-    if (counters.reward_moments is not None) != isinstance(env, VecNormalize):
+    if (counters.reward_moments is not None) != isinstance(model.get_env(), VecNormalize):
         raise ValueError("it normalises rewards, or does not, unlike the run")
-    recipients = {}
-    for n, (batch, last) in enumerate(zip(batches, counters.last_windows, strict=True)):
+    # As a fresh model's, but for what optimiser steps and windows of missions have added.
+    like = _tensors(model, networks)
+    like["episode_starts"] = torch.zeros(model.n_envs, dtype=torch.bool)
+    if state["adam"]:
+        like["adam"] = {
+            n: {"step": torch.zeros(()), "exp_avg": weight, "exp_avg_sq": weight}
+            for n, weight in enumerate(model.policy.parameters())
+        }
+    for n, (batch, last) in enumerate(
+        zip(env_of(model).batches, counters.last_windows, strict=True)
+    ):
         num_flown, num_windows = len(state["recipients"][n]), batch.mission.num_windows
         if not num_flown < last <= num_windows:
             raise ValueError(f"its missions end at window {last}, not within {num_windows}")
-        recipients[n] = torch.zeros((num_flown, *batch.shape), dtype=torch.int16)
-    adam = {
-        n: {"step": torch.zeros(()), "exp_avg": weight, "exp_avg_sq": weight}
-        for n, weight in enumerate(model.policy.parameters())
-    }
-    acting = acting_network(model).state_dict()
-    expected = {
-        "weights": model.policy.state_dict(),
-        "adam": adam if state["adam"] else {},  # which has nothing before its first step
-        "candidates": {int(row["decisions"]): acting for row in candidates(curve)},
-        "episode_starts": torch.zeros(model.n_envs, dtype=torch.bool),
-        "recipients": recipients,
-        "returns": torch.tensor(env.returns if isinstance(env, VecNormalize) else []),
-        "torch_rng": torch.get_rng_state(),
-    }
-    _check_like({name: state[name] for name in expected}, expected, "it")
+        like["recipients"][n] = torch.zeros((num_flown, *batch.shape), dtype=torch.int16)
+    _check_like({name: state[name] for name in like}, like, "it")
     if any(moments["step"] < 0 for moments in state["adam"].values()):
         raise ValueError("its optimiser's step count is negative")
-    return counters
 
 
 def _check_like(given: Any, like: Mapping[Any, Any] | Tensor, name: str) -> None:  # noqa: ANN401
@@ -216,26 +233,3 @@ def read_torch(path: Path, max_bytes: int) -> Any:  # noqa: ANN401 - whatever wa
         raise ValueError(
             f"checkpoint {path} is damaged, or none; begin a new run with another --out"
         ) from error
-
-
-def _restore(
-    state: dict[str, Any], counters: _Counters, model: PPO, rng: np.random.Generator
-) -> None:
-    policy, env = model.policy, model.get_env()
-    policy.load_state_dict(state["weights"])
-    policy.optimizer.load_state_dict(policy.optimizer.state_dict() | {"state": state["adam"]})
-    model.num_timesteps, model._n_updates = counters.num_timesteps, counters.num_updates
-    recipients = [state["recipients"][n].numpy() for n in range(len(counters.seeds))]
-    begun = counters.seeds, counters.last_windows
-    model._last_obs = env_of(model).replay(*begun, recipients)
-    model._last_episode_starts = state["episode_starts"].numpy()
-    if isinstance(env, VecNormalize) and counters.reward_moments is not None:
-        for name, value in zip(("mean", "var", "count"), counters.reward_moments, strict=True):
-            setattr(env.ret_rms, name, value)
-        env.returns = state["returns"].numpy()
-    # Last, as making networks and replaying missions may draw.
-    torch.set_rng_state(state["torch_rng"])
-    if state["cuda_rng"] is not None and model.device.type == "cuda":
-        torch.cuda.set_rng_state(state["cuda_rng"], model.device)
-    np.random.set_state(tuple(state["numpy_rng"]))  # noqa: NPY002 - as in `save`
-    rng.bit_generator.state = state["seeds_rng"]

@@ -38,7 +38,7 @@ class GraphVecEnv(SwarmVecEnv):
 
         Raises ValueError if they cannot be shared out evenly, or a size would have no batch.
         """
-        self._rng, self._agent_reward = rng, training.reward
+        self.rng, self._agent_reward = rng, training.reward
         self.agent, self.batches = training.credit_assignment, _make_batches(training)
         self.num_nodes = max(training.robots)  # of every graph
         for n, batch in enumerate(self.batches):
@@ -86,7 +86,7 @@ class GraphVecEnv(SwarmVecEnv):
     def _draw_seeds(self, batch: MissionBatch) -> list[int]:
         # One generator for all batches: a checkpoint keeps its state alone.
         size = batch.num_missions
-        return self._rng.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED, size=size).tolist()
+        return self.rng.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED, size=size).tolist()
 
     def _is_truncated(self) -> Bool[np.ndarray, "E"]:
         # The value of missions cut off early goes on, that of ended ones is 0.

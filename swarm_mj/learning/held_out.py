@@ -7,7 +7,7 @@ the flight.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -31,22 +31,10 @@ from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
 
 Flown = list[list[WindowCosts]]  # by team size, window by window
-Samples = list[Float[np.ndarray, "B"]]  # by team size
+Samples = list[Float[np.ndarray, "*window B"]]  # by team size
 MakePolicy = Callable[[Mission], Policy]
 OnWindow = Callable[[float], None]
-
-
-@dataclass(frozen=True, kw_only=True)
-class HeldOut:
-    """Means over held-out missions; over all team sizes, where there are several."""
-
-    aoi: float  # Eq. 10 [windows]
-    aoi_sem: float | None  # standard error over the missions [windows]; None of one mission
-    aoi_steady: float  # over the second half of the missions [windows]
-    velocity_variance: float  # Eq. 17 [m²/s²]
-    packets_per_window: float
-    delivery_ratio: float
-    objective: float  # the reward's cost, each size alike; the best policy has least of it
+FIELDS = {"aoi": "age_windows", "velocity_variance": "velocity_variance_m2ps2"}  # of costs
 
 
 def held_out_policy(training: Training, network: AggregationGnn, mission: Mission) -> GnnPolicy:
@@ -57,19 +45,27 @@ def held_out_policy(training: Training, network: AggregationGnn, mission: Missio
 
 def evaluate(
     training: Training, network: AggregationGnn, on_window: OnWindow = lambda _share: None
-) -> HeldOut:
-    """Fly the held-out missions; return what they cost."""
+) -> Row:
+    """Fly the held-out missions; return their mean costs, by the learning curve's columns.
+
+    Team sizes count alike. `aoi` is Eq. 10 [windows], with its standard error over the missions
+    unless there is one only, `aoi_steady` that of the missions' second half. `velocity_variance` is
+    Eq. 17 [m²/s²]. The best policy has the least `objective`, by the reward's cost.
+    """
     flies = partial(held_out_policy, training, network)
     return _means(training, fly(training, flies, HELD_OUT_SEED, training.held_out, on_window))
 
 
-def reference_columns(training: Training, on_window: OnWindow) -> Row:
-    """Fly `REFERENCES` on held-out missions; return their costs by the learning curve's columns."""
+def reference_columns(training: Training, curve: Sequence[Row], on_window: OnWindow) -> Row:
+    """Return the costs of `REFERENCES`, flown once a run, by the curve's columns."""
+    if curve:
+        return {name: x for name, x in curve[0].items() if name in selection.REFERENCE_COLUMNS}
     columns, sizes = {}, selection.reference_missions(training)
     shares = _shares_of(on_window, len(sizes))
     for name, size in sizes.items():
         flown = fly(training, partial(make_policy, name), HELD_OUT_SEED, size, next(shares))
-        columns |= {selection.column(cost, name): _mean(_own_costs(flown, cost)) for cost in JUDGED}
+        for cost in JUDGED:
+            columns[selection.column(cost, name)] = _mean(_per_mission(flown, cost))
     return columns
 
 
@@ -78,7 +74,7 @@ def choose(
     curve: Sequence[Row],
     networks: Mapping[int, AggregationGnn],  # the candidates', by the decisions behind them
     on_window: OnWindow,
-) -> tuple[Choice, HeldOut]:
+) -> tuple[Choice, Row]:
     """Choose among the finalists of a whole run on fresh missions; return its cost on others."""
     rows, run_decisions = selection.finalists(curve), int(curve[-1]["decisions"])
     num_flights = len(rows) + OTHER_FLIGHTS  # at most
@@ -92,24 +88,24 @@ def choose(
         return fly(training, policy_of, first_seed, size, next(shares))
 
     def objective(row: Row) -> float:
-        return _means(training, flown(flies(row), CHOICE_SEED)).objective
+        return _means(training, flown(flies(row), CHOICE_SEED))["objective"]
 
     kept = min(rows, key=objective) if len(rows) > 1 else rows[0]
     costs = flown(flies(kept))
-    own = _own_costs(costs, training.cost)
+    own = _per_mission(costs, training.cost)
     compared: dict[str, MakePolicy] = {name: partial(make_policy, name) for name in COMPARED}
     if kept is not curve[0]:
         compared["first"] = flies(curve[0])
+    others = {
+        name: _per_mission(flown(policy_of), training.cost) for name, policy_of in compared.items()
+    }
     choice = Choice(
         decisions=int(kept["decisions"]),
         run_decisions=run_decisions,
         num_finalists=len(rows),
         num_missions=size,
-        kept=_cost(own),
-        others={
-            name: _cost(_own_costs(flown(policy_of), training.cost), own)
-            for name, policy_of in compared.items()
-        },
+        kept=Cost(mean=_mean(own), sem=_standard_error(own)),
+        others={name: _compared(samples, own) for name, samples in others.items()},
     )
     return choice, _means(training, costs)
 
@@ -147,12 +143,8 @@ def record_replay(
     recorder = Recorder(swarm)
     for window in rollout(swarm, held_out_policy(training, network, mission)):
         recorder.add(window)
-    write_replay(
-        recorder.log(),
-        mission,
-        {"decisions": decisions, "seed": HELD_OUT_SEED, "training seed": training.seed},
-        folder / f"decisions-{decisions:09d}.rrd",
-    )
+    about = {"decisions": decisions, "seed": HELD_OUT_SEED, "training seed": training.seed}
+    write_replay(recorder.log(), mission, about, folder / f"decisions-{decisions:09d}.rrd")
 
 
 def fly(
@@ -177,41 +169,45 @@ def _shares_of(on_window: OnWindow, total: int) -> Iterator[OnWindow]:
         yield lambda share, n=n: on_window((n + share) / total)
 
 
-def _means(training: Training, costs: Flown) -> HeldOut:
-    age = [np.array([window.age_windows for window in windows]) for windows in costs]
-    variance = [np.array([w.velocity_variance_m2ps2 for w in windows]) for windows in costs]
-    objective = [each / size for each, size in zip(age, training.robots, strict=True)]
-    if training.reward == "velocity-variance":
-        objective = variance
+def _means(training: Training, costs: Flown) -> Row:
+    age, variance = (_samples(costs, cost) for cost in JUDGED)
+    is_aged = training.cost == "aoi"
+    # Larger teams are older: by the robot, every size has its say.
+    objective = [a / n for a, n in zip(age, training.robots, strict=True)] if is_aged else variance
     packets = [window.packets for windows in costs for window in windows]
     attempted = sum(int(each.attempted.sum()) for each in packets)
-    return HeldOut(
-        aoi=_mean(age),
-        aoi_sem=_standard_error([each.mean(axis=0) for each in age]),
-        aoi_steady=_mean([each[len(each) // 2 :] for each in age]),
-        velocity_variance=_mean(variance),
-        packets_per_window=attempted / sum(each.size for each in age),
-        delivery_ratio=sum(int(each.delivered.sum()) for each in packets) / max(1, attempted),
-        objective=_mean(objective),
+    error = _standard_error(_per_mission(costs, "aoi"))
+    return {
+        "aoi": _mean(age),
+        **({} if error is None else {"aoi_sem": error}),
+        "aoi_steady": _mean([each[len(each) // 2 :] for each in age]),
+        "velocity_variance": _mean(variance),
+        "packets_per_window": attempted / sum(each.size for each in age),
+        "delivery_ratio": sum(int(each.delivered.sum()) for each in packets) / max(1, attempted),
+        "objective": _mean(objective),
+    }
+
+
+def _samples(costs: Flown, cost: str) -> Samples:
+    return [np.array([getattr(each, FIELDS[cost]) for each in windows]) for windows in costs]
+
+
+def _per_mission(costs: Flown, cost: str) -> Samples:
+    return [each.mean(axis=0) for each in _samples(costs, cost)]
+
+
+def _compared(samples: Samples, kept: Samples) -> Cost:
+    """Return a policy's cost and, pair by pair, how far the policy that is kept is behind it."""
+    behind = [a - b for a, b in zip(kept, samples, strict=True)]
+    return Cost(
+        mean=_mean(samples),
+        sem=_standard_error(samples),
+        behind=_mean(behind),
+        behind_sem=_standard_error(behind),
     )
 
 
-def _own_costs(costs: Flown, cost: str) -> Samples:
-    """Return the cost of every mission flown: its `aoi`, or its `velocity_variance`."""
-    name = "age_windows" if cost == "aoi" else "velocity_variance_m2ps2"
-    return [np.mean([getattr(each, name) for each in windows], axis=0) for windows in costs]
-
-
-def _cost(samples: Samples, kept: Samples | None = None) -> Cost:
-    """Return a policy's cost and, pair by pair, how far the policy that is kept is behind it."""
-    cost = Cost(mean=_mean(samples), sem=_standard_error(samples))
-    if kept is None:
-        return cost
-    behind = [a - b for a, b in zip(kept, samples, strict=True)]
-    return replace(cost, behind=_mean(behind), behind_sem=_standard_error(behind))
-
-
-def _mean(by_size: Sequence[Float[np.ndarray, "..."]]) -> float:
+def _mean(by_size: Samples) -> float:
     return float(np.mean([each.mean() for each in by_size]))
 
 

@@ -17,17 +17,16 @@ from swarm_mj.learning.settings import PpoSettings, Training
 SILENT_SHARE = 0.1  # of the silent rows that are learned from
 
 
-def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
-    """Make PPO over fresh missions (III-C), and the generator that draws their seeds.
+def make_model(training: Training) -> PPO:
+    """Make PPO over fresh missions (III-C).
 
     Raises ValueError if the missions or the minibatches cannot be made of these settings.
     """
     torch.set_num_threads(training.threads)
-    rng, ppo, drops = np.random.default_rng(training.seed), training.ppo, training.drops_silence
-    inner = GraphVecEnv(training, rng)
-    env: VecEnv = inner
+    ppo, drops = training.ppo, training.drops_silence
+    env: VecEnv = GraphVecEnv(training, np.random.default_rng(training.seed))
     if training.reward == "velocity-variance":  # as in the authors' code
-        env = VecNormalize(inner, norm_obs=False, norm_reward=True, gamma=ppo.discount)
+        env = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=ppo.discount)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "You have specified a mini-batch size")  # one is smaller
         model = PPO(
@@ -51,7 +50,7 @@ def make_model(training: Training) -> tuple[PPO, np.random.Generator]:
         )
     # By optimiser steps, not by PPO's share of a budget, which a resumed run may raise.
     model.lr_schedule = lambda _: decayed_rate(ppo, model._n_updates)
-    return model, rng
+    return model
 
 
 def _batch_size(training: Training, num_envs: int) -> int:

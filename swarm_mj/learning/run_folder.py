@@ -1,24 +1,21 @@
-"""A run's folder: its files, what was asked for, and how far the run has come.
+"""A run's folder: its files, what was asked for, and what memory and disk the run takes.
 
 It holds `settings.json`, `checkpoint.pt`, `curve.csv` (one row an evaluation), `tensorboard/`,
 `policy.safetensors` (the one that is kept), `init.safetensors` (the one it began with, if any) and,
 on request, `replays/`.
 """
 
-import math
 import os
-from collections.abc import Callable, Collection, Iterable
-from dataclasses import asdict, dataclass, field
+from collections.abc import Collection
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated
 
-from msgspec import Meta
-
-from swarm_mj.learning.selection import Amount, Choice, Count, Row
+from swarm_mj.learning.selection import OTHER_FLIGHTS, num_missions
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.stored import POLICY
-from swarm_mj.protocol.costs import WindowCosts
-from swarm_mj.system.atomic import write_csv, write_json
+from swarm_mj.replay.recorder import replay_file, replay_memory
+from swarm_mj.system import needs
+from swarm_mj.system.atomic import write_json
 from swarm_mj.system.fields import check, setting
 from swarm_mj.system.reading import read_document, read_file
 
@@ -77,86 +74,6 @@ class TrainingRun:
     init: Path | None = None  # the stored policy that it begins with
 
 
-@dataclass(kw_only=True)
-class Accumulator:
-    """Costs of the missions in training since the last evaluation.
-
-    The logger's own means would not survive an interruption: these are in the checkpoint.
-    """
-
-    seconds: Amount = 0.0
-    decisions: Count = 0  # of teams
-    age_windows: Amount = 0.0  # summed over the decisions
-    attempted: Count = 0  # packets
-    delivered: Count = 0
-
-    def add(self, batches: Iterable[WindowCosts]) -> None:
-        """Add a window of all missions, but no time."""
-        for costs in batches:
-            self.decisions += len(costs.age_windows)
-            self.age_windows += float(costs.age_windows.sum())
-            self.attempted += int(costs.packets.attempted.sum())
-            self.delivered += int(costs.packets.delivered.sum())
-
-    def means(self) -> Row:
-        """Return means per mission and window; none before the first."""
-        if not self.decisions:
-            return {}
-        return {
-            "rollout/aoi": self.age_windows / self.decisions,
-            "rollout/packets_per_window": self.attempted / self.decisions,
-            "rollout/delivery_ratio": self.delivered / max(1, self.attempted),
-            "rollout/decisions_per_s": self.decisions / max(self.seconds, 1e-9),
-        }
-
-
-@dataclass(kw_only=True)
-class Progress:
-    """The state of a run, but for its weights and missions."""
-
-    decisions: Count = 0  # of teams, in all sessions
-    minutes: Amount = 0.0  # in all sessions, evaluations included
-    next_evaluation: Count = 0  # team decisions
-    next_replay: Count = 0  # team decisions
-    best_objective: Annotated[float, Meta(ge=0.0)] = math.inf
-    curve: list[Row] = field(default_factory=list)  # one row an evaluation
-    since_evaluation: Accumulator = field(default_factory=Accumulator)
-    optimiser: Row = field(default_factory=dict)  # what PPO last logged of itself
-    choice: Choice | None = None  # of the policy that is kept; None: it is of the best evaluation
-    evaluation_minutes: Amount = 0.0  # that the last one took
-
-    @property
-    def has_chosen(self) -> bool:
-        """True if the kept policy was selected after the last training step."""
-        return self.choice is not None and self.choice.run_decisions == self.decisions
-
-    @property
-    def best(self) -> Row | None:
-        """The best evaluation."""
-        return min(self.curve, key=lambda row: row["objective"], default=None)
-
-    def write_curve(self, folder: Path) -> None:
-        """Write the learning curve into a run's folder; later rows may have more columns."""
-        names = list(dict.fromkeys(name for row in self.curve for name in row))
-        write_csv(folder / CURVE, names, self.curve)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Status:
-    """A run's state after a window of training or of an evaluation, for listeners."""
-
-    decisions: int
-    minutes: float
-    aoi: float  # of the missions in training, in the last window [windows]
-    progress: Progress  # with the curve so far; the run's own, so only to be read
-    evaluated: float | None  # the share of an evaluation that is flown; None while training
-    what: str = "Training"  # or what is flown
-
-
-# Returns whether to go on; if not, the rollout is finished, or the evaluation left for later.
-Listener = Callable[[Status], bool]
-
-
 def write_run(folder: Path, run: TrainingRun) -> None:
     """Write a run's `settings.json`; raises OSError if the folder cannot be written."""
     init = None if run.init is None else str(run.init.resolve())
@@ -205,10 +122,8 @@ def check_new(folder: Path) -> None:
 
 
 def check_begun(folder: Path) -> None:
-    """Raise ValueError if the run in a folder cannot go on: it lost its checkpoint, or has links.
-
-    Links that lead out of the folder would have the run replace other files there.
-    """
+    """Raise ValueError if a folder's run cannot go on: it lost its checkpoint, or has links."""
+    # Through links that lead out of the folder, the run would replace other files.
     for path in folder.rglob("*"):
         if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
             raise ValueError(f"{path} is a link that leads out of the run; copy what it leads to")
@@ -218,3 +133,50 @@ def check_begun(folder: Path) -> None:
             f"{folder} has lost its {CHECKPOINT}, so its run cannot go on; put it back, or begin "
             "another run in another folder, by --out without --resume"
         )
+
+
+def training_needs(training: Training, limits: Limits) -> needs.Needs:
+    """Estimate a run: a rollout and the passes over it, held-out missions, checkpoints, replays."""
+    first = replace(training.mission, num_robots=training.robots[0])  # of the replays
+    size, rollout = max(training.robots), rollout_bytes(training)
+    decisions = limits.decisions or MAX_DECISIONS
+    num_flown = num_missions(training, decisions, 1 + OTHER_FLIGHTS)  # at most, to choose
+    held_out, under_way = (
+        needs.missions_memory(size, number, is_learned=True)
+        for number in (num_flown, training.missions)
+    )
+    # What leaves out silent rows sorts a copy of the others before it passes over them.
+    passes = max(2.0 * rollout, rollout + passes_bytes(training))
+    memory = held_out + (under_way - needs.LIBRARIES - needs.TORCH) + passes
+    file = 2.0 * training.missions * size * first.num_windows + 0.01 * needs.GB
+    addresses = needs.ADDRESSES + needs.OF_TORCH
+    if limits.replay_every is None:
+        return needs.Needs(memory=memory, addresses=addresses, file=file)
+    replay = replay_file(first)
+    num_replays = 1 + (limits.decisions or 0) // limits.replay_every
+    return needs.Needs(
+        memory=memory + replay_memory(first, first.num_windows),
+        addresses=addresses + needs.OF_RERUN,
+        file=file + num_replays * replay,
+        largest_file=max(file, replay),
+    )
+
+
+def rollout_bytes(training: Training) -> int:
+    """Return the size of a run's largest arrays: the rollout, and the robots' packet memory."""
+    nodes = max(training.robots)
+    rows = training.missions * nodes  # a graph each
+    graph = nodes * (4 * training.network.num_features + 4 + 1)  # features, parent, may address
+    remembered = 4 * nodes**2 if training.features in ("local", "extended") else 0
+    return rows * (graph * (training.ppo.num_steps + 1) + remembered)
+
+
+def passes_bytes(training: Training) -> float:
+    """Return the size of the activations that a minibatch keeps for its gradient."""
+    nodes, ppo, shape = max(training.robots), training.ppo, training.network
+    rows = training.missions * nodes * ppo.num_steps / ppo.num_minibatches
+    kept = 0.4 if training.drops_silence else 1.0  # of the rows
+    directions = 2 if shape.edges == "both" else 1
+    layers = (shape.receptive_field + 1) * (shape.depth + 1) * (2 + directions)
+    networks = 1 if training.shares_trunk else 2
+    return 4.0 * kept * rows * nodes * shape.latent * layers * networks

@@ -1,17 +1,20 @@
-"""Which policy of a run is kept, and when a run no longer learns: decided from its curve alone.
+"""The state of a run: its learning curve, which of its policies is kept, when it stops learning.
 
 The best of many noisy evaluations is biased. So the best few are flown again, on missions that
 none of them was judged on, and the reported age is from a third set. `held_out` flies them.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta
 
 from swarm_mj.learning.settings import Training
+from swarm_mj.protocol.costs import WindowCosts
+from swarm_mj.system.atomic import write_csv
 
 ORACLE = "greedy-oracle"
 # Policies without a payload or training, and what each knows.
@@ -60,6 +63,91 @@ class Choice:
     others: dict[str, Cost]  # on the same missions: `COMPARED`, and `first`
 
 
+@dataclass(kw_only=True)
+class Accumulator:
+    """Costs of the missions in training since the last evaluation.
+
+    The logger's own means would not survive an interruption: these are in the checkpoint.
+    """
+
+    seconds: Amount = 0.0
+    decisions: Count = 0  # of teams
+    age_windows: Amount = 0.0  # summed over the decisions
+    attempted: Count = 0  # packets
+    delivered: Count = 0
+
+    def add(self, batches: Iterable[WindowCosts]) -> None:
+        """Add a window of all missions, but no time."""
+        for costs in batches:
+            self.decisions += len(costs.age_windows)
+            self.age_windows += float(costs.age_windows.sum())
+            self.attempted += int(costs.packets.attempted.sum())
+            self.delivered += int(costs.packets.delivered.sum())
+
+    def means(self) -> Row:
+        """Return means per mission and window; none before the first."""
+        if not self.decisions:
+            return {}
+        return {
+            "rollout/aoi": self.age_windows / self.decisions,
+            "rollout/packets_per_window": self.attempted / self.decisions,
+            "rollout/delivery_ratio": self.delivered / max(1, self.attempted),
+            "rollout/decisions_per_s": self.decisions / max(self.seconds, 1e-9),
+        }
+
+
+@dataclass(kw_only=True)
+class Progress:
+    """The state of a run, but for its weights and missions."""
+
+    decisions: Count = 0  # of teams, in all sessions
+    minutes: Amount = 0.0  # in all sessions, evaluations included
+    next_evaluation: Count = 0  # team decisions
+    next_replay: Count = 0  # team decisions
+    best_objective: Annotated[float, Meta(ge=0.0)] = math.inf
+    curve: list[Row] = field(default_factory=list)  # one row an evaluation
+    since_evaluation: Accumulator = field(default_factory=Accumulator)
+    optimiser: Row = field(default_factory=dict)  # what PPO last logged of itself
+    choice: Choice | None = None  # of the policy that is kept; None: it is of the best evaluation
+    evaluation_minutes: Amount = 0.0  # that the last one took
+
+    @property
+    def has_chosen(self) -> bool:
+        """True if the kept policy was selected after the last training step."""
+        return self.choice is not None and self.choice.run_decisions == self.decisions
+
+    @property
+    def best(self) -> Row | None:
+        """The best evaluation."""
+        return min(self.curve, key=lambda row: row["objective"], default=None)
+
+    def has_stalled(self, patience: int | None) -> bool:
+        """Return whether the last `patience` evaluations brought no gain; never with None or 0."""
+        if not patience or len(self.curve) <= patience:
+            return False
+        before, since = self.curve[:-patience], self.curve[-patience:]
+        least_before, least = (min(row["objective"] for row in rows) for rows in (before, since))
+        return least > (1.0 - MIN_GAIN) * least_before
+
+    def write_curve(self, path: Path) -> None:
+        """Write the learning curve; later rows may have more columns."""
+        write_csv(path, list(dict.fromkeys(name for row in self.curve for name in row)), self.curve)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Status:
+    """A run's state after a window of training or of an evaluation, for listeners."""
+
+    progress: Progress  # the run's own, so only to be read
+    aoi: float = math.nan  # of the missions in training, in the last window [windows]
+    evaluated: float | None = None  # the share of an evaluation that is flown; None while training
+    what: str = "Training"  # or what is flown
+
+
+# Returns whether to go on; if not, the rollout is finished, or the evaluation left for later.
+Listener = Callable[[Status], bool]
+
+
 def column(cost: str, name: str) -> str:
     """Return the learning curve's column for a cost of a policy of `REFERENCES`."""
     return f"{cost}_{name.replace('-', '_')}"
@@ -101,22 +189,9 @@ def num_missions(training: Training, decisions: int, num_flights: int) -> int:
     return max(training.held_out, min(MAX_MISSIONS, within))
 
 
-def reserved_minutes(
-    training: Training, decisions: int, evaluation_minutes: float, limit: float
-) -> float:
+def reserved_minutes(training: Training, progress: Progress, limit: float) -> float:
     """Return the part of a run's minutes that its last evaluation and its choice will take."""
     num_flights = NUM_BEST + 1 + OTHER_FLIGHTS
-    missions = num_flights * num_missions(training, decisions, num_flights)
-    needed = evaluation_minutes * (1 + missions / training.held_out)
+    missions = num_flights * num_missions(training, progress.decisions, num_flights)
+    needed = progress.evaluation_minutes * (1 + missions / training.held_out)
     return min(needed, RESERVED_SHARE * limit)
-
-
-def has_stalled(curve: Sequence[Row], patience: int | None) -> bool:
-    """Return whether the last `patience` evaluations brought no gain; never with None or 0."""
-    if not patience or len(curve) <= patience:
-        return False
-    before, since = (
-        min((row["objective"] for row in rows), default=math.inf)
-        for rows in (curve[:-patience], curve[-patience:])
-    )
-    return since > (1.0 - MIN_GAIN) * before

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components
@@ -167,24 +167,22 @@ def usual_settings(credit: str, mission: Mission, robots: Sequence[int], seed: i
     Raises ValueError for values that are unknown or out of range.
     """
     check_value(Training.__dataclass_fields__["credit_assignment"], credit)
-    own = _per_team(is_reference=mission.preset == "reference") if credit == "team" else {}
-    return Training(mission=mission, robots=tuple(robots), seed=seed, **own)
-
-
-def _per_team(*, is_reference: bool) -> dict[str, Any]:
+    usual = Training(mission=mission, robots=tuple(robots), seed=seed)
+    if credit == "robot":
+        return usual
+    is_reference = mission.preset == "reference"
     # III-C, or the authors' code: other features, and two numbers per node. Both have the code's
     # edges. Over the text's, which lead from children to parents, nothing of the robot itself
     # reaches a teammate's node: its recipient could depend neither on where it is nor on the time.
     features, num_outputs = ("reference", 2) if is_reference else ("paper", 1)
-    network = GnnShape(
-        num_features=num_features(features), num_outputs=num_outputs, edges="reference"
+    inputs = num_features(features)
+    return replace(
+        usual,
+        credit_assignment="team",
+        features=features,
+        network=GnnShape(num_features=inputs, num_outputs=num_outputs, edges="reference"),
+        shares_trunk=False,
+        silence_logit=0.0 if is_reference else EVEN_SILENCE,
+        ppo=TEAM_REFERENCE if is_reference else TEAM_PAPER,
+        missions=32,
     )
-    return {
-        "credit_assignment": "team",
-        "features": features,
-        "network": network,
-        "shares_trunk": False,
-        "silence_logit": 0.0 if is_reference else EVEN_SILENCE,
-        "ppo": TEAM_REFERENCE if is_reference else TEAM_PAPER,
-        "missions": 32,
-    }

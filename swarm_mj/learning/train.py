@@ -1,22 +1,36 @@
 """The training run (III-C): PPO's loop from an empty folder or a checkpoint to a stored policy."""
 
+import math
+import time
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from stable_baselines3 import PPO
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
-from swarm_mj.learning import checkpoint, run_folder
+from swarm_mj.learning import checkpoint, held_out, run_folder, selection
 from swarm_mj.learning.actor_critic import GnnActorCritic
-from swarm_mj.learning.callback import TrainingCallback
+from swarm_mj.learning.graph_vec_env import env_of
 from swarm_mj.learning.ppo import make_model
-from swarm_mj.learning.run_folder import CHECKPOINT, INIT, SETTINGS, Progress, TrainingRun
-from swarm_mj.policies.stored import read_policy, save_policy
+from swarm_mj.learning.run_folder import CHECKPOINT, CURVE, INIT, REPLAYS, SETTINGS, TrainingRun
+from swarm_mj.learning.selection import Accumulator, Choice, Listener, Progress, Row
+from swarm_mj.policies.policy_config import GnnConfig
+from swarm_mj.policies.stored import POLICY, read_policy, save_policy
 from swarm_mj.system.outputs import owned
+from swarm_mj.system.provenance import commit, version
+
+# What PPO logs of itself, by its names.
+OPTIMISER = [
+    f"train/{name}"
+    for name in ("entropy", "explained_variance", "approx_kl", "clip_fraction", "value_loss")
+]
 
 
 def train(
-    run: TrainingRun, folder: Path, *, listener: run_folder.Listener, is_resumed: bool = False
+    run: TrainingRun, folder: Path, *, listener: Listener, is_resumed: bool = False
 ) -> Progress:
     """Train until a limit, or until the listener returns False; return where the run stands.
 
@@ -31,38 +45,202 @@ def train(
     check_folder(folder)
     with owned(folder / SETTINGS):
         check_folder(folder)  # a run may have begun, or come further, meanwhile
-        model, rng = make_model(run.training)
-        progress, networks = _begun(folder, run, model, rng)
-        model.set_logger(configure(str(folder / run_folder.TENSORBOARD), ["tensorboard"]))
-        callback = TrainingCallback(model, run, folder, progress, networks, rng, listener)
+        session = TrainingCallback(run, folder, listener)
         try:
-            callback.learn()
-            callback.choose()
+            session.learn()
+            session.choose()
         finally:
-            model.logger.close()
-    return progress
+            session._ppo.logger.close()
+    return session.progress
 
 
-def _begun(
-    folder: Path, run: TrainingRun, model: PPO, rng: np.random.Generator
-) -> tuple[Progress, checkpoint.Networks]:
-    """Take a run to its last checkpoint, or else to its beginning; then it can be resumed."""
-    kept, own, progress, init = folder / CHECKPOINT, folder / INIT, Progress(), None
-    networks: checkpoint.Networks = {}
-    # Nothing is written before all that is read has been checked.
-    if kept.exists():
-        progress, networks = checkpoint.load(kept, run.training, model, rng)
-    elif run.init is not None:
-        path = own if own.exists() else run.init
-        init = read_policy(path)
-        if init[1].network != run.training.network:
-            raise ValueError(f"policy {path} has another network than the run that begins with it")
-    run_folder.write_run(folder, run)
-    if progress.curve:
-        progress.write_curve(folder)  # the file may be ahead of the checkpoint
-    if init is not None:
-        assert isinstance(model.policy, GnnActorCritic)
-        model.policy.take_acting_network(init[0])
-        if not own.exists():
-            save_policy(own, *init)
-    return progress, networks
+class Stopped(Exception):  # noqa: N818 - nothing went wrong
+    """Ends an evaluation that the listener does not wait for."""
+
+
+class TrainingCallback(BaseCallback):
+    """One session of a run; PPO calls it after every window of a rollout."""
+
+    def __init__(self, run: TrainingRun, folder: Path, listener: Listener) -> None:
+        """Take a run to its last checkpoint, or else to its beginning; then it can be resumed."""
+        super().__init__()
+        self._run, self._training, self._folder, self._listener = (
+            run,
+            run.training,
+            folder,
+            listener,
+        )
+        self._ppo = make_model(run.training)
+        self._env, self._aoi, self._goes_on = env_of(self._ppo), math.nan, True
+        self.progress, self._networks = Progress(), checkpoint.Networks()
+        kept, own, init = folder / CHECKPOINT, folder / INIT, None
+        # Nothing is written before all that is read has been checked.
+        if kept.exists():
+            begun = checkpoint.load(kept, run.training, self._ppo)
+            self.progress, self._networks = begun
+        elif run.init is not None:
+            path = own if own.exists() else run.init
+            init = read_policy(path)
+            if init[1].network != run.training.network:
+                raise ValueError(f"policy {path} has another network than the run begun with it")
+        run_folder.write_run(folder, run)
+        if self.progress.curve:
+            self.progress.write_curve(folder / CURVE)  # the file may be ahead of the checkpoint
+        if init is not None:
+            assert isinstance(self._ppo.policy, GnnActorCritic)
+            self._ppo.policy.take_acting_network(init[0])
+            if not own.exists():
+                save_policy(own, *init)
+        self._ppo.set_logger(configure(str(folder / run_folder.TENSORBOARD), ["tensorboard"]))
+        self._counted_s, self._saved_s = time.monotonic(), -math.inf  # counted: in the progress
+
+    def learn(self) -> None:
+        """Alternate rollouts and PPO's passes over them until a limit, or the listener, ends it."""
+        model, progress, patience = self._ppo, self.progress, self._run.limits.patience
+        model._setup_learn(0, self, reset_num_timesteps=model.num_timesteps == 0)
+        # PPO's own loop knows no minutes and no stall, and would dump its logs by itself.
+        while True:
+            self._count_time()
+            is_last = self._is_over() or not self._goes_on
+            # Less --patience may end a run between evaluations: the last weights are judged first.
+            self._between_rollouts(is_last=is_last or progress.has_stalled(patience))
+            if is_last or not self._goes_on or progress.has_stalled(patience):
+                return
+            env = model.get_env()
+            assert env is not None
+            model.collect_rollouts(env, self, model.rollout_buffer, model.n_steps)
+            model.train()
+
+    def _is_over(self) -> bool:
+        """Return whether a limit is met; of the minutes, the selection will take some."""
+        progress, limits = self.progress, self._run.limits
+        if progress.decisions >= (limits.decisions or math.inf):
+            return True
+        if limits.minutes is None:
+            return False
+        reserved = selection.reserved_minutes(self._training, progress, limits.minutes)
+        return progress.minutes + reserved >= limits.minutes
+
+    def _on_step(self) -> bool:
+        costs, progress = self._env.costs, self.progress
+        progress.since_evaluation.add(costs)
+        progress.decisions += self._env.num_teams
+        self._aoi = float(np.mean([each.age_windows.mean() for each in costs]))
+        self._report()
+        return True
+
+    def _on_rollout_end(self) -> None:
+        # PPO's own mean is over the rows it learns from; over all rows, a decision's negative
+        # log-probability has the entropy for its mean.
+        log_p = self._ppo.rollout_buffer.log_probs
+        self.logger.record("train/entropy", -float(log_p.mean()))
+
+    def _report(self, what: str = "Training", flown: float | None = None) -> None:
+        """Call the listener; raise Stopped if it does not wait for the share of a flight to fly."""
+        self._count_time()
+        status = selection.Status(progress=self.progress, aoi=self._aoi, evaluated=flown, what=what)
+        self._goes_on = self._listener(status) and self._goes_on
+        if flown is not None and not self._goes_on:
+            raise Stopped
+
+    def _count_time(self) -> None:
+        """Move the time since the last call into the progress."""
+        now_s = time.monotonic()
+        self.progress.minutes += (now_s - self._counted_s) / 60.0
+        self.progress.since_evaluation.seconds += now_s - self._counted_s
+        self._counted_s = now_s
+
+    def _between_rollouts(self, *, is_last: bool) -> None:
+        """Evaluate, record a replay and keep a checkpoint, each if it is due."""
+        progress, decisions = self.progress, self.progress.decisions
+        # The last checkpoint is from before such a rollout.
+        if not all(torch.isfinite(weight).all() for weight in self._ppo.policy.parameters()):
+            raise ValueError(
+                f"the network's weights are no longer finite after {decisions} decisions; begin a "
+                "new run with a lower learning rate"
+            )
+        logged = self.logger.name_to_value
+        means = {name: float(logged[name]) for name in OPTIMISER if name in logged}
+        progress.optimiser = means or progress.optimiser  # of PPO's last passes over a rollout
+        is_new = not progress.curve or progress.curve[-1]["decisions"] < decisions
+        is_due = is_new and (is_last or decisions >= progress.next_evaluation)
+        if is_due:
+            if not progress.curve:
+                self._save()  # from the first evaluation on, a run without one has lost it
+            self._evaluate()
+        every = self._run.limits.replay_every
+        if every and decisions >= progress.next_replay and self._goes_on:
+            network = checkpoint.acting_network(self._ppo)
+            held_out.record_replay(self._training, network, decisions, self._folder / REPLAYS)
+            progress.next_replay = decisions - decisions % every + every
+        is_old = time.monotonic() - self._saved_s >= self._run.limits.checkpoint_every_s
+        if is_old or is_due or is_last or not self._goes_on:
+            self._save()
+
+    def _save(self) -> None:
+        self._count_time()
+        kept = self._training, self._ppo, self.progress, self._networks
+        checkpoint.save(self._folder / CHECKPOINT, *kept)
+        self._saved_s = time.monotonic()
+
+    def _evaluate(self) -> None:
+        """Fly the held-out missions, log, and keep the policy if it is the best."""
+        progress, training, every = self.progress, self._training, self._training.evaluate_every
+        decisions, network = progress.decisions, checkpoint.acting_network(self._ppo)
+        try:
+            flies_others = partial(self._report, "Flying others")
+            others = held_out.reference_columns(training, progress.curve, flies_others)
+            self._count_time()
+            means, begun = progress.since_evaluation.means(), progress.minutes
+            on_window = partial(self._report, "Evaluating")
+            costs = held_out.evaluate(training, network.to(self._ppo.device), on_window)
+        except Stopped:
+            return
+        self._count_time()
+        progress.evaluation_minutes = progress.minutes - begun
+        progress.since_evaluation = Accumulator()
+        progress.next_evaluation = decisions - decisions % every + every
+        row = {"decisions": float(decisions), "minutes": progress.minutes, **costs, **others}
+        progress.curve.append(row | means | progress.optimiser)
+        for name, value in progress.curve[-1].items():
+            self.logger.record(name if "/" in name else f"held_out/{name}", value)
+        self.logger.dump(decisions)
+        progress.write_curve(self._folder / CURVE)
+        self._networks[decisions] = network
+        kept = {int(row["decisions"]) for row in selection.candidates(progress.curve)}
+        for dropped in self._networks.keys() - kept:
+            del self._networks[dropped]
+        if costs["objective"] < progress.best_objective:
+            progress.best_objective, progress.choice = costs["objective"], None
+            self._keep(decisions, costs, None)
+        self._report()
+
+    def choose(self) -> None:
+        """Choose the policy that is kept, once nothing is left to train and if none is chosen."""
+        progress = self.progress
+        if not (self._goes_on and progress.curve) or progress.has_chosen:
+            return
+        flown = self._training, progress.curve, self._networks
+        try:
+            choice, costs = held_out.choose(*flown, partial(self._report, "Choosing"))
+        except Stopped:
+            return
+        self._keep(choice.decisions, costs, choice)
+        progress.choice = choice
+        self._save()
+
+    def _keep(self, decisions: int, costs: Row, choice: Choice | None) -> None:
+        """Store the policy of the evaluation after so many decisions, with its costs."""
+        training = self._training
+        (row,) = (each for each in self.progress.curve if each["decisions"] == decisions)
+        made = {"command": self._run.command, "decisions": decisions, "minutes": row["minutes"]}
+        config = GnnConfig(
+            network=training.network,
+            features=training.features,
+            silence_logit=training.silence_logit,
+            training=asdict(training) | made,
+            evaluation={"aoi_sem": None, **costs} | held_out.notes_of(training, choice),
+            commit=commit(),
+            version=version(),
+        )
+        save_policy(self._folder / POLICY, self._networks[decisions], config)

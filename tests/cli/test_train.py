@@ -13,8 +13,8 @@ import torch
 from forks import files
 
 from swarm_mj.cli import main
-from swarm_mj.learning.callback import TrainingCallback
 from swarm_mj.learning.run_folder import read_run
+from swarm_mj.learning.train import TrainingCallback
 from swarm_mj.policies.stored import read_policy
 from swarm_mj.replay.read import windows
 
@@ -111,7 +111,7 @@ def test_ctrl_c_finishes_the_rollout_and_tells_how_to_go_on(capsys):
 
 
 def test_ctrl_c_in_an_evaluation_leaves_it_for_later(here, capsys):
-    with ctrl_c_at("_on_window", 5):
+    with ctrl_c_at("_report", 5):
         assert train("--out", "r", *SMALL, "--budget", 128) == 130
     assert "none yet" in capsys.readouterr().out
     assert train("--out", "r", "--resume") == 0
@@ -150,13 +150,6 @@ def test_limits_are_kept_and_may_be_moved(here, capsys):
     assert (limits.decisions, limits.minutes) == (None, 1e-6)
     assert read_run(here / "r").command.endswith("--evaluate-every 128 --budget 128")
     capsys.readouterr()
-
-
-def test_a_run_begins_with_a_policy_and_its_network(whole, here):
-    """Which has 4 wide layers, whatever the usual ones are."""
-    policy = whole[0] / "runs" / "whole"
-    assert train("--out", "r", *MISSIONS, "--held-out", 2, "--init", policy, "--budget", 1) == 0
-    assert read_policy(here / "r")[0].shape.latent == 4
 
 
 @pytest.mark.usefixtures("here")

@@ -1,7 +1,6 @@
 """The bar of a training run, a line for every evaluation, and the report at its end."""
 
 import io
-import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,8 +15,8 @@ from swarm_mj.cli.train_report import (
     share_done,
     verdicts,
 )
-from swarm_mj.learning.run_folder import Limits, Progress, Status, TrainingRun
-from swarm_mj.learning.selection import Choice, Cost
+from swarm_mj.learning.run_folder import Limits, TrainingRun
+from swarm_mj.learning.selection import Choice, Cost, Progress, Status
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import paper
 
@@ -135,10 +134,8 @@ SHORT = replace(RUN, limits=Limits(decisions=4_000))
 ROW = {"decisions": 1000.0, "minutes": 0.5, "aoi": 31.5, "aoi_sem": 0.25, "objective": 1.0}
 
 
-def status(decisions, minutes, curve=(), **more):
-    """A run's state; the rest is as in training."""
-    usual = {"aoi": math.nan, "evaluated": None, "progress": Progress(curve=list(curve))}
-    return Status(decisions=decisions, minutes=minutes, **(usual | more))
+def at(decisions, minutes, curve=()):
+    return Progress(decisions=decisions, minutes=minutes, curve=list(curve))
 
 
 @pytest.mark.parametrize(
@@ -152,12 +149,12 @@ def status(decisions, minutes, curve=(), **more):
     ],
 )
 def test_the_share_done_is_by_the_nearest_limit(limits, share):
-    assert share_done(status(1_000, 2.0), limits) == pytest.approx(share)
+    assert share_done(at(1_000, 2.0), limits) == pytest.approx(share)
 
 
 def test_the_time_left_is_by_this_sessions_speed():
     """A session that began at 1000 decisions makes 500 a minute, whatever those before made."""
-    start, now = status(1_000, 60.0), status(2_000, 62.0)
+    start, now = at(1_000, 60.0), at(2_000, 62.0)
     assert minutes_left(now, start, Limits(decisions=3_500)) == pytest.approx(3.0)
     assert minutes_left(now, start, Limits(minutes=64.0)) == pytest.approx(2.0)
     assert minutes_left(now, start, Limits(decisions=3_500, minutes=64.0)) == pytest.approx(2.0)
@@ -179,7 +176,9 @@ def test_every_new_evaluation_is_a_line_and_those_of_earlier_sessions_are_not():
     better = ROW | {"decisions": 3000.0, "aoi": 25.0, "objective": 0.5}
     better |= {"aoi_spatial_tdma": 21.0, "aoi_greedy_oracle": 12.0}
     curves = ([ROW], [ROW, worse], [ROW, worse], [ROW, worse, better])
-    statuses = [status(1_000 * n, float(n), curve) for n, curve in enumerate(curves, start=1)]
+    statuses = [
+        Status(progress=at(1_000 * n, float(n), curve)) for n, curve in enumerate(curves, start=1)
+    ]
     shown, answers, _ = heard_by(lambda: False, statuses)
     first, second = (" ".join(line.split()) for line in shown.splitlines())
     assert first == "2,000 decisions 0.5 min held-out age 35.00 ± 0.25"
@@ -190,9 +189,9 @@ def test_every_new_evaluation_is_a_line_and_those_of_earlier_sessions_are_not():
 
 def test_the_bar_says_where_the_run_stands_and_what_is_evaluated():
     statuses = [
-        status(1_000, 1.0, [ROW]),
-        status(2_000, 2.0, [ROW], aoi=28.0),
-        status(2_000, 2.0, [ROW], evaluated=0.4, what="Choosing"),
+        Status(progress=at(1_000, 1.0, [ROW])),
+        Status(progress=at(2_000, 2.0, [ROW]), aoi=28.0),
+        Status(progress=at(2_000, 2.0, [ROW]), evaluated=0.4, what="Choosing"),
     ]
     shown, _, _ = heard_by(lambda: False, statuses[:2], terminal=True)
     assert "Training" in shown
@@ -203,7 +202,9 @@ def test_the_bar_says_where_the_run_stands_and_what_is_evaluated():
 
 
 def test_ctrl_c_is_passed_on_and_said_once():
-    shown, answers, watch = heard_by(lambda: True, [status(1, 1.0), status(2, 2.0)])
+    shown, answers, watch = heard_by(
+        lambda: True, [Status(progress=at(n, float(n))) for n in (1, 2)]
+    )
     assert answers == [False, False]
     assert watch.has_stopped
     assert shown.count("Interrupted: finishing this rollout") == 1
@@ -213,7 +214,7 @@ def test_ctrl_c_shows_in_the_bar_before_the_run_is_heard_of_again():
     file, pressed = io.StringIO(), []
     console = Console(file=file, force_terminal=True, width=100)
     with Watch(console, SHORT, lambda: bool(pressed)) as watch:
-        watch(status(1, 1.0))
+        watch(Status(progress=at(1, 1.0)))
         pressed.append(1)
         watch._bar.refresh()
         assert "Finishing" in file.getvalue()

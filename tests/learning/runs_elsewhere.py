@@ -21,7 +21,7 @@ from swarm_mj.cli import main
 from swarm_mj.learning import selection
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.held_out import reference_columns
-from swarm_mj.learning.run_folder import Progress
+from swarm_mj.learning.selection import Progress
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import paper
 from swarm_mj.policies.learned import sample
@@ -137,7 +137,7 @@ def _load_compiled_functions():
     for recipients in ([1, 1, 2, 3], [0, 1, 0, 3]):
         env.step(np.array(recipients))
     sample(np.zeros((2, 3), dtype=np.float32), np.array([0.1, 0.9]))
-    reference_columns(small_training(), lambda _share: None)
+    reference_columns(small_training(), [], lambda _share: None)
 
 
 def _in_a_child(work):

@@ -42,7 +42,7 @@ GIVEN["robot", "reference"] = GIVEN["robot", "paper"]
 def usual_model(credit, preset, task="stationary", **changes):
     """What PPO trains with the usual settings, of 5 robots."""
     mission = PRESETS[preset](task, num_robots=5, num_windows=20)
-    return make_model(replace(usual_settings(credit, mission, (5,)), **changes))[0]
+    return make_model(replace(usual_settings(credit, mission, (5,)), **changes))
 
 
 @pytest.mark.parametrize(("credit", "preset"), GIVEN)
@@ -86,6 +86,19 @@ def test_rewards_are_normalised_only_where_velocity_variance_is_the_cost(preset)
 
 def with_ppo(training, **changes):
     return replace(training, ppo=replace(training.ppo, **changes))
+
+
+def test_the_optimiser_steps_at_that_rate():
+    """Two passes a rollout and three minibatches a pass: the third rollout begins at step 12."""
+    training = with_ppo(small_training(), learning_rate=1e-3, decay=0.5, decay_steps=12)
+    model = make_model(training)
+    for rollouts, rate in ((2, 1e-3), (4, 0.5e-3)):
+        num_steps = rollouts * training.ppo.num_steps * model.n_envs - model.num_timesteps
+        model.learn(num_steps, reset_num_timesteps=False)
+        (group,) = model.policy.optimizer.param_groups
+        assert group["lr"] == pytest.approx(rate)
+        made = next(iter(model.policy.optimizer.state.values()))["step"]
+        assert made == rollouts * 2 * 3
 
 
 def test_minibatches_need_two_rows_each():
@@ -201,7 +214,7 @@ class Watch(BaseCallback):
 
 def one_rollout(training, monkeypatch):
     """A model after one rollout and before any optimiser step, and what happened in it."""
-    model, _ = make_model(training)
+    model = make_model(training)
     monkeypatch.setattr(model, "train", lambda: None)
     watch = Watch()
     model.learn(training.ppo.num_steps * model.n_envs, watch)

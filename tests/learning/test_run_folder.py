@@ -1,33 +1,34 @@
-"""A run's folder: its settings on disk, what may begin there, what kills leave, the curve."""
+"""A run's folder: its settings on disk, what may begin there, what kills leave, its size."""
 
-import csv
 import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from small_runs import small_training
 
-from swarm_mj.learning.graph_vec_env import GraphVecEnv
+from swarm_mj.learning.ppo import make_model
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
     CURVE,
     POLICY,
     SETTINGS,
-    Accumulator,
     Limits,
-    Progress,
     TrainingRun,
     check_begun,
     check_new,
     read_run,
+    rollout_bytes,
+    training_needs,
     write_run,
 )
+from swarm_mj.learning.settings import usual_settings
+from swarm_mj.mission import paper
 from swarm_mj.mission.components import Components
+from swarm_mj.policies.gnn.packet_memory import empty_memory
+from swarm_mj.replay.recorder import replay_file
 
 LIMITS = Limits(decisions=5, minutes=0.5, replay_every=3)
-ROW = {"decisions": 10.0, "aoi": 1 / 3, "objective": 0.2}
 RUN = TrainingRun(
     training=small_training(sizes=(4, 6)), limits=LIMITS, command="swarm-mj train --out x"
 )
@@ -119,40 +120,6 @@ def test_links_out_of_a_run_are_refused(tmp_path):
         check_begun(tmp_path / "run")
 
 
-def test_the_best_is_the_least_objective_and_the_first_of_equals():
-    assert Progress().best is None
-    rows = [ROW | {"objective": x, "decisions": float(n)} for n, x in enumerate((3.0, 1.0, 1.0))]
-    assert Progress(curve=rows).best is rows[1]
-
-
-def test_totals_are_per_mission_and_window():
-    training = small_training("team", sizes=(3,), groups=2)
-    env = GraphVecEnv(training, np.random.default_rng(1))
-    env.reset()
-    accumulator, ages, sent, arrived = Accumulator(), [], 0, 0
-    assert accumulator.means() == {}
-    for _ in range(5):
-        env.step(np.array([[1, 1, 2], [0, 2, 0], [0, 1, 2], [0, 1, 1]]))
-        accumulator.add(env.costs)
-        ages += [age for its in env.costs for age in its.age_windows]
-        sent += sum(its.packets.attempted.sum() for its in env.costs)
-        arrived += sum(its.packets.delivered.sum() for its in env.costs)
-    accumulator.seconds = 4.0
-    means = accumulator.means()
-    assert means["rollout/aoi"] == pytest.approx(sum(ages) / 20)
-    assert means["rollout/packets_per_window"] == sent / 20 == 1.0
-    assert means["rollout/delivery_ratio"] == pytest.approx(arrived / sent)
-    assert means["rollout/decisions_per_s"] == 5.0
-
-
-def test_a_curve_is_a_table_even_if_later_rows_have_more_columns(tmp_path):
-    Progress(curve=[ROW, ROW | {"train/entropy": 0.5}]).write_curve(tmp_path)
-    with (tmp_path / "curve.csv").open(newline="") as file:
-        first, second = csv.DictReader(file)
-    assert {name: float(x) for name, x in first.items() if x} == ROW
-    assert float(second["train/entropy"]) == 0.5
-
-
 def test_a_runs_own_parts_must_be_named(tmp_path):
     components = Components(channel="my_parts:Lossy", scene="my_parts:walls")
     run = replace(RUN, training=replace(RUN.training, components=components))
@@ -160,3 +127,28 @@ def test_a_runs_own_parts_must_be_named(tmp_path):
     with pytest.raises(ValueError, match="--channel my_parts:Lossy --scene my_parts:walls again"):
         read_run(tmp_path, ["my_parts:Lossy"])
     assert read_run(tmp_path, ["my_parts:Lossy", "my_parts:walls"]) == run
+
+
+# What a run takes of memory and disk.
+
+
+@pytest.mark.parametrize(("credit", "robots"), [("robot", 6), ("team", 6), ("robot", 40)])
+def test_a_rollout_is_of_the_arrays_that_are_made(credit, robots):
+    """With what robots remember of packets: at 40, more than the graph by which it exceeds them."""
+    mission = paper("stationary", num_robots=robots, range_ratio=0.5)
+    training = replace(usual_settings(credit, mission, (robots,)), missions=4)
+    buffer = make_model(training).rollout_buffer
+    made = sum(rows.nbytes for rows in buffer.observations.values())
+    if credit == "robot":
+        made += sum(array.nbytes for array in empty_memory(4, robots))
+    assert made < rollout_bytes(training) < 2.0 * made
+
+
+def test_replays_of_a_training_are_counted():
+    training = usual_settings("robot", paper("random-walk"), (40,))
+    none = training_needs(training, Limits(decisions=1000))
+    ten = training_needs(training, Limits(decisions=1000, replay_every=100))
+    each = replay_file(training.mission)
+    assert ten.file - none.file == pytest.approx(11 * each)
+    assert ten.memory > none.memory
+    assert ten.addresses > none.addresses

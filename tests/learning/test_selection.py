@@ -1,15 +1,19 @@
-"""What is chosen from a curve, by arithmetic in view."""
+"""A run's progress and what is chosen from its curve, by arithmetic in view."""
 
+import csv
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from small_runs import small_training
 
 from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED
+from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.selection import (
+    Accumulator,
+    Progress,
     candidates,
     finalists,
-    has_stalled,
     num_missions,
     reserved_minutes,
 )
@@ -67,12 +71,16 @@ def test_missions_that_choose_are_a_share_of_the_run(decisions, size):
 
 def test_minutes_are_reserved_for_every_flight_of_the_end_but_never_most_of_them():
     """The last evaluation, 4 finalists, 4 others: of 2 missions at first, as an evaluation has."""
-    training = small_training()
-    assert reserved_minutes(training, 0, 0.5, 60.0) == pytest.approx(0.5 + 8 * 0.5)
+
+    def reserved(decisions, evaluation, limit):
+        progress = Progress(decisions=decisions, evaluation_minutes=evaluation)
+        return reserved_minutes(small_training(), progress, limit)
+
+    assert reserved(0, 0.5, 60.0) == pytest.approx(0.5 + 8 * 0.5)
     # Half of 3200 decisions over 8 flights of 20 windows are 10 missions, 5 times as many.
-    assert reserved_minutes(training, 3200, 0.5, 60.0) == pytest.approx(0.5 + 8 * 2.5)
-    assert reserved_minutes(training, 3200, 0.5, 2.0) == 1.0
-    assert reserved_minutes(training, 0, 0.0, 2.0) == 0.0
+    assert reserved(3200, 0.5, 60.0) == pytest.approx(0.5 + 8 * 2.5)
+    assert reserved(3200, 0.5, 2.0) == 1.0
+    assert reserved(0, 0.0, 2.0) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -93,9 +101,44 @@ def test_minutes_are_reserved_for_every_flight_of_the_end_but_never_most_of_them
 def test_a_run_has_stalled_if_the_last_evaluations_gain_less_than_half_a_percent(
     objectives, patience, stalled
 ):
-    assert has_stalled(curve(*objectives), patience) is stalled
+    assert Progress(curve=curve(*objectives)).has_stalled(patience) is stalled
 
 
 def test_missions_that_choose_tell_or_train_are_others():
     assert HELD_OUT_SEED + 10_000 <= CHOICE_SEED
     assert CHOICE_SEED + 10_000 <= TEST_SEED < TEST_SEED + 10_000 < FIRST_TRAINING_SEED
+
+
+def test_the_best_is_the_least_objective_and_the_first_of_equals():
+    assert Progress().best is None
+    rows = curve(3.0, 1.0, 1.0)
+    assert Progress(curve=rows).best is rows[1]
+
+
+def test_a_curve_is_a_table_even_if_later_rows_have_more_columns(tmp_path):
+    row = {"decisions": 10.0, "aoi": 1 / 3}
+    Progress(curve=[row, row | {"train/entropy": 0.5}]).write_curve(tmp_path / "curve.csv")
+    with (tmp_path / "curve.csv").open(newline="") as file:
+        first, second = csv.DictReader(file)
+    assert {name: float(x) for name, x in first.items() if x} == row
+    assert float(second["train/entropy"]) == 0.5
+
+
+def test_totals_are_per_mission_and_window():
+    training = small_training("team", sizes=(3,), groups=2)
+    env = GraphVecEnv(training, np.random.default_rng(1))
+    env.reset()
+    accumulator, ages, sent, arrived = Accumulator(), [], 0, 0
+    assert accumulator.means() == {}
+    for _ in range(5):
+        env.step(np.array([[1, 1, 2], [0, 2, 0], [0, 1, 2], [0, 1, 1]]))
+        accumulator.add(env.costs)
+        ages += [age for its in env.costs for age in its.age_windows]
+        sent += sum(its.packets.attempted.sum() for its in env.costs)
+        arrived += sum(its.packets.delivered.sum() for its in env.costs)
+    accumulator.seconds = 4.0
+    means = accumulator.means()
+    assert means["rollout/aoi"] == pytest.approx(sum(ages) / 20)
+    assert means["rollout/packets_per_window"] == sent / 20 == 1.0
+    assert means["rollout/delivery_ratio"] == pytest.approx(arrived / sent)
+    assert means["rollout/decisions_per_s"] == 5.0

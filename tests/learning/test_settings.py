@@ -9,7 +9,6 @@ from small_runs import small_training
 
 from swarm_mj.learning.settings import Training, usual_settings
 from swarm_mj.mission import PRESETS, paper, reference
-from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.system.reading import read_json
 
@@ -20,13 +19,6 @@ CREDITS = [(credit, preset) for credit in ("robot", "team") for preset in PRESET
 def test_settings_come_back_from_json_as_they_were(credit, preset):
     training = usual_settings(credit, PRESETS[preset]("random-walk"), (10, 40), seed=2**62)
     assert read_json(json.dumps(asdict(training)), Training) == training
-
-
-@pytest.mark.parametrize(("credit", "preset"), CREDITS)
-def test_a_network_takes_what_its_features_are(credit, preset):
-    training = usual_settings(credit, PRESETS[preset]("random-walk"), (10,))
-    names = make_extractor(training.features, training.mission).names
-    assert training.network.num_features == len(names)
 
 
 def test_credit_per_team_is_the_papers():
@@ -60,18 +52,12 @@ def test_silence_is_dropped_only_where_it_earns_nothing():
 @pytest.mark.parametrize(
     ("changes", "complaint"),
     [
-        ({"missions": 0}, "missions must be a whole number from 1 to 4096, not 0"),
         ({"missions": 4097}, "missions must be a whole number from 1 to 4096, not 4097"),
-        ({"seed": -1}, "seed must be a whole number from 0 to 9223372036854775807, not -1"),
         ({"seed": 2**63}, "not 9223372036854775808"),
         ({"evaluate_every": 0}, "evaluation interval must be a whole number from 1"),
-        ({"held_out": 0}, "held-out missions must be a whole number from 1 to 10000, not 0"),
-        ({"threads": 0}, "threads must be a whole number from 1 to 256, not 0"),
         ({"robots": (10, 1)}, "robots must be a whole number from 2 to 200, not 1"),
-        ({"robots": (201,)}, "robots must be a whole number from 2 to 200, not 201"),
         ({"reward": "velocity-variance"}, "reward velocity-variance is a team's"),
         ({"robots": ()}, "robots must have at least 1 size"),
-        ({"groups": 0}, "groups must be a whole number from 1 to 4096, not 0"),
         ({"features": "paper"}, "num_features is 18, but the paper features are 8"),
     ],
 )
