@@ -65,7 +65,7 @@ def run(options: TrainOptions) -> int:
         ending = "Out of memory" if is_memory else "Broken off"
         console.print(f"{ending}; the last checkpoint is kept.\nGo on:    {go_on}", markup=False)
         return FAILED if is_memory else INTERRUPTED
-    if not watch.has_begun:
+    if watch.start is None:
         console.print(
             "Nothing was left to train: raise --budget or --minutes, which count in all, or give "
             "--patience 0 if the run stopped early."
@@ -83,11 +83,8 @@ def _asked_run(options: TrainOptions) -> TrainingRun:
     names = (run_folder.SETTINGS, run_folder.CHECKPOINT, run_folder.CURVE, POLICY)
     written = (Output("run", options.out / name) for name in names)
     check_outputs(*written, inputs=[options.init] if options.init else [])
-    needs, way_out = (
-        run_folder.training_needs(run.training, run.limits),
-        "choose fewer --missions or --robots",
-    )
-    check_fits(needs, options.out, way_out, is_forced=options.yes)
+    needs = run_folder.training_needs(run.training, run.limits)
+    check_fits(needs, options.out, "choose fewer --missions or --robots", is_forced=options.yes)
     return run
 
 

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from swarm_mj.learning import selection
 from swarm_mj.learning.run_folder import Limits, TrainingRun
-from swarm_mj.learning.selection import ORACLE, REFERENCES, Progress, Status
+from swarm_mj.learning.selection import ORACLE, REFERENCES, Cost, Progress, Row, Status
 from swarm_mj.system.progress import WorkBar
 
 FINISHING = "finishing this rollout, then all is kept; Ctrl-C again breaks off at once"
@@ -26,25 +26,20 @@ class Watch(WorkBar):
         """Prepare the bar; `is_interrupted` says whether Ctrl-C was pressed."""
         super().__init__("Training", 1.0, console=console, shows_time_left=False)
         self._console, self._run, self._is_interrupted = console, run, is_interrupted
-        self._start: Progress | None = None  # of this session
+        self.start: Progress | None = None  # of this session, once there was anything to do
         self._num_rows = 0
         self.has_stopped = False  # whether the run was asked to stop
-
-    @property
-    def has_begun(self) -> bool:
-        """True once there was anything to do."""
-        return self._start is not None
 
     def __call__(self, status: Status) -> bool:
         """Show a status; return whether to go on."""
         progress, limits = status.progress, self._run.limits
-        if self._start is None:
-            self._start, self._num_rows = replace(progress), len(progress.curve)
+        if self.start is None:
+            self.start, self._num_rows = replace(progress), len(progress.curve)
         if len(progress.curve) > self._num_rows:
             self._num_rows = len(progress.curve)
             self._console.print(_row(self._run, progress))
         self.what = status.what
-        self.text = _text(status, self._start, limits)
+        self.text = _text(status, self.start, limits)
         self.move_to(share_done(progress, limits))
         if self._is_interrupted() and not self.has_stopped:
             self.has_stopped = True
@@ -75,33 +70,27 @@ def minutes_left(progress: Progress, start: Progress, limits: Limits) -> float |
 
 def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
     """Return rows for the closing table: the policy kept, and others on the same missions."""
-    best, choice = progress.best, progress.choice
+    training, best, choice = run.training, progress.best, progress.choice
     if best is None:
         return {}
-    first = progress.curve[0]
-    if choice is None:
-        decisions = "untrained" if best is first else f"after {best['decisions']:,.0f} decisions"
-        rows = {
-            "missions": f"{run.training.held_out} of each team size, which chose the policy",
-            "policy kept": f"{_age(best)} windows, {decisions}",
-            NAMES["first"]: f"{_age(first)} windows",
-        }
-        others = {name: f"{age:.2f} windows" for name, age in _reference_ages(best).items()}
+    first, cost = progress.curve[0], training.cost
+    if choice is None:  # of the best evaluation, the age is shown whatever the cost
+        cost, missions = "aoi", f"{training.held_out} of each team size, which chose the policy"
+        when = "untrained" if best is first else f"after {best['decisions']:,.0f} decisions"
+        kept, others = _age(best), {"first": _age(first)} | _reference_ages(best)
     else:
-        kept = _amount(run, choice.kept.mean, choice.kept.sem)
-        rows = {
-            "missions": f"{choice.num_missions} of each team size, which chose nothing",
-            "policy kept": f"{kept}, after {choice.decisions:,} decisions",
-        }
-        others = {name: _amount(run, x.mean, x.sem) for name, x in choice.others.items()}
-    for name, cost in others.items():
+        missions = f"{choice.num_missions} of each team size, which chose nothing"
+        when = f"after {choice.decisions:,} decisions"
+        kept, others = choice.kept, choice.others
+    rows = {"missions": missions, "policy kept": f"{_amount(kept, cost)}, {when}"}
+    for name, each in others.items():
         known = f"; {REFERENCES[name]}" if name in REFERENCES else ""
-        rows[NAMES.get(name, name)] = cost + known
+        rows[NAMES.get(name, name)] = _amount(each, cost) + known
     # The oracle flies few missions, those of evaluations only.
     if (age := _reference_ages(first).get(ORACLE)) is not None:
         missions = f"on {_oracle_missions(run)} of the evaluations"
-        rows[ORACLE] = f"{age:.2f} windows, {missions}; {REFERENCES[ORACLE]}"
-    elif max(run.training.robots) > (most := selection.ORACLE_ROBOTS):
+        rows[ORACLE] = f"{_amount(age, 'aoi')}, {missions}; {REFERENCES[ORACLE]}"
+    elif max(training.robots) > (most := selection.ORACLE_ROBOTS):
         rows[ORACLE] = f"not flown: it would take long with more than {most} robots"
     return rows
 
@@ -124,7 +113,8 @@ def verdicts(run: TrainingRun, progress: Progress) -> Iterator[str]:
         yield f"Training did not help: {begun} did best, and is the one kept."
     for name, cost in choice.others.items():
         if cost.behind > 0.0:
-            other, behind = NAMES.get(name, name), _amount(run, cost.behind, cost.behind_sem)
+            difference = Cost(mean=cost.behind, sem=cost.behind_sem)
+            other, behind = NAMES.get(name, name), _amount(difference, run.training.cost)
             is_clear = cost.behind_sem is not None and cost.behind > CLEAR * cost.behind_sem
             lost, level = f"loses to {other} by", f"is no better than {other}, which is ahead by"
             yield f"The policy kept {lost if is_clear else level} {behind} on the same missions."
@@ -140,11 +130,12 @@ def has_stopped_early(run: TrainingRun, progress: Progress) -> bool:
 def _row(run: TrainingRun, progress: Progress) -> str:
     row = progress.curve[-1]
     note = "  best so far" if row is progress.best else ""
-    notes = {ORACLE: f" ({_oracle_missions(run)})"}
+    flown = {ORACLE: f" ({_oracle_missions(run)})"}
     ages = _reference_ages(row).items()
-    others = "".join(f"  {name} {age:.2f}{notes.get(name, '')}" for name, age in ages)
+    others = "".join(f"  {name} {age.mean:.2f}{flown.get(name, '')}" for name, age in ages)
     when = f"{row['decisions']:>11,.0f} decisions {row['minutes']:7.1f} min"
-    return f"{when}   held-out age {_age(row)}{note:13}{others}"
+    age = _amount(_age(row), "aoi").removesuffix(" windows")
+    return f"{when}   held-out age {age}{note:13}{others}"
 
 
 def _text(status: Status, start: Progress, limits: Limits) -> str:
@@ -164,15 +155,14 @@ def _text(status: Status, start: Progress, limits: Limits) -> str:
     return ", ".join(parts)
 
 
-def _age(row: dict[str, float]) -> str:
-    """Return a held-out age of information, with its standard error if it has one [windows]."""
-    return f"{row['aoi']:.2f}" + (f" ± {row['aoi_sem']:.2f}" if "aoi_sem" in row else "")
+def _age(row: Row) -> Cost:
+    return Cost(mean=row["aoi"], sem=row.get("aoi_sem"))
 
 
-def _reference_ages(row: dict[str, float]) -> dict[str, float]:
+def _reference_ages(row: Row) -> dict[str, Cost]:
     """Return the ages of reference policies that were flown on the same missions [windows]."""
-    columns = {name: selection.column("aoi", name) for name in REFERENCES}
-    return {name: row[column] for name, column in columns.items() if row.get(column) is not None}
+    ages = {name: row.get(selection.column("aoi", name)) for name in REFERENCES}
+    return {name: Cost(mean=age, sem=None) for name, age in ages.items() if age is not None}
 
 
 def _oracle_missions(run: TrainingRun) -> str:
@@ -182,8 +172,8 @@ def _oracle_missions(run: TrainingRun) -> str:
     return f"{number} of {held_out} missions"
 
 
-def _amount(run: TrainingRun, value: float, error: float | None) -> str:
-    """Return a value with its error, in the unit of the cost that the run lowers."""
-    unit, digits = ("windows", 2) if run.training.cost == "aoi" else ("m²/s²", 4)
-    spread = "" if error is None else f" ± {error:.{digits}f}"
-    return f"{value:.{digits}f}{spread} {unit}"
+def _amount(cost: Cost, kind: str) -> str:
+    """Return a cost with its standard error, in the unit of its kind."""
+    unit, digits = ("windows", 2) if kind == "aoi" else ("m²/s²", 4)
+    spread = "" if cost.sem is None else f" ± {cost.sem:.{digits}f}"
+    return f"{cost.mean:.{digits}f}{spread} {unit}"

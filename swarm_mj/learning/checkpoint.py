@@ -20,8 +20,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 from torch import Tensor
 
-from swarm_mj.learning.actor_critic import GnnActorCritic
 from swarm_mj.learning.graph_vec_env import env_of
+from swarm_mj.learning.ppo import GnnActorCritic
 from swarm_mj.learning.selection import NUM_BEST, Amount, Count, Progress, candidates
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.network import AggregationGnn

@@ -1,18 +1,25 @@
-"""Stable-baselines3's PPO with the run's numbers (III-C), and the rollout buffer of its credits."""
+"""Stable-baselines3's PPO with the run's numbers (III-C), its networks and its rollout buffer."""
 
 import warnings
 from collections.abc import Generator
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import torch
+from jaxtyping import Float, Int
 from stable_baselines3 import PPO
 from stable_baselines3.common.buffers import DictRolloutBuffer
-from stable_baselines3.common.type_aliases import DictRolloutBufferSamples
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.type_aliases import DictRolloutBufferSamples, PyTorchObs, Schedule
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
+from torch import Tensor
 
-from swarm_mj.learning.actor_critic import GnnActorCritic
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.settings import PpoSettings, Training
+from swarm_mj.policies.gnn.fast import FastAggregationGnn, empty_network
+from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.policies.gnn.policy import recipient_logits
 
 SILENT_SHARE = 0.1  # of the silent rows that are learned from
 
@@ -68,6 +75,126 @@ def decayed_rate(ppo: PpoSettings, num_epochs: int) -> float:
     """Return the learning rate after some passes: it falls in steps of the optimiser (III-C)."""
     share = ppo.decay ** (num_epochs * ppo.num_minibatches // ppo.decay_steps)
     return ppo.learning_rate * max(share, ppo.least_share)
+
+
+class GnnActorCritic(ActorCriticPolicy):
+    """Logits over recipients for every robot, and one value for every environment.
+
+    The two come from separate networks (III-C), or, to save time, from one whose last number per
+    node is the value. An environment is a robot, or a team: then log-probability, entropy and value
+    are sums over its robots. There is one difference between the presets: the paper's value is one
+    scalar per robot, of its own node; the authors' code sums those of all nodes of all graphs.
+    """
+
+    def __init__(self, *given: Any, training: Training, **others: Any) -> None:
+        self._training, self._shape = training, training.network
+        super().__init__(*given, **others)  # spaces and the rate's schedule come from PPO
+
+    def _build(self, lr_schedule: Schedule) -> None:
+        num_outputs = self._shape.num_outputs + self._training.shares_trunk
+        self.network = FastAggregationGnn(replace(self._shape, num_outputs=num_outputs))
+        if not self._training.shares_trunk:
+            self.value_network = FastAggregationGnn(replace(self._shape, num_outputs=1))
+        self.optimizer = torch.optim.Adam(
+            self.parameters(), lr=lr_schedule(1.0), **self.optimizer_kwargs
+        )
+
+    def acting_network(self) -> AggregationGnn:
+        """Return a copy of the network that acts, without what values."""
+        network = empty_network(self._shape)
+        weights = {name: t.detach().cpu().clone() for name, t in self.network.state_dict().items()}
+        for name in ("output.weight", "output.bias"):
+            weights[name] = weights[name][: self._shape.num_outputs].clone()
+        network.load_state_dict(weights, assign=True)
+        return network.requires_grad_(False)
+
+    def take_acting_network(self, given: AggregationGnn) -> None:
+        """Begins with another network's weights; its shape is this one's."""
+        own = self.network.state_dict()
+        with torch.no_grad():
+            for name, tensor in given.state_dict().items():
+                own[name][: len(tensor)].copy_(tensor)
+
+    def _robots(
+        self, obs: dict[str, Tensor], owner: Int[Tensor, "R"]
+    ) -> tuple[Float[Tensor, "R N"], Float[Tensor, "R N"]]:
+        """Logits over recipients, and a value for every node, of every robot's graph."""
+        node, parent = obs["node"].flatten(0, -3), obs["parent"].long().flatten(0, -2)
+        may_address, has_turn = obs["may_address"].bool().flatten(0, -2), obs["has_turn"].bool()
+        output = self.network(node, parent, may_address)
+        if self._training.shares_trunk:
+            output, values = output[:, :, :-1], output[:, :, -1]  # the last number of each node
+        else:
+            values = self.value_network(node, parent)[:, :, 0]
+        silence_logit = self._training.silence_logit
+        logits = recipient_logits(output, owner, may_address, silence_logit, has_turn.flatten())
+        return logits, values
+
+    def logits_and_value(
+        self, obs: PyTorchObs
+    ) -> tuple[Float[Tensor, "E *robots N"], Float[Tensor, "E"]]:
+        """Return the logits of each environment's decisions, and its value."""
+        assert isinstance(obs, dict)
+        if "owner" in obs:
+            owner = obs["owner"].long()
+            logits, values = self._robots(obs, owner.squeeze(1))
+            return logits, values.gather(1, owner).squeeze(1)
+        shape, is_robot = obs["may_address"].shape[:2], obs["is_robot"].bool()
+        everyone = torch.arange(shape[1], device=is_robot.device)
+        logits, values = self._robots(obs, everyone.repeat(shape[0]))
+        counted = is_robot[:, :, None] & is_robot[:, None, :]
+        if not self._training.sums_nodes:
+            counted = counted & torch.eye(shape[1], dtype=torch.bool, device=counted.device)
+        value = (values.unflatten(0, shape) * counted).flatten(1).sum(1)
+        return logits.unflatten(0, shape), value
+
+    def forward(
+        self, obs: PyTorchObs, deterministic: bool = False
+    ) -> tuple[Int[Tensor, "E *robots"], Float[Tensor, "E"], Float[Tensor, "E"]]:
+        """Actions, values and the actions' log-probabilities."""
+        logits, value = self.logits_and_value(obs)
+        actions = logits.argmax(-1) if deterministic else boltzmann_sample(logits)
+        return actions, value, log_probability(logits, actions)
+
+    def evaluate_actions(
+        self, obs: PyTorchObs, actions: Tensor
+    ) -> tuple[Float[Tensor, "E"], Float[Tensor, "E"], Float[Tensor, "E"]]:
+        """Values, the actions' log-probabilities and entropies."""
+        logits, value = self.logits_and_value(obs)
+        return value, log_probability(logits, actions.long()), entropy(logits)
+
+    def _predict(
+        self, observation: PyTorchObs, deterministic: bool = False
+    ) -> Int[Tensor, "E *robots"]:
+        return self(observation, deterministic)[0]
+
+    def predict_values(self, obs: PyTorchObs) -> Float[Tensor, "E"]:
+        """Return the environments' values."""
+        return self.logits_and_value(obs)[1]
+
+
+def boltzmann_sample(logits: Float[Tensor, "*rows N"]) -> Int[Tensor, "*rows"]:
+    """Return a draw from each row's Boltzmann distribution, by its cumulated probabilities."""
+    # In doubles: a uniform single is below 1 by more than their rounding, so the last recipient
+    # that has no probability is never drawn.
+    cumulated = logits.double().softmax(-1).cumsum(-1)
+    uniform = torch.rand(*logits.shape[:-1], 1, device=logits.device)
+    return (cumulated <= uniform * cumulated[..., -1:]).sum(-1)
+
+
+def log_probability(
+    logits: Float[Tensor, "E *robots N"], actions: Int[Tensor, "E *robots"]
+) -> Float[Tensor, "E"]:
+    """Return the log-probability of each environment's actions, summed over its robots."""
+    chosen = logits.log_softmax(-1).gather(-1, actions[..., None])
+    return chosen.flatten(1).sum(1)
+
+
+def entropy(logits: Float[Tensor, "E *robots N"]) -> Float[Tensor, "E"]:
+    """Return the entropy of each environment's decisions, summed over its robots [nats]."""
+    log_p = logits.log_softmax(-1)
+    each = -(log_p.exp() * log_p).sum(-1, keepdim=True)
+    return each.flatten(1).sum(1)
 
 
 class ActiveRolloutBuffer(DictRolloutBuffer):

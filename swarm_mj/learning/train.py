@@ -12,9 +12,8 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from swarm_mj.learning import checkpoint, held_out, run_folder, selection
-from swarm_mj.learning.actor_critic import GnnActorCritic
 from swarm_mj.learning.graph_vec_env import env_of
-from swarm_mj.learning.ppo import make_model
+from swarm_mj.learning.ppo import GnnActorCritic, make_model
 from swarm_mj.learning.run_folder import CHECKPOINT, CURVE, INIT, REPLAYS, SETTINGS, TrainingRun
 from swarm_mj.learning.selection import Accumulator, Choice, Listener, Progress, Row
 from swarm_mj.policies.policy_config import GnnConfig

@@ -153,19 +153,17 @@ def test_limits_are_kept_and_may_be_moved(here, capsys):
 
 
 @pytest.mark.usefixtures("here")
-def test_arm_team_trains_a_flock_for_its_velocities(capsys):
+def test_credit_team_trains_a_flock_for_its_velocities(capsys):
     options = ("--credit", "team", "--task", "flocking", "--reward", "velocity-variance")
     assert train("--out", "r", *SMALL, *options, "--budget", 1) == 0
     assert "m²/s²" in capsys.readouterr().out
 
 
-def test_missions_of_several_sizes_are_shared_out_evenly(here, capsys):
-    """In a folder of odd letters, which is kept and quoted."""
+@pytest.mark.usefixtures("here")
+def test_a_run_of_several_sizes_in_a_folder_of_odd_letters_is_kept_and_quoted(capsys):
     out = Path("runs") / "a [red] b"
     several = ("--robots", 3, 4, 5, "--windows", 12, "--range-ratio", 1, "--latent", 4)
     assert train("--out", out, *several, "--held-out", 1, "--budget", 1) == 0
-    training = read_run(here / out).training
-    assert (training.robots, training.missions, training.groups) == ((3, 4, 5), 18, 3)
     printed = capsys.readouterr().out
     assert "runs/a [red] b: credit per robot, stationary, 3, 4, 5 robots" in printed
     assert "train --out 'runs/a [red] b' --resume" in printed

@@ -61,19 +61,13 @@ def test_without_options_a_run_has_the_usual_settings(credit):
     [
         ("--seed", 7, "seed"),
         ("--receptive-field", 3, "network.receptive_field"),
-        ("--latent", 5, "network.latent"),
-        ("--depth", 4, "network.depth"),
         ("--edges", "reference", "network.edges"),
         ("--learning-rate", 0.5, "ppo.learning_rate"),
-        ("--entropy", 0.25, "ppo.entropy"),
         ("--discount", 0.75, "ppo.discount"),
         ("--threads", 2, "threads"),
-        ("--evaluate-every", 123, "evaluate_every"),
-        ("--held-out", 9, "held_out"),
         ("--task", "flocking", "mission.task"),
         ("--preset", "reference", "mission.preset"),
         ("--range-ratio", 0.5, "mission.range_ratio"),
-        ("--velocity-ratio", 0.5, "mission.velocity_ratio"),
         ("--windows", 77, "mission.num_windows"),
         ("--boundary", "none", "mission.boundary"),
     ],
@@ -107,11 +101,9 @@ def test_sizes_share_the_missions_evenly(sizes, missions, groups):
     assert (training.robots, training.missions, training.groups) == (sizes, missions, groups)
 
 
-@pytest.mark.parametrize(
-    ("missions", "groups"), [(1, 1), (2, 2), (3, 3), (6, 3), (7, 7), (8, 4), (10, 5), (14, 2)]
-)
-def test_groups_are_as_near_to_four_as_the_missions_allow(missions, groups):
-    assert asked("--missions", missions).groups == groups
+def test_groups_are_as_near_to_four_as_the_missions_allow():
+    expected = {1: 1, 2: 2, 3: 3, 6: 3, 7: 7, 8: 4, 10: 5, 14: 2}
+    assert {missions: asked("--missions", missions).groups for missions in expected} == expected
 
 
 def test_a_policy_to_begin_with_brings_its_network():

@@ -7,9 +7,8 @@ import pytest
 import torch
 from torch.distributions import Categorical
 
-from swarm_mj.learning.actor_critic import boltzmann_sample, entropy, log_probability
 from swarm_mj.learning.graph_vec_env import env_of
-from swarm_mj.learning.ppo import make_model
+from swarm_mj.learning.ppo import boltzmann_sample, make_model
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import PRESETS
 
@@ -113,21 +112,6 @@ def test_log_probabilities_entropies_and_values_are_those_of_a_loop_over_robots(
     torch.testing.assert_close(model.policy.predict_values(observation), value)
 
 
-@pytest.mark.parametrize("credit", ["robot", "team"])
-def test_robots_that_do_not_exist_are_silent_and_add_nothing(credit):
-    model, _ = model_of(credit, "paper", (3, 5))
-    observation = after_some_windows(model)
-    actions, _, _ = model.policy(observation)
-    if credit == "team":
-        unused = ~observation["is_robot"].bool()
-        everyone = torch.arange(5).expand_as(actions)
-        assert torch.equal(actions[unused], everyone[unused])
-    logits, _ = model.policy.logits_and_value(observation)
-    may_address = observation["may_address"].bool()
-    assert torch.all(logits.softmax(-1)[~may_address] == 0.0)
-    assert torch.all(torch.gather(may_address, -1, actions[..., None]))
-
-
 def test_draws_have_the_frequencies_of_the_boltzmann_distribution():
     """Those of different robots are independent."""
     torch.manual_seed(1)
@@ -140,17 +124,6 @@ def test_draws_have_the_frequencies_of_the_boltzmann_distribution():
     error = (expected * (1 - expected) / count).sqrt()
     assert torch.all((drawn - expected).abs() <= 4.0 * error)
     assert drawn[4] == 0.0
-
-
-def test_sums_over_robots_by_hand():
-    """Two robots, of which one chooses between 1:3 odds, and one has no choice."""
-    logits = torch.tensor([[[0.0, np.log(3.0), -1e9], [-1e9, 5.0, -1e9]]], dtype=torch.float32)
-    chosen = torch.tensor([[1, 1]])
-    torch.testing.assert_close(
-        log_probability(logits, chosen), torch.tensor([np.log(0.75)]).float()
-    )
-    plain = -(0.25 * np.log(0.25) + 0.75 * np.log(0.75))
-    torch.testing.assert_close(entropy(logits), torch.tensor([plain]).float())
 
 
 @pytest.mark.parametrize("credit", ["robot", "team"])

@@ -1,7 +1,6 @@
 """What PPO is given, its rollouts without most of the silent rows, and its advantages."""
 
 import copy
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -106,12 +105,6 @@ def test_minibatches_need_two_rows_each():
     said = "a rollout of 4 rows is too small for 3 minibatches; train on 6 or more missions"
     with pytest.raises(ValueError, match=said):
         make_model(team)
-
-
-def test_uneven_minibatches_are_no_cause_for_a_warning():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        make_model(with_ppo(small_training(), num_minibatches=7))
 
 
 def test_threads_are_torchs():
@@ -273,10 +266,3 @@ def test_nothing_leaks_over_the_end_of_a_mission(credit, monkeypatch):
     assert num_cut == 3 * rows
     assert num_over == 2 * rows  # of the batch that is not cut, and of the first one once more
     np.testing.assert_allclose(buffer.returns, buffer.advantages + buffer.values, rtol=1e-5)
-
-
-def test_without_discount_an_advantage_is_the_credit_itself(monkeypatch):
-    training = small_training("robot")
-    assert training.drops_silence
-    model, watch = one_rollout(training, monkeypatch)
-    np.testing.assert_array_equal(model.rollout_buffer.advantages, np.array(watch.rewards))

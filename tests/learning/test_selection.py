@@ -51,22 +51,12 @@ def test_only_what_is_near_the_best_flies_again():
     assert at(finalists(curve(4.5, 5.0, 4.0))) == [0.0, 10.0, 20.0]
 
 
-@pytest.mark.parametrize(
-    ("decisions", "size"),
-    [
-        # Half of the decisions, over 5 flights, 2 sizes and 20 windows; 2 are held out.
-        (0, 2),
-        (1000, 2),
-        (4000, 10),
-        (4399, 10),
-        (4400, 11),
-        (10**9, 40),
-    ],
-)
-def test_missions_that_choose_are_a_share_of_the_run(decisions, size):
+def test_missions_that_choose_are_a_share_of_the_run():
+    """Half of the decisions, over 5 flights, 2 sizes and 20 windows; 2 are held out."""
     training = small_training(sizes=(3, 6))
-    assert num_missions(training, decisions, 5) == size
-    assert num_missions(replace(training, held_out=50), decisions, 5) == 50
+    for decisions, size in ((0, 2), (1000, 2), (4399, 10), (4400, 11), (10**9, 40)):
+        assert num_missions(training, decisions, 5) == size
+        assert num_missions(replace(training, held_out=50), decisions, 5) == 50
 
 
 def test_minutes_are_reserved_for_every_flight_of_the_end_but_never_most_of_them():
@@ -91,7 +81,6 @@ def test_minutes_are_reserved_for_every_flight_of_the_end_but_never_most_of_them
         ((1.0, 1.0, 1.0), 2, True),
         ((1.0, 0.996, 2.0), 2, True),
         ((1.0, 0.994, 2.0), 2, False),
-        ((1.0, 0.994, 2.0, 1.5), 2, True),
         ((1.0, 2.0), 2, False),
         ((1.0, 2.0, 2.0), 0, False),
         ((1.0, 2.0, 2.0), None, False),

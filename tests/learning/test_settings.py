@@ -78,8 +78,3 @@ def test_whom_a_robot_addresses_can_depend_on_where_it_is(preset):
     moved[0, 0] += 1.0
     change = (network(moved, parent) - network(node, parent)).abs().amax(dim=2)
     assert torch.all(change > 0.0)
-
-
-def test_an_unknown_kind_of_credit_is_refused():
-    with pytest.raises(ValueError, match="credit must be one of robot, team, not 'both'"):
-        usual_settings("both", paper("stationary"), (40,))

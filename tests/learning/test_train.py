@@ -57,9 +57,13 @@ def evaluated_at(progress):
     return [row["decisions"] for row in progress.curve]
 
 
-def test_evaluations_come_at_the_start_at_intervals_and_at_the_end(whole):
+def test_evaluations_and_replays_come_at_the_start_at_intervals_and_at_the_end(whole):
     folder, progress, _ = whole
     assert evaluated_at(progress) == [0.0, 64.0, 128.0, 192.0]
+    for at in (0, 128):  # the first evaluations after 0 and 100
+        replay = folder / REPLAYS / f"decisions-{at:09d}.rrd"
+        assert len(windows(replay)) == TRAINING.mission.num_windows
+    assert len(list((folder / REPLAYS).iterdir())) == 2
     with (folder / CURVE).open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["aoi"]) for row in rows] == [row["aoi"] for row in progress.curve]
@@ -181,14 +185,6 @@ def test_hand_written_policies_fly_once_and_are_flat_curves(whole):
         assert [event.value for event in events.Scalars(f"held_out/{column}")] == expected
 
 
-def test_replays_are_recorded_at_intervals(whole):
-    folder, _, _ = whole
-    names = sorted(path.name for path in (folder / REPLAYS).iterdir())
-    assert names == ["decisions-000000000.rrd", "decisions-000000128.rrd"]
-    for name in names:
-        assert len(windows(folder / REPLAYS / name)) == TRAINING.mission.num_windows
-
-
 def test_listeners_hear_of_every_window_and_of_evaluations(whole):
     _, _, heard = whole
     trained = [decisions for decisions, evaluated, *_ in heard if evaluated is None]
@@ -249,16 +245,6 @@ def test_an_evaluation_that_is_broken_off_is_left_for_later(tmp_path):
     assert not (tmp_path / "run" / POLICY).exists()
     progress = run(TRAINING, tmp_path / "run", 32, is_resumed=True)
     assert evaluated_at(progress) == [0.0, 32.0]
-
-
-def test_a_stop_in_the_last_rollout_leaves_its_evaluation_to_the_next_session(tmp_path):
-    stopped = run(TRAINING, tmp_path / "run", 64, StopAfter(14))
-    assert stopped.decisions == 64
-    assert evaluated_at(stopped) == [0.0]
-    progress = run(TRAINING, tmp_path / "run", 64, is_resumed=True)
-    assert evaluated_at(progress) == [0.0, 64.0]
-    whole = run(TRAINING, tmp_path / "whole", 64)
-    assert progress.curve[-1]["rollout/aoi"] == whole.curve[-1]["rollout/aoi"]
 
 
 # Beginnings and refusals.
