@@ -1,4 +1,4 @@
-"""Missions that nothing tells apart but what one robot cannot know, or the robots' names.
+"""Missions that nothing tells apart but what one robot cannot know.
 
 They are missions of random talk. A robot knows its own buffer, and what it sent and decoded; a
 packet holds its sender's buffer and says whom it is for.
@@ -9,7 +9,6 @@ import copy
 import numpy as np
 
 from swarm_mj.mission import paper
-from swarm_mj.protocol.window import LocalViews, Phase
 from swarm_mj.simulation.swarm import Swarm
 
 NUM_ROBOTS, NUM_WINDOWS, SEEDS = 7, 60, (3, 4)
@@ -64,20 +63,3 @@ def mixed_views(robot):
     mine, theirs = flown(1), flown(2)
     afters = [*mine[1:], None]
     return mine, [with_causes_of(robot, *these) for these in zip(mine, theirs, afters, strict=True)]
-
-
-def renamed(view, name, new_name):
-    """The view of a team whose robot i is robot name[i] of this one."""
-    buffers = copy.deepcopy(view.buffers)
-    for field, array in vars(view.buffers).items():
-        if array.ndim == 1:  # by missions only
-            continue
-        pairs = np.ascontiguousarray(array[:, name][:, :, name])
-        if field == "parent":
-            pairs = np.where(pairs < 0, pairs, new_name[pairs])
-        vars(buffers)[field] = pairs
-    phases = tuple(
-        Phase(recipient=new_name[phase.recipient[:, name]], heard=new_name[phase.heard[:, name]])
-        for phase in view.phases
-    )
-    return LocalViews(buffers=buffers, now=view.now, phases=phases)

@@ -15,8 +15,7 @@ from swarm_mj.protocol.window import LocalViews
 class RoundRobin(CentralisedPolicy):
     """One robot after the other exchanges buffers with the one nearest the centre (IV-C).
 
-    Time-division multiple access around a base station (Miao et al. 2016), which is chosen anew in
-    each window from all true positions.
+    TDMA around a base station (Miao et al. 2016), chosen anew in each window.
     """
 
     uses = "the true positions: a base near the middle talks to each robot in turn"
@@ -33,10 +32,7 @@ class RoundRobin(CentralisedPolicy):
 
 
 class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
-    """Every robot exchanges buffers with its parent in the tree with probability p (IV-C).
-
-    The tree, of least length, is built from all true positions at the start of the mission.
-    """
+    """Every robot exchanges buffers with its parent in the tree with probability p (IV-C)."""
 
     uses = "the true positions at the start: a robot talks to its parent in their spanning tree"
 
@@ -49,8 +45,7 @@ class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
         N - 1, as in the authors' code, where its missing parent, -1, counts from the end.
         """
         super().__init__(probability)
-        self._is_recomputed = is_recomputed
-        self._root_transmits = root_transmits
+        self._is_recomputed, self._root_transmits = is_recomputed, root_transmits
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Forget the last mission's tree; arguments as in `Policy.start`."""

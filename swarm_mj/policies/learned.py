@@ -29,9 +29,8 @@ class LearnedPolicy(DecentralisedPolicy, ABC):
         self, extractor: FeatureExtractor, *, is_deterministic: bool = False, own_features: str = ""
     ) -> None:
         """Take what makes the features that the network was trained on, and their name if own."""
-        self._extractor = extractor
+        self._extractor, self._own_features = extractor, own_features
         self._is_deterministic = is_deterministic
-        self._own_features = own_features
 
     @property
     def parameters(self) -> Parameters:
@@ -40,12 +39,8 @@ class LearnedPolicy(DecentralisedPolicy, ABC):
         digest = hashlib.sha256(repr(made_of).encode())
         for name, values in sorted(weights.items()):
             digest.update(name.encode() + b"\0" + values.tobytes())
-        features = {"features": self._own_features} if self._own_features else {}
-        return {
-            "is_deterministic": self._is_deterministic,
-            "digest": digest.hexdigest()[:DIGITS],
-            **features,
-        }
+        its = {"is_deterministic": self._is_deterministic, "digest": digest.hexdigest()[:DIGITS]}
+        return its | ({"features": self._own_features} if self._own_features else {})
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Forget packets; take each mission's generator. Arguments as in `Policy.start`."""
@@ -99,8 +94,7 @@ class MlpPolicy(LearnedPolicy):
     ) -> None:
         """Take weights of that shape, and what makes the features that they were trained on."""
         super().__init__(extractor, **options)
-        self._shape = shape
-        self._weights = weights
+        self._shape, self._weights = shape, weights
         self.uses = f"{extractor.uses}, by a trained network"
 
     def logits(self, graphs: Graphs) -> Float[np.ndarray, "R N"]:
@@ -109,20 +103,16 @@ class MlpPolicy(LearnedPolicy):
         Each mission is one product of matrices: one product of all would round otherwise for other
         numbers of missions, so a mission would depend on those flown with it.
         """
-        num_robots = self._shape.num_robots
+        shape, num_robots = self._shape, self._shape.num_robots
         may_address = graphs.may_address.reshape(-1, num_robots, num_robots)
         node = graphs.node.reshape(*may_address.shape[:2], -1)
         values = np.concatenate([may_address.astype(np.float32), node], axis=2)
-        num_layers = len(self._shape.hidden) + 1
-        for n in range(num_layers):
+        for n in range(len(shape.hidden) + 1):
+            if n > 0:
+                values = np.tanh(values) if shape.activation == "tanh" else np.maximum(values, 0.0)
             values = values @ self._weights[f"{n}.weight"].T + self._weights[f"{n}.bias"]
-            if n < num_layers - 1:
-                is_tanh = self._shape.activation == "tanh"
-                values = np.tanh(values) if is_tanh else np.maximum(values, 0.0)
         logits = values.astype(np.float64).reshape(-1, num_robots)
-        if not self._shape.obeys_mask:
-            return logits
-        return np.where(graphs.may_address, logits, IMPOSSIBLE)
+        return np.where(graphs.may_address, logits, IMPOSSIBLE) if shape.obeys_mask else logits
 
     def identity(self) -> tuple[object, Weights]:
         """Return the shape and the weights."""

@@ -60,13 +60,13 @@ class MlpShape:
         check(self)
         _check_num_features(self.num_features, self.features)
 
+    @property
     def tensors(self) -> dict[str, tuple[int, ...]]:
-        """Return the weights' shapes by name: `0.weight` [Out, In] and `0.bias` [Out] first."""
+        """The weights' shapes by name: `0.weight` [Out, In] and `0.bias` [Out] first."""
         widths = [self.num_robots * (1 + self.num_features), *self.hidden, self.num_robots]
-        shapes: dict[str, tuple[int, ...]] = {}
-        for n, (before, after) in enumerate(itertools.pairwise(widths)):
-            shapes |= {f"{n}.weight": (after, before), f"{n}.bias": (after,)}
-        return shapes
+        layers = list(enumerate(itertools.pairwise(widths)))
+        weights = {f"{n}.weight": (after, before) for n, (before, after) in layers}
+        return weights | {f"{n}.bias": (after,) for n, (_, after) in layers}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,8 +113,7 @@ def check_fit(network: GnnShape, features: str) -> None:
 
 def _check_num_features(given: int, features: str) -> None:
     # A user's own set is not imported, as its name may stand in a file: it may have any number.
-    expected = given if is_own_set(features) else num_features(features)
-    if given != expected:
+    if not is_own_set(features) and given != (expected := num_features(features)):
         raise ValueError(
             f"network.num_features is {given}, but the {features} features are {expected}"
         )
@@ -122,15 +121,14 @@ def _check_num_features(given: int, features: str) -> None:
 
 def model_card(config: GnnConfig | MlpConfig) -> str:
     """Return a README in Markdown: how to fly the policy, and all that the config holds."""
-    flags = config.training.get("mission", {}).get("task", "TASK")
     kind = "a graph neural network (an Aggregation GNN)"
     teams = "Teams of any size fly with it; those much larger than trained on may fare badly."
+    flags = [config.training.get("mission", {}).get("task", "TASK")]
     if isinstance(config, MlpConfig):
-        flags += f" --robots {config.network.num_robots}"
-        kind = "perceptrons"
-        teams = f"It flies teams of {config.network.num_robots} robots only."
+        kind, teams = "perceptrons", f"It flies teams of {config.network.num_robots} robots only."
+        flags.append(f"--robots {config.network.num_robots}")
     if is_own_set(config.features):
-        flags += f" --features {config.features}"
+        flags.append(f"--features {config.features}")
     return f"""\
 # A learned communication policy of swarm_mj
 
@@ -138,7 +136,7 @@ Every robot evaluates {kind} on the `{config.features}` features of its own
 buffer, and draws from the result which robot it addresses in the next window, or that it stays
 silent. Packets carry T, M and P, as the paper's, and nothing more.
 
-    swarm-mj fly --policy FILE --task {flags}
+    swarm-mj fly --policy FILE --task {" ".join(flags)}
 
 `FILE` is the `{SUFFIX}` file that holds this card; `swarm-mj evaluate` takes it too.
 {teams}

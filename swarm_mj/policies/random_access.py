@@ -41,8 +41,8 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
 
     See Tseng et al., The broadcast storm problem, 2002. As in the authors' code a robot that
     transmits draws an addressee from the whole team, and is silent if it draws itself: so it
-    transmits with p (N - 1) / N. The addressee matters only under their half-duplex rule, by which
-    an addressed robot hears while it sends: only there packets name it, with `names_addressee`.
+    transmits with p (N - 1) / N. Packets name the addressee only under their half-duplex rule, by
+    which an addressed robot hears while it sends.
     """
 
     uses = "nothing: it transmits with probability p"
@@ -83,7 +83,7 @@ class Aloha(RandomTransmission, BroadcastPolicy):
     In slotted ALOHA (Abramson 1970; Roberts 1975) what counts is the load that all n stations offer
     together, so each of them sends less the more there are. Here a neighbourhood's robots are its
     stations, and `probability` is that any of them broadcasts in a slot: each does so with
-    1 - (1 - p)^(1/n). Random flooding has one probability for everyone and knows nothing of n.
+    1 - (1 - p)^(1/n).
     """
 
     uses = "how many neighbours its buffer shows"
@@ -130,8 +130,7 @@ class InnovationGossip(RandomTransmission, BroadcastPolicy):
     fresher since its own last broadcast: the rise of T^{i,j}, its own included, averaged over the
     team [windows]. A robot broadcasts with p times that, at most with certainty: p is per window of
     news. So robots that hear much pass it on soon, and one that hears nothing still reports its
-    position now and then. Two unanswered broadcasts a window lead to a lower age than one packet
-    that a neighbour answers.
+    position now and then.
     """
 
     uses = "how much it has learned since its last transmission"

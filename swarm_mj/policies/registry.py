@@ -96,11 +96,8 @@ def make_policy(
     the most probable recipient, not a draw. `features` are own feature sets, as `module:Name`, that
     may be imported for a learned policy.
 
-    Raises:
-        ValueError: The name is unknown, no sound policy is there, a probability is out of range or
-            not the policy's, or a policy that is not learned is to be deterministic.
-        OSError: A learned policy cannot be read.
-        TypeError: The name or the mission is none.
+    Raises ValueError if the name is unknown, no sound policy is there, or the policy takes no such
+    probability or mode, OSError if a file cannot be read, TypeError for no name or no mission.
     """
     check_kind("policy", name, str, '"planner"')
     check_kind("mission", mission, Mission, 'paper("flocking")')
@@ -125,8 +122,9 @@ def make_policy(
         return _own(name, mission)
     if name not in HAVE_PROBABILITY:
         return RULES[name](mission)
-    tuned = tuned_probability(name, mission) if probability is None else probability
-    return RULES[name](mission, tuned)
+    return RULES[name](
+        mission, tuned_probability(name, mission) if probability is None else probability
+    )
 
 
 def _learned(name: str, mission: Mission, **options: Any) -> Policy:
@@ -140,12 +138,11 @@ def _learned(name: str, mission: Mission, **options: Any) -> Policy:
 
 def _own(name: str, mission: Mission) -> Policy:
     policy = make("policy", name, mission)
-    if not isinstance(policy, CentralisedPolicy | DecentralisedPolicy):
-        raise ValueError(
-            f"policy {name} must make a DecentralisedPolicy or a CentralisedPolicy, not "
-            f"{policy!r:.80}"
-        )
-    return policy
+    if isinstance(policy, CentralisedPolicy | DecentralisedPolicy):
+        return policy
+    raise ValueError(
+        f"policy {name} must make a DecentralisedPolicy or a CentralisedPolicy, not {policy!r:.80}"
+    )
 
 
 def is_stored(name: str) -> bool:
@@ -197,8 +194,7 @@ def flown_name(name: str, mission: Mission) -> str:
 def with_payload(names: Sequence[str], payload: str) -> list[str]:
     """Return the names of policies whose packets carry this beyond T, M and P, where they can.
 
-    Raises:
-        ValueError: No such payload, or no policy that can go without.
+    Raises ValueError for no such payload, and if no policy can go without.
     """
     if payload not in PAYLOADS:
         raise ValueError(f"payload must be one of {', '.join(PAYLOADS)}, not {payload!r}")

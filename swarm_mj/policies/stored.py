@@ -16,7 +16,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.gnn.feature_sets import is_own_set, trained_extractor
+from swarm_mj.policies.gnn import feature_sets
 from swarm_mj.policies.learned import LearnedPolicy, MlpPolicy
 from swarm_mj.policies.policy_config import SUFFIX, GnnConfig, MlpConfig, Weights, model_card
 from swarm_mj.system.atomic import write_bytes
@@ -85,26 +85,34 @@ def load_policy(
     The mission's area, duration and range normalise what the robots see. A deterministic policy
     takes the most probable recipient instead of a draw. Users' own feature sets are imported only
     if their names, as `module:Name`, are among `features`: a policy cannot make us run code. Errors
-    are those of `read_weights`, and ValueError if it flies teams of another size.
+    are those of `read_weights`, and ValueError if it flies teams of another size, or its features
+    are none that may be imported, or now have another number.
     """
     weights, config = read_weights(path)
-    own, num_features, where = config.features, config.network.num_features, f"policy {path}"
     size = config.network.num_robots if isinstance(config, MlpConfig) else mission.num_robots
     if mission.num_robots != size:
         raise ValueError(
-            f"{where} flies teams of {size} robots, for which it was trained, not "
+            f"policy {path} flies teams of {size} robots, for which it was trained, not "
             f"{mission.num_robots}; choose --robots {size}"
         )
-    extractor = trained_extractor(own, num_features, mission, named=features, where=where)
-    own_features = own if is_own_set(own) else ""
-    options: Any = {"is_deterministic": is_deterministic, "own_features": own_features}
+    seen, num_trained_on = config.features, config.network.num_features
+    feature_sets.check_named(seen, features, f"policy {path}")
+    own = seen if feature_sets.is_own_set(seen) else ""
+    if own:
+        feature_sets.load_features(own)
+    if (num := feature_sets.num_features(seen)) != num_trained_on:
+        raise ValueError(
+            f"policy {path} was trained on {num_trained_on} features, and {seen} now has {num}"
+        )
+    extractor = feature_sets.make_extractor(seen, mission)
+    options: Any = {"is_deterministic": is_deterministic, "own_features": own}
     if isinstance(config, MlpConfig):
         return MlpPolicy(config.network, weights, extractor, **options)
     from swarm_mj.policies.gnn.fast import network_of
     from swarm_mj.policies.gnn.policy import GnnPolicy
 
     network = network_of(config.network, weights)
-    return GnnPolicy(network, extractor, silence_logit=config.silence_logit, **options)
+    return GnnPolicy(network, extractor, config.silence_logit, **options)
 
 
 def read_policy(path: Path) -> tuple["AggregationGnn", GnnConfig]:
@@ -180,22 +188,19 @@ def _config_of(text: str) -> GnnConfig | MlpConfig:
 def _check_tensors(config: GnnConfig | MlpConfig, path: Path, tensors: Weights) -> None:
     """Raise ValueError unless these are a network's tensors, single-precision and finite."""
     if isinstance(config, MlpConfig):
-        shapes = config.network.tensors()
+        shapes = config.network.tensors
     else:
         need("torch", f"policy {path}", "fly another")
         from swarm_mj.policies.gnn.fast import empty_network
 
-        empty = empty_network(config.network).state_dict()
-        shapes = {name: tuple(tensor.shape) for name, tensor in empty.items()}
+        shapes = {n: tuple(x.shape) for n, x in empty_network(config.network).state_dict().items()}
     for name in sorted(shapes.keys() ^ tensors.keys()):
         known = "lacks the" if name in shapes else "has an unknown"
         raise ValueError(f"it {known} tensor {name:.80}")
     for name, tensor in tensors.items():
-        given, wanted = (
-            f"{list(tensor.shape)} of {tensor.dtype}",
-            f"{list(shapes[name])} of float32",
-        )
+        given, wanted = (tensor.shape, tensor.dtype), (shapes[name], np.float32)
         if given != wanted:
-            raise ValueError(f"tensor {name} must be {wanted}, not {given}")
+            must, found = (f"{list(shape)} of {np.dtype(kind)}" for shape, kind in (wanted, given))
+            raise ValueError(f"tensor {name} must be {must}, not {found}")
         if not np.all(np.isfinite(tensor)):
             raise ValueError(f"tensor {name} has numbers that are not finite")

@@ -19,9 +19,8 @@ class Tdma(BroadcastPolicy):
     """In each slot one robot broadcasts, in a fixed random order of identities, unanswered.
 
     Time-division multiple access (Miao, Zander, Sung, Slimane: Fundamentals of Mobile Data
-    Networks, 2016). Nobody interferes, so every robot in range decodes. The order is drawn for each
-    mission and the same for all its robots: like the identities, it is granted before the mission
-    (II-C).
+    Networks, 2016). Nobody interferes, so every robot in range decodes. Like the identities, the
+    mission's order is granted to all of its robots beforehand (II-C).
     """
 
     uses = "its identity, a common random order and the clock: one robot transmits per slot"
@@ -40,19 +39,17 @@ class Tdma(BroadcastPolicy):
 class SpatialTdma(BroadcastPolicy):
     """TDMA in which robots far enough from the owner of the turn broadcast at the same time.
 
-    The common rule, who joins the owner of the turn, is that of `radio.spatial_reuse`: each robot
-    predicts from its own buffer, alone, which packets its teammates would decode, and robots that
-    believe the same decide the same. Until a robot has heard of everyone it transmits in its own
-    turn only: so the team begins as `Tdma` does, and no robot that joins overlooks a listener of
-    the owner's. Of what the mission grants of the channel it uses the mean powers.
+    Who joins the owner of the turn is the rule of `radio.spatial_reuse`: each robot predicts from
+    its own buffer, alone, which packets its teammates would decode, and robots that believe the
+    same decide the same. Until a robot has heard of everyone it transmits in its own turn only: so
+    the team begins as `Tdma` does, and no robot that joins overlooks a listener of the owner's.
     """
 
     uses = "as tdma, and the positions in its buffer: robots far enough apart share a slot"
 
     def __init__(self, *, range_m: float, threshold: float) -> None:
         """Take the distance at which a lone transmission just decodes, and its SINR, linear [1]."""
-        self._range_m = range_m
-        self._threshold = threshold
+        self._rule = range_m, threshold
         self._law: PowerLaw | None = None
 
     def inform(self, belief: Belief) -> None:
@@ -69,9 +66,8 @@ class SpatialTdma(BroadcastPolicy):
         """Return each robot whose turn it is or that may join."""
         is_oneself = np.eye(views.num_robots, dtype=np.bool_)
         is_sending = np.all(views.buffers.is_known | is_oneself, axis=2)
-        rule = self._range_m, self._threshold
-        turn = slot_of(views.now)
-        keep_joined(views.buffers.position_m, self._order, turn, *rule, is_sending, self._known)
+        turns = self._order, slot_of(views.now)
+        keep_joined(views.buffers.position_m, *turns, *self._rule, is_sending, self._known)
         return is_sending
 
 

@@ -9,14 +9,13 @@ from functools import cache
 from pathlib import Path
 
 from swarm_mj.mission import WORLDS, Mission
-from swarm_mj.system.fields import check, check_value, setting
+from swarm_mj.system.fields import check, same_as, setting
 from swarm_mj.system.reading import read_rows
 
 TABLE = Path(__file__).with_name("tuned.csv")
 MAX_BYTES = 10_000_000
 TUNED_AS = {"formation": "random-walk", "coverage": "random-walk"}  # teams within walls, too
 TUNED_AS |= dict.fromkeys(WORLDS, "paper")  # whose numbers these have but for arena and channel
-REGIME = ("preset", "task", "num_robots", "range_ratio", "velocity_ratio")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,11 +23,11 @@ class Tuned:
     """The best probability of a policy in one regime: a row of the table, its columns in order."""
 
     policy: str  # a name among `POLICIES`
-    preset: str
-    task: str
-    num_robots: int
-    range_ratio: float  # of 1 km
-    velocity_ratio: float  # of 1 km in 50 s; means nothing to a stationary team
+    preset: str = same_as(Mission, "preset")
+    task: str = same_as(Mission, "task")
+    num_robots: int = same_as(Mission, "num_robots")
+    range_ratio: float = same_as(Mission, "range_ratio")  # of 1 km
+    velocity_ratio: float = same_as(Mission, "velocity_ratio")  # means nothing to a team at rest
     probability: float = setting(low=0.0, high=1.0)  # the least mean age of a grid's
     aoi_mean: float = setting(low=0.0, high=1e9)  # with it, over the episodes (Eq. 10) [windows]
     aoi_sem: float = setting(low=0.0, high=1e9)  # standard error of that mean [windows]
@@ -39,8 +38,6 @@ class Tuned:
 
     def __post_init__(self) -> None:
         check(self)
-        for name in REGIME:
-            check_value(Mission.__dataclass_fields__[name], getattr(self, name))
 
 
 def tuned_probability(policy_name: str, mission: Mission) -> float:

@@ -11,18 +11,6 @@ from swarm_mj.policies.policy_config import GnnConfig, GnnShape, MlpConfig, MlpS
 from swarm_mj.system.reading import read_json
 
 
-@pytest.fixture
-def sound():
-    """The content of a sound config."""
-    return asdict(tiny_config(tiny_network()))
-
-
-def refused(content, complaint):
-    with pytest.raises(ValueError, match=complaint) as error:
-        read_json(json.dumps(content), GnnConfig)
-    assert len(str(error.value)) < 200
-
-
 @pytest.mark.parametrize("features", FEATURES)
 @pytest.mark.parametrize("commit", ["abc123", None])
 def test_a_config_comes_back_as_it_was(features, commit):
@@ -31,9 +19,17 @@ def test_a_config_comes_back_as_it_was(features, commit):
     assert read_json(json.dumps(asdict(config)), GnnConfig) == config
 
 
+ABSENT = object()
+LACKING = [
+    (key, ABSENT, f"missing required field `{key.rpartition('.')[2]}`")
+    for key in ("network", "features", "commit", "network.latent", "network.is_linear")
+]
+
+
 @pytest.mark.parametrize(
     ("key", "value", "complaint"),
     [
+        *LACKING,
         ("wings", 2, "unknown field `wings`"),
         ("network", [1], r"Expected `object`, got `array` - at `\$\.network`"),
         ("features", "paper", "num_features is 18, but the paper features are 8"),
@@ -49,30 +45,16 @@ def test_a_config_comes_back_as_it_was(features, commit):
         ("network.num_features", 8, "num_features is 8, but the extended features are 18"),
     ],
 )
-def test_what_is_no_config(sound, key, value, complaint):
+def test_what_is_no_config(key, value, complaint):
+    content = asdict(tiny_config(tiny_network()))
     part, _, name = key.rpartition(".")
-    (sound[part] if part else sound)[name] = value
-    refused(sound, complaint)
-
-
-@pytest.mark.parametrize("part", ["", "network"])
-def test_every_key_is_needed(sound, part):
-    keys = sound[part] if part else sound
-    for key, value in list(keys.items()):
-        del keys[key]
-        refused(sound, f"missing required field `{key}`")
-        keys[key] = value
-
-
-def test_a_config_made_by_hand_is_checked_too():
-    config = tiny_config(tiny_network())
-    for overrides, complaint in (
-        ({"features": "paper"}, "num_features is 18"),
-        ({"silence_logit": math.nan}, "silence_logit must be a number from -100 to 100, not nan"),
-        ({"network": replace(config.network, num_outputs=3)}, "num_outputs must be 1 or 2"),
-    ):
-        with pytest.raises(ValueError, match=complaint):
-            replace(config, **overrides)
+    its = content[part] if part else content
+    its[name] = value
+    if value is ABSENT:
+        del its[name]
+    with pytest.raises(ValueError, match=complaint) as error:
+        read_json(json.dumps(content), GnnConfig)
+    assert len(str(error.value)) < 200
 
 
 def test_the_card_says_how_to_fly_a_policy_and_all_that_its_config_holds():
@@ -105,16 +87,11 @@ def test_the_card_of_a_plain_network_says_how_to_fly_it_as_it_was_trained():
 @pytest.mark.parametrize(
     ("kind", "its", "complaint"),
     [
-        (
-            GnnShape,
-            {"num_features": 0},
-            "num_features must be a whole number from 1 to 1024, not 0",
-        ),
+        (GnnShape, {"num_features": 0}, "num_features must be a whole number from 1 to 1024"),
         (GnnShape, {"num_outputs": 1025}, "num_outputs must be a whole number from 1 to 1024, not"),
         (GnnShape, {"latent": 0}, "latent must be a whole number from 1 to 1024"),
         (GnnShape, {"depth": 9}, "depth must be a whole number from 1 to 8, not 9"),
         (GnnShape, {"receptive_field": -1}, "receptive_field must be a whole number from 0 to 16"),
-        (GnnShape, {"receptive_field": 17}, "receptive_field must be a whole number from 0 to 16"),
         (MlpShape, {"num_robots": 1}, "num_robots must be a whole number from 2 to 1000, not 1"),
         (MlpShape, {"hidden": (0,)}, "hidden must be a whole number from 1 to 4096, not 0"),
         (MlpShape, {"features": "mine"}, "features must be one of"),

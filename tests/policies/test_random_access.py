@@ -105,15 +105,6 @@ def test_packets_name_their_addressees_in_the_reference_preset_only(preset, is_n
 # Slotted ALOHA.
 
 
-def test_contenders_by_hand():
-    """Four on a line at 0, 240, 480, 720 m; robot 0 knows all, 1 nobody, 2 robot 1, 3 robot 0."""
-    line_m = np.array([[0.0, 0.0], [240.0, 0.0], [480.0, 0.0], [720.0, 0.0]])
-    is_known = np.array([[[1, 1, 1, 1], [0, 0, 0, 0], [0, 1, 1, 0], [1, 0, 0, 1]]], dtype=bool)
-    found = num_contenders(is_known, np.tile(line_m, (1, 4, 1, 1)), RANGE_M)
-    # 4 · 2/4: itself and robot 1 of four known; 4 · 1/1; 4 · 2/2; 4 · 1/2.
-    np.testing.assert_array_equal(found, [[2.0, 4.0, 4.0, 2.0]])
-
-
 @given(seed=st.integers(0, 2**32 - 1), num_robots=st.integers(2, 12))
 def test_contenders_are_counted_in_each_robots_own_beliefs(seed, num_robots):
     rng = np.random.default_rng(seed)
@@ -136,14 +127,6 @@ def test_a_neighbourhood_is_heard_with_the_probability(probability, num_robots):
         assert np.all(sending == probability)
     else:
         assert is_about(np.mean(np.any(sending, axis=1)), probability, 4000)
-
-
-def test_a_robot_alone_in_range_sends_with_the_probability_itself():
-    """Seven that know each other, everyone out of everyone's range: n is 7 · 1/7."""
-    apart_m = np.zeros((2000, 7, 7, 2))
-    apart_m[..., 0] = 1000.0 * np.arange(7)
-    policy = started(Aloha(0.4, range_m=RANGE_M), 2000, 7)
-    assert is_about(np.mean(policy.transmits(views_of(np.ones((2000, 7, 7)), apart_m))), 0.4, 14e3)
 
 
 # Innovation gossip.
@@ -187,8 +170,3 @@ def test_news_add_up_until_they_are_sent():
     for window in (1.0, 2.0, 3.0):
         has_sent |= is_telling(policy, np.full((2000, 4, 4), window))
     assert is_about(np.mean(~has_sent), 0.504, 8000)
-
-
-def test_gossip_of_probability_0_is_silence():
-    policy = gossip(0.0)
-    assert not any(np.any(is_telling(policy, np.full((1, 4, 4), t))) for t in range(200))

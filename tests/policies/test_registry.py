@@ -2,7 +2,6 @@
 
 import os
 
-import numpy as np
 import pytest
 from tiny_policies import save_tiny
 
@@ -17,7 +16,6 @@ from swarm_mj.policies.registry import (
     POLICIES,
     flown_name,
     is_learned,
-    is_stored,
     make_policy,
     normalised,
     with_payload,
@@ -25,7 +23,6 @@ from swarm_mj.policies.registry import (
 from swarm_mj.policies.sotdma.policy import SelfOrganisedTdma
 from swarm_mj.policies.tdma import SpatialTdma, Tdma
 from swarm_mj.policies.tuning import tuned_probability
-from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.packages import asset
 
 MISSION = paper("flocking", num_robots=8)
@@ -45,43 +42,30 @@ def folder(tmp_path, monkeypatch):
 
 @here
 @pytest.mark.parametrize(
-    "name",
+    ("typed", "plain"),
     [
-        *("runs/x/policy", "./runs/x/policy/", "mine", "mine/", "./mst", "mst/", "runs/../mine"),
-        *("all", "one.safetensors", "./one.safetensors"),
+        ("runs/x/policy", "runs/x/policy"),
+        ("./runs//x/policy/", "runs/x/policy"),
+        ("runs/../mine", "mine"),
+        ("mine/", "mine"),
+        ("mst/", "./mst"),
+        ("./mst", "./mst"),
+        ("all", "all"),
+        ("./one.safetensors", "one.safetensors"),
     ],
 )
-def test_a_directory_or_a_file_is_a_learned_policy(tmp_path, name):
-    for typed in (name, normalised(name), str(tmp_path / name)):
-        assert is_stored(typed)
-        assert is_learned(typed)
-        assert isinstance(make_policy(typed, MISSION), LearnedPolicy)
+def test_a_folder_or_a_file_is_a_learned_policy_by_any_of_its_names(tmp_path, typed, plain):
+    assert normalised(typed) == plain.replace("/", os.sep)
+    for name in (typed, plain, str(tmp_path / typed)):
+        assert is_learned(name)
+        assert isinstance(make_policy(name, MISSION), LearnedPolicy)
 
 
 @here
 def test_a_name_is_a_name_whatever_lies_about():
-    assert not any(map(is_stored, POLICIES))
     assert make_policy("mst", MISSION).parameters["probability"] > 0.0
-    assert [normalised(name) for name in POLICIES] == list(POLICIES)
-
-
-@here
-@pytest.mark.parametrize(
-    ("typed", "expected"),
-    [
-        ("runs/x/policy", "runs/x/policy"),
-        ("./runs//x/policy/", "runs/x/policy"),
-        ("mine/", "mine"),
-        ("./mine", "mine"),
-        ("./mst", "./mst"),
-        ("mst/", "./mst"),
-        ("gone/", "./gone"),
-        ("rumour", "rumour"),
-        ("", ""),
-    ],
-)
-def test_names_are_as_typed_but_for_what_leads_nowhere_else(typed, expected):
-    assert normalised(typed) == expected.replace("/", os.sep)
+    assert [normalised(name) for name in (*POLICIES, "rumour", "")] == [*POLICIES, "rumour", ""]
+    assert normalised("gone/") == os.path.join(os.curdir, "gone")
 
 
 @here
@@ -117,9 +101,6 @@ def test_the_shipped_policy_is_the_network_in_assets(tmp_path):
     stored = make_policy(str(asset("policies/gnn.safetensors")), MISSION)
     assert shipped.parameters == stored.parameters
     assert shipped.parameters != make_policy("./gnn", MISSION).parameters
-    assert shipped.payload == "none"
-    with pytest.raises(ValueError, match="gnn takes no transmission probability; leave out"):
-        make_policy("gnn", MISSION, 0.1)
 
 
 def test_ii_b_the_planner_can_go_without_payload():
@@ -143,21 +124,18 @@ KINDS = {
     "spatial-tdma": SpatialTdma,
     "sotdma": SelfOrganisedTdma,
     "planner": Planner,
+    "planner --payload none": SpatialTdma,
     "greedy-oracle": GreedyOracle,
 }
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_policies_by_name(name):
+def test_policies_by_name_and_what_flies_moving_teams_and_those_at_rest(name):
+    plans = name.startswith("planner")
     assert type(make_policy(name, MISSION)) is KINDS[name]
-
-
-def test_without_payload_the_planner_of_moving_teams_is_spatial_tdma_by_name():
-    name = "planner --payload none"
-    assert (flown_name(name, MISSION), flown_name(name, REST)) == ("spatial-tdma", name)
-    assert type(make_policy(name, MISSION)) is SpatialTdma
-    assert type(make_policy(name, REST)) is RestingPlanner
-    assert [flown_name(other, MISSION) for other in ("planner", "mst")] == ["planner", "mst"]
+    assert type(make_policy(name, REST)) is (RestingPlanner if plans else KINDS[name])
+    moving = "spatial-tdma" if name.endswith("none") else name
+    assert (flown_name(name, REST), flown_name(name, MISSION)) == (name, moving)
 
 
 def test_the_planner_of_a_team_at_rest_learns_links_if_slots_hold_them():
@@ -167,21 +145,6 @@ def test_the_planner_of_a_team_at_rest_learns_links_if_slots_hold_them():
     assert policy.payload == "links"
     slow = paper("stationary", num_robots=10, bit_rate=100e3)
     assert make_policy("planner", slow).payload == "none"
-
-
-@pytest.mark.parametrize("name", TUNED)
-def test_probability_reaches_the_policy(name):
-    """At 0 nobody transmits, at 1 nearly everybody does who has anything new to tell."""
-    num_sending = []
-    for probability in (0.0, 1.0):
-        swarm = Swarm(MISSION, [1])
-        policy = make_policy(name, MISSION, probability)
-        swarm.step_with_recipients(swarm.views.silence)
-        swarm.buffers.timestamp[:] = 1.0
-        swarm.start(policy)
-        num_sending.append(np.sum(swarm.decide() != swarm.views.silence))
-    assert num_sending[0] == 0
-    assert num_sending[1] >= 5
 
 
 @pytest.mark.parametrize(
@@ -206,8 +169,8 @@ def test_probability_is_tuned_by_default_and_named(name, preset):
     assert make_policy(name, mission, 0.17).parameters == {"probability": 0.17}
 
 
-@pytest.mark.parametrize("name", SCHEDULES)
+@pytest.mark.parametrize("name", [*SCHEDULES, "gnn"])
 def test_a_schedule_has_no_probability(name):
-    assert make_policy(name, REST).parameters == {}
+    assert name == "gnn" or make_policy(name, REST).parameters == {}
     with pytest.raises(ValueError, match=f"{name} takes no transmission probability"):
         make_policy(name, REST, 0.5)

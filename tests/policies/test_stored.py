@@ -46,7 +46,7 @@ def policy(tmp_path):
 
 def plain_weights(seed=1):
     rng = np.random.default_rng(seed)
-    shapes = PLAIN.network.tensors().items()
+    shapes = PLAIN.network.tensors.items()
     return {name: rng.standard_normal(shape).astype(np.float32) for name, shape in shapes}
 
 
@@ -93,20 +93,16 @@ def test_a_loaded_network_gives_identical_logits(tmp_path, features, shape):
 def test_a_plain_network_comes_back_as_it_was(plain):
     weights, config = read_weights(plain)
     assert config == PLAIN
-    assert weights.keys() == PLAIN.network.tensors().keys()
-    for name, values in plain_weights().items():
-        np.testing.assert_array_equal(weights[name], values)
+    np.testing.assert_equal(weights, plain_weights())
 
 
 def test_a_policy_is_one_file_that_others_can_read(policy):
     (written,) = policy.parent.iterdir()
-    weights, state = load_file(written), tiny_network().state_dict()
-    assert all(np.array_equal(weights[name], tensor) for name, tensor in state.items())
-    said = json.loads(metadata_of(written)["swarm_mj policy"])
-    assert (said["format"], said["format_version"], said["kind"]) == ("swarm_mj policy", 2, "gnn")
-    assert said["config"]["network"]["receptive_field"] == 1
-    assert said["config"]["training"]["seed"] == 3
-    assert said["card"] == model_card(tiny_config(tiny_network()))
+    weights = {name: tensor.numpy() for name, tensor in tiny_network().state_dict().items()}
+    np.testing.assert_equal(load_file(written), weights)
+    said, config = json.loads(metadata_of(written)["swarm_mj policy"]), tiny_config(tiny_network())
+    header = {"format": "swarm_mj policy", "format_version": 2, "kind": "gnn"}
+    assert said == header | {"config": asdict(config), "card": model_card(config)}
 
 
 def test_a_policy_is_the_same_bytes_every_time_and_loading_draws_no_numbers(policy):
@@ -125,10 +121,8 @@ def test_a_policy_is_the_same_bytes_every_time_and_loading_draws_no_numbers(poli
     ("saved", "named"),
     [
         ("x.safetensors", "x.safetensors"),
-        ("x", "x.safetensors"),
         ("x", "x"),
         ("x.y", "x.y"),
-        ("runs/x/policy", "runs/x/policy.safetensors"),
         ("runs/x/policy", "runs/x/policy"),
         ("runs/x/policy", "runs/x"),
     ],
@@ -178,17 +172,15 @@ def test_no_policy(tmp_path, kind):
 
 
 def test_a_folder_of_policies_lists_them(tmp_path):
-    for name in ("a/policy", "b/policy", "c"):
-        save_tiny(tmp_path / name)
+    names = ("a/policy", "b/policy", "c", *(f"d{n}" for n in range(7)))
+    files = [tmp_path / f"{name}.safetensors" for name in names]
+    for file in files:
+        file.parent.mkdir(exist_ok=True)
+        file.touch()
     with pytest.raises(ValueError, match="holds policies; name one of them") as refused:
         find_policy(tmp_path)
     shown = str(refused.value).partition("them: ")[2]
-    files = [f"{tmp_path / name}.safetensors" for name in ("a/policy", "b/policy", "c")]
-    assert shown == ", ".join(files)
-    for n in range(7):
-        (tmp_path / f"d{n}.safetensors").touch()
-    with pytest.raises(ValueError, match=r"d3\.safetensors, .*d4\.safetensors and 2 more$"):
-        find_policy(tmp_path)
+    assert shown == ", ".join(map(str, files[:8])) + " and 2 more"
 
 
 def test_an_oversized_file(policy):
@@ -245,10 +237,7 @@ def test_weights_that_are_no_policys(policy, metadata, complaint):
             r"tensor output.bias must be .*, not \[1\] of float64",
         ),
         (lambda w: w["output.bias"].fill(np.nan), "output.bias has numbers that are not finite"),
-        (
-            lambda w: w["output.weight"][0].fill(-np.inf),
-            "tensor output.weight has numbers that are not finite",
-        ),
+        (lambda w: w["output.weight"][0].fill(-np.inf), "output.weight has numbers that are not"),
     ],
 )
 def test_weights_of_another_network(policy, change, complaint):
@@ -262,6 +251,10 @@ def test_weights_of_a_type_that_numpy_lacks(policy):
     refused(policy, "it is damaged, or no safetensors file")
 
 
+def network_with(**its):
+    return lambda said: said["config"]["network"].update(its)
+
+
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
@@ -271,14 +264,14 @@ def test_weights_of_a_type_that_numpy_lacks(policy):
         (lambda s: s.update(wings=2), "unknown field `wings`"),
         (lambda s: s["config"].pop("training"), "missing required field `training`"),
         (lambda s: s["config"].update(extra=1), "unknown field `extra`"),
-        (lambda s: s["config"]["network"].update(hidden=[4, 10**9]), "hidden must be a whole"),
-        (lambda s: s["config"]["network"].update(activation="os.system"), "os.system"),
-        (lambda s: s["config"]["network"].update(features="mine"), "features must be one of"),
-        (lambda s: s["config"]["network"].update(features="os:system"), "add --features os:system"),
-        (lambda s: s["config"]["network"].update(num_features=7), "but the paper features are 8"),
-        (lambda s: s["config"]["network"].update(hidden=[4, 3]), r"tensor [12]\.\w+ must be"),
-        (lambda s: s["config"]["network"].update(hidden=[4]), "it has an unknown tensor 2"),
-        (lambda s: s["config"]["network"].update(hidden=[4, 2, 2]), "it lacks the tensor 3"),
+        (network_with(hidden=[4, 10**9]), "hidden must be a whole"),
+        (network_with(activation="os.system"), "os.system"),
+        (network_with(features="mine"), "features must be one of"),
+        (network_with(features="os:system"), "add --features os:system"),
+        (network_with(num_features=7), "but the paper features are 8"),
+        (network_with(hidden=[4, 3]), r"tensor [12]\.\w+ must be"),
+        (network_with(hidden=[4]), "it has an unknown tensor 2"),
+        (network_with(hidden=[4, 2, 2]), "it lacks the tensor 3"),
     ],
 )
 def test_plain_networks_that_are_not_sound(plain, change, complaint):
@@ -289,44 +282,31 @@ def test_plain_networks_that_are_not_sound(plain, change, complaint):
 # What is not saved.
 
 
-def nan_bias(network):
-    network.output.bias.data.fill_(float("nan"))
-
-
 @pytest.mark.parametrize(
-    ("shape", "change", "overrides", "complaint"),
+    ("overrides", "complaint"),
     [
-        ({}, None, {"training": {"rate": float("nan")}}, "config must be JSON all through"),
-        ({}, None, {"training": {"seed": np.int64(3)}}, "config must be JSON all through"),
-        ({}, None, {"training": {"log": "x" * 64_000_000}}, "may have up to 64000000 bytes, not "),
-        ({}, nan_bias, {}, "not finite"),
-        ({}, lambda network: network.double(), {}, "must be .* of float32, not"),
+        ({"training": {"rate": float("nan")}}, "config must be JSON all through"),
+        ({"training": {"seed": np.int64(3)}}, "config must be JSON all through"),
         (
-            *({"latent": 1024, "depth": 8}, None, {}),
-            r"mine\.safetensors may have up to 64000000 bytes, not 1",
+            {"training": {"log": "x" * 64_000_000}},
+            r"mine\.safetensors may have up to 64000000 bytes",
         ),
-        (
-            *({}, None, {"network": tiny_network(latent=7).shape}),
-            r"config describes .*latent=7.*network is .*latent=6",
-        ),
+        ({"network": tiny_network(latent=7).shape}, r"describes .*latent=7.*network is .*latent=6"),
+        ({"output": torch.tensor([np.nan])}, "not finite"),
+        ({"output": torch.zeros(1).double()}, "must be .* of float32, not"),
     ],
 )
-def test_what_could_not_be_loaded_is_not_saved(policy, shape, change, overrides, complaint):
-    network = tiny_network(seed=5, **shape)
-    config = replace(tiny_config(network), **overrides)
-    if change:
-        change(network)
+def test_what_could_not_be_loaded_is_not_saved(policy, overrides, complaint):
+    network, its = tiny_network(seed=5), dict(overrides)
+    network.output.bias.data = its.pop("output", network.output.bias.data)
     with pytest.raises(ValueError, match=complaint):
-        save_policy(policy, network, config, card="# Short")
+        save_policy(policy, network, replace(tiny_config(network), **its), card="# Short")
     assert torch.equal(read_policy(policy)[0].output.weight, tiny_network().output.weight)
 
 
 def test_a_policy_may_be_a_link_as_in_caches(policy, tmp_path):
     (tmp_path / "link").symlink_to(policy)
     assert read_policy(tmp_path / "link")[1] == read_policy(policy)[1]
-
-
-# Which libraries are needed.
 
 
 def test_a_plain_network_flies_without_torch(plain):

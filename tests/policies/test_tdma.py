@@ -11,7 +11,7 @@ from spatial_rule import agreed_senders, radio
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tdma import SpatialTdma, Tdma
-from swarm_mj.protocol.buffers import BROADCAST, empty_buffers
+from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.window import SLOT_WINDOWS, LocalViews
 from swarm_mj.simulation.swarm import Swarm
 
@@ -72,19 +72,6 @@ def test_age_of_a_fully_connected_team_is_its_closed_form(num_robots):
             halves_old = h * (h - 1) / 2 + (num_robots - h) * h
             expected = 0.5 * halves_old * (num_robots - 1) / num_robots**2
         np.testing.assert_allclose(swarm.step(policy).age_windows, expected, rtol=1e-12)
-
-
-def test_nobody_is_interfered_with():
-    """Whoever is in range of the speaker decodes it, in the first slot as in any."""
-    swarm, policy = Swarm(paper("stationary", num_robots=20), [3]), Tdma()
-    position_m = swarm.states.position_m[0]
-    for _ in range(20):
-        swarm.step(policy)
-        for phase in swarm.phases:
-            (speaker,) = speakers(phase.recipient == BROADCAST)
-            distance_m = np.hypot(*(position_m - position_m[speaker]).T)
-            expected = np.where(distance_m <= swarm.mission.range_m, speaker, np.arange(20))
-            np.testing.assert_array_equal(phase.heard[0], expected)
 
 
 # With spatial reuse.
@@ -173,18 +160,6 @@ def test_robots_that_believe_otherwise_decide_otherwise():
     assert senders(policy, views) == {0, 2}
     views.buffers.position_m[0, 2] = [[150.0, 0.0], [50.0, 0.0], [0.0, 0.0], [100.0, 0.0]]
     assert senders(policy, views) == {0}
-
-
-def test_who_knows_nobody_does_as_tdma_does():
-    """From an empty start the same order is spoken in, one robot a half window."""
-    spatial, plain = SpatialTdma(range_m=250.0, threshold=1.25), Tdma()
-    for policy in (spatial, plain):
-        policy.start(20, [np.random.default_rng(4)])
-    position_m = Swarm(MISSION, [1]).states.position_m[0]
-    for half in range(45):
-        views = views_of(position_m, np.eye(20), half)
-        assert senders(spatial, views) == senders(plain, views)
-        assert len(senders(spatial, views)) == 1
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -31,10 +31,8 @@ def found(monkeypatch, rows, *regime, **overrides):
 
 
 def test_iv_c_every_regime_of_the_figures_is_tuned_once_for_each_policy():
-    regimes = [
-        (r.policy, r.preset, r.task, r.num_robots, r.range_ratio, r.velocity_ratio)
-        for r in read_table(TABLE)
-    ]
+    columns = ("policy", "preset", "task", "num_robots", "range_ratio", "velocity_ratio")
+    regimes = [tuple(getattr(row, name) for name in columns) for row in read_table(TABLE)]
     named = itertools.product(POLICIES, ("paper", "reference"), REGIMES)
     assert regimes == [(policy, preset, *regime) for policy, preset, regime in named]
 
@@ -48,10 +46,9 @@ def test_iv_c_rows_say_how_they_were_found_and_are_met_exactly():
         assert tuned.version
         if tuned.preset == "reference" and tuned.policy in ("random-flooding", "mst"):
             assert tuned.probability in AUTHORS_GRID
-        make = {"paper": paper, "reference": reference}[tuned.preset]
         names = ("num_robots", "range_ratio", "velocity_ratio")
         its = {name: getattr(tuned, name) for name in names}
-        mission = make(tuned.task, num_windows=7, **its)
+        mission = PRESETS[tuned.preset](tuned.task, num_windows=7, **its)
         assert tuned_probability(tuned.policy, mission) == tuned.probability
 
 

@@ -11,6 +11,8 @@ from swarm_mj.system.compiled import compiled
 
 ZERO = np.float32(0.0)  # of the least type, so that float32 stays that
 
+Rows = Float[np.ndarray, "_ C"]
+
 
 class WantedEdges(NamedTuple):
     """Edges that end at nodes that are asked for, graph by graph."""
@@ -62,16 +64,13 @@ class EdgeSums(torch.autograd.Function):
     ) -> Float[Tensor, "w C"]:
         """Return the sums; all tensors are on a CPU."""
         total = torch.zeros_like(receiver)
-        _sum((as_array(receiver), as_array(sender), as_array(direction)), edges, total.numpy())
+        _sum(as_array(receiver), as_array(sender), as_array(direction), edges, total.numpy())
         ctx.save_for_backward(receiver, sender, direction)
         ctx.edges = edges
         return total
 
     @staticmethod
-    def backward(
-        ctx: Any,  # noqa: ANN401 - torch's own
-        *gradients: Tensor,
-    ) -> tuple[Tensor | None, ...]:
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor | None, ...]:  # noqa: ANN401 - torch's own
         """Return the gradients of the first three arguments, from that of the sums."""
         given = tuple(map(as_array, ctx.saved_tensors))
         back = tuple(map(np.zeros_like, given))
@@ -85,28 +84,20 @@ def as_array(tensor: Tensor) -> np.ndarray:
 
 
 @compiled()
-def _sum(
-    given: tuple[np.ndarray, ...], edges: WantedEdges, total: Float[np.ndarray, "w C"]
-) -> None:
-    receiver, sender, direction = given
-    for e in range(len(edges.end)):
-        to, start, d = edges.end[e], edges.start[e], edges.direction[e]
+def _sum(receiver: Rows, sender: Rows, direction: Rows, edges: WantedEdges, total: Rows) -> None:
+    for to, start, d in zip(edges.end, edges.start, edges.direction):  # noqa: B905 - not compiled
         for c in range(total.shape[1]):
             total[to, c] += max(receiver[to, c] + sender[start, c] + direction[d, c], ZERO)
 
 
 @compiled()
 def _spread(
-    given: tuple[np.ndarray, ...],
-    edges: WantedEdges,
-    gradient: Float[np.ndarray, "w C"],
-    gradients: tuple[np.ndarray, ...],
+    given: tuple[Rows, ...], edges: WantedEdges, gradient: Rows, gradients: tuple[Rows, ...]
 ) -> None:
     receiver, sender, direction = given
     of_receiver, of_sender, of_direction = gradients
     back = np.empty_like(direction[0])
-    for e in range(len(edges.end)):
-        to, start, d = edges.end[e], edges.start[e], edges.direction[e]
+    for to, start, d in zip(edges.end, edges.start, edges.direction):  # noqa: B905 - not compiled
         for c in range(len(back)):
             edge = receiver[to, c] + sender[start, c] + direction[d, c]
             back[c] = gradient[to, c] if edge > 0 else ZERO

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Shaped
+from jaxtyping import Bool, Float, Float32, Int, Shaped
 
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
@@ -23,7 +23,6 @@ ADDRESS_RANGES = 1.2  # a teammate believed farther away cannot be addressed [ra
 FAR_RANGES = 4.0  # distances count up to here [ranges]
 CROWD = 10.0  # neighbours that count as 1
 TEAM = 40.0  # robots that count as 1
-
 
 # What a node tells, by its field in `NODE`, in the network's order. A node of the robot itself
 # carries what concerns all of its neighbours.
@@ -49,6 +48,13 @@ FEATURES = {
 }
 NODE = np.dtype([(field, np.float32) for field in FEATURES])
 
+Pairs = Float[np.ndarray, "B N N"]
+Places = Float[np.ndarray, "B N N 2"]
+Flags = Bool[np.ndarray, "B N N"]
+Nodes = Shaped[np.ndarray, "B N N"]  # of `NODE`
+Timestamps = Float32[np.ndarray, "N"]
+Column = Float[np.ndarray, "N"]
+
 
 class ExtendedFeatures(FeatureExtractor):
     """Features for learning in minutes; see `FEATURES`."""
@@ -66,17 +72,18 @@ class ExtendedFeatures(FeatureExtractor):
     def graphs(self, views: LocalViews) -> Graphs:
         """Return what every robot's network sees now; must see every window."""
         remember(self._memory, views)
-        buffers, range_m = views.buffers, self._mission.range_m
-        believed_m, (num_missions, num_robots) = buffers.position_m, buffers.shape
-        node = np.empty((num_missions, num_robots, num_robots), dtype=NODE)
+        buffers, mission, num_robots = views.buffers, self._mission, views.num_robots
+        node = np.empty(buffers.timestamp.shape, dtype=NODE)
         may_address = np.empty(node.shape, dtype=np.bool_)
-        times, is_observed = (buffers.timestamp, buffers.last_attempt, views.now), buffers.is_known
-        _fill(*times, is_observed, believed_m, self._memory, range_m, node, may_address)
-        is_known = is_observed | np.eye(num_robots, dtype=np.bool_)
-        _fill_by_position(believed_m, is_known, views.now, range_m, node)
-        now, threshold = views.now.astype(np.int64), from_db(self._mission.sinr_threshold_db)
-        write_joined(believed_m, is_known, now, range_m, threshold, node["has_joined"])
-        rows = (num_missions * num_robots, num_robots)
+        is_known = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
+        now = views.now.astype(np.int64)
+        observed = (buffers.last_attempt, buffers.is_known, buffers.position_m, views.now)
+        _write_ages_and_news(self._memory, *observed, mission.range_m, node, may_address)
+        beliefs, range_m = (buffers.position_m, is_known), mission.range_m
+        _write_beliefs(*beliefs, now, range_m, node)
+        threshold = from_db(mission.sinr_threshold_db)
+        write_joined(*beliefs, now, range_m, threshold, node["has_joined"])
+        rows = (len(now) * num_robots, num_robots)
         return Graphs(
             node=node.view(np.float32).reshape(*rows, len(FEATURES)),
             parent=buffers.parent.reshape(rows),
@@ -98,15 +105,60 @@ class LocalFeatures(ExtendedFeatures):
         return replace(seen, node=seen.node[:, :, is_kept], has_turn=np.zeros_like(seen.has_turn))
 
 
+@compiled()
+def _write_ages_and_news(
+    memory: Memory,
+    last_attempt: Pairs,
+    is_observed: Flags,
+    believed_m: Places,
+    now: Float[np.ndarray, "B"],
+    range_m: float,
+    node: Nodes,
+    may_address: Flags,
+) -> None:
+    """Write all but what follows from positions and the clock alone.
+
+    A robot's own news is to all robots in range together.
+    """
+    num_missions, num_robots = node.shape[:2]
+    for b in range(num_missions):
+        rank = (np.arange(num_robots) - int(now[b])) % num_robots / num_robots
+        for i in range(num_robots):
+            own, said, news, unsaid_news = memory.timestamp[b, i], memory.said[b, i], 0.0, 0.0
+            num_known = np.sum(is_observed[b, i]) + (not is_observed[b, i, i])
+            known_share = num_known / num_robots
+            for k in range(num_robots):
+                of_k, observed = node[b, i, k], memory.timestamp[b, i, k]
+                heard, addressed = memory.heard[b, i, k], memory.addressed_by[b, i, k]
+                attempt = last_attempt[b, i, k]
+                of_k.timestamp_age = log_age(now[b], observed, is_observed[b, i, k])
+                of_k.heard_age = log_age(now[b], heard, heard > NEVER)
+                of_k.attempt_age = log_age(now[b], attempt, attempt > NEVER)
+                of_k.addressed_age = log_age(now[b], addressed, addressed > NEVER)
+                ranges = math.sqrt(squared_distance(believed_m[b, i], k, i)) / range_m
+                is_known = k == i or is_observed[b, i, k]
+                may_address[b, i, k] = not is_known or ranges <= ADDRESS_RANGES
+                of_k.is_oneself, of_k.is_known = k == i, is_known
+                of_k.known_share, of_k.team_size = known_share, num_robots / TEAM
+                of_k.turn_rank = rank[k]
+                of_k.distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known else 0.0
+                of_k.is_near = is_known and k != i and ranges <= 1.0
+                of_k.news, of_k.unsaid_news = 0.0, 0.0
+                if of_k.is_near > 0.0:
+                    of_k.news, of_k.unsaid_news = _rises(own, memory.neighbour[b, i, k], said)
+                    news += of_k.news
+                    unsaid_news += of_k.unsaid_news
+                    of_k.news, of_k.unsaid_news = logarithm(of_k.news), logarithm(of_k.unsaid_news)
+            # Of oneself at the end: a choice in the loop would double the time that it takes.
+            sent = memory.sent[b, i]
+            node[b, i, i].heard_age = log_age(now[b], sent, sent > NEVER)
+            node[b, i, i].news, node[b, i, i].unsaid_news = logarithm(news), logarithm(unsaid_news)
+
+
 @compiled(fastmath=True)
-def _news(
-    own: Float32[np.ndarray, "N"],
-    neighbour: Float32[np.ndarray, "N"],
-    said: Float32[np.ndarray, "N"],
-) -> tuple[float, float]:
+def _rises(own: Timestamps, neighbour: Timestamps, said: Timestamps) -> tuple[float, float]:
     """Mean rise of a neighbour's T if it heard all: by its packet, or also by one's own."""
-    by_packet, by_both = np.float32(0.0), np.float32(0.0)
-    zero = np.float32(0.0)
+    by_packet, by_both, zero = np.float32(0.0), np.float32(0.0), np.float32(0.0)
     for j in range(own.shape[0]):
         by_packet += max(own[j] - neighbour[j], zero)
         by_both += max(own[j] - max(neighbour[j], said[j]), zero)
@@ -114,76 +166,12 @@ def _news(
 
 
 @compiled()
-def _fill(
-    timestamp: Float[np.ndarray, "B N N"],
-    last_attempt: Float[np.ndarray, "B N N"],
-    now: Float[np.ndarray, "B"],
-    is_observed: Bool[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "B N N 2"],
-    memory: Memory,
+def _write_beliefs(
+    believed_m: Places,
+    is_known: Flags,
+    now: Int[np.ndarray, "B"],
     range_m: float,
-    node: Shaped[np.ndarray, "B N N"],
-    may_address: Bool[np.ndarray, "B N N"],
-) -> None:
-    """Write all features but neighbours and turns by distance or interference."""
-    num_missions, num_robots = timestamp.shape[:2]
-    rank, own = np.empty(num_robots), np.empty(num_robots, dtype=np.float32)
-    for b in range(num_missions):
-        for k in range(num_robots):
-            rank[k] = ((k - int(now[b])) % num_robots) / num_robots
-        for i in range(num_robots):
-            num_known = 0
-            for k in range(num_robots):
-                own[k] = timestamp[b, i, k]
-                num_known += k == i or is_observed[b, i, k]
-            for k in range(num_robots):
-                ranges = math.sqrt(squared_distance(position_m[b, i], k, i)) / range_m
-                is_known = k == i or is_observed[b, i, k]
-                is_near = is_known and k != i and ranges <= 1.0
-                of_k = node[b, i, k]
-                of_k.is_oneself = k == i
-                of_k.is_known = is_known
-                of_k.timestamp_age = log_age(now[b], timestamp[b, i, k], is_observed[b, i, k])
-                of_k.distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known else 0.0
-                of_k.is_near = is_near
-                heard, addressed = memory.heard[b, i, k], memory.addressed_by[b, i, k]
-                of_k.heard_age = log_age(now[b], heard, heard > NEVER)
-                attempt = last_attempt[b, i, k]
-                of_k.attempt_age = log_age(now[b], attempt, attempt > NEVER)
-                of_k.addressed_age = log_age(now[b], addressed, addressed > NEVER)
-                of_k.news, of_k.unsaid_news = 0.0, 0.0
-                if is_near:
-                    news = _news(own, memory.neighbour[b, i, k], memory.said[b, i])
-                    of_k.news, of_k.unsaid_news = news
-                of_k.turn_rank = rank[k]
-                of_k.known_share = num_known / num_robots
-                of_k.team_size = num_robots / TEAM
-                may_address[b, i, k] = k == i or not is_known or ranges <= ADDRESS_RANGES
-            sent = memory.sent[b, i]
-            _fill_oneself(i, log_age(now[b], sent, sent > NEVER), node[b, i])
-
-
-@compiled()
-def _fill_oneself(i: int, spoken_log_age: float, node: Shaped[np.ndarray, "N"]) -> None:
-    """Write what concerns all neighbours together; the news of each goes to its logarithm."""
-    news, unsaid_news = 0.0, 0.0
-    for k in range(node.shape[0]):
-        news += node[k].news
-        unsaid_news += node[k].unsaid_news
-        if node[k].is_near > 0.0:  # nobody else has news, and its logarithm is 0, too
-            node[k].news = logarithm(node[k].news)
-            node[k].unsaid_news = logarithm(node[k].unsaid_news)
-    node[i].heard_age = spoken_log_age
-    node[i].news, node[i].unsaid_news = logarithm(news), logarithm(unsaid_news)
-
-
-@compiled()
-def _fill_by_position(
-    believed_m: Float[np.ndarray, "B N N 2"],
-    is_known: Bool[np.ndarray, "B N N"],
-    now: Float[np.ndarray, "B"],
-    range_m: float,
-    node: Shaped[np.ndarray, "B N N"],
+    node: Nodes,
 ) -> None:
     """Write neighbours and turns by distance, which follow from positions and the clock alone."""
     num_missions, num_robots = is_known.shape[:2]
@@ -191,14 +179,13 @@ def _fill_by_position(
     x_m, y_m, is_close = np.empty(num_robots), np.empty(num_robots), np.empty(num_robots)
     known = np.empty(num_robots, np.int64)
     for b in range(num_missions):
-        window = int(now[b])
         for i in range(num_robots):
-            its = node[b, i]
+            its, last = node[b, i], node[b, i - 1]
             if believes_as_the_last(believed_m[b], is_known[b], i):
                 for k in range(num_robots):
-                    last = node[b, i - 1, k]
-                    its[k].neighbours, its[k].has_turn_1_5 = last.neighbours, last.has_turn_1_5
-                    its[k].has_turn_2, its[k].has_turn_3 = last.has_turn_2, last.has_turn_3
+                    of_k, same = its[k], last[k]
+                    of_k.neighbours, of_k.has_turn_1_5 = same.neighbours, same.has_turn_1_5
+                    of_k.has_turn_2, of_k.has_turn_3 = same.has_turn_2, same.has_turn_3
                 continue
             for k in range(num_robots):
                 x_m[k], y_m[k] = believed_m[b, i, k, 0], believed_m[b, i, k, 1]
@@ -209,7 +196,7 @@ def _fill_by_position(
                     dx, dy = x_m[j] - x_m[k], y_m[j] - y_m[k]
                     count += known[j] * (dx * dx + dy * dy <= range_m * range_m)
                 its[k].neighbours = count * known[k] / CROWD
-            at = (x_m, y_m, is_known[b, i], window, is_close)
+            at = (x_m, y_m, is_known[b, i], now[b], is_close)
             write_turns(*at, 1.5 * range_m, its["has_turn_1_5"])
             write_turns(*at, 2.0 * range_m, its["has_turn_2"])
             write_turns(*at, 3.0 * range_m, its["has_turn_3"])
@@ -217,11 +204,11 @@ def _fill_by_position(
 
 @compiled()
 def write_turns(
-    x_m: Float[np.ndarray, "N"],
-    y_m: Float[np.ndarray, "N"],
+    x_m: Column,
+    y_m: Column,
     is_known: Bool[np.ndarray, "N"],
     window: int,
-    is_close: Float[np.ndarray, "N"],
+    is_close: Column,
     radius_m: float,
     has_turn: Float32[np.ndarray, "N"],
 ) -> None:

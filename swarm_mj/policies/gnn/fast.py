@@ -16,30 +16,31 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from swarm_mj.policies.gnn.edge_sums import EdgeSums, as_array, edges_to
-from swarm_mj.policies.gnn.network import AggregationGnn, Core
-from swarm_mj.policies.policy_config import Edges, GnnShape
+from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.policies.policy_config import GnnShape
 
 NODES_AT_ONCE = 6400  # on a CPU: with more the caches spill, with fewer every step starts in vain
 IS_UPWARD = {"paper": (True,), "reference": (False,), "both": (True, False)}  # child to parent
+
+Rows = Float[Tensor, "n C"]
+Parents = Int[Tensor, "R N"]
+Asked = Bool[Tensor, "R N"]
 
 
 class FastAggregationGnn(AggregationGnn):
     """An `AggregationGnn` that composes layers and leaves out what nobody asks for."""
 
     def forward(
-        self,
-        node: Float[Tensor, "R N F"],
-        parent: Int[Tensor, "R N"],
-        is_wanted: Bool[Tensor, "R N"] | None = None,
+        self, node: Float[Tensor, "R N F"], parent: Parents, is_wanted: Asked | None = None
     ) -> Float[Tensor, "R N O"]:
         """As `AggregationGnn.forward`, to which the linear variant and a depth of 1 are left."""
         self.check(node, parent)
         is_composed = self.shape.has_core and self.shape.depth > 1
         evaluate = Composed(self) if is_composed else super().forward
         num_chunks = -(-parent.numel() // NODES_AT_ONCE) if node.device.type == "cpu" else 1
-        rows = (node, parent) if is_wanted is None else (node, parent, is_wanted)
-        chunks = zip(*(each.chunk(max(1, num_chunks)) for each in rows), strict=True)
-        return torch.cat([evaluate(*chunk) for chunk in chunks])
+        asked = torch.ones_like(parent, dtype=torch.bool) if is_wanted is None else is_wanted
+        chunks = (each.chunk(max(1, num_chunks)) for each in (node, parent, asked))
+        return torch.cat([evaluate(*chunk) for chunk in zip(*chunks, strict=True)])
 
 
 def empty_network(shape: GnnShape) -> FastAggregationGnn:
@@ -72,7 +73,7 @@ class Layer(NamedTuple):
         return Layer(self.weight @ before.weight, bias)
 
 
-def hidden(x: Float[Tensor, "n C"], layers: list[nn.Linear]) -> Float[Tensor, "n C"]:
+def hidden(x: Rows, layers: list[nn.Linear]) -> Rows:
     """Return a perceptron behind its first layer and before its last; overwrites its argument."""
     x = x.relu_()
     for layer in layers:
@@ -98,9 +99,9 @@ class Composed:
 
     def __init__(self, network: AggregationGnn) -> None:
         """Compose the weights as they are now; gradients flow back to them."""
-        assert isinstance(network.core, Core)
-        self._edges: Edges = network.shape.edges
-        self._depth, self._num_blocks = network.shape.depth, network.shape.receptive_field
+        assert network.core is not None
+        self._is_upward, num_blocks = IS_UPWARD[network.shape.edges], network.shape.receptive_field
+        self._is_compiled = network.shape.depth == 2 and num_blocks == 1
         self._encoder, self._decoder = network.encoder.node.layers, network.decoder.node.layers
         self._edge, self._node = network.core.edge.layers, network.core.node.layers
         of_edge, of_receiver, of_sender = self._edge[0].weight.chunk(3, dim=1)
@@ -112,7 +113,7 @@ class Composed:
             receiver=Layer(of_receiver, self._edge[0].bias),
             sender=Layer(of_sender, none),
         )
-        later = [entries.after(self._node[-1])] * self._num_blocks
+        later = [entries.after(self._node[-1])] * num_blocks
         self._stages = [entries.after(self._encoder[-1]), *later]
         self._edge_again = Layer(of_edge, none).after(self._edge[-1])
         self._mean = Layer(of_mean, none).after(self._edge[-1])
@@ -120,47 +121,40 @@ class Composed:
         no_output = torch.zeros_like(network.output.bias)
         self._outputs = [Layer(w, no_output).after(self._decoder[-1]) for w in outputs]
         self._output_bias = network.output.bias
-        directions = range(len(IS_UPWARD[self._edges]))
-        feature = none.new_tensor([[direction] for direction in directions])
+        feature = none.new_tensor([[direction] for direction in range(len(self._is_upward))])
         self._encoded_edges = network.encoder.edge(feature) @ of_edge.T
 
     def __call__(
-        self,
-        node: Float[Tensor, "R N F"],
-        parent: Int[Tensor, "R N"],
-        is_wanted: Bool[Tensor, "R N"] | None = None,
+        self, node: Float[Tensor, "R N F"], parent: Parents, is_wanted: Asked
     ) -> Float[Tensor, "R N O"]:
         """Evaluate the network; arguments as in `AggregationGnn.forward`."""
-        wanted = None if is_wanted is None else is_wanted.flatten().nonzero().squeeze(1)
+        wanted = is_wanted.flatten().nonzero().squeeze(1)
         v = hidden(self._encoder[0](node.flatten(0, 1)), self._encoder[1:-1])
-        own = picked(v, wanted)
+        own = v.index_select(0, wanted)
         output = self._output_bias + self._decode(0, own)
-        if self._depth == 2 and self._num_blocks == 1 and node.device.type == "cpu":
+        if self._is_compiled and node.device.type == "cpu":
             output = output + self._decode(1, self._only_block(v, own, parent, is_wanted))
         else:
-            links, e = ParentLinks(parent, self._edges, node), None
-            for stage in range(1, self._num_blocks + 1):
-                v, e = self._gn_block(self._stages[stage - 1], links, v, e)
-                output = output + self._decode(stage, picked(v, wanted))
-        if wanted is not None:
-            output = output.new_zeros(parent.numel(), output.shape[1]).index_copy(0, wanted, output)
-        return output.view(*parent.shape, output.shape[1])
+            links, e = ParentLinks(parent, self._is_upward, node.dtype), list(self._encoded_edges)
+            for stage, entries in enumerate(self._stages[:-1], start=1):
+                e = e if stage == 1 else [self._edge_again(each) for each in e]
+                ends = links.from_ends(entries.receiver(v), entries.sender(v))
+                e = [hidden(x.add_(y), self._edge[1:-1]) for x, y in zip(ends, e, strict=True)]
+                v = self._update_nodes(entries.node(v), links.mean(e), links.has_edge)
+                output = output + self._decode(stage, v.index_select(0, wanted))
+        everyone = output.new_zeros(parent.numel(), output.shape[1])
+        return everyone.index_copy(0, wanted, output).view(*parent.shape, output.shape[1])
 
-    def _decode(self, stage: int, node: Float[Tensor, "n C"]) -> Float[Tensor, "n O"]:
+    def _decode(self, stage: int, node: Rows) -> Float[Tensor, "n O"]:
         decoded = hidden(self._stages[stage].decoder(node), self._decoder[1:-1])
         return self._outputs[stage](decoded)
 
     def _only_block(
-        self,
-        node: Float[Tensor, "n C"],
-        wanted: Float[Tensor, "w C"],
-        parent: Int[Tensor, "R N"],
-        is_wanted: Bool[Tensor, "R N"] | None,
+        self, node: Rows, wanted: Float[Tensor, "w C"], parent: Parents, is_wanted: Asked
     ) -> Float[Tensor, "w C"]:
-        """As `_gn_block`, if no other follows and edges have one hidden layer."""
+        """Return the wanted nodes after the only block, if its edges have one hidden layer."""
         entries = self._stages[0]
-        asked = np.ones(parent.shape, np.bool_) if is_wanted is None else as_array(is_wanted)
-        edges = edges_to(as_array(parent), np.array(IS_UPWARD[self._edges]), asked)
+        edges = edges_to(as_array(parent), np.array(self._is_upward), as_array(is_wanted))
         total = EdgeSums.apply(
             entries.receiver(wanted),
             node @ entries.sender.weight.T,
@@ -171,34 +165,11 @@ class Composed:
         mean = total * degree.clamp(min=1).reciprocal()[:, None]
         return self._update_nodes(entries.node(wanted), mean, degree.sign())
 
-    def _gn_block(
-        self,
-        entries: Entries,
-        links: "ParentLinks",
-        node: Float[Tensor, "n C"],
-        edge: list[Tensor] | None,
-    ) -> tuple[Float[Tensor, "n C"], list[Tensor]]:
-        """Nodes and edges, by direction, before the last layers of NN_v and NN_e; None: encoded."""
-        ends = links.from_ends(entries.receiver(node), entries.sender(node))
-        edge = list(self._encoded_edges) if edge is None else [self._edge_again(e) for e in edge]
-        edge = [hidden(x.add_(e), self._edge[1:-1]) for x, e in zip(ends, edge, strict=True)]
-        return self._update_nodes(entries.node(node), links.mean(edge), links.has_edge), edge
-
-    def _update_nodes(
-        self,
-        entered: Float[Tensor, "n C"],
-        mean: Float[Tensor, "n C"],
-        has_edge: Float[Tensor, "n"],
-    ) -> Float[Tensor, "n C"]:
+    def _update_nodes(self, entered: Rows, mean: Rows, has_edge: Float[Tensor, "n"]) -> Rows:
         """NN_v, from its first layer's part for the node and the edges' mean before their last."""
         entered = entered.addmm_(mean, self._mean.weight.T)
         entered = entered.addr_(has_edge, self._mean.bias)  # without edges the mean is 0
         return hidden(entered, self._node[1:-1])
-
-
-def picked(x: Float[Tensor, "n *C"], rows: Int[Tensor, "w"] | None) -> Float[Tensor, "w *C"]:
-    """Return these rows; None is all of them."""
-    return x if rows is None else x.index_select(0, rows)
 
 
 class ParentLinks:
@@ -208,32 +179,26 @@ class ParentLinks:
     direction are as many as the nodes, and only the parents' rows have to be looked up.
     """
 
-    def __init__(self, parent: Int[Tensor, "R N"], edges: Edges, like: Tensor) -> None:
-        """Find the ends; means have the type of `like` and are on its device."""
-        self._is_upward = IS_UPWARD[edges]
+    def __init__(self, parent: Parents, is_upward: tuple[bool, ...], dtype: torch.dtype) -> None:
+        """Find the ends; means have this type."""
         own = torch.arange(parent.numel(), device=parent.device).view(parent.shape)
         has_parent = parent >= 0
+        self._is_upward = is_upward
         self._parent = torch.where(has_parent, own[:, :1] + parent, own).flatten()
-        count = has_parent.flatten().to(like.dtype)
+        count = has_parent.flatten().to(dtype)
         degree = torch.zeros_like(count)
-        for is_up in self._is_upward:
+        for is_up in is_upward:
             degree = degree.index_add(0, self._parent, count) if is_up else degree + count
         self.has_edge = degree.clamp(max=1)
         share = degree.clamp(min=1).reciprocal()
-        self._share = [count * (share[self._parent] if up else share) for up in self._is_upward]
+        self._share = [count * (share[self._parent] if up else share) for up in is_upward]
 
-    def from_ends(
-        self, receiver: Float[Tensor, "n C"], sender: Float[Tensor, "n C"]
-    ) -> list[Float[Tensor, "n C"]]:
+    def from_ends(self, receiver: Rows, sender: Rows) -> list[Rows]:
         """For every edge, its receiver's row of one array plus its sender's of another."""
-        return [
-            receiver.index_select(0, self._parent).add_(sender)
-            if is_up
-            else sender.index_select(0, self._parent).add_(receiver)
-            for is_up in self._is_upward
-        ]
+        ends = [(receiver, sender) if is_up else (sender, receiver) for is_up in self._is_upward]
+        return [above.index_select(0, self._parent).add_(below) for above, below in ends]
 
-    def mean(self, edge: list[Float[Tensor, "n C"]]) -> Float[Tensor, "n C"]:
+    def mean(self, edge: list[Rows]) -> Rows:
         """For each node, the mean over the edges that it receives; 0 without any."""
         total = torch.zeros_like(edge[0])
         for is_up, share, rows in zip(self._is_upward, self._share, edge, strict=True):

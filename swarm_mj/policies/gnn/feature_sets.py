@@ -34,15 +34,13 @@ def num_features(features: str) -> int:
 
 
 def _feature_set(features: str) -> type[FeatureExtractor]:
-    if is_own_set(features):
-        check_named(features, _own, "it")
-        return _own[features]
-    if features not in FEATURE_SETS:
+    check_named(features, _own, "it")
+    if features not in FEATURE_SETS | _own:
         raise ValueError(
             f"features must be one of {', '.join(FEATURE_SETS)}, or module:Name of your own, not "
             f"{features!r:.80}{did_you_mean(features, FEATURE_SETS)}"
         )
-    return FEATURE_SETS[features]
+    return (FEATURE_SETS | _own)[features]
 
 
 def load_features(features: str) -> None:
@@ -71,23 +69,3 @@ def check_named(features: str, named: Collection[str], where: str) -> None:
             f"{where} sees by features of someone's own, {features:.200}; if you trust that code, "
             f"add --features {features:.200}"
         )
-
-
-def trained_extractor(
-    features: str, num_features: int, mission: Mission, *, named: Collection[str], where: str
-) -> FeatureExtractor:
-    """Return the extractor that a stored network, which `where` calls, was trained on.
-
-    Raise ValueError if it is a user's own and not among those named, cannot be loaded, or now has
-    another number of features.
-    """
-    check_named(features, named, where)
-    if is_own_set(features):
-        load_features(features)
-    extractor = make_extractor(features, mission)
-    if len(extractor.names) != num_features:
-        raise ValueError(
-            f"{where} was trained on {num_features} features, and {features} now has "
-            f"{len(extractor.names)}"
-        )
-    return extractor

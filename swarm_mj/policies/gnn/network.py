@@ -3,6 +3,7 @@
 This is the definition. `gnn.fast` computes the same numbers in fewer steps.
 """
 
+import itertools
 from typing import NamedTuple
 
 import torch
@@ -10,6 +11,9 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from swarm_mj.policies.policy_config import Edges, GnnShape
+
+NodeRows = Float[Tensor, "n C"]
+EdgeRows = Float[Tensor, "e C"]
 
 
 class EdgeSet(NamedTuple):
@@ -37,12 +41,9 @@ class Perceptron(nn.ModuleList):
 
     def __init__(self, num_inputs: int, shape: GnnShape) -> None:
         widths = [num_inputs, *[shape.latent] * shape.depth]
-        super().__init__(map(nn.Linear, widths[:-1], widths[1:]))
-
-    @property
-    def layers(self) -> list[nn.Linear]:
-        """First to last."""
-        return [layer for layer in self if isinstance(layer, nn.Linear)]
+        layers = [nn.Linear(*ends) for ends in itertools.pairwise(widths)]
+        super().__init__(layers)
+        self.layers = layers  # as a ModuleList has modules of any kind
 
     def forward(self, x: Float[Tensor, "n In"]) -> Float[Tensor, "n C"]:
         """Apply the layers."""
@@ -74,21 +75,7 @@ class Core(Perceptrons):
         return self.node(torch.cat([mean, node], dim=1))
 
 
-class LinearCore(nn.Module):
-    """The linear updates: edges copy their senders, nodes keep the mean, so GN(v) = A v."""
-
-    def update_edge(self, _edge: Tensor, _receiver: Tensor, sender: Tensor) -> Tensor:
-        """Return the sender."""
-        return sender
-
-    def update_node(self, mean: Tensor, _node: Tensor) -> Tensor:
-        """Return the mean."""
-        return mean
-
-
-def mean_aggregation(
-    edge: Float[Tensor, "e C"], receiver: Int[Tensor, "e"], num_nodes: int
-) -> Float[Tensor, "n C"]:
+def mean_aggregation(edge: EdgeRows, receiver: Int[Tensor, "e"], num_nodes: int) -> NodeRows:
     """For each node, the mean over the edges it receives, 0 without any (Eq. 12)."""
     count = edge.new_zeros(num_nodes).index_add(0, receiver, edge.new_ones(len(edge)))
     total = edge.new_zeros(num_nodes, edge.shape[1]).index_add(0, receiver, edge)
@@ -96,12 +83,16 @@ def mean_aggregation(
 
 
 def gn_block(
-    core: Core | LinearCore, node: Float[Tensor, "n C"], edge: Float[Tensor, "e _"], edges: EdgeSet
-) -> tuple[Float[Tensor, "n C"], Float[Tensor, "e C"]]:
-    """Update all edges by their ends, and all nodes by the mean of their edges (Eq. 11)."""
-    edge = core.update_edge(edge, node[edges.receiver], node[edges.sender])
+    core: Core | None, node: NodeRows, edge: Float[Tensor, "e _"], edges: EdgeSet
+) -> tuple[NodeRows, EdgeRows]:
+    """Update all edges by their ends, and all nodes by the mean of their edges (Eq. 11).
+
+    Without a core, in the linear variant, edges copy their senders, so that GN(v) = A v.
+    """
+    sender = node[edges.sender]
+    edge = core.update_edge(edge, node[edges.receiver], sender) if core else sender
     mean = mean_aggregation(edge, edges.receiver, len(node))
-    return core.update_node(mean, node), edge
+    return core.update_node(mean, node) if core else mean, edge
 
 
 class AggregationGnn(nn.Module):
@@ -110,10 +101,9 @@ class AggregationGnn(nn.Module):
     def __init__(self, shape: GnnShape) -> None:
         """Draw the parameters from PyTorch's own generator."""
         super().__init__()
-        self.shape = shape
-        width = shape.latent
+        self.shape, width = shape, shape.latent
         self.encoder = Perceptrons(Perceptron(shape.num_features, shape))
-        self.core: Core | LinearCore = LinearCore()
+        self.core: Core | None = None
         if shape.has_core:
             self.encoder.edge = Perceptron(1, shape)
             self.core = Core(Perceptron(2 * width, shape), Perceptron(3 * width, shape))
@@ -128,9 +118,8 @@ class AggregationGnn(nn.Module):
     ) -> Float[Tensor, "R N O"]:
         """Map the features of the nodes of R graphs to numbers for each node.
 
-        `parent` is a node of the same graph, or -1: no edge. A smaller graph may be padded with
-        nodes that have no parent. Of nodes that are not wanted the numbers are 0; None is all.
-        Raises ValueError as `check` does.
+        `parent` is a node of the same graph, or -1: no edge, as of the nodes that pad a smaller
+        graph. Of nodes that are not wanted the numbers are 0; None is all. Raises as `check`.
         """
         self.check(node, parent)
         edges = edges_of(parent, self.shape.edges, node.dtype)
@@ -145,11 +134,11 @@ class AggregationGnn(nn.Module):
 
     def check(self, node: Tensor, parent: Tensor) -> None:
         """Raise ValueError on graphs that would give numbers without a meaning."""
-        num_features, num_nodes = node.shape[-1], parent.shape[-1]
-        if num_features != self.shape.num_features:
+        made_for, given, num_nodes = self.shape.num_features, node.shape[-1], parent.shape[-1]
+        if given != made_for:
             raise ValueError(
-                f"nodes must have the {self.shape.num_features} features that the network was made "
-                f"for, not {num_features}"
+                f"nodes must have the {made_for} features that the network was made for, "
+                f"not {given}"
             )
         if parent.numel() and (highest := int(parent.max())) >= num_nodes:
             raise ValueError(

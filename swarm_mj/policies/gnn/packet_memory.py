@@ -31,9 +31,8 @@ class Memory(NamedTuple):
 
 def empty_memory(num_missions: int, num_robots: int) -> Memory:
     """Return the memory of robots that never heard or said anything."""
-    robots = (num_missions, num_robots)
-    pairs = (*robots, num_robots)
-    shapes = (pairs, pairs, robots, (*pairs, num_robots), pairs, pairs)
+    pairs = (num_missions, num_robots, num_robots)
+    shapes = (pairs, pairs, pairs[:2], (*pairs, num_robots), pairs, pairs)
     return Memory(*(np.full(shape, NEVER, dtype=np.float32) for shape in shapes))
 
 
@@ -55,18 +54,14 @@ def _take_in(
     time: Float[np.ndarray, "B"],
     is_transmission: bool,
 ) -> None:
-    num_missions, num_robots = recipient.shape
-    for b in range(num_missions):
+    for b in range(len(time)):
         observe_own(memory.timestamp[b], time[b])
         packet = memory.timestamp[b].copy()
-        for i in range(num_robots):
+        for i, k in enumerate(heard[b]):
             if is_transmission and recipient[b, i] != i:
-                memory.sent[b, i] = time[b]
-                memory.said[b, i] = packet[i]
-            k = heard[b, i]
+                memory.sent[b, i], memory.said[b, i] = time[b], packet[i]
             if k != i:
-                memory.heard[b, i, k] = time[b]
-                memory.neighbour[b, i, k] = packet[k]
+                memory.heard[b, i, k], memory.neighbour[b, i, k] = time[b], packet[k]
                 if recipient[b, k] == i:
                     memory.addressed_by[b, i, k] = time[b]
         merge_timestamps(packet, heard[b], memory.timestamp[b])

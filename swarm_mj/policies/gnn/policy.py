@@ -20,7 +20,6 @@ class GnnPolicy(LearnedPolicy):
         self,
         network: AggregationGnn,
         extractor: FeatureExtractor,
-        *,
         silence_logit: float = 0.0,
         **options: Any,
     ) -> None:
@@ -29,8 +28,7 @@ class GnnPolicy(LearnedPolicy):
         The logit is added to silence, but in a robot's own turn.
         """
         super().__init__(extractor, **options)
-        self._network = network
-        self._silence_logit = silence_logit
+        self._network, self._silence_logit = network, silence_logit
         self.uses = f"{extractor.uses}, by a trained graph neural network"
 
     @property
@@ -42,18 +40,16 @@ class GnnPolicy(LearnedPolicy):
         """Return each robot's logits over recipients, from its own graph."""
         num_rows, num_robots = graphs.may_address.shape
         parent = torch.from_numpy(graphs.parent.astype(np.int64))  # a copy: buffers are read-only
-        node, may_address, has_turn = map(
-            torch.from_numpy, (graphs.node, graphs.may_address, graphs.has_turn)
-        )
+        given = (graphs.node, graphs.may_address, graphs.has_turn)
+        node, may_address, has_turn = map(torch.from_numpy, given)
         owner = torch.arange(num_rows) % num_robots
-        device, silence_logit = next(self._network.parameters()).device, self._silence_logit
-        num_threads = torch.get_num_threads()
+        device, num_threads = next(self._network.parameters()).device, torch.get_num_threads()
         torch.set_num_threads(1)  # small batches are slower on several
         try:
             with torch.inference_mode():
-                seen = (each.to(device) for each in (node, parent, may_address))
-                output = self._network(*seen).cpu()
-                return recipient_logits(output, owner, may_address, silence_logit, has_turn).numpy()
+                output = self._network(*(x.to(device) for x in (node, parent, may_address))).cpu()
+                rules = owner, may_address, self._silence_logit, has_turn
+                return recipient_logits(output, *rules).numpy()
         finally:
             torch.set_num_threads(num_threads)  # the setting is the process's
 

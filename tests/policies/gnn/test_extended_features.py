@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mixed_missions import MISSION as WALK
-from mixed_missions import NUM_ROBOTS, SEEDS, flown, mixed_views, renamed
+from mixed_missions import NUM_ROBOTS, SEEDS, flown, mixed_views
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures, write_turns
@@ -71,30 +71,20 @@ def test_identity_knowledge_and_ages():
     )
 
 
-def test_ages_count_up_to_500_windows():
-    for now, about_3 in ((504.0, log_age(498)), (900.0, 1.0)):
-        check(seen(silent_views(now))[0], age_of_T=[1.0, 0.0, 1.0, about_3])
-
-
-def test_distances_by_belief():
-    """200 and 350 m are 0.8 and 1.4 ranges; up to 4 count, and 1.2 are worth addressing."""
-    found, may_address = seen(silent_views())
-    check(found, distance=[0.2, 0.0, 0.0, 0.35], is_in_range=[1, 0, 0, 0])
-    assert may_address.tolist() == [True, True, True, False]
+@pytest.mark.parametrize("range_m", [250.0, 500.0])
+@pytest.mark.parametrize(
+    ("at_0", "at_3"), [(200.0, 350.0), (251.0, 299.0), (249.0, 301.0), (3000.0, 200.0)]
+)
+def test_distances_by_belief(at_0, at_3, range_m):
+    """Up to 4 ranges count, and those up to 1.2 are worth addressing."""
     views = silent_views()
-    for at_0, at_3 in ((251.0, 299.0), (249.0, 301.0), (3000.0, 200.0)):
-        views[0].buffers.position_m[0, OBSERVER, 0] = [at_0, 0.0]
-        views[0].buffers.position_m[0, OBSERVER, 3] = [0.0, at_3]
-        found, may_address = seen(views)
-        check(found, distance=[min(at_0 / 1000, 1.0), 0.0, 0.0, at_3 / 1000])
-        check(found, is_in_range=[at_0 < 250, 0, 0, at_3 < 250])
-        assert may_address.tolist() == [at_0 < 300, True, True, at_3 < 300]
-
-
-def test_the_range_is_the_missions():
-    found, may_address = seen(silent_views(), paper("stationary", num_robots=4, range_ratio=0.5))
-    check(found, distance=[0.1, 0.0, 0.0, 0.175], is_in_range=[1, 0, 0, 1])
-    assert np.all(may_address)
+    views[0].buffers.position_m[0, OBSERVER] = [[at_0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, at_3]]
+    mission = paper("stationary", num_robots=4, range_ratio=range_m / 1000.0)
+    found, may_address = seen(views, mission)
+    far_m = 4 * range_m
+    check(found, distance=[min(at_0 / far_m, 1.0), 0.0, 0.0, at_3 / far_m])
+    check(found, is_in_range=[at_0 < range_m, 0, 0, at_3 < range_m])
+    assert may_address.tolist() == [at_0 < 1.2 * range_m, True, True, at_3 < 1.2 * range_m]
 
 
 def test_neighbours_of_each_by_belief():
@@ -194,29 +184,17 @@ def views_of_a_talk():
     ]
 
 
-def test_ages_of_packets_heard_and_meant_for_oneself():
-    """Robot 3's packet came at 10.5 and was meant for robot 1, whose own first word is at 11.5."""
-    found, _ = seen(views_of_a_talk()[:2])
-    check(
-        found,
-        age_of_last_packet_heard=[1.0, 1.0, 1.0, log_age(0.5)],
-        age_of_last_being_addressed=[1.0, 1.0, 1.0, log_age(0.5)],
-    )
-    found, _ = seen(views_of_a_talk())
-    check(
-        found,
-        age_of_last_packet_heard=[1.0, log_age(0.5), 1.0, log_age(1.5)],
-        age_of_last_being_addressed=[1.0, 1.0, 1.0, log_age(1.5)],
-        age_of_last_attempt=[log_age(0.5), 1.0, 1.0, 1.0],
-    )
-
-
-def test_being_overheard_is_not_being_addressed():
-    views = views_of_a_talk()[:2]
-    views[1].phases[0].recipient[0, TEACHER] = 2
-    found, _ = seen(views)
-    check(found, age_of_last_packet_heard=[1.0, 1.0, 1.0, log_age(0.5)])
-    check(found, age_of_last_being_addressed=[1.0] * 4)
+@pytest.mark.parametrize(("addressed", "is_meant"), [(OBSERVER, True), (2, False)])
+def test_ages_of_packets_heard_and_meant_for_oneself(addressed, is_meant):
+    """Robot 3's packet came at 10.5, and robot 1's own first word is at 11.5."""
+    views = views_of_a_talk()
+    views[1].phases[0].recipient[0, TEACHER] = addressed
+    for num_views, own, since in ((2, 1.0, 0.5), (3, log_age(0.5), 1.5)):
+        found, _ = seen(views[:num_views])
+        of_3 = log_age(since)
+        check(found, age_of_last_packet_heard=[1.0, own, 1.0, of_3])
+        check(found, age_of_last_being_addressed=[1.0, 1.0, 1.0, of_3 if is_meant else 1.0])
+    check(found, age_of_last_attempt=[log_age(0.5), 1.0, 1.0, 1.0])
 
 
 def test_news_to_those_in_range():
@@ -225,37 +203,13 @@ def test_news_to_those_in_range():
     Robot 1 spoke first at 11.5, with T = [4, 11.5, 9, 10.5]: all that is new since is 0.5 of its
     own clock.
     """
-    heard_only, _ = seen(views_of_a_talk()[:2])
-    to_0, to_3 = (4 + 11 + 9 + 10.5) / 4, (1 + 9 + 0 + 0) / 4
-    by_packet = "news to it, by its last packet"
-    by_both = "news to it, if it heard what was said last"
-    expected = [log_age(to_0), log_age(to_0 + to_3), 0.0, log_age(to_3)]
-    for name in (by_packet, by_both):
-        np.testing.assert_allclose(heard_only[name], expected, rtol=1e-6)
-    after_speech, _ = seen(views_of_a_talk())
-    to_0, to_3 = (4 + 12 + 9 + 10.5) / 4, (1 + 10 + 0 + 0) / 4
-    expected = [log_age(to_0), log_age(to_0 + to_3), 0.0, log_age(to_3)]
-    np.testing.assert_allclose(after_speech[by_packet], expected, rtol=1e-6)
-    expected = [log_age(0.125), log_age(0.25), 0.0, log_age(0.125)]
-    np.testing.assert_allclose(after_speech[by_both], expected, rtol=1e-6)
-
-
-def test_a_start_forgets_what_was_heard():
-    extractor = started()
-    for view in views_of_a_talk():
-        extractor.graphs(view)
-    extractor.start(1, 4)
-    node = extractor.graphs(silent_views()[0]).node
-    np.testing.assert_array_equal(node, started().graphs(silent_views()[0]).node)
-
-
-def test_every_feature_is_in_range_and_all_named_here_are_all():
-    extractor = started(mission=WALK)
-    assert len(extractor.names) == 18
-    for view in flown(5):
-        node = extractor.graphs(view).node
-        assert node.shape == (len(SEEDS) * NUM_ROBOTS, NUM_ROBOTS, 18)
-        assert np.all((node >= 0.0) & (node <= 2.0))
+    names = ("news to it, by its last packet", "news to it, if it heard what was said last")
+    before, after = (4 + 11 + 9 + 10.5, 1 + 9 + 0 + 0), (4 + 12 + 9 + 10.5, 1 + 10 + 0 + 0)
+    for num_views, rises in ((2, (before, before)), (3, (after, (0.5, 0.5)))):
+        found, _ = seen(views_of_a_talk()[:num_views])
+        for name, (to_0, to_3) in zip(names, rises, strict=True):
+            expected = [log_age(to_0 / 4), log_age((to_0 + to_3) / 4), 0.0, log_age(to_3 / 4)]
+            np.testing.assert_allclose(found[name], expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize("robot", [0, 4])
@@ -276,26 +230,14 @@ def test_the_local_features_are_the_extended_ones_without_turns():
     extended, local = started(mission=WALK), started(LocalFeatures, WALK)
     kept = [k for k, name in enumerate(extended.names) if "turn" not in name]
     assert local.names == tuple(extended.names[k] for k in kept)
-    assert len(local.names) == 13
+    assert (len(extended.names), len(local.names)) == (18, 13)
     for view in flown(6):
         graphs, fewer = extended.graphs(view), local.graphs(view)
+        assert np.all((graphs.node >= 0.0) & (graphs.node <= 2.0))
         np.testing.assert_array_equal(fewer.node, graphs.node[:, :, kept])
         np.testing.assert_array_equal(fewer.may_address, graphs.may_address)
         np.testing.assert_array_equal(fewer.parent, graphs.parent)
         assert not np.any(fewer.has_turn)
-
-
-def test_names_matter_for_turns_only():
-    """A team under other names sees the same, each under its new name, but for whose turn it is."""
-    name = np.random.default_rng(1).permutation(NUM_ROBOTS)
-    one, other = started(mission=WALK), started(mission=WALK)
-    is_turn = np.array(["turn" in called for called in one.names])
-    assert is_turn.sum() == 5
-    for view in flown(6):
-        node = one.graphs(view).node.reshape(len(SEEDS), NUM_ROBOTS, NUM_ROBOTS, -1)
-        same = other.graphs(renamed(view, name, np.argsort(name))).node.reshape(node.shape)
-        expected = node[:, name][:, :, name]
-        np.testing.assert_allclose(same[..., ~is_turn], expected[..., ~is_turn], atol=1e-6)
 
 
 # Turns by distance.
@@ -318,21 +260,6 @@ def order(num_robots, now):
     half = (now + num_robots // 2) % num_robots
     after = [*range(half, num_robots), *range(half)]
     return [now % num_robots, *(k for k in after if k != now % num_robots)]
-
-
-def test_turns_by_hand():
-    """On a line, 80 m apart; robot 2 leads in window 2, then 0, 1 and 3 are asked."""
-    believed_m = [[0.0, 0.0], [80.0, 0.0], [160.0, 0.0], [240.0, 0.0]]
-    assert turns(believed_m, [True] * 4, 2).tolist() == [
-        [True, False, True, False],  # 0 is 160 m off, 1 and 3 are near
-        [True, False, True, False],
-        [False, False, True, False],
-    ]
-    assert turns(believed_m, [True] * 4, 7).tolist() == [
-        [False, True, False, True],  # 3 leads; 1 is asked first and 160 m off
-        [False, True, False, True],
-        [False, False, False, True],
-    ]
 
 
 def test_exactly_a_radius_apart_is_far_enough():

@@ -12,7 +12,7 @@ from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.policy_config import GnnShape
 
 DIRECTIONS = ["paper", "reference", "both"]
-SHAPES = list(itertools.product(DIRECTIONS, [False, True], [1, 2, 3], [0, 1, 3]))
+SHAPES = list(itertools.product(DIRECTIONS, [2, 3], [0, 1, 3]))
 
 
 def plain_and_fast(dtype=torch.double, **its):
@@ -52,12 +52,14 @@ def outputs_and_gradients(network, node, parent, is_wanted=None):
 
 
 @pytest.mark.parametrize("asks", [False, True])
-@pytest.mark.parametrize(("edges", "is_linear", "depth", "receptive_field"), SHAPES)
-def test_the_fast_network_is_the_plain_one(edges, is_linear, depth, receptive_field, asks):
+@pytest.mark.parametrize(
+    ("edges", "depth", "receptive_field", "is_linear"),
+    [*((*shape, False) for shape in SHAPES), ("both", 1, 2, False), ("both", 2, 2, True)],
+)
+def test_the_fast_network_is_the_plain_one(edges, depth, receptive_field, is_linear, asks):
     """Also if only some nodes are wanted: they are as they were, and the rest is 0."""
-    plain, fast = plain_and_fast(
-        edges=edges, is_linear=is_linear, depth=depth, receptive_field=receptive_field
-    )
+    its = {"depth": depth, "receptive_field": receptive_field, "is_linear": is_linear}
+    plain, fast = plain_and_fast(edges=edges, **its)
     graphs, is_wanted = some_graphs(depth, 5, 7), some_wanted(depth, 5, 7) if asks else None
     expected, found = (outputs_and_gradients(each, *graphs, is_wanted) for each in (plain, fast))
     if is_wanted is not None:
@@ -106,13 +108,3 @@ def test_nothing_in_nothing_out(shape):
     _, fast = plain_and_fast()
     nothing = fast(torch.zeros(*shape, 3).double(), torch.zeros(shape, dtype=torch.int))
     assert nothing.shape == (*shape, 2)
-
-
-def test_it_refuses_what_the_plain_one_refuses():
-    _, fast = plain_and_fast()
-    node, parent = some_graphs(8, 2, 4)
-    with pytest.raises(ValueError, match="made for, not 2"):
-        fast(node[..., :2], parent)
-    parent[1, 2] = 4
-    with pytest.raises(ValueError, match="a parent must be one of its graph's nodes, 0 to 3"):
-        fast(node, parent)
