@@ -31,6 +31,7 @@ def test_a_flight_is_drawn_window_by_window():
 def test_a_team_at_rest_has_no_velocities_and_a_notebook_shows_its_chart_once(monkeypatch):
     run = swarm_mj.fly("stationary", policy="tdma", record=False, **SHORT)
     (age,) = run.plot().axes
+    assert run.task_cost is None
     assert len(age.lines) == 1  # what was not recorded has no worst pair
     assert len(plt.get_fignums()) == 1
     monkeypatch.setattr(plt, "get_backend", lambda: "module://matplotlib_inline.backend_inline")
@@ -40,6 +41,7 @@ def test_a_team_at_rest_has_no_velocities_and_a_notebook_shows_its_chart_once(mo
 
 def test_a_task_with_a_cost_of_its_own_shows_that():
     run = swarm_mj.fly("formation", policy="tdma", **SHORT)
+    assert run.task_cost == ("formation error", "m")
     cost = run.plot().axes[1]
     assert cost.get_ylabel() == "formation error\n[m]"
     assert list(cost.lines[0].get_ydata()) == list(run.to_dataframe().task_cost)

@@ -153,26 +153,8 @@ def test_a_task_with_a_cost_of_its_own_shows_that_instead_of_velocities():
             "random-walk, tdma, 40 robots, seed 3, arena blocks, fading rayleigh, known map",
         ),
         (paper("flocking", bit_rate=250e3), "flocking, tdma, 40 robots, seed 3, 250 kbit/s"),
+        (PRESETS["urban"](), "random-walk, tdma, 40 robots, seed 3, preset urban"),
     ],
 )
 def test_the_title_names_the_arena_and_what_the_channel_adds(mission, title):
     assert flight_title(mission, "tdma", 3) == title
-
-
-FREE = {"path_loss": "free-space", "shadowing_db": 0.0}
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({}, ""),
-        ({"num_robots": 40, "fading": "rician"}, ""),
-        ({"arena": "forest"}, ", arena forest"),
-        ({"arena": "open"}, ", arena open"),
-        (FREE, ", fading rician, rician_k 8"),
-        (FREE | {"fading": "none"}, ", free space"),
-    ],
-)
-def test_the_title_names_a_world_and_what_was_changed_in_it(given, said):
-    title = flight_title(PRESETS["urban"](**given), "tdma", 3)
-    assert title == f"random-walk, tdma, 40 robots, seed 3, preset urban{said}"

@@ -132,7 +132,6 @@ def test_compiling_is_not_timed(monkeypatch):
     ("keywords", "complaint"),
     [
         ({"num_robot": 20}, "swarm_mj.fly has no 'num_robot'; did you mean num_robots?"),
-        ({"polcy": "tdma"}, "swarm_mj.fly has no 'polcy'; did you mean policy?"),
         ({"policy": "tdmaa"}, "not 'tdmaa'; did you mean tdma?"),
         ({"features": "mine:Feat"}, "was trained on the features mine:Feat; leave them out"),
         ({"seed": -1}, "seeds must be one or more integers from 0"),

@@ -35,14 +35,3 @@ def test_noise_is_the_spread_of_what_should_be_the_same():
     )
     assert noise([4.0, 4.4]).endswith("10%.")
     assert noise([4.0, 6.0]).endswith("50%; the machine was busy, so measure again when it is not.")
-
-
-REFUSED = {
-    "--missions 0": "missions must be a whole number from 1 to 10000, not 0",
-    "--seconds nan": "seconds must be a number from 0.1 to 600 [s], not nan",
-}
-
-
-@pytest.mark.parametrize("options", REFUSED)
-def test_bench_refuses_bad_input(refusal, options):
-    assert REFUSED[options] in refusal("bench", *options.split())

@@ -1,19 +1,16 @@
-"""`swarm-mj fly` as a process: what it prints, writes, refuses, and leaves when interrupted."""
+"""`swarm-mj fly`: what it prints, writes, refuses, and leaves when interrupted."""
 
 import json
-import os
 import re
 import shlex
 import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from forks import files
 
+from swarm_mj.api import fly as flight
 from swarm_mj.cli import fly, main, parse
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
@@ -58,29 +55,65 @@ def test_a_summary_is_what_the_library_computes(succeed, tmp_path):
 
 REFUSED = {
     "--robots 1": "a whole number from 2 to 1000 [robots], not 1",
-    "--robots many": "argument --robots: invalid int value: 'many'",
     "--range-ratio 0": "range ratio must be a number from 0.01 to 10 [of 1 km], not 0",
     "--policy magic": "policy must be one of random-flooding, round-robin, mst",
-    "--policy mst --probability 1.5": "probability must be a number from 0 to 1, not 1.5",
     "--policy round-robin --probability 0.1": "takes no transmission probability",
     "--seed -1": "not [-1]",
     "--seed 18446744073709551616": "from 0 to 9223372036854775807",
     "--observer 40": "observer must be from 0 to 39, not 40",
     "--range-ratio 0.02": "too sparse",
     "--record replay.txt": "must be named *.rrd",
-    "--json .": "--json . is a folder; name a file",
     "--record a.rrd --json ./a.rrd": "same file",
     "--no-record --view": "--view needs a replay",
     "--no-record --record a.rrd": "not allowed with",
     "--bit-rate fast": "argument --bit-rate: name bits per second, 250k, 1M or none",
     "--policy tdma --bit-rate 2k": "16 bytes for a single entry, but a slot holds 12 bytes at",
-    "--wings 2": "unrecognized arguments: --wings 2",
+    "--rician-k -1": "Rician K must be a number from 0 to 10000 [1], not -1",
+    "--arena blocks --physics exact": "choose physics contact, or arena open",
+    "--preset urban --physics exact": "arena blocks has obstacles; choose physics contact, or",
+    "--collide --physics exact": "exact physics knows no collisions, so robots cannot",
 }
 
 
 @pytest.mark.parametrize("options", REFUSED)
 def test_bad_input_is_one_clear_line_and_leaves_nothing(refusal, options):
     assert REFUSED[options] in refusal("fly", *options.split())
+
+
+GEOM = '<geom name="pillar" type="box" size="20 20 5" pos="0 0 5" group="1"/>'
+ARENAS = {  # what stands in a file, and what is wrong with it; more are in tests/physics/
+    GEOM.replace("20 20 5", "2000 2000 5"): (
+        "6 of 6 robots found no free space in 1000 draws over an area of 387 m by 387 m; choose an "
+        "arena that leaves more room, or fewer robots"
+    ),
+    GEOM.replace("20 20 5", "20 wide 5"): "line 3",
+    GEOM.replace("20 20 5", "20 0 5"): "size 1 must be positive in geom",
+    '<geom type="mesh" mesh="hall"/>': "arena world.xml: Error: ",
+    GEOM.replace("group", 'user="-3" group'): (
+        "arena world.xml: the penetration loss of geom pillar must be 0 dB or more, not -3"
+    ),
+    f'<body name="cart"><joint type="slide"/>{GEOM}</body>': (
+        "arena world.xml: cart has a joint, but obstacles stand still"
+    ),
+}
+
+
+def write_arena(folder, geom):
+    text = f"<mujoco>\n<worldbody>\n{geom}\n</worldbody>\n</mujoco>\n"
+    (folder / "world.xml").write_text(text)
+
+
+@pytest.mark.parametrize("geom", ARENAS)
+def test_a_bad_arena_is_one_clear_line(refusal, tmp_path, geom):
+    write_arena(tmp_path, geom)
+    line = refusal("fly", "--robots", 6, "--windows", 3, "--arena", "world.xml")
+    assert ARENAS[geom] in line
+
+
+def test_a_hall_that_would_fill_a_smaller_teams_area_is_flown(succeed, tmp_path):
+    """6 robots have 387 m by 387 m, and the 3 that compile ahead would have 274 m."""
+    write_arena(tmp_path, GEOM.replace("20 20 5", "150 150 5"))
+    succeed("fly", *SHORT, "--no-record", "--arena", "world.xml", "--policy", "tdma")
 
 
 def test_an_output_below_a_file_is_refused_before_the_flight(refusal, tmp_path):
@@ -115,15 +148,13 @@ def test_an_existing_file_needs_force(succeed, refusal, tmp_path, flag, name):
     check_replay(path) if flag == "--record" else json.loads(path.read_text())
 
 
-def test_viewing_needs_a_display_and_says_so_first(tmp_path):
-    bare = {key: value for key, value in os.environ.items() if "DISPLAY" not in key}
-    done = subprocess.run(
-        [sys.executable, "-m", "swarm_mj", "fly", *SHORT, "--view"],
-        cwd=tmp_path, env=bare, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 2
-    assert "no display" in done.stderr
-    assert files(tmp_path) == []
+def test_viewing_needs_a_display_and_says_so_first(here, monkeypatch, capsys):
+    monkeypatch.setattr("swarm_mj.replay.view.sys.platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert main(["fly", *SHORT, "--view"]) == 2
+    assert "no display" in capsys.readouterr().err
+    assert files(here) == []
 
 
 def test_the_next_commands_fit_the_mission_and_the_screen(monkeypatch):
@@ -145,43 +176,23 @@ def test_the_next_commands_fit_the_mission_and_the_screen(monkeypatch):
         assert callable(run)
 
 
-# Flies as `swarm-mj` does, and tells by a file when the flight is well under way.
-FLY_AND_TELL = """
-import signal, sys
-from pathlib import Path
-from swarm_mj.api import fly as flight
-from swarm_mj.cli import main
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
-windows = flight.rollout
-def told(*arguments):
-    for count, window in enumerate(windows(*arguments)):
-        if count == 40:
-            Path("under-way").touch()
-        yield window
-flight.rollout = told
-sys.exit(main(sys.argv[1:]))
-"""
+def test_ctrl_c_leaves_a_readable_replay_of_what_was_flown(here, monkeypatch, capsys):
+    def pressed(*arguments):
+        for count, window in enumerate(rollout(*arguments), start=1):
+            if count == 15:
+                signal.raise_signal(signal.SIGINT)
+            yield window
 
-
-def test_ctrl_c_leaves_a_readable_replay_of_what_was_flown(tmp_path):
-    outputs = ["--record", "cut.rrd", "--json", "cut.json"]
-    flight = subprocess.Popen(
-        [sys.executable, "-c", FLY_AND_TELL, "fly", "--windows", "100000", "--seed", "3", *outputs],
-        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    while flight.poll() is None and not (tmp_path / "under-way").exists():
-        time.sleep(0.01)
-    flight.send_signal(signal.SIGINT)
-    output, errors = flight.communicate(timeout=120)
-    assert flight.returncode == 130, errors
-    flown = windows(tmp_path / "cut.rrd")
-    np.testing.assert_array_equal(flown, np.arange(1, len(flown) + 1))
-    assert 40 < len(flown) < 100_000
-    assert f"Interrupted after {len(flown)} of 100000 windows" in errors
-    assert f"{len(flown)} in" in output
-    summary = json.loads((tmp_path / "cut.json").read_text())
-    assert (summary["interrupted"], summary["num_windows"]) == (True, len(flown))
-    assert files(tmp_path) == ["cut.json", "cut.rrd", "under-way"]
+    monkeypatch.setattr(flight, "rollout", pressed)
+    outputs = ("--record", "cut.rrd", "--json", "cut.json")
+    assert main(["fly", *SHORT, "--policy", "tdma", *outputs]) == 130
+    said = capsys.readouterr()
+    np.testing.assert_array_equal(windows(here / "cut.rrd"), np.arange(1, 16))
+    assert said.err == "Interrupted after 15 of 20 windows.\n"
+    assert "15 in" in said.out
+    summary = json.loads((here / "cut.json").read_text())
+    assert (summary["interrupted"], summary["num_windows"]) == (True, 15)
+    assert files(here) == ["cut.json", "cut.rrd"]
 
 
 @pytest.mark.parametrize("lost", ["a.rrd", "a.json"])

@@ -68,8 +68,6 @@ REFUSED = {
     "fly --policy runs/y --probability 0.1": "takes no transmission probab",
     "fly --policy mst --deterministic": "applies to learned policies only, not to mst",
     "evaluate --policy mst --deterministic": "none is among mst; leave it out",
-    "evaluate --policy mst runs/z": "there is no policy runs/z",
-    "evaluate --policy runs/y --probability 0.1": "takes no transmission prob",
     "evaluate --policy runs/y --baseline runs/x": "not 'runs/x'; add it to them",
 }
 

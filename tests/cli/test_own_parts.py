@@ -127,11 +127,9 @@ def test_the_scene_is_in_the_file(succeed, tmp_path):
 
 
 REFUSED = {
-    "--policy my_parts:coin": "policy my_parts:coin: my_parts.py has no coin; did you",
     "--policy my_parts:Lossy": "must make a DecentralisedPolicy or a CentralisedPolicy",
     "--policy my_parts:Coin --probability 0.1": "takes no transmission probab",
     "--policy my_parts:Coin --deterministic": "applies to learned policies only",
-    "--channel free-space": "channel must be named module:Name, such as my_parts:Mine",
     "--channel your_parts:Lossy": "there is no module your_parts in",
     "--controller my_parts:breaks": "controller my_parts:breaks raised RuntimeError: out",
     "--features my_parts:Coin": "no policy here was trained on the features my_parts:Co",

@@ -26,8 +26,3 @@ def test_scene_does_not_replace_a_file_unasked(succeed, refusal, tmp_path):
     assert "scene.xml exists" in refusal("scene")
     assert (tmp_path / "scene.xml").read_text() == "mine"
     succeed("scene", "--force", "--robots", 3)
-
-
-def test_scene_refuses_bad_input(refusal):
-    assert "from 2 to 1000 [robots], not 1" in refusal("scene", "--robots", "1")
-    assert "is a folder" in refusal("scene", "--out", ".")

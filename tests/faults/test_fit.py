@@ -106,7 +106,9 @@ def flown_short(tmp_path, capsys, ending="Out of memory"):
     outputs = ("--record", str(tmp_path / "a.rrd"), "--json", str(tmp_path / "a.json"))
     assert main(["fly", *SMALL, *outputs]) == 1
     check_replay(tmp_path / "a.rrd")
-    kept = json.loads((tmp_path / "a.json").read_text())["num_windows"]
+    summary = json.loads((tmp_path / "a.json").read_text())
+    kept = summary["num_windows"]
+    assert summary["interrupted"] is True
     assert f"{ending} after {kept} of 120 windows." in " ".join(capsys.readouterr().err.split())
     return kept
 

@@ -96,3 +96,9 @@ def test_a_block_takes_about_what_umi_loses_without_line_of_sight():
 def test_where_a_world_is_flown_names_only_what_was_changed():
     assert where_flown(PRESETS["urban"]()) == ["preset urban"]
     assert where_flown(PRESETS["urban"](arena="forest")) == ["preset urban", "arena forest"]
+    free = {"path_loss": "free-space", "shadowing_db": 0.0}
+    for given, said in (
+        (free, "fading rician, rician_k 8"),
+        (free | {"fading": "none"}, "free space"),
+    ):
+        assert ", ".join(where_flown(PRESETS["urban"](**given))) == f"preset urban, {said}"
