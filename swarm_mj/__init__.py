@@ -99,7 +99,7 @@ _HOMES = {
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - any of the names
     """Return a name of `__all__`, or the version, when it is first asked for."""
     if name == "__version__":
-        return import_module("swarm_mj.system.provenance").version()
+        return import_module("swarm_mj.system.packages").version()
     for home, names in _HOMES.items():
         if name in names:
             return getattr(import_module(f"swarm_mj.{home}"), name)

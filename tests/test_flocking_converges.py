@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from channels import to_nobody
+from channels import tell_everyone_the_truth, to_nobody
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.registry import make_policy
@@ -18,17 +18,6 @@ def spread_mps(swarm):
     return np.std(swarm.states.velocity_mps, axis=1)
 
 
-def stay_silent(swarm):
-    num_missions, num_robots = swarm.states.velocity_mps.shape[:2]
-    return np.broadcast_to(np.arange(num_robots), (num_missions, num_robots)).copy()
-
-
-def tell_everyone_the_truth(swarm):
-    """Perfect communication: no channel serves all receivers at once, so the test plays it."""
-    swarm.buffers.timestamp[...] = 0.5 + swarm.now[:, None, None]
-    swarm.buffers.velocity_mps[...] = swarm.states.velocity_mps[:, None]
-
-
 @pytest.mark.parametrize("preset", [paper, reference])
 @pytest.mark.parametrize("physics", ["exact", "contact"])
 def test_eq16_perfect_knowledge_shrinks_the_spread_by_a_tenth_a_window(preset, physics):
@@ -39,9 +28,10 @@ def test_eq16_perfect_knowledge_shrinks_the_spread_by_a_tenth_a_window(preset, p
     """
     swarm = Swarm(preset("flocking", physics=physics, num_robots=20), [1, 2], channel=to_nobody)
     start_mps, mean_mps = spread_mps(swarm), np.mean(swarm.states.velocity_mps, axis=1)
+    silence = np.tile(np.arange(20), (2, 1))
     for k in range(1, NUM_WINDOWS + 1):
         tell_everyone_the_truth(swarm)
-        costs = swarm.step_with_recipients(stay_silent(swarm))
+        costs = swarm.step_with_recipients(silence)
         np.testing.assert_allclose(spread_mps(swarm), 0.9**k * start_mps, rtol=1e-9)
         variance = np.sum(start_mps**2, axis=1) * 0.81**k
         np.testing.assert_allclose(costs.velocity_variance_m2ps2, variance, rtol=1e-9)

@@ -65,10 +65,5 @@ def test_the_results_are_the_papers_missions_tuned_as_the_authors_did():
         assert json.loads(result.config)["preset"] == "reference"
         if result.policy != "round-robin":
             assert result.probability in AUTHORS_GRID & tuned
-
-
-def test_results_say_where_they_come_from():
-    for result in OURS:
         assert result.version
-        assert result.commit
-        assert not result.commit.endswith("+")
+        assert result.commit[-1:] not in ("", "+")

@@ -29,12 +29,3 @@ def test_type_checkers_are_told_of_the_same_names():
     homes = {(home, name) for home, names in swarm_mj._HOMES.items() for name in names}
     assert told == homes
     assert sorted(name for _, name in homes) == sorted(swarm_mj.__all__)
-
-
-def test_rollout_is_a_module_that_has_a_function_of_its_name():
-    """One meaning each, whatever was imported before."""
-    from swarm_mj.simulation.rollout import rollout
-
-    assert swarm_mj.simulation.rollout.rollout is rollout
-    assert "rollout" not in swarm_mj.__all__
-    assert not callable(swarm_mj.simulation.rollout)

@@ -39,22 +39,19 @@ def installed(built, tmp_path_factory):
     return target
 
 
-def run(installed, tmp_path, *arguments):
-    """Runs Python away from the checkout, the wheel's contents first on its path."""
+def run(folder, path, *arguments):
+    """Runs Python away from the checkout, with these folders first on its path."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, path))}
+    environment.pop("MUJOCO_GL", None)  # MuJoCo then loads OpenGL
+    command = [sys.executable, *arguments]
     return subprocess.run(
-        [sys.executable, *arguments],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(installed)},
-        capture_output=True,
-        text=True,
-        check=False,
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
 
 
 def test_an_index_would_take_both(built):
     check = [sys.executable, "-m", "twine", "check", "--strict", *map(str, built)]
-    done = subprocess.run(check, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
+    done = subprocess.run(check, capture_output=True, text=True, check=True)
     assert done.stdout.count("PASSED") == 2
 
 
@@ -71,18 +68,14 @@ def test_both_bring_what_they_need(built):
 
 
 def test_assets_come_from_the_wheel(installed, tmp_path):
-    done = run(
-        installed,
-        tmp_path,
-        "-c",
-        "from swarm_mj.system.packages import asset; print(asset('arena.xml'))",
-    )
+    code = "from swarm_mj.system.packages import asset; print(asset('arena.xml'))"
+    done = run(tmp_path, [installed], "-c", code)
     assert done.stdout.strip() == str(installed / "swarm_mj" / "assets" / "arena.xml")
 
 
 def test_it_flies_the_shipped_network_and_leaves_a_replay(installed, tmp_path):
     command = ("fly", "--policy", "gnn", "--robots", "5", "--windows", "10")
-    done = run(installed, tmp_path, "-m", "swarm_mj", *command)
+    done = run(tmp_path, [installed], "-m", "swarm_mj", *command)
     assert done.returncode == 0, done.stderr
     assert len(list((tmp_path / "replays").glob("*.rrd"))) == 1
 
@@ -111,26 +104,13 @@ def core(installed, tmp_path_factory):
         for top in {file.parts[0] for file in metadata.files(name)} - {"..", "__pycache__"}:
             (packages / top).symlink_to(metadata.distribution(name).locate_file(top))
     shutil.copytree(installed, wheel, dirs_exist_ok=True)
-    for compiled in (ROOT / "swarm_mj").rglob(
-        "*.nb?"
-    ):  # of the same sources: to compile takes long
+    # Compiled code of the same sources: to compile takes long.
+    for compiled in (ROOT / "swarm_mj").rglob("*.nb?"):
         place = wheel / compiled.relative_to(ROOT)
         place.parent.mkdir(exist_ok=True)
         shutil.copy(compiled, place)
-
-    def run(folder, *arguments):
-        environment = os.environ | {"PYTHONPATH": f"{wheel}{os.pathsep}{packages}"}
-        environment.pop("MUJOCO_GL", None)  # MuJoCo then loads OpenGL
-        return subprocess.run(
-            [sys.executable, "-S", *arguments],  # without this Python's own site-packages
-            cwd=folder,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-
-    return run
+    # -S: without this Python's own site-packages.
+    return lambda folder, *arguments: run(folder, [wheel, packages], "-S", *arguments)
 
 
 FLY_IN_THE_CORE = """

@@ -26,8 +26,8 @@ from swarm_mj.policies import make_policy
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.atomic import write_text
 from swarm_mj.system.fields import setting
+from swarm_mj.system.writing import write_text
 
 # What a colour is for: as matplotlib draws it, on a light page, on a dark page.
 COLOURS = {

@@ -24,10 +24,9 @@ from rerun.experimental import ViewerClient
 from swarm_mj.cli import script
 from swarm_mj.replay.read import check_replay, windows
 from swarm_mj.replay.view import LOOPBACK, VIEWER, free_ports, quiet_environment
-from swarm_mj.system.atomic import write_bytes
 from swarm_mj.system.fields import setting
-from swarm_mj.system.outputs import Output, check_outputs, owned
 from swarm_mj.system.processes import running
+from swarm_mj.system.writing import Output, check_outputs, owned, write_bytes
 
 START_TIMEOUT_S = 60.0
 LOAD_TIMEOUT_S = 120.0

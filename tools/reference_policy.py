@@ -27,7 +27,7 @@ from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.policy_config import GnnConfig, GnnShape
 from swarm_mj.policies.stored import save_policy
 from swarm_mj.system.fields import setting
-from swarm_mj.system.provenance import version
+from swarm_mj.system.packages import version
 from swarm_mj.system.reading import read_file
 from swarm_mj.system.terminal import tell_cores
 

@@ -22,12 +22,10 @@ from swarm_mj.mission import PAPERS, Mission
 from swarm_mj.policies.registry import HAVE_PROBABILITY, make_policy
 from swarm_mj.policies.tuning import TABLE, Tuned, read_table
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.atomic import write_csv
 from swarm_mj.system.fields import same_as, setting
-from swarm_mj.system.outputs import Output, check_outputs, owned
-from swarm_mj.system.progress import WorkBar
-from swarm_mj.system.provenance import commit, version
-from swarm_mj.system.terminal import plain_console
+from swarm_mj.system.packages import commit, version
+from swarm_mj.system.terminal import WorkBar, plain_console
+from swarm_mj.system.writing import Output, check_outputs, owned, write_csv
 
 AUTHORS_GRID = (0.04, 0.06, 0.08, 0.1, 0.12, 0.15)  # of flooding and MST, in the authors' code
 WIDE_GRID = (0.01, 0.02, 0.03, *AUTHORS_GRID, 0.2, 0.25, 0.3, 0.4)

@@ -21,8 +21,8 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.fields import setting
-from swarm_mj.system.progress import WorkBar
-from swarm_mj.system.provenance import commit, version
+from swarm_mj.system.packages import commit, version
+from swarm_mj.system.terminal import WorkBar
 
 
 @dataclass(frozen=True, kw_only=True)

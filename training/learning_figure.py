@@ -19,8 +19,8 @@ from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.style import CAPTION, FAINT, WIDTH_IN, look_of, save, styled
 from swarm_mj.evaluation.results import read_results
 from swarm_mj.system.fields import setting
-from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.reading import read_rows
+from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "training" / "results" / "learning"

@@ -20,11 +20,10 @@ from swarm_mj.evaluation.figures.contents import RESULT_FIGURES, ResultFigure
 from swarm_mj.evaluation.progress import progress_path
 from swarm_mj.evaluation.results import MAX_BYTES, read_results
 from swarm_mj.mission import PAPERS
-from swarm_mj.system.atomic import write_bytes
 from swarm_mj.system.fields import setting
-from swarm_mj.system.outputs import Output, check_outputs
-from swarm_mj.system.provenance import commit
+from swarm_mj.system.packages import commit
 from swarm_mj.system.reading import read_file
+from swarm_mj.system.writing import Output, check_outputs, write_bytes
 
 ROOT = Path(__file__).resolve().parent.parent
 

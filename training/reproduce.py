@@ -27,12 +27,12 @@ from swarm_mj.cli import parse, script
 from swarm_mj.evaluation.results import Result, read_results, write_csv
 from swarm_mj.learning.run_folder import CURVE, SETTINGS, read_run
 from swarm_mj.policies.stored import POLICY, read_policy
-from swarm_mj.system import atomic
+from swarm_mj.system import writing
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
-from swarm_mj.system.outputs import Output, check_outputs
-from swarm_mj.system.provenance import code_digest, commit
+from swarm_mj.system.packages import code_digest, commit
 from swarm_mj.system.reading import read_file, read_json, read_rows
+from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 FIGURES = ("fig3", "fig6", "fig5", "fig4")  # the most telling first
@@ -174,7 +174,7 @@ class Work:
 
     def do(self) -> None:
         """Trains and flies what is not there yet, and hands over the tables; raises Failed."""
-        atomic.write_json(self.folder / BEGUN, self._now())
+        writing.write_json(self.folder / BEGUN, self._now())
         for number, (name, command) in enumerate(self.trainings.items(), start=1):
             _say(f"{self.figure}: training {number} of {len(self.trainings)}, {name}")
             self._train(name, command)
@@ -188,19 +188,19 @@ class Work:
         run, ended = self.folder / name, self.folder / f"{name}.trained"
         if not ended.exists():
             _run([*command, "--resume"] if (run / SETTINGS).exists() else command)
-            atomic.write_text(ended, "")
+            writing.write_text(ended, "")
 
     def _hand_over(self) -> None:
         """Write the tables, that of the flights last: it is drawn."""
         results, trainings, curves = self.tables
         rows = {name: _rows(self.folder / name / CURVE) for name in self.trainings}
         table = [{"training": name} | row for name, its in rows.items() for row in its]
-        atomic.write_csv(
+        writing.write_csv(
             curves,
             CURVE_COLUMNS,
             ({name: row.get(name) for name in CURVE_COLUMNS} for row in table),
         )
-        atomic.write_csv(trainings, TRAINING_COLUMNS, map(self._training, rows, rows.values()))
+        writing.write_csv(trainings, TRAINING_COLUMNS, map(self._training, rows, rows.values()))
         write_csv(results, list(self._results(rows)))
 
     def _training(self, name: str, rows: Sequence[dict[str, Any]]) -> dict[str, object]:

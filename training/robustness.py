@@ -15,7 +15,7 @@ from pathlib import Path
 from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import script
 from swarm_mj.system.fields import setting
-from swarm_mj.system.outputs import Output, check_outputs
+from swarm_mj.system.writing import Output, check_outputs
 
 RESULTS = Path(__file__).resolve().parent / "results" / "robustness"
 QUESTIONS = {

@@ -16,10 +16,9 @@ from pathlib import Path
 from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import script
 from swarm_mj.policies.stored import POLICY
-from swarm_mj.system.atomic import write_bytes
 from swarm_mj.system.fields import setting
-from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.reading import read_file
+from swarm_mj.system.writing import Output, check_outputs, write_bytes
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "training" / "results" / "learning"

@@ -21,8 +21,8 @@ from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.contents import AOI, VARIANCE
 from swarm_mj.evaluation.figures.style import WIDTH_IN, save, styled, write_caption
 from swarm_mj.system.fields import setting
-from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.reading import read_json, read_rows
+from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 MOST_BYTES = 10_000_000

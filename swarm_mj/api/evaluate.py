@@ -19,9 +19,9 @@ from swarm_mj.policies.registry import is_learned, listed, normalised
 from swarm_mj.system import needs
 from swarm_mj.system.fields import check_value, name_of
 from swarm_mj.system.needs import Needs, check_fits, memory_errors
-from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
-from swarm_mj.system.progress import AFTER_S, quiet_console
+from swarm_mj.system.terminal import AFTER_S, quiet_console
+from swarm_mj.system.writing import Output, check_outputs
 
 if TYPE_CHECKING:  # each takes its time to import
     from matplotlib.figure import Figure

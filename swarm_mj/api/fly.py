@@ -32,8 +32,8 @@ from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import check_kind, check_names
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import Needs, check_fits, free_memory, in_gb, memory_errors
-from swarm_mj.system.progress import WorkBar, quiet_bar
-from swarm_mj.system.provenance import commit, version
+from swarm_mj.system.packages import commit, version
+from swarm_mj.system.terminal import WorkBar, quiet_bar
 
 WINDOWS_BETWEEN_LOOKS = 50  # at the free memory
 COMPILING_WINDOWS = 10  # in which three robots use all that a flight does, schedules included

@@ -17,12 +17,10 @@ from swarm_mj.mission.components import components_in
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rendering.style import DEFAULTS, default_seconds, fitted
 from swarm_mj.simulation.rollout import WindowRecord
-from swarm_mj.system.atomic import write_bytes, write_csv, write_json
 from swarm_mj.system.fields import as_typed, did_you_mean
-from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
-from swarm_mj.system.progress import is_notebook, quiet_bar
-from swarm_mj.system.terminal import named_values, plain_console
+from swarm_mj.system.terminal import is_notebook, named_values, plain_console, quiet_bar
+from swarm_mj.system.writing import Output, check_outputs, write_bytes, write_csv, write_json
 
 if TYPE_CHECKING:  # each takes its time to import, and flights do without
     from matplotlib.figure import Figure

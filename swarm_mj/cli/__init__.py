@@ -104,7 +104,7 @@ def script(kind: type[T], run: Callable[[T], int], arguments: Sequence[str] | No
 
 def _show_or_refuse(arguments: Sequence[str]) -> NoReturn:
     """Print the overview or the version, or refuse a line that names no command."""
-    from swarm_mj.system.provenance import version
+    from swarm_mj.system.packages import version
 
     begin_with = {f"{NAME} {command}": meaning for command, meaning in BEGINNING.items()}
     parser = Parser(

@@ -20,14 +20,13 @@ from rich.console import Console
 from rich.table import Column, Table
 
 from swarm_mj.radio import reception
-from swarm_mj.system.atomic import check_writable
 from swarm_mj.system.exit_codes import DONE, FAILED
 from swarm_mj.system.fields import setting
 from swarm_mj.system.needs import free_memory, free_room, in_gb
-from swarm_mj.system.packages import CORE
+from swarm_mj.system.packages import CORE, commit, version
 from swarm_mj.system.processes import PYTHON, running
-from swarm_mj.system.provenance import commit, version
 from swarm_mj.system.terminal import num_cores, plain_console
+from swarm_mj.system.writing import check_writable
 
 State = Literal["ok", "absent", "broken"]  # absent: flying does without; broken: nothing flies
 MARKS = {"ok": "ok", "absent": "-", "broken": "BROKEN"}

@@ -24,9 +24,9 @@ from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import same_as, setting
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits, memory_errors
-from swarm_mj.system.outputs import Output, check_outputs, owned
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import tell_cores
+from swarm_mj.system.writing import Output, check_outputs, owned
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,8 @@ from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.policies.registry import stored_policies
 from swarm_mj.system.fields import setting
 from swarm_mj.system.needs import LIBRARIES, YES, Needs, check_fits
-from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.terminal import plain_console
+from swarm_mj.system.writing import Output, check_outputs
 
 FLOCKS = f"the mission flown for {FLOCK}"  # a heading of the help
 

@@ -22,15 +22,13 @@ from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.view import has_display, view_command
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.atomic import write_json
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits
-from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
-from swarm_mj.system.progress import WorkBar
-from swarm_mj.system.terminal import plain_console, this_command
+from swarm_mj.system.terminal import WorkBar, plain_console, this_command
+from swarm_mj.system.writing import Output, check_outputs, write_json
 
 REPLAYS = Path("replays")
 OTHERWISE = "name another place with --record, or leave it out with --no-record"

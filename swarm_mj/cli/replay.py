@@ -13,13 +13,11 @@ from swarm_mj.mission.components import SHOWN_AS, Components, is_own
 from swarm_mj.replay.rendering import style as styles
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.replay.view import serve_command, view_command
-from swarm_mj.system.atomic import write_bytes
 from swarm_mj.system.fields import setting
 from swarm_mj.system.needs import YES, check_fits
-from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.packages import need
-from swarm_mj.system.progress import WorkBar
-from swarm_mj.system.terminal import plain_console
+from swarm_mj.system.terminal import WorkBar, plain_console
+from swarm_mj.system.writing import Output, check_outputs, write_bytes
 
 if TYPE_CHECKING:
     from swarm_mj.replay.footage import Footage

@@ -20,8 +20,8 @@ from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import same_as, setting
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits, memory_errors
-from swarm_mj.system.outputs import Output, check_outputs
 from swarm_mj.system.terminal import named_values, plain_console, tell_cores, this_command
+from swarm_mj.system.writing import Output, check_outputs
 
 
 @dataclass(frozen=True, kw_only=True)

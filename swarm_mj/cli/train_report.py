@@ -10,7 +10,7 @@ from rich.console import Console
 from swarm_mj.learning import selection
 from swarm_mj.learning.run_folder import Limits, TrainingRun
 from swarm_mj.learning.selection import ORACLE, REFERENCES, Cost, Progress, Row, Status
-from swarm_mj.system.progress import WorkBar
+from swarm_mj.system.terminal import WorkBar
 
 FINISHING = "finishing this rollout, then all is kept; Ctrl-C again breaks off at once"
 CLEAR = 2.0  # standard errors of a difference that is not due to chance

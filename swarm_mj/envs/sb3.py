@@ -19,7 +19,7 @@ from swarm_mj.envs.vec_env import AGENTS, SwarmVecEnv
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy_config import MlpConfig, MlpShape
 from swarm_mj.policies.stored import save_weights
-from swarm_mj.system.provenance import commit, version
+from swarm_mj.system.packages import commit, version
 
 ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}  # of networks that can be stored as policies
 

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.evaluation.batch import BatchCosts
-from swarm_mj.system.atomic import append_bytes, write_bytes
 from swarm_mj.system.reading import read_file, read_json
+from swarm_mj.system.writing import append_bytes, write_bytes
 
 DIGEST_DIGITS = 16
 MAX_BYTES = 2**32  # four times what 100 000 missions of 40 policies take

@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.specification import NOTHING
-from swarm_mj.system import atomic
+from swarm_mj.system import writing
 from swarm_mj.system.fields import FORMER_NAMES, check_value, kind_of
 from swarm_mj.system.reading import read_rows
 
@@ -147,7 +147,7 @@ def read_results(path: Path) -> list[Result]:
 
 def write_csv(path: Path, results: Iterable[Result]) -> None:
     """Write results as the rows of a CSV file, replaced if it exists; None is an empty cell."""
-    atomic.write_csv(path, COLUMNS, (asdict(result) for result in results))
+    writing.write_csv(path, COLUMNS, (asdict(result) for result in results))
 
 
 def _result(place: str, row: dict[str, str]) -> Result:

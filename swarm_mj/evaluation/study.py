@@ -21,8 +21,8 @@ from swarm_mj.policies.registry import check_used, flown_name, is_learned, is_ow
 from swarm_mj.simulation.swarm import MAX_SEED
 from swarm_mj.system.fields import check, setting
 from swarm_mj.system.interrupt import deferred_interrupt
-from swarm_mj.system.progress import WorkBar
-from swarm_mj.system.provenance import code_digest, commit, version
+from swarm_mj.system.packages import code_digest, commit, version
+from swarm_mj.system.terminal import WorkBar
 
 DEFAULT_POLICIES = ("planner", *BASELINES)
 MAX_EPISODES = 100_000

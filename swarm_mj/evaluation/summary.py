@@ -24,7 +24,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import flown_name
 from swarm_mj.protocol.window import SLOT_WINDOWS
-from swarm_mj.system.atomic import write_json
+from swarm_mj.system.writing import write_json
 
 COSTS = ("aoi", "velocity_variance")  # of each mission
 

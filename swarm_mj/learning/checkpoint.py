@@ -25,8 +25,8 @@ from swarm_mj.learning.ppo import GnnActorCritic
 from swarm_mj.learning.selection import NUM_BEST, Amount, Count, Progress, candidates
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.network import AggregationGnn
-from swarm_mj.system.atomic import write_bytes
 from swarm_mj.system.reading import read_file, read_json, read_plain
+from swarm_mj.system.writing import write_bytes
 
 CHECKPOINT_VERSION = 4
 SPARE_BYTES = 100_000_000  # the curve's, and what else does not depend on the settings

@@ -15,9 +15,9 @@ from swarm_mj.learning.settings import Training
 from swarm_mj.policies.stored import POLICY
 from swarm_mj.replay.recorder import replay_file, replay_memory
 from swarm_mj.system import needs
-from swarm_mj.system.atomic import write_json
 from swarm_mj.system.fields import check, setting
 from swarm_mj.system.reading import read_document, read_file
+from swarm_mj.system.writing import write_json
 
 SETTINGS, CHECKPOINT, CURVE = "settings.json", "checkpoint.pt", "curve.csv"
 INIT, REPLAYS, TENSORBOARD = "init.safetensors", "replays", "tensorboard"

@@ -14,7 +14,7 @@ from msgspec import Meta
 
 from swarm_mj.learning.settings import Training
 from swarm_mj.protocol.costs import WindowCosts
-from swarm_mj.system.atomic import write_csv
+from swarm_mj.system.writing import write_csv
 
 ORACLE = "greedy-oracle"
 # Policies without a payload or training, and what each knows.

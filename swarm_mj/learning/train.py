@@ -18,8 +18,8 @@ from swarm_mj.learning.run_folder import CHECKPOINT, CURVE, INIT, REPLAYS, SETTI
 from swarm_mj.learning.selection import Accumulator, Choice, Listener, Progress, Row
 from swarm_mj.policies.policy_config import GnnConfig
 from swarm_mj.policies.stored import POLICY, read_policy, save_policy
-from swarm_mj.system.outputs import owned
-from swarm_mj.system.provenance import commit, version
+from swarm_mj.system.packages import commit, version
+from swarm_mj.system.writing import owned
 
 # What PPO logs of itself, by its names.
 OPTIMISER = [

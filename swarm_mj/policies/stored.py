@@ -19,9 +19,9 @@ from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn import feature_sets
 from swarm_mj.policies.learned import LearnedPolicy, MlpPolicy
 from swarm_mj.policies.policy_config import SUFFIX, GnnConfig, MlpConfig, Weights, model_card
-from swarm_mj.system.atomic import write_bytes
 from swarm_mj.system.packages import need
 from swarm_mj.system.reading import check_size, open_file, read_document, read_file, read_plain
+from swarm_mj.system.writing import write_bytes
 
 if TYPE_CHECKING:  # a plain network flies without torch, so functions import it
     from swarm_mj.policies.gnn.network import AggregationGnn

@@ -22,7 +22,7 @@ from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog
 from swarm_mj.replay.stage import draw_stage
 from swarm_mj.replay.team import draw_team
-from swarm_mj.system.atomic import write_bytes
+from swarm_mj.system.writing import write_bytes
 
 APPLICATION = "swarm_mj"
 

@@ -33,16 +33,14 @@ FieldOf = Any  # what a field's maker returns: type checkers take it for the att
 
 
 def setting(default: object = MISSING, help: str = "", **metadata: Any) -> FieldOf:
-    """Return a field that says what it means.
+    """Return a field that says what it means; without a default, its value must be given.
 
-    Args:
-        default: The value unless given; without one, it must be given.
-        help: What it means, on the command line; without it, the field is no option.
-        **metadata: `label`, the name in words; `unit`; `source`, where the default comes from;
-            `low` and `high`, the range; `choices`, and `is_joined` where several may be joined by
-            commas; and what `cli.options` shows: `group`, the heading it stands under; `metavar`;
-            `shown`, the default in words; `is_positional`, for an option without a flag; `flag`, if
-            it is not made from the name; `convert`, which makes a value of what was typed.
+    `help` says what it means on the command line; without it, the field is no option. The metadata
+    are `label`, the name in words; `unit`; `source`, where the default comes from; `low` and
+    `high`, the range; `choices`, and `is_joined` where several may be joined by commas; and what
+    `cli.options` shows: `group`, the heading it stands under; `metavar`; `shown`, the default in
+    words; `is_positional`, for an option without a flag; `flag`, if it is not made from the name;
+    `convert`, which makes a value of what was typed.
     """
     return field(default=default, metadata=metadata | ({"help": help} if help else {}))
 
@@ -54,10 +52,9 @@ def same_as(owner: type[Any], name: str) -> FieldOf:
 
 
 def check(settings: Any) -> None:  # noqa: ANN401 - any dataclass
-    """Pass if every field's value is of its kind and in its range, or among its choices.
+    """Raise ValueError unless every field's value is of its kind and in its range or choices.
 
-    Raises:
-        ValueError: One is not; the message names it, what is allowed, and the value.
+    The message names the field, what is allowed, and the value.
     """
     for spec in fields(settings):
         value = getattr(settings, spec.name)
@@ -116,9 +113,8 @@ def check_kind(
     if not isinstance(value, kinds):
         allowed = kinds if isinstance(kinds, tuple) else (kinds,)
         names = " or ".join(kind.__name__ for kind in allowed)
-        raise TypeError(
-            f"{what} must be of the type {names}, such as {such_as}, not {_shown(value)}"
-        )
+        rule = f"{what} must be of the type {names}, such as {such_as}"
+        raise TypeError(f"{rule}, not {_shown(value)}")
 
 
 def name_of(part: Any) -> str:  # noqa: ANN401 - any function or object
@@ -129,9 +125,7 @@ def name_of(part: Any) -> str:  # noqa: ANN401 - any function or object
 
 
 def check_callable(what: str, value: object, takes: tuple[str, ...]) -> None:
-    """Raise TypeError unless an argument is None or callable with these arguments."""
-    if value is None:
-        return
+    """Raise TypeError unless an argument is callable with these arguments."""
     if isinstance(value, type) or not callable(value):
         raise TypeError(f"{what} must be a function, or an object like one, not {_shown(value)}")
     try:
@@ -141,9 +135,8 @@ def check_callable(what: str, value: object, takes: tuple[str, ...]) -> None:
     try:
         signature.bind(*takes)
     except TypeError as error:
-        raise TypeError(
-            f"a {what} is called with ({', '.join(takes)}), but this one takes {signature}"
-        ) from error
+        rule = f"a {what} is called with ({', '.join(takes)})"
+        raise TypeError(f"{rule}, but this one takes {signature}") from error
 
 
 def _shown(value: object) -> str:
@@ -177,7 +170,5 @@ def _check_choice(label: str, value: Any, choices: Sequence[str], *, is_joined: 
     for each in map(str.strip, value.split(",")) if several else [value]:
         if each not in choices:
             joined = ", or several joined by commas" if is_joined else ""
-            raise ValueError(
-                f"{label} must be one of {', '.join(choices)}{joined}, not {each!r}"
-                f"{did_you_mean(each, choices)}"
-            )
+            rule = f"{label} must be one of {', '.join(choices)}{joined}"
+            raise ValueError(f"{rule}, not {each!r}{did_you_mean(each, choices)}")

@@ -4,6 +4,7 @@ The constants are peaks measured on Linux, with all tasks and policies, of 2 to 
 compares estimates with peaks; they should be right within a factor of 2, and rather too high.
 """
 
+import math
 import os
 import resource
 import shutil
@@ -15,6 +16,7 @@ from pathlib import Path
 import psutil
 
 YES = "start even though memory or disk may not suffice"  # the help of --yes
+WAY_ON = ", or try it with --yes"
 CONTROL_GROUPS = Path("/sys/fs/cgroup")
 # Of both versions of control groups: folder, limit, use, and how names in memory.stat begin.
 GROUPS = {
@@ -40,36 +42,28 @@ class Needs:
 
 
 def check_fits(
-    needs: Needs,
-    output: Path | None,
-    way_out: str,
-    *,
-    is_forced: bool,
-    way_on: str = ", or try it with --yes",
+    needs: Needs, output: Path | None, way_out: str, *, is_forced: bool, way_on: str = WAY_ON
 ) -> None:
-    """Pass if a command's needs will be met, or it is forced by `--yes`.
+    """Raise ValueError if a command's needs will not be met, unless it is forced by `--yes`.
 
-    Raises:
-        ValueError: Memory, addresses or the disk will not suffice; it says by how much, what to
-            choose instead (the way out), and how to start all the same (the way on).
+    The message says what lacks and how much, what to choose instead (the way out), and how to start
+    all the same (the way on).
     """
-    addresses = free_addresses()
-    has = [("of memory", needs.memory, free_memory(), "are free")]
-    if addresses is not None:
-        asked = needs.memory + needs.addresses
-        has.append(("of address space", asked, addresses, "are left by ulimit -v"))
+    asked = needs.memory + needs.addresses
+    has = [
+        ("of memory", needs.memory, free_memory(), "are free"),
+        ("of address space", asked, free_addresses(), "are left by ulimit -v"),
+    ]
     if output is not None:
-        has.append(("on disk", needs.file, free_room(output), f"fit at {output}"))
-        most = largest_file()
-        if most is not None:
-            largest = needs.file if needs.largest_file is None else needs.largest_file
-            has.append(("in one file", largest, most, "are allowed by ulimit -f"))
+        largest = needs.file if needs.largest_file is None else needs.largest_file
+        has += [
+            ("on disk", needs.file, free_room(output), f"fit at {output}"),
+            ("in one file", largest, largest_file(), "are allowed by ulimit -f"),
+        ]
     for what, needed, free, where in has:
         if needed > free and not is_forced:
-            raise ValueError(
-                f"this takes about {in_gb(needed)} {what}, and {in_gb(free)} {where}; "
-                f"{way_out}{way_on}"
-            )
+            lack = f"this takes about {in_gb(needed)} {what}, and {in_gb(free)} {where}"
+            raise ValueError(f"{lack}; {way_out}{way_on}")
 
 
 def missions_memory(num_robots: int, num_missions: int, *, is_learned: bool) -> float:
@@ -102,14 +96,9 @@ def free_memory() -> int:
     return min([psutil.virtual_memory().available, *_left_by_groups()])
 
 
-def free_addresses() -> int | None:
-    """Return what this process may still ask for under `ulimit -v`; None without one.
-
-    Libraries ask for much that they never fill.
-    """
-    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    used = psutil.Process().memory_info().vms
-    return None if limit == resource.RLIM_INFINITY else limit - used
+def free_addresses() -> float:
+    """Return the addresses that `ulimit -v` leaves this process, filled or not; may be infinite."""
+    return _limit(resource.RLIMIT_AS) - psutil.Process().memory_info().vms
 
 
 def free_room(path: Path) -> int:
@@ -119,10 +108,14 @@ def free_room(path: Path) -> int:
     return shutil.disk_usage(folder).free
 
 
-def largest_file() -> int | None:
-    """Return how large a file may get under `ulimit -f`; None without a limit."""
-    limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
-    return None if limit == resource.RLIM_INFINITY else limit
+def largest_file() -> float:
+    """Return how large a file may get under `ulimit -f`; may be infinite."""
+    return _limit(resource.RLIMIT_FSIZE)
+
+
+def _limit(which: int) -> float:
+    limit, _ = resource.getrlimit(which)
+    return math.inf if limit == resource.RLIM_INFINITY else float(limit)
 
 
 def _left_by_groups() -> Iterator[int]:

@@ -1,8 +1,10 @@
-"""Files that this package brings, and the packages that it needs: how to get one that is missing.
+"""The installed package: its files, version and commit, and the packages that it needs.
 
 A plain `pip install swarm_mj` brings them all; its core, which flies, does without most.
 """
 
+import hashlib
+import subprocess
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,6 +13,8 @@ from pathlib import Path
 CORE = ("jaxtyping", "msgspec", "mujoco", "numba", "numpy", "packaging", "psutil", "rich")
 # Modules that are named otherwise than the packages that bring them.
 BROUGHT_BY = {"PIL": "pillow", "dm_control": "dm-control", "rerun": "rerun-sdk"}
+# What numbers depend on; what is drawn from them is no change to them.
+SOURCES = ("swarm_mj", "assets", ":!assets/figures", ":!assets/pictures", "pyproject.toml")
 
 
 def asset(name: str) -> Path:
@@ -22,6 +26,43 @@ def asset(name: str) -> Path:
     raise FileNotFoundError(f"asset {name} is neither in the package nor beside it; reinstall")
 
 
+def version() -> str:
+    """Return the installed package's version."""
+    return metadata.version("swarm_mj")
+
+
+def code_digest() -> str:
+    """Return a hash of the package's code and data, which tells changes that no commit tells."""
+    package = Path(__file__).resolve().parents[1]
+    digest = hashlib.sha256()
+    for path in sorted([*package.rglob("*.py"), *package.rglob("*.csv")]):
+        digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+def commit() -> str | None:
+    """Return the checkout's commit, with `+` if the package differs; None outside a checkout."""
+    checkout = Path(__file__).resolve().parents[2]
+    if not (checkout / ".git").exists():
+        return None
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(checkout), *arguments]
+        done = subprocess.run(command, capture_output=True, check=True, encoding="utf-8")
+        return done.stdout.strip()
+
+    try:
+        head = git("rev-parse", "--short=12", "HEAD")
+        return f"{head}+" if git("status", "--porcelain", "--", *SOURCES) else head
+    except (OSError, subprocess.CalledProcessError):
+        return None
+
+
+def is_installed(module: str) -> bool:
+    """Return whether a module, by its name as it is imported, can be."""
+    return find_spec(module) is not None
+
+
 def need(module: str, what: str, way_out: str = "") -> None:
     """Raise ModuleNotFoundError unless a module can be imported; arguments as of `missing`."""
     if not is_installed(module):
@@ -30,25 +71,16 @@ def need(module: str, what: str, way_out: str = "") -> None:
 
 def missing(module: str, what: str, way_out: str = "") -> str:
     """Return how to install a module that `what` needs, or how to do without it: the way out."""
-    package = BROUGHT_BY.get(module, module.replace("_", "-"))
-    instead = f", or {way_out}" if way_out else ""
-    return (
-        f"{what} needs {package}, which is not installed; pip install '{_wanted(package)}'{instead}"
-    )
-
-
-def is_installed(module: str) -> bool:
-    """Return whether a module, by its name as it is imported, can be."""
-    return find_spec(module) is not None
-
-
-def _wanted(package: str) -> str:
-    """Return a package with the versions that fit, as pip takes it; without, if none are known."""
     from packaging.requirements import Requirement
 
+    package = BROUGHT_BY.get(module, module.replace("_", "-"))
     try:
         wanted = [Requirement(text) for text in metadata.requires("swarm_mj") or ()]
     except metadata.PackageNotFoundError:  # a checkout that was never installed
         wanted = []
-    fitting = (each for each in wanted if each.name == package)
-    return next((f"{each.name}{each.specifier}" for each in fitting), package)
+    versions = next((str(each.specifier) for each in wanted if each.name == package), "")
+    instead = f", or {way_out}" if way_out else ""
+    return (
+        f"{what} needs {package}, which is not installed; "
+        f"pip install '{package}{versions}'{instead}"
+    )

@@ -49,13 +49,10 @@ def guard() -> Iterator[Callable[[int], None]]:
 def running(
     command: Sequence[str],
     *,
-    environment: Mapping[str, str] | None = None,
-    output: IO[str] | None = None,
+    environment: Mapping[str, str] | None = None,  # this process's
+    output: IO[str] | None = None,  # where this process's goes
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """Start a program that ends, with all that it started, when the block or this process does.
-
-    Its environment and the place of its output are this process's unless given.
-    """
+    """Start a program that ends, with all that it started, when the block or this process does."""
     with (
         guard() as watch,
         subprocess.Popen(

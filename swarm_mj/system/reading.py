@@ -27,9 +27,7 @@ MAX_LETTERS = 160  # of what msgspec says
 def open_file(path: Path, what: str, *, folder: Path | None = None) -> BinaryIO:
     """Open a regular file, at once: pipes and devices would be waited for, or have no end.
 
-    Raises:
-        ValueError: There is no such file, it cannot be read, or a link leads out of the folder
-            where it must be.
+    Raises ValueError if it cannot be read, or a link leads out of the folder where it must be.
     """
     try:
         if folder is not None and not path.resolve().is_relative_to(folder.resolve()):
@@ -64,8 +62,7 @@ def check_size(what: str, size: int, most_bytes: int) -> None:
 def read_rows(path: Path, what: str, most_bytes: int) -> tuple[list[str], list[Row]]:
     """Return a CSV file: the names of its columns, and its rows with the lines that they end on.
 
-    Raises:
-        ValueError: It cannot be read, is too large, or is no CSV with as many cells as columns.
+    Raises ValueError as `read_file` does, or if it is no CSV with as many cells as columns.
     """
     content = read_file(path, what, most_bytes)
     try:
@@ -87,17 +84,15 @@ def read_json(text: bytes | str, kind: type[Kind]) -> Kind:
 def read_document(text: bytes | str, name: str, version: int, kind: type[Kind]) -> Kind:
     """Read JSON as `read_json` does, of an object with a `format` and a `format_version`.
 
-    Raises:
-        ValueError: It has another format, or a newer version of it; else as `read_json`.
+    Raises ValueError as `read_json` does, or if it has another format, or a newer version of it.
     """
     document: Any = _plain(text)
     header = read_plain(document, _Header)
     if header.format != name:
         raise ValueError(f'its format must be "{name}", not {header.format!r:.40}')
-    if header.format_version > version:
+    if (newer := header.format_version) > version:
         raise ValueError(
-            f"its format_version is {header.format_version}, and this swarm_mj reads {version}; "
-            "update it"
+            f"its format_version is {newer}, and this swarm_mj reads {version}; update it"
         )
     names = _Header.__struct_fields__
     return read_plain({key: document[key] for key in document if key not in names}, kind)
@@ -112,8 +107,6 @@ def read_plain(value: object, kind: type[Kind]) -> Kind:
 
 
 class _Header(msgspec.Struct):
-    """The beginning of documents of any version."""
-
     format: str
     format_version: Annotated[int, msgspec.Meta(ge=1)]
 
@@ -143,9 +136,6 @@ def _with_all_keys(value: Any, kind: object, at: str = "$") -> Any:  # noqa: ANN
 
     msgspec itself would fill in what lacks and drop what is unknown: a damaged or newer file would
     pass. Fields that say `may_lack` are newer than some files: there they have their default.
-
-    Raises:
-        ValueError: A field lacks, or a key is no field.
     """
     if not (isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict)):
         return value

@@ -13,10 +13,10 @@ GONE = (errno.EPIPE, errno.EIO)  # a pipe's reader has closed it; the terminal i
 
 @contextmanager
 def lasting_streams() -> Iterator[Callable[[], OSError | None]]:
-    """Within it, what this process says after its reader has gone is dropped, and work goes on.
+    """Drop what this process says within it after its reader has gone; work goes on.
 
-    So it does on a full disk, but that is a failure: what is yielded writes all that was said so
-    far, and returns the first failure, if there was one.
+    So it does on a full disk, but that is a failure: the function that it yields writes all that
+    was said so far, and returns the first failure, if there was one.
 
     Characters that a terminal does not know become `?`. Streams that were closed lead nowhere:
     files opened later would else take their numbers, and with them what libraries complain of.

@@ -1,17 +1,36 @@
-"""The output of commands, and their names."""
+"""Text, tables and the bar of long work on a terminal, and the names of programs."""
 
 import os
 import shutil
 import sys
 from pathlib import Path
+from threading import Timer
+from typing import Any
 
 from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+
+BAR_WIDTH = 20
+AFTER_S = 2.0  # shorter work from Python shows no bar
 
 
 def plain_console(*, is_error: bool = False) -> Console:
     """Return a terminal that shows text as it is: no colours, no broken lines, no markup."""
     return Console(stderr=is_error, highlight=False, soft_wrap=True, markup=False)
+
+
+def is_notebook() -> bool:
+    """Return whether this Python is the kernel of a notebook."""
+    ipython = sys.modules.get("IPython")
+    shell: Any = ipython.get_ipython() if ipython else None
+    return hasattr(shell, "kernel")
+
+
+def quiet_console() -> Console:
+    """Return a terminal, if there is one: notebooks claim to be one, but keep every redrawing."""
+    forced = False if is_notebook() else None
+    return Console(stderr=True, highlight=False, force_jupyter=False, force_terminal=forced)
 
 
 def num_cores() -> int:
@@ -44,3 +63,74 @@ def this_command(name: str = "swarm-mj") -> str:
     if (found and Path(found) == program) or not program.exists():
         return name
     return os.path.relpath(program)
+
+
+class WorkBar:
+    """A bar on the terminal while a `with` statement lasts; it leaves nothing behind.
+
+    It shows `what` is under way before the bar, and `text` behind it; both may change.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        total: float | int,
+        unit: str = "",
+        *,
+        completed: float | int = 0,
+        console: Console | None = None,
+        shows_time_left: bool = True,
+        after_s: float = 0.0,
+    ) -> None:
+        """Prepare the bar, on standard error unless there is another console.
+
+        Without a unit, it shows no numbers; the time left is by the speed so far. Work that is done
+        in less than `after_s` shows no bar [s].
+        """
+        self.what, self.text = what, ""
+        console = console or Console(stderr=True, highlight=False)
+        count = f"{{task.completed:.0f}}/{{task.total:.0f}} {unit}"
+        self._bar = Progress(
+            TextColumn("{task.fields[bar].shown_what}", markup=False),
+            BarColumn(BAR_WIDTH),
+            *([TextColumn(count, markup=False)] if unit else []),
+            TextColumn("{task.fields[bar].text}", markup=False),
+            *([TimeRemainingColumn()] if shows_time_left else []),
+            console=console,
+            transient=True,
+            disable=not console.is_terminal,
+        )
+        self._timer = Timer(after_s, self._bar.start)
+        self._timer.daemon = True
+        self._id = self._bar.add_task("", total=total, completed=int(completed), bar=self)
+
+    def __enter__(self) -> "WorkBar":
+        if self._timer.interval > 0.0 and not self._bar.disable:
+            self._timer.start()
+        else:
+            self._bar.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._timer.cancel()
+        if self._timer.is_alive():
+            self._timer.join()
+        self._bar.stop()
+
+    def advance(self, done: int = 1) -> None:
+        """Count more work as done."""
+        self._bar.advance(self._id, done)
+
+    def move_to(self, completed: float | int) -> None:
+        """Set how much work is done in all."""
+        self._bar.update(self._id, completed=completed)
+
+    @property
+    def shown_what(self) -> str:
+        """The words before the bar, which are asked for at every redrawing."""
+        return self.what
+
+
+def quiet_bar(what: str, total: int, unit: str) -> WorkBar:
+    """Return a bar for Python: on a terminal, once the work takes its time."""
+    return WorkBar(what, total, unit, console=quiet_console(), after_s=AFTER_S)

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from channels import to_nobody
+from channels import tell_everyone_the_truth, to_nobody
 from hypothesis import given
 from hypothesis import strategies as st
-from truth import tell_everyone_the_truth
 
 from swarm_mj.control.added_tasks import (
     DAMPING_PER_S,

@@ -1,14 +1,15 @@
 """Counts what the fault suite tried and what held, by the marker `fault("class")` of each test.
 
-A test is one try unless it says `record_property("tries", n)`, of which `record_property("held",
-n)` held, or all of them if it passed.
+A test is one try unless it records how many "tries" it makes.
 """
 
+import os
 from collections import Counter
 
 import pytest
 
 CLASS = "fault class"
+FACTOR = float(os.environ.get("SWARM_MJ_TRIES", "1"))
 
 
 def pytest_configure(config):
@@ -23,16 +24,28 @@ def _class_of_fault(request, record_property):
     record_property(CLASS, marker.args[0])
 
 
+@pytest.fixture
+def tries(record_property):
+    """How often to try: a little in every test run, under `make attack` many times as often."""
+
+    def number(usual):
+        number = max(1, round(usual * FACTOR))
+        record_property("tries", number)
+        return number
+
+    return number
+
+
 def pytest_terminal_summary(terminalreporter):
     """Prints a line for each class: tried and held."""
     tried, held = Counter(), Counter()
     for outcome in ("passed", "failed"):
         for report in terminalreporter.stats.get(outcome, []):
-            said = dict(report.user_properties)
-            if report.when == "call" and CLASS in said:
-                num_tries = said.get("tries", 1)
-                tried[said[CLASS]] += num_tries
-                held[said[CLASS]] += said.get("held", num_tries if report.passed else 0)
+            name = dict(report.user_properties).get(CLASS)
+            if report.when == "call" and name:
+                num_tries = sum(n for key, n in report.user_properties if key == "tries") or 1
+                tried[name] += num_tries
+                held[name] += num_tries if report.passed else 0
     if tried:
         terminalreporter.section("faults: tried and held")
         for name in sorted(tried):

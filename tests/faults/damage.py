@@ -1,26 +1,29 @@
 """Damaged copies of a file, and what programs say of them."""
 
 import importlib.util
+import os
 import random
 import sys
 from pathlib import Path
 
-from tries import tries
-
 FLIPS, CUTS = 100, 30
 ROOT = Path(__file__).parent.parent.parent
+RESULTS = ROOT / "training" / "results"
 BAD_INPUT = 2
 
 
-def damaged(whole: bytes):
-    """Copies of a file with one bit flipped, then copies that are cut; the same ones each time."""
-    rng = random.Random(12)
+def damaged(path, tries, crafted=()):
+    """Writes damaged copies in place of a file, the same ones each time, after crafted ones."""
+    rng, whole = random.Random(12), path.read_bytes()
+    copies = list(crafted)
     for _ in range(tries(FLIPS)):
         copy = bytearray(whole)
         copy[rng.randrange(len(whole))] ^= 1 << rng.randrange(8)
-        yield bytes(copy)
-    for _ in range(tries(CUTS)):
-        yield whole[: rng.randrange(len(whole))]
+        copies.append(bytes(copy))
+    copies += [whole[: rng.randrange(len(whole))] for _ in range(tries(CUTS))]
+    for content in copies:
+        path.write_bytes(content)
+        yield content
 
 
 def program(folder, name):
@@ -30,6 +33,14 @@ def program(folder, name):
     sys.modules[name] = module  # where `swarm_mj.cli.script` looks for it
     spec.loader.exec_module(module)
     return module
+
+
+def put_no_file(path, kind):
+    """Puts a device, a pipe, a folder or a link to itself in a file's place."""
+    if kind in ("device", "loop"):
+        path.symlink_to("/dev/zero" if kind == "device" else path)
+    else:
+        os.mkfifo(path) if kind == "pipe" else path.mkdir()
 
 
 def complaint(capsys, code):

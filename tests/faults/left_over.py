@@ -29,11 +29,17 @@ def left_over(mark):
     return found
 
 
-def left_after_limit(mark):
-    """The processes with a mark once those that ought to end have had their time; ends them."""
+def after_limit(find):
+    """What is found once all that ought to end has had its time."""
     deadline = time.monotonic() + LIMIT_S + SLACK_S
-    while (found := left_over(mark)) and time.monotonic() < deadline:
+    while (found := find()) and time.monotonic() < deadline:
         time.sleep(0.05)
+    return found
+
+
+def left_after_limit(mark):
+    """The processes with a mark that have not ended in time; ends them."""
+    found = after_limit(lambda: left_over(mark))
     for number in found:
         with suppress(ProcessLookupError):
             os.kill(number, signal.SIGKILL)
@@ -42,10 +48,7 @@ def left_after_limit(mark):
 
 def taken_after_limit(ports):
     """The ports of this machine that still cannot be listened on."""
-    deadline = time.monotonic() + LIMIT_S + SLACK_S
-    while (taken := [port for port in ports if _is_taken(port)]) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    return taken
+    return after_limit(lambda: [port for port in ports if _is_taken(port)])
 
 
 def _is_taken(port):
@@ -74,8 +77,7 @@ if __name__ == "__main__":  # jobs import it
     timer.daemon = True
     timer.start()
     sys.argv = sys.argv[5:]
-    is_file = program.endswith(".py")
-    run = runpy.run_path if is_file else runpy.run_module
+    run = runpy.run_path if program.endswith(".py") else runpy.run_module
     run(program, run_name="__main__")
 """
 

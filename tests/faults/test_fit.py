@@ -5,7 +5,6 @@ from itertools import chain, repeat
 from pathlib import Path
 
 import pytest
-from tries import tries
 
 from swarm_mj.api import fly as flight
 from swarm_mj.cli import main
@@ -20,29 +19,23 @@ FACTOR = 2.0  # by which estimates and peaks may differ
 SMALL = ("--robots", "4", "--windows", "120")
 PEAKS = Path(__file__).with_name("peaks.py")
 TDMA = ("--policy", "tdma")
+SHORT = ("--budget", "128", "--held-out", "1")
 MEASURED = [
     ("fly", "--robots", "800", "--windows", "3", *TDMA, "--no-record"),
     ("fly", "--robots", "300", "--windows", "100", *TDMA, "--record", "0.rrd"),
     ("fly", "--robots", "4", "--windows", "1000", *TDMA, "--record", "1.rrd"),
     ("evaluate", "--robots", "100", "--windows", "2", "--episodes", "25", "--policy", "gnn"),
-    (
-        *("train", "--out", "a", "--credit", "team", "--robots", "10", "--windows", "8"),
-        *("--budget", "128", "--held-out", "1"),
-    ),
-    (
-        *("train", "--out", "b", "--robots", "50", "--windows", "16", "--missions", "4"),
-        *("--budget", "128", "--held-out", "1"),
-    ),
+    ("train", "--out", "a", "--credit", "team", "--robots", "10", "--windows", "8", *SHORT),
+    ("train", "--out", "b", "--robots", "50", "--windows", "16", "--missions", "4", *SHORT),
     ("evaluate", "--robots", "150", "--windows", "2", "--episodes", "25", *TDMA),
 ]
 
 
 @pytest.mark.slow
 @pytest.mark.fault("memory: estimates")
-def test_estimates_are_near_the_peaks(forks, tmp_path, record_property):
+def test_estimates_are_near_the_peaks(forks, tmp_path, tries):
     """Fault 8: nothing was estimated. The measured processes have loaded what trains already."""
     lines = MEASURED[: tries(5)]
-    record_property("tries", len(lines))
     (tmp_path / "lines.json").write_text(json.dumps(lines))
     done = forks.run(tmp_path, PEAKS)
     assert done.returncode == 0, done.stderr
@@ -81,20 +74,19 @@ def small_machine(monkeypatch):
         (("train", "--out", "a", "--replay-every", "1"), "GB on disk"),
     ],
 )
-def test_what_cannot_fit_is_refused_with_numbers(monkeypatch, tmp_path, capsys, arguments, says):
+def test_what_cannot_fit_is_refused_with_numbers(here, capsys, arguments, says):
     """Fault 8: 53 GB of memory and a file of 12 GB were simply begun."""
-    monkeypatch.chdir(tmp_path)
     assert main(list(arguments)) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "this takes about" in line
     assert says in line
     assert line.endswith("or try it with --yes")
-    assert not list(tmp_path.iterdir())
+    assert not list(here.iterdir())
 
 
 @pytest.mark.fault("memory: refused before the work")
-def test_yes_begins_all_the_same(monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_yes_begins_all_the_same(monkeypatch):
     monkeypatch.setattr(needs, "free_memory", lambda: 1.0)
     flight = ["fly", "--robots", "4", "--windows", "3", "--no-record"]
     assert main(flight) == 2
@@ -118,11 +110,8 @@ def test_a_flight_ends_while_what_was_flown_can_be_written(monkeypatch, tmp_path
     """Fault 8: others may take the memory that was free when it began."""
     free = chain([1e12], repeat(0))
     monkeypatch.setattr(flight, "free_memory", lambda: next(free))
-    ending = (
-        "Memory ran short (0 GB are free, writing the replay takes 0.102 GB; "
-        "--yes flies on all the same)"
-    )
-    assert flown_short(tmp_path, capsys, ending) == 100
+    needed = "0 GB are free, writing the replay takes 0.102 GB; --yes flies on all the same"
+    assert flown_short(tmp_path, capsys, f"Memory ran short ({needed})") == 100
 
 
 @pytest.mark.fault("memory: what was flown is kept")
@@ -186,9 +175,8 @@ def test_what_ulimit_does_not_allow_is_refused(limited, tmp_path, more, line):
 
 
 @pytest.mark.fault("memory: what was flown is kept")
-def test_an_evaluation_that_runs_out_of_memory_is_resumed(monkeypatch, capsys, tmp_path):
+def test_an_evaluation_that_runs_out_of_memory_is_resumed(monkeypatch, capsys, here):
     """Fault 8: it was a traceback, and nobody was told that it could go on."""
-    monkeypatch.chdir(tmp_path)
     study = ["evaluate", "--robots", "4", "12", "--windows", "3", "--episodes", "5"]
     study += ["--policy", "tdma", "--range-ratio", "3"]
 
@@ -205,4 +193,4 @@ def test_an_evaluation_that_runs_out_of_memory_is_resumed(monkeypatch, capsys, t
     ]
     assert main([*study, "--csv", "a.csv", "--resume"]) == 0
     assert main([*study, "--csv", "b.csv"]) == 0
-    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
+    assert (here / "a.csv").read_bytes() == (here / "b.csv").read_bytes()

@@ -4,9 +4,9 @@ import io
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
+from damage import RESULTS
 
 import swarm_mj
 from swarm_mj.cli import main
@@ -17,7 +17,6 @@ FLIGHT = ("fly", *ROBOTS, "--no-record")
 EVALUATION = ("evaluate", *ROBOTS, "--policy", "tdma", "--episodes", "2")
 BENCH = ("bench", "--help")
 RECORD = ("--record", "a.rrd")
-RESULTS = Path(swarm_mj.__file__).parent.parent / "training" / "results" / "paper-random-walk.csv"
 NOWHERE = "/proc/nowhere"  # nobody can make that
 NOT_UTF8 = os.fsdecode(b"a\xff")
 
@@ -70,7 +69,16 @@ def test_a_read_only_installation_without_a_home_works(installation, tmp_path, e
 @pytest.mark.fault("odd machine: read-only, no home")
 def test_figures_need_no_folder_of_their_own(tmp_path):
     """Fault 23, too: matplotlib complained in two lines."""
-    asked = ("figures", RESULTS, "--out", "figures", "--figure", "fig5", "--format", "png")
+    asked = (
+        "figures",
+        RESULTS / "paper-random-walk.csv",
+        "--out",
+        "figures",
+        "--figure",
+        "fig5",
+        "--format",
+        "png",
+    )
     done = python("-m", "swarm_mj", *map(str, asked), cwd=tmp_path, HOME=NOWHERE)
     assert (done.returncode, done.stderr) == (0, b"")
 
@@ -78,9 +86,9 @@ def test_figures_need_no_folder_of_their_own(tmp_path):
 @pytest.mark.fault("odd machine: terminals")
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-16", "utf-8"])
 @pytest.mark.parametrize("command", [FLIGHT, EVALUATION, BENCH])
-def test_any_terminal_shows_what_it_can(monkeypatch, tmp_path, encoding, command):
+@pytest.mark.usefixtures("here")
+def test_any_terminal_shows_what_it_can(monkeypatch, encoding, command):
     """Fault 26: `±` and `²` failed in ASCII when all was flown."""
-    monkeypatch.chdir(tmp_path)
     shown, told = (io.TextIOWrapper(io.BytesIO(), encoding=encoding) for _ in range(2))
     monkeypatch.setattr(sys, "stdout", shown)
     monkeypatch.setattr(sys, "stderr", told)
@@ -121,16 +129,13 @@ def test_closed_streams_get_no_file_s_number(tmp_path):
         ("replay", f"{NOT_UTF8}.rrd"),
     ],
 )
-def test_a_name_that_is_not_utf8_is_refused_before_the_work(
-    monkeypatch, tmp_path, capsys, arguments
-):
+def test_a_name_that_is_not_utf8_is_refused_before_the_work(here, capsys, arguments):
     """Fault 26: replays failed when all was flown, tables when all was evaluated."""
-    monkeypatch.chdir(tmp_path)
     assert main(list(arguments)) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "udcff" in line
     assert "utf-8; rename it" in line
-    assert not list(tmp_path.iterdir())
+    assert not list(here.iterdir())
 
 
 @pytest.mark.fault("odd machine: names")

@@ -11,14 +11,13 @@ import urllib.request
 from pathlib import Path
 
 import pytest
+from damage import ROOT
 from left_over import left_after_limit, needs_proc, signalled, taken_after_limit
-from tries import tries
 
 from swarm_mj.replay.view import quiet_environment, serve_command
 from swarm_mj.system.processes import running
 
 ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL)
-ROOT = Path(__file__).parent.parent.parent
 HAS_VULKAN = any(Path("/usr/share/vulkan/icd.d").glob("*.json"))
 
 # Two processes that compute for half a minute without letting another thread of theirs run.
@@ -47,69 +46,58 @@ def replay(forks, tmp_path_factory):
     return folder / "a.rrd"
 
 
-@needs_proc
-@pytest.mark.fault("orphans of killed programs")
-@pytest.mark.parametrize("end", ENDS)
-def test_jobs_that_compute_end_with_their_parent(forks, tmp_path, record_property, end):
-    """Fault 6."""
-    program = tmp_path / "busy.py"
-    program.write_text(BUSY)
-    rng, num_tries = random.Random(end), tries(2)
-    for _ in range(num_tries):
-        done, mark = signalled(forks, tmp_path, [end], rng.uniform(0.0, 1.0), program)
+@pytest.fixture
+def ended(forks, tmp_path, tries):
+    """Runs a program that is ended at random moments; nothing of it is left running."""
+
+    def runs(usual, end, between_s, *program):
+        rng = random.Random(end)
         # A signal in the first moment, before anything has begun, ends a process as usual.
-        assert done.returncode in ((-end,) if end == signal.SIGKILL else (130, -end)), done.stderr
-        assert left_after_limit(mark) == {}
-        assert "Traceback" not in done.stderr
-    record_property("tries", num_tries)
+        codes = {-end} if end == signal.SIGKILL else {0, 130, -end}
+        for _ in range(tries(usual)):
+            done, mark = signalled(forks, tmp_path, [end], rng.uniform(*between_s), *program)
+            assert done.returncode in codes, done.stderr
+            assert left_after_limit(mark) == {}
+            assert "Traceback" not in done.stderr
+            yield done
 
-
-@needs_proc
-@pytest.mark.fault("orphans of killed programs")
-def test_an_evaluation_s_jobs_end_with_it(forks, tmp_path, record_property):
-    """Fault 6, as it was found."""
-    rng, num_tries = random.Random(6), tries(1)
-    for _ in range(num_tries):
-        done, mark = signalled(
-            forks, tmp_path, [signal.SIGKILL], rng.uniform(0.1, 4.0), "swarm_mj",
-            "evaluate", "--policy", "planner", "tdma", "--jobs", 2, "--episodes", 1000,
-        )  # fmt: skip
-        assert done.returncode == -signal.SIGKILL, done.stderr
-        assert left_after_limit(mark) == {}
-        assert "Traceback" not in done.stderr
-    record_property("tries", num_tries)
+    return runs
 
 
 @needs_proc
 @pytest.mark.fault("orphans of killed programs")
 @pytest.mark.parametrize("end", ENDS)
-def test_the_server_of_a_replay_ends_with_it(forks, replay, tmp_path, record_property, end):
+def test_jobs_that_compute_end_with_their_parent(ended, tmp_path, end):
+    """Fault 6."""
+    (tmp_path / "busy.py").write_text(BUSY)
+    assert all(done.returncode for done in ended(2, end, (0.0, 1.0), tmp_path / "busy.py"))
+
+
+@needs_proc
+@pytest.mark.fault("orphans of killed programs")
+def test_an_evaluation_s_jobs_end_with_it(ended):
+    """Fault 6, as it was found."""
+    jobs = ("--policy", "planner", "tdma", "--jobs", 2, "--episodes", 1000)
+    assert list(ended(1, signal.SIGKILL, (0.1, 4.0), "swarm_mj", "evaluate", *jobs))
+
+
+@needs_proc
+@pytest.mark.fault("orphans of killed programs")
+@pytest.mark.parametrize("end", ENDS)
+def test_the_server_of_a_replay_ends_with_it(ended, replay, end):
     """Fault 5: and its ports are free again."""
-    rng, num_tries = random.Random(end), tries(1)
-    for _ in range(num_tries):
-        done, mark = signalled(
-            forks, tmp_path, [end], rng.uniform(0.0, 2.0), "swarm_mj", "replay", "--web", replay
-        )
-        assert done.returncode in ({-end} if end == signal.SIGKILL else {0, 130}), done.stderr
-        assert left_after_limit(mark) == {}
+    for done in ended(1, end, (0.0, 2.0), "swarm_mj", "replay", "--web", replay):
         ports = re.findall(r"127\.0\.0\.1(?::|%3A)(\d+)", done.stdout)
         assert taken_after_limit([*map(int, ports)]) == []
-    record_property("tries", num_tries)
 
 
 @needs_proc
 @pytest.mark.skipif(not HAS_VULKAN, reason="no Vulkan driver on this machine")
 @pytest.mark.fault("orphans of killed programs")
-def test_a_picture_s_viewer_ends_with_it(forks, replay, tmp_path, record_property):
+def test_a_picture_s_viewer_ends_with_it(ended, replay, tmp_path):
     """Fault 5, of tools/picture.py."""
-    rng, num_tries = random.Random(5), tries(1)
-    for _ in range(num_tries):
-        tool, delay_s = ROOT / "tools" / "picture.py", rng.uniform(2.0, 6.0)
-        done, mark = signalled(forks, tmp_path, [signal.SIGKILL], delay_s, tool, replay)
-        assert done.returncode == -signal.SIGKILL, done.stderr
-        assert left_after_limit(mark) == {}
+    assert list(ended(1, signal.SIGKILL, (2.0, 6.0), ROOT / "tools" / "picture.py", replay))
     assert not (tmp_path / "replay.png").exists()
-    record_property("tries", num_tries)
 
 
 @pytest.fixture
@@ -139,16 +127,8 @@ def test_a_server_tells_nobody_that_it_is_used(replay, tmp_path, monkeypatch, as
     monkeypatch.setenv("FORCE_RERUN_ANALYTICS", "1")
     config = tmp_path / "rerun" / "analytics.json"
     config.parent.mkdir()
-    config.write_text(
-        json.dumps(
-            {
-                "analytics_enabled": True,
-                "analytics_id": "0",
-                "config_file_path": str(config),
-                "data_dir_path": str(tmp_path / "data"),
-            }
-        )
-    )
+    paths = {"config_file_path": str(config), "data_dir_path": str(tmp_path / "data")}
+    config.write_text(json.dumps({"analytics_enabled": True, "analytics_id": "0", **paths}))
     command, address = serve_command(replay)
     environment = quiet_environment() | {"XDG_CONFIG_HOME": str(tmp_path), "ALL_PROXY": proxy}
     with running(command, environment=environment) as server:

@@ -1,7 +1,6 @@
 """Files that others hand us, damaged or crafted: one line says so, and the exit code is 2."""
 
 import csv
-import os
 import shutil
 import zipfile
 from dataclasses import asdict
@@ -9,7 +8,7 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 import synthetic
-from damage import ROOT, complaint, damaged, program, told_or_read
+from damage import RESULTS, complaint, damaged, program, put_no_file, told_or_read
 from tiny_policies import save_tiny
 
 from swarm_mj.cli import main, script
@@ -18,70 +17,36 @@ from swarm_mj.policies.stored import read_policy
 from swarm_mj.policies.tuning import TABLE, read_table
 
 
-@pytest.fixture(scope="module")
-def replay(tmp_path_factory):
-    path = tmp_path_factory.mktemp("replay") / "a.rrd"
-    mission = ["--robots", "5", "--windows", "5"]
-    assert main(["fly", "--policy", "tdma", *mission, "--record", str(path)]) == 0
-    return path
-
-
 @pytest.mark.fault("damaged files are told")
-def test_damaged_replays_are_told_by_all_readers(replay, tmp_path, capsys, record_property):
+def test_damaged_replays_are_told_by_all_readers(tmp_path, capsys, tries):
     """Fault 11: a flip in what a replay holds was shown as if it had been flown, or crashed."""
-    picture = program("tools", "picture")
-    path, num_tries = tmp_path / "a.rrd", 0
-    for content in damaged(replay.read_bytes()):
-        path.write_bytes(content)
-        num_tries += 1
+    picture, path = program("tools", "picture"), tmp_path / "a.rrd"
+    flight = ["fly", "--policy", "tdma", "--robots", "5", "--windows", "5", "--record", str(path)]
+    assert main(flight) == 0
+    capsys.readouterr()
+    for _ in damaged(path, tries):
         assert "is no whole replay: damaged" in complaint(capsys, main(["replay", str(path)]))
         with pytest.raises(ValueError, match="is no whole replay: damaged"):
             picture.take_picture(path, None, tmp_path / "a.png", "1600x900", 0)
-    record_property("tries", num_tries)
 
 
 @pytest.mark.fault("damaged files are told")
 @pytest.mark.parametrize("what", ["results", "table", "policy", "curve"])
-def test_damaged_files_are_told_or_sound(what, tmp_path, record_property):
+def test_damaged_files_are_told_or_sound(what, tmp_path, tries):
     """Faults 15, 16: what can be read is within its ranges, and all else is told in a line."""
-    path, read = READERS[what](tmp_path)
-    num_tries = 0
-    for content in damaged(path.read_bytes()):
-        path.write_bytes(content)
-        num_tries += 1
-        told_or_read(read)
-    record_property("tries", num_tries)
-
-
-def _results(folder):
-    write_csv(folder / "r.csv", synthetic.everything())
-    return folder / "r.csv", lambda: read_results(folder / "r.csv")
-
-
-def _table(folder):
-    (folder / "t.csv").write_text("\n".join(TABLE.read_text().splitlines()[:5]))
-    return folder / "t.csv", lambda: read_table(folder / "t.csv")
-
-
-def _policy(folder):
-    path = folder / "policy.safetensors"
-    save_tiny(path)
-    return path, lambda: read_policy(path)
-
-
-def _curve(folder):
-    curve = ROOT / "training" / "results" / "learning" / "rest-curve.csv"
-    shutil.copy(curve, folder / "curve.csv")
-    learning_figure = program("training", "learning_figure")
-    return folder / "curve.csv", lambda: learning_figure.read_curve(folder / "curve.csv")
-
-
-READERS = {
-    "results": _results,
-    "table": _table,
-    "policy": _policy,
-    "curve": _curve,
-}
+    path = tmp_path / "file.safetensors"
+    write, read = {
+        "results": (lambda: write_csv(path, synthetic.everything()), read_results),
+        "table": (lambda: path.write_text("".join(TABLE.open().readlines()[:5])), read_table),
+        "policy": (lambda: save_tiny(path), read_policy),
+        "curve": (
+            lambda: shutil.copy(RESULTS / "learning" / "rest-curve.csv", path),
+            program("training", "learning_figure").read_curve,
+        ),
+    }[what]
+    write()
+    for _ in damaged(path, tries):
+        told_or_read(lambda: read(path))
 
 
 def with_cells(path, **cells):
@@ -139,15 +104,8 @@ def test_a_policy_s_name_is_no_formula(tmp_path):
 @pytest.mark.parametrize("kind", ["device", "pipe", "folder", "loop"])
 def test_what_is_no_file_is_refused_by_all_readers(tmp_path, capsys, record_property, kind):
     """Faults 8, 14, 22: a pipe was waited for, /dev/zero read until the memory was full."""
-    path = tmp_path / "x"
-    make = {
-        "device": lambda: path.symlink_to("/dev/zero"),
-        "pipe": lambda: os.mkfifo(path),
-        "folder": path.mkdir,
-        "loop": lambda: path.symlink_to(path),
-    }
-    make[kind]()
-    name, out = str(path), str(tmp_path / "out")
+    put_no_file(tmp_path / "x", kind)
+    name, out = str(tmp_path / "x"), str(tmp_path / "out")
     tune, weights = program("tools", "tune"), program("tools", "reference_policy")
     codes = [
         lambda: main(["replay", name]),
@@ -163,21 +121,17 @@ def test_what_is_no_file_is_refused_by_all_readers(tmp_path, capsys, record_prop
 
 
 @pytest.mark.fault("crafted files are refused")
-def test_weights_of_others_are_arrays_and_no_bombs(tmp_path, capsys, record_property):
+def test_weights_of_others_are_arrays_and_no_bombs(tmp_path, capsys, tries):
     """Fault 16: empty and damaged zips gave tracebacks."""
-    weights = program("tools", "reference_policy")
-    path, num_tries = tmp_path / "w.npz", 0
+    weights, path = program("tools", "reference_policy"), tmp_path / "w.npz"
     with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED) as bomb:
         bomb.writestr("policy.npy", bytes(10**8))
     np.save(tmp_path / "one.npy", np.zeros(3))
     np.savez(path, a=np.zeros(50))
     crafted = [(tmp_path / name).read_bytes() for name in ("bomb.npz", "one.npy")]
-    for content in [b"", b"PK\x05\x06" + bytes(18), *crafted, *damaged(path.read_bytes())]:
-        path.write_bytes(content)
-        num_tries += 1
+    for _ in damaged(path, tries, [b"", b"PK\x05\x06" + bytes(18), *crafted]):
         assert told_or_read(lambda: weights.network_of(path)) is None
     complaint(capsys, script(weights.Options, weights.run, [str(path)]))
-    record_property("tries", num_tries)
 
 
 @pytest.mark.fault("crafted files are refused")
@@ -192,19 +146,15 @@ def test_weights_of_others_are_arrays_and_no_bombs(tmp_path, capsys, record_prop
         ["train", "--out", "x", "--minutes", "1e300"],
     ],
 )
-def test_options_that_name_nothing_are_refused(command, tmp_path, monkeypatch, capsys):
+def test_options_that_name_nothing_are_refused(command, here, capsys):
     """Faults 17, 25: a run began in the current folder."""
-    monkeypatch.chdir(tmp_path)
     complaint(capsys, main(command))
-    assert list(tmp_path.iterdir()) == []
+    assert list(here.iterdir()) == []
 
 
 @pytest.mark.fault("crafted files are refused")
-def test_experiments_find_their_files_from_anywhere(tmp_path, monkeypatch):
+def test_experiments_find_their_files_from_anywhere(here):
     """Fault 18."""
-    monkeypatch.chdir(tmp_path)
-    learning_figure = program("training", "learning_figure")
-    out = ["--out", str(tmp_path / "figure")]
-    figure = learning_figure.LearningFigure
-    assert script(figure, figure.__call__, out) == 0
-    assert (tmp_path / "figure.svg").exists()
+    figure = program("training", "learning_figure").LearningFigure
+    assert script(figure, figure.__call__, ["--out", "figure"]) == 0
+    assert (here / "figure.svg").exists()

@@ -19,7 +19,7 @@ from swarm_mj.learning import checkpoint
 from swarm_mj.learning.ppo import make_model
 from swarm_mj.learning.run_folder import CHECKPOINT, SETTINGS, read_run
 from swarm_mj.mission import paper
-from swarm_mj.system.outputs import owned
+from swarm_mj.system.writing import owned
 
 EVALUATE = ["evaluate", "--policy", "tdma", "--robots", "3", "--windows", "2", "--episodes", "30"]
 
@@ -51,14 +51,13 @@ def interrupted(evaluate, tmp_path, monkeypatch):
 
 
 @pytest.mark.fault("one output, one process")
-def test_a_second_evaluation_of_one_output_is_refused(evaluate, tmp_path, capsys, record_property):
+def test_a_second_evaluation_of_one_output_is_refused(evaluate, tmp_path, capsys):
     """Fault 9: both wrote into one progress file."""
     for more in ((), ("--force",), ("--resume",)):
         with owned(tmp_path / "o.csv"):
             said = complaint(capsys, evaluate(1000, *more))
         assert f"o.csv is being written by process {os.getpid()}" in said
     assert list(tmp_path.iterdir()) == []
-    record_property("tries", 3)
 
 
 @pytest.mark.fault("what is resumed is one's own")
@@ -76,23 +75,19 @@ def test_progress_of_two_evaluations_is_refused(evaluate, interrupted, tmp_path,
 
 
 @pytest.mark.fault("damaged files are told")
-def test_damaged_progress_is_told_or_dropped(tmp_path, record_property):
+def test_damaged_progress_is_told_or_dropped(tmp_path, tries):
     """Fault 14, and more: a flip in a number was taken for another cost."""
-    path, num_tries = tmp_path / "progress", 0
+    path = tmp_path / "progress"
     study = Study(policies=("tdma",), regimes=(paper(num_robots=3, num_windows=2),), episodes=30)
     header = study.header()
     progress.start(path, header)
     for index, batch in enumerate(study.batches):
         progress.append(path, header, index, fly_batch(batch))
-    whole = path.read_bytes()
     flown = progress.resume(path, header)
-    for content in damaged(whole):
-        path.write_bytes(content)
-        num_tries += 1
+    for content in damaged(path, tries):
         resumed = told_or_read(lambda: progress.resume(path, header))
         assert resumed is None or resumed.items() <= flown.items()
         assert resumed is not None or path.read_bytes() == content
-    record_property("tries", num_tries)
 
 
 CRAFTED = [
@@ -114,9 +109,6 @@ def test_crafted_progress_is_refused(evaluate, tmp_path, capsys, content):
     assert "progress" in complaint(capsys, evaluate(1000, "--resume"))
     assert path.exists()
     assert not (tmp_path / "o.csv").exists()
-
-
-# Training runs.
 
 
 @pytest.fixture(scope="module")
@@ -178,9 +170,8 @@ def test_a_run_is_not_written_through_links(begun, tmp_path, capsys, name):
 
 def begin_with(folder, init):
     """Makes of a run one that has begun with a policy and was killed at once."""
-    for name in (CHECKPOINT, "curve.csv"):
+    for name in (CHECKPOINT, "curve.csv", "policy.safetensors"):
         (folder / name).unlink()
-    (folder / "policy.safetensors").unlink()
     settings = json.loads((folder / SETTINGS).read_text())
     (folder / SETTINGS).write_text(json.dumps(settings | {"init": str(init)}))
 
@@ -211,26 +202,17 @@ PPO = [
     {"wings": 2},
 ]
 TRAINING = [
-    {"robots": []},
-    {"robots": [4, 10**9]},
-    {"features": "all"},
-    {"silence_logit": 1e300},
-    {"groups": 0},
-    {"groups": 3},
-    {"missions": 0},
-    {"threads": 10**9},
-    {"mission": None},
-    {"network": {}},
+    *({"robots": value} for value in ([], [4, 10**9])),
+    *({"groups": value} for value in (0, 3)),
+    *({"features": "all"}, {"silence_logit": 1e300}, {"missions": 0}, {"threads": 10**9}),
+    *({"mission": None}, {"network": {}}),
 ]
 NETWORK = [{"num_features": 7}, {"num_outputs": 9}, {"latent": 10**9}, {"edges": "none"}]
 MISSION = [{"num_robots": 10**9}, {"task": "swim"}, {"range_ratio": 0.0}, {"num_windows": 10**9}]
 LIMITS = [
-    {"decisions": 0},
-    {"decisions": 1.5},
-    {"minutes": -1.0},
-    {"minutes": "inf"},
-    {"checkpoint_every_s": -1.0},
-    {"replay_every": 0},
+    *({"decisions": value} for value in (0, 1.5)),
+    *({"minutes": value} for value in (-1.0, "inf")),
+    *({"checkpoint_every_s": -1.0}, {"replay_every": 0}),
 ]
 WHOLE = [{"init": 5}, {"init": "\0"}, {"command": []}, {"format_version": 3}, {"training": []}]
 
@@ -321,27 +303,18 @@ def test_crafted_checkpoints_are_refused(begun, capsys, record_property):
 
 @pytest.mark.slow
 @pytest.mark.fault("damaged files are told")
-def test_damaged_checkpoints_are_told_or_whole(begun, record_property):
+def test_damaged_checkpoints_are_told_or_whole(begun, tries):
     """Fault 22: of a zip file's bits, those that say when it was made mean nothing."""
-    training = small_training()
+    path, training = begun / CHECKPOINT, small_training()
     model = make_model(training)
-    path, num_tries = begun / CHECKPOINT, 0
-    whole = path.read_bytes()
     progress, _ = checkpoint.load(path, training, model)
-    for content in damaged(whole):
-        path.write_bytes(content)
-        num_tries += 1
+    for _ in damaged(path, tries):
         read = told_or_read(lambda: checkpoint.load(path, training, model)[0])
         assert read is None or asdict(read) == asdict(progress)
-    record_property("tries", num_tries)
 
 
 @pytest.mark.fault("damaged files are told")
-def test_damaged_settings_are_told_or_sound(begun, record_property):
+def test_damaged_settings_are_told_or_sound(begun, tries):
     """Fault 22."""
-    path, num_tries = begun / SETTINGS, 0
-    for content in damaged(path.read_bytes()):
-        path.write_bytes(content)
-        num_tries += 1
+    for _ in damaged(begun / SETTINGS, tries):
         told_or_read(lambda: read_run(begun))
-    record_property("tries", num_tries)

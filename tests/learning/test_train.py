@@ -27,7 +27,7 @@ from swarm_mj.policies.stored import POLICY, read_policy
 from swarm_mj.replay.read import windows
 from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.outputs import owned
+from swarm_mj.system.writing import owned
 
 TRAINING = small_training()
 PROMISED = {

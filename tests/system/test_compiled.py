@@ -13,36 +13,26 @@ import swarm_mj.system.interrupt
 from swarm_mj.system.compiled import _read, digest
 
 PHYSICS = """
+from typing import NamedTuple
 from swarm_mj.system.compiled import compiled
-
-HALF = 0.5
-
-
+HALF = {half}
+class {name}(NamedTuple):
+    x: float
 @compiled()
-def scaled(x: float) -> float:
-    return {factor} * x
+def scaled(pair: {name}) -> float:
+    return {factor} * pair.x
 """
 LOOP = """
 from swarm_mj.system.compiled import compiled
-from swarm_mj.physics import HALF, scaled
-
-
+from swarm_mj.physics import HALF, {name}, scaled
 @compiled(fastmath=True)
 def total(n: int) -> float:
-    return HALF * n + scaled(1.0)
+    return HALF * n + scaled({name}(1.0))
 """
 RUN = """
 from swarm_mj.loop import total
 print(total(4), sum(total.stats.cache_hits.values()), total.stats.cache_path)
 """
-ASSUME = """
-from swarm_mj.loop import total
-from swarm_mj.physics import scaled
-total(4)
-print(*(" fast " in str(function.inspect_llvm()) for function in (total, scaled)))
-"""
-
-
 # Presses Ctrl-C where LLVM calls back into Python, both when a function is compiled and when it is
 # loaded, and then uses the function all the same.
 INTERRUPTED = """
@@ -60,6 +50,11 @@ try:
 except KeyboardInterrupt:
     print(sum(map(len, (total.stats.cache_hits, total.stats.cache_misses))), total(4))
 """
+ASSUMED = """
+from swarm_mj.physics import scaled
+if total.stats.cache_misses:
+    print(*(" fast " in str(function.inspect_llvm()) for function in (total, scaled)))
+"""
 
 
 class Checkout:
@@ -68,19 +63,18 @@ class Checkout:
     def __init__(self, root):
         self.root = root
         self.package = root / "swarm_mj"
-        self.package.mkdir()
-        (self.package / "system").mkdir()
+        (self.package / "system").mkdir(parents=True)
         for module in (swarm_mj.system.compiled, swarm_mj.system.interrupt):
             shutil.copy(module.__file__, self.package / "system")
         for folder in (self.package, self.package / "system"):
             (folder / "__init__.py").touch()
-        (self.package / "loop.py").write_text(LOOP)
-        self.write(factor=2.0)
+        self.write()
 
-    def write(self, factor, half=0.5):
-        """New physics."""
-        source = PHYSICS.format(factor=factor).replace("HALF = 0.5", f"HALF = {half}")
+    def write(self, factor=2.0, half=0.5, name="Pair"):
+        """New physics; the loop's own file changes with the name only."""
+        source = PHYSICS.format(factor=factor, half=half, name=name)
         (self.package / "physics.py").write_text(source)
+        (self.package / "loop.py").write_text(LOOP.format(name=name))
 
     def python(self, code, **environment):
         """What a new process prints."""
@@ -111,7 +105,10 @@ def files_of(folder):
 
 
 def test_functions_are_compiled_anew_when_what_they_call_changes(checkout):
-    """In another file: a function, and a constant. The old cache is overwritten."""
+    """In another file: a function, a constant, a class that an index names and that is gone.
+
+    The old cache is overwritten.
+    """
     beside = str(checkout.package / "__pycache__")
     assert checkout.run() == (4.0, False, beside)
     before = files_of(beside)
@@ -119,38 +116,16 @@ def test_functions_are_compiled_anew_when_what_they_call_changes(checkout):
     assert checkout.run() == (4.0, True, beside)
     checkout.write(factor=3.0)
     assert checkout.run() == (5.0, False, beside)
-    checkout.write(factor=3.0, half=1.5)
+    checkout.write(factor=3.0, half=1.5, name="Other")
     assert checkout.run() == (9.0, False, beside)
     assert files_of(beside) == before
 
 
-def test_an_index_that_names_a_class_that_is_gone_is_overwritten(checkout):
-    """The function keeps its name and line, so the index of before is found."""
-    source = """
-from typing import NamedTuple
-from swarm_mj.system.compiled import compiled
-class {name}(NamedTuple):
-    x: float
-@compiled()
-def doubled(pair: {name}) -> float:
-    return 2.0 * pair.x
-"""
-    for name in ("Before", "After"):
-        (checkout.package / "pairs.py").write_text(source.format(name=name))
-        code = f"from swarm_mj.pairs import {name}, doubled\nprint(doubled({name}(3.0)))"
-        assert checkout.python(code) == "6.0"
-
-
-def test_a_folder_given_holds_the_cache(checkout, tmp_path):
+def test_the_cache_is_where_it_is_to_be_else_in_the_user_s_folder_or_nowhere(checkout, tmp_path):
+    """A file where the package's folder should be cannot be written to by anyone."""
     value, _, path = checkout.run(NUMBA_CACHE_DIR=str(tmp_path / "given"))
-    assert value == 4.0
-    assert Path(path).parent == tmp_path / "given"
+    assert (value, Path(path).parent) == (4.0, tmp_path / "given")
     assert files_of(path)
-    assert not files_of(checkout.package / "__pycache__")
-
-
-def test_an_installation_that_cannot_be_written_uses_the_user_s_folder_or_none(checkout, tmp_path):
-    """A file where the folder should be cannot be written to by anyone."""
     shutil.rmtree(checkout.package / "__pycache__", ignore_errors=True)
     (checkout.package / "__pycache__").touch()
     home = str(tmp_path / "home")
@@ -162,14 +137,13 @@ def test_an_installation_that_cannot_be_written_uses_the_user_s_folder_or_none(c
 
 
 def test_ctrl_c_interrupts_only_once_a_function_is_whole(checkout):
-    """Broken off, the process crashed when it ended, or failed of a function half made."""
-    for _ in ("compiled", "loaded"):
-        assert checkout.python(INTERRUPTED) == "1 4.0"
+    """Broken off, the process crashed when it ended, or failed of a function half made.
 
-
-def test_assumptions_on_floats_are_never_those_of_the_caller(checkout):
-    """The loop lets its sums be reordered; nobody said so of the function that it calls."""
-    assert checkout.python(ASSUME) == "True False"
+    Of the two functions, the loop lets its sums be reordered; the one that it calls does not say
+    so, and never has its caller's assumptions on floats.
+    """
+    assert checkout.python(INTERRUPTED + ASSUMED).split("\n") == ["1 4.0", "True False"]
+    assert checkout.python(INTERRUPTED) == "1 4.0"
 
 
 def test_the_digest_of_a_users_file_watches_its_own_package(tmp_path):
@@ -177,9 +151,8 @@ def test_the_digest_of_a_users_file_watches_its_own_package(tmp_path):
     package.mkdir()
     (package / "__init__.py").write_text("")
     (package / "outer.py").write_text("from mine.inner import loop\nfrom numpy import pi\n")
-    inner = package / "inner.py"
-    inner.write_text("loop = 1\n")
+    (package / "inner.py").write_text("loop = 1\n")
     before = digest(package / "outer.py")
-    inner.write_text("loop = 2\n")
+    (package / "inner.py").write_text("loop = 2\n")
     _read.cache_clear()
     assert digest(package / "outer.py") != before

@@ -32,23 +32,18 @@ def test_a_shielded_job_stays_shielded(number):
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_other_signals_are_ctrl_cs(number):
+def test_other_signals_are_ctrl_cs_but_a_hang_up_is_never_the_second(number):
+    """A terminal that is closed sends several."""
     before = signal.getsignal(number)
     with pytest.raises(KeyboardInterrupt), interruptible():
         signal.raise_signal(number)
     with deferred_interrupt() as is_interrupted:
         signal.raise_signal(number)
         assert is_interrupted()
-    assert signal.getsignal(number) == before
-
-
-def test_a_hang_up_is_never_the_second():
-    """A terminal that is closed sends several."""
-    with deferred_interrupt():
-        signal.raise_signal(signal.SIGTERM)
         signal.raise_signal(signal.SIGHUP)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGTERM)
+    assert signal.getsignal(number) == before
 
 
 @pytest.mark.parametrize("number", INTERRUPTS)
@@ -67,9 +62,6 @@ def test_what_is_held_interrupts_at_the_end(number):
         work()
     assert done == ["all of it"]
     assert signal.getsignal(number) == before
-
-
-def test_what_is_held_is_noted_by_work_that_defers_it():
     with deferred_interrupt() as is_interrupted:
         with held_interrupts():
             signal.raise_signal(signal.SIGINT)

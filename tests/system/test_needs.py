@@ -1,5 +1,6 @@
 """Refusals of what does not fit; faults/test_fit.py compares estimates with measured peaks."""
 
+import math
 import resource
 import shutil
 from pathlib import Path
@@ -16,7 +17,7 @@ from swarm_mj.system.needs import Needs, check_fits
 def machine(monkeypatch):
     """8 GB of memory, 2 GB of disk, and addresses without a limit."""
 
-    def set_to(memory=8e9, addresses=None, room=2e9, most=None):
+    def set_to(memory=8e9, addresses=math.inf, room=2e9, most=math.inf):
         monkeypatch.setattr(needs, "free_memory", lambda: memory)
         monkeypatch.setattr(needs, "free_addresses", lambda: addresses)
         monkeypatch.setattr(needs, "free_room", lambda _: room)
@@ -54,17 +55,6 @@ def test_a_refusal_names_need_limit_and_way_out(machine, tmp_path):
     assert "about 4 GB of address space, and 1.5 GB are left by ulimit -v" in line
 
 
-NO_LIMIT = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
-
-
-@pytest.fixture
-def limits(monkeypatch):
-    """Limits of this process, by their numbers; none unless set."""
-    found = {}
-    monkeypatch.setattr(needs.resource, "getrlimit", lambda which: found.get(which, NO_LIMIT))
-    return found
-
-
 def test_free_memory_is_the_machines(monkeypatch, tmp_path):
     monkeypatch.setattr(needs, "CONTROL_GROUPS", tmp_path)  # where there are none
     assert 0 < needs.free_memory() <= psutil.virtual_memory().total
@@ -98,22 +88,20 @@ def test_control_groups_leave_their_limits_less_what_they_cannot_give_back(
     assert needs.free_memory() == 5000 - 3000 + 7
 
 
-def test_addresses_are_what_ulimit_leaves(limits):
-    assert needs.free_addresses() is None
-    limits[resource.RLIMIT_AS] = (10**15, 10**15)
+def test_addresses_and_files_are_what_ulimit_leaves(monkeypatch):
+    limits = {}  # of this process, by their numbers; none unless set
+    none = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+    monkeypatch.setattr(needs.resource, "getrlimit", lambda which: limits.get(which, none))
+    assert (needs.free_addresses(), needs.largest_file()) == (math.inf, math.inf)
+    limits |= {resource.RLIMIT_AS: (10**15, 10**15), resource.RLIMIT_FSIZE: (4096, 4096)}
     used = psutil.Process().memory_info().vms
     assert needs.free_addresses() == pytest.approx(10**15 - used, abs=1e8)
-
-
-def test_files_may_take_what_the_disk_has_and_one_what_the_limit_allows(limits, tmp_path):
-    file = tmp_path / "not" / "yet" / "made.rrd"
-    assert needs.free_room(file) == pytest.approx(shutil.disk_usage(tmp_path).free, rel=0.1)
-    assert needs.largest_file() is None
-    limits[resource.RLIMIT_FSIZE] = (4096, 4096)
     assert needs.largest_file() == 4096
 
 
-def test_the_disk_is_the_one_where_a_link_leads(tmp_path, monkeypatch):
+def test_files_may_take_what_the_disk_has_where_a_link_leads(tmp_path, monkeypatch):
+    file = tmp_path / "not" / "yet" / "made.rrd"
+    assert needs.free_room(file) == pytest.approx(shutil.disk_usage(tmp_path).free, rel=0.1)
     (tmp_path / "far").mkdir()
     (tmp_path / "link.rrd").symlink_to(tmp_path / "far" / "there.rrd")
     free = {tmp_path: 1, tmp_path / "far": 2}
@@ -122,18 +110,14 @@ def test_the_disk_is_the_one_where_a_link_leads(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "error",
+    ("error", "becomes"),
     [
-        RuntimeError("can't allocate memory: you tried"),
-        RuntimeError("CUDA out of memory"),
-        ValueError("Error: engine error: Could not allocate memory"),  # MuJoCo's
+        (RuntimeError("can't allocate memory: you tried"), MemoryError),
+        (RuntimeError("CUDA out of memory"), MemoryError),
+        (ValueError("Error: engine error: Could not allocate memory"), MemoryError),  # MuJoCo's
+        (RuntimeError("other"), RuntimeError),
     ],
 )
-def test_a_librarys_lack_of_memory_is_a_memory_error(error):
-    with pytest.raises(MemoryError), needs.memory_errors():
+def test_a_librarys_lack_of_memory_is_a_memory_error(error, becomes):
+    with pytest.raises(becomes), needs.memory_errors():
         raise error
-
-
-def test_other_errors_stay_what_they_are():
-    with pytest.raises(RuntimeError, match="other"), needs.memory_errors():
-        raise RuntimeError("other")

@@ -1,13 +1,15 @@
-"""Text is printed as it is, and programs are called as the reader can call them."""
+"""Text is printed as it is, programs are named as they can be called, and the bar is true."""
 
 import io
 import sys
+import time
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
 
 from swarm_mj.system import terminal
-from swarm_mj.system.terminal import named_values, plain_console, this_command
+from swarm_mj.system.terminal import WorkBar, named_values, plain_console, this_command
 
 
 @pytest.mark.parametrize("is_error", [False, True])
@@ -34,25 +36,9 @@ def test_values_stand_beside_their_names_under_the_title():
     table = named_values("A flight", {"age": "13.4", "hops": "1.2"}, caption="of all pairs")
     Console(file=shown, width=40).print(table)
     lines = [line.strip() for line in shown.getvalue().splitlines()]
-    assert lines[0] == "A flight"
-    assert [line.strip("│ ").split() for line in lines if "│" in line] == [
-        ["age", "│", "13.4"],
-        ["hops", "│", "1.2"],
-    ]
-    assert lines[-1] == "of all pairs"
-
-
-@pytest.fixture
-def programs(tmp_path, monkeypatch):
-    """A Python and a program beside it, in `env/bin`, seen from `work`."""
-    for name in ("env/bin/python", "env/bin/swarm-mj", "other/swarm-mj"):
-        path = tmp_path / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch(mode=0o755)
-    (tmp_path / "work").mkdir()
-    monkeypatch.chdir(tmp_path / "work")
-    monkeypatch.setattr(sys, "executable", str(tmp_path / "env" / "bin" / "python"))
-    return tmp_path
+    rows = [line.strip("│ ").split() for line in lines if "│" in line]
+    assert (lines[0], lines[-1]) == ("A flight", "of all pairs")
+    assert rows == [["age", "│", "13.4"], ["hops", "│", "1.2"]]
 
 
 @pytest.mark.parametrize(
@@ -61,12 +47,74 @@ def programs(tmp_path, monkeypatch):
         ("env/bin", "swarm-mj", "swarm-mj"),
         ("nowhere", "swarm-mj", "../env/bin/swarm-mj"),
         ("other", "swarm-mj", "../env/bin/swarm-mj"),  # another of the same name
-        ("nowhere", "python", "../env/bin/python"),
         ("nowhere", "tensorboard", "tensorboard"),  # there is none beside this Python
     ],
 )
 def test_a_program_is_called_by_name_if_that_is_the_one(
-    programs, monkeypatch, on_path, name, called
+    tmp_path, monkeypatch, on_path, name, called
 ):
-    monkeypatch.setenv("PATH", str(programs / on_path))
+    """A Python and a program beside it, in `env/bin`, seen from `work`."""
+    for program in ("env/bin/python", "env/bin/swarm-mj", "other/swarm-mj", "work/none"):
+        (tmp_path / program).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / program).touch(mode=0o755)
+    monkeypatch.chdir(tmp_path / "work")
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "env" / "bin" / "python"))
+    monkeypatch.setenv("PATH", str(tmp_path / on_path))
     assert this_command(name) == called
+
+
+def bar_on(is_terminal=True, **options):
+    """A bar, and what it draws."""
+    file = io.StringIO()
+    console = Console(file=file, force_terminal=is_terminal, width=100, color_system=None)
+    return WorkBar("Flying", 40, "missions", completed=10, console=console, **options), file
+
+
+def test_the_bar_says_what_is_under_way_and_how_far_it_is():
+    bar, file = bar_on()
+    with bar:
+        bar.advance(5)
+        bar.text = "age 7.5"
+        bar._bar.refresh()
+        assert "Flying" in file.getvalue()
+        assert "15/40 missions age 7.5" in file.getvalue()
+        bar.what = "Finishing"
+        bar.move_to(40.0)
+        bar._bar.refresh()
+    assert "Finishing" in file.getvalue()
+    assert "40/40 missions" in file.getvalue()
+
+
+def test_the_bar_is_gone_in_the_end_also_after_a_failure():
+    """It ends with an erased line."""
+    bar, file = bar_on()
+    with pytest.raises(KeyboardInterrupt), bar:
+        raise KeyboardInterrupt
+    assert file.getvalue().endswith(("\x1b[2K", "\x1b[2K\r", "\x1b[?25h\r\x1b[1A\x1b[2K"))
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.01])
+def test_nothing_is_drawn_where_nobody_looks(after_s):
+    bar, file = bar_on(is_terminal=False, after_s=after_s)
+    with pytest.raises(KeyboardInterrupt), bar:
+        raise KeyboardInterrupt
+    assert file.getvalue() == ""
+
+
+@pytest.mark.parametrize(("after_s", "is_shown"), [(0.01, True), (100.0, False)])
+def test_a_bar_waits_for_work_that_takes_its_time(after_s, is_shown):
+    bar, file = bar_on(after_s=after_s)
+    with bar:
+        for _ in range(1000):
+            if "Flying" in file.getvalue() or not is_shown:
+                break
+            time.sleep(0.01)
+    assert ("Flying" in file.getvalue()) == is_shown
+
+
+def test_notebooks_which_claim_to_be_terminals_show_none(monkeypatch):
+    monkeypatch.setenv("FORCE_COLOR", "1")  # as a notebook's server does
+    assert terminal.quiet_console().is_terminal
+    shell = SimpleNamespace(kernel=None)
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
+    assert not terminal.quiet_console().is_terminal

@@ -17,7 +17,7 @@ from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.policies.tuning import read_table
 from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.outputs import owned
+from swarm_mj.system.writing import owned
 
 TOOL = Path(__file__).parent.parent.parent / "tools" / "tune.py"
 QUICK = ("--episodes", "2", "--windows", "3")

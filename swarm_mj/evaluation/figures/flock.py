@@ -18,7 +18,7 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import velocity_variance
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.provenance import commit, version
+from swarm_mj.system.packages import commit, version
 
 ARROW_SHARE = 0.13  # of a panel's width: the length of its longest arrow
 MARGIN_M = 150.0  # around the robots, for their arrows

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from swarm_mj.policies.registry import WITHOUT_PAYLOAD
-from swarm_mj.system.atomic import write_bytes
+from swarm_mj.system.writing import write_bytes
 
 WIDTH_IN = 7.5  # shown at 900 pixels, a point of type is 1.7 pixels
 FAINT = "#666666"

@@ -8,7 +8,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from residual_gnn.network import Weights, shapes
-from swarm_mj.system.atomic import write_bytes
+from swarm_mj.system.writing import write_bytes
 
 FORMAT = "swarm_mj residual policy"  # the entry of the metadata that describes the weights
 SHIPPED = Path(__file__).with_name("weights.safetensors")

@@ -26,8 +26,8 @@ from residual_gnn.training_run import (
 from swarm_mj.cli import script
 from swarm_mj.mission import Mission, paper
 from swarm_mj.system.fields import as_typed, setting
-from swarm_mj.system.outputs import Output, check_outputs, owned
-from swarm_mj.system.provenance import commit
+from swarm_mj.system.packages import commit
+from swarm_mj.system.writing import Output, check_outputs, owned
 
 WINDOWS = 250  # of a mission that is learned from
 KINDS = {  # what 40 robots at rest meet; they believe in free space

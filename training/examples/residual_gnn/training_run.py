@@ -27,8 +27,8 @@ from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.atomic import write_bytes, write_csv
 from swarm_mj.system.fields import check, setting
+from swarm_mj.system.writing import write_bytes, write_csv
 
 CHECKPOINT, CURVE = "checkpoint.pt", "curve.csv"
 MAX_BYTES = 100_000_000
