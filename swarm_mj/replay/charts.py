@@ -1,5 +1,6 @@
 """Beside the map: the ego robot's tree, the age matrix, the radio's state lanes, and plots."""
 
+import itertools
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -9,9 +10,9 @@ import rerun as rr
 from jaxtyping import Bool, Float, Int, UInt8
 
 from swarm_mj.mission.geometry import ROOT, spanning_tree
+from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay import palette
-from swarm_mj.replay.mismatch import LinkMismatch
-from swarm_mj.replay.packets import is_other
+from swarm_mj.replay.links import LinkMismatch, by_kind, is_other
 from swarm_mj.replay.palette import Colour
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog
@@ -166,12 +167,13 @@ def plots(log: Log) -> dict[str, list[PlotCurve]]:
     if log.mismatch is not None:
         named = "believed, too weak (red); works, unbelieved (green); cut off (white)"
         found[f"Share [%]: {named}"] = _mismatch_curves(log, log.mismatch)
-    name, unit, cost = "velocity variance", "m²/s²", log.velocity_variance_m2ps2
-    if log.task_cost is not None:
-        name, unit, cost = log.task_cost.name, log.task_cost.unit, log.task_cost.value
-    if log.task_cost is not None or log.has_motion:
-        title = f"{name[:1].upper()}{name[1:]} [{unit}]"
-        found[title] = [PlotCurve("task/cost", name, palette.VARIANCE, cost)]
+    cost = log.task_cost
+    if cost is None and log.has_motion:
+        variance = log.velocity_variance_m2ps2
+        cost = TaskCost(name="velocity variance", unit="m²/s²", value=variance)
+    if cost is not None:
+        title = f"{cost.name[:1].upper()}{cost.name[1:]} [{cost.unit}]"
+        found[title] = [PlotCurve("task/cost", cost.name, palette.VARIANCE, cost.value)]
     return found
 
 
@@ -181,14 +183,10 @@ def packet_counts(log: Log) -> dict[str, tuple[Colour, Int[np.ndarray, "T"]]]:
     Broadcasts are sent, and heard if any robot decoded them.
     """
     if not log.is_broadcast:
-        fates = ("delivered", "lost", "overheard", "answered")
-        num = len(log.window)
+        num, packets = len(log.window), log.packets
         return {
-            fate: (
-                getattr(palette, fate.upper()),
-                np.bincount(log.packets[fate].row, minlength=num),
-            )
-            for fate in fates
+            fate: (getattr(palette, fate.upper()), np.bincount(packets[fate].row, minlength=num))
+            for fate in ("delivered", "lost", "overheard", "answered")
         }
     row, phase, hearer = np.nonzero(is_other(log.heard))
     is_heard = np.zeros(log.heard.shape, dtype=bool)
@@ -199,34 +197,26 @@ def packet_counts(log: Log) -> dict[str, tuple[Colour, Int[np.ndarray, "T"]]]:
 
 def _mismatch_curves(log: Log, mismatch: LinkMismatch) -> list[PlotCurve]:
     at, none = mismatch.window - log.window[0], np.zeros(len(log.window), dtype=int)
-    is_too_weak, row = mismatch.links["is_too_weak"], mismatch.links["row"]
-    num_weak, num_works = (
-        np.bincount(row[which], minlength=len(at)) for which in (is_too_weak, ~is_too_weak)
-    )
-    believed, working = (
-        (none if num is None else num)[at] for num in (log.num_believed, log.num_working)
-    )
+    kinds = by_kind(mismatch.links).values()
+    num_works, num_weak = (np.bincount(its["row"], minlength=len(at)) for its in kinds)
+    numbers = log.num_believed, log.num_working
+    believed, working = ((none if num is None else num)[at] for num in numbers)
     others, cut_off = np.sum(log.is_on[at], axis=1) - 1, np.sum(log.is_cut_off[at], axis=1)
     shares = {
         "believed, too weak": (palette.TOO_WEAK, num_weak, believed),
         "works, unbelieved": (palette.UNBELIEVED, num_works, working),
         f"cut off from r{log.ego}": (palette.EGO, cut_off, others),
     }
-    return [
-        PlotCurve(
-            "world/" + name.replace(" ", "_"),
-            name,
-            colour,
-            100.0 * part / np.maximum(1, of),
-            window=mismatch.window,
-        )
-        for name, (colour, part, of) in shares.items()
-    ]
+    curves = []
+    for name, (colour, part, of) in shares.items():
+        path, share = "world/" + name.replace(" ", "_"), 100.0 * part / np.maximum(1, of)
+        curves.append(PlotCurve(path, name, colour, share, window=mismatch.window))
+    return curves
 
 
 def draw_plots(out: RerunLog, shown: dict[str, list[PlotCurve]]) -> None:
     """Draw the curves of all plots."""
-    for curve in (curve for curves in shown.values() for curve in curves):
+    for curve in itertools.chain(*shown.values()):
         path, style = f"plots/{curve.path}", {"colors": [curve.colour], "names": [curve.name]}
         if isinstance(curve.std, float):
             out.fixed(path, rr.SeriesLines(widths=[1.6], **style))

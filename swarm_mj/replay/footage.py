@@ -10,18 +10,20 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components, components_in
 from swarm_mj.physics.scene import Scene
 from swarm_mj.replay import palette
-from swarm_mj.replay.mismatch import (
+from swarm_mj.replay.links import (
     NO_MISMATCH,
     PIECES,
     Lines,
     LinkMismatch,
     Links,
+    PacketSegments,
+    Positions,
     by_kind,
     divided,
     ends,
+    packet_segments,
     shades,
 )
-from swarm_mj.replay.packets import PacketSegments, Positions, packet_segments
 from swarm_mj.replay.recorder import Log, Recorder
 from swarm_mj.simulation.swarm import Swarm
 

@@ -2,7 +2,7 @@
 
 import itertools
 import re
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import rerun as rr
@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 from swarm_mj.replay import palette
 from swarm_mj.replay.charts import TREE_HEIGHT, TREE_WIDTH, PlotCurve
 from swarm_mj.replay.footage import Ground
-from swarm_mj.replay.mismatch import PIECES, WHOLE, by_kind
+from swarm_mj.replay.links import PIECES, WHOLE, by_kind
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import LAYERS, TIMELINE, RerunLog
 from swarm_mj.replay.stage import square_m
@@ -28,6 +28,8 @@ LAST = 5.1  # the height of the last row, with its texts
 LINE = 1.9  # of a text's second line, which they have beyond free space only
 BELOW = 2.6  # from a sample to its text
 NUM_SHADES = 60
+
+Range: TypeAlias = tuple[float, float]
 
 
 class Layout(rrb.Blueprint):
@@ -50,33 +52,16 @@ def layout(log: Log, frame: Ground, shown: dict[str, list[PlotCurve]]) -> Layout
     ground = _drawing("/", name, (-reach, reach), (-reach, reach), contents=["/arena/**"])
     samples = _drawing("/legend", "Legend", (0.0, WIDTH), (-3.5, height), titlebar=False)
     across, up = ((-0.05 * size, 1.05 * size) for size in (TREE_WIDTH, TREE_HEIGHT))
-    ages = rrb.TensorView(
-        origin="/ages",
-        name="Age of information, all pairs",
-        scalar_mapping=rrb.TensorScalarMapping(colormap="Viridis", mag_filter="Nearest"),
-        view_fit="Fill",
-    )
-    tree_and_ages = rrb.Horizontal(
-        _drawing("/tree", f"Tree of r{log.ego}, in hops", across, up), ages
-    )
+    tree = _drawing("/tree", f"Tree of r{log.ego}, in hops", across, up)
+    mapping = rrb.TensorScalarMapping(colormap="Viridis", mag_filter="Nearest")
+    ages = "Age of information, all pairs"
+    matrix = rrb.TensorView(origin="/ages", name=ages, scalar_mapping=mapping, view_fit="Fill")
     charts = [_plot(name, curves) for name, curves in shown.items()]
     mission = rrb.Horizontal(
         rrb.Vertical(ground, samples, row_shares=[4, height / (ROW + LAST)]),
-        rrb.Vertical(tree_and_ages, *charts, row_shares=[4, *[3] * len(charts)]),
+        rrb.Vertical(rrb.Horizontal(tree, matrix), *charts, row_shares=[4, *[3] * len(charts)]),
         column_shares=[11, 10],
         name="Mission",
-    )
-    scene = rrb.Spatial3DView(
-        origin="/",
-        contents=["/scene/**"],
-        name="Scene in 3-D, colours as on the map",
-        background=palette.BACKGROUND,
-        line_grid=False,
-        eye_controls=rrb.EyeControls3D(
-            position=(0.0, -1.35 * frame.reach_m, 1.75 * frame.reach_m),
-            look_target=(0.0, -0.12 * frame.reach_m, 0.0),
-            eye_up=(0.0, 0.0, 1.0),
-        ),
     )
     radio = rrb.Horizontal(
         rrb.StateTimelineView(origin="/state", name="Radio of every robot"),
@@ -86,19 +71,30 @@ def layout(log: Log, frame: Ground, shown: dict[str, list[PlotCurve]]) -> Layout
     )
     time = {"timeline": TIMELINE, "fps": WINDOWS_PER_SECOND, "loop_mode": "all"}
     return Layout(
-        rrb.Tabs(mission, scene, radio, active_tab=0),
+        rrb.Tabs(mission, _scene(frame.reach_m), radio, active_tab=0),
         rrb.TimePanel(state="collapsed", **time),
         collapse_panels=True,
         auto_views=False,
     )
 
 
+def _scene(reach_m: float) -> rrb.Spatial3DView:
+    return rrb.Spatial3DView(
+        origin="/",
+        contents=["/scene/**"],
+        name="Scene in 3-D, colours as on the map",
+        background=palette.BACKGROUND,
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(
+            position=(0.0, -1.35 * reach_m, 1.75 * reach_m),
+            look_target=(0.0, -0.12 * reach_m, 0.0),
+            eye_up=(0.0, 0.0, 1.0),
+        ),
+    )
+
+
 def _drawing(
-    origin: str,
-    name: str,
-    x_range: tuple[float, float],
-    y_range: tuple[float, float],
-    **options: Any,
+    origin: str, name: str, x_range: Range, y_range: Range, **options: Any
 ) -> rrb.Spatial2DView:
     # The background is set so that colours do not depend on the viewer's theme.
     bounds = rrb.VisualBounds2D(x_range=x_range, y_range=y_range)
@@ -108,13 +104,10 @@ def _drawing(
 
 
 def _plot(name: str, curves: list[PlotCurve]) -> rrb.TimeSeriesView:
-    hidden: dict[Any, Any] = {
-        f"/plots/{curve.path}": rrb.EntityBehavior(visible=False)
-        for curve in curves
-        if curve.is_hidden
-    }
-    seen = (curve.values + curve.std for curve in curves if not curve.is_hidden)
-    top = palette.nice_top(max(float(np.max(each)) for each in seen))
+    unseen = rrb.EntityBehavior(visible=False)
+    hidden: dict[Any, Any] = {f"/plots/{each.path}": unseen for each in curves if each.is_hidden}
+    seen = [each for each in curves if not each.is_hidden]
+    top = palette.nice_top(max(float(np.max(each.values + each.std)) for each in seen))
     return rrb.TimeSeriesView(
         overrides=hidden,
         axis_y=rrb.ScalarAxis(range=(0.0, 1.06 * top)),  # so that both ends have numbers
@@ -190,6 +183,5 @@ def _draw_sample(out: RerunLog, path: str, name: str, x: float, y: float) -> Non
 
 
 def _write(out: RerunLog, path: str, texts: list[str], places: list[tuple[float, float]]) -> None:
-    """Write texts as the labels of invisible points."""
-    style = {"show_labels": True, "radii": -0.1, "colors": [palette.TEXT]}
+    style = {"show_labels": True, "radii": -0.1, "colors": [palette.TEXT]}  # points are not seen
     out.fixed(path, rr.Points2D.from_fields(positions=places, labels=texts, **style))

@@ -16,8 +16,7 @@ from rerun.chunk import RrdReader
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Facts, Footage, frame
-from swarm_mj.replay.mismatch import LINK, NO_MISMATCH, NUMBERS, LinkMismatch
-from swarm_mj.replay.packets import SEGMENTS, PacketSegments
+from swarm_mj.replay.links import LINK, NO_MISMATCH, NUMBERS, SEGMENTS, LinkMismatch, PacketSegments
 from swarm_mj.replay.rerun_log import TIMELINE
 from swarm_mj.system.reading import open_file, read_json
 
@@ -83,21 +82,20 @@ def read_footage(path: Path) -> Footage:
         facts, columns = read_json(text, Facts), _columns(path)
         mission = facts.mission
         age = _numbers(columns["/scene/robots age"]).reshape(-1, mission.num_robots)
-        position_m = _numbers(columns["/scene/robots Cylinders3D:centers"])
-        position_m = position_m.reshape(*age.shape, 3)[..., :2]
+        centres_m = _numbers(columns["/scene/robots Cylinders3D:centers"])
+        position_m = centres_m.reshape(*age.shape, 3)[..., :2]
         # Teams at rest have no headings, and in free space no robot is cut off.
-        headings, cut_off = np.zeros((*age.shape, 6)), np.zeros(age.shape)
-        if (lines := columns.get("/scene/heading LineStrips3D:strips")) is not None:
-            headings = _numbers(lines).reshape(headings.shape)
-        if (flags := columns.get("/scene/robots is_cut_off")) is not None:
-            cut_off = _numbers(flags).reshape(age.shape)
+        none = pa.array(np.zeros(6 * age.size))
+        headings = _numbers(columns.get("/scene/heading LineStrips3D:strips", none))
+        headings = headings.reshape(*age.shape, 6)
+        cut_off = _numbers(columns.get("/scene/robots is_cut_off", none[: age.size]))
         return Footage(
             facts=facts,
             window=_windows(columns, "/scene/robots"),
             position_m=position_m,
             velocity_mps=headings[..., 3:5] - headings[..., :2],
             age=age,
-            is_cut_off=cut_off > 0.0,
+            is_cut_off=cut_off.reshape(age.shape) > 0.0,
             mismatch=_mismatch(columns),
             is_on=_numbers(columns["/scene/robots is_on"]).reshape(age.shape) > 0.0,
             segments=_segments(columns),

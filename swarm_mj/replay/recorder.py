@@ -11,8 +11,14 @@ from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.costs import TaskCost
-from swarm_mj.replay.mismatch import LinkMismatch, radio_snapshot, stride_of
-from swarm_mj.replay.packets import PacketLinks, fates, is_other
+from swarm_mj.replay.links import (
+    LinkMismatch,
+    PacketLinks,
+    fates,
+    is_other,
+    radio_snapshot,
+    stride_of,
+)
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.needs import GB
@@ -113,28 +119,24 @@ class Recorder:
 
     def add(self, flown: WindowRecord | None = None) -> None:
         """Record the window that was just flown, if any, with its costs, if they are known."""
-        buffers, states, index, own = (
-            self._swarm.buffers,
-            self._swarm.states,
-            self._index,
-            self._ego,
-        )
-        age = self._swarm.now[index] - buffers.timestamp[index]
-        num_robots, costs = len(age), None if flown is None else flown.costs
-        is_on = np.ones(num_robots, bool) if states.is_active is None else states.is_active[index]
-        others = age[is_on[:, None] & is_on & ~np.eye(num_robots, dtype=bool)]
+        swarm, index, own = self._swarm, self._index, self._ego
+        buffers, states, phases = swarm.buffers, swarm.states, swarm.phases
+        age = swarm.now[index] - buffers.timestamp[index]
+        costs, robots = None if flown is None else flown.costs, np.arange(len(age))
+        is_on = np.ones(len(age), bool) if states.is_active is None else states.is_active[index]
+        others = age[is_on[:, None] & is_on & (robots[:, None] != robots)]
         if len(self._rows) % self._stride == 0:
             self._age.append(age.astype(np.float32))
         is_due = len(self._rows) % self._radio_stride == 0
-        if is_due and (seen := radio_snapshot(self._swarm, index)) is not None:
-            self._radio = seen._asdict()
-            del self._radio["links"]
+        if is_due and (seen := radio_snapshot(swarm, index)) is not None:
             seen.links["row"] = len(self._links)
             self._links.append(seen.links)
+            self._radio = {name: its for name, its in seen._asdict().items() if name != "links"}
         if costs is not None and costs.task_cost is not None:
             self._task_costs.append(costs.task_cost)
-        phases = self._swarm.phases
-        silence = np.tile(np.arange(num_robots), (2, 1))  # of a mission that has not begun
+        silence = [robots, robots]  # of a mission that has not begun
+        no_cost = np.full(len(swarm.now), np.nan)
+        variance = no_cost if costs is None else costs.velocity_variance_m2ps2
         shown = {
             "position_m": states.position_m[index],
             "velocity_mps": states.velocity_mps[index],
@@ -145,23 +147,15 @@ class Recorder:
             "believed_m": buffers.position_m[index, own],
             "ego_age": age[own],
             "parent": buffers.parent[index, own],
-            "age_mean": np.nan if costs is None else costs.age_windows[index],
+            "age_mean": (no_cost if costs is None else costs.age_windows)[index],
             "age_std": np.std(others),
             "age_max": np.max(others),
-            "velocity_variance_m2ps2": np.nan
-            if costs is None
-            else costs.velocity_variance_m2ps2[index],
+            "velocity_variance_m2ps2": variance[index],
             **self._radio,
         }
         # Copies: the swarm writes its arrays in place, and a view would keep a whole matrix. The
         # row comes last: whatever an interrupt leaves unfinished, rows count the whole windows.
         self._rows.append({name: np.array(value) for name, value in shown.items()})
-
-    @property
-    def num_bytes(self) -> int:
-        """The memory taken so far; every window takes the same."""
-        row = sum(value.nbytes for value in self._rows[0].values()) if self._rows else 0
-        return len(self._rows) * row + sum(each.nbytes for each in (*self._age, *self._links))
 
     def log(self) -> Log:
         """Return everything recorded so far; raise ValueError if that is nothing."""

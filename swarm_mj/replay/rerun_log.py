@@ -9,8 +9,7 @@ from jaxtyping import Float, Int
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Ground
-from swarm_mj.replay.mismatch import NUMBERS, LinkMismatch, Links, shades
-from swarm_mj.replay.packets import Points
+from swarm_mj.replay.links import NUMBERS, LinkMismatch, Links, Points, shades
 from swarm_mj.replay.palette import Colour, dim
 from swarm_mj.replay.recorder import Log
 

@@ -24,7 +24,7 @@ from swarm_mj.physics.state import (
     Obstacles,
 )
 from swarm_mj.replay.footage import Ground
-from swarm_mj.replay.packets import lifted
+from swarm_mj.replay.links import lifted
 from swarm_mj.replay.rerun_log import LAYERS, RerunLog
 
 SQUARE_M = 100.0
@@ -65,7 +65,6 @@ def draw_stage(out: RerunLog, mission: Mission) -> None:
 
 
 def _draw_ground(out: RerunLog, mission: Mission) -> None:
-    """Draw the floor's grid in both views, and the area's outline on the map, y up."""
     if out.frame.moves:
         away = lifted(-out.frame.centre_m, 0.0)
         out.timed("scene", rr.Transform3D.columns(translation=away))
@@ -188,7 +187,6 @@ def _drawn(model: MjModel, data: MjData, g: int, fill_mode: str) -> rr.AsCompone
 
 
 def _colour(model: MjModel, g: int) -> UInt8[np.ndarray, "3"]:
-    """Return a geom's colour, or its material's, or the mean of its texture."""
     material = int(model.geom_matid[g])
     if material < 0:
         return (255.0 * model.geom_rgba[g, :3]).astype(np.uint8)

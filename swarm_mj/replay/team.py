@@ -6,8 +6,16 @@ from jaxtyping import UInt8
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
-from swarm_mj.replay.mismatch import PIECES, LinkMismatch, by_kind, divided, ends
-from swarm_mj.replay.packets import PacketLinks, arcs, lifted
+from swarm_mj.replay.links import (
+    PIECES,
+    LinkMismatch,
+    PacketLinks,
+    arcs,
+    by_kind,
+    divided,
+    ends,
+    lifted,
+)
 from swarm_mj.replay.rerun_log import RerunLog
 
 TRAIL_WINDOWS = 150
@@ -41,7 +49,6 @@ def draw_team(out: RerunLog, footage: Footage, colours: UInt8[np.ndarray, "T N 3
 
 
 def _draw_robots(out: RerunLog, colours: UInt8[np.ndarray, "T N 3"]) -> None:
-    """Draw robots on the map, and a ring with a name around the ego robot."""
     log = out.log
     names = [f"r{i}" for i in range(log.parent.shape[1])]
     out.fixed("arena/robots", rr.Points2D.from_fields(labels=names, show_labels=False))
@@ -59,7 +66,7 @@ def _draw_robots(out: RerunLog, colours: UInt8[np.ndarray, "T N 3"]) -> None:
 def _draw_bodies(
     out: RerunLog, colours: UInt8[np.ndarray, "T N 3"], radius_m: float, height_m: float
 ) -> None:
-    """Draw robots as cylinders; those who click on one, and videos, read what is known of it."""
+    # Those who click on one, and videos, read what is known of it.
     log, path = out.log, "scene/robots"
     radii = np.full(log.is_on.shape[1], radius_m)
     radii[log.ego] *= OBSERVER
@@ -74,7 +81,6 @@ def _draw_bodies(
 
 
 def _draw_motion(out: RerunLog, height_m: float) -> None:
-    """Draw headings, where robots were, and where the ego robot believes each one to be."""
     log = out.log
     speed = np.linalg.norm(log.velocity_mps, axis=2, keepdims=True)
     # All of one length, for agreement is in directions.
@@ -96,7 +102,6 @@ def _draw_motion(out: RerunLog, height_m: float) -> None:
 
 
 def _draw_radio(out: RerunLog, packets: dict[str, PacketLinks], range_m: float) -> None:
-    """Draw on the map who transmits first, the range in silence around them, and all packets."""
     log = out.log
     row, sender = np.nonzero(log.is_transmitter)
     where = log.position_m[row, sender]
@@ -120,7 +125,6 @@ def _draw_radio(out: RerunLog, packets: dict[str, PacketLinks], range_m: float) 
 
 
 def _draw_mismatch(out: RerunLog, mismatch: LinkMismatch, radius_m: float, height_m: float) -> None:
-    """Draw links on which channel and belief differ, and who is cut off from the ego robot."""
     log = out.log
     for kind, links in by_kind(mismatch.links).items():
         whole_m = ends(links, log.position_m, mismatch.window[links["row"]] - log.window[0])

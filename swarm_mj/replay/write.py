@@ -16,7 +16,7 @@ from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 from swarm_mj.replay import charts, palette
 from swarm_mj.replay.footage import Footage, footage_of, frame
 from swarm_mj.replay.layout import draw_legend, layout
-from swarm_mj.replay.packets import is_other
+from swarm_mj.replay.links import is_other
 from swarm_mj.replay.read import FACTS, with_digest
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog

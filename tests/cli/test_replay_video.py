@@ -91,14 +91,6 @@ def test_bad_input_is_one_clear_line(tdma, here, capsys, arguments, complaint):
     assert list(here.iterdir()) == []
 
 
-def test_a_damaged_replay_makes_no_video(tdma, here, capsys):
-    whole = Path(tdma).read_bytes()
-    Path("cut.rrd").write_bytes(whole[: len(whole) // 2])
-    assert main(["replay", "cut.rrd", "--video", "a.mp4", *SMALL]) == 2
-    assert "cut.rrd is no whole replay" in capsys.readouterr().err
-    assert [path.name for path in here.iterdir()] == ["cut.rrd"]
-
-
 def test_an_interrupt_or_a_lack_of_opengl_leaves_nothing(tdma, here, monkeypatch, capsys):
     def interrupted(*_):
         raise KeyboardInterrupt

@@ -4,16 +4,7 @@ import numpy as np
 import pytest
 from reading import column, rows, static
 
-from swarm_mj.mission.geometry import spanning_tree
-from swarm_mj.replay.charts import dendrogram, plots, radio_states, rate, walk
-
-
-def test_a_walk_visits_everyone_once_and_children_after_parents(two_way):
-    parent = spanning_tree(two_way.log.position_m[:1])[0].tolist()
-    order = walk(parent, range(12), -1)[0][1:]
-    assert sorted(order) == list(range(12))
-    for j, k in enumerate(parent):
-        assert k < 0 or order.index(k) < order.index(j)
+from swarm_mj.replay.charts import dendrogram, plots, radio_states
 
 
 @pytest.mark.parametrize("flight", ["two_way", "flooded"])
@@ -97,13 +88,6 @@ def test_depth_is_the_number_of_hops_to_the_observer(replay, two_way):
     assert hops[0] > 0.0
 
 
-def test_the_rate_counts_the_last_ten_windows():
-    counts = np.arange(25)
-    np.testing.assert_array_equal(
-        rate(counts), [sum(counts[max(0, t - 9) : t + 1]) for t in range(25)]
-    )
-
-
 @pytest.mark.parametrize(
     ("flight", "names"),
     [("two_way", ["delivered", "lost", "overheard", "answered"]), ("flooded", ["sent", "heard"])],
@@ -113,7 +97,9 @@ def test_the_packet_plot_counts_as_the_costs_do(flight, names, request):
     _, curves, *_ = plots(recorded.log).values()
     assert [curve.path for curve in curves] == [f"radio/{name}" for name in names]
     for curve, name in zip(curves, names, strict=True):
-        np.testing.assert_array_equal(curve.values, rate(recorded.counted(name).astype(int)))
+        counts = recorded.counted(name)
+        expected = [sum(counts[max(0, t - 9) : t + 1]) for t in range(len(counts))]
+        np.testing.assert_array_equal(curve.values, expected)
 
 
 def test_the_plot_of_the_world_has_shares_of_links_and_robots(blocked, blocked_replay):

@@ -10,7 +10,7 @@ from swarm_mj.mission.components import Components
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import footage_now, footage_of, frame
-from swarm_mj.replay.mismatch import LINK, LinkMismatch, radio_snapshot
+from swarm_mj.replay.links import LINK, LinkMismatch, radio_snapshot
 from swarm_mj.replay.read import read_footage
 from swarm_mj.replay.write import write_replay
 from swarm_mj.simulation.swarm import Swarm

@@ -8,7 +8,7 @@ from reading import entities, static
 from rerun.chunk import RrdReader
 
 from swarm_mj.replay.layout import WIDTH, legend_height
-from swarm_mj.replay.mismatch import NO_MISMATCH
+from swarm_mj.replay.links import NO_MISMATCH
 from swarm_mj.replay.write import write_replay
 
 ADDRESSED = {"delivered", "lost", "answered", "overheard"}

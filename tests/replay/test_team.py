@@ -7,25 +7,17 @@ import pytest
 from reading import colours, column, counts, entities, rows, static
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.packets import SEGMENTS
+from swarm_mj.replay.links import SEGMENTS
 from swarm_mj.replay.write import write_replay
 
 CLOSE = {"rtol": 1e-5, "atol": 1e-2}  # of float32
+FLIGHTS = {"": "two_way", "flood_": "flooded", "blocked_": "blocked"}  # by their replays' names
+ROBOTS = np.arange(12)
 
 
 def lines(path, entity):
     """Straight lines as [start, end] pairs, all windows in a row."""
     return rows(path, entity, "LineStrips2D:strips", 2, 2)
-
-
-def test_robots_stand_where_they_are_on_the_map_and_in_space(replay, two_way):
-    on_map = rows(replay, "/arena/robots", "Points2D:positions", 12, 2)
-    in_space = rows(replay, "/scene/robots", "Cylinders3D:centers", 12, 3)
-    np.testing.assert_allclose(on_map, two_way.log.position_m, rtol=1e-6, atol=1e-4)
-    np.testing.assert_array_equal(in_space[..., :2], on_map)
-    assert np.all(in_space[..., 2] > 0.0)
-    radii = static(replay, "/scene/robots", "Cylinders3D:radii")
-    assert (len(radii), np.argmax(radii)) == (12, two_way.log.ego)
 
 
 def test_robots_wear_the_colour_of_their_age(replay, two_way):
@@ -78,35 +70,53 @@ def test_a_window_s_arcs_are_its_packets(replay, two_way):
     assert np.all(points[:, SEGMENTS // 2, 2] > points[:, 0, 2])
 
 
-def test_broadcasts_lead_from_marked_transmitters_to_hearers(flood_replay, flooded):
+def test_broadcasts_lead_to_hearers(flood_replay, flooded):
     log = flooded.log
     ends = np.stack(log.packets["heard"].ends(log.position_m), axis=1)
     np.testing.assert_allclose(lines(flood_replay, "/arena/radio/heard"), ends, **CLOSE)
-    row, sender = np.nonzero(np.any(log.recipient != np.arange(12), axis=1))
-    entity, component = "/arena/radio/transmitter", "Points2D:positions"
-    marked = rows(flood_replay, entity, component, 2)
-    np.testing.assert_allclose(marked, log.position_m[row, sender], **CLOSE)
-    per_window = counts(flood_replay, entity, component)
-    np.testing.assert_array_equal(per_window, np.bincount(row, minlength=30))
 
 
-def test_circles_have_the_range_and_stand_around_transmitters(replay, two_way):
-    log, entity = two_way.log, "/arena/radio/range"
-    assert set(rows(replay, entity, "Ellipses2D:half_sizes")) == {250.0}
-    row, sender = np.nonzero(log.recipient[:, 0] != np.arange(12))
-    per_window = counts(replay, entity, "Ellipses2D:centers")
-    np.testing.assert_array_equal(per_window, np.bincount(row, minlength=30))
-    centres = rows(replay, entity, "Ellipses2D:centers", 2)
-    np.testing.assert_allclose(centres, log.position_m[row, sender], **CLOSE)
+def is_cut_off(log):
+    return np.array([[of != team[log.ego] for of in team] for team in log.group])
 
 
-def test_rings_are_where_the_observer_believes_the_others(replay, two_way):
-    log, entity = two_way.log, "/arena/belief/ring"
-    shown = log.is_known & (np.arange(12) != log.ego)
-    per_window = counts(replay, entity, "Ellipses2D:centers")
-    np.testing.assert_array_equal(per_window, np.sum(shown, axis=1))
-    centres = rows(replay, entity, "Ellipses2D:centers", 2)
-    np.testing.assert_allclose(centres, log.believed_m[shown], **CLOSE)
+@pytest.mark.parametrize(
+    ("flight", "entity", "component", "which"),
+    [
+        ("", "/arena/robots", "Points2D:positions", lambda log: log.is_on),
+        ("", "/scene/robots", "Cylinders3D:centers", lambda log: log.is_on),
+        ("", "/arena/belief/ring", "Ellipses2D:centers", lambda log: log.is_known & (ROBOTS != 4)),
+        ("", "/arena/radio/range", "Ellipses2D:centers", lambda log: log.recipient[:, 0] != ROBOTS),
+        (
+            "flood_",
+            "/arena/radio/transmitter",
+            "Points2D:positions",
+            lambda log: np.any(log.recipient != ROBOTS, axis=1),
+        ),
+        ("blocked_", "/arena/world/cut_off", "Points2D:positions", is_cut_off),
+        ("blocked_", "/scene/world/cut_off", "Cylinders3D:centers", is_cut_off),
+    ],
+)
+def test_marks_are_where_the_robots_are_that_they_concern(
+    flight, entity, component, which, request
+):
+    """Rings of beliefs are where the ego robot, r4, believes the others."""
+    path, its = request.getfixturevalue(f"{flight}replay"), FLIGHTS[flight]
+    log = request.getfixturevalue(its).log
+    is_shown, where = which(log), log.believed_m if "belief" in entity else log.position_m
+    assert np.any(is_shown)
+    num_axes = 3 if "scene" in entity else 2
+    per_window = counts(path, entity, component)
+    np.testing.assert_array_equal(per_window, np.sum(is_shown, axis=1))
+    found = rows(path, entity, component, num_axes)[:, :2]
+    np.testing.assert_allclose(found, where[is_shown], **CLOSE)
+
+
+def test_sizes_are_the_range_on_the_map_and_in_space_the_observer_s_is_the_largest(replay):
+    assert set(rows(replay, "/arena/radio/range", "Ellipses2D:half_sizes")) == {250.0}
+    assert np.all(rows(replay, "/scene/robots", "Cylinders3D:centers", 3)[:, 2] > 0.0)
+    radii = static(replay, "/scene/robots", "Cylinders3D:radii")
+    assert (len(radii), np.argmax(radii)) == (12, 4)
 
 
 def test_headings_have_one_length_and_the_direction_of_flight(replay, two_way):
@@ -147,16 +157,6 @@ def test_lines_are_the_mismatched_links(blocked, blocked_replay, kind, dashes, v
     np.testing.assert_allclose(shown[:, 0, :2], start_m, atol=1e-3)
     margins = column(blocked_replay, entity, "margin_db").flatten().to_numpy()
     np.testing.assert_array_equal(margins[::pieces], links["margin_db"])
-
-
-def test_halos_are_around_the_robots_that_are_cut_off(blocked, blocked_replay):
-    log = blocked.log
-    is_apart = np.array([[of != team[log.ego] for of in team] for team in log.group])
-    assert 0 < np.sum(is_apart) < is_apart.size
-    on_map = rows(blocked_replay, "/arena/world/cut_off", "Points2D:positions", 2)
-    in_space = rows(blocked_replay, "/scene/world/cut_off", "Cylinders3D:centers", 3)[:, :2]
-    for shown in (on_map, in_space):
-        np.testing.assert_allclose(shown, log.position_m[is_apart], **CLOSE)
 
 
 def test_what_a_mission_lacks_is_not_drawn(replay, still_replay, flood_replay):

@@ -12,7 +12,7 @@ from PIL.ImageDraw import ImageDraw
 from swarm_mj.mission.presets import where_flown
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
-from swarm_mj.replay.mismatch import DASHES, WHOLE
+from swarm_mj.replay.links import DASHES, WHOLE
 from swarm_mj.replay.palette import Colour, dim
 
 CURVES: tuple[Colour, ...] = (palette.MEAN_AGE, palette.VARIANCE)  # of one flight, and a second
@@ -96,7 +96,6 @@ def _observers(footages: Sequence[Footage]) -> str:
 
 
 def _samples(footages: Sequence[Footage], observers: str) -> dict[str, Colour]:
-    """Return the texts of what is seen in any of the missions, with its colours."""
     samples = {"never heard of": palette.UNKNOWN}
     if any(np.any(each.velocity_mps) for each in footages):
         samples["heading"] = palette.HEADING
@@ -118,7 +117,6 @@ def _samples(footages: Sequence[Footage], observers: str) -> dict[str, Colour]:
 
 
 def _draw_sample(draw: ImageDraw, colour: Colour, x: float, middle: float, size: int) -> None:
-    """Draw a disc for robots, a line for packets and links, and a dashed one for weak links."""
     if colour in (palette.UNKNOWN, palette.CUT_OFF):
         draw.circle((x + 0.6 * size, middle), 0.3 * size, colour)
         return
@@ -144,8 +142,8 @@ def draw_shortfalls(
         text = f"{margin} dB"
         width, high = draw.textlength(text, small) + 2 * TAG, 0.95 * size
         # To the right, to the left, below or above: where it covers least.
-        sides = np.array([[0.7, -0.5], [-0.7, -0.5], [-0.5, 0.8], [-0.5, -1.8]])
-        sides = sides * size + [[0.0, 0.0], [-width, 0.0], [0.0, 0.0], [0.0, 0.0]]
+        sides = np.array([[0.7, -0.5], [-0.7, -0.5], [-0.5, 0.8], [-0.5, -1.8]]) * size
+        sides[1, 0] -= width
         low = robots[robot] + sides
         boxes = np.hstack([low, low + np.array([width, high])])
         covered = LABELS_FIRST * _num_overlaps(boxes, shown) + _num_overlaps(boxes, on_robots)
@@ -165,7 +163,7 @@ def _num_overlaps(
 
 
 def _draw_tag(draw: ImageDraw, text: str, x: float, y: float, small: Font) -> None:
-    """Draw a text on a dark ground, so that it is read before anything."""
+    # On a dark ground, so that it is read before anything.
     left, top, right, bottom = draw.textbbox((x, y), text, small)
     draw.rectangle((left - TAG, top - TAG, right + TAG, bottom + TAG), palette.BACKGROUND)
     draw.text((x, y), text, palette.TOO_WEAK, small)

@@ -14,7 +14,7 @@ from mujoco._structs import MjvCamera, MjvGeom, MjvScene
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage, Ground
-from swarm_mj.replay.packets import SEGMENTS, arcs, lifted
+from swarm_mj.replay.links import SEGMENTS, arcs, lifted
 
 Shade: TypeAlias = np.ndarray | palette.Colour
 

@@ -29,8 +29,7 @@ WAY_OUT = (
 def make_context(width: int, height: int) -> Any:  # noqa: ANN401 - each back end has its own
     """Return MuJoCo's `GLContext` to draw pictures of this size in.
 
-    Raises:
-        OSError: No OpenGL works here, or not the one that MUJOCO_GL names.
+    Raise OSError if no OpenGL works here, or not the one that MUJOCO_GL names.
     """
     name = backend()
     try:

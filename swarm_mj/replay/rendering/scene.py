@@ -3,6 +3,7 @@
 import atexit
 import threading
 import warnings
+from contextlib import AbstractContextManager
 from weakref import ref
 
 import numpy as np
@@ -46,7 +47,7 @@ NO_WINDOW = 'the window needs a display; without one, render_mode="rgb_array" dr
 CLOSING_S = 5.0  # what the window may take to close
 
 
-class SceneRenderer:
+class SceneRenderer(AbstractContextManager["SceneRenderer"]):
     """Draws pictures of one mission's scene, all of one size.
 
     MuJoCo's own `Renderer` takes the back end that was chosen when MuJoCo was imported, and frees
@@ -122,15 +123,12 @@ class SceneRenderer:
             self._context.free()
             self._opengl.free()
 
-    def __enter__(self) -> "SceneRenderer":
-        return self
-
     def __exit__(self, *error: object) -> None:
         self.close()
 
 
 def _close(renderer: "ref[SceneRenderer]") -> None:
-    """Close a renderer that is still there when Python ends: by then, OpenGL would fail."""
+    # A renderer that is still there when Python ends: later, OpenGL would fail.
     if (left := renderer()) is not None:
         left.close()
 

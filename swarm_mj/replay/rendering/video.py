@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
-from swarm_mj.replay.packets import lifted
+from swarm_mj.replay.links import lifted
 from swarm_mj.replay.rendering.drawing import (
     CURVES,
     AgePlot,

@@ -4,7 +4,7 @@ import numpy as np
 
 from swarm_mj.mission import paper
 from swarm_mj.replay.footage import Facts, Footage, Ground
-from swarm_mj.replay.packets import PacketSegments
+from swarm_mj.replay.links import PacketSegments
 
 GREEN = (39, 173, 129)  # of viridis, at 5 of its 8 steps: what is fresh by 0.625
 AGE = (1.0 - 0.625) / 0.9 * 10.0  # of which robots are as green [windows]

@@ -8,7 +8,7 @@ from moments import moment
 from PIL import Image, ImageDraw
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.mismatch import LINK, LinkMismatch
+from swarm_mj.replay.links import LINK, LinkMismatch
 from swarm_mj.replay.rendering.drawing import (
     SHADE,
     AgePlot,

@@ -9,8 +9,7 @@ from moments import moment
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Ground
-from swarm_mj.replay.mismatch import LINK, LinkMismatch
-from swarm_mj.replay.packets import SEGMENTS
+from swarm_mj.replay.links import LINK, SEGMENTS, LinkMismatch
 from swarm_mj.replay.rendering.markers import FOV_Y_DEG, draw_markers, look_at
 
 

@@ -1,4 +1,4 @@
-"""Mismatched links: by lone packets through the channel itself, and by hand behind one wall."""
+"""Packets, against the costs' counts and a plain loop; mismatched links, by lone packets."""
 
 from dataclasses import replace
 
@@ -9,19 +9,84 @@ from mujoco import mjtGeom
 
 from swarm_mj.mission import paper
 from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP
-from swarm_mj.replay.mismatch import (
+from swarm_mj.replay.links import (
     DASHES,
     EVERY,
     LINK,
+    RISE,
+    SEGMENTS,
     LinkMismatch,
+    arcs,
     by_kind,
     divided,
-    ends,
+    packet_segments,
     radio_snapshot,
     shades,
     stride_of,
 )
 from swarm_mj.simulation.swarm import Swarm
+
+
+@pytest.mark.parametrize(
+    ("flight", "fate", "counted"),
+    [
+        *(("two_way", fate, fate) for fate in ("delivered", "lost", "overheard", "answered")),
+        ("flooded", "heard", "receptions"),
+    ],
+)
+def test_links_are_as_many_as_the_costs_count(flight, fate, counted, request):
+    recorded = request.getfixturevalue(flight)
+    links = recorded.log.packets[fate]
+    assert np.all(np.diff(links.row) >= 0)
+    found = np.bincount(links.row, minlength=len(recorded.log.window))
+    np.testing.assert_array_equal(found, recorded.counted(counted))
+    assert np.any(found)
+
+
+def test_a_broadcast_leads_to_each_robot_that_decoded_it(flooded):
+    log = flooded.log
+    expected = [
+        (t, log.heard[t, slot, hearer], hearer)
+        for t, slot, hearer in np.ndindex(len(log.window), 2, 12)
+        if log.heard[t, slot, hearer] != hearer
+    ]
+    assert list(zip(*log.packets["heard"], strict=True)) == expected
+
+
+def test_answers_heard_or_not_are_the_delivered_requests_turned_round(two_way):
+    links = two_way.log.packets
+    requests = set(zip(*links["delivered"], strict=True))
+    answers = {
+        (row, receiver, sender)
+        for fate in ("answered", "unanswered")
+        for row, sender, receiver in zip(*links[fate], strict=True)
+    }
+    assert answers == requests
+
+
+def test_segments_are_in_the_order_of_drawing_and_lost_ones_stop_short(two_way, flooded):
+    log = two_way.log
+    segments = packet_segments(log.packets, log.position_m)
+    assert list(segments) == ["overheard", "unanswered", "lost", "delivered", "answered"]
+    for fate, (row, start_m, end_m) in segments.items():
+        share, links = 0.6 if fate in ("lost", "unanswered") else 1.0, log.packets[fate]
+        start, end = (log.position_m[row, robot] for robot in (links.sender, links.receiver))
+        np.testing.assert_array_equal(row, links.row)
+        np.testing.assert_allclose(start_m, start)
+        np.testing.assert_allclose(end_m, share * end + (1.0 - share) * start)
+    assert list(packet_segments(flooded.log.packets, flooded.log.position_m)) == ["heard"]
+
+
+def test_an_arc_starts_and_ends_at_its_ends_and_is_highest_in_the_middle():
+    start, end = np.array([[0.0, 0.0], [10.0, 5.0]]), np.array([[100.0, 0.0], [10.0, -35.0]])
+    points = arcs(start, end, 2.0)
+    assert points.shape == (2, SEGMENTS + 1, 3)
+    np.testing.assert_allclose(points[:, 0], np.pad(start, ((0, 0), (0, 1)), constant_values=2.0))
+    np.testing.assert_allclose(points[:, -1], np.pad(end, ((0, 0), (0, 1)), constant_values=2.0))
+    np.testing.assert_allclose(points[:, SEGMENTS // 2, 2], 2.0 + RISE * np.array([100.0, 40.0]))
+    np.testing.assert_allclose(points[0, :, 1], 0.0)
+    assert arcs(start[:0], end[:0], 0.0).shape == (0, SEGMENTS + 1, 3)
+
 
 CITY = {"arena": "blocks", "shadowing_db": 6.0, "num_robots": 14, "high_power_fraction": 0.3}
 WALL_DB = 3.0
@@ -164,13 +229,6 @@ def test_dashes_lead_from_robot_to_robot_as_long_as_one_another():
     lines = divided(np.array([[[0.0, 0.0], [18.0, 0.0]]]), DASHES)
     expected = [[(0, 0), (3, 0)], [(5, 0), (8, 0)], [(10, 0), (13, 0)], [(15, 0), (18, 0)]]
     np.testing.assert_allclose(lines, expected, atol=1e-12)
-
-
-def test_a_link_is_where_its_robots_are():
-    where = np.array([[0.0, 0.0], [100.0, 0.0], [0.0, 50.0]]) + 7.0 * np.arange(3)[:, None, None]
-    lines = ends(LINKS, where, LINKS["row"])
-    np.testing.assert_array_equal(lines, [[(0, 0), (100, 0)], [(14, 14), (14, 64)]])
-    np.testing.assert_array_equal(ends(LINKS[:1], where, 1), [[(7, 7), (107, 7)]])
 
 
 def test_the_more_is_missing_the_darker():
