@@ -15,7 +15,7 @@ from swarm_mj.api.flight_table import flight_rows, flight_title, window_columns
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import components_in
 from swarm_mj.replay.recorder import Log
-from swarm_mj.replay.rendering.style import DEFAULTS, default_seconds, fitted
+from swarm_mj.replay.view import DEFAULTS, default_seconds, fitted
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.system.fields import as_typed, did_you_mean
 from swarm_mj.system.packages import need

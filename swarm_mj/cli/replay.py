@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from swarm_mj.mission.components import SHOWN_AS, Components, is_own
-from swarm_mj.replay.rendering import style as styles
+from swarm_mj.replay import view
 from swarm_mj.replay.view import run as run_viewer
-from swarm_mj.replay.view import serve_command, view_command
 from swarm_mj.system.fields import setting
 from swarm_mj.system.needs import YES, check_fits
 from swarm_mj.system.packages import need
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 
 VIDEO = "video"  # a heading of the help
 _video = partial(setting, group=VIDEO)
-OWN_TIME, BARE = f"the mission's own time, {styles.LONGEST_S:g} at most", "the bare arena"
+OWN_TIME, BARE = f"the mission's own time, {view.LONGEST_S:g} at most", "the bare arena"
 SUFFIXES = ".mp4|.gif"
 PIXELS = (160, 3840)  # of a side
 
@@ -73,8 +72,8 @@ def run(options: ReplayOptions) -> int:
     for file in options.file:
         check_replay(file)
     if not options.web:
-        return run_viewer(view_command(*options.file))
-    command, address = serve_command(*options.file)
+        return run_viewer(view.view_command(*options.file))
+    command, address = view.serve_command(*options.file)
     plain_console().print(f"Open {address}\nCtrl-C ends it.")
     return run_viewer(command)
 
@@ -82,16 +81,14 @@ def run(options: ReplayOptions) -> int:
 def _make_video(options: ReplayOptions, video: Path) -> int:
     if options.web:
         raise ValueError("--web is not allowed with --video; leave one out")
-    if len(options.file) > styles.MAX_MISSIONS:
-        raise ValueError(
-            f"a video shows 1 or {styles.MAX_MISSIONS} replays, not {len(options.file)}"
-        )
+    if len(options.file) > view.MAX_MISSIONS:
+        raise ValueError(f"a video shows 1 or {view.MAX_MISSIONS} replays, not {len(options.file)}")
     check_outputs(
         Output("video", video, SUFFIXES), inputs=options.file, must_be_new=not options.force
     )
     suffix = video.suffix.lower()
     style = _style(options, suffix)
-    needs = styles.video_needs(style.width, style.height, style.num_frames, suffix)
+    needs = view.video_needs(style.width, style.height, style.num_frames, suffix)
     check_fits(needs, video, "choose a smaller --size or fewer --seconds", is_forced=options.yes)
     for module in ("av", "PIL", "rerun"):
         need(module, "a video")
@@ -100,7 +97,7 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
 
     with Console(stderr=True, highlight=False).status("Reading ..."):
         footages = [_in_scene(read_footage(file), options.scene) for file in options.file]
-    style = replace(style, seconds=options.seconds or styles.default_seconds(footages))
+    style = replace(style, seconds=options.seconds or view.default_seconds(footages))
     with WorkBar("Rendering", style.num_frames, "pictures") as bar:
         content = make_video(footages, suffix, style, bar.advance)
     write_bytes(video, content)
@@ -112,9 +109,9 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
     return 0
 
 
-def _style(options: ReplayOptions, suffix: str) -> styles.VideoStyle:
+def _style(options: ReplayOptions, suffix: str) -> view.VideoStyle:
     """Return the style asked for; raise ValueError for what the kind of file cannot have."""
-    style = styles.DEFAULTS[suffix]
+    style = view.DEFAULTS[suffix]
     if options.size:
         match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", options.size)
         width, height = (int(number) for number in match.groups()) if match else (0, 0)
@@ -126,7 +123,7 @@ def _style(options: ReplayOptions, suffix: str) -> styles.VideoStyle:
             raise ValueError(f"size of an MP4 must be even numbers, not {options.size}")
         style = replace(style, width=width, height=height)
     seconds, fps = options.seconds or style.seconds, options.fps or style.fps
-    return styles.fitted(replace(style, seconds=seconds, fps=fps), suffix)
+    return view.fitted(replace(style, seconds=seconds, fps=fps), suffix)
 
 
 def _in_scene(footage: "Footage", scene: str | None) -> "Footage":

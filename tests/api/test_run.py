@@ -12,9 +12,9 @@ import pytest
 
 import swarm_mj
 from swarm_mj.api.run import Metrics
+from swarm_mj.replay import view
 from swarm_mj.replay.read import windows
-from swarm_mj.replay.rendering import style
-from swarm_mj.replay.rendering.style import VideoStyle
+from swarm_mj.replay.view import VideoStyle
 
 SHORT = {"num_robots": 6, "num_windows": 20, "range_ratio": 0.5}
 
@@ -96,7 +96,7 @@ TINY = {"num_robots": 4, "num_windows": 3, "range_ratio": 2.0}
 def small(monkeypatch):
     """Small pictures, of which there are few."""
     for suffix in (".mp4", ".gif"):
-        monkeypatch.setitem(style.DEFAULTS, suffix, VideoStyle(width=320, height=200, fps=4))
+        monkeypatch.setitem(view.DEFAULTS, suffix, VideoStyle(width=320, height=200, fps=4))
 
 
 @pytest.mark.usefixtures("opengl", "small")

@@ -27,22 +27,6 @@ from swarm_mj.replay.links import (
 from swarm_mj.simulation.swarm import Swarm
 
 
-@pytest.mark.parametrize(
-    ("flight", "fate", "counted"),
-    [
-        *(("two_way", fate, fate) for fate in ("delivered", "lost", "overheard", "answered")),
-        ("flooded", "heard", "receptions"),
-    ],
-)
-def test_links_are_as_many_as_the_costs_count(flight, fate, counted, request):
-    recorded = request.getfixturevalue(flight)
-    links = recorded.log.packets[fate]
-    assert np.all(np.diff(links.row) >= 0)
-    found = np.bincount(links.row, minlength=len(recorded.log.window))
-    np.testing.assert_array_equal(found, recorded.counted(counted))
-    assert np.any(found)
-
-
 def test_a_broadcast_leads_to_each_robot_that_decoded_it(flooded):
     log = flooded.log
     expected = [

@@ -130,10 +130,3 @@ def test_an_ego_robot_must_exist_and_nothing_flown_is_no_log():
             Recorder(swarm, ego=ego)
     with pytest.raises(ValueError, match="at least 1 window"):
         Recorder(swarm).log()
-
-
-@pytest.mark.parametrize(("flight", "slots"), [("two_way", (0,)), ("flooded", (0, 1))])
-def test_transmitters_are_who_speaks_without_being_asked(flight, slots, request):
-    log = request.getfixturevalue(flight).log
-    for t, i in np.ndindex(len(log.window), 12):
-        assert log.is_transmitter[t, i] == any(log.recipient[t, slot, i] != i for slot in slots)

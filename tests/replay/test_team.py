@@ -7,7 +7,6 @@ import pytest
 from reading import colours, column, counts, entities, rows, static
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.links import SEGMENTS
 from swarm_mj.replay.write import write_replay
 
 CLOSE = {"rtol": 1e-5, "atol": 1e-2}  # of float32
@@ -57,17 +56,6 @@ def test_an_answer_stands_to_the_left_of_its_way(replay, two_way):
     left = way[:, 0] * aside[:, 1] - way[:, 1] * aside[:, 0]
     np.testing.assert_allclose(left, left[0], atol=1e-2)
     assert left[0] > 1.0
-
-
-def test_a_window_s_arcs_are_its_packets(replay, two_way):
-    entity, component = "/scene/packets/delivered", "LineStrips3D:strips"
-    per_window = counts(replay, entity, component)
-    np.testing.assert_array_equal(per_window, two_way.counted("delivered"))
-    points = rows(replay, entity, component, SEGMENTS + 1, 3)
-    ends = two_way.log.packets["delivered"].ends(two_way.log.position_m)
-    for at, where in zip((0, -1), ends, strict=True):
-        np.testing.assert_allclose(points[:, at, :2], where, **CLOSE)
-    assert np.all(points[:, SEGMENTS // 2, 2] > points[:, 0, 2])
 
 
 def test_broadcasts_lead_to_hearers(flood_replay, flooded):

@@ -27,7 +27,7 @@ from swarm_mj.replay.rendering.drawing import (
     draw_title,
 )
 from swarm_mj.replay.rendering.scene import SceneRenderer
-from swarm_mj.replay.rendering.style import DEFAULTS, GIF, MAX_MISSIONS, VideoStyle, fitted
+from swarm_mj.replay.view import DEFAULTS, GIF, MAX_MISSIONS, VideoStyle, fitted
 
 Picture = UInt8[np.ndarray, "H W 3"]
 

@@ -20,6 +20,11 @@ def drawn(footage):
     return [scene.geoms[k] for k in range(scene.ngeom)]
 
 
+def end(line):
+    """Where a line ends that MuJoCo keeps by its start, turn and length."""
+    return line.pos + line.size[2] * line.mat[:, 2]
+
+
 def test_the_observer_is_the_largest_and_white():
     discs = drawn(moment([(0.0, 0.0), (100.0, 0.0), (0.0, 100.0)], observer=1))
     assert np.argmax([disc.size[0] for disc in discs]) == 1
@@ -49,9 +54,16 @@ def test_links_that_surprise_are_drawn_until_there_is_no_room():
 
 def test_a_packet_is_an_arc_of_lines_and_a_heading_one_more():
     seen = moment([(0.0, 0.0), (100.0, 0.0)], [(0, 1)])
-    assert len(drawn(seen)) == 2 + SEGMENTS
-    seen.velocity_mps[0, 0] = (3.0, 0.0)
+    arc = drawn(seen)[2:]
+    assert len(arc) == SEGMENTS
+    places = [*(line.pos for line in arc), end(arc[-1])]
+    np.testing.assert_allclose([end(line) for line in arc], places[1:], atol=1e-4)
+    np.testing.assert_allclose([places[0][:2], places[-1][:2]], [(0, 0), (100, 0)], atol=1e-4)
+    seen.velocity_mps[0, 1] = (0.0, 3.0)
     assert len(drawn(seen)) == 3 + SEGMENTS
+    heading = drawn(seen)[2]
+    np.testing.assert_allclose(heading.pos[:2], (100, 0))
+    np.testing.assert_allclose(heading.mat[:, 2], (0, 1, 0), atol=1e-6)
 
 
 @pytest.mark.parametrize(("width", "height"), [(1280, 720), (400, 400), (300, 900)])

@@ -60,35 +60,6 @@ def test_robots_stand_where_the_camera_says():
     np.testing.assert_allclose((x, y), expected[3], atol=5.0)
 
 
-def test_a_link_joins_the_robots_it_leads_from_and_to():
-    """With it, two blobs are one; the third robot stays alone."""
-    where = [(0.0, 400.0), (-300.0, -100.0), (200.0, -250.0), (400.0, 200.0)]
-    mission = paper("random-walk", num_robots=4, density_per_km2=4.0)
-    with SceneRenderer(mission, *SIZE) as renderer:
-        apart = is_of(renderer.frame(moment(where)), GREEN)
-        joined = is_of(renderer.frame(moment(where, [(1, 2)])), GREEN)
-        camera = renderer.camera(moment(where))
-    assert ndimage.label(apart)[1] == 3
-    blobs, count = ndimage.label(joined, structure=np.ones((3, 3)))
-    assert count == 2
-    (x1, y1), (x2, y2), (x3, y3) = camera.pixels(np.pad(np.array(where[1:]), ((0, 0), (0, 1))))
-    at = {blobs[round(y) - 2, round(x)] for x, y in ((x1, y1), (x2, y2))}
-    assert len(at - {0}) == 1
-    assert blobs[round(y3) - 2, round(x3)] not in at | {0}
-
-
-def test_a_heading_points_along_the_velocity():
-    seen = moment([(0.0, -400.0), (0.0, 0.0)])
-    with SceneRenderer(paper(num_robots=2, density_per_km2=2.0), *SIZE) as renderer:
-        still = renderer.frame(seen).astype(int)
-        seen.velocity_mps[0, 1] = (2.0, 0.0)
-        moving = renderer.frame(seen).astype(int)
-        x, y = renderer.camera(seen).pixels(np.zeros((1, 3)))[0]
-    rows, columns = np.nonzero(np.abs(moving - still).max(axis=2) > 60)
-    assert columns.min() >= x
-    assert columns.max() - x > 3 * np.abs(rows - y).max()
-
-
 def test_the_floor_of_an_open_area_follows_its_team():
     """Where the team is, the squares are the same after whole pairs of them."""
     mission = paper(num_robots=2, density_per_km2=2.0)

@@ -12,8 +12,8 @@ from PIL import Image, ImageSequence
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import footage_of
 from swarm_mj.replay.links import NO_MISMATCH
-from swarm_mj.replay.rendering.style import VideoStyle
 from swarm_mj.replay.rendering.video import Movie, encode_gif, encode_mp4, make_video
+from swarm_mj.replay.view import VideoStyle
 
 with_opengl = pytest.mark.usefixtures("opengl")
 MEAN_AGE = np.array(palette.MEAN_AGE, dtype=int)
