@@ -1,7 +1,6 @@
-"""What joins robots in recorded windows: packets, and links that surprise policies.
+"""Links between robots in recorded windows: packets, and those on which channel and belief differ.
 
-What became of each packet, and where it is drawn; on which links the channel and what policies
-believe of it differ, and who is cut off. Policies believe in mean powers: a lone packet decodes if
+Packets have a fate and are drawn by it. Policies believe in mean powers: a lone packet decodes if
 its mean power is above the threshold. The fading and losses of single packets are no mismatch.
 """
 
