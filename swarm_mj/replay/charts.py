@@ -160,10 +160,12 @@ def plots(log: Log) -> dict[str, list[PlotCurve]]:
     counts, named = packet_counts(log), "delivered (green), lost (orange), answered (blue)"
     if log.is_broadcast:
         named = "sent (grey), heard by anyone (blue)"
-    found[f"Packets in {RATE_WINDOWS} windows: {named}"] = [
-        PlotCurve(f"radio/{name}", name, colour, rate(count), is_hidden=name == "overheard")
-        for name, (colour, count) in counts.items()
-    ]
+    found[f"Packets in {RATE_WINDOWS} windows: {named}"] = shown = []
+    for name, (colour, count) in counts.items():
+        # Over several windows, for the counts of single ones would hide the trend.
+        recent = np.convolve(count, np.ones(RATE_WINDOWS))[: len(count)]
+        is_hidden = name == "overheard"
+        shown.append(PlotCurve(f"radio/{name}", name, colour, recent, is_hidden=is_hidden))
     if log.mismatch is not None:
         named = "believed, too weak (red); works, unbelieved (green); cut off (white)"
         found[f"Share [%]: {named}"] = _mismatch_curves(log, log.mismatch)
@@ -225,9 +227,3 @@ def draw_plots(out: RerunLog, shown: dict[str, list[PlotCurve]]) -> None:
             out.fixed(path, rr.Measurements.from_fields(widths=[2.0], **style))
             columns = rr.Measurements.columns(values=curve.values, variances=curve.std**2)
         out.timed(path, columns, curve.window)
-
-
-def rate(per_window: Int[np.ndarray, "T"]) -> np.ndarray:
-    """Return the packets in the last `RATE_WINDOWS` windows, at each window."""
-    # Over several windows, for the counts of single ones would hide the trend.
-    return np.convolve(per_window, np.ones(RATE_WINDOWS))[: len(per_window)]

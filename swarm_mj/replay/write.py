@@ -1,4 +1,4 @@
-"""Writes a log as a rerun recording, its layout inside."""
+"""Writes a log as a rerun recording: what moves on the map and in 3-D, and all else around it."""
 
 import json
 from collections.abc import Mapping
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 import rerun_bindings as bindings
+from jaxtyping import UInt8
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import components_in
@@ -16,15 +17,34 @@ from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 from swarm_mj.replay import charts, palette
 from swarm_mj.replay.footage import Footage, footage_of, frame
 from swarm_mj.replay.layout import draw_legend, layout
-from swarm_mj.replay.links import is_other
+from swarm_mj.replay.links import (
+    PIECES,
+    LinkMismatch,
+    PacketLinks,
+    arcs,
+    by_kind,
+    divided,
+    ends,
+    is_other,
+    lifted,
+)
 from swarm_mj.replay.read import FACTS, with_digest
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog
 from swarm_mj.replay.stage import draw_stage
-from swarm_mj.replay.team import draw_team
 from swarm_mj.system.writing import write_bytes
 
 APPLICATION = "swarm_mj"
+
+TRAIL_WINDOWS = 150
+TRAIL_STRIDE = 15
+TRAIL_EVERY = 5  # windows; in between, the last one is shown
+HEADING_SHARE = 0.06  # a heading's length, of half the map's width
+RING_SHARE = 0.014  # the radius of a ring around a believed position, likewise
+RADIUS_SHARE = 1.4 * RING_SHARE  # of a body in 3-D, likewise
+OBSERVER = 1.3  # times larger
+BODY_HEIGHT = 0.8  # of a body, by its radius
+HALO, HALO_M = 1.7, 2.0  # of a robot that is cut off, by the robot's radius; its height [m]
 
 
 def write_replay(log: Log, mission: Mission, config: Mapping[str, Any], path: Path) -> None:
@@ -81,3 +101,115 @@ def draw(out: RerunLog, footage: Footage) -> None:
     charts.draw_tree(out, known)
     charts.draw_age_matrix(out, full_scale)
     charts.draw_states(out)
+
+
+def draw_team(out: RerunLog, footage: Footage, colours: UInt8[np.ndarray, "T N 3"]) -> None:
+    """Draw everything that moves, the same on the map and in 3-D."""
+    log, radius_m = out.log, RADIUS_SHARE * out.frame.reach_m
+    height_m = BODY_HEIGHT * radius_m
+    _draw_robots(out, colours)
+    _draw_bodies(out, colours, radius_m, height_m)
+    if log.has_motion:
+        _draw_motion(out, height_m)
+    row, child = np.nonzero(log.has_parent)
+    parent = log.parent[row, child]
+    out.lines("arena/tree", log.position_m[row, parent], log.position_m[row, child], row)
+    _draw_radio(out, log.packets, footage.facts.mission.range_m)
+    for fate, drawn in footage.segments.items():
+        strips = arcs(drawn.start_m, drawn.end_m, height_m)
+        out.layer(f"scene/packets/{fate}", drawn.row, strips=strips)
+    if log.mismatch is not None:
+        _draw_mismatch(out, log.mismatch, radius_m, height_m)
+
+
+def _draw_robots(out: RerunLog, colours: UInt8[np.ndarray, "T N 3"]) -> None:
+    log = out.log
+    names = [f"r{i}" for i in range(log.parent.shape[1])]
+    out.fixed("arena/robots", rr.Points2D.from_fields(labels=names, show_labels=False))
+    where = log.position_m.reshape(-1, 2)
+    out.layer("arena/robots", positions=where, colors=colours.reshape(-1, 3))
+    row, where = np.arange(len(log.window)), log.position_m[:, log.ego]
+    radius_m = 2.0 * RING_SHARE * out.frame.reach_m
+    out.rings("arena/ego", where, radius_m, row)
+    # The name is a point's label, for rerun misplaces an ellipse's.
+    name = rr.Points2D.from_fields(labels=[f"r{log.ego}"], show_labels=True)
+    out.fixed("arena/ego/name", name)
+    out.layer("arena/ego/name", row, positions=where - (0.0, 3.0 * radius_m))
+
+
+def _draw_bodies(
+    out: RerunLog, colours: UInt8[np.ndarray, "T N 3"], radius_m: float, height_m: float
+) -> None:
+    # Those who click on one, and videos, read what is known of it.
+    log, path = out.log, "scene/robots"
+    radii = np.full(log.is_on.shape[1], radius_m)
+    radii[log.ego] *= OBSERVER
+    lengths = np.full(len(radii), height_m)
+    out.fixed(path, rr.Cylinders3D.from_fields(radii=radii, lengths=lengths, fill_mode="solid"))
+    where = lifted(log.position_m.reshape(-1, 2), height_m / 2.0)
+    out.things(path, rr.Cylinders3D.columns(centers=where, colors=colours.reshape(-1, 3)))
+    age = log.known_age.astype(np.float32).ravel()
+    out.things(path, rr.AnyValues.columns(age=age, is_on=log.is_on.ravel()))
+    if log.mismatch is not None:
+        out.things(path, rr.AnyValues.columns(is_cut_off=log.is_cut_off.ravel()))
+
+
+def _draw_motion(out: RerunLog, height_m: float) -> None:
+    log = out.log
+    speed = np.linalg.norm(log.velocity_mps, axis=2, keepdims=True)
+    # All of one length, for agreement is in directions.
+    way_m = HEADING_SHARE * out.frame.reach_m * log.velocity_mps / np.maximum(speed, 1e-9)
+    start, end = (at.reshape(-1, 2) for at in (log.position_m, log.position_m + way_m))
+    out.lines("arena/heading", start, end)
+    out.lines("scene/heading", lifted(start, height_m), lifted(end, height_m))
+    # Trails are drawn anew every few windows only: they would be half the file.
+    rows = np.arange(0, len(log.window), TRAIL_EVERY)
+    past = range(0, TRAIL_WINDOWS + 1, TRAIL_STRIDE)
+    trail = np.stack([log.position_m[np.maximum(0, rows - ago)] for ago in past], axis=2)
+    out.fixed_layer("arena/trail")
+    columns = rr.LineStrips2D.columns(strips=trail.reshape(-1, len(past), 2))
+    out.timed("arena/trail", columns.partition([trail.shape[1]] * len(rows)), log.window[rows])
+    row, other = np.nonzero(log.is_other_known)
+    believed = log.believed_m[row, other]
+    out.lines("arena/belief/error", believed, log.position_m[row, other], row)
+    out.rings("arena/belief/ring", believed, RING_SHARE * out.frame.reach_m, row)
+
+
+def _draw_radio(out: RerunLog, packets: dict[str, PacketLinks], range_m: float) -> None:
+    log = out.log
+    row, sender = np.nonzero(log.is_transmitter)
+    where = log.position_m[row, sender]
+    out.rings("arena/radio/range", where, range_m, row)
+    if log.is_broadcast:
+        out.layer("arena/radio/transmitter", row, positions=where)
+    else:
+        lost = packets["lost"]
+        out.lines("arena/radio/lost/rest", *lost.ends(log.position_m), lost.row)
+    aside_m = 0.8 * RING_SHARE * out.frame.reach_m  # an answer stands beside its request
+    aside = {"delivered": 0.0, "lost": 0.0, "answered": aside_m, "unanswered": aside_m}
+    for fate, links in packets.items():
+        path, (start, end) = f"arena/radio/{fate}", links.ends(log.position_m)
+        if fate not in aside:
+            out.lines(path, start, end, links.row)
+            continue
+        way = end - start
+        length = np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
+        origins = start + aside[fate] * (way[:, ::-1] * (-1.0, 1.0) / length)  # to the left
+        out.layer(path, links.row, origins=origins, vectors=palette.PACKETS[fate][1] * way)
+
+
+def _draw_mismatch(out: RerunLog, mismatch: LinkMismatch, radius_m: float, height_m: float) -> None:
+    log = out.log
+    for kind, links in by_kind(mismatch.links).items():
+        whole_m = ends(links, log.position_m, mismatch.window[links["row"]] - log.window[0])
+        # In 3-D they are whole, whatever their kind: dashes would make the file larger.
+        out.mismatch_lines(f"scene/world/{kind}", links, lifted(whole_m, height_m), mismatch)
+        each = np.repeat(links, len(PIECES[kind]))
+        out.mismatch_lines(f"arena/world/{kind}", each, divided(whole_m, PIECES[kind]), mismatch)
+    row, robot = np.nonzero(log.is_cut_off)
+    where_m, path = log.position_m[row, robot], "scene/world/cut_off"
+    out.layer("arena/world/cut_off", row, positions=where_m)
+    out.fixed(path, rr.Cylinders3D.from_fields(colors=[palette.CUT_OFF], fill_mode="solid"))
+    radii, lengths = np.full(len(row), HALO * radius_m), np.full(len(row), HALO_M)
+    halos = rr.Cylinders3D.columns(centers=lifted(where_m, 0.0), radii=radii, lengths=lengths)
+    out.things(path, halos, row)
