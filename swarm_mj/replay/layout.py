@@ -33,7 +33,7 @@ Range: TypeAlias = tuple[float, float]
 
 
 class Layout(rrb.Blueprint):
-    """A blueprint that can be closed; rerun would keep the stream that it makes of each."""
+    """A blueprint that can be closed; rerun would keep the stream and two threads of each."""
 
     def _log_to_stream(self, stream: rr.RecordingStream) -> None:
         self._stream = stream
