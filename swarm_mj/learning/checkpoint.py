@@ -167,8 +167,11 @@ def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
 
 def _check(state: Mapping[str, Any], counters: _Counters, model: PPO, networks: Networks) -> None:
     """Raise ValueError unless a state is as one of this model's would be, in range and finite."""
-    if not all(math.isfinite(row[name]) for row in counters.progress.curve for name in IN_A_ROW):
+    progress, env = counters.progress, env_of(model)
+    if not all(math.isfinite(row[name]) for row in progress.curve for name in IN_A_ROW):
         raise ValueError("its curve has numbers that are not finite")
+    if counters.num_timesteps * env.num_teams != progress.decisions * env.num_envs:
+        raise ValueError("its steps are not those of its decisions")
     if (counters.reward_moments is not None) != isinstance(model.get_env(), VecNormalize):
         raise ValueError("it normalises rewards, or does not, unlike the run")
     # As a fresh model's, but for what optimiser steps and windows of missions have added.
@@ -179,9 +182,7 @@ def _check(state: Mapping[str, Any], counters: _Counters, model: PPO, networks: 
             n: {"step": torch.zeros(()), "exp_avg": weight, "exp_avg_sq": weight}
             for n, weight in enumerate(model.policy.parameters())
         }
-    for n, (batch, last) in enumerate(
-        zip(env_of(model).batches, counters.last_windows, strict=True)
-    ):
+    for n, (batch, last) in enumerate(zip(env.batches, counters.last_windows, strict=True)):
         num_flown, num_windows = len(state["recipients"][n]), batch.mission.num_windows
         if not num_flown < last <= num_windows:
             raise ValueError(f"its missions end at window {last}, not within {num_windows}")

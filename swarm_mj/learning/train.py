@@ -49,7 +49,7 @@ def train(
             session.learn()
             session.choose()
         finally:
-            session._ppo.logger.close()
+            session.ppo.logger.close()
     return session.progress
 
 
@@ -63,39 +63,35 @@ class TrainingCallback(BaseCallback):
     def __init__(self, run: TrainingRun, folder: Path, listener: Listener) -> None:
         """Take a run to its last checkpoint, or else to its beginning; then it can be resumed."""
         super().__init__()
-        self._run, self._training, self._folder, self._listener = (
-            run,
-            run.training,
-            folder,
-            listener,
-        )
-        self._ppo = make_model(run.training)
-        self._env, self._aoi, self._goes_on = env_of(self._ppo), math.nan, True
+        self._run, self._training = run, run.training
+        self._folder, self._listener = folder, listener
+        self.ppo = make_model(run.training)
+        self._env, self._aoi, self._goes_on = env_of(self.ppo), math.nan, True
         self.progress, self._networks = Progress(), checkpoint.Networks()
         kept, own, init = folder / CHECKPOINT, folder / INIT, None
         # Nothing is written before all that is read has been checked.
         if kept.exists():
-            begun = checkpoint.load(kept, run.training, self._ppo)
-            self.progress, self._networks = begun
+            self.progress, self._networks = checkpoint.load(kept, run.training, self.ppo)
         elif run.init is not None:
             path = own if own.exists() else run.init
             init = read_policy(path)
             if init[1].network != run.training.network:
-                raise ValueError(f"policy {path} has another network than the run begun with it")
+                whose = "the run that begins with it"
+                raise ValueError(f"policy {path} has another network than {whose}")
         run_folder.write_run(folder, run)
         if self.progress.curve:
             self.progress.write_curve(folder / CURVE)  # the file may be ahead of the checkpoint
         if init is not None:
-            assert isinstance(self._ppo.policy, GnnActorCritic)
-            self._ppo.policy.take_acting_network(init[0])
+            assert isinstance(self.ppo.policy, GnnActorCritic)
+            self.ppo.policy.take_acting_network(init[0])
             if not own.exists():
                 save_policy(own, *init)
-        self._ppo.set_logger(configure(str(folder / run_folder.TENSORBOARD), ["tensorboard"]))
+        self.ppo.set_logger(configure(str(folder / run_folder.TENSORBOARD), ["tensorboard"]))
         self._counted_s, self._saved_s = time.monotonic(), -math.inf  # counted: in the progress
 
     def learn(self) -> None:
         """Alternate rollouts and PPO's passes over them until a limit, or the listener, ends it."""
-        model, progress, patience = self._ppo, self.progress, self._run.limits.patience
+        model, progress, patience = self.ppo, self.progress, self._run.limits.patience
         model._setup_learn(0, self, reset_num_timesteps=model.num_timesteps == 0)
         # PPO's own loop knows no minutes and no stall, and would dump its logs by itself.
         while True:
@@ -131,7 +127,7 @@ class TrainingCallback(BaseCallback):
     def _on_rollout_end(self) -> None:
         # PPO's own mean is over the rows it learns from; over all rows, a decision's negative
         # log-probability has the entropy for its mean.
-        log_p = self._ppo.rollout_buffer.log_probs
+        log_p = self.ppo.rollout_buffer.log_probs
         self.logger.record("train/entropy", -float(log_p.mean()))
 
     def _report(self, what: str = "Training", flown: float | None = None) -> None:
@@ -153,7 +149,7 @@ class TrainingCallback(BaseCallback):
         """Evaluate, record a replay and keep a checkpoint, each if it is due."""
         progress, decisions = self.progress, self.progress.decisions
         # The last checkpoint is from before such a rollout.
-        if not all(torch.isfinite(weight).all() for weight in self._ppo.policy.parameters()):
+        if not all(torch.isfinite(weight).all() for weight in self.ppo.policy.parameters()):
             raise ValueError(
                 f"the network's weights are no longer finite after {decisions} decisions; begin a "
                 "new run with a lower learning rate"
@@ -169,7 +165,7 @@ class TrainingCallback(BaseCallback):
             self._evaluate()
         every = self._run.limits.replay_every
         if every and decisions >= progress.next_replay and self._goes_on:
-            network = checkpoint.acting_network(self._ppo)
+            network = checkpoint.acting_network(self.ppo)
             held_out.record_replay(self._training, network, decisions, self._folder / REPLAYS)
             progress.next_replay = decisions - decisions % every + every
         is_old = time.monotonic() - self._saved_s >= self._run.limits.checkpoint_every_s
@@ -178,21 +174,21 @@ class TrainingCallback(BaseCallback):
 
     def _save(self) -> None:
         self._count_time()
-        kept = self._training, self._ppo, self.progress, self._networks
+        kept = self._training, self.ppo, self.progress, self._networks
         checkpoint.save(self._folder / CHECKPOINT, *kept)
         self._saved_s = time.monotonic()
 
     def _evaluate(self) -> None:
         """Fly the held-out missions, log, and keep the policy if it is the best."""
         progress, training, every = self.progress, self._training, self._training.evaluate_every
-        decisions, network = progress.decisions, checkpoint.acting_network(self._ppo)
+        decisions, network = progress.decisions, checkpoint.acting_network(self.ppo)
         try:
             flies_others = partial(self._report, "Flying others")
             others = held_out.reference_columns(training, progress.curve, flies_others)
             self._count_time()
             means, begun = progress.since_evaluation.means(), progress.minutes
             on_window = partial(self._report, "Evaluating")
-            costs = held_out.evaluate(training, network.to(self._ppo.device), on_window)
+            costs = held_out.evaluate(training, network.to(self.ppo.device), on_window)
         except Stopped:
             return
         self._count_time()

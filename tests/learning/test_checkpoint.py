@@ -72,7 +72,7 @@ def test_a_sound_one_is_taken_by_its_own_run_alone(kept, tmp_path):
 def test_progress_comes_back_to_the_last_bit(tmp_path):
     row = dict.fromkeys(sorted(IN_A_ROW), 1 / 3)
     progress = Progress(
-        decisions=7,
+        decisions=8,  # of 4 teams, each of 5 robots
         minutes=0.1 + 0.2,
         next_evaluation=12,
         curve=[row, row | {"train/explained_variance": math.nan}],
@@ -80,6 +80,7 @@ def test_progress_comes_back_to_the_last_bit(tmp_path):
         optimiser={"train/entropy": 2 / 3},
     )
     model = make_model(TRAINING)
+    model.num_timesteps = 2 * 4 * 5
     model._last_episode_starts = np.ones(model.n_envs, dtype=bool)
     save(tmp_path / "c.pt", TRAINING, model, progress, {0: acting_network(model)})
     again, networks = load(tmp_path / "c.pt", TRAINING, make_model(TRAINING))
@@ -149,6 +150,7 @@ def states(tmp_path_factory):
     [
         ("robots", lambda s: s["numpy_rng"][1].pop(), "length >= 624"),
         ("robots", lambda s: s["progress"].update(wings=2), "unknown field `wings`"),
+        ("robots", lambda s: s["progress"].update(decisions=60), "its steps are not those of"),
         ("robots", lambda s: s["progress"]["curve"][0].update(aoi=math.inf), "not finite"),
         ("robots", lambda s: s["progress"]["curve"][0].update(aoi="1"), "Expected `float`, got"),
         ("robots", lambda s: s["progress"]["choice"].update(num_missions=-1), "`int` >= 0"),

@@ -30,10 +30,8 @@ from swarm_mj.mission import paper
 from swarm_mj.policies.learned import sample
 
 RESUMED = {
-    "robot": {},
     "robot, discounted": {"discount": 0.9},
     "robot, walking, two sizes": {"task": "random-walk", "sizes": (4, 6)},
-    "team": {"credit": "team"},
     "team, two sizes": {"credit": "team", "sizes": (4, 6)},
     "team, for the flock": {"credit": "team", "task": "flocking", "reward": "velocity-variance"},
 }
@@ -83,7 +81,7 @@ def timed(folder):
 
 ASKED = (
     *("--robots", "4", "--windows", "12", "--range-ratio", "1", "--missions", "4"),
-    *("--held-out", "2", "--evaluate-every", "128", "--budget", "256", "--seed", "2"),
+    *("--held-out", "2", "--evaluate-every", "128", "--budget", "128", "--seed", "2"),
     *("--learning-rate", "0.01"),  # so that each evaluation has a better policy to keep
 )
 
