@@ -20,7 +20,7 @@ import torch
 
 from swarm_mj.cli import script
 from swarm_mj.evaluation.batch import fly_batch
-from swarm_mj.evaluation.jobs import run_jobs
+from swarm_mj.evaluation.flying import run_jobs
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import reference
 from swarm_mj.policies.gnn.network import AggregationGnn

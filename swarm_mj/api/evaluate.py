@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 from swarm_mj.api.fly import mission_of
 from swarm_mj.api.run import Metrics
 from swarm_mj.evaluation.batch import BatchCosts
+from swarm_mj.evaluation.flying import fly_study
 from swarm_mj.evaluation.results import COLUMNS, Result, write_csv
-from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study, fly_study
+from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study
 from swarm_mj.evaluation.summary import Evaluated, summarise, write_evaluated
 from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission

@@ -18,7 +18,7 @@ from mujoco._specs import MjSpec
 from mujoco._structs import MjData
 
 from swarm_mj.evaluation.batch import fly_batch
-from swarm_mj.evaluation.jobs import run_jobs
+from swarm_mj.evaluation.flying import run_jobs
 from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission, paper

@@ -12,10 +12,10 @@ from rich.console import Console
 from swarm_mj.api.evaluate import study_needs
 from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_missions
 from swarm_mj.cli.options import output_option
-from swarm_mj.evaluation import progress
+from swarm_mj.evaluation import flying
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.results import write_csv
-from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study, fly_study, num_flown
+from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study
 from swarm_mj.evaluation.summary import summarise, write_evaluated
 from swarm_mj.evaluation.table import print_results
 from swarm_mj.mission import Mission
@@ -93,18 +93,18 @@ def _evaluate(options: EvaluateOptions, study: Study, kept: Path | None) -> int:
     console, header = Console(stderr=True, highlight=False), study.header()
     costs: dict[int, BatchCosts] = {}
     if kept and options.resume and kept.exists():
-        costs = progress.resume(kept, header)
+        costs = flying.resume_progress(kept, header)
     elif kept:
-        progress.start(kept, header)
+        flying.start_progress(kept, header)
     try:
-        keep = partial(progress.append, kept, header) if kept else None
+        keep = partial(flying.append_progress, kept, header) if kept else None
         with memory_errors():
-            fly_study(study, costs, options.jobs, keep, console)
+            flying.fly_study(study, costs, options.jobs, keep, console)
     except (KeyboardInterrupt, MemoryError) as error:
         is_memory = isinstance(error, MemoryError)
         ending = "Out of memory" if is_memory else "Interrupted"
         hint = "the same command with --resume continues" if kept else "nothing was kept"
-        flown, total = num_flown(study, costs), study.episodes * len(study.pairs)
+        flown, total = flying.num_flown(study, costs), study.episodes * len(study.pairs)
         console.print(f"{ending} after {flown} of {total} missions; {hint}.")
         return FAILED if is_memory else INTERRUPTED
     with deferred_interrupt():
@@ -127,7 +127,7 @@ def _progress_file(options: EvaluateOptions, outputs: Iterable[Output]) -> Path 
         if options.resume:
             raise ValueError("--resume needs the --json or --csv of the run that was interrupted")
         return None
-    kept = progress.progress_path(output)
+    kept = flying.progress_path(output)
     check_outputs(Output("progress", kept), *outputs)  # also against a link to the progress
     if kept.exists() and not (options.resume or options.force):
         raise ValueError(

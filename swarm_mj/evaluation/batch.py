@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.evaluation.lower_bound import share_connected
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components, one_line_each
+from swarm_mj.mission.geometry import gather_connected
 from swarm_mj.policies.policy import Parameters, Policy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import NEVER
@@ -20,7 +20,6 @@ from swarm_mj.simulation.rollout import WindowRecord, rollout
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.compiled import compiled
 
-MEANS = ("aoi", "velocity_variance", "hops")  # over windows
 TOTALS = ("sent", "transmitted", "delivered", "heard", "receptions")  # of `costs.Packets`
 
 
@@ -48,7 +47,7 @@ class BatchCosts:
     """The costs of a batch: one number per mission, in the order of the seeds."""
 
     aoi: list[float]  # Eq. 10, mean over windows [windows]
-    aoi_steady: list[float]  # as above, over the second half of the mission
+    aoi_steady: list[float]  # as above, over the second half
     aoi_floor: list[float | None]  # the connectivity floor, as above; None: own channel
     velocity_variance: list[float]  # Eq. 17, mean over windows [m²/s²]
     hops: list[float]  # depth of the parent trees, mean over windows
@@ -92,42 +91,45 @@ def costs_of(swarm: Swarm, flown: Iterable[WindowRecord]) -> BatchCosts:
     # The floor is by the mission's own range, which other channels need not have.
     has_floor = isinstance(swarm.channel, FreeSpaceRadio) and swarm.channel == radio_of(mission)
     shared = np.full_like(swarm.buffers.timestamp, NEVER)
-    names = (*MEANS, "aoi_steady", "aoi_floor", "task_cost", *TOTALS)
-    sums = {name: np.zeros(shape[0]) for name in names}
-    complete, last_task_cost = np.full(shape[0], np.inf), np.full(shape[0], np.nan)
+    complete, missing = np.full(shape[0], np.inf), np.full(shape[0], np.nan)
+    sums, task_cost = dict[str, np.ndarray](), missing
     ages = np.zeros(round(num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
     for window in flown:
         costs, states, now = window.costs, swarm.states, swarm.now
         # Always an array, so that the loops below are compiled for one kind of arguments.
         is_on = np.ones(shape, np.bool_) if states.is_active is None else states.is_active
-        sums["aoi"] += costs.age_windows
-        sums["aoi_steady"] += costs.age_windows * (now[0] > num_windows - num_steady)
-        sums["aoi_floor"] += (
-            share_connected(shared, states.position_m, mission.range_m, now, is_on)
-            if has_floor
-            else np.nan
-        )
-        sums["velocity_variance"] += costs.velocity_variance_m2ps2
-        sums["hops"] += window.hops
-        last_task_cost = costs.task_cost.value if costs.task_cost else last_task_cost
-        sums["task_cost"] += last_task_cost
-        for name in TOTALS:
-            sums[name] += getattr(costs.packets, name)
+        floor = missing
+        if has_floor:
+            floor = share_connected(shared, states.position_m, mission.range_m, now, is_on)
+        task_cost = costs.task_cost.value if costs.task_cost else missing
+        measured = {
+            "aoi": costs.age_windows,
+            "aoi_steady": costs.age_windows * (now[0] > num_windows - num_steady),
+            "aoi_floor": floor,
+            "velocity_variance": costs.velocity_variance_m2ps2,
+            "hops": window.hops,
+            "task_cost": task_cost,
+        }
+        measured |= {f"packets_{name}": getattr(costs.packets, name) for name in TOTALS}
+        for name, values in measured.items():
+            sums[name] = sums.get(name, 0.0) + values
         complete = np.minimum(complete, np.where(costs.is_complete, now, np.inf))
         count_ages(swarm.buffers.timestamp, now, ages, is_on)
-    means = (*MEANS, "aoi_floor", "task_cost")
-    own: dict[str, Any] = {f"packets_{name}": _known(sums[name], int) for name in TOTALS}
+    known: dict[str, Any] = {}
+    for name, total in sums.items():
+        windows = num_steady if name == "aoi_steady" else num_windows
+        is_count = name.startswith("packets_")
+        known[name] = _known(total, int) if is_count else _known(total / windows, float)
     return BatchCosts(
-        **own | {name: _known(sums[name] / num_windows, float) for name in means},
-        aoi_steady=(sums["aoi_steady"] / num_steady).tolist(),
-        task_cost_last=_known(last_task_cost, float),
+        **known,
+        task_cost_last=_known(task_cost, float),
         complete_window=_known(complete, int),
         ages=ages.tolist(),
     )
 
 
 def _known(costs: Float[np.ndarray, "B"], kind: type) -> list[Any]:
-    """Return costs as this kind of number; None where one never happened, or does not apply."""
+    # None is what never happened, or does not apply.
     return [kind(cost) if np.isfinite(cost) else None for cost in costs]
 
 
@@ -148,3 +150,43 @@ def count_ages(
                 if is_active[b, j]:
                     counts[int((now[b] - timestamp[b, i, j]) / SLOT_WINDOWS)] += 1
             counts[int((now[b] - timestamp[b, i, i]) / SLOT_WINDOWS)] -= 1
+
+
+@compiled()
+def share_connected(
+    timestamp: Float[np.ndarray, "B N N"],
+    position_m: Float[np.ndarray, "B N 2"],
+    range_m: float,
+    now: Float[np.ndarray, "B"],
+    is_on: Bool[np.ndarray, "B N"],
+) -> Float[np.ndarray, "B"]:
+    """Let connected robots share everything at once; return the mean age of all pairs as in II-C.
+
+    Two robots are neighbours while a lone packet decodes between them, within `range_m`. At the end
+    of a window, `now`, every robot receives the newest entries of its connected part of the disk
+    graph, in T [windows] in place. The age that is left is due to teams that fall apart: the
+    floor that no radio goes below, if robots rest while they talk. Only robots that are on share
+    and count.
+    """
+    num_missions, num_robots = position_m.shape[:2]
+    age, newest = np.empty(num_missions), np.empty(num_robots)
+    is_met = np.empty(num_robots, dtype=np.bool_)
+    part = np.empty(num_robots, dtype=np.int64)
+    for b in range(num_missions):
+        is_met[:] = ~is_on[b]  # robots that are off share nothing, so no part begins at them
+        total = 0.0
+        for first in range(num_robots):
+            if is_met[first]:
+                continue
+            members = part[: gather_connected(position_m[b], range_m, first, is_met, part)]
+            newest[:] = timestamp[b, first]
+            for i in members:
+                np.maximum(newest, timestamp[b, i], newest)  # in place: nothing is allocated
+            for i in members:
+                newest[i] = now[b]
+            for i in members:
+                timestamp[b, i] = newest
+            total += members.size * newest[is_on[b]].sum()
+        num_on = is_on[b].sum()
+        age[b] = now[b] - total / (num_on * num_on)
+    return age

@@ -1,18 +1,13 @@
-"""A study: which policies meet which missions, and their flights."""
+"""A study: which policies meet which missions, as batches of them."""
 
 import json
-from collections.abc import Callable, Mapping
-from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import product
 from typing import Any
 
-from rich.console import Console
-
 from swarm_mj.control.motion import Costed, controller_of
-from swarm_mj.evaluation.batch import Batch, BatchCosts, fly_batch
-from swarm_mj.evaluation.jobs import run_jobs
+from swarm_mj.evaluation.batch import Batch
 from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components, digest
@@ -20,9 +15,7 @@ from swarm_mj.policies.policy import Parameters, Policy
 from swarm_mj.policies.registry import check_used, flown_name, is_learned, is_own_policy, normalised
 from swarm_mj.simulation.swarm import MAX_SEED
 from swarm_mj.system.fields import check, setting
-from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.packages import code_digest, commit, version
-from swarm_mj.system.terminal import WorkBar
 
 DEFAULT_POLICIES = ("planner", *BASELINES)
 MAX_EPISODES = 100_000
@@ -160,39 +153,3 @@ class Study:
             "policies and regimes": [self.config(policy, regime) for regime, policy in self.pairs],
         }
         return json.loads(json.dumps(header))
-
-
-def num_flown(study: Study, costs: Mapping[int, BatchCosts]) -> int:
-    """Return how many of a study's missions have been flown."""
-    return sum(len(study.batches[index].seeds) for index in costs)
-
-
-def fly_study(
-    study: Study,
-    costs: dict[int, BatchCosts],
-    num_jobs: int,
-    keep: Callable[[int, BatchCosts], None] | None,
-    console: Console,
-    *,
-    after_s: float = 0.0,
-) -> None:
-    """Fly the batches that `costs` lacks, into `costs` and where they are kept.
-
-    A bar on the console shows how far it is, once that takes longer than `after_s`.
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C was pressed; `costs` has all batches that were flown.
-    """
-    left = [index for index in range(len(study.batches)) if index not in costs]
-    flown = run_jobs(fly_batch, [study.batches[index] for index in left], num_jobs)
-    total, done = study.episodes * len(study.pairs), num_flown(study, costs)
-    bar = WorkBar("Flying", total, "missions", completed=done, console=console, after_s=after_s)
-    with bar, closing(flown):
-        for which, batch_costs in flown:
-            with deferred_interrupt() as is_interrupted:
-                costs[left[which]] = batch_costs
-                if keep:
-                    keep(left[which], batch_costs)
-            if is_interrupted():
-                raise KeyboardInterrupt
-            bar.move_to(num_flown(study, costs))

@@ -1,4 +1,4 @@
-"""Results of a study from the costs of its batches: one per policy and regime."""
+"""Results of a study from its batches' costs: one per policy and regime, with their errors."""
 
 import json
 import math
@@ -8,17 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.published import published
 from swarm_mj.evaluation.results import COLUMNS, Result
-from swarm_mj.evaluation.statistics import (
-    bootstrap_interval,
-    quantile_of_counts,
-    spread,
-    standard_error,
-)
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
@@ -27,6 +21,11 @@ from swarm_mj.protocol.window import SLOT_WINDOWS
 from swarm_mj.system.writing import write_json
 
 COSTS = ("aoi", "velocity_variance")  # of each mission
+CONFIDENCE = 0.95
+RESAMPLES = 9999  # of a bootstrap; SciPy's own choice
+BATCH = 1000  # resamples at once: bounds the memory that many samples take
+RESAMPLING_SEED = 0  # the same samples have the same interval, wherever they come from
+ROUNDING = 1e-12  # samples that differ by no more than this share of their size are constant
 
 # Numbers of missions by the name of their cost; nan where a mission has none.
 Samples = dict[str, Float[np.ndarray, "n"]]
@@ -67,13 +66,14 @@ def summarise(
     merged = {pair: merge(each) for pair, each in batches.items()}
     evaluated = []
     for (regime, policy), own in merged.items():
-        baseline = flown_name(study.compared_to, regime)
+        baseline, made = flown_name(study.compared_to, regime), study.make_policy(policy, regime)
         columns = {
             **_regime(study, policy, regime),
             **_costs(own),
-            **_packets(own, regime, study.make_policy(policy, regime)),
+            **_packets(own, regime, made),
             **_differences(own, merged[regime, baseline]),
             **_published(policy, None if study.components.names else regime),
+            "payload": made.payload,
             "version": made_by["version"],
             "commit": made_by["commit"],
             "baseline": baseline,
@@ -115,7 +115,6 @@ def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
         "episodes": study.episodes,
         "seed": study.seed,
         "probability": study.parameters[regime, policy].get("probability"),
-        "payload": study.make_policy(policy, regime).payload,
         "task_cost_name": name,
         "task_cost_unit": unit,
     }
@@ -123,8 +122,8 @@ def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
 
 def _costs(costs: Samples) -> dict[str, Any]:
     columns: dict[str, Any] = {}
-    for cost in COSTS:
-        columns |= {f"{cost}_{name}": value for name, value in spread(costs[cost]).items()}
+    for name in COSTS:
+        columns |= {f"{name}_{figure}": value for figure, value in spread(costs[name]).items()}
     for name in ("aoi_steady", "aoi_floor", "task_cost", "task_cost_last"):
         columns[f"{name}_mean"] = float(np.mean(costs[name]))
         columns[f"{name}_sem"] = standard_error(costs[name])
@@ -135,11 +134,9 @@ def _costs(costs: Samples) -> dict[str, Any]:
 
 def _packets(costs: Samples, regime: Mission, policy: Policy) -> dict[str, Any]:
     """Return how many were sent and decoded, their bytes, and how far knowledge spread."""
-    num_sent, num_windows = (
-        float(costs["packets_sent"].sum()),
-        costs["aoi"].size * regime.num_windows,
-    )
-    sent_bytes = policy.packet(regime).num_bytes * float(costs["packets_transmitted"].sum())
+    num_sent, num_bytes = float(costs["packets_sent"].sum()), policy.packet(regime).num_bytes
+    num_windows = costs["aoi"].size * regime.num_windows
+    sent_bytes = num_bytes * float(costs["packets_transmitted"].sum())
     # A mission that never was complete counts as late as any, so that the median stays honest.
     complete = np.nan_to_num(costs["complete_window"], nan=np.inf)
 
@@ -149,7 +146,7 @@ def _packets(costs: Samples, regime: Mission, policy: Policy) -> dict[str, Any]:
 
     return {
         "packets_per_window": num_sent / num_windows,
-        "packet_bytes": policy.packet(regime).num_bytes,
+        "packet_bytes": num_bytes,
         "bytes_per_second": sent_bytes / (num_windows * regime.window_s),
         "delivery_ratio": per_packet("packets_delivered"),
         "heard_ratio": per_packet("packets_heard"),
@@ -180,3 +177,55 @@ def _published(policy: str, regime: Mission | None) -> dict[str, Any]:
         for cost in COSTS
         for figure in ("mean", "sem")
     }
+
+
+def spread(samples: Float[np.ndarray, "n"]) -> dict[str, float | None]:
+    """Return mean, errors and quantiles of independent samples, one or more, in their own unit.
+
+    `std` is the sample's standard deviation (n - 1 below), `sem` the mean's standard error,
+    `ci_low` and `ci_high` the ends of `bootstrap_interval`; p95 is linear between samples.
+    """
+    ci_low, ci_high = bootstrap_interval(samples)
+    return {
+        "mean": float(np.mean(samples)),
+        "std": float(np.std(samples, ddof=1)) if samples.size > 1 else None,
+        "sem": standard_error(samples),
+        "ci_low": ci_low,
+        "ci_high": ci_high,
+        "median": float(np.median(samples)),
+        "p95": float(np.percentile(samples, 95.0)),
+        "worst": float(np.max(samples)),
+    }
+
+
+def standard_error(samples: Float[np.ndarray, "n"]) -> float | None:
+    """Return the mean's standard error, std / sqrt(n); None of fewer than two samples."""
+    return float(np.std(samples, ddof=1)) / math.sqrt(samples.size) if samples.size > 1 else None
+
+
+def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> tuple[float | None, float | None]:
+    """Return the bias-corrected and accelerated bootstrap interval of the mean (Efron 1987).
+
+    The samples are independent; paired differences are one sample a pair. Both ends are None where
+    the samples do not vary, or there is only one.
+    """
+    largest = float(np.max(np.abs(samples), initial=0.0))
+    if samples.size < 2 or float(np.ptp(samples)) <= ROUNDING * largest:
+        return None, None
+    from scipy.stats import bootstrap  # takes its time to import
+
+    found = bootstrap(
+        (samples,),
+        np.mean,
+        confidence_level=CONFIDENCE,
+        n_resamples=RESAMPLES,
+        batch=BATCH,
+        method="BCa",
+        rng=np.random.default_rng(RESAMPLING_SEED),
+    ).confidence_interval
+    return float(found.low), float(found.high)
+
+
+def quantile_of_counts(counts: Int[np.ndarray, "bins"], share: float) -> int:
+    """Return the first bin at or below which at least this share of all counts lies."""
+    return int(np.searchsorted(np.cumsum(counts), share * int(np.sum(counts))))

@@ -84,16 +84,16 @@ def test_results_are_what_the_library_computes(whole):
 EVALUATE_AND_END = """
 import os, signal, sys
 from swarm_mj.cli import main, parse
-from swarm_mj.evaluation import progress
+from swarm_mj.evaluation import flying
 which, count = int(sys.argv[1]), int(sys.argv[2])
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may have had it ignored
-append, kept = progress.append, []
+append, kept = flying.append_progress, []
 def ending(*arguments):
     append(*arguments)
     kept.append(arguments)
     if len(kept) == count:
         os.kill(os.getpid(), which)
-progress.append = ending
+flying.append_progress = ending
 if __name__ == "__main__":  # jobs import it
     sys.exit(main(sys.argv[3:]))
 """

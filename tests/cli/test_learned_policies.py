@@ -7,7 +7,7 @@ from tiny_policies import save_tiny
 
 from swarm_mj.cli import main
 from swarm_mj.evaluation.batch import fly_batch
-from swarm_mj.evaluation.progress import progress_path, start
+from swarm_mj.evaluation.flying import progress_path, start_progress
 from swarm_mj.evaluation.results import read_results
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import paper
@@ -112,7 +112,7 @@ def test_a_resumed_evaluation_is_of_the_same_weights(capsys, runs, tmp_path):
         regimes=(paper("flocking", num_robots=5, num_windows=12, range_ratio=0.5),),
         episodes=2,
     )
-    start(progress, study.header())
+    start_progress(progress, study.header())
     save_tiny(runs / "y" / "policy", "paper", seed=3)
     assert main([*evaluated, "--resume"]) == 2
     assert "is of another evaluation: its digest is" in capsys.readouterr().err

@@ -43,21 +43,14 @@ def test_a_csv_comes_back_bit_for_bit(tmp_path):
     assert read_results(tmp_path / "new" / "r.csv") == results
 
 
-def test_columns_are_read_by_their_former_names(tmp_path):
-    write_csv(tmp_path / "r.csv", [some_result()])
-    header, row = (tmp_path / "r.csv").read_text().splitlines()
-    header = header.replace("failure_fraction", "switched_off").replace("prior_knowledge", "known")
-    (tmp_path / "r.csv").write_text(f"{header}\n{row}\n")
-    assert read_results(tmp_path / "r.csv") == [some_result()]
-
-
-def test_columns_stand_in_the_order_of_the_fields(tmp_path):
+def test_columns_are_read_by_former_names_too_and_others_are_passed_over(tmp_path):
     write_csv(tmp_path / "r.csv", [some_result()])
     header, row = (tmp_path / "r.csv").read_text().splitlines()
     assert header == ",".join(COLUMNS)
-    assert header.startswith("policy,task,preset,num_robots,range_ratio,velocity_ratio,boundary")
-    assert header.endswith("published_velocity_variance_sem,version,commit,config")
     assert row.startswith(f"mst,flocking,reference,4,{5 / 300!r},")
+    header = header.replace("failure_fraction", "switched_off").replace("prior_knowledge", "known")
+    (tmp_path / "r.csv").write_text(f"remark,{header}\nby hand,{row}\n")
+    assert read_results(tmp_path / "r.csv") == [some_result()]
 
 
 def with_rows(path, *rows):
@@ -66,13 +59,6 @@ def with_rows(path, *rows):
         writer.writeheader()
         writer.writerows(rows)
     return path
-
-
-def test_columns_that_no_result_has_are_passed_over_in_any_order(tmp_path):
-    row = dict(reversed(asdict(some_result()).items()))
-    assert read_results(with_rows(tmp_path / "r.csv", row | {"remark": "by hand"})) == [
-        some_result()
-    ]
 
 
 @pytest.mark.parametrize(
@@ -118,24 +104,16 @@ def test_older_files_that_lack_columns_with_defaults_are_read(tmp_path, new, def
     ]
 
 
-def test_missing_columns_are_named(tmp_path):
+def test_missing_columns_rows_and_files_are_named(tmp_path):
     without = [name for name in COLUMNS if name not in ("aoi_sem", "task")]
     (tmp_path / "r.csv").write_text(",".join(without) + "\n")
     with pytest.raises(ValueError, match=r"r\.csv lacks the columns task, aoi_sem; make them with"):
         read_results(tmp_path / "r.csv")
-
-
-def test_a_file_without_rows_is_no_result(tmp_path):
     (tmp_path / "r.csv").write_text(",".join(COLUMNS) + "\n")
     with pytest.raises(ValueError, match="has no rows"):
         read_results(tmp_path / "r.csv")
-
-
-@pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00\x01", b'policy,"task', b"{}\n"])
-def test_what_is_no_csv_of_results(tmp_path, content):
-    (tmp_path / "r.csv").write_bytes(content)
-    with pytest.raises(ValueError, match="swarm-mj evaluate --csv"):
-        read_results(tmp_path / "r.csv")
+    with pytest.raises(ValueError, match=r"there is no results file .*none\.csv"):
+        read_results(tmp_path / "none.csv")
 
 
 def test_a_file_that_was_cut_off_is_refused(tmp_path):
@@ -145,8 +123,3 @@ def test_a_file_that_was_cut_off_is_refused(tmp_path):
     (tmp_path / "r.csv").write_text(text[:-3])
     with pytest.raises(ValueError, match=r"no CSV \(unexpected end of data\)"):
         read_results(tmp_path / "r.csv")
-
-
-def test_a_missing_file_says_so(tmp_path):
-    with pytest.raises(ValueError, match=r"there is no results file .*none\.csv"):
-        read_results(tmp_path / "none.csv")

@@ -1,4 +1,4 @@
-"""Results summed up from made-up batches, against hand arithmetic and scipy."""
+"""Results of made-up batches, and their statistics, against hand arithmetic and scipy."""
 
 import json
 import math
@@ -7,12 +7,20 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 import scipy.stats
+from hypothesis import given
+from hypothesis import strategies as st
 
 from swarm_mj.evaluation import study as study_module
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.results import COLUMNS
 from swarm_mj.evaluation.study import Study
-from swarm_mj.evaluation.summary import summarise, write_evaluated
+from swarm_mj.evaluation.summary import (
+    bootstrap_interval,
+    quantile_of_counts,
+    spread,
+    summarise,
+    write_evaluated,
+)
 from swarm_mj.mission import paper, reference
 
 STATIONARY = reference("stationary")
@@ -165,10 +173,13 @@ def test_differences_are_paired():
             assert getattr(mst, f"{cost}_difference_{figure}") is None
 
 
-def test_the_baseline_can_be_named():
-    mst, round_robin = results(two_policies(baseline="round-robin"))
+def test_a_named_baseline_and_a_flocks_published_variance():
+    flocks = paper("flocking", velocity_ratio=0.5)
+    mst, round_robin = results(two_policies(flocks, baseline="round-robin"))
     assert mst.aoi_difference_mean == pytest.approx(-3.0)
     assert round_robin.aoi_difference_mean is None
+    assert mst.published_velocity_variance_mean == 1.9393
+    assert mst.published_velocity_variance_sem == pytest.approx(0.08339)
 
 
 def test_the_regime_and_the_origin_stand_beside():
@@ -182,12 +193,6 @@ def test_the_regime_and_the_origin_stand_beside():
     assert config["policy"] == "mst"
     assert config["probability"] == mst.probability
     assert config["max_acceleration_mps2"] == 10.0
-
-
-def test_flocks_have_a_published_variance_too():
-    flock, _ = results(two_policies(paper("flocking", velocity_ratio=0.5)))
-    assert flock.published_velocity_variance_mean == 1.9393
-    assert flock.published_velocity_variance_sem == pytest.approx(0.08339)
 
 
 def test_one_mission_has_no_errors_and_a_difference():
@@ -237,3 +242,68 @@ def test_json_has_the_columns_with_each_missions_costs(tmp_path):
     with pytest.raises(ValueError, match="not JSON compliant"):
         write_evaluated(tmp_path / "r.json", [replace(found[0], aoi=[math.nan])])
     assert not list(tmp_path.iterdir())
+
+
+def test_spread_by_hand():
+    """Squares of the distances to the mean of 3: 4, 1, 0, 1, 4 are 10; 10 / (5 - 1) = 2.5."""
+    found = spread(np.array([5.0, 1.0, 3.0, 2.0, 4.0]))
+    errors = {"std": math.sqrt(2.5), "sem": math.sqrt(2.5 / 5.0)}
+    p95 = 4.0 + 0.8  # 95 % of the way over 4 gaps: 3.8 gaps
+    interval = {name: found[name] for name in ("ci_low", "ci_high")}
+    expected = {"mean": 3.0, "median": 3.0, "p95": p95, "worst": 5.0} | errors | interval
+    assert found == pytest.approx(expected)
+
+
+def test_the_interval_is_near_a_plain_bootstraps_and_students():
+    samples = np.random.default_rng(1).normal(50.0, 10.0, size=100)
+    low, high = bootstrap_interval(samples)
+    rng = np.random.default_rng(2)
+    means = [rng.choice(samples, 100).mean() for _ in range(4000)]
+    student = scipy.stats.t.interval(0.95, 99, samples.mean(), scipy.stats.sem(samples))
+    for expected in (np.percentile(means, [2.5, 97.5]), student):
+        np.testing.assert_allclose([low, high], expected, atol=0.15)
+
+
+def test_the_interval_of_skewed_samples_leans_to_their_tail():
+    """What "bias-corrected and accelerated" is for."""
+    samples = np.random.default_rng(3).lognormal(sigma=1.5, size=40)
+    low, high = bootstrap_interval(samples)
+    assert high - samples.mean() > 1.3 * (samples.mean() - low)
+
+
+@pytest.mark.parametrize(
+    "samples", [[7.0], [0.0, 0.0], [3.0] * 50, [0.1 + 0.2, 0.3, 0.3], [-5.0, -5.0]]
+)
+def test_samples_that_do_not_vary_have_no_interval(samples):
+    assert bootstrap_interval(np.array(samples)) == (None, None)
+    found = spread(np.array(samples))
+    assert (found["ci_low"], found["ci_high"]) == (None, None)
+
+
+@pytest.mark.parametrize("samples", [[1.0, 2.0], [0.0, 0.0, 0.0, 1.0], [1e-9, 2e-9, 1e9]])
+def test_few_samples_still_have_an_interval_around_them(samples):
+    low, high = bootstrap_interval(np.array(samples))
+    assert min(samples) <= low <= high <= max(samples)
+
+
+@pytest.mark.parametrize(
+    ("counts", "share", "expected"),
+    [
+        ([95, 5], 0.95, 0),  # exactly 95 % lie in bin 0
+        ([94, 6], 0.95, 1),
+        ([0, 0, 1], 0.95, 2),
+        ([0, 3, 1, 0], 1.0, 2),
+        ([0, 3, 1, 0], 0.0, 0),
+    ],
+)
+def test_quantile_of_counts_by_hand(counts, share, expected):
+    assert quantile_of_counts(np.array(counts), share) == expected
+
+
+@given(st.lists(st.integers(0, 9), min_size=1, max_size=300))
+def test_quantile_of_counts_as_of_what_was_counted(values):
+    """numpy's inverted distribution function, on the values themselves."""
+    counts = np.bincount(values, minlength=10)
+    for percent in (50, 100):
+        expected = np.percentile(values, percent, method="inverted_cdf")
+        assert quantile_of_counts(counts, percent / 100.0) == expected

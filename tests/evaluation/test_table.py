@@ -101,13 +101,18 @@ def test_broadcasts_have_hearers_and_addressed_packets_arrive(printed):
 
 
 @pytest.mark.parametrize(
-    ("payload", "mark"), [("snapshots", ["+", "snapshots"]), ("none", []), (None, [])]
+    ("option", "payload", "mark"),
+    [
+        ("", "snapshots", ["+", "snapshots"]),
+        (" --payload none", "none", ["--payload", "none"]),
+        ("", None, []),
+    ],
 )
-def test_payloads_beyond_the_papers_are_marked_and_explained(printed, payload, mark):
-    lines = printed([some_result("planner", 1.0, payload=payload)], 100)
-    _, below = rows(lines, "planner")
-    assert below[: len(mark)] == mark
-    assert ("+: packets carry more than T, M, P" in " ".join(lines)) == bool(mark)
+def test_payloads_beyond_the_papers_are_marked_and_explained(printed, option, payload, mark):
+    lines = printed([some_result(f"planner{option}", 1.0, payload=payload)], 100)
+    above, below = rows(lines, "planner")
+    assert (above[:2], below[: len(mark)]) == (["planner", "1.00"], mark)
+    assert ("+: packets carry more than T, M, P" in " ".join(lines)) == (payload == "snapshots")
 
 
 def test_what_packets_weigh_and_what_teams_send(printed):
@@ -119,26 +124,13 @@ def test_what_packets_weigh_and_what_teams_send(printed):
     assert "sent by the team [kbit/s]: mst 8.0" in lines
 
 
-def test_an_option_stands_below_its_policy(printed):
-    lines = printed([some_result("planner --payload none", 1.0, payload="none")], 100)
-    above, below = rows(lines, "planner")
-    assert above[:2] == ["planner", "1.00"]
-    assert below[:2] == ["--payload", "none"]
-
-
-def test_velocities_are_those_of_flocks(printed):
-    for task in ("stationary", "random-walk"):  # whose velocities depend on no policy
-        assert "variance" not in "\n".join(printed([some_result("a", 1.0, task=task)], 100))
-    flocking = "\n".join(printed([some_result("a", 1.0, task="flocking")], 100))
-    assert "Velocity variance (var.): of the robots' velocities [m²/s²]" in flocking
-
-
 def test_the_lower_bound_stands_below(printed):
     lines = printed([some_result("a", 1.0), some_result("b", 2.0, aoi_floor_mean=1.75)], 100)
     assert "lower bound (connectivity): 1.00 to 1.75, by policy" in lines
     assert "lower bound (connectivity): 1.00" in printed([some_result("a", 1.0)], 100)
     unknown = "\n".join(printed([some_result("a", 1.0, aoi_floor_mean=None)], 100))
     assert "ower bound" not in unknown
+    assert "variance" not in unknown  # which depends on the policy in flocks alone
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 
 from swarm_mj.api import fly as flight
 from swarm_mj.cli import main
-from swarm_mj.evaluation import study as studies
+from swarm_mj.evaluation import flying
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.replay.read import check_replay
 from swarm_mj.replay.recorder import Recorder
@@ -186,7 +186,7 @@ def test_an_evaluation_that_runs_out_of_memory_is_resumed(monkeypatch, capsys, h
         return fly_batch(batch)
 
     with monkeypatch.context() as small:
-        small.setattr(studies, "fly_batch", flown)
+        small.setattr(flying, "fly_batch", flown)
         assert main([*study, "--csv", "a.csv"]) == 1
     assert capsys.readouterr().err.splitlines()[-1:] == [
         "Out of memory after 5 of 10 missions; the same command with --resume continues."

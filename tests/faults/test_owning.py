@@ -25,7 +25,7 @@ BUSY = '''"""Computes."""
 import sys
 from dataclasses import dataclass
 from swarm_mj.cli import script
-from swarm_mj.evaluation.jobs import run_jobs
+from swarm_mj.evaluation.flying import run_jobs
 @dataclass
 class Options:
     pass

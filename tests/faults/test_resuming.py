@@ -12,7 +12,7 @@ from small_runs import run, small_training
 from tiny_policies import save_tiny
 
 from swarm_mj.cli import main
-from swarm_mj.evaluation import progress
+from swarm_mj.evaluation import flying
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.evaluation.study import Study
 from swarm_mj.learning import checkpoint
@@ -39,11 +39,11 @@ def interrupted(evaluate, tmp_path, monkeypatch):
         append(*batch)
         raise KeyboardInterrupt
 
-    append, path = progress.append, tmp_path / "o.csv.progress"
+    append, path = flying.append_progress, tmp_path / "o.csv.progress"
 
     def interrupt(seed):
         with monkeypatch.context() as patch:
-            patch.setattr(progress, "append", append_and_stop)
+            patch.setattr(flying, "append_progress", append_and_stop)
             assert evaluate(seed, "--force") == 130
         return path.read_bytes()
 
@@ -80,12 +80,12 @@ def test_damaged_progress_is_told_or_dropped(tmp_path, tries):
     path = tmp_path / "progress"
     study = Study(policies=("tdma",), regimes=(paper(num_robots=3, num_windows=2),), episodes=30)
     header = study.header()
-    progress.start(path, header)
+    flying.start_progress(path, header)
     for index, batch in enumerate(study.batches):
-        progress.append(path, header, index, fly_batch(batch))
-    flown = progress.resume(path, header)
+        flying.append_progress(path, header, index, fly_batch(batch))
+    flown = flying.resume_progress(path, header)
     for content in damaged(path, tries):
-        resumed = told_or_read(lambda: progress.resume(path, header))
+        resumed = told_or_read(lambda: flying.resume_progress(path, header))
         assert resumed is None or resumed.items() <= flown.items()
         assert resumed is not None or path.read_bytes() == content
 

@@ -45,16 +45,6 @@ def test_the_command_named_evaluates_the_drawn_policies_in_the_figures_regimes(f
         assert [getattr(r, figure.x_name) for r in study.regimes] == list(XS[figure.name])
 
 
-def test_what_is_fixed_and_what_is_swept():
-    fixed = {name: figure.fixed for name, figure in RESULT_FIGURES.items()}
-    assert fixed == {
-        "fig3": ("num_robots", "range_ratio"),
-        "fig4": ("num_robots",),
-        "fig5": ("range_ratio", "velocity_ratio"),
-        "fig6": ("num_robots", "range_ratio"),
-    }
-
-
 def test_the_command_line_knows_the_figures_without_matplotlib():
     code = "import sys, swarm_mj.cli.figures; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

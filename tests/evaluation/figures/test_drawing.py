@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.text import Text
@@ -14,7 +12,7 @@ from swarm_mj.evaluation.figures.contents import RESULT_FIGURES
 from swarm_mj.evaluation.figures.drawing import draw, spread
 from swarm_mj.evaluation.figures.style import LOOKS
 
-FIG3, FIG4, FIG5, FIG6 = RESULT_FIGURES.values()
+FIG3, FIG4, _, FIG6 = RESULT_FIGURES.values()
 FLOODING = {0.2: (70.0, 3.0), 0.5: (16.0, 0.5), 1.0: (12.0, 0.25)}
 
 
@@ -34,12 +32,17 @@ def names(axes):
 
 def test_a_curve_has_its_points_and_errors_and_the_published_one_is_dashed_and_hollow():
     (axes,) = draw(FIG4, sweep("random-flooding", "range_ratio", FLOODING)).axes
-    ours, low, high = bars(axes)["random flooding"]
+    found = bars(axes)
+    others = ("MST", "round robin", "GNN")
+    assert set(found) - {"random flooding"} == {
+        f"{name}, published" for name in ("random flooding", *others)
+    }
+    ours, low, high = found["random flooding"]
     np.testing.assert_array_equal(ours.get_xdata(), [0.2, 0.5, 1.0])
     np.testing.assert_array_equal(ours.get_ydata(), [70.0, 16.0, 12.0])
     np.testing.assert_allclose(low, [67.0, 15.5, 11.75])
     np.testing.assert_allclose(high, [73.0, 16.5, 12.25])
-    theirs, low, high = bars(axes)["random flooding, published"]
+    theirs, low, high = found["random flooding, published"]
     np.testing.assert_array_equal(theirs.get_xdata(), [0.2, 0.25, 0.5, 0.75, 1.0])
     assert theirs.get_ydata()[0] == 72.633
     np.testing.assert_allclose((high - low)[0], 2 * 1.53417)  # std 15.3417 of 100 missions
@@ -54,18 +57,6 @@ def test_a_logarithmic_axis_leaves_the_same_room_at_both_ends_by_hand():
     (axes,) = draw(FIG4, ours).axes
     assert axes.get_yscale() == "log"
     np.testing.assert_allclose(np.log10(axes.get_ylim()), [-0.36, 6.36])
-
-
-def test_all_published_curves_are_there_even_where_ours_are_missing():
-    (axes,) = draw(FIG5, [result("tdma", "random-walk")]).axes
-    assert set(bars(axes)) == {
-        "TDMA",
-        "MST, published",
-        "random flooding, published",
-        "round robin, published",
-        "GNN, each size, published",
-        "GNN, from 40, published",
-    }
 
 
 def test_every_method_is_named_once_and_slanted_if_only_the_paper_has_it():
@@ -172,9 +163,6 @@ def test_nothing_that_is_written_overlaps_or_leaves_the_page():
         assert not any(box.overlaps(other) for other in boxes[:index])
 
 
-WANTED = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12).map(np.array)
-
-
 @pytest.mark.parametrize(
     ("wanted", "gap", "places"),
     [
@@ -186,15 +174,6 @@ WANTED = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12).map(np.array)
 )
 def test_names_are_spread_by_hand(wanted, gap, places):
     np.testing.assert_allclose(spread(np.array(wanted), gap), places)
-
-
-@given(WANTED)
-def test_they_keep_their_order_and_distance(wanted):
-    gap = 0.05
-    places = spread(wanted, gap)
-    order = np.argsort(wanted, kind="stable")
-    assert np.all(np.diff(places[order]) >= gap - 1e-12)
-    assert np.all((places >= -1e-12) & (places <= 1.0 + 1e-12))
 
 
 @pytest.mark.parametrize("seed", range(5))

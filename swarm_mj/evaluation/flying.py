@@ -1,0 +1,211 @@
+"""The flights of a study: in several processes, kept as they get done, and gone on with later.
+
+The progress file holds whole lines, each a digest and JSON: first what the batches depend on, then
+one batch a line. A line's digest is of the first line's JSON and its own, so it shows a line of
+another evaluation as well as damage, and what passes needs no other check. JSON gives floats back
+as they were, so a resumed evaluation ends in the same files.
+"""
+
+import hashlib
+import json
+import os
+import signal
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing, contextmanager
+from dataclasses import asdict, dataclass
+from multiprocessing import get_context, resource_tracker
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rich.console import Console
+
+from swarm_mj.evaluation.batch import BatchCosts, fly_batch
+from swarm_mj.evaluation.study import Study
+from swarm_mj.system.interrupt import INTERRUPTS, deferred_interrupt
+from swarm_mj.system.processes import guard
+from swarm_mj.system.reading import read_file, read_json
+from swarm_mj.system.terminal import WorkBar
+from swarm_mj.system.writing import append_bytes, write_bytes
+
+Piece = TypeVar("Piece")
+Product = TypeVar("Product")
+
+# Jobs share the machine's cores, so none starts threads of its own. And none draws: MuJoCo need not
+# look for a window system, which it does by a program that complains if it is left.
+SURROUNDINGS = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+# Nor does any run what lies in the folder one stands in, as `python -c` would.
+SURROUNDINGS |= {"MUJOCO_GL": "disable", "PYTHONSAFEPATH": "1"}
+DIGEST_DIGITS = 16
+MAX_BYTES = 2**32  # four times what 100 000 missions of 40 policies take
+
+
+def num_flown(study: Study, costs: Mapping[int, BatchCosts]) -> int:
+    """Return how many of a study's missions have been flown."""
+    return sum(len(study.batches[index].seeds) for index in costs)
+
+
+def fly_study(
+    study: Study,
+    costs: dict[int, BatchCosts],
+    num_jobs: int,
+    keep: Callable[[int, BatchCosts], None] | None,
+    console: Console,
+    *,
+    after_s: float = 0.0,
+) -> None:
+    """Fly the batches that `costs` lacks, into `costs` and where they are kept.
+
+    A bar on the console shows how far it is, once that takes longer than `after_s`.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C was pressed; `costs` has all batches that were flown.
+    """
+    left = [index for index in range(len(study.batches)) if index not in costs]
+    flown = run_jobs(fly_batch, [study.batches[index] for index in left], num_jobs)
+    total, done = study.episodes * len(study.pairs), num_flown(study, costs)
+    bar = WorkBar("Flying", total, "missions", completed=done, console=console, after_s=after_s)
+    with bar, closing(flown):
+        for which, batch_costs in flown:
+            with deferred_interrupt() as is_interrupted:
+                costs[left[which]] = batch_costs
+                if keep:
+                    keep(left[which], batch_costs)
+            if is_interrupted():
+                raise KeyboardInterrupt
+            bar.move_to(num_flown(study, costs))
+
+
+def run_jobs(
+    work: Callable[[Piece], Product], pieces: Sequence[Piece], num_jobs: int
+) -> Generator[tuple[int, Product]]:
+    """Do all pieces of work; yield each one's index and product, in the order they are done.
+
+    One of `num_jobs` is this process itself. Others import `work`, and pieces and products are
+    pickled on the way. Ctrl-C reaches this process only; the others end with it, however it ends.
+
+    Raises:
+        OSError: A process ended before its work did.
+        Exception: What `work` raised of the first piece that failed.
+    """
+    num_jobs = min(num_jobs, len(pieces))
+    if num_jobs <= 1:
+        yield from ((index, work(piece)) for index, piece in enumerate(pieces))
+        return
+    # Forked processes would inherit locks that MuJoCo's threads hold.
+    with guard() as watch, ProcessPoolExecutor(num_jobs, get_context("spawn")) as pool:
+        with deferred_interrupt() as is_interrupted, _inherited():
+            futures = {pool.submit(work, piece): index for index, piece in enumerate(pieces)}
+            # The pool itself leaves its processes waiting for work for ever if this one is killed.
+            for process in pool._processes.values():
+                watch(process.pid or 0)
+        try:
+            if is_interrupted():
+                raise KeyboardInterrupt
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except BrokenProcessPool:
+            raise OSError("a job was ended from outside, perhaps for want of memory") from None
+        finally:
+            for process in list(pool._processes.values()):
+                process.kill()  # without waiting for the pieces under way
+
+
+@contextmanager
+def _inherited() -> Iterator[None]:
+    """Let processes that are started meanwhile inherit SURROUNDINGS, and a mask against Ctrl-C."""
+    before = dict(os.environ)
+    os.environ.update(SURROUNDINGS)
+    resource_tracker.ensure_running()  # multiprocessing's; to start it lifts all masks
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for name in SURROUNDINGS.keys() - before.keys():
+            del os.environ[name]
+        os.environ.update(before)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Flown:
+    # A line of the progress file but the first.
+    batch: int
+    costs: BatchCosts
+
+
+def progress_path(output: Path) -> Path:
+    """Return where the progress towards an output is kept: beside it."""
+    return output.with_name(f"{output.name}.progress")
+
+
+def start_progress(path: Path, header: dict[str, Any]) -> None:
+    """Begin a progress file, in place of any other; raise OSError if that cannot be."""
+    write_bytes(path, _line(b"", _json(header)))
+
+
+def append_progress(path: Path, header: dict[str, Any], index: int, costs: BatchCosts) -> None:
+    """Add what a batch cost, by its index among the study's; raise OSError if that cannot be."""
+    append_bytes(path, _line(_json(header), _json({"batch": index, "costs": asdict(costs)})))
+
+
+def resume_progress(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]:
+    """Return what an interrupted evaluation with this header has flown, by the batches' indices.
+
+    A line that was cut off is dropped from the file; it is begun anew if not even its header, what
+    the batches depend on, was written.
+
+    Raises:
+        ValueError: The batches depended on something else, or the file is damaged or none of this
+            kind.
+        OSError: The file cannot be read or written.
+    """
+    content = read_file(path, "progress", MAX_BYTES)
+    whole, _, cut_off = content.rpartition(b"\n")
+    if not whole and _line(b"", _json(header)).startswith(cut_off):
+        start_progress(path, header)
+        return {}
+    lines = [line.partition(b" ")[2] for line in whole.split(b"\n")]
+    try:
+        before = read_json(lines[0], dict)
+        digested = [_line(b"" if line is lines[0] else lines[0], line) for line in lines]
+        if b"".join(digested) != whole + b"\n":
+            raise ValueError("a line does not have its digest")
+        flown = [read_json(line, _Flown) for line in lines[1:]]
+    except ValueError as error:
+        raise ValueError(
+            f"progress {path} is damaged, or of another version; start over with --force instead "
+            "of --resume"
+        ) from error
+    if difference := next(_differences("", before, header), ""):
+        raise ValueError(
+            f"progress {path} is of another evaluation: {difference}; repeat that one, or start "
+            "over with --force instead of --resume"
+        )
+    if cut_off:
+        write_bytes(path, whole + b"\n")
+    return {each.batch: each.costs for each in flown}
+
+
+def _line(first: bytes, text: bytes) -> bytes:
+    """Return a line of JSON with its digest; `first` is the JSON of the file's first line."""
+    return b"%b %b\n" % (hashlib.sha256(first + text).hexdigest()[:DIGEST_DIGITS].encode(), text)
+
+
+def _json(content: dict[str, Any]) -> bytes:
+    return json.dumps(content, allow_nan=False).encode()
+
+
+def _differences(name: str, before: object, now: object) -> Iterator[str]:
+    """Say in words where two pieces of JSON differ."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        for key in dict.fromkeys([*now, *before]):
+            yield from _differences(key, before.get(key), now.get(key))
+    elif isinstance(before, list) and isinstance(now, list):
+        if len(before) != len(now):
+            yield f"it has {len(before)} {name}, not {len(now)}"
+        for pair in zip(before, now, strict=False):
+            yield from _differences(name, *pair)
+    elif before != now:
+        yield f"its {name} is {before!r:.80}, not {now!r:.80}"
