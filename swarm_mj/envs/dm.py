@@ -95,7 +95,6 @@ class SwarmTask(_Task):
     """Choose everyone's recipient, so that the robots' information on each other is young."""
 
     def __init__(self, seed: int) -> None:
-        """Take the seed of the first episode's mission."""
         self._next_seed = seed
 
     def initialize_episode(self, physics: SwarmPhysics) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium.utils import EzPickle
 from jaxtyping import Bool, UInt8
 
-from swarm_mj.envs.mission_batch import Info, Observation, next_seed
+from swarm_mj.envs.mission_batch import Info, Observation, seed_or_next
 from swarm_mj.envs.options import check_reset, make_team_batch, team_spaces
 from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.mission import Mission
@@ -37,7 +37,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         """Begin a mission, whose seed is in `info`; raise ValueError for any options."""
         check_reset(options or {})
         super().reset(seed=seed, options=options)
-        self.batch.restart([next_seed(self.np_random) if seed is None else seed])
+        self.batch.restart([seed_or_next(seed, self.np_random)])
         return self._seen()
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, Info]:
@@ -64,7 +64,5 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         self._screen.close()
 
     def _seen(self) -> tuple[Observation, Info]:
-        """Show the present state, and return its view and info."""
         self._screen.update(self.batch)
-        info = {name: values[0].item() for name, values in self.batch.infos().items()}
-        return {name: values[0] for name, values in self.batch.observation.items()}, info
+        return self.batch.first()

@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space, create_empty_array
 from jaxtyping import Int, UInt8
 
-from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, next_seed
+from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, seed_or_next
 from swarm_mj.envs.options import check_count, check_reset, make_team_batch, team_spaces
 from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.mission import Mission
@@ -74,10 +74,8 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
     ) -> tuple[Observation, Info]:
         """Begin missions, all or those of `options["reset_mask"]` [B].
 
-        Args:
-            seed: One for each environment; or the first one's, which the others count on from; or
-                None, for missions drawn from the last seeds given.
-            options: `reset_mask`, or nothing.
+        The seed is one for each environment; or the first one's, which the others count on from; or
+        None, for missions drawn from the last seeds given.
 
         Raises:
             ValueError: Not one seed or one bool per environment, another option, or no connected
@@ -85,13 +83,13 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         """
         check_reset(options or {}, ("reset_mask",))
         super().reset(seed=seed if isinstance(seed, int) else None)
-        mask = np.asarray((options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
+        mask = np.asarray((options or {}).get("reset_mask", [True] * self.num_envs))
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
             raise ValueError(
                 f"reset_mask must be {self.num_envs} bools, one an environment and not all False, "
                 f"not {mask!r}"
             )
-        seeds = [seed] * self.num_envs if seed is None else seed
+        seeds = [None] * self.num_envs if seed is None else seed
         if isinstance(seeds, int):
             seeds = range(seeds, seeds + self.num_envs)
         if len(seeds) != self.num_envs:
@@ -168,20 +166,15 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
 
     def _begin(self, envs: Int[np.ndarray, "E"], seeds: Sequence[int | None], infos: Info) -> None:
         """Begin these environments' missions in a group of their own; note their infos."""
-        begun = []
+        begun, batch = [], self._spare_batch(envs)
         for env, seed in zip(envs.tolist(), seeds, strict=True):
             if seed is not None or env not in self._rngs:
                 self._rngs[env], _ = seeding.np_random(seed)
-            begun.append(next_seed(self._rngs[env]) if seed is None else seed)
-        batch = self._spare_batch(envs)
+            begun.append(seed_or_next(seed, self._rngs[env]))
         batch.restart(begun)
         left = [(group, ~np.isin(group.envs, envs)) for group in self._groups]
-        self._groups = [
-            _Group(group.batch, group.rows[stays], group.envs[stays])
-            for group, stays in left
-            if stays.any()
-        ]
-        self._groups.append(_Group(batch, np.arange(len(envs)), envs))
+        stay = [_Group(g.batch, g.rows[stays], g.envs[stays]) for g, stays in left if stays.any()]
+        self._groups = [*stay, _Group(batch, np.arange(len(envs)), envs)]
         self._is_over[envs] = False
         self._note(infos, self._groups[-1])
 

@@ -77,8 +77,7 @@ class MissionBatch:
     def step(self, recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B N"]:
         """Fly one window of Alg. 1, in which each robot addresses a recipient; itself is silence.
 
-        Returns:
-            The reward of each robot; all of a team alike, unless the reward is credit.
+        Return the reward of each robot; all of a team alike, unless the reward is credit.
 
         Raises:
             ValueError: No mission has begun, they are over, or a recipient is no robot; nothing has
@@ -100,8 +99,9 @@ class MissionBatch:
     def fly(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
         """Fly a window as `step` does, without working out rewards."""
         if self.is_over:
-            windows = f"its {self.last_window} windows"
-            raise ValueError(f"the mission is over after {windows}; call reset()")
+            raise ValueError(
+                f"the mission is over after its {self.last_window} windows; call reset()"
+            )
         self.costs = self.flown.step_with_recipients(recipient)
         self.recipients.append(recipient.astype(np.int16))
         self._see()
@@ -162,17 +162,20 @@ class MissionBatch:
             infos["velocity_variance_m2ps2"] = velocity_variance(swarm.states.velocity_mps)
             infos["is_complete"] = is_complete
             infos |= {f"packets_{name}": np.zeros(self.num_missions) for name in PACKETS}
-            if isinstance(controller, Costed):
-                infos["task_cost"] = controller.cost(swarm.states)
-            return infos
-        for name in ("age_windows", "velocity_variance_m2ps2", "is_complete"):
-            infos[name] = getattr(costs, name)
-        infos |= {f"packets_{name}": getattr(costs.packets, name) for name in PACKETS}
-        if costs.task_cost:
-            infos["task_cost"] = costs.task_cost.value
-        return infos
+            task_cost = controller.cost(swarm.states) if isinstance(controller, Costed) else None
+        else:
+            for name in ("age_windows", "velocity_variance_m2ps2", "is_complete"):
+                infos[name] = getattr(costs, name)
+            infos |= {f"packets_{name}": getattr(costs.packets, name) for name in PACKETS}
+            task_cost = costs.task_cost and costs.task_cost.value
+        return infos if task_cost is None else infos | {"task_cost": task_cost}
+
+    def first(self) -> tuple[Observation, Info]:
+        """Return the view and the infos of the first mission, which many a face has alone."""
+        info = {name: values[0].item() for name, values in self.infos().items()}
+        return {name: values[0] for name, values in self.observation.items()}, info
 
 
-def next_seed(rng: np.random.Generator) -> int:
-    """Draw the seed of a mission for which none was given; never one of an evaluation."""
-    return int(rng.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED))
+def seed_or_next(seed: int | None, rng: np.random.Generator) -> int:
+    """Return the seed given, or draw another mission's; never one of an evaluation."""
+    return int(rng.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED)) if seed is None else seed

@@ -69,14 +69,8 @@ def make_batch(
     check_features_named(features)
     if is_own_set(features):
         load_features(features)
-    return MissionBatch(
-        mission,
-        num_missions,
-        features=features,
-        reward=reward,
-        with_parents=with_parents,
-        components=components,
-    )
+    seen = {"features": features, "with_parents": with_parents}
+    return MissionBatch(mission, num_missions, reward=reward, components=components, **seen)
 
 
 def check_count(what: str, number: object) -> None:

@@ -7,7 +7,7 @@ from gymnasium import Space
 from gymnasium.utils import EzPickle, seeding
 from jaxtyping import UInt8
 
-from swarm_mj.envs.mission_batch import Info, Observation, next_seed
+from swarm_mj.envs.mission_batch import Info, Observation, seed_or_next
 from swarm_mj.envs.options import make_batch, robot_spaces
 from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.mission import Mission
@@ -62,7 +62,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         del options
         if seed is not None:
             self._rng, _ = seeding.np_random(seed)
-        self.batch.restart([next_seed(self._rng) if seed is None else seed])
+        self.batch.restart([seed_or_next(seed, self._rng)])
         self.agents = list(self.possible_agents)
         return self._seen()
 
@@ -81,7 +81,14 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         """
         [chosen] = self.batch.flown.views.silence.tolist()
         for agent, action in actions.items():
-            self._check_action(agent, action)
+            if agent not in self._robot:
+                names = f"{self.possible_agents[0]} to {self.possible_agents[-1]}"
+                raise ValueError(f"agents are {names}, not {agent!r:.80}; leave it out")
+            if action is None:
+                raise ValueError(
+                    f"the action of {agent} must be a robot's number from 0 to "
+                    f"{len(self._robot) - 1}, its own for silence, not None"
+                )
             if agent in self.agents:
                 chosen[self._robot[agent]] = np.squeeze(action)  # some wrap it
         if not self.agents:
@@ -104,23 +111,9 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         """Give back what pictures took."""
         self._screen.close()
 
-    def _check_action(self, agent: str, action: object) -> None:
-        names = self.possible_agents
-        if agent not in self._robot:
-            raise ValueError(
-                f"agents are {names[0]} to {names[-1]}, not {agent!r:.80}; leave it out"
-            )
-        if action is None:
-            raise ValueError(
-                f"the action of {agent} must be a robot's number from 0 to {len(names) - 1}, its "
-                "own for silence, not None"
-            )
-
     def _seen(self) -> tuple[dict[str, Observation], dict[str, Info]]:
-        """Show the present state, and return each agent's view and info."""
         self._screen.update(self.batch)
-        seen = {name: values[0] for name, values in self.batch.observation.items()}
-        info = {name: values[0].item() for name, values in self.batch.infos().items()}
+        seen, info = self.batch.first()
         views = {
             agent: {name: rows[self._robot[agent]] for name, rows in seen.items()}
             for agent in self.agents

@@ -52,29 +52,22 @@ def make_vec_env(
         raise ValueError(f"agent must be one of {', '.join(AGENTS)}, not {agent!r}")
     for name in {"n_envs", "num_envs"} & options.keys():
         raise TypeError(f"make_vec_env has no {name!r}; did you mean num_missions?")
-    if agent == "robot":
-        batch = make_batch(mission, num_missions, **options)
-        env = SwarmVecEnv([batch], agent, *robot_spaces(batch))
-    else:
-        batch = make_team_batch(mission, num_missions, **options)
-        env = SwarmVecEnv([batch], agent, *team_spaces(batch))
+    is_robot = agent == "robot"
+    batch = (make_batch if is_robot else make_team_batch)(mission, num_missions, **options)
+    env = SwarmVecEnv([batch], agent, *(robot_spaces if is_robot else team_spaces)(batch))
     env.seed(seed)
     return env
 
 
 def save_policy(model: BaseAlgorithm, path: Path | str) -> Path:
-    """Store a trained actor as a policy that `swarm-mj fly --policy FILE` flies.
+    """Store a trained actor as a policy that `swarm-mj fly --policy FILE` flies; return the file.
 
-    The file holds the network's weights, no code and no pickle; the model itself is not kept.
+    It holds the network's weights, no code and no pickle; the model itself is not kept. A file at
+    `path` is replaced; `.safetensors` is appended unless it ends so.
 
-    Args:
-        model: PPO, A2C or MaskablePPO with its own "MultiInputPolicy", trained on an environment
-            of `make_vec_env` whose agents are robots; `VecNormalize` may have normalised its
-            rewards. A model that was loaded needs it again: `PPO.load(path, env=env)`.
-        path: Where; `.safetensors` is appended unless it ends so. A file there is replaced.
-
-    Returns:
-        The file.
+    The model is PPO, A2C or MaskablePPO with its own "MultiInputPolicy", trained on an environment
+    of `make_vec_env` whose agents are robots; `VecNormalize` may have normalised its rewards. A
+    model that was loaded needs it again: `PPO.load(path, env=env)`.
 
     Raises:
         ValueError: The model is another.

@@ -13,7 +13,7 @@ from jaxtyping import Bool
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
-from swarm_mj.envs.mission_batch import MissionBatch, Observation, next_seed
+from swarm_mj.envs.mission_batch import MissionBatch, Observation, seed_or_next
 
 AGENTS = ("robot", "team")  # what an environment is
 
@@ -116,11 +116,10 @@ class SwarmVecEnv(VecEnv):
     def _begin(self, n: int) -> None:
         """Begin other missions of batch n: of the seeds given, or else drawn from them."""
         first = sum(batch.num_missions for batch in self.batches[:n])
-        mine = range(first, first + self.batches[n].num_missions)
-        seeds = [next_seed(self._rngs[b]) if (s := self._given[b]) is None else s for b in mine]
-        for b in mine:
-            self._given[b] = None
-        self.batches[n].restart(seeds)
+        mine = slice(first, first + self.batches[n].num_missions)
+        given = zip(self._given[mine], self._rngs[mine], strict=True)
+        self.batches[n].restart([seed_or_next(seed, rng) for seed, rng in given])
+        self._given[mine] = [None] * self.batches[n].num_missions
 
     def _is_truncated(self) -> Bool[np.ndarray, "E"]:
         """Return where a mission's end is a cut in time; as Gymnasium has it, everywhere."""
@@ -135,11 +134,11 @@ class SwarmVecEnv(VecEnv):
         """Return each environment's mission's seed and the window's costs there."""
         infos: list[dict[str, Any]] = []
         for batch in self.batches:
-            of_batch = {name: values.tolist() for name, values in batch.infos().items()}
-            for row in zip(*of_batch.values(), strict=True):
-                infos += [
-                    dict(zip(of_batch, row, strict=True)) for _ in range(self._per_mission(batch))
-                ]
+            names, values = zip(*batch.infos().items(), strict=True)
+            for row in zip(*(each.tolist() for each in values), strict=True):
+                infos += (
+                    dict(zip(names, row, strict=True)) for _ in range(self._per_mission(batch))
+                )
         return infos
 
     def _observe(self) -> Observation:
