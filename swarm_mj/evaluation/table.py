@@ -1,7 +1,8 @@
 """Results on the terminal: one table per regime, the lowest age first."""
 
 import io
-from collections.abc import Callable, Iterator, Sequence
+import re
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Any
 
@@ -63,6 +64,35 @@ def _regime(result: Result) -> str:
     )
 
 
+# Forms of cells by their columns' headings: a number that does not exist is a dash, and a part in
+# angle brackets is left out with it. `reached` is of packets, or of broadcasts at least one robot.
+COLUMNS = {
+    "AoI ± SEM\n95 %": "{aoi_mean:.2f}< ± {aoi_sem:.2f}>\n<{aoi_ci_low:.2f}, {aoi_ci_high:.2f}>",
+    "median\np95": "{aoi_median:.2f}\n{aoi_p95:.2f}",
+    "difference\n95 %": (
+        "{aoi_difference_mean:.2f}\n<{aoi_difference_ci_low:.2f}, {aoi_difference_ci_high:.2f}>"
+    ),
+    "packets\nreached": "{packets_per_window:.2f}\n{reached:.0%}",
+    "hearers\nbytes": "{hearers_per_packet:.2f}\n{packet_bytes:,d}",
+}
+OF_COSTED = {
+    "task cost\nat the end": (
+        "{task_cost_mean:.2f}< ± {task_cost_sem:.2f}>\n"
+        "{task_cost_last_mean:.2f}< ± {task_cost_last_sem:.2f}>"
+    ),
+    "difference\nof task cost": (
+        "{task_cost_difference_mean:.2f}\n"
+        "<{task_cost_difference_ci_low:.2f}, {task_cost_difference_ci_high:.2f}>"
+    ),
+}
+PUBLISHED = "{published_aoi_mean:.2f}< ± {published_aoi_sem:.2f}>"
+OF_FLOCKS = {
+    "velocity\nvariance": "{velocity_variance_mean:.4f}",
+    "published\nAoI, var.": PUBLISHED + "<\n{published_velocity_variance_mean:.4f}>",
+}
+OF_OTHERS = {"published\nAoI": PUBLISHED}
+
+
 def _table(results: Sequence[Result]) -> Table:
     of_task = OF_FLOCKS if results[0].task == "flocking" else OF_OTHERS
     columns = COLUMNS | (OF_COSTED if _has_own_cost(results[0]) else of_task)
@@ -71,59 +101,23 @@ def _table(results: Sequence[Result]) -> Table:
     for name in columns:
         table.add_column(name, justify="right")
     for result in results:
-        table.add_row(_name(result), *(cell(result) for cell in columns.values()))
+        table.add_row(_name(result), *(_cell(form, result) for form in columns.values()))
     return table
 
 
-def _number(value: float | int | None, form: str = ".2f") -> str:
-    return NONE if value is None else format(value, form)
-
-
-def _mean(result: Result, name: str) -> str:
-    """Return a cost's mean and, where there is one, its standard error."""
-    mean, sem = getattr(result, f"{name}_mean"), getattr(result, f"{name}_sem")
-    return _number(mean) if sem is None else f"{_number(mean)} ± {sem:.2f}"
-
-
-def _interval(result: Result, name: str) -> str:
-    low, high = getattr(result, f"{name}_ci_low"), getattr(result, f"{name}_ci_high")
-    return "" if low is None else f"{low:.2f}, {_number(high)}"
-
-
-def _difference(result: Result, cost: str) -> str:
-    mean = getattr(result, f"{cost}_difference_mean")
-    return f"{_number(mean)}\n{_interval(result, f'{cost}_difference')}"
-
-
-def _packets(result: Result) -> str:
-    """Return packets per window, and the share decoded by the addressee; of broadcasts, by any."""
+def _cell(form: str, result: Result) -> str:
     reached = result.heard_ratio if result.delivery_ratio is None else result.delivery_ratio
-    return f"{_number(result.packets_per_window)}\n{_number(reached, '.0%')}"
+    numbers = {**vars(result), "reached": reached}
 
+    def optional(part: re.Match[str]) -> str:
+        names = re.findall(r"{(\w+):", part[1])
+        return "" if any(numbers[name] is None for name in names) else part[1]
 
-def _published(result: Result) -> str:
-    """Return the paper's age and, of flocks, its velocity variance below."""
-    variance = result.published_velocity_variance_mean
-    return _mean(result, "published_aoi") + ("" if variance is None else f"\n{variance:.4f}")
+    def number(field: re.Match[str]) -> str:
+        value = numbers[field[1]]
+        return NONE if value is None else format(value, field[2])
 
-
-Columns = dict[str, Callable[[Result], str]]
-COLUMNS: Columns = {
-    "AoI ± SEM\n95 %": lambda r: f"{_mean(r, 'aoi')}\n{_interval(r, 'aoi')}",
-    "median\np95": lambda r: f"{_number(r.aoi_median)}\n{_number(r.aoi_p95)}",
-    "difference\n95 %": lambda r: _difference(r, "aoi"),
-    "packets\nreached": _packets,
-    "hearers\nbytes": lambda r: f"{_number(r.hearers_per_packet)}\n{_number(r.packet_bytes, ',d')}",
-}
-OF_COSTED: Columns = {
-    "task cost\nat the end": lambda r: f"{_mean(r, 'task_cost')}\n{_mean(r, 'task_cost_last')}",
-    "difference\nof task cost": lambda r: _difference(r, "task_cost"),
-}
-OF_FLOCKS: Columns = {
-    "velocity\nvariance": lambda r: _number(r.velocity_variance_mean, ".4f"),
-    "published\nAoI, var.": _published,
-}
-OF_OTHERS: Columns = {"published\nAoI": _published}
+    return re.sub(r"{(\w+):([^}]+)}", number, re.sub(r"<(.+?)>", optional, form, flags=re.DOTALL))
 
 
 def _has_own_cost(result: Result) -> bool:

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from channels import to_nobody, to_the_addressee
+from channels import to_nobody
 
-from swarm_mj.envs.mission_batch import seed_or_next
 from swarm_mj.envs.options import make_batch, robot_spaces
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, make_extractor
@@ -25,25 +24,16 @@ def recipients(num_windows, num_missions=2, num_robots=5):
     return np.random.default_rng(5).integers(0, num_robots, (num_windows, num_missions, num_robots))
 
 
-def test_eq10_reward_is_minus_the_mean_age_over_all_pairs():
-    batch = begun("random-walk")
+def test_eq10_eq17_rewards_are_minus_the_mean_age_and_the_variance_of_velocities():
+    walks, flocks = begun("random-walk"), begun("flocking", reward="velocity-variance")
     for now, recipient in enumerate(recipients(10), start=1):
-        reward = batch.step(recipient)
+        of_age, of_variance = walks.step(recipient), flocks.step(recipient)
         for b in range(2):
-            ages = [now - t for row in batch.swarm.buffers.timestamp[b] for t in row]
-            assert reward[b] == pytest.approx([-sum(ages) / 25] * 5, rel=1e-14)
-
-
-def test_eq17_reward_is_minus_the_variance_of_velocities():
-    batch = begun("flocking", reward="velocity-variance")
-    for recipient in recipients(5):
-        reward = batch.step(recipient)
-        for b in range(2):
-            velocity = batch.swarm.states.velocity_mps[b]
-            variance = sum(
-                ((velocity[:, axis] - velocity[:, axis].mean()) ** 2).mean() for axis in (0, 1)
-            )
-            assert reward[b] == pytest.approx([-variance] * 5, rel=1e-12)
+            ages = [now - t for row in walks.swarm.buffers.timestamp[b] for t in row]
+            assert of_age[b] == pytest.approx([-sum(ages) / 25] * 5, rel=1e-14)
+            velocity = flocks.swarm.states.velocity_mps[b]
+            squares = [(each - each.mean()) ** 2 for each in velocity.T]
+            assert of_variance[b] == pytest.approx([-np.sum(squares) / 5] * 5, rel=1e-12)
 
 
 @pytest.mark.parametrize("task", ["formation", "coverage", "flocking"])
@@ -153,11 +143,6 @@ def test_no_feature_leaves_its_bounds(mission, features):
         assert most <= seen["observation"].high.max()
 
 
-def test_drawn_seeds_are_none_of_an_evaluations():
-    rng = np.random.default_rng(0)
-    assert min(seed_or_next(None, rng) for _ in range(1000)) >= 2**40
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -182,15 +167,10 @@ def test_refusals(options, message):
         make_batch(**options)
 
 
-def test_parts_may_be_named():
-    by_name = begun("stationary", channel="channels:to_the_addressee")
-    itself = begun("stationary", channel=to_the_addressee)
-    for recipient in recipients(10):
-        np.testing.assert_array_equal(by_name.step(recipient), itself.step(recipient))
-
-
-def test_nothing_flies_on_after_the_last_window():
+def test_nothing_flies_before_it_has_begun_and_after_the_last_window():
     batch = begun("stationary")
+    with pytest.raises(ValueError, match="call reset"):
+        make_batch().step(np.zeros((1, 40), dtype=int))
     for recipient in recipients(10):
         batch.step(recipient)
     with pytest.raises(ValueError, match=r"over after its 10 windows; call reset\(\)"):
@@ -198,8 +178,3 @@ def test_nothing_flies_on_after_the_last_window():
     assert batch.flown.now[0] == 10.0
     batch.restart([1, 2])
     batch.step(recipient)
-
-
-def test_before_it_has_begun():
-    with pytest.raises(ValueError, match="call reset"):
-        make_batch().step(np.zeros((1, 40), dtype=int))

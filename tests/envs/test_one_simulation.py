@@ -4,9 +4,13 @@ Two missions of other seeds fly through each face, window by window, beside a sw
 hand; all is equal to the last digit.
 """
 
+import pickle
+from functools import partial
+
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import data_equivalence
 
 from swarm_mj.envs import register_environments
 from swarm_mj.envs.dm import make_environment
@@ -139,6 +143,13 @@ def test_every_face_flies_the_same_missions(face, numbers):
             assert other.now[row] == swarm.now[b]
     assert (swarm.states.is_active is not None) == ("failure_fraction" in numbers)
     assert np.all(np.mean(swarm.buffers.timestamp > 0.0, axis=(1, 2)) > 0.4)  # they did talk
+
+
+@pytest.mark.parametrize("face", [SwarmEnv, parallel_env, partial(SwarmVectorEnv, 2)])
+def test_a_copy_by_pickle_flies_the_same(face):
+    env = face("flocking", features="paper", num_robots=5, range_ratio=0.4)
+    copy = pickle.loads(pickle.dumps(env))
+    assert data_equivalence(env.reset(seed=3), copy.reset(seed=3), exact=True)
 
 
 def test_later_missions_are_the_same_too():

@@ -1,4 +1,3 @@
-import pickle
 import subprocess
 import sys
 import warnings
@@ -69,12 +68,6 @@ def test_each_agent_sees_and_is_paid_its_own():
     assert [agent for agent, reward in rewards.items() if reward != 0.0] == ["robot_0"]
 
 
-def test_agents_that_say_nothing_are_silent():
-    env = parallel_env(**SMALL)
-    env.reset(seed=0)
-    assert env.step({"robot_2": 3})[4]["robot_0"]["packets_sent"] == 1.0
-
-
 @pytest.mark.parametrize(
     ("actions", "message"),
     [
@@ -103,12 +96,6 @@ def test_nothing_flies_on_when_nobody_is_left():
     assert env.batch.flown.now[0] == 12.0
 
 
-def test_a_copy_by_pickle_flies_the_same():
-    env = parallel_env(**FAILING)
-    copy = pickle.loads(pickle.dumps(env))
-    assert data_equivalence(env.reset(seed=3), copy.reset(seed=3), exact=True)
-
-
 def chained(env):
     env = supersuit.pettingzoo_env_to_vec_env_v1(env)
     return supersuit.concat_vec_envs_v1(env, 2, base_class="stable_baselines3")
@@ -116,10 +103,6 @@ def chained(env):
 
 def learn(policy, env):
     return PPO(policy, env, n_steps=8, batch_size=48, n_epochs=1).learn(200).num_timesteps >= 200
-
-
-def test_supersuits_chain_trains_on_what_agents_see():
-    assert learn("MultiInputPolicy", chained(parallel_env(**SMALL)))
 
 
 def test_supersuits_black_death_trains_where_robots_fail():

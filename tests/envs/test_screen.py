@@ -37,7 +37,7 @@ def pictures():
     return drawn
 
 
-def test_a_single_environment_is_drawn(pictures):
+def test_single_environments_are_drawn(pictures):
     assert len({picture.tobytes() for pair in pictures for picture in pair}) == 12
     env = SwarmEnv(MISSION, render_mode="rgb_array")
     env.reset(seed=3)
@@ -45,9 +45,6 @@ def test_a_single_environment_is_drawn(pictures):
         env.step(recipient[0])
         np.testing.assert_array_equal(env.render(), pair[0])
     env.close()
-
-
-def test_agents_are_drawn(pictures):
     env = parallel_env(MISSION, render_mode="rgb_array")
     env.reset(seed=4)
     np.testing.assert_array_equal(env.render(), pictures[0][1])

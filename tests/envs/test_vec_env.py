@@ -56,16 +56,6 @@ def test_after_the_last_window_another_mission_begins():
     np.testing.assert_array_equal(env.reset()["observation"], first["observation"])
 
 
-def test_rewards_are_each_robots_own():
-    env = make_vec_env("stationary", 2, reward="credit", seed=1, **SMALL)
-    env.reset()
-    silence = np.tile(np.arange(4), 2)
-    spoken = silence.copy()
-    spoken[5] = 0  # robot 1 of the second mission
-    reward = env.step(spoken)[1]
-    assert np.flatnonzero(reward).tolist() == [5]
-
-
 @pytest.mark.parametrize(("agent", "size"), [("robot", 4), ("team", 16)])
 def test_sb3_contrib_gets_the_masks(agent, size):
     far_apart = {**SMALL, "range_ratio": 0.15, "num_windows": 100}

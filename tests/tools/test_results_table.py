@@ -1,15 +1,11 @@
 """The README's tables, from made-up results."""
 
-import shutil
 from importlib import import_module
-from pathlib import Path
 
 import pytest
 from synthetic import result, sweep
 
 from swarm_mj.evaluation.results import write_csv
-
-TOOL = Path(__file__).parent.parent.parent / "tools" / "results_table.py"
 
 
 @pytest.fixture(scope="module")
@@ -102,10 +98,3 @@ def test_a_policy_missing_somewhere_and_one_without_errors(tool):
     ]
     table = tool.table(rows, "aoi").splitlines()
     assert table[2:] == ["| tdma |  | 9.0 ± 1.0 |", "| mst | 11.0 | 22.0 |"]
-
-
-def test_files_that_are_no_results_are_a_clear_error(tool, tmp_path, capsys):
-    shutil.copy(TOOL, tmp_path / "tool.csv")
-    assert tool.main([str(tmp_path / "tool.csv")]) == 2
-    assert tool.main([str(tmp_path / "nothing.csv")]) == 2
-    assert capsys.readouterr().err.count("results_table: error: ") == 2

@@ -103,26 +103,15 @@ def test_a_row_says_what_was_measured(tool, monkeypatch):
     assert row.aoi_sem == pytest.approx(stats.sem([29.0, 30.0, 34.0]), abs=5e-5)
 
 
-def test_the_next_search_starts_where_the_last_ended(tool, monkeypatch):
+def test_the_next_search_starts_where_the_last_ended(tool, monkeypatch, capsys):
+    """The best at a grid's end is reported."""
     grid = (0.1, 0.2, 0.3, 0.4, 0.5)
     flown = with_ages(tool, monkeypatch, lambda p: abs(p - 0.4))
     work = [search(tool, grid), search(tool, grid), search(tool, (0.6, 0.7, 0.8))]
-    rows = tool._tune_all(work, range(3), tool.Console(quiet=True))
+    rows = tool._tune_all(work, range(3), tool.Console(soft_wrap=True))
+    assert "mst paper stationary, 40 robots, range 0.25" in capsys.readouterr().out
     assert [row.probability for row in rows] == [0.4, 0.4, 0.6]
     assert flown == [0.3, 0.2, 0.4, 0.5, 0.4, 0.3, 0.5, 0.7, 0.6, 0.8]
-
-
-def test_the_best_at_a_grids_end_is_reported(tool, monkeypatch, capsys):
-    with_ages(tool, monkeypatch, lambda p: p)
-    tool._tune_all([search(tool, (0.1, 0.2))], range(3), tool.Console(soft_wrap=True))
-    assert "mst paper stationary, 40 robots, range 0.25" in capsys.readouterr().out
-
-
-def test_tables_are_read_as_they_were_written(tool, monkeypatch, tmp_path):
-    with_ages(tool, monkeypatch, lambda p: 30.0 + p / 3)
-    rows = [tool.tune(search(tool, (p,)), range(3), p) for p in (0.1, 0.2)]
-    tool.write_table(rows, tmp_path / "a.csv")
-    assert read_table(tmp_path / "a.csv") == rows
 
 
 def test_a_table_that_another_writes_is_left_alone(run, tmp_path):
