@@ -16,8 +16,8 @@ from pathlib import Path
 
 from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import script
-from swarm_mj.evaluation.figures.contents import RESULT_FIGURES, ResultFigure
 from swarm_mj.evaluation.flying import progress_path
+from swarm_mj.evaluation.published import RESULT_FIGURES, ResultFigure
 from swarm_mj.evaluation.results import MAX_BYTES, read_results
 from swarm_mj.mission import PAPERS
 from swarm_mj.system.fields import setting

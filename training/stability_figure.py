@@ -18,8 +18,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from swarm_mj.cli import script
-from swarm_mj.evaluation.figures.contents import AOI, VARIANCE
 from swarm_mj.evaluation.figures.style import WIDTH_IN, save, styled, write_caption
+from swarm_mj.evaluation.published import AOI, VARIANCE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.reading import read_json, read_rows
 from swarm_mj.system.writing import Output, check_outputs

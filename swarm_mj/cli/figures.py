@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from swarm_mj.evaluation.figures.contents import FIGURES, FLOCK, FORMATS, RESULT_FIGURES
+from swarm_mj.evaluation.published import FIGURES, FLOCK, FORMATS, RESULT_FIGURES
 from swarm_mj.evaluation.results import Result, read_results
 from swarm_mj.mission.components import components_in
 from swarm_mj.mission.specification import NOTHING, OPEN

@@ -108,8 +108,8 @@ def _trained_on(model: BaseAlgorithm) -> MissionBatch:
     normalised = env and unwrap_vec_wrapper(env, VecNormalize)
     is_ours = isinstance(inner, SwarmVecEnv)
     refused = {
-        "a policy is made of an actor that draws recipients, and {kind} has none; train PPO, A2C or "
-        "MaskablePPO": not hasattr(model.policy, "action_dist"),
+        "a policy is made of an actor that draws recipients, and {kind} has none; train PPO, A2C "
+        "or MaskablePPO": not hasattr(model.policy, "action_dist"),
         "the model has no environment; load the model with it: {kind}.load(path, env=env)": (
             env is None
         ),
@@ -120,8 +120,8 @@ def _trained_on(model: BaseAlgorithm) -> MissionBatch:
         "a policy of this kind sees no parents; train without with_parents=True": (
             is_ours and inner.batches[0].with_parents
         ),
-        "a policy cannot be made of a model whose observations VecNormalize normalises, as it would "
-        "need their averages; they are normalised already, so train with VecNormalize(env, "
+        "a policy cannot be made of a model whose observations VecNormalize normalises, as it "
+        "would need their averages; they are normalised already, so train with VecNormalize(env, "
         "norm_obs=False)": normalised is not None and normalised.norm_obs,
     }
     for reason, is_refused in refused.items():

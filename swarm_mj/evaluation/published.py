@@ -1,7 +1,8 @@
-"""The paper's result figures as numbers: mean and standard deviation over 100 missions a point.
+"""The paper's result figures (V): their missions, axes and numbers.
 
-Source of `published.csv`: the data behind Figs. 3 to 6, which the paper's authors published with
-their code; one row per point and cost, methods named as in the figures.
+Source of `published.csv`, mean and standard deviation over 100 missions a point: the data behind
+Figs. 3 to 6, which the paper's authors published with their code; one row per point and cost,
+methods named as in the figures.
 
 Figs. 3 and 4 both give a stationary team at range ratio 0.25, from different missions: Fig. 3 draws
 it as the baselines' level lines (44.43, 45.28, 42.02), Fig. 4 as a point of its curves (46.76,
@@ -11,14 +12,17 @@ sweep. Fig. 5's curves fit random walks, not stationary teams: its
 """
 
 import math
+import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import msgspec
 
-from swarm_mj.mission import PAPERS, Mission
+from swarm_mj.mission import PAPERS, Mission, Task
+from swarm_mj.policies.registry import WITHOUT_PAYLOAD, flown_name
 from swarm_mj.system.reading import read_rows
 
 METHODS = {
@@ -28,6 +32,22 @@ METHODS = {
 }
 BASELINES = tuple(METHODS.values())  # the paper's three, as `POLICIES` names them
 COSTS = {"age of information [windows]": "aoi", "velocity variance [m^2/s^2]": "velocity_variance"}
+FLOCK = "fig2"  # a mission's start and end, drawn by `flock`; the others are below
+FORMATS = ("svg", "png", "pdf")
+OPTIONS = {
+    "num_robots": "--robots",
+    "range_ratio": "--range-ratio",
+    "velocity_ratio": "--velocity-ratio",
+}
+# All but sotdma, which is slow. The planners and gnn are drawn under `paper` only: gnn was trained
+# there, and they take several times as long as all others together.
+DRAWN = (
+    "tdma",  # first: the others are compared to it
+    *("random-flooding", "round-robin", "mst", "aloha", "gossip", "spatial-tdma"),
+    *("planner", WITHOUT_PAYLOAD, "gnn", "greedy-oracle"),
+)
+PAPER_ONLY = ("planner", WITHOUT_PAYLOAD, "gnn")
+Scale = Literal["linear", "log"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,27 +74,117 @@ class Point:
         return METHODS.get(self.method)
 
 
-class Sweep(NamedTuple):
-    """The figure that sweeps a field of a task's missions, all others as the paper sets them."""
-
-    figure: str
-    x_name: str
-    irrelevant: tuple[str, ...] = ()  # fields that change nothing in this task
-
-
-SWEEPS = {
-    "stationary": Sweep("fig4_transmit_power", "range_ratio", irrelevant=("velocity_ratio",)),
-    "random-walk": Sweep("fig5_team_size", "num_robots"),
-    "flocking": Sweep("fig6_flocking", "velocity_ratio"),
-}
-
-
 @cache
 def points() -> tuple[Point, ...]:
     """Return all points of all curves, in the order of the file."""
     _, rows = read_rows(Path(__file__).with_suffix(".csv"), "table", 1_000_000)
     named = [row | {"cost": COSTS[row["cost"]]} for _, row in rows]
     return msgspec.convert(named, tuple[Point, ...], strict=False)
+
+
+class Panel(NamedTuple):
+    """One pair of axes: a cost over the figure's x."""
+
+    cost: str  # aoi or velocity_variance, as results and published points name it
+    label: str  # with the cost's unit
+    scale: Scale = "log"
+
+
+AOI = Panel("aoi", "age of information [windows]")
+VARIANCE = Panel("velocity_variance", "velocity variance [m²/s²]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResultFigure:
+    """One of the paper's result figures."""
+
+    published: str  # its name among the published points
+    title: str
+    task: Task
+    x_name: str  # a field of the mission, or receptive_field, a policy's own
+    x_label: str  # with its unit
+    x_scale: Scale = "linear"
+    irrelevant: tuple[str, ...] = ()  # fields that change nothing in this task
+    panels: tuple[Panel, ...] = (AOI,)
+
+    @property
+    def name(self) -> str:
+        """Its name on the command line."""
+        return self.published.partition("_")[0]
+
+    @property
+    def xs(self) -> tuple[float, ...]:
+        """The published curves' places on the x axis, ascending."""
+        return tuple(sorted({point.x for point in points() if point.figure == self.published}))
+
+    @property
+    def sweeps_missions(self) -> bool:
+        """True if x is a number of the mission, so that every policy has a curve over it."""
+        return self.x_name in OPTIONS
+
+    @property
+    def fixed(self) -> tuple[str, ...]:
+        """The numbers of the mission that are fixed in the figure."""
+        free = {self.x_name, *self.irrelevant}
+        return tuple(name for name in OPTIONS if name not in free)
+
+    def mission(self, preset: str) -> Mission:
+        """Return the missions' numbers as a preset has them; x is any."""
+        return PAPERS[preset](self.task)
+
+    def command(self, preset: str) -> str:
+        """Return the command that makes the figure's results."""
+        return shlex.join(["swarm-mj", *self.arguments(preset), "--csv", "FILE"])
+
+    def arguments(self, preset: str) -> Sequence[str]:
+        """Return the arguments of `swarm-mj` that make the figure's results, without the file."""
+        drawn = [policy for policy in DRAWN if preset == "paper" or policy not in PAPER_ONLY]
+        flown = dict.fromkeys(flown_name(policy, self.mission(preset)) for policy in drawn)
+        command = ["evaluate", "--policy", *flown, "--task", self.task, "--preset", preset]
+        if self.sweeps_missions:
+            command += [OPTIONS[self.x_name], *(f"{x:g}" for x in self.xs)]
+        return command
+
+
+_ALL = (
+    ResultFigure(
+        published="fig3_receptive_field",
+        title="Receptive field",
+        task="stationary",
+        x_name="receptive_field",
+        x_label="receptive field of the GNN [hops]",
+        irrelevant=("velocity_ratio",),
+        panels=(AOI._replace(scale="linear"),),
+    ),
+    ResultFigure(
+        published="fig4_transmit_power",
+        title="Transmit power",
+        task="stationary",
+        x_name="range_ratio",
+        x_label="range ratio: how far a packet reaches in silence [km]",
+        x_scale="log",
+        irrelevant=("velocity_ratio",),
+    ),
+    ResultFigure(
+        published="fig5_team_size",
+        title="Team size",
+        task="random-walk",
+        x_name="num_robots",
+        x_label="team size [robots]",
+    ),
+    ResultFigure(
+        published="fig6_flocking",
+        title="Flocking",
+        task="flocking",
+        x_name="velocity_ratio",
+        x_label="velocity ratio: how far a robot gets along an axis [km in 50 s]",
+        panels=(AOI, VARIANCE),
+    ),
+)
+RESULT_FIGURES = {figure.name: figure for figure in _ALL}
+FIGURES = (FLOCK, *RESULT_FIGURES)
+# The figure that sweeps a field of a task's missions, all others as the paper sets them.
+SWEEPS = {figure.task: figure for figure in _ALL if figure.sweeps_missions}
 
 
 def published(policy: str, mission: Mission) -> dict[str, Point]:
@@ -89,5 +199,5 @@ def published(policy: str, mission: Mission) -> dict[str, Point]:
     if mission != PAPERS[mission.preset](mission.task, **free):
         return {}
     x = getattr(mission, sweep.x_name)
-    found = (p for p in points() if p.figure == sweep.figure and p.policy == policy)
+    found = (p for p in points() if p.figure == sweep.published and p.policy == policy)
     return {point.cost: point for point in found if point.x == x}

@@ -7,9 +7,9 @@ from xml.etree import ElementTree
 import pytest
 from PIL import Image
 
-from swarm_mj.evaluation.figures.contents import FLOCK, RESULT_FIGURES
 from swarm_mj.evaluation.figures.curves import results_of
 from swarm_mj.evaluation.figures.drawing import caption
+from swarm_mj.evaluation.published import FLOCK, RESULT_FIGURES
 from swarm_mj.evaluation.results import read_results
 
 ROOT = Path(__file__).parent.parent.parent

@@ -10,7 +10,7 @@ import reproduce as program
 from synthetic import result
 
 from swarm_mj.cli import parse
-from swarm_mj.evaluation.figures.contents import RESULT_FIGURES
+from swarm_mj.evaluation.published import RESULT_FIGURES
 from swarm_mj.evaluation.results import read_results, write_csv
 
 ROOT = Path(__file__).parents[2]

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from swarm_mj.evaluation.figures.contents import OPTIONS, ResultFigure
-from swarm_mj.evaluation.published import points
+from swarm_mj.evaluation.published import OPTIONS, ResultFigure, points
 from swarm_mj.evaluation.results import Result, carries_more
 from swarm_mj.mission import PAPERS
 from swarm_mj.system.reading import read_json

@@ -11,9 +11,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 from scipy.optimize import isotonic_regression
 
-from swarm_mj.evaluation.figures.contents import Panel, ResultFigure
 from swarm_mj.evaluation.figures.curves import Curve, budgets, curves, results_of
 from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, look_of, styled, write_caption
+from swarm_mj.evaluation.published import Panel, ResultFigure
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
 
 TOP_IN, PANEL_IN, GAP_IN, BOTTOM_IN = 0.86, 3.3, 0.35, 0.75

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from synthetic import altered, everything, result, sweep
 
-from swarm_mj.evaluation.figures.contents import RESULT_FIGURES
 from swarm_mj.evaluation.figures.curves import curves, preset_of, results_of
 from swarm_mj.evaluation.figures.drawing import caption
+from swarm_mj.evaluation.published import RESULT_FIGURES
 
 FIG3, FIG4, FIG5, FIG6 = RESULT_FIGURES.values()
 

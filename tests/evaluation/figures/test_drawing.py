@@ -8,9 +8,9 @@ from matplotlib.text import Text
 from scipy.optimize import minimize
 from synthetic import everything, result, sweep
 
-from swarm_mj.evaluation.figures.contents import RESULT_FIGURES
 from swarm_mj.evaluation.figures.drawing import draw, spread
 from swarm_mj.evaluation.figures.style import LOOKS
+from swarm_mj.evaluation.published import RESULT_FIGURES
 
 FIG3, FIG4, _, FIG6 = RESULT_FIGURES.values()
 FLOODING = {0.2: (70.0, 3.0), 0.5: (16.0, 0.5), 1.0: (12.0, 0.25)}

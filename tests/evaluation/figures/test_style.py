@@ -10,9 +10,9 @@ from matplotlib.colors import to_rgb
 from PIL import Image
 from synthetic import everything
 
-from swarm_mj.evaluation.figures.contents import DRAWN, FORMATS, RESULT_FIGURES
 from swarm_mj.evaluation.figures.drawing import draw
 from swarm_mj.evaluation.figures.style import LOOKS, save, styled
+from swarm_mj.evaluation.published import DRAWN, FORMATS, RESULT_FIGURES
 from swarm_mj.policies.registry import POLICIES
 
 # Linear RGB as it is seen without red or green cones (Viénot, Brettel, Mollon 1999).
