@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import supersuit
 from gymnasium import spaces
-from gymnasium.utils.env_checker import data_equivalence
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 from stable_baselines3 import PPO
 
@@ -24,19 +23,6 @@ def test_pettingzoos_own_checks(options):
         warnings.simplefilter("error")
         parallel_api_test(parallel_env(**options), num_cycles=30)
         parallel_seed_test(lambda: parallel_env(**options), num_cycles=5)
-
-
-def test_the_same_seed_is_the_same_episodes():
-    """Over whole episodes, of which the later ones have no seed of their own."""
-    first, second = parallel_env(**FAILING), parallel_env(**FAILING)
-    assert data_equivalence(first.reset(seed=3), second.reset(seed=3), exact=True)
-    for _ in range(2):
-        while first.agents:
-            actions = {agent: first.action_space(agent).sample() for agent in first.agents}
-            assert data_equivalence(first.step(actions), second.step(actions), exact=True)
-            assert first.agents == second.agents
-        assert data_equivalence(first.reset(), second.reset(), exact=True)
-    assert not data_equivalence(first.reset(), second.reset(seed=4), exact=True)
 
 
 def test_robots_that_fail_drop_out():

@@ -164,11 +164,6 @@ def test_who_is_off_passes_nothing_on_and_does_not_count():
     assert aged(known, x_m, 4) == [0.0]
 
 
-def test_neighbours_are_at_most_the_range_apart():
-    assert aged(empty(1, 2), (0.0, 1.0), 1) == [0.0]
-    assert aged(empty(1, 2), (0.0, 1.01), 1) == [0.5]
-
-
 @given(seed=st.integers(0, 2**32 - 1), num_missions=st.integers(1, 3), num_robots=st.integers(2, 9))
 def test_floor_as_by_components_of_a_graph(seed, num_missions, num_robots):
     rng = np.random.default_rng(seed)

@@ -193,17 +193,11 @@ def test_damage_before_the_last_line_is_found(tmp_path, line):
         start_progress(other, HEADER | {"seed": 2000})
         append_progress(other, HEADER | {"seed": 2000}, 1, some_costs(0.5))
         added = other.read_bytes().splitlines(keepends=True)[1]
-    path.write_bytes(path.read_bytes() + added)
-    with pytest.raises(ValueError, match=r"is damaged, or of another version; start .* --force"):
-        resume_progress(path, HEADER)
-
-
-def test_a_text_that_is_none_is_not_replaced(tmp_path):
-    """Even if it has no line that ends."""
-    (tmp_path / "p").write_text("my thesis")
-    with pytest.raises(ValueError, match="is damaged"):
-        resume_progress(tmp_path / "p", HEADER)
-    assert (tmp_path / "p").read_text() == "my thesis"
+    for content in (path.read_bytes() + added, b"a text without a line that ends"):
+        path.write_bytes(content)
+        with pytest.raises(ValueError, match=r"is damaged, or of another version; .* --force"):
+            resume_progress(path, HEADER)
+        assert path.read_bytes() == content
 
 
 def test_numbers_that_are_none_never_get_in(tmp_path):

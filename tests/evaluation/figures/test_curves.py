@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import altered, everything, result, sweep
+from synthetic import altered, result, sweep
 
-from swarm_mj.evaluation.figures.curves import curves, preset_of, results_of
+from swarm_mj.evaluation.figures.curves import curves, results_of
 from swarm_mj.evaluation.figures.drawing import caption
 from swarm_mj.evaluation.published import RESULT_FIGURES
 
@@ -77,6 +77,9 @@ def test_other_regimes_are_passed_over():
     kept = result("tdma", velocity_ratio=0.5)  # which is nothing to a stationary team
     assert results_of(FIG4, [*others, kept]) == [kept]
     assert results_of(FIG5, [*others, kept]) == others[:1]
+    with pytest.raises(ValueError, match="none of the 1 results has task random-walk") as refused:
+        results_of(FIG5, [kept])
+    assert "--task random-walk --preset reference --robots 10 20 40 60 80" in str(refused.value)
 
 
 def test_a_single_episode_has_no_error_and_no_cost_is_zero():
@@ -106,25 +109,11 @@ def test_mixed_results_are_refused(name, value, complaint):
     assert " --task stationary " in str(refused.value)
 
 
-def test_two_presets_and_unknown_ones_are_refused():
-    with pytest.raises(ValueError, match="presets reference and paper; draw one at a time"):
-        preset_of([*everything("reference"), *everything("paper")])
-    with pytest.raises(ValueError, match="paper or reference, not 'mine'"):
-        preset_of([replace(result("mst"), preset="mine")])
-    assert preset_of(everything("paper")) == "paper"
-
-
 def test_two_results_of_the_same_policy_and_regime_are_refused():
     with pytest.raises(ValueError, match=r"two results of mst at range_ratio 0\.25; keep one"):
         results_of(FIG4, [result("mst"), result("tdma"), result("mst", aoi_mean=2.0)])
     with pytest.raises(ValueError, match="fig3 has two results of mst; keep one"):
         results_of(FIG3, [result("mst"), result("mst")])
-
-
-def test_no_points_names_the_command_that_makes_them():
-    with pytest.raises(ValueError, match="none of the 1 results has task random-walk") as refused:
-        results_of(FIG5, [result("mst")])
-    assert "--task random-walk --preset reference --robots 10 20 40 60 80" in str(refused.value)
 
 
 @pytest.mark.parametrize("config", ["", "[1]", "{"])
