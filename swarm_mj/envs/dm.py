@@ -82,7 +82,6 @@ class SwarmPhysics(mujoco.Physics):
         return self.swarm.mission.window_s
 
     def _show(self) -> None:
-        """Copy the robots' states and the time to where dm_control looks for them."""
         mission, states = self.swarm.mission, self.swarm.states
         self.data.time = self.swarm.now[0] * mission.window_s
         self.data.qpos[:] = states.position_m.ravel()

@@ -131,7 +131,6 @@ class SwarmVecEnv(VecEnv):
         return reward
 
     def _infos(self) -> list[dict[str, Any]]:
-        """Return each environment's mission's seed and the window's costs there."""
         infos: list[dict[str, Any]] = []
         for batch in self.batches:
             names, values = zip(*batch.infos().items(), strict=True)
@@ -142,7 +141,6 @@ class SwarmVecEnv(VecEnv):
         return infos
 
     def _observe(self) -> Observation:
-        """Return the present view of all environments."""
         seen = [batch.observation for batch in self.batches]
         together = {name: np.concatenate([each[name] for each in seen]) for name in seen[0]}
         if self.agent == "team":

@@ -198,7 +198,6 @@ def _json(content: dict[str, Any]) -> bytes:
 
 
 def _differences(name: str, before: object, now: object) -> Iterator[str]:
-    """Say in words where two pieces of JSON differ."""
     if isinstance(before, dict) and isinstance(now, dict):
         for key in dict.fromkeys([*now, *before]):
             yield from _differences(key, before.get(key), now.get(key))

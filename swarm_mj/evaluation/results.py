@@ -160,7 +160,6 @@ def _result(place: str, row: dict[str, str]) -> Result:
 
 
 def _value(spec: Field[Any], text: str) -> Any:  # noqa: ANN401 - any field's value
-    """Return a cell as its field's type; raise ValueError if it is not, or out of its range."""
     if text == "" and NoneType in get_args(spec.type):
         return None
     kind = kind_of(spec)

@@ -133,7 +133,6 @@ def _costs(costs: Samples) -> dict[str, Any]:
 
 
 def _packets(costs: Samples, regime: Mission, policy: Policy) -> dict[str, Any]:
-    """Return how many were sent and decoded, their bytes, and how far knowledge spread."""
     num_sent, num_bytes = float(costs["packets_sent"].sum()), policy.packet(regime).num_bytes
     num_windows = costs["aoi"].size * regime.num_windows
     sent_bytes = num_bytes * float(costs["packets_transmitted"].sum())

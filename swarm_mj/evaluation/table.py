@@ -121,7 +121,6 @@ def _cell(form: str, result: Result) -> str:
 
 
 def _has_own_cost(result: Result) -> bool:
-    """Return whether the task has a cost other than the paper's velocity variance."""
     return result.task_cost_name not in (None, Flocking.cost_name)
 
 
@@ -132,7 +131,6 @@ def _name(result: Result) -> str:
 
 
 def _below(results: Sequence[Result]) -> Iterator[str]:
-    """Yield the lines below a table: the bits that teams send, and the lower bound, if known."""
     sent = [
         f"{result.policy} {BITS_PER_BYTE * result.bytes_per_second / 1000.0:,.1f}"
         for result in results

@@ -121,7 +121,6 @@ def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, its: Sequence[Curv
 def _head(
     drawing: Figure, figure: ResultFigure, results: Sequence[Result], height_in: float
 ) -> None:
-    """Write the title, the fixed numbers of the missions, and the legend."""
     fixed = [FIXED[name].format(getattr(results[0], name)) for name in figure.fixed]
     regime = ", ".join([figure.task.replace("-", " "), *fixed])
     line = 1.0 - 0.28 / height_in

@@ -108,7 +108,6 @@ def _power(value: float) -> str:
 
 
 def _frame(axes: Axes, position_m: Float[np.ndarray, "P 2"]) -> None:
-    """Show the square around all robots, which is the same in both panels."""
     low = (np.min(position_m, axis=0) - MARGIN_M) / KM
     high = (np.max(position_m, axis=0) + MARGIN_M) / KM
     centre, half = (low + high) / 2.0, float(np.max(high - low)) / 2.0
