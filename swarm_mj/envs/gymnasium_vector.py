@@ -13,9 +13,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space, create_empty_array
 from jaxtyping import Int, UInt8
 
+from swarm_mj.envs.gymnasium import RENDERING, Screen
 from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, seed_or_next
 from swarm_mj.envs.options import check_count, check_reset, make_team_batch, team_spaces
-from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.mission import Mission
 from swarm_mj.system.fields import did_you_mean
 

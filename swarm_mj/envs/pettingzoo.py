@@ -7,9 +7,9 @@ from gymnasium import Space
 from gymnasium.utils import EzPickle, seeding
 from jaxtyping import UInt8
 
+from swarm_mj.envs.gymnasium import RENDERING, Screen
 from swarm_mj.envs.mission_batch import Info, Observation, seed_or_next
 from swarm_mj.envs.options import make_batch, robot_spaces
-from swarm_mj.envs.screen import RENDERING, Screen
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.checks import check_robots
 

@@ -1,3 +1,7 @@
+import os
+import shutil
+import subprocess
+import sys
 import warnings
 
 import gymnasium
@@ -6,8 +10,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from swarm_mj.envs import register_environments
-from swarm_mj.envs.gymnasium import SwarmEnv
+from swarm_mj.envs.gymnasium import HEIGHT, WIDTH, Screen, SwarmEnv
+from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
+from swarm_mj.envs.pettingzoo import parallel_env
 from swarm_mj.mission import paper
+from swarm_mj.replay.footage import footage_now
+from swarm_mj.replay.rendering.scene import SceneRenderer
 from swarm_mj.simulation.swarm import Swarm
 
 SMALL = {"num_robots": 5, "num_windows": 8, "range_ratio": 0.4}
@@ -67,3 +75,126 @@ def test_a_mission_may_be_given_whole_and_changed():
     register_environments()
     env = gymnasium.make("swarm_mj/Flocking-v0", mission=paper("stationary", **SMALL), num_robots=3)
     assert env.unwrapped.batch.mission == paper("stationary", **{**SMALL, "num_robots": 3})
+
+
+# Pictures: of the right mission, at the right moment.
+
+MISSION = paper("random-walk", num_robots=6, range_ratio=0.4, num_windows=9)
+
+
+def recipients(num_windows):
+    return np.random.default_rng(1).integers(0, 6, (num_windows, 2, 6))
+
+
+@pytest.fixture(scope="module")
+def pictures():
+    """Of the missions of seeds 3 and 4 after each window, drawn without any environment."""
+    swarm = Swarm(MISSION, [3, 4])
+    with SceneRenderer(MISSION, WIDTH, HEIGHT) as renderer:
+        drawn = [[renderer.frame(footage_now(swarm, b)) for b in (0, 1)]]
+        for recipient in recipients(5):
+            swarm.step_with_recipients(recipient)
+            drawn.append([renderer.frame(footage_now(swarm, b)) for b in (0, 1)])
+    return drawn
+
+
+@pytest.mark.usefixtures("opengl")
+def test_single_environments_are_drawn(pictures):
+    assert len({picture.tobytes() for pair in pictures for picture in pair}) == 12
+    env = SwarmEnv(MISSION, render_mode="rgb_array")
+    env.reset(seed=3)
+    for recipient, pair in zip(recipients(5), pictures[1:], strict=True):
+        env.step(recipient[0])
+        np.testing.assert_array_equal(env.render(), pair[0])
+    env.close()
+    env = parallel_env(MISSION, render_mode="rgb_array")
+    env.reset(seed=4)
+    np.testing.assert_array_equal(env.render(), pictures[0][1])
+    env.close()
+
+
+@pytest.mark.usefixtures("opengl")
+def test_every_mission_of_a_vector_is_drawn(pictures):
+    """Also of those that began later than the others."""
+    env = SwarmVectorEnv(3, MISSION, render_mode="rgb_array")
+    env.reset(seed=[3, 4, 5])
+    for recipient in recipients(2):
+        env.step(np.concatenate([recipient, recipient[:1]]))
+    env.reset(seed=[None, 4, None], options={"reset_mask": np.array([False, True, False])})
+    drawn = env.render()
+    assert len(drawn) == 3
+    np.testing.assert_array_equal(drawn[0], pictures[2][0])
+    np.testing.assert_array_equal(drawn[1], pictures[0][1])
+    env.close()
+
+
+def test_without_a_mode_there_is_no_picture():
+    for env in (SwarmEnv(MISSION), parallel_env(MISSION), SwarmVectorEnv(2, MISSION)):
+        env.reset(seed=1)
+        assert env.render() is None
+        env.close()
+
+
+def test_a_mode_that_there_is_not():
+    with pytest.raises(ValueError, match="render_mode must be one of rgb_array, human, not 'ansi'"):
+        Screen("ansi")
+    with pytest.raises(ValueError, match="render_mode must be one of rgb_array, not 'human'"):
+        SwarmVectorEnv(2, MISSION, render_mode="human")
+
+
+DRAW_AND_END = """
+import gymnasium, swarm_mj
+env = gymnasium.make("swarm_mj/Flocking-v0", num_robots=3, render_mode="rgb_array")
+env.reset(seed=1)
+print(env.render().shape)
+"""
+
+
+@pytest.mark.usefixtures("opengl")
+def test_a_script_that_closes_nothing_ends_quietly():
+    command = [sys.executable, "-W", "ignore", "-c", DRAW_AND_END]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "(600, 800, 3)\n", "")
+
+
+# In a process of its own: a window belongs to the process, and to its display.
+FLY_BEFORE_A_HUMAN = """
+import time
+import gymnasium, swarm_mj
+import numpy as np
+env = gymnasium.make("swarm_mj/Flocking-v0", num_robots=5, num_windows=9, render_mode="human")
+env.reset(seed=1)
+started = time.monotonic()
+for _ in range(8):
+    env.step(np.arange(5))
+assert time.monotonic() - started > 0.7, "faster than time"
+viewer = env.unwrapped._screen._viewer
+assert viewer._window.is_running()
+assert viewer._markers.ngeom == 10, viewer._markers.ngeom  # five discs with headings
+env.close()
+assert not viewer._window.is_running()
+print("seen")
+"""
+
+
+def fly_before_a_human(*program, **environment):
+    command = [*program, sys.executable, "-W", "ignore", "-c", FLY_BEFORE_A_HUMAN]
+    environ = {k: v for k, v in os.environ.items() if k != "DISPLAY"} | environment
+    return subprocess.run(command, env=environ, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.usefixtures("opengl")
+@pytest.mark.skipif(shutil.which("xvfb-run") is None, reason="needs Xvfb, a display without one")
+def test_a_human_sees_a_mission_in_a_window():
+    done = fly_before_a_human("xvfb-run", "-a")
+    assert (done.returncode, done.stdout) == (0, "seen\n"), done.stderr
+
+
+@pytest.mark.usefixtures("opengl")
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have a display always")
+def test_without_a_display_it_says_so():
+    done = fly_before_a_human()
+    last = done.stderr.strip().splitlines()[-1]
+    assert last == (
+        'OSError: the window needs a display; without one, render_mode="rgb_array" draws pictures'
+    )

@@ -93,8 +93,7 @@ def trained(algorithm=MaskablePPO, env=None, **options):
     return algorithm(policy, env, n_steps=8, seed=1, **options).learn(64)
 
 
-@pytest.mark.parametrize("algorithm", [MaskablePPO, A2C, PPO])
-@pytest.mark.parametrize("net_arch", [[], [8], [16, 8]])
+@pytest.mark.parametrize(("algorithm", "net_arch"), [(MaskablePPO, [16, 8]), (A2C, [8]), (PPO, [])])
 def test_a_stored_actor_decides_as_the_trained_one(tmp_path, algorithm, net_arch):
     activation = nn.ReLU if net_arch == [8] else nn.Tanh
     kwargs = {"net_arch": net_arch, "activation_fn": activation}
