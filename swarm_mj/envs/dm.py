@@ -19,7 +19,6 @@ from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.protocol.checks import check_robots
-from swarm_mj.protocol.costs import age_of_information
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.simulation.swarm import Swarm
 
@@ -74,7 +73,7 @@ class SwarmPhysics(mujoco.Physics):
     def step(self, nstep: int = 1) -> None:
         """Fly windows of Alg. 1 with the recipients in `recipient`."""
         for _ in range(nstep):
-            self.swarm.step_with_recipients(self.recipient)
+            self.costs = self.swarm.step_with_recipients(self.recipient)
         self._show()
 
     def timestep(self) -> float:
@@ -120,9 +119,7 @@ class SwarmTask(_Task):
 
     def get_reward(self, physics: SwarmPhysics) -> float:
         """Return minus the age of information after the window (cost of Eq. 10) [windows]."""
-        swarm = physics.swarm
-        age, _ = age_of_information(swarm.buffers, swarm.now, swarm.states.is_active)
-        return -float(age[0])
+        return -float(physics.costs.age_windows[0])
 
     def get_termination(self, physics: SwarmPhysics) -> float | None:
         """Return a discount of 1 after the last window: a mission is cut off, it reaches no end."""

@@ -146,12 +146,3 @@ def test_a_gain_is_the_news_of_the_packet_and_of_its_answer():
     told = (10.5 - 3.0) + (7.0 - 2.0)
     answered = (11.0 - 4.0) + (6.0 - 1.0)
     assert gained[0] == pytest.approx(told + answered)
-
-
-def test_nothing_given_is_changed():
-    swarm = Swarm(paper("stationary", num_robots=5, range_ratio=0.5), [1])
-    given_ = (swarm.buffers.timestamp, swarm.states.position_m, np.array([[1, 2, 2, 2, 3]]))
-    before = copy.deepcopy(given_)
-    credits_of(*given_, swarm.channel, swarm.now)
-    for after, as_it_was in zip(given_, before, strict=True):
-        np.testing.assert_array_equal(after, as_it_was)
