@@ -97,9 +97,8 @@ def test_made_by_name():
     assert isinstance(env, SwarmVectorEnv)
     assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
     assert (env.num_envs, env.single_action_space.shape) == (2, (5,))
-    assert gymnasium.make_vec("swarm_mj/Flocking-v0").metadata["autoreset_mode"] is (
-        AutoresetMode.NEXT_STEP
-    )
+    default = gymnasium.make_vec("swarm_mj/Flocking-v0").metadata["autoreset_mode"]
+    assert default is AutoresetMode.NEXT_STEP
 
 
 def test_without_autoreset_an_ended_mission_is_refused():

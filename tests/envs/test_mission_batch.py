@@ -70,15 +70,16 @@ def test_credit_is_the_age_that_a_window_without_the_robot_would_have_left():
 
 
 def test_what_is_seen_is_what_the_networks_see():
-    batch = begun("stationary", with_parents=True, num_robots=8, num_windows=60, range_ratio=0.15)
+    sparse = {"num_robots": 8, "num_windows": 60, "range_ratio": 0.15}
+    batch = begun("stationary", with_parents=True, seeds=(1, 2, 3), **sparse)
     extractor = make_extractor("extended", batch.mission)
-    extractor.start(2, 8)
-    for recipient in recipients(60, 2, 8):
+    extractor.start(3, 8)
+    for recipient in recipients(60, 3, 8):
         batch.step(recipient)
         graphs, seen = extractor.graphs(batch.swarm.views), batch.observation
         np.testing.assert_array_equal(seen["observation"].reshape(graphs.node.shape), graphs.node)
-        np.testing.assert_array_equal(seen["parent"].reshape(16, 8), graphs.parent)
-        np.testing.assert_array_equal(seen["action_mask"].reshape(16, 8) == 1, graphs.may_address)
+        np.testing.assert_array_equal(seen["parent"].reshape(24, 8), graphs.parent)
+        np.testing.assert_array_equal(seen["action_mask"].reshape(24, 8) == 1, graphs.may_address)
     assert not np.all(seen["action_mask"])  # some teammates are believed out of range
 
 

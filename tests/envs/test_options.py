@@ -8,12 +8,11 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode
 
 from swarm_mj.envs import environment_id, register_environments
 from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
-from swarm_mj.envs.options import check_features_named, make_batch, robot_spaces, team_spaces
+from swarm_mj.envs.options import make_batch, robot_spaces, team_spaces
 from swarm_mj.mission import Task, paper
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.policies.gnn.graphs import PaperFeatures
@@ -21,21 +20,31 @@ from swarm_mj.policies.gnn.graphs import PaperFeatures
 SMALL = {"num_robots": 3, "num_windows": 5}
 
 
-@pytest.mark.parametrize("name", ["RandomWalk", "swarm_mj/RandomWalk-v0", "random_walk"])
-def test_tasks_by_other_names(name):
-    with pytest.raises(ValueError, match=r"must be one of .*; did you mean random-walk\?"):
-        make_batch(name)
+RESET = {"options": {"mask": 1}}
+REFUSED = {
+    "did you mean random-walk": lambda: make_batch("swarm_mj/RandomWalk-v0"),
+    "one of .*; did you mean random-walk": lambda: make_batch("random_walk"),
+    "here 'flocking'; use swarm_mj/Coverage-v0 or 'coverage'": lambda: gymnasium.make(
+        "swarm_mj/Flocking-v0", task="coverage"
+    ),
+    r"give it to reset\(seed=...\)": lambda: gymnasium.make("swarm_mj/Flocking-v0", seed=1),
+    r'features="swarm_mj\.policies\.gnn\.graphs:PaperFeatures"': lambda: make_batch(
+        features=PaperFeatures
+    ),
+    "no option 'mask'; it has none": lambda: SwarmEnv(**SMALL).reset(**RESET),
+    "no option 'mask'; it has reset_mask": lambda: SwarmVectorEnv(2, **SMALL).reset(**RESET),
+    "num_envs must be 1 or more, not 0": lambda: SwarmVectorEnv(0, **SMALL),
+    "NextStep, SameStep, Disabled, not 'Same'; did you mean": lambda: SwarmVectorEnv(
+        1, autoreset_mode="Same", **SMALL
+    ),
+}
 
 
-def test_an_environments_name_settles_its_task():
-    with pytest.raises(TypeError, match="here 'flocking'; use swarm_mj/Coverage-v0 or 'coverage'"):
-        gymnasium.make("swarm_mj/Flocking-v0", task="coverage")
+@pytest.mark.parametrize("complaint", REFUSED)
+def test_what_is_refused(complaint):
+    with pytest.raises((ValueError, TypeError), match=complaint):
+        REFUSED[complaint]()
     assert make_batch(paper("flocking"), task="coverage").mission.task == "coverage"
-
-
-def test_seeds_are_given_to_reset():
-    with pytest.raises(TypeError, match=r"give it to reset\(seed=...\)"):
-        gymnasium.make("swarm_mj/Flocking-v0", seed=1)
 
 
 OWN = """
@@ -64,32 +73,6 @@ def test_own_features_name_all_their_numbers_which_have_no_bounds(here, monkeypa
     seen, _ = robot_spaces(team)
     team.restart([1])
     assert {name: each[0, 0] for name, each in team.observation.items()} in seen
-
-
-def test_features_are_no_class():
-    named = r'features="swarm_mj\.policies\.gnn\.graphs:PaperFeatures"'
-    with pytest.raises(TypeError, match=named):
-        check_features_named(PaperFeatures)
-
-
-def test_options_of_reset():
-    single, vector = SwarmEnv(**SMALL), SwarmVectorEnv(2, **SMALL)
-    with pytest.raises(ValueError, match="no option 'mask'; it has none"):
-        single.reset(options={"mask": 1})
-    with pytest.raises(ValueError, match="no option 'mask'; it has reset_mask"):
-        vector.reset(options={"mask": 1})
-    single.reset(options={})
-    vector.reset(options={"reset_mask": np.ones(2, dtype=bool)})
-
-
-def test_what_a_vector_is_not():
-    with pytest.raises(ValueError, match="num_envs must be 1 or more, not 0"):
-        SwarmVectorEnv(0, **SMALL)
-    with pytest.raises(ValueError, match="NextStep, SameStep, Disabled, not 'Same'; did you mean"):
-        SwarmVectorEnv(1, autoreset_mode="Same", **SMALL)
-    for mode in ("SameStep", AutoresetMode.SAME_STEP):
-        env = SwarmVectorEnv(1, autoreset_mode=mode, **SMALL)
-        assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
 
 
 def test_a_robot_sees_a_row_of_what_the_team_sees():
