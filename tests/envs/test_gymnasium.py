@@ -3,6 +3,7 @@ import shutil
 import subprocess
 import sys
 import warnings
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -72,9 +73,8 @@ def test_parts_by_name_are_made_when_the_environment_is():
 
 
 def test_a_mission_may_be_given_whole_and_changed():
-    register_environments()
-    env = gymnasium.make("swarm_mj/Flocking-v0", mission=paper("stationary", **SMALL), num_robots=3)
-    assert env.unwrapped.batch.mission == paper("stationary", **{**SMALL, "num_robots": 3})
+    mission, changes = paper("flocking", **SMALL), {"task": "coverage", "num_robots": 3}
+    assert SwarmEnv(mission, **changes).batch.mission == replace(mission, **changes)
 
 
 # Pictures: of the right mission, at the right moment.

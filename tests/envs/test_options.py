@@ -13,7 +13,7 @@ from swarm_mj.envs import environment_id, register_environments
 from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
 from swarm_mj.envs.options import make_batch, robot_spaces, team_spaces
-from swarm_mj.mission import Task, paper
+from swarm_mj.mission import Task
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.policies.gnn.graphs import PaperFeatures
 
@@ -44,7 +44,6 @@ REFUSED = {
 def test_what_is_refused(complaint):
     with pytest.raises((ValueError, TypeError), match=complaint):
         REFUSED[complaint]()
-    assert make_batch(paper("flocking"), task="coverage").mission.task == "coverage"
 
 
 OWN = """
