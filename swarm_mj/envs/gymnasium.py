@@ -1,6 +1,6 @@
 """The Gymnasium face: a team under one controller, whose action is everyone's recipient.
 
-Its screen is that of the vector's and of PettingZoo's face, too.
+The vector environment and PettingZoo's draw on the same screen.
 """
 
 import time

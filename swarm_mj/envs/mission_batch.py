@@ -171,11 +171,11 @@ class MissionBatch:
         return infos if task_cost is None else infos | {"task_cost": task_cost}
 
     def first(self) -> tuple[Observation, Info]:
-        """Return the view and the infos of the first mission, which many a face has alone."""
+        """Return the first mission's view and infos, for environments of a single mission."""
         info = {name: values[0].item() for name, values in self.infos().items()}
         return {name: values[0] for name, values in self.observation.items()}, info
 
 
 def seed_or_next(seed: int | None, rng: np.random.Generator) -> int:
-    """Return the seed given, or draw another mission's; never one of an evaluation."""
+    """Return the seed; if it is None, draw another mission's, which no evaluation has."""
     return int(rng.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED)) if seed is None else seed

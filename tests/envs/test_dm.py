@@ -167,7 +167,7 @@ physics.free()
 """
 
 
-@pytest.fixture(scope="module", params=["egl", "osmesa"])
+@pytest.fixture(scope="module", params=["egl", pytest.param("osmesa", marks=pytest.mark.slow)])
 def photographed(request, tmp_path_factory):
     path = tmp_path_factory.mktemp("picture") / "top.npz"
     command = [sys.executable, "-c", TAKE_PICTURE, str(path)]
