@@ -12,7 +12,7 @@ from gymnasium import spaces
 from swarm_mj.envs import environment_id, register_environments
 from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
-from swarm_mj.envs.options import make_batch, robot_spaces, team_spaces
+from swarm_mj.envs.options import check_features_named, make_batch, robot_spaces, team_spaces
 from swarm_mj.mission import Task
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.policies.gnn.graphs import PaperFeatures
@@ -28,8 +28,8 @@ REFUSED = {
         "swarm_mj/Flocking-v0", task="coverage"
     ),
     r"give it to reset\(seed=...\)": lambda: gymnasium.make("swarm_mj/Flocking-v0", seed=1),
-    r'features="swarm_mj\.policies\.gnn\.graphs:PaperFeatures"': lambda: make_batch(
-        features=PaperFeatures
+    r'features="swarm_mj\.policies\.gnn\.graphs:PaperFeatures"': lambda: check_features_named(
+        PaperFeatures
     ),
     "no option 'mask'; it has none": lambda: SwarmEnv(**SMALL).reset(**RESET),
     "no option 'mask'; it has reset_mask": lambda: SwarmVectorEnv(2, **SMALL).reset(**RESET),
