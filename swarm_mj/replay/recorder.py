@@ -157,6 +157,12 @@ class Recorder:
         # row comes last: whatever an interrupt leaves unfinished, rows count the whole windows.
         self._rows.append({name: np.array(value) for name, value in shown.items()})
 
+    @property
+    def num_bytes(self) -> int:
+        """The memory taken so far; every window takes the same."""
+        row = sum(value.nbytes for value in self._rows[0].values()) if self._rows else 0
+        return len(self._rows) * row + sum(each.nbytes for each in (*self._age, *self._links))
+
     def log(self) -> Log:
         """Return everything recorded so far; raise ValueError if that is nothing."""
         if not self._rows:

@@ -85,6 +85,9 @@ def test_snapshots_are_taken_every_few_windows_and_groups_stand_until_the_next()
         np.testing.assert_array_equal(shown, expected)
     is_apart = np.array([[of != team[2] for of in team] for team in log.group])
     np.testing.assert_array_equal(log.is_cut_off, is_apart)
+    kept = [*record._age, *(value for row in record._rows for value in row.values())]
+    found = sum(seen[w].links.nbytes for w in (0, 5, 10))
+    assert record.num_bytes == sum(each.nbytes for each in kept) + found
 
 
 def test_free_space_has_no_snapshots_and_rows_keep_no_more_than_themselves():
