@@ -39,8 +39,7 @@ _loaded: dict[str, str] = {}  # modules of users' code, and what a message calls
 class Components:
     """A mission's channel, controller and scene: objects or names; None is the mission's own.
 
-    Raises:
-        TypeError: One is neither a name nor something that is called as its kind is.
+    Raises TypeError for what is neither a name nor called as its kind is.
     """
 
     # Any admits objects; files and command lines hold names only.
@@ -70,11 +69,9 @@ class Components:
         return "".join(f", {kind} {name}" for kind, name in self.names.items())
 
     def made(self, mission: Mission) -> "Components":
-        """Return the components as objects.
+        """Return the components as objects; raise ValueError as `make`.
 
-        Raises:
-            ValueError: As for `make`, or a named channel would replace what the mission asks for.
-            TypeError: As for the class.
+        A named channel must not replace what the mission asks for.
         """
         named = {kind: each for kind, each in self.given.items() if isinstance(each, str)}
         if "channel" in named and mission.beyond_free_space:
@@ -112,10 +109,8 @@ def is_ours(component: object) -> bool:
 def load(kind: str, name: str) -> Any:  # noqa: ANN401 - whatever has that name
     """Return what a user's `module:Name` names; the current folder is searched first.
 
-    `kind` says for messages what it is to be, such as "channel".
-
-    Raises:
-        ValueError: The name has another form, leads nowhere, or the module cannot be imported.
+    `kind` says for messages what it is to be, such as "channel". Raises ValueError if the name has
+    another form, leads nowhere, or the module cannot be imported.
     """
     _check_form(kind, name)
     module_name, _, attribute = name.partition(":")
@@ -140,9 +135,7 @@ def make(kind: str, name: str, mission: Mission) -> Any:  # noqa: ANN401 - any k
     What `name` names is called with the mission, or with nothing if it needs no argument. A
     function of two arguments, or an object like one, is the component itself. Either may be a
     `functools.partial`, by which one file holds a component with several values of its numbers.
-
-    Raises:
-        ValueError: As for `load`, or what it names cannot be called so, or raises.
+    Raises ValueError as `load` does, and if what it names cannot be called so, or raises.
     """
     found = load(kind, name)
     if not callable(found):

@@ -48,23 +48,17 @@ def connected_positions(
     `largest_part_at` says who is in the largest connected part under the team's own channel. Robots
     that `is_blocked_at` names cannot be there and are drawn anew. With `keeps_largest` only robots
     outside the largest part are drawn anew, not the whole team: between obstacles hardly any team
-    is connected that is drawn at once.
-
-    Raises:
-        ValueError: All draws were disconnected, or the area has hardly any free space.
+    is connected that is drawn at once. Raises ValueError if all draws were disconnected, or the
+    area has hardly any free space.
     """
     num_draws = min(MAX_DRAWS, MAX_ROBOTS_DRAWN // num_robots)
     position_m, is_kept = np.empty((num_robots, 2)), np.zeros(num_robots, dtype=np.bool_)
     for _ in range(num_draws):
         _draw_free(position_m, is_kept, half_side_m, rng, is_blocked_at)
-        if largest_part_at is None:
-            if is_connected(position_m, range_m):
-                return position_m
-        else:
-            part = largest_part_at(position_m)
-            if np.all(part):
-                return position_m
-            is_kept = part & keeps_largest
+        part = largest_part_at(position_m) if largest_part_at else is_kept
+        if np.all(part) if largest_part_at else is_connected(position_m, range_m):
+            return position_m
+        is_kept = part & keeps_largest
     reach = f"a range of {range_m:g} m"
     if largest_part_at is not None:
         reach += " in free space, and less in their channel,"
@@ -86,10 +80,7 @@ def _draw_free(
     for _ in range(MAX_FREE_DRAWS):
         fresh = rng.uniform(-half_side_m, half_side_m, size=(int(np.sum(is_due)), 2))
         position_m[is_due] = fresh
-        if is_blocked_at is None:
-            return
-        is_due = is_blocked_at(position_m)
-        if not np.any(is_due):
+        if is_blocked_at is None or not np.any(is_due := is_blocked_at(position_m)):
             return
     raise ValueError(
         f"{int(np.sum(is_due))} of {len(position_m)} robots found no free space in "

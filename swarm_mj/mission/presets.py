@@ -12,11 +12,7 @@ def paper(task: Task = "flocking", **overrides: Any) -> Mission:
     """Return the paper's text, taken literally, with any fields of `Mission` overridden.
 
     Unless overridden, a flock has no boundary. In an arena with obstacles it has one, and physics
-    are `contact`, as where robots collide.
-
-    Raises:
-        ValueError: A value is outside its range.
-        TypeError: An override is no field of `Mission`.
+    are `contact`, as where robots collide. Raises as `Mission` does.
     """
     is_open = overrides.get("arena", OPEN) == OPEN
     is_touching = not is_open or overrides.get("collide", False)

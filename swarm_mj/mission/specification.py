@@ -6,6 +6,7 @@ Where the paper's text and its authors' code differ, each difference is a field 
 
 import math
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -21,8 +22,8 @@ HalfDuplex = Literal["strict", "eavesdroppers"]
 FlockingSet = Literal["heard", "moving"]
 PathLossLaw = Literal["free-space", "log-distance", "two-ray"]
 FadingLaw = Literal["none", "rayleigh", "rician"]
-Number = float | int
 Grant = Literal["map", "statistics", "start"]  # what robots may know before the mission
+Knowable = Literal["nothing", Grant]
 
 # Ratios are fractions of this distance, whatever the team's size (IV-B).
 MISSION_DISTANCE_M = 1000.0
@@ -32,35 +33,38 @@ MIN_SURVIVORS = 2  # whatever the fraction that fails, so that there is an age o
 OPEN = "open"  # the arena of the paper's missions: nothing stands in it
 CHANNEL = "channel"  # a heading of the help
 NOTHING = "nothing"  # is known beforehand, beyond free space
-KNOWABLE = (NOTHING, *get_args(Grant))
 NEW = "not the paper's"  # the source of what the paper has not
 
 
 def _number(
-    default: Number, label: str, unit: str, low: float, high: float, help: str = "", **about: str
+    default: float | None,
+    label: str,
+    unit: str,
+    low: float,
+    high: float,
+    help: str = "",
+    **more: str,
 ) -> FieldOf:
     """Return a number: name in words, unit, range; with help, an option. By default of IV-B."""
-    limits = {"unit": unit, "low": low, "high": high}
-    return setting(default, help, label=label, **limits, **{"source": "IV-B"} | about)
+    about = {"source": "IV-B"} | more
+    return setting(default, help, label=label, unit=unit, low=low, high=high, **about)
 
 
-def _radio(default: float, label: str, unit: str, low: float, high: float, help: str) -> FieldOf:
-    """Return a number of the channel beyond free space, an option under its own heading."""
-    return _number(default, label, unit, low, high, help, group=CHANNEL, source=NEW)
+# Numbers of the channel beyond free space are options under a heading of their own.
+_radio = partial(_number, group=CHANNEL, source=NEW)
 
 
 def _choice(
-    default: str, label: str, source: str, choices: object, help: str = "", group: str | None = None
+    default: str, label: str, source: str, choices: object, help: str = "", **about: Any
 ) -> FieldOf:
     """Return one of several names, given as a `Literal`."""
-    about = {"label": label, "source": source, "choices": get_args(choices)}
-    return setting(default, help, **about, **({"group": group} if group else {}))
+    return setting(default, help, label=label, source=source, choices=get_args(choices), **about)
 
 
 def in_order(prior_knowledge: str) -> str:
     """Return grants as they are kept: each once, in one order, joined by commas."""
     grants = dict.fromkeys(name.strip() for name in prior_knowledge.split(","))
-    order = [*KNOWABLE, *grants]  # unknown names stay, for the message that refuses them
+    order = [*get_args(Knowable), *grants]  # unknown names stay, for the message that refuses them
     return ",".join(sorted(grants, key=order.index))
 
 
@@ -106,7 +110,12 @@ class Mission:
 
     # The channel beyond the paper's free space (`radio.mission_radio`).
     path_loss: PathLossLaw = _choice(
-        "free-space", "path loss", "Eq. 1", PathLossLaw, "how power falls with distance", CHANNEL
+        "free-space",
+        "path loss",
+        "Eq. 1",
+        PathLossLaw,
+        "how power falls with distance",
+        group=CHANNEL,
     )
     loss_exponent: float = _radio(
         3.0, "path loss exponent", "1", 1.0, 10.0, "slope of log-distance: 2 is free space's"
@@ -124,7 +133,7 @@ class Mission:
         20.0, "shadowing distance", "m", 0.1, 10_000.0, "over which its correlation falls to 1/e"
     )
     fading: FadingLaw = _choice(
-        "none", "fading", NEW, FadingLaw, "of every link, anew in each slot", CHANNEL
+        "none", "fading", NEW, FadingLaw, "of every link, anew in each slot", group=CHANNEL
     )
     rician_k: float = _radio(
         4.0, "Rician K", "1", 0.0, 10_000.0, "power in line of sight over scattered; 0: Rayleigh"
@@ -142,25 +151,14 @@ class Mission:
         0.0, "high-power fraction", "of the team", 0.0, 1.0, "robots with more transmit power"
     )
     high_power_db: float = _radio(6.0, "extra power", "dB", 0.0, 60.0, "how much more that is")
-    prior_knowledge: str = setting(
-        NOTHING,
+    prior_knowledge: str = _choice(
+        *(NOTHING, "prior knowledge", NEW, Knowable),
         "what robots know before the mission, several joined by commas",
-        group=CHANNEL,
-        label="prior knowledge",
-        source=NEW,
-        choices=KNOWABLE,
-        is_joined=True,
-        convert=in_order,
+        **{"group": CHANNEL, "is_joined": True, "convert": in_order},
     )
-    bit_rate: float | None = setting(
-        None,
+    bit_rate: float | None = _radio(
+        *(None, "bit rate", "bit/s", 1.0, 1e12),
         "in bit/s, as 250k or 6M; what does not fit into a slot of 50 ms is not sent",
-        group=CHANNEL,
-        label="bit rate",
-        unit="bit/s",
-        source=NEW,
-        low=1.0,
-        high=1e12,
         metavar="RATE",
     )
 
@@ -194,16 +192,13 @@ class Mission:
             raise ValueError(
                 f"prior knowledge must be nothing or some of {some}, not {self.prior_knowledge}"
             )
+        said = "exact physics knows no collisions,"
         if self.physics == "exact" and self.arena != OPEN:
-            raise ValueError(
-                f"exact physics knows no collisions, and arena {self.arena} has obstacles; choose "
-                "physics contact, or arena open"
-            )
+            has = f"{said} and arena {self.arena} has obstacles"
+            raise ValueError(f"{has}; choose physics contact, or arena open")
         if self.physics == "exact" and self.collide:
-            raise ValueError(
-                "exact physics knows no collisions, so robots cannot collide in it; choose physics "
-                "contact, or let them pass through each other"
-            )
+            choose = "choose physics contact, or let them pass through each other"
+            raise ValueError(f"{said} so robots cannot collide in it; {choose}")
         for name, value in vars(self).items():
             if isinstance(value, np.generic):  # which JSON does not know
                 object.__setattr__(self, name, value.item())
@@ -249,9 +244,8 @@ class Mission:
     @property
     def num_high_power(self) -> int:
         """Number of robots with more transmit power: the first ones, to the nearest."""
-        if self.high_power_db == 0.0:
-            return 0
-        return round(self.high_power_fraction * self.num_robots)
+        has_more = self.high_power_db > 0.0
+        return round(self.high_power_fraction * self.num_robots) if has_more else 0
 
     def grants(self, what: str) -> bool:
         """Return whether robots know this before the mission."""

@@ -3,7 +3,6 @@
 Obstacles (`physics.solid_geoms`) attenuate packets and, in `contact` physics, reflect robots.
 """
 
-import math
 import os
 from collections.abc import Callable
 from itertools import product
@@ -37,11 +36,7 @@ COLOURS = {
 
 
 def arena_of(mission: Mission) -> Arena | None:
-    """Return the arena of a mission; None for the paper's, which is empty.
-
-    Raises:
-        ValueError: There is no such arena, and no such file.
-    """
+    """Return the arena of a mission, or raise ValueError; None is the paper's, which is empty."""
     name = mission.arena
     if name in ARENAS:
         return ARENAS[name]
@@ -59,10 +54,9 @@ def notes_on(mission: Mission) -> list[str]:
     """Return a note on each obstacle in a file that neither robots nor packets can meet."""
     if arena_of(mission) is not _from_file:
         return []
-    names = idle_obstacles(_read(mission.arena).compile(), _reach_m(mission))
+    idle = idle_obstacles(_read(mission.arena).compile(), mission).items()
     return [
-        f"arena {mission.arena}: {name} does nothing, as it stands {where}"
-        for name, where in names.items()
+        f"arena {mission.arena}: {name} does nothing, as it stands {where}" for name, where in idle
     ]
 
 
@@ -101,11 +95,7 @@ ARENAS: dict[str, Arena | None] = {OPEN: None, "blocks": blocks, "forest": fores
 
 
 def _from_file(spec: MjSpec, mission: Mission) -> None:
-    """Add the contents of a user's MJCF file.
-
-    Raises:
-        ValueError: MuJoCo does not take it, something moves in it, or it has no obstacle.
-    """
+    """Add the contents of a user's MJCF file, or raise ValueError."""
     theirs = _read(mission.arena)
     try:
         model = theirs.compile()
@@ -117,7 +107,7 @@ def _from_file(spec: MjSpec, mission: Mission) -> None:
         raise ValueError(f"arena {mission.arena}: {moves} has a joint, but obstacles stand still")
     if num_obstacles == 0:
         raise ValueError(f"arena {mission.arena} has no obstacle: {_why_none(theirs)}")
-    idle = idle_obstacles(model, _reach_m(mission))
+    idle = idle_obstacles(model, mission)
     if len(idle) == num_obstacles:
         name, where = next(iter(idle.items()))
         said = f"no obstacle can do anything; {name} stands {where}"
@@ -146,17 +136,11 @@ def _refused(file: str, error: ValueError) -> ValueError:
     return ValueError(f"arena {file}: {' '.join(str(error).split())}")
 
 
-def _reach_m(mission: Mission) -> float:
-    """Return how far from the centre robots can get per axis [m]."""
-    return mission.half_side_m if mission.has_walls else math.inf
-
-
 def _why_none(theirs: MjSpec) -> str:
     """Explain why a file holds no obstacle, and what to do."""
-    grouped = [geom for geom in theirs.geoms if geom.group == OBSTACLE_GROUP]
     if not theirs.geoms:
         why = "it has no geom; add walls"
-    elif grouped:
+    elif any(geom.group == OBSTACLE_GROUP for geom in theirs.geoms):
         why = f"its geoms of group {OBSTACLE_GROUP} are planes or height fields; give it boxes"
     else:
         why = f'none of its geoms is of group {OBSTACLE_GROUP}; give walls group="{OBSTACLE_GROUP}"'

@@ -54,9 +54,7 @@ def compose(
     A start, of the first mission, is for viewers, and is also the keyframe `start`. Without it, all
     robots stand at the origin until `Physics.place` moves them. A scene changes the arena with the
     robots in it; its geoms stop robots in `contact` physics only, as `exact` has no collisions.
-
-    Raises:
-        ValueError: The scene added, took away or renamed joints or actuators.
+    Raises ValueError if the scene added, took away or renamed joints or actuators.
     """
     spec = MjSpec.from_file(str(asset("arena.xml")))
     spec.option.timestep = timestep_s(mission)
@@ -69,10 +67,9 @@ def compose(
         spec.attach(robot.copy(), frame=frame, prefix=f"r{i}/")
     if mission.collide:
         spec.option.disableflags &= ~int(mjtDisableBit.mjDSBL_CONTACT)
-    if (arena := arena_of(mission)) is not None:
-        _change(spec, mission, arena)
-    if scene is not None:
-        _change(spec, mission, scene)
+    for change in (arena_of(mission), scene):
+        if change is not None:
+            _change(spec, mission, change)
     if start is not None:
         _place_robots(spec, mission, start)
     return spec

@@ -9,20 +9,11 @@ import numpy as np
 from mujoco._functions import mj_kinematics
 from mujoco._structs import MjData, MjModel
 
-from swarm_mj.physics.state import (
-    BOX,
-    CAPSULE,
-    CYLINDER,
-    ELLIPSOID,
-    ROBOT_HEIGHT_M,
-    ROBOT_RADIUS_M,
-    SPHERE,
-    Obstacles,
-)
+from swarm_mj.mission import Mission
+from swarm_mj.physics.state import BOX, KINDS, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, Obstacles
 
 OBSTACLE_GROUP = 1
 MESH = 7  # as MuJoCo numbers it
-KINDS = (SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX)
 
 # Per obstacle crossed. Walls: COST 231 (1999), section 4.7, at 1.8 GHz. A building counts as two
 # outer walls of 7 dB and the rooms between them; a tree as 12 m of leaves at about 0.5 dB/m (ITU-R
@@ -32,11 +23,7 @@ DEFAULT_LOSS_DB = 10.0
 
 
 def obstacles_of(model: MjModel) -> Obstacles:
-    """Return the obstacles of a compiled scene.
-
-    Raises:
-        ValueError: A loss is negative or not finite.
-    """
+    """Return the obstacles of a compiled scene, or raise ValueError by a loss (`loss_db_of`)."""
     data = MjData(model)
     mj_kinematics(model, data)
     found = np.array(obstacle_geoms(model), dtype=int)
@@ -65,11 +52,9 @@ def obstacle_geoms(model: MjModel) -> list[int]:
     return np.flatnonzero(is_obstacle).tolist()
 
 
-def idle_obstacles(model: MjModel, reach_m: float) -> dict[str, str]:
-    """Return the obstacles that neither robots nor packets can meet, and where they stand.
-
-    Robots get as far from the centre as `reach_m` per axis [m].
-    """
+def idle_obstacles(model: MjModel, mission: Mission) -> dict[str, str]:
+    """Return the obstacles that neither robots nor packets can meet, and where they stand."""
+    reach_m = mission.half_side_m if mission.has_walls else np.inf  # from the centre, per axis
     found, idle = obstacles_of(model), {}
     for o, g in enumerate(obstacle_geoms(model)):
         # Of the box around it that MuJoCo keeps, in the obstacle's frame; a ball may be narrower.
@@ -86,11 +71,7 @@ def idle_obstacles(model: MjModel, reach_m: float) -> dict[str, str]:
 
 
 def loss_db_of(model: MjModel, g: int) -> float:
-    """Return an obstacle's penetration loss [dB].
-
-    Raises:
-        ValueError: It is negative or not finite.
-    """
+    """Return an obstacle's penetration loss [dB]; raise ValueError if negative or not finite."""
     material = int(model.geom_matid[g])
     named = model.mat(material).name if material >= 0 else ""
     loss_db = LOSS_DB.get(named, DEFAULT_LOSS_DB)

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 ROBOT_RADIUS_M = 0.5  # assets/robot.xml
 ROBOT_HEIGHT_M = 1.0  # of its centre, and of its antenna, above the floor
-SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = 2, 3, 4, 5, 6  # as MuJoCo numbers them
+KINDS = SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = 2, 3, 4, 5, 6  # as MuJoCo numbers them
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,14 +18,6 @@ class RobotStates:
     position_m: Float[np.ndarray, "B N 2"]  # p [m]
     velocity_mps: Float[np.ndarray, "B N 2"]  # v [m/s]
     is_active: Bool[np.ndarray, "B N"] | None = None  # who observes and transmits; None: all robots
-
-    def copy(self) -> "RobotStates":
-        """Return the same in arrays of its own."""
-        return RobotStates(
-            position_m=self.position_m.copy(),
-            velocity_mps=self.velocity_mps.copy(),
-            is_active=None if self.is_active is None else self.is_active.copy(),
-        )
 
 
 class Obstacles(NamedTuple):

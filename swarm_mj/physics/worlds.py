@@ -37,8 +37,7 @@ class Physics:
     ) -> None:
         """Compile the scene and make B worlds, stepped by MuJoCo's threads.
 
-        Raises:
-            ValueError: The scene changed the robots, or MuJoCo rejects it.
+        Raises ValueError if the scene changed the robots, or MuJoCo rejects it.
         """
         self._mission = mission
         try:
@@ -74,8 +73,7 @@ class Physics:
     ) -> None:
         """Restart all worlds from p_0 [m] and v_0 [m/s].
 
-        Raises:
-            ValueError: There is not one finite state per robot, or robots that collide overlap.
+        Raises ValueError without one finite state per robot, or if robots that collide overlap.
         """
         self._check_vectors("position", position_m)
         self._check_vectors("velocity", velocity_mps)
@@ -94,8 +92,7 @@ class Physics:
     def step(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> RobotStates:
         """Move all robots through one window, with u clipped to plus or minus A_max (Eq. 15).
 
-        Raises:
-            ValueError: There is not one finite acceleration per robot.
+        Raises ValueError unless there is one finite acceleration per robot.
         """
         self._check_vectors("acceleration", acceleration_mps2)
         if self._mission.physics == "exact":
@@ -110,9 +107,8 @@ class Physics:
         if np.shape(given) != expected:
             shape = f"{expected}, missions by robots by axes"
             raise ValueError(f"{what} must have shape {shape}, not {np.shape(given)}")
-        first = _first_not_finite(given)
-        if first >= 0:
-            b, i, _ = np.unravel_index(first, expected)
+        if not np.all(is_finite := np.isfinite(given)):
+            b, i, _ = np.argwhere(~is_finite)[0]
             raise ValueError(
                 f"{what} must be finite, not ({given[b, i, 0]:g}, {given[b, i, 1]:g}) "
                 f"of robot {i} in mission {b}"
@@ -157,15 +153,6 @@ def _check_apart(position_m: Float[np.ndarray, "B N 2"]) -> None:
                 f"{np.min(apart_m):.2g} m apart, and collide below {2.0 * ROBOT_RADIUS_M:g} m; "
                 "place them farther apart"
             )
-
-
-@compiled()
-def _first_not_finite(states: Float[np.ndarray, "B N 2"]) -> int:
-    flat = states.ravel()
-    for n in range(flat.size):
-        if not np.isfinite(flat[n]):
-            return n
-    return -1
 
 
 @compiled()

@@ -1,6 +1,6 @@
 """The costs (II-C, IV-A): age of information (Eq. 10), velocity variance (Eq. 17), packets."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -24,22 +24,15 @@ class Packets:
 
     attempted: Float[np.ndarray, "B"]  # requests, each to one recipient
     delivered: Float[np.ndarray, "B"]  # of these, decoded by the recipient
+    lost: Float[np.ndarray, "B"]  # and of these, not
     overheard: Float[np.ndarray, "B"]  # receptions of requests and responses meant for another
     answered: Float[np.ndarray, "B"]  # responses that the first sender decoded
 
     heard: Float[np.ndarray, "B"]  # broadcasts that at least one robot decoded
     receptions: Float[np.ndarray, "B"]  # times that a robot decoded a broadcast
 
-    @property
-    def lost(self) -> Float[np.ndarray, "B"]:
-        """Attempted, and not decoded by the recipient."""
-        return self.attempted - self.delivered
 
-
-PACKETS = (
-    *("sent", "transmitted", "attempted", "delivered", "lost", "overheard", "answered"),
-    *("heard", "receptions"),
-)
+PACKETS = tuple(spec.name for spec in fields(Packets))
 
 
 def age_of_information(
@@ -80,16 +73,15 @@ def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets
 
     Both phases are broadcasts (IV-C), or the second answers the first (Alg. 1).
     """
-    sent, delivered, overheard, heard, receptions = _count(phases[0].recipient, phases[0].heard)
-    later, answered, overheard_later, heard_later, receptions_later = _count(
-        phases[1].recipient, phases[1].heard
-    )
+    sent, delivered, overheard, heard, receptions = _count(phases[0])
+    later, answered, overheard_later, heard_later, receptions_later = _count(phases[1])
     none = np.full_like(sent, np.nan)
     return Packets(
         sent=sent + later if is_broadcast else sent,
         transmitted=sent + later,
         attempted=none if is_broadcast else sent,
         delivered=none if is_broadcast else delivered,
+        lost=none if is_broadcast else sent - delivered,
         overheard=none if is_broadcast else overheard + overheard_later,
         answered=none if is_broadcast else answered,
         heard=heard + heard_later if is_broadcast else none,
@@ -103,10 +95,7 @@ def mean_hops(
     """Return the mean depth of teammates in the parent trees (II-B), 0 without teammates [hops].
 
     Depths of active robots in active robots' trees count, through any robot. A state known
-    beforehand came over no radio, so has no depth.
-
-    Raises:
-        ValueError: Some parents lead nowhere, or in a circle.
+    beforehand came over no radio, so has no depth. Raises ValueError if parents form no trees.
     """
     hops = np.empty(buffers.parent.shape[0])
     counts = np.ones(buffers.shape, dtype=np.bool_) if is_active is None else is_active
@@ -177,10 +166,9 @@ def _mean_age(
 
 
 @compiled()
-def _count(
-    recipient: Int[np.ndarray, "B N"], heard: Int[np.ndarray, "B N"]
-) -> tuple[Float[np.ndarray, "B"], ...]:
+def _count(phase: Phase) -> tuple[Float[np.ndarray, "B"], ...]:
     """Return the packets of one phase: sent, delivered, overheard, heard, and receptions."""
+    recipient, heard = phase
     num_missions, num_robots = recipient.shape
     sent, delivered = np.zeros(num_missions), np.zeros(num_missions)
     overheard, num_heard, receptions = sent.copy(), sent.copy(), sent.copy()
@@ -209,18 +197,15 @@ def _mean_depth(
 ) -> bool:
     """Fill `hops`; returns whether all parents form trees."""
     num_missions, num_robots = parent.shape[:2]
-    depth = np.empty(num_robots, dtype=np.int64)
-    path = np.empty(num_robots, dtype=np.int64)
+    depth, path = np.empty(num_robots, dtype=np.int64), np.empty(num_robots, dtype=np.int64)
     for b in range(num_missions):
-        total = 0
-        num_known = 0
+        total, num_known = 0, 0
         for i in np.nonzero(is_active[b])[0]:
             depth[:] = -1
             depth[i] = 0
             for j in range(num_robots):
                 if timestamp[b, i, j] > NEVER and j != i:
-                    k = j
-                    length = 0
+                    k, length = j, 0
                     while depth[k] < 0:
                         path[length] = k
                         length += 1

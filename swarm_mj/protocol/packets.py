@@ -154,8 +154,7 @@ def fits(packet: Packet, mission: Mission) -> bool:
 def fitting(packet: Packet, mission: Mission, policy: str) -> Packet:
     """Return a policy's whole packet with as many entries as a slot of the mission holds.
 
-    Raises:
-        ValueError: The slot does not hold the payload and one entry.
+    Raises ValueError if that is less than the payload and one entry.
     """
     rate, capacity = mission.bit_rate, slot_bytes(mission)
     if rate is None or capacity is None or fits(packet, mission):

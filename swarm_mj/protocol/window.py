@@ -5,9 +5,10 @@ are broadcasts that nobody answers. Index order: `[b, i]` is robot `i` of missio
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from copy import deepcopy
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -21,16 +22,11 @@ from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
 from swarm_mj.system.compiled import compiled
 
 
-@dataclass(frozen=True, kw_only=True)
-class Phase:
+class Phase(NamedTuple):
     """The recipients of one slot, and the senders decoded."""
 
     recipient: Int[np.ndarray, "B N"]  # S^i: whom i addressed, or BROADCAST; itself: it was silent
     heard: Int[np.ndarray, "B N"]  # i with j in R^i: whom robot j decoded; itself: nobody
-
-    def copy(self) -> "Phase":
-        """Return the same in new arrays."""
-        return Phase(recipient=self.recipient.copy(), heard=self.heard.copy())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,8 +43,7 @@ class LocalViews:
 
     def copy(self) -> "LocalViews":
         """Return the same for code that may write: new arrays, and the buffers, which none can."""
-        phases = tuple(phase.copy() for phase in self.phases)
-        return LocalViews(buffers=self.buffers, now=self.now.copy(), phases=phases)
+        return replace(self, now=self.now.copy(), phases=deepcopy(self.phases))
 
     @property
     def num_robots(self) -> int:
@@ -182,10 +177,15 @@ def transmit(
     return _send(buffers, states, recipient, channel, now)
 
 
+@compiled()
 def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
     """Return whom each robot answers: the sender it decoded, if that packet was meant for it."""
-    answered = np.empty_like(transmission.recipient)
-    _answer_senders(transmission.recipient, transmission.heard, answered)
+    recipient, heard = transmission
+    answered = np.empty_like(recipient)
+    for b in range(recipient.shape[0]):
+        for j in range(recipient.shape[1]):
+            i = heard[b, j]
+            answered[b, j] = i if recipient[b, i] == j else j
     return answered
 
 
@@ -214,8 +214,8 @@ def _send(
 ) -> Phase:
     """Send everyone's packet through the channel (Eq. 6) and merge what was decoded."""
     sent_to = of_active(states.is_active, recipient)
-    at_once = channel_at(channel, now)
-    heard = of_active(states.is_active, checked_decode(at_once, states.position_m, sent_to))
+    heard = checked_decode(channel_at(channel, now), states.position_m, sent_to)
+    heard = of_active(states.is_active, heard)
     merge(buffers, heard, entries_sent(buffers, sent_to))
     return Phase(recipient=sent_to.copy(), heard=heard)
 
@@ -227,16 +227,3 @@ def of_active(
     if is_active is None:
         return robots
     return np.where(is_active, robots, np.arange(is_active.shape[1], dtype=robots.dtype))
-
-
-@compiled()
-def _answer_senders(
-    recipient: Int[np.ndarray, "B N"],
-    heard: Int[np.ndarray, "B N"],
-    answered: Int[np.ndarray, "B N"],
-) -> None:
-    num_missions, num_robots = recipient.shape
-    for b in range(num_missions):
-        for j in range(num_robots):
-            i = heard[b, j]
-            answered[b, j] = i if recipient[b, i] == j else j

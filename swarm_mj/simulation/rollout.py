@@ -56,11 +56,8 @@ def rollout(swarm: Swarm, policy: Policy | None = None) -> Iterator[WindowRecord
     """Fly the missions, one window at a time, for the caller to watch, record or break off.
 
     The policy is started; None is the one that was started already. When a window's costs are
-    yielded, the swarm stands at the end of that window.
-
-    Raises:
-        ValueError: The swarm has flown already, or no policy was started.
-        TypeError: The swarm or the policy is none.
+    yielded, the swarm stands at the end of that window. Raises as `Swarm.step` does, and ValueError
+    if the swarm has flown already.
     """
     check_kind("swarm", swarm, Swarm, "Swarm(mission, [1])")
     if np.any(swarm.now > 0):
@@ -75,8 +72,7 @@ def rollout(swarm: Swarm, policy: Policy | None = None) -> Iterator[WindowRecord
 def summarise(flown: Iterable[WindowRecord]) -> Summary:
     """Return the costs of the windows flown, in order; `rollout` itself will do.
 
-    Raises:
-        ValueError: No window was flown.
+    Raises ValueError if no window was flown.
     """
     flown = list(flown)
     if not flown:

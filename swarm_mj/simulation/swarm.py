@@ -1,6 +1,7 @@
 """The swarm: B missions side by side, window by window: motion, physics, radio, buffers, costs."""
 
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from functools import partial
 from numbers import Integral
 
@@ -21,13 +22,8 @@ from swarm_mj.protocol.buffers import Buffers, empty_buffers, grant_start, obser
 from swarm_mj.protocol.checks import check_robots
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
 from swarm_mj.protocol.packets import fitting, packet_of, with_room
-from swarm_mj.protocol.window import (
-    SLOT_WINDOWS,
-    LocalViews,
-    Phase,
-    RequestResponse,
-    WindowProtocol,
-)
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS
+from swarm_mj.protocol.window import LocalViews, Phase, RequestResponse, WindowProtocol
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.radio.mission_radio import mission_radio
@@ -58,12 +54,8 @@ class Swarm:
 
         Channel, controller and scene are objects or `module:Name`; unless given, they are the
         mission's own, and no obstacles are added. All missions share a scene. The threads are
-        MuJoCo's.
-
-        Raises:
-            ValueError: No seed, a negative one, no connected team could be drawn, or the scene
-                changed the robots.
-            TypeError: The mission is none, or a component cannot be called.
+        MuJoCo's. Raises ValueError without seeds, or if no connected team could be drawn or the
+        scene changed the robots; TypeError for what is no mission, or cannot be called.
         """
         check_kind("mission", mission, Mission, 'paper("flocking")')
         own = Components(channel=channel, controller=controller, scene=scene).made(mission)
@@ -87,8 +79,7 @@ class Swarm:
     def restart(self, seeds: Sequence[int]) -> None:
         """Start all missions anew, as many as before; a policy must then be started, too.
 
-        Raises:
-            ValueError: Not as many seeds, a negative one, or no connected team could be drawn.
+        Raises ValueError as the constructor does.
         """
         _check_seeds(seeds, self._num_missions)
         streams = zip(*(_streams(seed) for seed in seeds), strict=True)
@@ -116,18 +107,12 @@ class Swarm:
     def _place(self, b: int, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
         """Draw where mission b's robots begin, connected under their channel where it can say."""
         mission, channel = self.mission, self.channel
+        team = mission.num_robots, mission.half_side_m, mission.range_m
         has_obstacles = len(self._obstacles.kind) > 0
         is_asked = isinstance(channel, ComposedChannel)
         connects = partial(channel.largest_part, mission=b) if is_asked else None
-        return connected_positions(
-            mission.num_robots,
-            mission.half_side_m,
-            mission.range_m,
-            rng,
-            connects,
-            self._is_blocked if has_obstacles or mission.collide else None,
-            keeps_largest=has_obstacles,
-        )
+        is_blocked = self._is_blocked if has_obstacles or mission.collide else None
+        return connected_positions(*team, rng, connects, is_blocked, keeps_largest=has_obstacles)
 
     def _is_blocked(self, position_m: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
         """Return which robots would touch an obstacle there, or another robot if they collide."""
@@ -156,9 +141,8 @@ class Swarm:
     def start(self, policy: Policy) -> None:
         """Fly a policy from now on, with new random streams and all else forgotten.
 
-        Raises:
-            ValueError: Its packets never fit into a slot.
-            TypeError: It is no policy, or neither decentralised nor centralised.
+        Raises ValueError if its packets never fit into a slot, and TypeError unless it is a
+        decentralised or centralised policy.
         """
         check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
         room = policy.packet(self.mission).num_entries
@@ -190,10 +174,7 @@ class Swarm:
         """Fly one window: the policy decides, the robots move, then they talk.
 
         A policy that is new to these missions is started; None is the one that was started.
-
-        Raises:
-            ValueError: No policy was started.
-            TypeError: It is no policy.
+        Raises as `start` does, and ValueError if none was started.
         """
         if policy is not None and policy is not self._policy:
             self.start(policy)
@@ -202,15 +183,14 @@ class Swarm:
     def step_with_recipients(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
         """Fly one window of Alg. 1 with these recipients; itself is silence.
 
-        Raises:
-            ValueError: A recipient is no robot, or there is not one per robot; nothing has moved.
+        Raises ValueError, before anything moves, unless they are one robot per robot.
         """
         request_response = RequestResponse(silence_is_attempt=self.mission.silence_is_attempt)
         return self._play(request_response, lambda: recipient)
 
     def _states_for(self, component: object) -> RobotStates:
         """Return the true states; a user's own component gets copies, so it can move nothing."""
-        return self.states if is_ours(component) else self.states.copy()
+        return self.states if is_ours(component) else deepcopy(self.states)
 
     def _play(
         self, window: WindowProtocol, decide: Callable[[], Int[np.ndarray, "B N"]]
