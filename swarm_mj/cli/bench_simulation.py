@@ -22,9 +22,8 @@ from swarm_mj.evaluation.flying import run_jobs
 from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission, paper
-from swarm_mj.physics.arenas import BLOCK_M, HALF_HEIGHT_M
+from swarm_mj.physics.arenas import BLOCK_M, HALF_HEIGHT_M, OBSTACLE_GROUP
 from swarm_mj.physics.scene import Scene, compose
-from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP
 from swarm_mj.policies.centralised import RoundRobin
 from swarm_mj.policies.planner.plan import epoch_plan
 from swarm_mj.policies.planner.policy import epoch_windows

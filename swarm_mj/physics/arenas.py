@@ -1,6 +1,8 @@
 """Arenas: obstacles in the area, at a size that grows with the team.
 
-Obstacles (`physics.solid_geoms`) attenuate packets and, in `contact` physics, reflect robots.
+Obstacles attenuate packets and, in `contact` physics, reflect robots. They are the static geoms of
+group `OBSTACLE_GROUP`. The penetration loss of one is its first `user` number [dB]; without one, or
+with 0, that of its material's name (`LOSS_DB`), or `DEFAULT_LOSS_DB`.
 """
 
 import os
@@ -9,16 +11,21 @@ from itertools import product
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 from mujoco._enums import mjtGeom
+from mujoco._functions import mj_kinematics
 from mujoco._specs import MjSpec
+from mujoco._structs import MjData, MjModel
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.specification import OPEN
-from swarm_mj.physics.solid_geoms import OBSTACLE_GROUP, idle_obstacles, obstacles_of
+from swarm_mj.physics.state import BOX, KINDS, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, Obstacles
 from swarm_mj.system.fields import did_you_mean
 
 Arena = Callable[[MjSpec, Mission], None]  # adds the obstacles
 
+OBSTACLE_GROUP = 1
+MESH = 7  # as MuJoCo numbers it
 HALF_HEIGHT_M = 5.0  # of obstacles: well above the robots
 BLOCK_PITCH_M = 200.0  # from street to street
 BLOCK_M = 110.0  # side of a city block; the rest of the pitch is street
@@ -33,6 +40,11 @@ COLOURS = {
     "light wall": [0.45, 0.50, 0.58, 1.0],
     "tree": [0.20, 0.38, 0.30, 1.0],
 }
+# Per obstacle crossed. Walls: COST 231 (1999), section 4.7, at 1.8 GHz. A building counts as two
+# outer walls of 7 dB and the rooms between them; a tree as 12 m of leaves at about 0.5 dB/m (ITU-R
+# P.833).
+LOSS_DB = {"light wall": 3.4, "heavy wall": 6.9, "building": 25.0, "tree": 6.0}
+DEFAULT_LOSS_DB = 10.0
 
 
 def arena_of(mission: Mission) -> Arena | None:
@@ -171,3 +183,64 @@ def _halton(n: int, base: int) -> float:
         point += digit * share
         share /= base
     return point
+
+
+def obstacles_of(model: MjModel) -> Obstacles:
+    """Return the obstacles of a compiled scene, or raise ValueError by a loss (`loss_db_of`)."""
+    data = MjData(model)
+    mj_kinematics(model, data)
+    found = np.array(obstacle_geoms(model), dtype=int)
+    kind, size_m = model.geom_type[found].copy(), model.geom_size[found].copy()
+    centre_m = data.geom_xpos[found].copy()
+    rotation = data.geom_xmat[found].reshape(-1, 3, 3).copy()
+    for o in np.flatnonzero(kind == MESH):
+        middle_m, half_m = np.split(model.geom_aabb[found[o]], 2)
+        centre_m[o] += rotation[o] @ middle_m
+        kind[o], size_m[o] = BOX, half_m
+    return Obstacles(
+        kind=kind.astype(np.int64),
+        centre_m=centre_m,
+        rotation=rotation,
+        size_m=size_m,
+        reach_m=np.maximum(model.geom_rbound[found], 0.0),
+        power_left=10.0 ** (-np.array([loss_db_of(model, int(g)) for g in found]) / 10.0),
+    )
+
+
+def obstacle_geoms(model: MjModel) -> list[int]:
+    """Return the geoms that are obstacles."""
+    stands_still = model.body_weldid[model.geom_bodyid] == 0
+    is_solid = np.isin(model.geom_type, (*KINDS, MESH))
+    is_obstacle = stands_still & is_solid & (model.geom_group == OBSTACLE_GROUP)
+    return np.flatnonzero(is_obstacle).tolist()
+
+
+def idle_obstacles(model: MjModel, mission: Mission) -> dict[str, str]:
+    """Return the obstacles that neither robots nor packets can meet, and where they stand."""
+    reach_m = mission.half_side_m if mission.has_walls else np.inf  # from the centre, per axis
+    found, idle = obstacles_of(model), {}
+    for o, g in enumerate(obstacle_geoms(model)):
+        # Of the box around it that MuJoCo keeps, in the obstacle's frame; a ball may be narrower.
+        half_m = np.abs(found.rotation[o]) @ model.geom_aabb[g, 3:]
+        half_m = np.minimum(half_m, found.reach_m[o])
+        name = f"geom {model.geom(g).name or f'number {g}'}"
+        off_m = np.abs(found.centre_m[o] - [0.0, 0.0, ROBOT_HEIGHT_M]) - half_m
+        if np.any(off_m[:2] > reach_m):
+            idle[name] = f"outside the area of {2 * reach_m:.0f} m by {2 * reach_m:.0f} m"
+        elif off_m[2] > ROBOT_RADIUS_M:
+            side = "above" if found.centre_m[o, 2] > ROBOT_HEIGHT_M else "below"
+            idle[name] = f"{side} the robots, which are {ROBOT_HEIGHT_M:g} m above the floor"
+    return idle
+
+
+def loss_db_of(model: MjModel, g: int) -> float:
+    """Return an obstacle's penetration loss [dB]; raise ValueError if negative or not finite."""
+    material = int(model.geom_matid[g])
+    named = model.mat(material).name if material >= 0 else ""
+    loss_db = LOSS_DB.get(named, DEFAULT_LOSS_DB)
+    if model.nuser_geom > 0 and model.geom_user[g, 0] != 0.0:  # 0 where a geom has none
+        loss_db = float(model.geom_user[g, 0])
+    if not (np.isfinite(loss_db) and loss_db >= 0.0):
+        geom = f"geom {model.geom(g).name or f'number {g}'}"
+        raise ValueError(f"the penetration loss of {geom} must be 0 dB or more, not {loss_db:g}")
+    return loss_db

@@ -16,9 +16,9 @@ from mujoco import batch
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.geometry import overlaps_earlier
+from swarm_mj.physics.arenas import obstacles_of
 from swarm_mj.physics.scene import ROBOT_MASS_KG, Scene, compose, num_substeps, timestep_s
-from swarm_mj.physics.solid_geoms import obstacles_of
-from swarm_mj.physics.state import ROBOT_RADIUS_M, Obstacles, RobotStates
+from swarm_mj.physics.state import ROBOT_RADIUS_M, RobotStates
 from swarm_mj.system.compiled import compiled
 
 OPEN, MIRROR, CLIP = 0, 1, 2  # at the boundary
@@ -47,6 +47,7 @@ class Physics:
                 raise
             said = " ".join(str(error).split())
             raise ValueError(f"the scene does not compile: {said}") from error
+        self.obstacles = obstacles_of(self._model)
         self._batch = batch.Batch(self._model, num_missions, num_threads)
         shape = (num_missions, mission.num_robots, 2)
         self._qpos = self._batch.bind("qpos").reshape(shape)
@@ -56,17 +57,8 @@ class Physics:
         self._wall = OPEN
         if mission.has_walls and mission.physics == "exact":
             self._wall = MIRROR if mission.wall_hit == "mirror" else CLIP
-        self._states = RobotStates(position_m=np.zeros(shape), velocity_mps=np.zeros(shape))
-
-    @property
-    def obstacles(self) -> Obstacles:
-        """The obstacles of the scene."""
-        return obstacles_of(self._model)
-
-    @property
-    def states(self) -> RobotStates:
-        """The true states; later steps do not change these arrays."""
-        return self._states
+        # True states, in arrays that later steps do not change.
+        self.states = RobotStates(position_m=np.zeros(shape), velocity_mps=np.zeros(shape))
 
     def place(
         self, position_m: Float[np.ndarray, "B N 2"], velocity_mps: Float[np.ndarray, "B N 2"]
@@ -83,11 +75,11 @@ class Physics:
         self._qpos[...] = position_m
         self._qvel[...] = velocity_mps
         self._ctrl[...] = velocity_mps if self._mission.physics == "exact" else 0.0
-        self._states = RobotStates(position_m=position_m.copy(), velocity_mps=velocity_mps.copy())
+        self.states = RobotStates(position_m=position_m.copy(), velocity_mps=velocity_mps.copy())
 
     def deactivate(self, is_active: Bool[np.ndarray, "B N"]) -> None:
         """Make these the active robots from now on; the others keep moving."""
-        self._states = replace(self._states, is_active=is_active)
+        self.states = replace(self.states, is_active=is_active)
 
     def step(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> RobotStates:
         """Move all robots through one window, with u clipped to plus or minus A_max (Eq. 15).
@@ -99,11 +91,11 @@ class Physics:
             self._step_exact(acceleration_mps2)
         else:
             self._step_contact(acceleration_mps2)
-        return self._states
+        return self.states
 
     def _check_vectors(self, what: str, given: np.ndarray) -> None:
         """Raise ValueError unless there is one finite vector per robot."""
-        expected = self._states.position_m.shape
+        expected = self.states.position_m.shape
         if np.shape(given) != expected:
             shape = f"{expected}, missions by robots by axes"
             raise ValueError(f"{what} must have shape {shape}, not {np.shape(given)}")
@@ -119,7 +111,7 @@ class Physics:
         mission, worlds = self._mission, (self._qpos, self._qvel, self._ctrl)
         limits = mission.max_acceleration_mps2, mission.max_velocity_mps, mission.half_side_m
         moved = _kick(*worlds, acceleration_mps2, mission.window_s, *limits, self._wall)
-        self._states = replace(self._states, position_m=moved[0], velocity_mps=moved[1])
+        self.states = replace(self.states, position_m=moved[0], velocity_mps=moved[1])
 
     def _step_contact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
         if self._rests and not np.any(self._qvel) and not np.any(acceleration_mps2):
@@ -136,8 +128,8 @@ class Physics:
             self._ctrl[...] = ROBOT_MASS_KG * np.clip(held_mps2, lowest, highest)
             self._batch.step()
         np.clip(self._qvel, -limit_mps, limit_mps, out=self._qvel)  # rounding of the last step
-        self._states = replace(
-            self._states, position_m=self._qpos.copy(), velocity_mps=self._qvel.copy()
+        self.states = replace(
+            self.states, position_m=self._qpos.copy(), velocity_mps=self._qvel.copy()
         )
 
 

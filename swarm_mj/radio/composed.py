@@ -24,8 +24,7 @@ from swarm_mj.radio.fading import (
     mixed,
     shadow,
 )
-from swarm_mj.radio.obstruction import obstruct
-from swarm_mj.radio.power_law import PowerLaw, write_path_loss
+from swarm_mj.radio.power_law import PowerLaw, obstruct, write_path_loss
 from swarm_mj.radio.reception import Air, decoded, incoming_at, silent_air, transmit
 from swarm_mj.system.compiled import compiled
 

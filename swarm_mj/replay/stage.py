@@ -12,8 +12,8 @@ from mujoco._structs import MjData, MjModel
 from scipy.spatial import ConvexHull
 
 from swarm_mj.mission import Mission
+from swarm_mj.physics.arenas import loss_db_of, obstacle_geoms, obstacles_of
 from swarm_mj.physics.scene import compose
-from swarm_mj.physics.solid_geoms import loss_db_of, obstacle_geoms, obstacles_of
 from swarm_mj.physics.state import (
     BOX,
     CAPSULE,

@@ -27,7 +27,7 @@ from swarm_mj.protocol.window import LocalViews, Phase, RequestResponse, WindowP
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.radio.mission_radio import mission_radio
-from swarm_mj.radio.obstruction import blocked
+from swarm_mj.radio.power_law import blocked
 from swarm_mj.system.fields import check_kind
 
 MAX_THREADS = 1024

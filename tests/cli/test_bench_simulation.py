@@ -13,8 +13,8 @@ from swarm_mj.cli.bench_simulation import (
     world_rows,
 )
 from swarm_mj.mission import paper
+from swarm_mj.physics.arenas import obstacles_of
 from swarm_mj.physics.scene import compose
-from swarm_mj.physics.solid_geoms import obstacles_of
 from swarm_mj.policies.centralised import RoundRobin
 from swarm_mj.protocol.costs import mean_hops
 from swarm_mj.simulation.swarm import Swarm

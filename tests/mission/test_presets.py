@@ -6,7 +6,7 @@ import pytest
 
 from swarm_mj.mission import PRESETS, WORLDS, paper, reference
 from swarm_mj.mission.presets import where_flown
-from swarm_mj.physics.solid_geoms import LOSS_DB
+from swarm_mj.physics.arenas import LOSS_DB
 from swarm_mj.radio.free_space import path_loss_db
 
 TASKS = ["stationary", "random-walk", "flocking"]

@@ -1,6 +1,7 @@
 """The radio is the mission's; beliefs and true links against laws and how often packets decode."""
 
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from scipy.stats import norm
 from walls import walls
 
 from swarm_mj.mission import Mission, paper, reference
-from swarm_mj.mission.specification import KNOWABLE
+from swarm_mj.mission.specification import Knowable
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.links import links_between, lone_probabilities
@@ -142,7 +143,7 @@ def test_without_knowledge_belief_is_free_space_to_the_last_digit(fields):
         np.testing.assert_array_equal(mine, its)
 
 
-@pytest.mark.parametrize("known", KNOWABLE)
+@pytest.mark.parametrize("known", get_args(Knowable))
 def test_only_who_knows_the_map_reckons_with_a_wall(known):
     """Its 10 dB are as much as a factor of 3.2 in distance: 120 and 200 m are too far then."""
     linked = chances(

@@ -9,8 +9,7 @@ import rerun as rr
 from mujoco import mjtGeom
 from reading import entities, static
 
-from swarm_mj.physics.arenas import BLOCK_M
-from swarm_mj.physics.solid_geoms import obstacles_of
+from swarm_mj.physics.arenas import BLOCK_M, obstacles_of
 from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.stage import FLOOR_M, filling, footprints, square_m, static_geoms
 from swarm_mj.replay.write import write_replay
