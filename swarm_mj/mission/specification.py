@@ -22,6 +22,7 @@ HalfDuplex = Literal["strict", "eavesdroppers"]
 FlockingSet = Literal["heard", "moving"]
 PathLossLaw = Literal["free-space", "log-distance", "two-ray"]
 FadingLaw = Literal["none", "rayleigh", "rician"]
+Number = float | int | None
 Grant = Literal["map", "statistics", "start"]  # what robots may know before the mission
 Knowable = Literal["nothing", Grant]
 
@@ -37,13 +38,7 @@ NEW = "not the paper's"  # the source of what the paper has not
 
 
 def _number(
-    default: float | None,
-    label: str,
-    unit: str,
-    low: float,
-    high: float,
-    help: str = "",
-    **more: str,
+    default: Number, label: str, unit: str, low: float, high: float, help: str = "", **more: str
 ) -> FieldOf:
     """Return a number: name in words, unit, range; with help, an option. By default of IV-B."""
     about = {"source": "IV-B"} | more
