@@ -245,6 +245,5 @@ def _unwrapped(found: object) -> object:
 
 
 def _name(component: object) -> str:
-    if isinstance(component, str):
-        return component
-    return getattr(component, "__qualname__", type(component).__qualname__)
+    name = getattr(component, "__qualname__", type(component).__qualname__)
+    return component if isinstance(component, str) else name

@@ -124,21 +124,21 @@ def mission_radio(
     truth is free space: nothing else is known of such a channel.
     """
     radio = radio_of(mission)
-    law, reception, shadowing_db = _law(mission, radio), _reception(mission), mission.shadowing_db
+    law, reception = _law(mission, radio), _reception(mission, radio)
     channel: Channel | VaryingChannel = radio if own is None else own
     if own is None and (mission.beyond_free_space or len(obstacles.kind) > 0):
         channel = ComposedChannel(
             law._replace(obstacles=obstacles),
             reception,
-            shadowing_db=shadowing_db,
+            shadowing_db=mission.shadowing_db,
             shadowing_distance_m=mission.shadowing_distance_m,
         )
     composed = channel if isinstance(channel, ComposedChannel) else None
     known = obstacles if mission.grants("map") else NO_OBSTACLES
     belief = Belief(radio=radio)
     if mission.beyond_free_space and mission.grants("statistics"):
-        law = law._replace(obstacles=known)
-        belief = Belief(radio=radio, law=law, reception=reception, shadowing_db=shadowing_db)
+        law, std_db = law._replace(obstacles=known), mission.shadowing_db
+        belief = Belief(radio=radio, law=law, reception=reception, shadowing_db=std_db)
     elif len(known.kind) > 0:
         everyone_mw = np.full(mission.num_robots, radio.received_at_1_m_mw)
         belief = Belief(radio=radio, law=PowerLaw(everyone_mw, obstacles=known))
@@ -163,8 +163,7 @@ def _law(mission: Mission, radio: FreeSpaceRadio) -> PowerLaw:
     return PowerLaw(by_robot(mission, radio.received_at_1_m_mw), breakpoint_m, exponent)
 
 
-def _reception(mission: Mission) -> Reception:
-    radio = radio_of(mission)
+def _reception(mission: Mission, radio: FreeSpaceRadio) -> Reception:
     rician_k = {"none": NO_FADING, "rayleigh": NO_LINE_OF_SIGHT, "rician": mission.rician_k}
     return Reception(
         noise_mw=radio.noise_mw,

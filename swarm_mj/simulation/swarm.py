@@ -66,13 +66,10 @@ class Swarm:
         self.mission = mission
         self.scene = own.scene
         self._physics = Physics(mission, len(seeds), scene=own.scene, num_threads=num_threads)
-        self._obstacles = self._physics.obstacles
-        self.channel, self.belief, self._truth = mission_radio(
-            mission, self._obstacles, own.channel
-        )
+        radio = mission_radio(mission, self._physics.obstacles, own.channel)
+        self.channel, self.belief, self._truth = radio
         is_tasks = own.controller is None
         self.controller: Controller = controller_of(mission) if is_tasks else own.controller
-        self._costed = costed(self.controller)
         self._num_missions = len(seeds)
         self.restart(seeds)
 
@@ -108,7 +105,7 @@ class Swarm:
         """Draw where mission b's robots begin, connected under their channel where it can say."""
         mission, channel = self.mission, self.channel
         team = mission.num_robots, mission.half_side_m, mission.range_m
-        has_obstacles = len(self._obstacles.kind) > 0
+        has_obstacles = len(self._physics.obstacles.kind) > 0
         is_asked = isinstance(channel, ComposedChannel)
         connects = partial(channel.largest_part, mission=b) if is_asked else None
         is_blocked = self._is_blocked if has_obstacles or mission.collide else None
@@ -116,7 +113,7 @@ class Swarm:
 
     def _is_blocked(self, position_m: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
         """Return which robots would touch an obstacle there, or another robot if they collide."""
-        is_blocked = blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, self._obstacles)
+        is_blocked = blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, self._physics.obstacles)
         if self.mission.collide:
             is_blocked |= overlaps_earlier(position_m, 2.0 * ROBOT_RADIUS_M)
         return is_blocked
@@ -141,8 +138,7 @@ class Swarm:
     def start(self, policy: Policy) -> None:
         """Fly a policy from now on, with new random streams and all else forgotten.
 
-        Raises ValueError if its packets never fit into a slot, and TypeError unless it is a
-        decentralised or centralised policy.
+        Raises ValueError if its packets never fit into a slot, and TypeError if it is no policy.
         """
         check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
         room = policy.packet(self.mission).num_entries
@@ -197,7 +193,7 @@ class Swarm:
     ) -> WindowCosts:
         """Fly one window of this protocol."""
         start, self.is_broadcast = self.now, window.is_broadcast
-        decide_after = partial(self._decide_after, decide, window.is_broadcast, start)
+        decide_after = partial(self._decide_after, decide, start)
         survivors, is_due = self._survivors, start[0] >= self.mission.failure_window
         if survivors is not None and is_due and self.states.is_active is None:
             self._physics.deactivate(survivors)
@@ -210,7 +206,6 @@ class Swarm:
     def _decide_after(
         self,
         decide: Callable[[], Int[np.ndarray, "B N"]],
-        may_broadcast: bool,
         start: Float[np.ndarray, "B"],
         phases: tuple[Phase, ...],
     ) -> np.ndarray:
@@ -218,12 +213,12 @@ class Swarm:
         if phases:  # a later slot is decided by its own clock, and knows the earlier one
             self.phases, self.now = phases, start + len(phases) * SLOT_WINDOWS
         recipient = np.asarray(decide())
-        check_robots("recipient", recipient, self.buffers.shape, may_broadcast=may_broadcast)
+        check_robots("recipient", recipient, self.buffers.shape, may_broadcast=self.is_broadcast)
         return recipient
 
     def _task_cost(self) -> TaskCost | None:
         """Return what the task costs now, where the controller has a cost."""
-        controller = self._costed
+        controller = costed(self.controller)
         if controller is None:
             return None
         value = np.asarray(controller.cost(self._states_for(controller)), dtype=np.float64)
