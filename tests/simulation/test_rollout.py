@@ -9,7 +9,7 @@ from swarm_mj.protocol.costs import Packets, WindowCosts, mean_hops
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 
-ADDRESSED = ("attempted", "delivered", "overheard", "answered")
+ADDRESSED = ("attempted", "delivered", "lost", "overheard", "answered")
 BROADCAST = ("sent", "heard", "receptions")
 TRANSMITTED = {"transmitted": [4.0, 2.0]}  # in each window
 
@@ -21,7 +21,7 @@ def packets_of(**counts):
 
 
 def flown_by_hand(age, variance, is_complete, hops, packets):
-    """One window of two missions; packets: attempted, delivered, overheard, answered."""
+    """One window of two missions; packets: attempted, delivered, lost, overheard, answered."""
     counts = {name: np.array(count, float) for name, count in zip(ADDRESSED, packets, strict=True)}
     costs = WindowCosts(
         age_windows=np.array(age),
@@ -34,13 +34,13 @@ def flown_by_hand(age, variance, is_complete, hops, packets):
 
 THREE_WINDOWS = [
     flown_by_hand(
-        [1.0, 0.5], [9.0, 4.0], [False, False], [0.0, 1.0], ([3, 1], [1, 0], [2, 0], [1, 0])
+        [1.0, 0.5], [9.0, 4.0], [False, False], [0.0, 1.0], ([3, 1], [1, 0], [2, 1], [2, 0], [1, 0])
     ),
     flown_by_hand(
-        [2.0, 1.0], [6.0, 5.0], [True, False], [1.5, 1.0], ([2, 2], [2, 1], [0, 4], [0, 1])
+        [2.0, 1.0], [6.0, 5.0], [True, False], [1.5, 1.0], ([2, 2], [2, 1], [0, 1], [0, 4], [0, 1])
     ),
     flown_by_hand(
-        [6.0, 3.0], [0.0, 6.0], [True, False], [3.0, 1.0], ([0, 1], [0, 1], [0, 0], [0, 1])
+        [6.0, 3.0], [0.0, 6.0], [True, False], [3.0, 1.0], ([0, 1], [0, 1], [0, 0], [0, 0], [0, 1])
     ),
 ]
 
@@ -85,7 +85,7 @@ def test_broadcasts_are_summed_up_by_hand():
     np.testing.assert_array_equal(summary.packets_sent, [10.0, 0.0])
     np.testing.assert_array_equal(summary.packets_heard, [7.0, 0.0])
     np.testing.assert_array_equal(summary.hearers_per_packet, [1.5, np.nan])
-    for name in (*ADDRESSED, "lost"):
+    for name in ADDRESSED:
         assert np.isnan(getattr(summary, f"packets_{name}")).all()
 
 
