@@ -70,6 +70,7 @@ class Swarm:
         self.channel, self.belief, self._truth = radio
         is_tasks = own.controller is None
         self.controller: Controller = controller_of(mission) if is_tasks else own.controller
+        self._costed = costed(self.controller)
         self._num_missions = len(seeds)
         self.restart(seeds)
 
@@ -218,7 +219,7 @@ class Swarm:
 
     def _task_cost(self) -> TaskCost | None:
         """Return what the task costs now, where the controller has a cost."""
-        controller = costed(self.controller)
+        controller = self._costed
         if controller is None:
             return None
         value = np.asarray(controller.cost(self._states_for(controller)), dtype=np.float64)
@@ -243,7 +244,6 @@ def _check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
 def _streams(seed: int) -> list[np.random.Generator]:
     """Return a stream each for placement, motion, policy, failures and channel.
 
-    Apart, so that all policies meet equal missions. Only add to the end: a stream's place is what
-    it draws from.
+    Apart, so that all policies meet equal missions. Add new ones at the end only.
     """
     return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(5)]

@@ -7,8 +7,8 @@ from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, make_extractor
 from swarm_mj.policies.gnn.graphs import PaperFeatures, ReferenceFeatures
 from swarm_mj.policies.random_access import RandomFlooding
-from swarm_mj.protocol.buffers import NO_PARENT, empty_buffers
-from swarm_mj.protocol.window import LocalViews
+from swarm_mj.protocol.buffers import NO_PARENT, Buffers, empty_buffers
+from swarm_mj.protocol.window import LocalViews, Phase
 from swarm_mj.simulation.swarm import Swarm
 
 # 4 robots at 40 per km²: a side of sqrt(0.1) km; 200 windows of 0.1 s: 20 s.
@@ -75,9 +75,9 @@ def test_rows_are_robots_mission_by_mission(features):
     alone = started(make_extractor(features, MISSION))
     for window in range(8):
         graphs, views = extractor.graphs(together.views), together.views
-        parts = (views.buffers, *views.phases)
-        buffers, *phases = (type(x)(**{k: v[1:2] for k, v in vars(x).items()}) for x in parts)
-        own = LocalViews(buffers=buffers, now=views.now[1:2], phases=tuple(phases))
+        buffers = Buffers(**{name: rows[1:2] for name, rows in vars(views.buffers).items()})
+        phases = tuple(Phase(*(rows[1:2] for rows in phase)) for phase in views.phases)
+        own = LocalViews(buffers=buffers, now=views.now[1:2], phases=phases)
         expected = alone.graphs(own)
         for name in ("node", "parent", "may_address", "has_turn"):
             rows = getattr(graphs, name)
