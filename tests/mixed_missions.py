@@ -53,8 +53,8 @@ def with_causes_of(robot, mine, theirs, after):
             if array.ndim > 1:  # by robots
                 array[b, kept] = getattr(mine.buffers, name)[b, kept]
         for own, other in zip(mine.phases, mixed.phases, strict=True):
-            for name, array in vars(other).items():
-                array[b, causes(mine, b, robot)] = getattr(own, name)[b, causes(mine, b, robot)]
+            for known, array in zip(own, other, strict=True):
+                array[b, causes(mine, b, robot)] = known[b, causes(mine, b, robot)]
     return mixed
 
 

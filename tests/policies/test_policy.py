@@ -1,6 +1,7 @@
 import copy
 import inspect
 import math
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -41,13 +42,14 @@ def real_views(seeds):
 
 
 def with_row_of(mine, theirs):
-    """A copy of `theirs` in which `ROW` of every array, in every dataclass within, is `mine`'s."""
+    """A copy of `theirs` in which `ROW` of every array within is `mine`'s."""
     mixed = copy.deepcopy(theirs)
-    phases = zip(mine.phases, mixed.phases, strict=True)
-    for own, other in [(mine.buffers, mixed.buffers), *phases]:
-        for name, array in vars(own).items():
-            if array.ndim > 1:  # by robots
-                vars(other)[name][:, ROW] = array[:, ROW]
+    kept, replaced = (
+        [*vars(views.buffers).values(), *chain(*views.phases)] for views in (mine, mixed)
+    )
+    for own, other in zip(kept, replaced, strict=True):
+        if own.ndim > 1:  # by robots
+            other[:, ROW] = own[:, ROW]
     return mixed
 
 
