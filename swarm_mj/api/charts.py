@@ -1,7 +1,7 @@
 """Charts of flights and evaluations: one mission over time, and policies below each other."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -14,9 +14,6 @@ from swarm_mj.evaluation.figures.style import FAINT, escape_mathtext, look_of, s
 from swarm_mj.evaluation.results import Result
 from swarm_mj.mission.components import components_in
 
-if TYPE_CHECKING:  # which imports this to draw
-    from swarm_mj.api.run import Run
-
 Course = Float[np.ndarray, "T"]
 
 WIDTH_IN, PANEL_IN, ROW_IN, HEAD_IN = 7.5, 2.1, 0.32, 1.1
@@ -25,15 +22,23 @@ MIN_SHARE = 1e-6  # of the largest velocity variance that is drawn
 LABELS = {"aoi": "age of information\n[windows]", "velocity_variance": "velocity variance\n[m²/s²]"}
 
 
-def draw_flight(run: "Run") -> Figure:
-    """Return a chart of a mission's costs over its windows, in the policy's colour."""
-    columns, colour = run.columns(), look_of(run.config["policy"]).colour
-    own_cost = run.task_cost
+def draw_flight(
+    columns: Mapping[str, Course],
+    title: str,
+    policy: str,
+    window_s: float,
+    own_cost: tuple[str, str] | None,
+) -> Figure:
+    """Return a chart of a mission's costs over its windows, in the policy's colour.
+
+    `own_cost` is the name and the unit of the task's cost, if it has one.
+    """
+    colour = look_of(policy).colour
     if own_cost and own_cost[0] == Flocking.cost_name:
         own_cost = None
     number = 2 if own_cost or np.any(columns["velocity_variance"]) else 1
     with styled():
-        figure, axes = _axes(run.title, number, 1, HEAD_IN + number * PANEL_IN, sharex=True)
+        figure, axes = _axes(title, number, 1, HEAD_IN + number * PANEL_IN, sharex=True)
         for each in axes:
             each.margins(x=0.01)
         _draw_age(axes[0], columns, colour)
@@ -48,7 +53,7 @@ def draw_flight(run: "Run") -> Figure:
             # Far below its largest value the variance of a converged flock is rounding noise.
             least = max(float(np.min(variance)), MIN_SHARE * float(np.max(variance)))
             axes[1].set_ylim(bottom=least / 2.0)
-        axes[-1].set_xlabel(f"window of {run.mission.window_s:g} s")
+        axes[-1].set_xlabel(f"window of {window_s:g} s")
     return _kept(figure)
 
 

@@ -138,7 +138,8 @@ class Run:
         need("matplotlib", "a chart")
         from swarm_mj.api.charts import draw_flight
 
-        return draw_flight(self)
+        policy, window_s = self.config["policy"], self.mission.window_s
+        return draw_flight(self.columns(), self.title, policy, window_s, self.task_cost)
 
     def show(self) -> None:
         """Play the flight as a video, in a notebook; elsewhere, say how to see it.

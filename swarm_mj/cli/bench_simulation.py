@@ -173,6 +173,7 @@ def _planning(mission: Mission) -> Callable[[], object]:
     belief, seen = Belief(radio=radio_of(mission)), replace(settings, fresh_rounds=10.0)
 
     def plan() -> object:
+        """Plan the next epoch of one robot's snapshot."""
         snapshots = take_snapshots(buffers, 0, now, mission.window_s, num_windows / 2.0, seen)
         is_free = np.ones(2 * num_windows, dtype=bool)
         timestamp = buffers.timestamp[0]
@@ -190,6 +191,7 @@ def talking(swarm: Swarm, recipient: Int[np.ndarray, "B N"]) -> Callable[[], obj
     """
 
     def talk() -> None:
+        """Play the radio's part of the next window."""
         window(swarm.buffers, swarm.states, recipient, swarm.channel, swarm.now)
         swarm.now = swarm.now + 1.0
 

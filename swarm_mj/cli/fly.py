@@ -68,11 +68,7 @@ def run(options: FlyOptions) -> int:
     name = registry.flown_name(asked, mission)
     options = replace(options, policy=name)
     path = _replay_path(options)
-    if path:
-        need("rerun", "a replay", "fly without one: --no-record")
-    way_out = "choose fewer --robots or --windows" + (", or --no-record" if path else "")
-    needs = flight_needs(mission, name, is_recorded=path is not None)
-    check_fits(needs, path, way_out, is_forced=options.yes)
+    _check_machine(options, path)
     policy = registry.make_policy(name, mission, **options.how)
     components = options.components.made(mission)
     registry.check_used(options.features, [policy])
@@ -106,6 +102,15 @@ def run(options: FlyOptions) -> int:
         console.print(f"{flown.ending} after {windows}.")
         return flown.code
     return run_viewer(view_command(path)) if options.view and path else DONE
+
+
+def _check_machine(options: FlyOptions, path: Path | None) -> None:
+    """Raise an error if a package, memory or disk for the flight and its replay is missing."""
+    if path:
+        need("rerun", "a replay", "fly without one: --no-record")
+    way_out = "choose fewer --robots or --windows" + (", or --no-record" if path else "")
+    needs = flight_needs(options.mission, options.policy, is_recorded=path is not None)
+    check_fits(needs, path, way_out, is_forced=options.yes)
 
 
 def _next_commands(options: FlyOptions, path: Path | None) -> Iterator[tuple[str, str]]:

@@ -110,10 +110,12 @@ def _cell(form: str, result: Result) -> str:
     numbers = {**vars(result), "reached": reached}
 
     def optional(part: re.Match[str]) -> str:
+        """Return a part of the form, or nothing if a number in it is missing."""
         names = re.findall(r"{(\w+):", part[1])
         return "" if any(numbers[name] is None for name in names) else part[1]
 
     def number(field: re.Match[str]) -> str:
+        """Return a number in its format."""
         value = numbers[field[1]]
         return NONE if value is None else format(value, field[2])
 
