@@ -10,13 +10,7 @@ import pytest
 
 from swarm_mj.cli import parse
 from swarm_mj.evaluation import published as module
-from swarm_mj.evaluation.published import (
-    BASELINES,
-    FIGURES,
-    RESULT_FIGURES,
-    points,
-    published,
-)
+from swarm_mj.evaluation.published import BASELINES, FIGURES, RESULT_FIGURES, points, published
 from swarm_mj.mission import PAPERS, PRESETS, WORLDS, paper, reference
 from swarm_mj.policies.registry import POLICIES
 

@@ -8,12 +8,7 @@ from hypothesis import strategies as st
 from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial.distance import cdist
 
-from swarm_mj.mission.geometry import (
-    ROOT,
-    gather_connected,
-    overlaps_earlier,
-    spanning_tree,
-)
+from swarm_mj.mission.geometry import ROOT, gather_connected, overlaps_earlier, spanning_tree
 
 # On a line, 10 m apart but for a gap, as robots 3, 0, 4, 1, 2: the middle one is robot 4.
 LINE_M = np.array([[10.0, 0.0], [45.0, 0.0], [55.0, 0.0], [0.0, 0.0], [20.0, 0.0]])

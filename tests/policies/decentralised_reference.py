@@ -204,10 +204,7 @@ class Mind:
         group = self.groups[slot % len(self.groups)]
         if self.me not in group:
             return False
-        here_m, reach_m = (
-            row[1][self.me],
-            self.settings.polite_ranges * self.mission.range_m,
-        )
+        here_m, reach_m = (row[1][self.me], self.settings.polite_ranges * self.mission.range_m)
         return not any(is_near(row, k, here_m, reach_m) for k in group[: group.index(self.me)])
 
     def answers(self, row, turn, flown):

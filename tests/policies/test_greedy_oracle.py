@@ -8,12 +8,7 @@ from standing_teams import Team, flooded_team, knowledge_after, received, single
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.physics.state import BOX, Obstacles, RobotStates
-from swarm_mj.policies.greedy_oracle import (
-    GreedyOracle,
-    greedy_window,
-    packet_gains,
-    window_gains,
-)
+from swarm_mj.policies.greedy_oracle import GreedyOracle, greedy_window, packet_gains, window_gains
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.window import LocalViews

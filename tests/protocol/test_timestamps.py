@@ -6,10 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm_mj.protocol.buffers import empty_buffers, merge
-from swarm_mj.protocol.timestamps import (
-    merge_expected,
-    merge_timestamps,
-)
+from swarm_mj.protocol.timestamps import merge_expected, merge_timestamps
 
 
 def random_slot(seed, num_robots):

@@ -98,8 +98,7 @@ def test_eq1_path_loss_is_friis_free_space(distance_m, frequency_hz):
 
 
 @pytest.mark.parametrize(
-    ("loss_db", "gain"),
-    [(0.0, 1.0), (10.0, 0.1), (30.0, 1e-3), (3.010299957, 0.5), (-20.0, 100.0)],
+    ("loss_db", "gain"), [(0.0, 1.0), (10.0, 0.1), (30.0, 1e-3), (3.010299957, 0.5), (-20.0, 100.0)]
 )
 def test_eq2_gain_by_hand(loss_db, gain):
     assert channel_gain(loss_db) == pytest.approx(gain)

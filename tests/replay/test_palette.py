@@ -21,8 +21,7 @@ def test_older_is_darker_until_the_scale_ends():
 
 
 @pytest.mark.parametrize(
-    ("age", "scale"),
-    [(0.2, 1.0), (3.4, 4.0), (42.0, 50.0), (51.0, 100.0), (100.0, 100.0)],
+    ("age", "scale"), [(0.2, 1.0), (3.4, 4.0), (42.0, 50.0), (51.0, 100.0), (100.0, 100.0)]
 )
 def test_the_full_scale_is_round_and_reaches_19_ages_in_20(age, scale):
     ages = np.full(100, age)

@@ -98,9 +98,7 @@ def test_a_level_is_a_line_with_a_band():
 
 
 def test_flocking_has_a_panel_for_each_cost():
-    results = [
-        result("mst", "flocking", velocity_variance_mean=0.2, velocity_variance_sem=0.01),
-    ]
+    results = [result("mst", "flocking", velocity_variance_mean=0.2, velocity_variance_sem=0.01)]
     above, below = draw(FIG6, results).axes
     assert above.get_title("left") == "age of information [windows]"
     assert below.get_title("left") == "velocity variance [m²/s²]"

@@ -64,8 +64,7 @@ class Apart(BroadcastPolicy):
 
 
 @pytest.mark.parametrize(
-    ("preset", "task"),
-    [(paper, "stationary"), (paper, "random-walk"), (reference, "stationary")],
+    ("preset", "task"), [(paper, "stationary"), (paper, "random-walk"), (reference, "stationary")]
 )
 def test_eq9_robots_decide_by_their_buffers_and_by_t_and_p_in_packets(preset, task):
     mission = preset(task, num_robots=8, range_ratio=0.2)
