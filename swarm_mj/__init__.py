@@ -23,6 +23,7 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     III-A   Eq. 14  Aggregation GNN          policies.gnn.network.AggregationGnn
     III-C           decisions                policies.gnn.policy.recipient_logits
     III-C           PPO                      learning.ppo.make_model
+    III-C           the training loop        learning.train.TrainingSession.learn
     IV-A    Eq. 15  dynamics                 physics.worlds.Physics.step
     IV-A    Eq. 16  flocking control         control.motion.flocking
     IV-A    Eq. 17  velocity variance        protocol.costs.velocity_variance

@@ -1,4 +1,4 @@
-"""The words of the project: the field's terms, and plain English (docs/code.md)."""
+"""The words of the project: the field's terms, and plain English."""
 
 import ast
 import re

@@ -24,7 +24,7 @@ from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import AFTER_S, quiet_console
 from swarm_mj.system.writing import Output, check_outputs
 
-if TYPE_CHECKING:  # each takes its time to import
+if TYPE_CHECKING:  # each is slow to import
     from matplotlib.figure import Figure
     from pandas import DataFrame
 

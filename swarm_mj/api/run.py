@@ -22,7 +22,7 @@ from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import is_notebook, named_values, plain_console, quiet_bar
 from swarm_mj.system.writing import Output, check_outputs, write_bytes, write_csv, write_json
 
-if TYPE_CHECKING:  # each takes its time to import, and flights do without
+if TYPE_CHECKING:  # each is slow to import, and flights do without
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
@@ -189,7 +189,7 @@ class Run:
             case ".rrd":
                 log = self._recorded()
                 need("rerun", "a replay")
-                from swarm_mj.replay.write import write_replay  # rerun takes its time to import
+                from swarm_mj.replay.write import write_replay  # rerun is slow to import
 
                 config = {name: value for name, value in self.config.items() if value is not None}
                 write_replay(log, self.mission, config, path)

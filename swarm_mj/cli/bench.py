@@ -96,7 +96,7 @@ def _measure(
         yield (title, ("", ""), [list(simulation.evaluation_rows(episodes, options.jobs, seconds))])
     if not options.no_learning:
         say("Measuring networks and training (a minute or two) ...")
-        from swarm_mj.cli import bench_learning  # torch takes its time to import
+        from swarm_mj.cli import bench_learning  # torch is slow to import
 
         rows = bench_learning.learning_rows(threads=options.threads, seconds=seconds)
         yield "Learning: 40 robots at rest", ("", ""), [list(rows)]

@@ -47,7 +47,7 @@ def run(options: FiguresOptions) -> int:
     results = [result for path in options.results for result in _papers(path)]
     console = plain_console()
     with Console(stderr=True).status("Drawing ...") as status:
-        # matplotlib takes its time to import; it would warn of a cache that it cannot write.
+        # matplotlib is slow to import; it would warn of a cache that it cannot write.
         logging.getLogger("matplotlib").setLevel(logging.ERROR)
         from swarm_mj.evaluation.figures.curves import NoPointsError, preset_of
         from swarm_mj.evaluation.figures.drawing import draw

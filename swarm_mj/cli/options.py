@@ -76,7 +76,7 @@ def nested(
 def nested_option(spec: Field[Any], place: str, **about: Any) -> Field[Any]:
     """Return a field of a nested dataclass as an option; its value is parsed as `place`.
 
-    What is said `about` it goes before the field's own metadata; `is_many` has it take several
+    `about` overrides the field's own metadata; `is_many` has it take several
     values, after one flag or several.
     """
     option = copy(spec)

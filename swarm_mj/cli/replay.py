@@ -67,7 +67,7 @@ def run(options: ReplayOptions) -> int:
         raise ValueError(
             "--size, --seconds, --fps, --scene and --force are of videos; name one by --video"
         )
-    from swarm_mj.replay.read import check_replay  # rerun takes its time to import
+    from swarm_mj.replay.read import check_replay  # rerun is slow to import
 
     for file in options.file:
         check_replay(file)
@@ -93,7 +93,7 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
     for module in ("av", "PIL", "rerun"):
         need(module, "a video")
     from swarm_mj.replay.read import read_footage
-    from swarm_mj.replay.rendering.video import make_video  # MuJoCo takes its time to import
+    from swarm_mj.replay.rendering.video import make_video  # MuJoCo is slow to import
 
     with Console(stderr=True, highlight=False).status("Reading ..."):
         footages = [_in_scene(read_footage(file), options.scene) for file in options.file]

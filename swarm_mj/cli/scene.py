@@ -25,7 +25,7 @@ class SceneOptions:
 
 def run(options: SceneOptions) -> int:
     """Run the command; return its exit code."""
-    from swarm_mj.physics.scene import compose  # MuJoCo takes its time to import
+    from swarm_mj.physics.scene import compose  # MuJoCo is slow to import
     from swarm_mj.simulation.swarm import Swarm
 
     mission = options.mission

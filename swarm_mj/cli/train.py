@@ -52,7 +52,7 @@ def run(options: TrainOptions) -> int:
     with console.status("Preparing ..."):
         asked = _asked_run(options)
         tell_cores(asked.training.threads, "threads")
-        from swarm_mj.learning.train import train  # stable-baselines3 takes its time to import
+        from swarm_mj.learning.train import train  # stable-baselines3 is slow to import
     try:
         with memory_errors(), deferred_interrupt() as is_interrupted:
             watch = Watch(console, asked, is_interrupted)

@@ -11,7 +11,7 @@ NAMESPACE = "swarm_mj"
 
 
 def register_environments() -> None:
-    """Lets `gymnasium.make` and `make_vec` know `swarm_mj/Flocking-v0` and the other tasks' names.
+    """Register `swarm_mj/Flocking-v0` and the other tasks for `gymnasium.make` and `make_vec`.
 
     Each takes the options of `envs.options.make_batch`, among them any field of `Mission`.
     """

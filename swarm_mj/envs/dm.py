@@ -1,4 +1,4 @@
-"""The dm_control face: one mission as a `control.Environment`, with its cameras and its viewer.
+"""dm_control's interface: one mission as a `control.Environment`, with its cameras and its viewer.
 
 The swarm flies the mission; dm_control is shown where the robots are. Changes of its physics are
 seen in a picture, and are overwritten at the next window.

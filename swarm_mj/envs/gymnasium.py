@@ -1,4 +1,4 @@
-"""The Gymnasium face: a team under one controller, whose action is everyone's recipient.
+"""Gymnasium's interface: a team under one controller, whose action is everyone's recipient.
 
 The vector environment and PettingZoo's draw on the same screen.
 """

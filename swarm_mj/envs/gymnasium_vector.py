@@ -1,4 +1,4 @@
-"""Gymnasium's vector face: B missions in as few swarms as can be.
+"""Gymnasium's vector interface: B missions in as few swarms as can be.
 
 Missions that begin together are one group, played as one swarm. A mission that begins alone, by
 `reset_mask`, leaves its group for a new one; its row in the old group flies on, silent and unseen.

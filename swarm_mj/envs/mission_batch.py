@@ -1,6 +1,6 @@
 """Missions side by side, as environments and training fly them: views, rewards, infos.
 
-All faces but dm_control's are made of this, so the same seeds and actions are the same missions
+All interfaces but dm_control's consist of it, so the same seeds and actions are the same missions
 through each of them.
 """
 
@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.control.motion import Costed
 from swarm_mj.envs.credit import credits_of, snapshot_channel
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components
@@ -130,7 +129,7 @@ class MissionBatch:
 
     @property
     def is_active(self) -> Bool[np.ndarray, "B N"]:
-        """Robots that have not been switched off."""
+        """Robots that have not failed."""
         is_active = self.flown.states.is_active
         return np.ones(self.shape, dtype=np.bool_) if is_active is None else is_active
 
@@ -155,20 +154,20 @@ class MissionBatch:
         Names and numbers are those of `swarm-mj fly --json`. Before the first window, when nothing
         is known and nothing was sent, ages and packets are 0.
         """
-        swarm, costs, controller = self.flown, self.costs, self.flown.controller
+        swarm, costs = self.flown, self.costs
         infos: Info = {"seed": np.array(self.seeds)}
         if costs is None:
             infos["age_windows"], is_complete = age_of_information(swarm.buffers, swarm.now)
             infos["velocity_variance_m2ps2"] = velocity_variance(swarm.states.velocity_mps)
             infos["is_complete"] = is_complete
             infos |= {f"packets_{name}": np.zeros(self.num_missions) for name in PACKETS}
-            task_cost = controller.cost(swarm.states) if isinstance(controller, Costed) else None
+            task_cost = swarm.task_cost()
         else:
             for name in ("age_windows", "velocity_variance_m2ps2", "is_complete"):
                 infos[name] = getattr(costs, name)
             infos |= {f"packets_{name}": getattr(costs.packets, name) for name in PACKETS}
-            task_cost = costs.task_cost and costs.task_cost.value
-        return infos if task_cost is None else infos | {"task_cost": task_cost}
+            task_cost = costs.task_cost
+        return infos if task_cost is None else infos | {"task_cost": task_cost.value}
 
     def first(self) -> tuple[Observation, Info]:
         """Return the first mission's view and infos, for environments of a single mission."""

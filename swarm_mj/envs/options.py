@@ -18,6 +18,7 @@ from swarm_mj.mission import MISSION_DISTANCE_M, PRESETS, Mission, Task
 from swarm_mj.mission.components import Components
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies.gnn.feature_sets import is_own_set, load_features
+from swarm_mj.policies.gnn.graphs import REFERENCE_WINDOWS
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.radio.free_space import Channel
@@ -190,9 +191,9 @@ def team_spaces(batch: MissionBatch) -> tuple[spaces.Space[Any], spaces.Space[An
 def _largest_feature(mission: Mission) -> float:
     """Return a bound on every number that a feature set makes of a mission.
 
-    Ages are shares of the mission or of 500 windows; positions and distances are those of robots
-    that fly straight on all the time, by the area or by 1 km; counts are by 10 at least.
+    Ages are shares of the mission or of `REFERENCE_WINDOWS`; positions and distances are those of
+    robots that fly straight on all the time, by the area or by 1 km; counts are by 10 at least.
     """
     flown_m = mission.max_velocity_mps * mission.window_s * mission.num_windows
     lengths = (mission.side_m + 2.0 * flown_m) / min(mission.side_m, MISSION_DISTANCE_M)
-    return float(np.ceil(mission.num_robots + mission.num_windows / 500.0 + lengths))
+    return float(np.ceil(mission.num_robots + mission.num_windows / REFERENCE_WINDOWS + lengths))

@@ -1,4 +1,4 @@
-"""The PettingZoo face: every robot is an agent, `robot_0` to `robot_{N-1}`."""
+"""PettingZoo's interface: every robot is an agent, `robot_0` to `robot_{N-1}`."""
 
 from typing import Any
 
@@ -27,7 +27,7 @@ METADATA: dict[str, Any] = {"name": "swarm_mj_v0", **RENDERING}
 class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
     """One mission; a step is a window, and all are cut off (truncated) after the last one.
 
-    A robot that is switched off is terminated, and drops out. `reset(seed=s)` begins the mission of
+    A robot that fails is terminated, and drops out. `reset(seed=s)` begins the mission of
     seed s; without a seed it begins another one, drawn from the last seed given.
     """
 

@@ -1,4 +1,4 @@
-"""The stable-baselines3 face: B missions behind one `VecEnv`, for its algorithms and sb3-contrib's.
+"""stable-baselines3's interface: B missions as one `VecEnv`, for its algorithms, sb3-contrib's too.
 
 An environment is one robot, or one team. All missions begin and end together.
 """

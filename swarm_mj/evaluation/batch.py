@@ -30,7 +30,7 @@ class Batch:
     policy: str  # a name among `POLICIES`, or a directory
     probability: float | None  # of a transmission; None is the policy's own
     is_deterministic: bool = False  # a learned policy takes its most probable recipient
-    features: tuple[str, ...] = ()  # users' own, that a learned policy may see by
+    features: tuple[str, ...] = ()  # users' own extractors that a learned policy may load
     components: Components = Components()  # by name, as they are made in other processes
     parameters: Parameters | None = None  # what it must have, where that is known
     mission: Mission
@@ -100,7 +100,7 @@ def costs_of(swarm: Swarm, flown: Iterable[WindowRecord]) -> BatchCosts:
         is_on = np.ones(shape, np.bool_) if states.is_active is None else states.is_active
         floor = missing
         if has_floor:
-            floor = share_connected(shared, states.position_m, mission.range_m, now, is_on)
+            floor = connectivity_floor(shared, states.position_m, mission.range_m, now, is_on)
         task_cost = costs.task_cost.value if costs.task_cost else missing
         measured = {
             "aoi": costs.age_windows,
@@ -153,7 +153,7 @@ def count_ages(
 
 
 @compiled()
-def share_connected(
+def connectivity_floor(
     timestamp: Float[np.ndarray, "B N N"],
     position_m: Float[np.ndarray, "B N 2"],
     range_m: float,

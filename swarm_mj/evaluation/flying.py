@@ -1,4 +1,4 @@
-"""The flights of a study: in several processes, kept as they get done, and gone on with later.
+"""The flights of a study: in several processes, kept one by one, so that a study can be resumed.
 
 The progress file holds whole lines, each a digest and JSON: first what the batches depend on, then
 one batch a line. A line's digest is of the first line's JSON and its own, so it shows a line of
@@ -57,7 +57,7 @@ def fly_study(
 ) -> None:
     """Fly the batches that `costs` lacks, into `costs` and where they are kept.
 
-    A bar on the console shows how far it is, once that takes longer than `after_s`.
+    A bar on the console shows the progress once the flights have taken `after_s` seconds.
 
     Raises:
         KeyboardInterrupt: Ctrl-C was pressed; `costs` has all batches that were flown.

@@ -43,7 +43,7 @@ class Study:
     seed: int = setting(1000, "seed of the first mission; the others follow one by one")
     probability: float | None = setting(None, low=0.0, high=1.0)  # None is each policy's own
     is_deterministic: bool = False  # whether learned policies take the most probable recipient
-    features: tuple[str, ...] = ()  # users' own, that learned policies may see by
+    features: tuple[str, ...] = ()  # users' own extractors that learned policies may load
     components: Components = Components()
     baseline: str | None = setting(
         None,

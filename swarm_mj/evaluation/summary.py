@@ -211,7 +211,7 @@ def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> tuple[float | None, f
     largest = float(np.max(np.abs(samples), initial=0.0))
     if samples.size < 2 or float(np.ptp(samples)) <= ROUNDING * largest:
         return None, None
-    from scipy.stats import bootstrap  # takes its time to import
+    from scipy.stats import bootstrap  # slow to import
 
     found = bootstrap(
         (samples,),

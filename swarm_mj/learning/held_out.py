@@ -136,7 +136,7 @@ def record_replay(
     training: Training, network: AggregationGnn, decisions: int, folder: Path
 ) -> None:
     """Record the first held-out mission, as the network flies it after so many team decisions."""
-    from swarm_mj.replay.write import write_replay  # rerun takes its time to import
+    from swarm_mj.replay.write import write_replay  # rerun is slow to import
 
     mission = replace(training.mission, num_robots=training.robots[0])
     swarm = Swarm(mission, [HELD_OUT_SEED], **training.components.given)
@@ -172,7 +172,7 @@ def _shares_of(on_window: OnWindow, total: int) -> Iterator[OnWindow]:
 def _means(training: Training, costs: Flown) -> Row:
     age, variance = (_samples(costs, cost) for cost in JUDGED)
     is_aged = training.cost == "aoi"
-    # Larger teams are older: by the robot, every size has its say.
+    # Ages grow with the team; divided by its size, no size outweighs the others.
     objective = [a / n for a, n in zip(age, training.robots, strict=True)] if is_aged else variance
     packets = [window.packets for windows in costs for window in windows]
     attempted = sum(int(each.attempted.sum()) for each in packets)

@@ -109,7 +109,7 @@ class GnnActorCritic(ActorCriticPolicy):
         return network.requires_grad_(False)
 
     def take_acting_network(self, given: AggregationGnn) -> None:
-        """Begins with another network's weights; its shape is this one's."""
+        """Begin with another network's weights; its shape is this one's."""
         own = self.network.state_dict()
         with torch.no_grad():
             for name, tensor in given.state_dict().items():

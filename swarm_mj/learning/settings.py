@@ -31,7 +31,7 @@ class PpoSettings:
     decay_steps: int = setting(200, low=1, high=10**9)  # ... in this many optimiser steps ...
     least_share: float = setting(0.1, low=0.0, high=1.0)  # ... but not below this share of it
     num_steps: int = setting(32, low=1, high=100_000)  # windows of each mission in a rollout
-    num_minibatches: int = setting(10, low=1, high=10**6)  # that a rollout is shared out to
+    num_minibatches: int = setting(10, low=1, high=10**6)  # into which a rollout is divided
     num_epochs: int = setting(2, low=1, high=1000)  # passes over a rollout
     discount: float = setting(
         0.0, "gamma; 0: a packet's credit is that of its own window alone", low=0.0, high=1.0
@@ -98,8 +98,8 @@ class Training:
         "your own",
     )
     network: GnnShape = ROBOTS_NETWORK  # that acts
-    shares_trunk: bool = True  # whether values come from its last stage but one number
-    # What silence has ahead, but in a robot's own turn: e^7 to 1.
+    shares_trunk: bool = True  # whether values are one more output of the same network
+    # Added to the logit of silence, except in a robot's own turn: odds of e^7 to 1.
     silence_logit: float = setting(7.0, low=-100.0, high=100.0)
     reward: Reward = setting(
         "aoi", "the cost to lower; velocity-variance needs --credit team", choices=get_args(Reward)

@@ -44,7 +44,7 @@ def train(
     check_folder(folder)
     with owned(folder / SETTINGS):
         check_folder(folder)  # a run may have begun, or come further, meanwhile
-        session = TrainingCallback(run, folder, listener)
+        session = TrainingSession(run, folder, listener)
         try:
             session.learn()
             session.choose()
@@ -57,7 +57,7 @@ class Stopped(Exception):  # noqa: N818 - nothing went wrong
     """Ends an evaluation that the listener does not wait for."""
 
 
-class TrainingCallback(BaseCallback):
+class TrainingSession(BaseCallback):
     """One session of a run; PPO calls it after every window of a rollout."""
 
     def __init__(self, run: TrainingRun, folder: Path, listener: Listener) -> None:
@@ -90,7 +90,7 @@ class TrainingCallback(BaseCallback):
         self._counted_s, self._saved_s = time.monotonic(), -math.inf  # counted: in the progress
 
     def learn(self) -> None:
-        """Alternate rollouts and PPO's passes over them until a limit, or the listener, ends it."""
+        """Alternate rollouts and passes over them until a limit or the listener ends it (III-C)."""
         model, progress, patience = self.ppo, self.progress, self._run.limits.patience
         model._setup_learn(0, self, reset_num_timesteps=model.num_timesteps == 0)
         # PPO's own loop knows no minutes and no stall, and would dump its logs by itself.
@@ -148,7 +148,7 @@ class TrainingCallback(BaseCallback):
     def _between_rollouts(self, *, is_last: bool) -> None:
         """Evaluate, record a replay and keep a checkpoint, each if it is due."""
         progress, decisions = self.progress, self.progress.decisions
-        # The last checkpoint is from before such a rollout.
+        # The last checkpoint was written before the rollout that broke the weights.
         if not all(torch.isfinite(weight).all() for weight in self.ppo.policy.parameters()):
             raise ValueError(
                 f"the network's weights are no longer finite after {decisions} decisions; begin a "

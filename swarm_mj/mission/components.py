@@ -77,7 +77,7 @@ class Components:
         if "channel" in named and mission.beyond_free_space:
             raise ValueError(
                 f"channel {self.channel} takes the place of the mission's own, so "
-                f"{mission.beyond_free_space} would change nothing; leave out either"
+                f"{mission.beyond_free_space} would change nothing; leave out one of them"
             )
         found = {kind: make(kind, name, mission) for kind, name in named.items()}
         for kind, each in found.items():

@@ -14,10 +14,10 @@ from swarm_mj.mission.specification import Mission
 from swarm_mj.system.compiled import compiled
 
 MAX_DRAWS = 20_000  # the sparsest of the paper's teams (range ratio 0.2) connects in a few hundred
-MAX_FREE_DRAWS = 1000  # of a robot; of an area that is half free, a robot needs two
+MAX_FREE_DRAWS = 1000  # for one robot; in an area that is half free it needs two on average
 MAX_ROBOTS_DRAWN = 2_000_000  # bounds the draws of large teams, whose test takes longer
 
-# Says something of each robot, were the team at these positions [m].
+# Answers a question about each robot of a team at these positions [m].
 Test = Callable[[Float[np.ndarray, "N 2"]], Bool[np.ndarray, "N"]]
 
 

@@ -67,6 +67,9 @@ def in_order(prior_knowledge: str) -> str:
 class Mission:
     """A mission's numbers; the defaults are the paper's text (IV-B).
 
+    A field with a help text is an option of the command line, too: `range_ratio` is `--range-ratio`
+    and `num_robots` is `--robots` (`cli.options` makes them).
+
     Raises:
         ValueError: A field is outside its range; the message names the value and the range.
         TypeError: There is no such field; the message names the one most like it.
@@ -147,12 +150,21 @@ class Mission:
     )
     high_power_db: float = _radio(6.0, "extra power", "dB", 0.0, 60.0, "how much more that is")
     prior_knowledge: str = _choice(
-        *(NOTHING, "prior knowledge", NEW, Knowable),
+        NOTHING,
+        "prior knowledge",
+        NEW,
+        Knowable,
         "what robots know before the mission, several joined by commas",
-        **{"group": CHANNEL, "is_joined": True, "convert": in_order},
+        group=CHANNEL,
+        is_joined=True,
+        convert=in_order,
     )
     bit_rate: float | None = _radio(
-        *(None, "bit rate", "bit/s", 1.0, 1e12),
+        None,
+        "bit rate",
+        "bit/s",
+        1.0,
+        1e12,
         "in bit/s, as 250k or 6M; what does not fit into a slot of 50 ms is not sent",
         metavar="RATE",
     )
@@ -187,13 +199,16 @@ class Mission:
             raise ValueError(
                 f"prior knowledge must be nothing or some of {some}, not {self.prior_knowledge}"
             )
-        said = "exact physics knows no collisions,"
         if self.physics == "exact" and self.arena != OPEN:
-            has = f"{said} and arena {self.arena} has obstacles"
-            raise ValueError(f"{has}; choose physics contact, or arena open")
+            raise ValueError(
+                f"exact physics knows no collisions, and arena {self.arena} has obstacles; choose "
+                "physics contact, or arena open"
+            )
         if self.physics == "exact" and self.collide:
-            choose = "choose physics contact, or let them pass through each other"
-            raise ValueError(f"{said} so robots cannot collide in it; {choose}")
+            raise ValueError(
+                "exact physics knows no collisions, so robots cannot collide in it; choose "
+                "physics contact, or let them pass through each other"
+            )
         for name, value in vars(self).items():
             if isinstance(value, np.generic):  # which JSON does not know
                 object.__setattr__(self, name, value.item())

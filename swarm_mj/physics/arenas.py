@@ -18,7 +18,7 @@ from mujoco._specs import MjSpec
 from mujoco._structs import MjData, MjModel
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.specification import OPEN
+from swarm_mj.mission.specification import OPEN, SQUARE_METRES_PER_KM2
 from swarm_mj.physics.state import BOX, KINDS, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, Obstacles
 from swarm_mj.system.fields import did_you_mean
 
@@ -98,7 +98,7 @@ def rooms(spec: MjSpec, mission: Mission) -> None:
 
 def forest(spec: MjSpec, mission: Mission) -> None:
     """Add trees, spread evenly but not in rows: the points of Halton (1960) in bases 2 and 3."""
-    for n in range(1, round(TREES_PER_KM2 * mission.side_m**2 / 1e6) + 1):
+    for n in range(1, round(TREES_PER_KM2 * mission.side_m**2 / SQUARE_METRES_PER_KM2) + 1):
         x, y = ((_halton(n, base) - 0.5) * mission.side_m for base in (2, 3))
         _add(spec, "tree", "cylinder", (x, y), (TREE_RADIUS_M, HALF_HEIGHT_M))
 

@@ -128,7 +128,7 @@ def make_policy(
 
 
 def _learned(name: str, mission: Mission, **options: Any) -> Policy:
-    # The core of the package flies without these libraries, and torch takes its time to import.
+    # The core of the package flies without these libraries, and torch is slow to import.
     need("torch" if name == SHIPPED else "safetensors", f"policy {name}", "fly another")
     from swarm_mj.policies.stored import load_policy
 

@@ -25,7 +25,7 @@ AGE_BITS = 16  # ages of up to 32,767 windows; older ones count as that old
 
 @dataclass(frozen=True, kw_only=True)
 class PacketField:
-    """Numbers of one kind in a packet: code n stands for `low` + n `step`; or ValueError."""
+    """Numbers of one kind in a packet: code n stands for `low` + n `step`."""
 
     name: str
     bits: int  # of one number

@@ -223,7 +223,7 @@ def _send(
 def of_active(
     is_active: Bool[np.ndarray, "B N"] | None, robots: Int[np.ndarray, "B N"]
 ) -> Int[np.ndarray, "B N"]:
-    """Return these choices, but of inactive robots themselves: silence, or nobody heard."""
+    """Return these choices, with inactive robots' own identities for theirs: silence, or no one."""
     if is_active is None:
         return robots
     return np.where(is_active, robots, np.arange(is_active.shape[1], dtype=robots.dtype))

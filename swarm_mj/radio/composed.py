@@ -24,7 +24,8 @@ from swarm_mj.radio.fading import (
     mixed,
     shadow,
 )
-from swarm_mj.radio.power_law import PowerLaw, obstruct, write_path_loss
+from swarm_mj.radio.obstruction import obstruct
+from swarm_mj.radio.power_law import PowerLaw, write_path_loss
 from swarm_mj.radio.reception import Air, decoded, incoming_at, silent_air, transmit
 from swarm_mj.system.compiled import compiled
 
@@ -136,7 +137,7 @@ def strong_groups(is_linked: Bool[np.ndarray, "N N"]) -> Int[np.ndarray, "N"]:
 
     Links go from row to column, so groups are the graph's strongly connected components.
     """
-    from scipy.sparse.csgraph import connected_components  # takes its time to import
+    from scipy.sparse.csgraph import connected_components  # slow to import
 
     _, label = connected_components(is_linked, connection="strong")
     _, first, group = np.unique(label, return_index=True, return_inverse=True)

@@ -24,9 +24,9 @@ from swarm_mj.radio.free_space import (
     transmit_power_dbm,
 )
 from swarm_mj.radio.links import KNOWN, Curves, Links, decode_curves, doubtful, links_between
+from swarm_mj.radio.obstruction import NO_OBSTACLES
 from swarm_mj.radio.power_law import (
     FREE_SPACE_EXPONENT,
-    NO_OBSTACLES,
     TWO_RAY_EXPONENT,
     PowerLaw,
     powers_between,

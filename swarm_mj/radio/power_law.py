@@ -1,44 +1,25 @@
-"""Mean powers from positions alone: transmit powers, path loss and obstacles, for compiled loops.
+"""Mean powers from positions alone: transmit powers and path loss, for compiled loops.
 
 The paper's radio is free space everywhere (Eq. 1). The other laws agree with it up to a breakpoint,
 so a mission's transmit power means the same under each of them; beyond it, tenfold distance costs
 10 n dB. Index order: `i` sends, `j` receives.
-
-Every obstacle that the straight line between two antennas crosses costs dB, which add up: the
-multi-wall model of COST 231 (1999, section 4.7). Lines are tested against boxes, cylinders,
-spheres, capsules and ellipsoids in compiled loops, and agree with MuJoCo's own rays, which a test
-holds them against.
 """
 
 import math
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from swarm_mj.mission.geometry import squared_distance
-from swarm_mj.physics.state import BOX, CYLINDER, ELLIPSOID, ROBOT_HEIGHT_M, SPHERE, Obstacles
+from swarm_mj.physics.state import ROBOT_HEIGHT_M, Obstacles
+from swarm_mj.radio.obstruction import NO_OBSTACLES, obstruct
 from swarm_mj.radio.reception import received_power
 from swarm_mj.system.compiled import compiled
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 FREE_SPACE_EXPONENT = 2.0
 TWO_RAY_EXPONENT = 4.0
-
-Vector = tuple[float, float, float]
-Interval = tuple[float, float]  # of the share of a line's way; empty if it ends before it begins
-
-NOTHING = (1.0, 0.0)
-
-# An empty table, not None: compiled loops then have one type, and end at once.
-NO_OBSTACLES = Obstacles(
-    kind=np.zeros(0, dtype=np.int64),
-    centre_m=np.zeros((0, 3)),
-    rotation=np.zeros((0, 3, 3)),
-    size_m=np.zeros((0, 3)),
-    reach_m=np.zeros(0),
-    power_left=np.zeros(0),
-)
 
 
 class PowerLaw(NamedTuple):
@@ -100,148 +81,3 @@ def powers_between(position_m: Float[np.ndarray, "N 2"], law: PowerLaw) -> Float
     for i in range(num_robots):
         write_powers(i, position_m, law, power[i])
     return power
-
-
-@compiled()
-def obstruct(
-    i: int,
-    position_m: Float[np.ndarray, "N 2"],
-    height_m: float,
-    obstacles: Obstacles,
-    power: Float[np.ndarray, "N"],
-) -> None:
-    """Multiply the power of i's packets at every other robot by what obstacles leave of it.
-
-    The robots' antennas are at this height above the floor [m].
-    """
-    if obstacles.kind.shape[0] == 0:
-        return
-    x, y = position_m[i, 0], position_m[i, 1]
-    for j in range(position_m.shape[0]):
-        if j != i:
-            along_m = (position_m[j, 0] - x, position_m[j, 1] - y, 0.0)
-            power[j] *= power_through((x, y, height_m), along_m, obstacles)
-
-
-@compiled()
-def blocked(
-    position_m: Float[np.ndarray, "N 2"], height_m: float, radius_m: float, obstacles: Obstacles
-) -> Bool[np.ndarray, "N"]:
-    """Return which robots of this radius touch an obstacle, by four lines across each.
-
-    Their centres are at this height above the floor [m].
-    """
-    touches = np.zeros(position_m.shape[0], dtype=np.bool_)
-    for i in range(position_m.shape[0]):
-        for turn in range(4):
-            x, y = math.cos(0.25 * math.pi * turn), math.sin(0.25 * math.pi * turn)
-            start_m = (position_m[i, 0] - radius_m * x, position_m[i, 1] - radius_m * y, height_m)
-            along_m = (2.0 * radius_m * x, 2.0 * radius_m * y, 0.0)
-            touches[i] |= _next_crossed(start_m, along_m, 0, obstacles) < obstacles.kind.shape[0]
-    return touches
-
-
-@compiled()
-def power_through(start_m: Vector, along_m: Vector, obstacles: Obstacles) -> float:
-    """Return the share of the power that reaches the end of a line, linear [1]."""
-    left = 1.0
-    o = _next_crossed(start_m, along_m, 0, obstacles)
-    while o < obstacles.kind.shape[0]:
-        left *= obstacles.power_left[o]
-        o = _next_crossed(start_m, along_m, o + 1, obstacles)
-    return left
-
-
-@compiled()
-def _next_crossed(start_m: Vector, along_m: Vector, first: int, obstacles: Obstacles) -> int:
-    """Return the next obstacle that a line crosses, from this one on; their number if none."""
-    # Most obstacles are too far off, which few numbers show.
-    start_x, start_y, start_z = start_m
-    along_x, along_y, along_z = along_m
-    length_m2 = along_x * along_x + along_y * along_y + along_z * along_z
-    per_m2 = 1.0 / length_m2 if length_m2 > 0.0 else 0.0
-    num_obstacles = obstacles.kind.shape[0]
-    for o in range(first, num_obstacles):
-        x = obstacles.centre_m[o, 0] - start_x
-        y = obstacles.centre_m[o, 1] - start_y
-        z = obstacles.centre_m[o, 2] - start_z
-        share = min(max((x * along_x + y * along_y + z * along_z) * per_m2, 0.0), 1.0)
-        x, y, z = x - share * along_x, y - share * along_y, z - share * along_z
-        is_near = x * x + y * y + z * z <= obstacles.reach_m[o] ** 2
-        if is_near and _crosses(start_m, along_m, o, obstacles):
-            return o
-    return num_obstacles
-
-
-@compiled()
-def _crosses(start_m: Vector, along_m: Vector, o: int, obstacles: Obstacles) -> bool:
-    """Return whether a line has a point in common with an obstacle."""
-    kind, centre_m, size_m = obstacles.kind[o], obstacles.centre_m[o], obstacles.size_m[o]
-    frame = obstacles.rotation[o]
-    dx, dy, dz = start_m[0] - centre_m[0], start_m[1] - centre_m[1], start_m[2] - centre_m[2]
-    x, y, z = _turned((dx, dy, dz), frame)
-    u, v, w = _turned(along_m, frame)
-    if kind == BOX:
-        part = _within(x, u, size_m[0], (0.0, 1.0))
-        part = _within(y, v, size_m[1], part)
-        part = _within(z, w, size_m[2], part)
-        return part[0] <= part[1]
-    if kind == ELLIPSOID:  # a ball, once every axis is counted in its own half length
-        place = (x / size_m[0], y / size_m[1], z / size_m[2])
-        return _meets_ball(place, (u / size_m[0], v / size_m[1], w / size_m[2]), 1.0)
-    radius_m, half_m = size_m[0], size_m[1]
-    if kind == SPHERE:
-        return _meets_ball((x, y, z), (u, v, w), radius_m)
-    part = _within(z, w, half_m, (0.0, 1.0))
-    part = _within_ball((x, y, 0.0), (u, v, 0.0), radius_m, part)
-    if kind == CYLINDER or part[0] <= part[1]:
-        return part[0] <= part[1]
-    is_met = _meets_ball((x, y, z - half_m), (u, v, w), radius_m)  # a capsule's ends
-    return is_met or _meets_ball((x, y, z + half_m), (u, v, w), radius_m)
-
-
-@compiled()
-def _turned(vector: Vector, frame: Float[np.ndarray, "3 3"]) -> Vector:
-    """Return a vector of the scene in the frame of an obstacle."""
-    a, b, c = vector
-    return (
-        frame[0, 0] * a + frame[1, 0] * b + frame[2, 0] * c,
-        frame[0, 1] * a + frame[1, 1] * b + frame[2, 1] * c,
-        frame[0, 2] * a + frame[1, 2] * b + frame[2, 2] * c,
-    )
-
-
-@compiled()
-def _within(p: float, v: float, half: float, part: Interval) -> Interval:
-    """Return the part of an interval of s in which p + s v lies within plus or minus half."""
-    if v == 0.0:
-        return part if abs(p) <= half else NOTHING
-    near, far = (-half - p) / v, (half - p) / v
-    if near > far:
-        near, far = far, near
-    return max(part[0], near), min(part[1], far)
-
-
-@compiled()
-def _meets_ball(place: Vector, along: Vector, radius: float) -> bool:
-    """Return whether a line meets a ball around the origin."""
-    low, high = _within_ball(place, along, radius, (0.0, 1.0))
-    return low <= high
-
-
-@compiled()
-def _within_ball(place: Vector, along: Vector, radius: float, part: Interval) -> Interval:
-    """Return the part of an interval of s in which place + s along lies in a ball."""
-    x, y, z = place
-    u, v, w = along
-    # The line's points in the ball are those between the roots of a s² + 2 b s + c.
-    a = u * u + v * v + w * w
-    b = x * u + y * v + z * w
-    c = x * x + y * y + z * z - radius * radius
-    if a == 0.0:
-        return part if c <= 0.0 else NOTHING
-    square = b * b - a * c
-    if square < 0.0:
-        return NOTHING
-    root = math.sqrt(square)
-    return max(part[0], (-b - root) / a), min(part[1], (-b + root) / a)

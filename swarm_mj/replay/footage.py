@@ -15,7 +15,7 @@ from swarm_mj.replay.links import (
     PIECES,
     Lines,
     LinkMismatch,
-    Links,
+    LinkRows,
     PacketSegments,
     Positions,
     by_kind,
@@ -92,7 +92,7 @@ class Footage:
     position_m: Positions  # p
     velocity_mps: Float[np.ndarray, "T N 2"]  # of any length: only its direction is shown
     age: Float[np.ndarray, "T N"]  # of what the observer knows [windows]; nan: nothing
-    is_on: Bool[np.ndarray, "T N"]  # whether a robot was switched on
+    is_on: Bool[np.ndarray, "T N"]  # whether a robot had not failed
     segments: dict[str, PacketSegments]  # packets by their fate, in the order of drawing
     age_mean: Float[np.ndarray, "T"]  # Eq. 10 [windows]
     is_cut_off: Bool[np.ndarray, "T N"]  # whether it can exchange no packets with the observer
@@ -114,7 +114,7 @@ class Footage:
             its = slice(*np.searchsorted(drawn.row, [row, row + 1]))
             yield drawn.start_m[its], drawn.end_m[its], palette.PACKETS[fate][0]
 
-    def links(self, row: int) -> Links:
+    def links(self, row: int) -> LinkRows:
         """Return the links that are shown in one window: of those too weak, the observer's only.
 
         In a city, all of them together would not show which robots each one joins.

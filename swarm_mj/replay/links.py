@@ -40,7 +40,7 @@ NUMBERS = ("sender", "receiver", "loss_db", "margin_db")
 LINK = np.dtype([("row", int), *((name, np.int16) for name in NUMBERS), ("is_too_weak", bool)])
 
 
-Links: TypeAlias = Shaped[np.ndarray, "_"]  # an array of `LINK`
+LinkRows: TypeAlias = Shaped[np.ndarray, "_"]  # an array of `LINK`
 Lines: TypeAlias = Float[np.ndarray, "_ 2 2"]  # from start to end [m]
 
 
@@ -134,9 +134,9 @@ class LinkMismatch(NamedTuple):
     """The L links that differ in C snapshots, each of which stands until the next."""
 
     window: Int[np.ndarray, "C"]  # of each snapshot; 1 is the mission's first
-    links: Links  # with the row of their snapshot, ascending
+    links: LinkRows  # with the row of their snapshot, ascending
 
-    def at(self, window: int) -> Links:
+    def at(self, window: int) -> LinkRows:
         """Return the links of the snapshot that stands for a window."""
         row = np.searchsorted(self.window, window, side="right") - 1
         return self.links[self.links["row"] == row]
@@ -149,7 +149,7 @@ class RadioSnapshot(NamedTuple):
     """The mean links of one mission at one moment."""
 
     group: Int16[np.ndarray, "N"]  # the first of the robots that each is connected with
-    links: Links  # that differ
+    links: LinkRows  # that differ
     num_believed: int  # links that are believed in, one for both directions
     num_working: int  # links that decode, likewise
 
@@ -193,12 +193,12 @@ def radio_snapshot(swarm: Swarm, index: int = 0) -> RadioSnapshot | None:
     return RadioSnapshot(group, links, num_believed, num_working)
 
 
-def by_kind(links: Links) -> dict[str, Links]:
+def by_kind(links: LinkRows) -> dict[str, LinkRows]:
     """Sort links: those that decode without belief, and believed ones that are too weak."""
     return {kind: links[links["is_too_weak"] == (kind == "too_weak")] for kind in palette.MISMATCH}
 
 
-def ends(links: Links, position_m: Positions, row: int | Int[np.ndarray, "L"]) -> Lines:
+def ends(links: LinkRows, position_m: Positions, row: int | Int[np.ndarray, "L"]) -> Lines:
     """Return where links begin and end, by the robots' positions in a window or each one's [m]."""
     return np.stack([position_m[row, links[end]] for end in NUMBERS[:2]], axis=1)
 
@@ -209,7 +209,7 @@ def divided(lines_m: Lines, pieces: Float[np.ndarray, "P 2"]) -> Lines:
     return (start_m + pieces[None, :, :, None] * way_m).reshape(-1, 2, 2)
 
 
-def shades(kind: str, links: Links) -> UInt8[np.ndarray, "L 3"]:
+def shades(kind: str, links: LinkRows) -> UInt8[np.ndarray, "L 3"]:
     """Return the colours of links of one kind: the lower the margin, the darker."""
     if kind != "too_weak":
         return np.tile(np.array(palette.MISMATCH[kind], dtype=np.uint8), (len(links), 1))

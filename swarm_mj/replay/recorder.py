@@ -26,6 +26,10 @@ from swarm_mj.system.needs import GB
 # Longer or larger flights keep the age matrix of every k-th window only.
 MAX_AGE_MATRIX_BYTES = 64e6
 AGE_BYTES = 4  # float32
+# Fits of measured peaks and files: of rerun itself, of each window, of each robot in it; and of the
+# age matrices, which are copied in memory and compressed in the file.
+RERUN_BYTES, WINDOW_BYTES, ROBOT_BYTES, MATRIX_COPIES = 0.1 * GB, 15e3, 1e3, 2.2
+BLUEPRINT_BYTES, WINDOW_FILE_BYTES, ROBOT_FILE_BYTES, MATRIX_SHARE = 0.5e6, 500.0, 150.0, 0.25
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +44,7 @@ class Log:
     position_m: Float[np.ndarray, "T N 2"]  # p [m]
     velocity_mps: Float[np.ndarray, "T N 2"]  # v [m/s]
     recipient: Int[np.ndarray, "T 2 N"]  # S^i in both phases; itself: silent
-    is_on: Bool[np.ndarray, "T N"]  # whether a robot was switched on
+    is_on: Bool[np.ndarray, "T N"]  # whether a robot had not failed
     heard: Int[np.ndarray, "T 2 N"]  # the sender that robot j decoded in both phases; itself: none
     is_broadcast: bool  # packets have no addressee; otherwise the second phase answers the first
     is_known: Bool[np.ndarray, "T N"]  # whether the ego robot has heard of j
@@ -189,10 +193,12 @@ class Recorder:
 def replay_memory(mission: Mission, num_windows: int) -> float:
     """Return the memory that recording takes at its peak, when the replay is written."""
     matrices = min(MAX_AGE_MATRIX_BYTES, AGE_BYTES * num_windows * mission.num_robots**2)
-    return 0.1 * GB + (15e3 + 1e3 * mission.num_robots) * num_windows + 2.2 * matrices
+    a_window = WINDOW_BYTES + ROBOT_BYTES * mission.num_robots
+    return RERUN_BYTES + a_window * num_windows + MATRIX_COPIES * matrices
 
 
 def replay_file(mission: Mission) -> float:
     """Return a replay's size, of teams that move; others' are smaller."""
     matrices = min(MAX_AGE_MATRIX_BYTES, AGE_BYTES * mission.num_windows * mission.num_robots**2)
-    return 0.5e6 + (500.0 + 150.0 * mission.num_robots) * mission.num_windows + 0.25 * matrices
+    a_window = WINDOW_FILE_BYTES + ROBOT_FILE_BYTES * mission.num_robots
+    return BLUEPRINT_BYTES + a_window * mission.num_windows + MATRIX_SHARE * matrices

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Ground
-from swarm_mj.replay.links import NUMBERS, LinkMismatch, Links, Points, shades
+from swarm_mj.replay.links import NUMBERS, LinkMismatch, LinkRows, Points, shades
 from swarm_mj.replay.palette import Colour, dim
 from swarm_mj.replay.recorder import Log
 
@@ -130,7 +130,7 @@ class RerunLog:
         self.layer(path, row, centers=centre, half_sizes=np.full(centre.shape, radius_m))
 
     def mismatch_lines(
-        self, path: str, links: Links, lines_m: Float[np.ndarray, "L 2 A"], of: LinkMismatch
+        self, path: str, links: LinkRows, lines_m: Float[np.ndarray, "L 2 A"], of: LinkMismatch
     ) -> None:
         """Write a line for each of these links; those who click on one read its numbers."""
         self.fixed_layer(path)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from swarm_mj.system.needs import ADDRESSES, LIBRARIES, OF_RERUN, Needs
 from swarm_mj.system.processes import PYTHON, running
 
-if TYPE_CHECKING:  # what draws takes its time to import
+if TYPE_CHECKING:  # what draws is slow to import
     from swarm_mj.replay.footage import Footage
 
 LOOPBACK = "127.0.0.1"

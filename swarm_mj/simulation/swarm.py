@@ -27,7 +27,7 @@ from swarm_mj.protocol.window import LocalViews, Phase, RequestResponse, WindowP
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.radio.mission_radio import mission_radio
-from swarm_mj.radio.power_law import blocked
+from swarm_mj.radio.obstruction import blocked
 from swarm_mj.system.fields import check_kind
 
 MAX_THREADS = 1024
@@ -200,7 +200,7 @@ class Swarm:
             self._physics.deactivate(survivors)
         self.phases = window(self.buffers, decide_after, self.move, self.channel, start)
         self.now = start + 1.0
-        flown, cost = (self.buffers, self.states, self.phases, self.now), self._task_cost()
+        flown, cost = (self.buffers, self.states, self.phases, self.now), self.task_cost()
         return window_costs(*flown, is_broadcast=window.is_broadcast, task_cost=cost)
 
     # Not within `_play`: tests, which check types, would wrap it anew in every window.
@@ -217,7 +217,7 @@ class Swarm:
         check_robots("recipient", recipient, self.buffers.shape, may_broadcast=self.is_broadcast)
         return recipient
 
-    def _task_cost(self) -> TaskCost | None:
+    def task_cost(self) -> TaskCost | None:
         """Return what the task costs now, where the controller has a cost."""
         controller = self._costed
         if controller is None:

@@ -135,7 +135,7 @@ REFUSED = {
     "--features my_parts:Coin": "no policy here was trained on the features my_parts:Co",
     "--channel my_parts:Lossy --fading rayleigh --erasure 0.3": (
         "channel my_parts:Lossy takes the place of the mission's own, so fading rayleigh, erasure "
-        "0.3 would change nothing; leave out either"
+        "0.3 would change nothing; leave out one of them"
     ),
 }
 

@@ -14,7 +14,7 @@ from forks import files
 
 from swarm_mj.cli import main
 from swarm_mj.learning.run_folder import read_run
-from swarm_mj.learning.train import TrainingCallback
+from swarm_mj.learning.train import TrainingSession
 from swarm_mj.policies.stored import read_policy
 from swarm_mj.replay.read import windows
 
@@ -83,7 +83,7 @@ def test_the_commands_that_it_prints_work(whole, monkeypatch, capsys, label):
 @contextmanager
 def ctrl_c_at(method, *calls):
     """Presses Ctrl-C in certain windows of the training, or of its evaluations."""
-    original, count = getattr(TrainingCallback, method), itertools.count(1)
+    original, count = getattr(TrainingSession, method), itertools.count(1)
 
     def pressing(session, *arguments):
         if next(count) in calls:
@@ -92,7 +92,7 @@ def ctrl_c_at(method, *calls):
 
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(TrainingCallback, method, pressing)
+        patch.setattr(TrainingSession, method, pressing)
         yield
     signal.signal(signal.SIGINT, before)
 

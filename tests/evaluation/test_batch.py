@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from swarm_mj.evaluation.batch import (
     TOTALS,
     Batch,
+    connectivity_floor,
     costs_of,
     count_ages,
     fly_batch,
-    share_connected,
 )
 from swarm_mj.mission import paper
 from swarm_mj.mission.placement import is_connected
@@ -51,7 +51,7 @@ def test_costs_are_those_of_the_flight(policy, failure_fraction):
         flown.append(window)
         age, is_on = swarm.now[:, None, None] - swarm.buffers.timestamp, active(swarm)
         place = swarm.states.position_m, mission.range_m
-        floors.append(share_connected(known, *place, swarm.now, is_on))
+        floors.append(connectivity_floor(known, *place, swarm.now, is_on))
         ages.extend(age[is_on[:, :, None] & is_on[:, None, :] & ~np.eye(6, dtype=bool)].tolist())
     summary = summarise(flown)
     for name in ("aoi", "velocity_variance", "hops"):
@@ -128,7 +128,7 @@ def empty(num_missions, num_robots):
 def aged(known, x_m, t, is_on=None):
     """The age at t of one mission's robots on a line with a range of 1 m, all on unless given."""
     position_m, on = np.array([[(x, 0.0) for x in x_m]]), [is_on or [True] * len(x_m)]
-    return share_connected(known, position_m, 1.0, np.array([float(t)]), np.array(on))
+    return connectivity_floor(known, position_m, 1.0, np.array([float(t)]), np.array(on))
 
 
 def test_a_courier_brings_what_it_last_knew():
@@ -163,7 +163,7 @@ def test_floor_as_by_components_of_a_graph(seed, num_missions, num_robots):
     for t in (1.0, 2.0, 3.0, 4.0):
         position_m = rng.random((num_missions, num_robots, 2))
         is_on = np.ones(position_m.shape[:2], dtype=bool)
-        found = share_connected(known, position_m, 0.4, np.full(num_missions, t), is_on)
+        found = connectivity_floor(known, position_m, 0.4, np.full(num_missions, t), is_on)
         for b in range(num_missions):
             places = dict(enumerate(position_m[b]))
             graph = nx.random_geometric_graph(num_robots, 0.4, pos=places)
@@ -192,6 +192,6 @@ def test_no_policy_goes_below_the_floor(name, task, failing):
         on = swarm.states.is_active
         is_on = np.ones((2, 8), dtype=bool) if on is None else on
         place = swarm.states.position_m, mission.range_m
-        floors.append(share_connected(known, *place, swarm.now, is_on))
+        floors.append(connectivity_floor(known, *place, swarm.now, is_on))
         assert np.all(flown.costs.age_windows >= floors[-1] - 1e-9)
     assert (np.max(floors) > 0.0) == (task != "stationary")

@@ -208,7 +208,7 @@ def test_a_better_policy_takes_the_place_of_the_last_and_a_worse_one_does_not(
     tmp_path, monkeypatch
 ):
     judge(monkeypatch, [3.0, 1.0, 2.0, 1.0])
-    monkeypatch.setattr(train.TrainingCallback, "choose", lambda _: None)
+    monkeypatch.setattr(train.TrainingSession, "choose", lambda _: None)
     progress = run(TRAINING, tmp_path / "run")
     assert progress.best_objective == 1.0
     _, config = read_policy(tmp_path / "run" / POLICY)

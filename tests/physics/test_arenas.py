@@ -13,7 +13,7 @@ from swarm_mj.physics.arenas import ARENAS, DEFAULT_LOSS_DB, OBSTACLE_GROUP, not
 from swarm_mj.physics.scene import compose
 from swarm_mj.physics.state import BOX, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, SPHERE
 from swarm_mj.policies import make_policy
-from swarm_mj.radio.power_law import blocked
+from swarm_mj.radio.obstruction import blocked
 from swarm_mj.simulation.swarm import Swarm
 
 WITH_OBSTACLES = [name for name in ARENAS if name != "open"]

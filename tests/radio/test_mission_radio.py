@@ -14,7 +14,7 @@ from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.links import links_between, lone_probabilities
 from swarm_mj.radio.mission_radio import TrueLinks, mission_radio, radio_of
-from swarm_mj.radio.power_law import NO_OBSTACLES
+from swarm_mj.radio.obstruction import NO_OBSTACLES
 
 
 def test_radio_is_the_missions():

@@ -211,7 +211,7 @@ def _is_common(buffers: Buffers, b: int) -> bool:
 
 
 def epoch_windows(epoch: int, num_robots: int, settings: PlannerSettings) -> int:
-    """Return how long an epoch is: the discovery, then two short ones, then all others."""
+    """Return how long an epoch is: the first, then two short ones, then all others."""
     if epoch > 2:
         return max(settings.min_epoch_windows, round(settings.epoch_rounds * num_robots))
     rounds = settings.early_epoch_rounds if epoch > 0 else settings.first_epoch_rounds

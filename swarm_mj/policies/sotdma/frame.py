@@ -32,7 +32,7 @@ class Rule(NamedTuple):
     interference: float = 1.2  # times what robots believe of it: choices at the edge fail
     predicted_slots: int = 48  # for which choices of unheard robots are predicted [slots]
     marked_slots: int = 200  # for which a slot that a neighbour missed is marked [slots]
-    min_miss_probability: float = 0.1  # rarer misses mark a slot, as no chance
+    min_miss_probability: float = 0.1  # a miss that is rarer was no chance, and marks its slot
     contention_every: int = 16  # the last of this many slots is no part of the frames [slots]
     contention_probability: float = 0.4  # that a robot in need transmits in it [1]
     need_frames: float = 3.0  # a neighbour not heard for longer is lost [frames]
