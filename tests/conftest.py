@@ -9,8 +9,8 @@ from hypothesis import settings
 from sampled_types import check_again
 
 # Compiling takes its time on an example's first run; no law here is about time.
-settings.register_profile("swarm_mj", deadline=None, max_examples=50)
-settings.load_profile("swarm_mj")
+settings.register_profile("all", deadline=None, max_examples=50)
+settings.register_profile("fast", deadline=None, max_examples=20)
 
 TRAINING = Path(__file__).parent.parent / "training"
 
@@ -36,6 +36,7 @@ def _experiments_are_left_alone():
 @pytest.hookimpl(trylast=True)  # after the hook that has the types of all imported modules checked
 def pytest_configure(config):
     """Decide once for all processes by what pictures are drawn, before a library chooses itself."""
+    settings.load_profile("fast" if "not slow" in config.option.markexpr else "all")
     if not hasattr(config, "workerinput"):  # workers inherit it
         from swarm_mj.replay.rendering.opengl import CHOICE, backend
 

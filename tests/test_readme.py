@@ -91,11 +91,8 @@ def page_folder(here, monkeypatch):
             del sys.modules[name]
 
 
-# The README's code runs each time, that of the other pages in `make test-all`.
-@pytest.mark.parametrize(
-    "page",
-    [page if page == "README.md" else pytest.param(page, marks=pytest.mark.slow) for page in RUN],
-)
+@pytest.mark.slow  # what it shows is tested elsewhere; here, that it is shown as it is
+@pytest.mark.parametrize("page", RUN)
 def test_a_page_runs_from_top_to_bottom(page, page_folder, forks):
     namespace = {"__name__": "page"}
     for block in RUN[page]:

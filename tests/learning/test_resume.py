@@ -29,6 +29,8 @@ from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import paper
 from swarm_mj.policies.learned import sample
 
+pytestmark = pytest.mark.slow  # `cli/test_own_parts.py` holds the law once
+
 RESUMED = {
     "robot, discounted": {"discount": 0.9},
     "robot, walking, two sizes": {"task": "random-walk", "sizes": (4, 6)},

@@ -10,6 +10,8 @@ import pytest
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.mission import Mission
 
+pytestmark = pytest.mark.slow
+
 FILE = Path(__file__).parents[2] / "training" / "results" / "paper-random-walk.csv"
 CHEAP = ("tdma", "round-robin", "spatial-tdma", "planner")
 

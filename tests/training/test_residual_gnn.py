@@ -18,6 +18,7 @@ from swarm_mj.policies.registry import make_policy
 TINY = ["--robots", "6", "--windows", "100", "--held-out", "1", "--places", "2", "--together", "1"]
 
 
+@pytest.mark.slow
 def test_a_run_trains_goes_on_and_its_weights_fly(tmp_path, monkeypatch):
     """Each improvement takes half a minute of a clock that only the training looks at."""
     monkeypatch.setattr(module, "KINDS", {"30 % erased": {"erasure": 0.3}})
