@@ -1,9 +1,6 @@
-"""Faces of the swarm for other people's libraries, and their names in Gymnasium's registry."""
+"""Interfaces of other people's libraries, and their names in Gymnasium's registry."""
 
 from typing import get_args
-
-# Not `gymnasium` itself: a module of this room has its name.
-from gymnasium.envs.registration import register, registry
 
 from swarm_mj.mission import Task
 
@@ -15,6 +12,9 @@ def register_environments() -> None:
 
     Each takes the options of `envs.options.make_batch`, among them any field of `Mission`.
     """
+    # The other interfaces need no Gymnasium; and `gymnasium` here is a module of this folder.
+    from gymnasium.envs.registration import register, registry
+
     for task in get_args(Task):
         name = environment_id(task)
         if name not in registry:

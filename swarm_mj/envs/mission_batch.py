@@ -49,13 +49,17 @@ class MissionBatch:
         reward: str = "aoi",
         with_parents: bool = False,
         components: Components = Components(),
+        keeps_recipients: bool = False,
     ) -> None:
-        """Take the missions, which `restart` begins; arguments as in `options.make_batch`."""
+        """Take the missions, which `restart` begins; arguments as in `options.make_batch`.
+
+        With `keeps_recipients`, a mission under way can be flown again, by checkpoints.
+        """
         self.mission, self.num_missions = mission, num_missions
         self.shape = (num_missions, mission.num_robots)  # B N
         self.features, self.reward, self.with_parents = features, reward, with_parents
         self.swarm: Swarm | None = None  # made when it begins
-        self._components = components
+        self._components, self._keeps_recipients = components, keeps_recipients
         self._extractor = make_extractor(features, mission)
         self.num_features = len(self._extractor.names)  # F
 
@@ -68,7 +72,7 @@ class MissionBatch:
         self.seeds = list(seeds)
         self.last_window = last_window or self.mission.num_windows
         self.costs: WindowCosts | None = None  # of the last window
-        self.recipients: list[np.ndarray] = []  # window by window: flown again, they lead here
+        self.recipients: list[np.ndarray] = []  # of the windows flown, if they are kept
         self._extractor.start(self.num_missions, self.mission.num_robots)
         self._see()
         check_width(self.features, self._extractor, self.graphs)
@@ -102,7 +106,8 @@ class MissionBatch:
                 f"the mission is over after its {self.last_window} windows; call reset()"
             )
         self.costs = self.flown.step_with_recipients(recipient)
-        self.recipients.append(recipient.astype(np.int16))
+        if self._keeps_recipients:
+            self.recipients.append(recipient.astype(np.int16))
         self._see()
         return self.costs
 

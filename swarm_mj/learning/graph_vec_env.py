@@ -163,6 +163,7 @@ def _make_batches(training: Training) -> list[MissionBatch]:
             features=training.features,
             reward="credit" if training.credit_assignment == "robot" else training.reward,
             components=training.components,
+            keeps_recipients=True,
         )
         for n in range(num_batches)
     ]

@@ -1,4 +1,4 @@
-"""Communication policies (IV-C), one file each; `registry` knows their names."""
+"""Communication policies (IV-C), one file for each kind; `registry` knows their names."""
 
 from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.policies.registry import POLICIES, make_policy

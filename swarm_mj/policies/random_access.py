@@ -130,7 +130,8 @@ class InnovationGossip(RandomTransmission, BroadcastPolicy):
     fresher since its own last broadcast: the rise of T^{i,j}, its own included, averaged over the
     team [windows]. A robot broadcasts with p times that, at most with certainty: p is per window of
     news. So robots that hear much pass it on soon, and one that hears nothing still reports its
-    position now and then.
+    position now and then. Two unanswered broadcasts a window lead to a lower age than one packet
+    that a neighbour answers.
     """
 
     uses = "how much it has learned since its last transmission"

@@ -19,8 +19,8 @@ class Tdma(BroadcastPolicy):
     """In each slot one robot broadcasts, in a fixed random order of identities, unanswered.
 
     Time-division multiple access (Miao, Zander, Sung, Slimane: Fundamentals of Mobile Data
-    Networks, 2016). Nobody interferes, so every robot in range decodes. Like the identities, the
-    mission's order is granted to all of its robots beforehand (II-C).
+    Networks, 2016). Nobody interferes, so every robot in range decodes. The order is drawn for each
+    mission and, like the identities, granted to all of its robots beforehand (II-C).
     """
 
     uses = "its identity, a common random order and the clock: one robot transmits per slot"

@@ -62,6 +62,7 @@ class Plan:
 
     def outcome(self) -> Float[np.ndarray, "N N"]:
         """Return T after the last slot of a plan that ends, as expected [windows]."""
+        assert math.isfinite(self._num_slots)
         while len(self._transmits) < self._num_slots:
             self._extend()
         return self._timestamp.astype(np.float64) / SLOTS_PER_WINDOW
