@@ -150,8 +150,10 @@ def window(
     Buffers are written in place; `states` are true, and fixed during the window; the clock shows
     the start of the window [windows]. Silence may count as addressing oneself (Eq. 7).
     """
-    now, noted = now + SLOT_WINDOWS, silence_is_attempt
-    transmission = transmit(buffers, states, recipient, channel, now, silence_is_attempt=noted)
+    now = now + SLOT_WINDOWS
+    transmission = transmit(
+        buffers, states, recipient, channel, now, silence_is_attempt=silence_is_attempt
+    )
 
     now = now + SLOT_WINDOWS
     observe_self(buffers, states, now)

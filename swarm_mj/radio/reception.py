@@ -1,6 +1,6 @@
-"""Reception (II-A): the one place that says which packet a robot decodes, and how probably.
+"""Reception (II-A): the rules that say which packet a robot decodes, and how probably.
 
-The channels, the schedulers and the policies that predict receptions all call these. Index order:
+The channels, the schedulers and the policies that predict receptions share them. Index order:
 `i` sends, `j` receives. Powers are in one unit, whichever it is.
 """
 

@@ -6,7 +6,8 @@ file imports, one after the other, so that physics can stand once and loops anyw
 
 The cache lies in `NUMBA_CACHE_DIR` if that is set, else in the `__pycache__` beside the file, else,
 in an installation that cannot be written, in the user's cache folder. Where none of them can be
-written, every process compiles anew. What is out of date is overwritten, so no folder grows.
+written, every process compiles anew. What is out of date is overwritten. Only files of functions
+that moved within their file, or are gone, stay behind.
 """
 
 import functools
