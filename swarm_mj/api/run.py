@@ -106,7 +106,7 @@ class Run:
 
     @property
     def task_cost(self) -> tuple[str, str] | None:
-        """The name of the task's cost, such as a formation error, and its unit; None without."""
+        """The name of the task's cost, such as velocity variance, and its unit; None without."""
         cost = self.windows[0].costs.task_cost
         return None if cost is None else (cost.name, cost.unit)
 

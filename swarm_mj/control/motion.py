@@ -1,4 +1,4 @@
-"""Controllers: their interface, the paper's (IV-A), which stand, walk or flock, and the tasks.
+"""Controllers: their interface, and the paper's (IV-A), which stand, walk or flock.
 
 Index order: `[b, i]` is robot `i` of mission `b`.
 """
@@ -9,7 +9,6 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.control.added_tasks import Coverage, Formation
 from swarm_mj.mission import FlockingSet, Mission, Task
 from swarm_mj.mission.batched_rng import Stream, normal
 from swarm_mj.physics.state import RobotStates
@@ -37,8 +36,8 @@ class Controller(Protocol):
 class Costed(Protocol):
     """A controller with a task cost, next to the age of information."""
 
-    cost_name: str  # such as "formation error"
-    cost_unit: str  # such as "m"
+    cost_name: str  # such as "velocity variance"
+    cost_unit: str  # such as "m²/s²"
 
     def cost(self, states: RobotStates, /) -> Float[np.ndarray, "B"]:
         """Return the task cost of these states, per mission; 0 or more."""
@@ -68,7 +67,7 @@ def controller_of(mission: Mission) -> Controller:
 
 def initial_velocity(mission: Mission, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
     """Draw the initial velocities [m/s]: uniform in plus or minus V_max per axis, or 0 (IV-A)."""
-    if mission.task not in ("random-walk", "flocking"):
+    if mission.task == "stationary":
         return np.zeros((mission.num_robots, 2))
     limit = mission.max_velocity_mps
     return rng.uniform(-limit, limit, size=(mission.num_robots, 2))
@@ -118,8 +117,6 @@ CONTROLLERS: dict[Task, Callable[[Mission], Controller]] = {
     "stationary": lambda _: stand,
     "random-walk": RandomWalk,
     "flocking": Flocking,
-    "formation": Formation,
-    "coverage": Coverage,
 }
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from swarm_mj.system.fields import FieldOf, as_typed, check, check_names, setting
 
 Preset = Literal["paper", "reference", "indoor", "urban", "open-field"]
-Task = Literal["stationary", "random-walk", "flocking", "formation", "coverage"]
+Task = Literal["stationary", "random-walk", "flocking"]
 PhysicsMode = Literal["exact", "contact"]
 Boundary = Literal["reflect", "none"]
 WallHit = Literal["mirror", "clip"]

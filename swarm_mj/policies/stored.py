@@ -20,7 +20,7 @@ from swarm_mj.policies.gnn import feature_sets
 from swarm_mj.policies.learned import LearnedPolicy, MlpPolicy
 from swarm_mj.policies.policy_config import SUFFIX, GnnConfig, MlpConfig, Weights, model_card
 from swarm_mj.system.packages import need
-from swarm_mj.system.reading import check_size, open_file, read_document, read_file, read_plain
+from swarm_mj.system.reading import check_size, open_file, read_document, read_plain
 from swarm_mj.system.writing import write_bytes
 
 if TYPE_CHECKING:  # a plain network flies without torch, so functions import it
@@ -28,7 +28,6 @@ if TYPE_CHECKING:  # a plain network flies without torch, so functions import it
 
 POLICY = f"policy{SUFFIX}"  # the policy of a run, in its folder
 FORMAT, VERSION = "swarm_mj policy", 2  # and the metadata's entry; version 1 was a folder
-OLD_FOLDER, OLD_WEIGHTS, OLD_CONFIG = "policy", "model.safetensors", "config.json"
 CONFIGS = {"gnn": GnnConfig, "mlp": MlpConfig}
 MAX_BYTES = 64_000_000
 MAX_SHOWN = 8  # policies in a message
@@ -133,15 +132,10 @@ def read_weights(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
     """
     place = find_policy(path)
     try:
-        if place.is_dir():  # a GNN as swarm_mj 0.1 stored it
-            text = read_file(place / OLD_CONFIG, "config", MAX_BYTES)
-            weights, _ = _read_tensors(place / OLD_WEIGHTS)
-            config = read_document(text, FORMAT, 1, GnnConfig)
-        else:
-            weights, metadata = _read_tensors(place)
-            if FORMAT not in metadata:
-                raise ValueError("it has weights, but does not say of which policy")
-            config = _config_of(metadata[FORMAT])
+        weights, metadata = _read_tensors(place)
+        if FORMAT not in metadata:
+            raise ValueError("it has weights, but does not say of which policy")
+        config = _config_of(metadata[FORMAT])
         _check_tensors(config, path, weights)
     except ValueError as error:
         raise ValueError(f"policy {place}: {error}; {WAY_OUT}") from error
@@ -151,12 +145,17 @@ def read_weights(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
 def find_policy(path: Path) -> Path:
     """Return where a policy is: the file `path` or `path.safetensors`, or that in a run's folder.
 
-    `runs/mine` and `runs/mine/policy` name the policy of a run, also of one that swarm_mj 0.1
-    trained, whose policies are folders; ValueError if there is none.
+    `runs/mine` and `runs/mine/policy` name the policy of a run; ValueError if there is none.
     """
-    for place in (path, Path(f"{path}{SUFFIX}"), path / POLICY, path / OLD_FOLDER):
-        if os.path.isfile(place) or os.path.isfile(place / OLD_WEIGHTS):
+    for place in (path, Path(f"{path}{SUFFIX}"), path / POLICY):
+        if os.path.isfile(place):
             return place
+    for folder in (path, path / "policy"):
+        if os.path.isfile(folder / "config.json"):
+            raise ValueError(
+                f"policy {folder} is a folder, as swarm_mj 0.1 stored policies, which is no longer "
+                "read; train it again with `swarm-mj train`"
+            )
     found = sorted({*path.glob(f"*{SUFFIX}"), *path.glob(f"*/{POLICY}")})
     if found:
         more = f" and {len(found) - MAX_SHOWN} more" if len(found) > MAX_SHOWN else ""

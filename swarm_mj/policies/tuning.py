@@ -14,8 +14,6 @@ from swarm_mj.system.reading import read_rows
 
 TABLE = Path(__file__).with_name("tuned.csv")
 MAX_BYTES = 10_000_000
-TUNED_AS = {"formation": "random-walk", "coverage": "random-walk"}  # teams within walls, too
-TUNED_AS |= dict.fromkeys(WORLDS, "paper")  # whose numbers these have but for arena and channel
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,10 +42,11 @@ def tuned_probability(policy_name: str, mission: Mission) -> float:
     """Return a policy's tuned probability in the regime that is nearest to a mission's.
 
     Nearest by the ratios of team size, range and velocity, among the regimes of the same preset and
-    task, or of those in `TUNED_AS`; ValueError if there are none.
+    task; ValueError if there are none.
     """
-    preset, task = (TUNED_AS.get(name, name) for name in (mission.preset, mission.task))
-    group = (policy_name, preset, task)
+    # Worlds have the paper's numbers but for arena and channel.
+    preset = "paper" if mission.preset in WORLDS else mission.preset
+    group = (policy_name, preset, mission.task)
     rows = [row for row in _table() if (row.policy, row.preset, row.task) == group]
     if not rows:
         raise ValueError(

@@ -108,8 +108,8 @@ def mean_hops(
 class TaskCost:
     """The cost of the robots' task, as their controller measures it."""
 
-    name: str  # such as "formation error"
-    unit: str  # such as "m"
+    name: str  # such as "velocity variance"
+    unit: str  # such as "m²/s²"
     value: Float[np.ndarray, "B"]
 
 

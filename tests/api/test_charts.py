@@ -40,7 +40,7 @@ def test_a_team_at_rest_has_no_velocities_and_a_notebook_shows_its_chart_once(mo
 
 
 def test_a_task_with_a_cost_of_its_own_shows_that():
-    run = swarm_mj.fly("formation", policy="tdma", **SHORT)
+    run = swarm_mj.fly("random-walk", controller="added_tasks:Formation", policy="tdma", **SHORT)
     assert run.task_cost == ("formation error", "m")
     cost = run.plot().axes[1]
     assert cost.get_ylabel() == "formation error\n[m]"

@@ -45,7 +45,7 @@ def test_each_policy_has_its_numbers(found):
 
 
 def test_what_each_mission_s_task_cost_is_in_the_table_too(here):
-    found = swarm_mj.evaluate("tdma", task="formation", num_missions=2, **SHORT)
+    found = swarm_mj.evaluate("tdma", task="flocking", num_missions=2, **SHORT)
     found.save("found.json")
     (told,) = json.loads((here / "found.json").read_text())["results"]
     table = found.to_dataframe(by_mission=True)

@@ -133,7 +133,7 @@ def test_a_task_with_a_cost_of_its_own_shows_that_instead_of_velocities():
     costs = {"mean": 200.0, "first": 300.25, "last": 100.5}
     its = {f"task_cost_{name}": np.array([cost]) for name, cost in costs.items()}
     named = {"task_cost_name": "formation error", "task_cost_unit": "m"}
-    rows, text = shown("mst", "formation", replace(summary(**ADDRESSED), **named, **its))
+    rows, text = shown("mst", "random-walk", replace(summary(**ADDRESSED), **named, **its))
     assert rows["formation error, mean"] == "200.00 m"
     assert rows["first to last window"] == "300.25 to 100.50 m"
     assert "velocity" not in text

@@ -33,8 +33,7 @@ def test_nothing_typed_shows_where_to_begin(capsys):
         ("fly --polcy=tdma", "did you mean --policy?"),
         (
             "fly --task flok",
-            "task must be one of stationary, random-walk, flocking, formation, coverage, not "
-            "'flok'; did you mean flocking?",
+            "stationary, random-walk, flocking, not 'flok'; did you mean flocking?",
         ),
         ("train --out r --credit tem", "did you mean team?"),
     ],

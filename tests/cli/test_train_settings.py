@@ -40,7 +40,7 @@ def test_the_defaults_that_the_help_shows_are_the_usual_settings(capsys):
         f"(default: {robot.features}, team: the preset's own)",
         f"side by side, 1 to 4096 (default: {robot.missions}, team: {team.missions})",
         "is the same policy, 0 or more (default: 0)",
-        "stationary, random-walk, flocking, formation, coverage (default: stationary)",
+        "stationary, random-walk, flocking (default: stationary)",
         "paper, reference, indoor, urban, open-field (default: paper)",
         "several are trained on together, 2 to 200 (default: 40)",
         "reflect, none (default: the preset's own)",

@@ -73,7 +73,7 @@ def test_parts_by_name_are_made_when_the_environment_is():
 
 
 def test_a_mission_may_be_given_whole_and_changed():
-    mission, changes = paper("flocking", **SMALL), {"task": "coverage", "num_robots": 3}
+    mission, changes = paper("flocking", **SMALL), {"task": "random-walk", "num_robots": 3}
     assert SwarmEnv(mission, **changes).batch.mission == replace(mission, **changes)
 
 

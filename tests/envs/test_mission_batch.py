@@ -36,10 +36,10 @@ def test_eq10_eq17_rewards_are_minus_the_mean_age_and_the_variance_of_velocities
             assert of_variance[b] == pytest.approx([-np.sum(squares) / 5] * 5, rel=1e-12)
 
 
-@pytest.mark.parametrize("task", ["formation", "coverage", "flocking"])
-def test_task_cost_is_what_the_controller_says(task):
-    batch = begun(task, reward="task-cost")
-    swarm = Swarm(batch.mission, [1, 2])
+@pytest.mark.parametrize("controller", [None, "added_tasks:Coverage"])
+def test_task_cost_is_what_the_controller_says(controller):
+    batch = begun("flocking", reward="task-cost", controller=controller)
+    swarm = Swarm(batch.mission, [1, 2], controller=controller)
     start = batch.infos()["task_cost"]
     np.testing.assert_array_equal(start, swarm.controller.cost(swarm.states))
     for recipient in recipients(5):

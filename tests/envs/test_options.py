@@ -24,8 +24,8 @@ RESET = {"options": {"mask": 1}}
 REFUSED = {
     "did you mean random-walk": lambda: make_batch("swarm_mj/RandomWalk-v0"),
     "one of .*; did you mean random-walk": lambda: make_batch("random_walk"),
-    "here 'flocking'; use swarm_mj/Coverage-v0 or 'coverage'": lambda: gymnasium.make(
-        "swarm_mj/Flocking-v0", task="coverage"
+    "here 'flocking'; use swarm_mj/RandomWalk-v0 or 'random-walk'": lambda: gymnasium.make(
+        "swarm_mj/Flocking-v0", task="random-walk"
     ),
     r"give it to reset\(seed=...\)": lambda: gymnasium.make("swarm_mj/Flocking-v0", seed=1),
     r'features="swarm_mj\.policies\.gnn\.graphs:PaperFeatures"': lambda: check_features_named(

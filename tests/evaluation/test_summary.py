@@ -22,6 +22,7 @@ from swarm_mj.evaluation.summary import (
 from swarm_mj.mission import paper, reference
 
 STATIONARY = reference("stationary")
+FLOCK = paper("flocking", num_robots=5)
 
 
 @pytest.fixture(autouse=True)
@@ -211,8 +212,8 @@ def test_missions_come_in_the_order_of_their_seeds_whatever_was_done_first():
 
 
 def test_a_tasks_cost_is_named_and_compared():
-    mst, round_robin = results(two_policies(paper("coverage", num_robots=5)), with_task_costs())
-    assert (mst.task_cost_name, mst.task_cost_unit) == ("distance to the nearest robot", "m")
+    mst, round_robin = results(two_policies(FLOCK), with_task_costs())
+    assert (mst.task_cost_name, mst.task_cost_unit) == ("velocity variance", "m²/s²")
     assert mst.task_cost_mean == pytest.approx((4.0 + 4.6 + 4.3) / 3)
     assert mst.task_cost_last_mean == pytest.approx(4.3 / 2)
     assert mst.task_cost_sem == pytest.approx(0.3 / 3**0.5)
@@ -221,7 +222,7 @@ def test_a_tasks_cost_is_named_and_compared():
 
 
 def test_json_has_the_columns_with_each_missions_costs(tmp_path):
-    found = evaluated(two_policies(paper("coverage", num_robots=5)), with_task_costs())
+    found = evaluated(two_policies(FLOCK), with_task_costs())
     write_evaluated(tmp_path / "r.json", found)
     first, second = json.loads((tmp_path / "r.json").read_text())["results"]
     costs_of = ["episode_aoi", "episode_velocity_variance", "episode_task_cost"]

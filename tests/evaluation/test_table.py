@@ -156,7 +156,7 @@ def test_a_tasks_own_cost_has_a_column_and_a_sentence(printed):
     cost = {"name": "formation error", "unit": "m", "mean": 321.5, "sem": 1.25, "last_mean": 12.25}
     cost |= {"difference_mean": -4.5, "difference_ci_low": -7.0, "difference_ci_high": -2.0}
     columns = {f"task_cost_{name}": value for name, value in cost.items()}
-    text = "\n".join(printed([some_result("mst", 1.0, task="formation", **columns)], 100))
+    text = "\n".join(printed([some_result("mst", 1.0, task="random-walk", **columns)], 100))
     sentence = "Task cost: formation error [m], mean over windows ± standard error"
     for said in ("± 1.25", "-7.00, -2.00", "321.50", "12.25", sentence):
         assert said in text

@@ -133,20 +133,11 @@ def test_a_policy_is_named_by_its_file_or_its_run(tmp_path, saved, named):
     assert find_policy(tmp_path / named).suffix == ".safetensors"
 
 
-def test_folders_of_version_0_1_are_read(tmp_path):
-    run, network = tmp_path / "runs" / "x", tiny_network()
-    (run / "policy").mkdir(parents=True)
-    weights = {name: tensor.numpy() for name, tensor in network.state_dict().items()}
-    save_file(weights, run / "policy" / "model.safetensors")
-    header = {"format": "swarm_mj policy", "format_version": 1}
-    text = json.dumps(header | asdict(tiny_config(network)))
-    (run / "policy" / "config.json").write_text(text)
-    for named in (run, run / "policy"):
-        read, config = read_policy(named)
-        assert config == tiny_config(network)
-        assert torch.equal(read.output.weight, network.output.weight)
-    (run / "policy" / "config.json").write_text("{}")
-    refused(run, "missing required field `format`")
+@pytest.mark.parametrize("named", ["x", "x/policy"])
+def test_folders_of_version_0_1_are_refused(tmp_path, named):
+    (tmp_path / "x" / "policy").mkdir(parents=True)
+    (tmp_path / "x" / "policy" / "config.json").touch()
+    refused(tmp_path / named, "x/policy is a folder, as swarm_mj 0.1 stored policies, .* train it")
 
 
 def test_a_plain_network_flies_teams_of_its_size_alone_and_is_none_to_train_on(plain):

@@ -1,21 +1,14 @@
-"""Formation and coverage by hand, by brute force, and as flights without news; their spring."""
+"""The examples of controllers by hand, by brute force, and as flights with and without news."""
 
+import added_tasks
 import numpy as np
 import pytest
+from added_tasks import DAMPING_PER_S, STIFFNESS_PER_S2, Coverage, Formation, block, cell, moments
 from channels import tell_everyone_the_truth, to_nobody
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_mj.control.added_tasks import (
-    DAMPING_PER_S,
-    STIFFNESS_PER_S2,
-    Coverage,
-    Formation,
-    block,
-    cell,
-    moments,
-    steer,
-)
+import swarm_mj
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import empty_buffers
@@ -30,11 +23,35 @@ def states_of(position_m, velocity_mps=0.0, is_active=None):
     return RobotStates(position_m=position_m, velocity_mps=velocity_mps, is_active=is_active)
 
 
+def news_of(*entries, num_robots):
+    """Buffers in which robot 0 has heard where others were, and nobody else has heard anything."""
+    buffers = empty_buffers(1, num_robots)
+    for j, position_m in entries:
+        buffers.timestamp[0, 0, j] = 1.0
+        buffers.position_m[0, 0, j] = position_m
+    return buffers
+
+
+@pytest.mark.parametrize("name", ["Formation", "Coverage"])
+def test_it_flies_by_name(name):
+    """As the commands in the example's own docstring do."""
+    run = swarm_mj.fly(
+        "random-walk",
+        policy="tdma",
+        controller=f"added_tasks:{name}",
+        num_robots=6,
+        num_windows=300,
+    )
+    part = getattr(added_tasks, name)
+    assert run.task_cost == (part.cost_name, part.cost_unit)
+    assert 0.0 < run.summary.task_cost_last < run.summary.task_cost_first
+
+
 def test_a_robot_at_rest_comes_to_its_target_and_never_past_it():
     """Critically damped from rest: (1 + t / 2) exp(-t / 2) of the way is left."""
     position_m, velocity_mps, step_s = np.array([[[8.0, 0.0]]]), np.zeros((1, 1, 2)), 1e-3
     for n in range(1, 12_001):
-        wanted_mps2 = steer(np.zeros((1, 1, 2)), states_of(position_m, velocity_mps))
+        wanted_mps2 = added_tasks.steer(np.zeros((1, 1, 2)), states_of(position_m, velocity_mps))
         velocity_mps = velocity_mps + step_s * wanted_mps2
         position_m = position_m + step_s * velocity_mps
         if n % 3000 == 0:
@@ -43,8 +60,11 @@ def test_a_robot_at_rest_comes_to_its_target_and_never_past_it():
             assert position_m[0, 0] == pytest.approx([left_m, 0.0], abs=0.01)
 
 
-def cost_along(swarm, num_windows, *, tells_the_truth):
-    """The task's cost after each window, where nobody hears anybody by radio."""
+def cost_along(part, num_windows, shift_m=0.0, *, tells_the_truth, **fields):
+    """The task's cost after each window of a team that begins at rest, without a radio."""
+    mission = paper("stationary", velocity_ratio=1.0, **fields)
+    swarm = Swarm(mission, [1, 2], channel=to_nobody, controller=part(mission))
+    swarm._physics.place(swarm.states.position_m + shift_m, swarm.states.velocity_mps)
     costs = []
     for _ in range(num_windows):
         if tells_the_truth:
@@ -53,9 +73,33 @@ def cost_along(swarm, num_windows, *, tells_the_truth):
     return np.array(costs)
 
 
+def errors_along(num_windows, shift_m=0.0, *, tells_the_truth=True):
+    nine = {"num_robots": 9, "boundary": "none"}
+    return cost_along(Formation, num_windows, shift_m, tells_the_truth=tells_the_truth, **nine)
+
+
+def test_fresh_news_lead_to_the_formation_wherever_it_stands_and_none_do_not():
+    informed = errors_along(600)
+    assert np.all(np.diff(informed[:200:10], axis=0) < 0.0)
+    assert np.all(informed[-1] < 0.01)
+    np.testing.assert_allclose(informed[:60], errors_along(60, 1000.0), rtol=1e-6)
+    uninformed = errors_along(50, tells_the_truth=False)
+    np.testing.assert_allclose(uninformed, uninformed[:1].repeat(50, axis=0))
+
+
+def test_the_cost_falls_by_lloyds_algorithm_and_not_where_nobody_hears_anything():
+    informed, uninformed = (
+        cost_along(Coverage, 200, tells_the_truth=is_informed, num_robots=12)
+        for is_informed in (True, False)
+    )
+    assert np.all(np.diff(informed[::25], axis=0) <= 1e-9)
+    assert np.all(informed[-1] < 0.85 * informed[0])
+    assert np.all(uninformed[-1] > 1.5 * informed[-1])  # all of them moved to the middle
+
+
 def formation_error(position_m, place_m, is_active=None):
     """The task's cost, with these places."""
-    task = Formation(paper("formation", num_robots=len(place_m)))
+    task = Formation(paper(num_robots=len(place_m)))
     task._place_m = place_m
     return task.cost(states_of(position_m, is_active=is_active))
 
@@ -68,71 +112,40 @@ def test_a_block_of_five_by_hand():
     np.testing.assert_allclose(place_m.mean(axis=0), 0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("num_robots", [2, 3, 4, 10, 40, 97, 1000])
+@pytest.mark.parametrize("num_robots", [2, 3, 10, 97, 1000])
 def test_a_block_fits_the_area_whatever_the_team(num_robots):
-    mission = paper("formation", num_robots=num_robots)
-    place_m = block(num_robots, mission.side_m / 2)
+    place_m = block(num_robots, HALF)
     assert len(np.unique(place_m.round(6), axis=0)) == num_robots
-    assert np.all(np.ptp(place_m, axis=0) <= mission.side_m / 2 + 1e-9)
+    assert np.all(np.ptp(place_m, axis=0) <= HALF + 1e-9)
 
 
-def test_the_law_by_hand():
+def test_the_law_of_the_formation_by_hand():
     """Robot 0 knows robot 2 alone, which was at (100, 0): its own place is d_0 - d_2 from there."""
-    mission = paper("formation", num_robots=4)
+    mission = paper(num_robots=4)
     place_m = block(4, mission.side_m / 2)
-    buffers = empty_buffers(1, 4)
-    buffers.timestamp[0, 0, 2] = 1.0
-    buffers.position_m[0, 0, 2] = [100.0, 0.0]
     states = states_of(np.full((1, 4, 2), 7.0), 3.0)
-    u = Formation(mission)(buffers, states)
+    u = Formation(mission)(news_of((2, [100.0, 0.0]), num_robots=4), states)
     target_m = np.array([100.0, 0.0]) + place_m[0] - place_m[2]
     expected = STIFFNESS_PER_S2 * (target_m - 7.0) - DAMPING_PER_S * 3.0
     np.testing.assert_allclose(u[0, 0], expected)
     np.testing.assert_allclose(u[0, 1:], -3.0 * DAMPING_PER_S)  # they know nobody, and stop
 
 
-def test_the_error_of_a_formation_is_none_wherever_it_stands():
-    place_m = block(7, 100.0)
+def test_the_error_of_a_formation_by_hand():
+    """None wherever it stands. One of four is 8 m off: 2 m of it are everyone's, so 6 and 3 x 2."""
+    place_m = block(4, 100.0)
     there = np.stack([place_m, place_m + np.array([30.0, -500.0])])
     np.testing.assert_allclose(formation_error(there, place_m), 0.0, atol=1e-9)
-
-
-def test_the_error_of_one_robot_out_of_place_by_hand():
-    """One of four is 8 m off: 2 m of it are everyone's, so 6 and three times 2 are left."""
-    place_m = block(4, 100.0)
-    position_m = place_m[None].copy()
-    position_m[0, 3, 0] += 8.0
+    there[:, 3, 0] += 8.0
     expected = np.sqrt((6.0**2 + 3 * 2.0**2) / 4)
-    assert formation_error(position_m, place_m)[0] == pytest.approx(expected)
-    everyone_else = np.array([[True, True, True, False]])
-    assert formation_error(position_m, place_m, everyone_else)[0] == pytest.approx(0.0, abs=1e-9)
-
-
-def errors_along(tells_the_truth, shift_m=0.0, num_windows=600):
-    mission = paper("formation", num_robots=9, velocity_ratio=1.0, boundary="none")
-    swarm = Swarm(mission, [1, 2], channel=to_nobody)
-    states = swarm.states
-    swarm._physics.place(states.position_m + shift_m, states.velocity_mps)
-    return cost_along(swarm, num_windows, tells_the_truth=tells_the_truth)
-
-
-def test_fresh_news_lead_to_the_formation_and_none_do_not():
-    told = errors_along(True)
-    assert np.all(np.diff(told[:200:10], axis=0) < 0.0)
-    assert np.all(told[-1] < 0.01)
-    untold = errors_along(False, num_windows=50)
-    np.testing.assert_allclose(untold, untold[:1].repeat(50, axis=0))  # nobody knows anybody
-
-
-def test_a_team_elsewhere_does_the_same():
-    here, there = errors_along(True, num_windows=60), errors_along(True, 1000.0, num_windows=60)
-    np.testing.assert_allclose(here, there, rtol=1e-6)
+    assert formation_error(there, place_m) == pytest.approx([expected] * 2)
+    everyone_else = np.array([[True, True, True, False]] * 2)
+    np.testing.assert_allclose(formation_error(there, place_m, everyone_else), 0.0, atol=1e-9)
 
 
 def test_a_robot_that_knows_nobody_moves_to_the_middle_of_the_area():
-    mission = paper("coverage", num_robots=2)
     states = states_of([[[10.0, -20.0], [30.0, 40.0]]])
-    u = Coverage(mission)(empty_buffers(1, 2), states)
+    u = Coverage(paper(num_robots=2))(empty_buffers(1, 2), states)
     np.testing.assert_allclose(u, -STIFFNESS_PER_S2 * states.position_m)
 
 
@@ -140,39 +153,28 @@ def test_a_robot_moves_to_the_centroid_of_its_cell_by_what_it_heard():
     """Robot 0 at x = -20 heard that robot 1 was at x = 40: its cell ends at x = 10.
 
     The cell is 10 m + P_max wide and its centroid at (10 - P_max) / 2. It does not matter where
-    robot 1 is now.
+    robot 1 is now. Outside the area and without ground there, a robot returns.
     """
-    mission = paper("coverage", num_robots=2)
-    buffers = empty_buffers(1, 2)
-    buffers.timestamp[0, 0, 1] = 3.0
-    buffers.position_m[0, 0, 1] = [40.0, 0.0]
-    states = states_of([[[-20.0, 0.0], [99.0, 99.0]]])
-    u = Coverage(mission)(buffers, states)
-    target_m = (10.0 - mission.half_side_m) / 2.0
-    expected = STIFFNESS_PER_S2 * np.array([target_m + 20.0, 0.0])
-    np.testing.assert_allclose(u[0, 0], expected, atol=1e-9)
-
-
-def test_who_is_outside_the_area_and_has_no_ground_there_returns():
-    mission = paper("coverage", num_robots=2, boundary="none")
+    mission = paper(num_robots=2)
     half = mission.half_side_m
-    buffers = empty_buffers(1, 2)
-    buffers.timestamp[0, 0, 1] = 1.0
-    buffers.position_m[0, 0, 1] = [half, 0.0]
-    states = states_of([[[half + 50.0, 0.0], [half, 0.0]]])
-    u = Coverage(mission)(buffers, states)
+    states = states_of([[[-20.0, 0.0], [99.0, 99.0]]])
+    u = Coverage(mission)(news_of((1, [40.0, 0.0]), num_robots=2), states)
+    expected = STIFFNESS_PER_S2 * np.array([(10.0 - half) / 2.0 + 20.0, 0.0])
+    np.testing.assert_allclose(u[0, 0], expected, atol=1e-9)
+    outside = states_of([[[half + 50.0, 0.0], [half, 0.0]]])
+    u = Coverage(mission)(news_of((1, [half, 0.0]), num_robots=2), outside)
     np.testing.assert_allclose(u[0, 0], [-50.0 * STIFFNESS_PER_S2, 0.0])
 
 
 def test_the_cost_of_two_robots_in_the_middle_by_hand():
     """The mean of x² + y² over a square of 2 h is 2 h² / 3."""
-    mission = paper("coverage", num_robots=2)
+    mission = paper(num_robots=2)
     cost = Coverage(mission).cost(states_of(np.zeros((1, 2, 2))))
     assert cost[0] ** 2 == pytest.approx(2 * mission.half_side_m**2 / 3)
 
 
 def test_the_cost_is_the_distance_to_the_nearest_active_robot():
-    mission = paper("coverage", num_robots=8, density_per_km2=800.0)  # 100 m by 100 m
+    mission = paper(num_robots=8, density_per_km2=800.0)  # 100 m by 100 m
     position_m = np.random.default_rng(0).uniform(-HALF, HALF, (3, 8, 2))
     is_active = np.ones((3, 8), dtype=bool)
     is_active[1, :4] = False
@@ -181,17 +183,6 @@ def test_the_cost_is_the_distance_to_the_nearest_active_robot():
     for b in range(3):
         apart_m2 = np.sum((points - position_m[b, is_active[b]]) ** 2, axis=2)
         assert cost[b] ** 2 == pytest.approx(np.mean(np.min(apart_m2, axis=1)), rel=1e-4)
-
-
-def test_the_cost_falls_by_lloyds_algorithm_and_not_where_nobody_hears_anything():
-    mission = paper("coverage", num_robots=12, velocity_ratio=0.5)
-    told, untold = (
-        cost_along(Swarm(mission, [1, 2], channel=to_nobody), 300, tells_the_truth=is_told)
-        for is_told in (True, False)
-    )
-    assert np.all(np.diff(told[::25], axis=0) <= 1e-9)
-    assert np.all(told[-1] < 0.85 * told[0])
-    assert np.all(untold[-1] > 1.5 * told[-1])  # all of them moved to the middle
 
 
 def grid(half, num):
@@ -216,16 +207,12 @@ def test_two_robots_share_by_the_bisector():
     assert corners_of(east) == [(10, -50), (10, 50), (50, -50), (50, 50)]
 
 
-def test_of_robots_at_one_point_the_first_takes_all():
-    pair = np.array([[1.0, 1.0], [1.0, 1.0]])
-    assert len(cell(pair, everyone(pair), 0, HALF)) == 4
-    assert len(cell(pair, everyone(pair), 1, HALF)) == 0
-
-
-def test_who_does_not_count_takes_nothing():
-    three = np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0]])
-    polygon = cell(three, np.array([True, False, False]), 0, HALF)
-    assert moments(polygon, three[0])[0] == pytest.approx(1e4)
+def test_of_robots_at_one_point_the_first_takes_all_and_who_does_not_count_nothing():
+    three = np.array([[1.0, 1.0], [1.0, 1.0], [-1.0, 0.0]])
+    counts = np.array([True, True, False])
+    first, second = (cell(three, counts, i, HALF) for i in range(2))
+    assert moments(first, three[0])[0] == pytest.approx(1e4)
+    assert len(second) == 0
 
 
 @given(seed=st.integers(0, 2**32 - 1), num_robots=st.integers(2, 12))

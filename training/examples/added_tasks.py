@@ -1,4 +1,11 @@
-"""Tasks that are not the paper's, on stale positions: formation and coverage.
+"""Two controllers that act on stale positions, formation and coverage: parts of a user's own.
+
+    cd training/examples
+    swarm-mj fly --controller added_tasks:Coverage --task random-walk
+    swarm-mj fly --controller added_tasks:Formation --task random-walk --velocity-ratio 0.6
+
+`--task` says how they begin: with velocities in `random-walk`, at rest in `stationary`. But there
+`planner` takes them for robots that stay where they are, so moving teams are random walks.
 
 Formation is displacement consensus of double integrators (Oh, Park and Ahn, Automatica 53, 2015):
 u_i = k (mean over j of (p_j + d_i - d_j) - p_i) - c v_i. As c² >= 2k, no delay makes the robots
