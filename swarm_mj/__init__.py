@@ -12,6 +12,7 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     II-B    Eq. 6   channel f                radio.free_space.Channel
     II-B    Eq. 7   last attempt             protocol.buffers.record_attempt
     II-B    Eq. 8   merge                    protocol.buffers.merge
+    II-B    Fig. 1  a robot's buffer         protocol.buffers.Buffers
     II-C    Eq. 9   local policy             policies.policy.DecentralisedPolicy
     II-C    Eq. 10  age of information       protocol.costs.age_of_information
     III-B   Alg. 1  the protocol's window    protocol.window.window
@@ -27,11 +28,16 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     IV-A    Eq. 15  dynamics                 physics.worlds.Physics.step
     IV-A    Eq. 16  flocking control         control.motion.flocking
     IV-A    Eq. 17  velocity variance        protocol.costs.velocity_variance
+    IV-A    Fig. 2  a flock that agrees      evaluation.figures.flock.draw_flock
     IV-B            mission specification    mission.specification.Mission
     IV-B            initial positions        mission.placement.connected_positions
     IV-C            random flooding          policies.random_access.RandomFlooding
     IV-C            round robin              policies.centralised.RoundRobin
     IV-C            minimum spanning tree    policies.centralised.MinimumSpanningTree
+    V       Fig. 3  receptive field          evaluation.published.RECEPTIVE_FIELD
+    V       Fig. 4  transmit power           evaluation.published.TRANSMIT_POWER
+    V       Fig. 5  team size                evaluation.published.TEAM_SIZE
+    V       Fig. 6  velocity of a flock      evaluation.published.FLOCKING
 
 Around the paper: `system` (compiling, declared fields, files that appear whole, processes),
 `simulation` (B missions side by side; a policy from the first window to the last), more `policies`

@@ -12,7 +12,7 @@ import pytest
 import swarm_mj
 
 PACKAGE = Path(swarm_mj.__file__).parent
-LINE = re.compile(r"^    (I\S+)\s+(Eq\. \d+|Alg\. \d+)?\s+\S.*?\s{2,}(\S+)$", re.MULTILINE)
+LINE = re.compile(r"^    ([IV]\S*)\s+((?:Eq|Alg|Fig)\. \d+)?\s+\S.*?\s{2,}(\S+)$", re.MULTILINE)
 MAP = [(section, item, target) for section, item, target in LINE.findall(swarm_mj.__doc__)]
 
 
@@ -36,18 +36,19 @@ def resolve(target):
 
 
 def test_the_map_is_complete():
-    equations = {item for _, item, _ in MAP if item}
-    assert equations == {f"Eq. {n}" for n in range(1, 18)} | {"Alg. 1"}
+    numbered = [f"Eq. {n}" for n in range(1, 18)] + [f"Fig. {n}" for n in range(1, 7)]
+    assert {item for _, item, _ in MAP if item} == {*numbered, "Alg. 1"}
 
 
 @pytest.mark.parametrize(("section", "item", "target"), MAP)
 def test_every_entry_leads_to_code_that_names_it(section, item, target):
     found = resolve(target)
-    assert (item or section) in getattr(found, "py_func", found).__doc__  # compiled by numba or not
+    doc = getattr(found, "py_func", found).__doc__  # compiled by numba or not
+    assert (item or section) in doc or not callable(found)  # a value's text stands below it
 
 
-def test_every_equation_ends_the_first_line_of_one_docstring():
-    """Whoever looks for an equation lands on one function."""
+def test_every_equation_and_figure_ends_the_first_line_of_one_docstring():
+    """A search for an equation leads to one function."""
     sources = {path: path.read_text() for path in PACKAGE.rglob("*.py")}
     for _, item, target in MAP:
         if item and item != "Eq. 6":  # the channel is an argument: it has no one home

@@ -27,7 +27,9 @@ PAGES = {  # where they are on the site, and in the repository
 PLACES = {source: page for page, source in PAGES.items()}
 LINK = re.compile(r"(\]\(|src=\")(?![a-z]+:|#)([^)#\"\s]+)")
 FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
-MAP_LINE = re.compile(r"^    (I\S+)\s+(Eq\. \d+|Alg\. \d+)?\s+(\S.*?)\s{2,}(\S+)$", re.MULTILINE)
+MAP_LINE = re.compile(
+    r"^    ([IV]\S*)\s+((?:Eq|Alg|Fig)\. \d+)?\s+(\S.*?)\s{2,}(\S+)$", re.MULTILINE
+)
 
 
 def on_files(files: Files, *, config: MkDocsConfig) -> Files:
@@ -154,8 +156,9 @@ def home_of(name: str) -> str:
 
 MAP_INTRODUCTION = """# From the paper to the code
 
-Where each section, equation and algorithm of [the paper](https://arxiv.org/abs/2103.05091) is in
-the code. A name leads to its description; open "Source code" there to read the code itself.
+Where each section, equation, algorithm and figure of
+[the paper](https://arxiv.org/abs/2103.05091) is in the code.
+A name leads to its description; open "Source code" there to read the code itself.
 
 | section | equation | what it says | code |
 |---|---|---|---|"""

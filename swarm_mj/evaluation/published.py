@@ -146,41 +146,48 @@ class ResultFigure:
         return command
 
 
-_ALL = (
-    ResultFigure(
-        published="fig3_receptive_field",
-        title="Receptive field",
-        task="stationary",
-        x_name="receptive_field",
-        x_label="receptive field of the GNN [hops]",
-        irrelevant=("velocity_ratio",),
-        panels=(AOI._replace(scale="linear"),),
-    ),
-    ResultFigure(
-        published="fig4_transmit_power",
-        title="Transmit power",
-        task="stationary",
-        x_name="range_ratio",
-        x_label="range ratio: how far a packet reaches in silence [km]",
-        x_scale="log",
-        irrelevant=("velocity_ratio",),
-    ),
-    ResultFigure(
-        published="fig5_team_size",
-        title="Team size",
-        task="random-walk",
-        x_name="num_robots",
-        x_label="team size [robots]",
-    ),
-    ResultFigure(
-        published="fig6_flocking",
-        title="Flocking",
-        task="flocking",
-        x_name="velocity_ratio",
-        x_label="velocity ratio: how far a robot gets along an axis [km in 50 s]",
-        panels=(AOI, VARIANCE),
-    ),
+RECEPTIVE_FIELD = ResultFigure(
+    published="fig3_receptive_field",
+    title="Receptive field",
+    task="stationary",
+    x_name="receptive_field",
+    x_label="receptive field of the GNN [hops]",
+    irrelevant=("velocity_ratio",),
+    panels=(AOI._replace(scale="linear"),),
 )
+"""Stationary teams whose GNN looks one to several hops far (Fig. 3)."""
+
+TRANSMIT_POWER = ResultFigure(
+    published="fig4_transmit_power",
+    title="Transmit power",
+    task="stationary",
+    x_name="range_ratio",
+    x_label="range ratio: how far a packet reaches in silence [km]",
+    x_scale="log",
+    irrelevant=("velocity_ratio",),
+)
+"""Stationary teams whose packets reach less or more far (Fig. 4)."""
+
+TEAM_SIZE = ResultFigure(
+    published="fig5_team_size",
+    title="Team size",
+    task="random-walk",
+    x_name="num_robots",
+    x_label="team size [robots]",
+)
+"""Random walks of teams that are smaller or larger (Fig. 5)."""
+
+FLOCKING = ResultFigure(
+    published="fig6_flocking",
+    title="Flocking",
+    task="flocking",
+    x_name="velocity_ratio",
+    x_label="velocity ratio: how far a robot gets along an axis [km in 50 s]",
+    panels=(AOI, VARIANCE),
+)
+"""Flocks that are slower or faster (Fig. 6)."""
+
+_ALL = (RECEPTIVE_FIELD, TRANSMIT_POWER, TEAM_SIZE, FLOCKING)
 RESULT_FIGURES = {figure.name: figure for figure in _ALL}
 FIGURES = (FLOCK, *RESULT_FIGURES)
 # The figure that sweeps a field of a task's missions, all others as the paper sets them.

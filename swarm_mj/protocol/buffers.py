@@ -20,7 +20,7 @@ NEVER = 0.0  # T_0 and L_0: the clock's first tick is half a window, so 0 is bef
 
 @dataclass(frozen=True, kw_only=True)
 class Buffers:
-    """The knowledge of every robot i about every robot j, in all B missions."""
+    """The knowledge of every robot i about every robot j, in all B missions (Fig. 1)."""
 
     timestamp: Float[np.ndarray, "B N N"]  # T^{i,j}: when j observed it [windows], or NEVER
     position_m: Float[np.ndarray, "B N N 2"]  # M^{i,j}: where j was, as i knows it [m]

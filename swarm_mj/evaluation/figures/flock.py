@@ -49,7 +49,7 @@ def fly_flock(mission: Mission, policy_name: str, seed: int) -> tuple[Snapshot, 
 
 
 def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
-    """Fly the preset's flock and draw its start and its end, an arrow per robot.
+    """Fly the preset's flock and draw its start and end, an arrow per robot (Fig. 2).
 
     The colour is the distance of a robot's velocity from the team's mean. Raises ValueError as
     `fly_flock` does.
