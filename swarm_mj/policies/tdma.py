@@ -11,8 +11,8 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.protocol.window import SLOT_WINDOWS, LocalViews
 from swarm_mj.radio.mission_radio import Belief
-from swarm_mj.radio.power_law import PowerLaw
-from swarm_mj.radio.spatial_reuse import keep_joined, known_powers
+from swarm_mj.radio.power_law import PowerLaw, no_powers
+from swarm_mj.radio.spatial_reuse import keep_joined
 
 
 class Tdma(BroadcastPolicy):
@@ -49,7 +49,7 @@ class SpatialTdma(BroadcastPolicy):
 
     def __init__(self, *, range_m: float, threshold: float) -> None:
         """Take the distance at which a lone transmission just decodes, and its SINR, linear [1]."""
-        self._rule = range_m, threshold
+        self._range_m, self._threshold = range_m, threshold
         self._law: PowerLaw | None = None
 
     def inform(self, belief: Belief) -> None:
@@ -60,14 +60,21 @@ class SpatialTdma(BroadcastPolicy):
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draw every mission's order; arguments as in `Policy.start`."""
         self._order = draw_order(num_robots, rngs)
-        self._known = None if self._law is None else known_powers(self._law, len(rngs))
+        self._powers = None if self._law is None else no_powers(self._law, len(rngs))
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return each robot whose turn it is or that may join."""
         is_oneself = np.eye(views.num_robots, dtype=np.bool_)
         is_sending = np.all(views.buffers.is_known | is_oneself, axis=2)
-        turns = self._order, slot_of(views.now)
-        keep_joined(views.buffers.position_m, *turns, *self._rule, is_sending, self._known)
+        keep_joined(
+            views.buffers.position_m,
+            self._order,
+            slot_of(views.now),
+            self._range_m,
+            self._threshold,
+            is_sending,
+            self._powers,
+        )
         return is_sending
 
 

@@ -11,21 +11,23 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt64
 
-from swarm_mj.physics.state import ROBOT_HEIGHT_M
 from swarm_mj.radio.fading import (
     NO_FADING,
     Waves,
     draw_waves,
     fade,
-    follow_robots,
     is_in_burst,
     keyed_uniform,
     link_key,
     mixed,
-    shadow,
 )
-from swarm_mj.radio.obstruction import obstruct
-from swarm_mj.radio.power_law import PowerLaw, write_path_loss
+from swarm_mj.radio.power_law import (
+    MeanPowers,
+    PowerLaw,
+    compute_powers,
+    no_powers,
+    place_robots,
+)
 from swarm_mj.radio.reception import Air, decoded, incoming_at, silent_air, transmit
 from swarm_mj.system.compiled import compiled
 
@@ -48,7 +50,7 @@ class ComposedChannel:
     """The channel of B missions; `at` gives that of one slot.
 
     Mean powers follow from the law (in mW), shadowing and positions. They are computed for those
-    robots that transmit, once for each place: for a team at rest, once in a mission.
+    robots that transmit.
     """
 
     def __init__(
@@ -61,17 +63,16 @@ class ComposedChannel:
     ) -> None:
         self.reception = reception
         self._law = law
-        self._shadowing = shadowing_db, shadowing_distance_m
+        self._shadowing_db, self._shadowing_distance_m = shadowing_db, shadowing_distance_m
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Start new missions; one generator each, from which its own shadowing is drawn, too."""
         self.key = np.array([rng.integers(2**64, dtype=np.uint64) for rng in rngs])
-        shape = len(rngs), num_robots
-        self._position_m = np.full((*shape, 2), np.nan)
-        self._is_done = np.zeros(shape, dtype=np.bool_)
-        self._received_mw = np.zeros((*shape, num_robots))
-        is_shadowed = self._shadowing[0] > 0.0
-        self._waves = draw_waves(*self._shadowing, num_robots, rngs) if is_shadowed else None
+        self._powers_mw = no_powers(self._law, len(rngs))
+        self._waves: Waves | None = None
+        if self._shadowing_db > 0.0:
+            std_db, correlation_m = self._shadowing_db, self._shadowing_distance_m
+            self._waves = draw_waves(std_db, correlation_m, num_robots, rngs)
 
     def at(self, slot: Int[np.ndarray, "W"], mission: Int[np.ndarray, "W"]) -> "SlotChannel":
         """Return the channel of W rows: of each its slot and its mission, counted from 0."""
@@ -87,9 +88,8 @@ class ComposedChannel:
 
         Rows of one mission agree on positions. The next call overwrites the powers.
         """
-        known = self._position_m, self._is_done, self._received_mw
-        _update_powers(position_m, mission, is_sender, self._law, self._waves, *known)
-        return self._received_mw
+        _update_powers(self._powers_mw, self._waves, position_m, mission, is_sender)
+        return self._powers_mw.power
 
     def mean_powers_mw(
         self, position_m: Float[np.ndarray, "N 2"], mission: int
@@ -124,12 +124,10 @@ class SlotChannel:
         self, position_m: Float[np.ndarray, "W N 2"], recipient: Int[np.ndarray, "W N"]
     ) -> Int[np.ndarray, "W N"]:
         """Return whose packet each robot decodes; arguments as in `Channel`."""
-        channel, heard = self.channel, np.empty_like(recipient)
+        channel, mission = self.channel, self.mission
         is_sender = recipient != np.arange(recipient.shape[1])
-        received_mw = channel.received_mw(position_m, self.mission, is_sender)
-        slot = self.slot, self.mission, channel.key, channel.reception
-        _decode(received_mw, recipient, *slot, heard)
-        return heard
+        received_mw = channel.received_mw(position_m, mission, is_sender)
+        return _decode(received_mw, recipient, self.slot, mission, channel.key, channel.reception)
 
 
 def strong_groups(is_linked: Bool[np.ndarray, "N N"]) -> Int[np.ndarray, "N"]:
@@ -146,32 +144,18 @@ def strong_groups(is_linked: Bool[np.ndarray, "N N"]) -> Int[np.ndarray, "N"]:
 
 @compiled()
 def _update_powers(
+    powers_mw: MeanPowers,
+    waves: Waves | None,
     position_m: Float[np.ndarray, "W N 2"],
     mission: Int[np.ndarray, "W"],
     is_sender: Bool[np.ndarray, "W N"],
-    law: PowerLaw,
-    waves: Waves | None,
-    known_m: Float[np.ndarray, "B N 2"],
-    is_done: Bool[np.ndarray, "B N"],
-    received_mw: Float[np.ndarray, "B N N"],
 ) -> None:
-    """Write the powers of senders that are new where the robots now are."""
+    """Compute the powers of senders that are new where the robots now are."""
     for w in range(mission.shape[0]):
-        b = mission[w]
-        # Any one that moved makes all powers at it change, not only its own.
-        if np.any(position_m[w] != known_m[b]):
-            known_m[b] = position_m[w]
-            is_done[b] = False
-            if waves is not None:  # without waves, code for shadowing is not even compiled
-                follow_robots(waves, b, position_m[w])
+        place_robots(powers_mw, mission[w], position_m[w], waves)
         for i in range(is_sender.shape[1]):
-            if is_sender[w, i] and not is_done[b, i]:
-                is_done[b, i] = True
-                power_mw = received_mw[b, i]
-                write_path_loss(i, position_m[w], law, power_mw)
-                if waves is not None:
-                    shadow(waves, b, i, power_mw)
-                obstruct(i, position_m[w], ROBOT_HEIGHT_M, law.obstacles, power_mw)
+            if is_sender[w, i]:
+                compute_powers(powers_mw, mission[w], i, waves)
 
 
 @compiled()
@@ -182,16 +166,17 @@ def _decode(
     mission: Int[np.ndarray, "W"],
     mission_key: UInt64[np.ndarray, "B"],
     rule: Reception,
-    heard: Int[np.ndarray, "W N"],
-) -> None:
-    """Fill `heard`: the strongest packet at each receiver, if it clears the threshold."""
+) -> Int[np.ndarray, "W N"]:
+    """Return the sender of the strongest packet at each receiver, if it clears the threshold."""
     num_rows, num_robots = recipient.shape
+    heard = np.empty_like(recipient)
     for w in range(num_rows):
         key = np.uint64(mission_key[mission[w]])
         air = _faded_air(received_mw[mission[w]], recipient[w], key, slot[w], rule)
         for j in range(num_robots):
             i = decoded(incoming_at(air, j), j, rule.noise_mw, rule.threshold)
             heard[w, j] = j if i == j or _is_lost(i, j, key, slot[w], rule) else i
+    return heard
 
 
 @compiled()

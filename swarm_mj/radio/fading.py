@@ -33,6 +33,10 @@ _UNIT = 2.0**-53
 NUM_WAVES = 64
 STEPS_PER_CORRELATION = 10.0  # places within that share of d_corr count as one
 
+# A robot's cosine and sine in a wave, as the first end of a link and as the other.
+FIRST_COS, FIRST_SIN, OTHER_COS, OTHER_SIN = range(4)
+NUM_ENDS = 4
+
 
 @compiled()
 def mixed(key: np.uint64, number: np.uint64) -> np.uint64:
@@ -104,7 +108,7 @@ class Waves(NamedTuple):
     other_end: Float[np.ndarray, "B W 2"]  # [rad/m]
     phase: Float[np.ndarray, "B W"]  # counted to the other end [rad]
     place: Float[np.ndarray, "B N 2"]  # of each robot, in steps; nan before it has one
-    ends: Float32[np.ndarray, "B N 4 W"]  # cosine and sine at the first end, and at the other
+    ends: Float32[np.ndarray, "B N E W"]  # of what each robot is to a wave: `FIRST_COS` and so on
     step_m: float  # places are rounded to multiples of this
     std_db: float
 
@@ -128,10 +132,13 @@ def draw_waves(
         (wave_numbers(rng), wave_numbers(rng), rng.uniform(0.0, 2.0 * np.pi, NUM_WAVES))
         for rng in rngs
     ]
+    first_end, other_end, phase = map(np.stack, zip(*drawn, strict=True))
     return Waves(
-        *(np.stack(each) for each in zip(*drawn, strict=True)),
+        first_end=first_end,
+        other_end=other_end,
+        phase=phase,
         place=np.full((len(rngs), num_robots, 2), np.nan),
-        ends=np.empty((len(rngs), num_robots, 4, NUM_WAVES), dtype=np.float32),
+        ends=np.empty((len(rngs), num_robots, NUM_ENDS, NUM_WAVES), dtype=np.float32),
         step_m=correlation_m / STEPS_PER_CORRELATION,
         std_db=std_db,
     )
@@ -153,15 +160,15 @@ def follow_robots(waves: Waves, b: int, position_m: Float[np.ndarray, "N 2"]) ->
 
 @compiled()
 def _set_ends(
-    x_m: float, y_m: float, waves: Waves, b: int, ends: Float32[np.ndarray, "4 W"]
+    x_m: float, y_m: float, waves: Waves, b: int, ends: Float32[np.ndarray, "E W"]
 ) -> None:
     """Fill `ends` with the cosines and sines of mission b's waves in this place."""
     first_end, other_end, phase = waves.first_end[b], waves.other_end[b], waves.phase[b]
     for w in range(phase.shape[0]):
         first = first_end[w, 0] * x_m + first_end[w, 1] * y_m
         other = other_end[w, 0] * x_m + other_end[w, 1] * y_m + phase[w]
-        ends[0, w], ends[1, w] = math.cos(first), math.sin(first)
-        ends[2, w], ends[3, w] = math.cos(other), math.sin(other)
+        ends[FIRST_COS, w], ends[FIRST_SIN, w] = math.cos(first), math.sin(first)
+        ends[OTHER_COS, w], ends[OTHER_SIN, w] = math.cos(other), math.sin(other)
 
 
 @compiled()
@@ -173,9 +180,15 @@ def shadow(waves: Waves, b: int, i: int, power: Float[np.ndarray, "N"]) -> None:
 
 # Adding in any order lets the compiler use its vectors; shadowing is random in the last digit, too.
 @compiled(fastmath={"reassoc", "nnan", "nsz"})
-def _neper(a: Float32[np.ndarray, "4 W"], b: Float32[np.ndarray, "4 W"], std_db: float) -> float:
+def _neper(a: Float32[np.ndarray, "E W"], b: Float32[np.ndarray, "E W"], std_db: float) -> float:
     """Return the loss between two ends as an exponent of e of the power [1]; its sign is either."""
     total = np.float32(0.0)
     for w in range(a.shape[1]):
-        total += a[0, w] * b[2, w] - a[1, w] * b[3, w] + b[0, w] * a[2, w] - b[1, w] * a[3, w]
+        # cos(first of a + other of b) + cos(first of b + other of a), by their addition theorem
+        total += (
+            a[FIRST_COS, w] * b[OTHER_COS, w]
+            - a[FIRST_SIN, w] * b[OTHER_SIN, w]
+            + b[FIRST_COS, w] * a[OTHER_COS, w]
+            - b[FIRST_SIN, w] * a[OTHER_SIN, w]
+        )
     return float(total) * std_db / math.sqrt(a.shape[1]) / DB_PER_NEPER

@@ -5,14 +5,19 @@ rises with the margin: the SINR of the mean powers over the threshold, in dB. In
 sends, `j` receives.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.radio.fading import NO_FADING
+from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.free_space import DB_PER_NEPER, FreeSpaceRadio
+from swarm_mj.radio.power_law import (
+    FREE_SPACE_EXPONENT,
+    PowerLaw,
+    free_space_law,
+    powers_between,
+)
 from swarm_mj.radio.reception import (
     MIN_DISTANCE_M,
     NOBODY,
@@ -32,7 +37,6 @@ MAX_MARGIN_DB = 80.0  # up to which a fade's own distribution is worked out
 FINE_STEP_DB = 0.01  # and how finely
 STD_STEP_DB = 0.5
 MAX_STD_DB = 12.0
-MANY = 100.0  # the K from which a Rician amplitude is normal, to a good approximation
 SIGMAS, SIGMA_STEP = 4.0, 0.05  # how far a normal distribution is followed, and how finely
 LEAST_PROBABILITY = 0.02  # what is less counts as 0, which spares schedulers hopeless links
 
@@ -63,25 +67,37 @@ def links_between(
     position_m: Float[np.ndarray, "N 2"],
     spread_m: Float[np.ndarray, "N"] | None = None,
     is_known: Bool[np.ndarray, "N"] | None = None,
+    law: PowerLaw | None = None,
 ) -> Links:
     """Return the links between robots at believed positions.
 
     Each belief has a standard deviation `spread_m`; None: the positions are true. Robots that are
-    not known to be anywhere hear nothing and are not heard; None: everyone is known.
+    not known to be anywhere hear nothing and are not heard; None: everyone is known. The law is
+    that of mean powers [mW]; None: the radio's in free space.
     """
-    apart_m = position_m[:, None] - position_m[None, :]
-    distance_m = np.maximum(np.sqrt(np.sum(apart_m**2, axis=2)), MIN_DISTANCE_M)
-    received_mw = radio.received_at_1_m_mw / distance_m**2  # as `received_power`
-    np.fill_diagonal(received_mw, 0.0)  # nobody receives itself
+    num_robots = len(position_m)
+    if law is None:
+        law = free_space_law(radio.received_at_1_m_mw, num_robots)
+    received_mw = powers_between(position_m, law)
     if is_known is not None:
         received_mw *= is_known[:, None] & is_known[None, :]
-    distance_over_std = np.full_like(distance_m, np.inf)
+    distance_over_std = np.full((num_robots, num_robots), np.inf)
     if spread_m is not None:
+        apart_m = position_m[:, None] - position_m[None, :]
+        distance_m = np.maximum(np.sqrt(np.sum(apart_m**2, axis=2)), MIN_DISTANCE_M)
         variance_m2 = spread_m[:, None] ** 2 + spread_m[None, :] ** 2
         np.divide(distance_m, np.sqrt(variance_m2), out=distance_over_std, where=variance_m2 > 0.0)
-    nothing = np.zeros(distance_m.shape, dtype=np.int64)
+        # The steeper the path loss, the more dB an error of the distance is worth.
+        is_steeper = distance_m > law.breakpoint_m
+        distance_over_std /= np.where(is_steeper, law.exponent / FREE_SPACE_EXPONENT, 1.0)
     return Links(
-        received_mw, distance_over_std, radio.noise_mw, radio.threshold, KNOWN, nothing, received_mw
+        received_mw=received_mw,
+        distance_over_std=distance_over_std,
+        noise_mw=radio.noise_mw,
+        threshold=radio.threshold,
+        curves=KNOWN,
+        row=np.zeros((num_robots, num_robots), dtype=np.int64),
+        interference_mw=received_mw,
     )
 
 
@@ -212,15 +228,9 @@ def _fade_exceeds(margin_db: Float[np.ndarray, "M"], rician_k: float) -> Float[n
     least = 10.0 ** (-margin_db / 10.0)  # of the mean power
     if rician_k == NO_FADING:
         return (least <= 1.0).astype(np.float64)
-    if rician_k > MANY:
-        z = (np.sqrt(least) - 1.0) * math.sqrt(2.0 * rician_k)
-        return np.array([0.5 * math.erfc(value / math.sqrt(2.0)) for value in z.tolist()])
-    # The Marcum Q function Q_1, as a mixture of Poisson's distributions.
-    count = np.arange(int(rician_k + 12.0 * math.sqrt(rician_k) + 30.0))
-    log_factorial = np.array([math.lgamma(n + 1.0) for n in count.tolist()])
-    no_sight = np.where(count == 0, 0.0, -np.inf)  # as 0^0 is 1
-    log_power = count * math.log(rician_k) if rician_k > 0.0 else no_sight
-    of_sight = np.exp(-rician_k + log_power - log_factorial)
-    y = ((1.0 + rician_k) * least)[:, None]
-    of_scatter = np.exp(-y + count * np.log(y) - log_factorial)
-    return np.cumsum(of_scatter, axis=1) @ of_sight
+    if rician_k == NO_LINE_OF_SIGHT:
+        return np.exp(-least)
+    from scipy.special import chndtr  # slow to import
+
+    # The power, times 2 (K + 1), is non-central chi-squared with two degrees of freedom.
+    return 1.0 - chndtr(2.0 * (rician_k + 1.0) * least, 2.0, 2.0 * rician_k)

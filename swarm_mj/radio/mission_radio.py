@@ -29,7 +29,7 @@ from swarm_mj.radio.power_law import (
     FREE_SPACE_EXPONENT,
     TWO_RAY_EXPONENT,
     PowerLaw,
-    powers_between,
+    free_space_law,
     two_ray_breakpoint_m,
 )
 
@@ -45,8 +45,9 @@ class Belief:
 
     def law_over_noise(self, num_robots: int) -> PowerLaw:
         """Return the law of a team's mean powers, free space's too, in units of the noise."""
-        at_1_m_mw = np.full(num_robots, self.radio.received_at_1_m_mw)
-        law = PowerLaw(at_1_m_mw) if self.law is None else self.law
+        law = self.law
+        if law is None:
+            law = free_space_law(self.radio.received_at_1_m_mw, num_robots)
         return law._replace(at_1_m=law.at_1_m / self.radio.noise_mw)
 
     def links(
@@ -56,17 +57,7 @@ class Belief:
         is_known: Bool[np.ndarray, "N"] | None = None,
     ) -> Links:
         """Return the links between believed positions; arguments as of `links_between`."""
-        links = links_between(self.radio, position_m, spread_m, is_known)
-        if (law := self.law) is not None:
-            # The steeper the path loss, the more dB an error of the distance is worth.
-            is_far = links.received_mw < self.radio.received_at_1_m_mw / law.breakpoint_m**2
-            steepness = np.where(is_far, law.exponent / FREE_SPACE_EXPONENT, 1.0)
-            received_mw = powers_between(position_m, law) * (links.received_mw > 0.0)
-            links = links._replace(
-                received_mw=received_mw,
-                interference_mw=received_mw,
-                distance_over_std=links.distance_over_std / steepness,
-            )
+        links = links_between(self.radio, position_m, spread_m, is_known, self.law)
         return _with_chances(links, self.reception, self.shadowing_db)
 
 
@@ -124,25 +115,35 @@ def mission_radio(
     truth is free space: nothing else is known of such a channel.
     """
     radio = radio_of(mission)
-    law, reception = _law(mission, radio), _reception(mission, radio)
-    channel: Channel | VaryingChannel = radio if own is None else own
-    if own is None and (mission.beyond_free_space or len(obstacles.kind) > 0):
+    channel: Channel | VaryingChannel = radio
+    if own is not None:
+        channel = own
+    elif mission.beyond_free_space or len(obstacles.kind) > 0:
         channel = ComposedChannel(
-            law._replace(obstacles=obstacles),
-            reception,
+            _law(mission, radio, obstacles),
+            _reception(mission, radio),
             shadowing_db=mission.shadowing_db,
             shadowing_distance_m=mission.shadowing_distance_m,
         )
     composed = channel if isinstance(channel, ComposedChannel) else None
+    truth = TrueLinks(radio=radio, channel=composed)
+    return MissionRadio(channel=channel, belief=_belief(mission, radio, obstacles), truth=truth)
+
+
+def _belief(mission: Mission, radio: FreeSpaceRadio, obstacles: Obstacles) -> Belief:
+    """Return what the mission grants to know of its channel."""
     known = obstacles if mission.grants("map") else NO_OBSTACLES
-    belief = Belief(radio=radio)
     if mission.beyond_free_space and mission.grants("statistics"):
-        law, std_db = law._replace(obstacles=known), mission.shadowing_db
-        belief = Belief(radio=radio, law=law, reception=reception, shadowing_db=std_db)
-    elif len(known.kind) > 0:
-        everyone_mw = np.full(mission.num_robots, radio.received_at_1_m_mw)
-        belief = Belief(radio=radio, law=PowerLaw(everyone_mw, obstacles=known))
-    return MissionRadio(channel, belief, TrueLinks(radio=radio, channel=composed))
+        return Belief(
+            radio=radio,
+            law=_law(mission, radio, known),
+            reception=_reception(mission, radio),
+            shadowing_db=mission.shadowing_db,
+        )
+    if len(known.kind) > 0:
+        law = free_space_law(radio.received_at_1_m_mw, mission.num_robots, known)
+        return Belief(radio=radio, law=law)
+    return Belief(radio=radio)
 
 
 def by_robot(mission: Mission, default_mw: float) -> Float[np.ndarray, "N"]:
@@ -152,15 +153,16 @@ def by_robot(mission: Mission, default_mw: float) -> Float[np.ndarray, "N"]:
     return power_mw
 
 
-def _law(mission: Mission, radio: FreeSpaceRadio) -> PowerLaw:
-    """Return the law of the mission's mean powers [mW], shadowing and obstacles apart."""
+def _law(mission: Mission, radio: FreeSpaceRadio, obstacles: Obstacles) -> PowerLaw:
+    """Return the law of the mission's mean powers [mW] between these obstacles."""
     breakpoint_m, exponent = math.inf, FREE_SPACE_EXPONENT
     if mission.path_loss == "log-distance":  # Rappaport 2002, Eq. 4.69
         breakpoint_m, exponent = mission.reference_m, mission.loss_exponent
     elif mission.path_loss == "two-ray":
         breakpoint_m = two_ray_breakpoint_m(mission.antenna_height_m, mission.frequency_hz)
         exponent = TWO_RAY_EXPONENT
-    return PowerLaw(by_robot(mission, radio.received_at_1_m_mw), breakpoint_m, exponent)
+    at_1_m_mw = by_robot(mission, radio.received_at_1_m_mw)
+    return PowerLaw(at_1_m_mw, breakpoint_m, exponent, obstacles)
 
 
 def _reception(mission: Mission, radio: FreeSpaceRadio) -> Reception:

@@ -1,4 +1,4 @@
-"""Mean powers from positions alone: transmit powers and path loss, for compiled loops.
+"""Mean powers from positions: transmit powers, path loss, shadowing, for compiled loops.
 
 The paper's radio is free space everywhere (Eq. 1). The other laws agree with it up to a breakpoint,
 so a mission's transmit power means the same under each of them; beyond it, tenfold distance costs
@@ -9,10 +9,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, Obstacles
+from swarm_mj.radio.fading import Waves, follow_robots, shadow
 from swarm_mj.radio.obstruction import NO_OBSTACLES, obstruct
 from swarm_mj.radio.reception import received_power
 from swarm_mj.system.compiled import compiled
@@ -29,6 +30,34 @@ class PowerLaw(NamedTuple):
     breakpoint_m: float = math.inf  # up to which free space holds
     exponent: float = FREE_SPACE_EXPONENT  # n, beyond it
     obstacles: Obstacles = NO_OBSTACLES
+
+
+class MeanPowers(NamedTuple):
+    """The powers of every mission, each computed once for where its robots are.
+
+    A team at rest needs each once in a mission, and robots that believe the same share them.
+    """
+
+    law: PowerLaw
+    position_m: Float[np.ndarray, "B N 2"]  # what the powers are for [m]; nan before the first
+    is_done: Bool[np.ndarray, "B N"]  # whose powers are computed for that
+    power: Float[np.ndarray, "B N N"]  # of i at j, in the law's unit; of others, anything
+
+
+def no_powers(law: PowerLaw, num_missions: int) -> MeanPowers:
+    """Return no powers so far, by this law."""
+    shape = num_missions, len(law.at_1_m)
+    return MeanPowers(
+        law=law,
+        position_m=np.full((*shape, 2), np.nan),
+        is_done=np.zeros(shape, dtype=np.bool_),
+        power=np.empty((*shape, shape[1])),
+    )
+
+
+def free_space_law(at_1_m: float, num_robots: int, obstacles: Obstacles = NO_OBSTACLES) -> PowerLaw:
+    """Return the law of a team whose packets all have this power after one metre."""
+    return PowerLaw(np.full(num_robots, at_1_m), obstacles=obstacles)
 
 
 def two_ray_breakpoint_m(height_m: float, frequency_hz: float) -> float:
@@ -71,6 +100,31 @@ def write_path_loss(
         apart_m2 = squared_distance(position_m, i, j)
         power[j] = power_after(law.at_1_m[i], apart_m2, law.breakpoint_m, law.exponent)
     power[i] = 0.0
+
+
+@compiled()
+def place_robots(
+    powers: MeanPowers, b: int, position_m: Float[np.ndarray, "N 2"], waves: Waves | None = None
+) -> None:
+    """Forget the powers of mission b if its robots are elsewhere now; None is no shadowing."""
+    # Any one that moved makes all powers at it change, not only its own.
+    if np.any(powers.position_m[b] != position_m):
+        powers.position_m[b] = position_m
+        powers.is_done[b] = False
+        if waves is not None:  # without waves, code for shadowing is not even compiled
+            follow_robots(waves, b, position_m)
+
+
+@compiled()
+def compute_powers(powers: MeanPowers, b: int, i: int, waves: Waves | None = None) -> None:
+    """Make sure of the powers of i's packets in mission b, whose robots have been placed."""
+    if not powers.is_done[b, i]:
+        powers.is_done[b, i] = True
+        position_m, power = powers.position_m[b], powers.power[b, i]
+        write_path_loss(i, position_m, powers.law, power)
+        if waves is not None:
+            shadow(waves, b, i, power)
+        obstruct(i, position_m, ROBOT_HEIGHT_M, powers.law.obstacles, power)
 
 
 @compiled()

@@ -12,24 +12,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from swarm_mj.mission.geometry import squared_distance
-from swarm_mj.radio.power_law import PowerLaw, write_powers
+from swarm_mj.radio.power_law import MeanPowers, compute_powers, place_robots
 from swarm_mj.radio.reception import NOBODY, is_received, received_power, sinr
 from swarm_mj.system.compiled import compiled
 
 NOISE = 1.0
 FREE_SPACE = np.zeros((0, 0))  # in place of powers
-
-
-class KnownPowers(NamedTuple):
-    """Powers by the law that robots believe in, as far as they were needed, for one belief.
-
-    Robots that believe the same share them, and so do all slots of a team at rest.
-    """
-
-    law: PowerLaw  # [noise]
-    believed_m: Float[np.ndarray, "B N 2"]  # where the robot asked last believes all to be [m]
-    is_done: Bool[np.ndarray, "B N"]  # whose powers are computed for that
-    power: Float[np.ndarray, "B N N"]  # [noise]
 
 
 class _Belief(NamedTuple):
@@ -51,17 +39,6 @@ class _Slot(NamedTuple):
     is_sender: Bool[np.ndarray, "N"]
     signal: Float[np.ndarray, "N"]  # of the packet that each robot decodes; 0 is none
     total: Float[np.ndarray, "N"]  # of all packets in the air
-
-
-def known_powers(law: PowerLaw, num_missions: int) -> KnownPowers:
-    """Return no powers so far, by this law."""
-    num_robots = len(law.at_1_m)
-    return KnownPowers(
-        law,
-        np.full((num_missions, num_robots, 2), np.nan),
-        np.zeros((num_missions, num_robots), dtype=np.bool_),
-        np.empty((num_missions, num_robots, num_robots)),
-    )
 
 
 @compiled()
@@ -121,14 +98,14 @@ def keep_joined(
     range_m: float,
     threshold: float,
     is_sending: Bool[np.ndarray, "B N"],
-    known: KnownPowers | None = None,
+    powers: MeanPowers | None = None,
 ) -> None:
     """Leave those among the senders who send by the rule and their own beliefs.
 
     Robots take turns in this order, whose place `turn` (mod N) owns the slot, and sends in any
     case. Robot i believes the others to be in places [b, i]. A lone transmission just decodes at
-    the range, with an SINR of the threshold, linear [1]. Known powers are by the law that all
-    believe in, and written in place; None is free space.
+    the range, with an SINR of the threshold, linear [1]. Powers are those that the robot asked last
+    believes in, by the law that all believe in [noise], and written in place; None is free space.
     """
     num_missions, num_robots = order.shape
     at_1_m = threshold * range_m * range_m
@@ -137,9 +114,12 @@ def keep_joined(
         asked = _asked(order[b], turn[b])
         for i in range(num_robots):
             if i != owner and is_sending[b, i]:
-                power = FREE_SPACE if known is None else _powers_for(believed_m[b, i], known, b)
+                power = FREE_SPACE
+                if powers is not None:
+                    place_robots(powers, b, believed_m[b, i])
+                    power = powers.power[b]
                 belief = _Belief(believed_m[b, i], at_1_m, power, threshold)
-                is_sending[b, i] = _senders(owner, asked, i, belief, known, b)[i]
+                is_sending[b, i] = _senders(owner, asked, i, belief, powers, b)[i]
         is_sending[b, owner] = True
 
 
@@ -155,48 +135,29 @@ def _senders(
     asked: Int[np.ndarray, "A"],
     last: int,
     belief: _Belief,
-    known: KnownPowers | None,
+    powers: MeanPowers | None,
     b: int,
 ) -> Bool[np.ndarray, "N"]:
     """Return who sends: the owner of the turn, and who joins it up to the `last` that is asked."""
     num_robots = belief.believed_m.shape[0]
     is_sender = np.zeros(num_robots, dtype=np.bool_)
     slot = _Slot(is_sender, np.zeros(num_robots), np.zeros(num_robots))
-    if known is not None:
-        _compute(owner, known, b)
-        _compute(last, known, b)
+    if powers is not None:
+        compute_powers(powers, b, owner)
+        compute_powers(powers, b, last)
     _join(owner, belief, slot)
     # A robot that may not join the owner alone may not join it with others either.
     if last != NOBODY and not _may_join(last, belief, slot):
         return is_sender
     for k in asked:
         # A sender that is asked again may not join either: nobody would gain by it.
-        if known is not None and slot.signal[k] == 0.0:
-            _compute(k, known, b)
+        if powers is not None and slot.signal[k] == 0.0:
+            compute_powers(powers, b, k)
         if _may_join(k, belief, slot):
             _join(k, belief, slot)
         if k == last:
             break
     return is_sender
-
-
-@compiled()
-def _powers_for(
-    believed_m: Float[np.ndarray, "N 2"], known: KnownPowers, b: int
-) -> Float[np.ndarray, "N N"]:
-    """Return the powers in mission b, none of them computed if they were for other beliefs."""
-    if np.any(known.believed_m[b] != believed_m):
-        known.believed_m[b] = believed_m
-        known.is_done[b] = False
-    return known.power[b]
-
-
-@compiled()
-def _compute(k: int, known: KnownPowers, b: int) -> None:
-    """Make sure of the powers of k's packets in mission b."""
-    if not known.is_done[b, k]:
-        write_powers(k, known.believed_m[b], known.law, known.power[b, k])
-        known.is_done[b, k] = True
 
 
 @compiled()

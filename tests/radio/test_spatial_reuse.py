@@ -9,10 +9,10 @@ from walls import walls
 
 from swarm_mj.mission import paper
 from swarm_mj.radio.mission_radio import mission_radio
+from swarm_mj.radio.power_law import no_powers
 from swarm_mj.radio.spatial_reuse import (
     believes_as_the_last,
     keep_joined,
-    known_powers,
     write_joined,
 )
 
@@ -78,7 +78,7 @@ def test_eq3_by_what_was_known_powers_the_channel_its_own_rule_is_the_judge(
     channel, belief, _ = mission_radio(mission, WALLS)
     channel.start(num_robots, [rng])
     law = belief.law_over_noise(num_robots)
-    known, order = known_powers(law, 1), rng.permutation(num_robots)
+    known, order = no_powers(law, 1), rng.permutation(num_robots)
     position_m = rng.uniform(-400, 400, (num_robots, 2))
     for turn in range(4):
         if not stands_still:
@@ -101,7 +101,7 @@ def test_each_robot_reckons_with_its_own_beliefs_of_what_it_was_told():
     believed_m[0, 2, 2:] += 5000.0
     is_sending = np.ones((1, 4), dtype=bool)
     args = (believed_m, np.arange(4)[None], np.array([0]), 250.0, belief.radio.threshold)
-    keep_joined(*args, is_sending, known_powers(belief.law_over_noise(4), 1))
+    keep_joined(*args, is_sending, no_powers(belief.law_over_noise(4), 1))
     assert is_sending[0].tolist() == [True, False, True, False]
 
 
