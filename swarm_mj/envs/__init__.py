@@ -4,8 +4,6 @@ from typing import get_args
 
 from swarm_mj.mission import Task
 
-NAMESPACE = "swarm_mj"
-
 
 def register_environments() -> None:
     """Register `swarm_mj/Flocking-v0` and the other tasks for `gymnasium.make` and `make_vec`.
@@ -28,4 +26,4 @@ def register_environments() -> None:
 
 def environment_id(task: str) -> str:
     """Return a task's environment: `swarm_mj/RandomWalk-v0` is that of `random-walk`."""
-    return f"{NAMESPACE}/{task.title().replace('-', '')}-v0"
+    return f"swarm_mj/{task.title().replace('-', '')}-v0"

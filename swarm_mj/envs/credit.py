@@ -53,14 +53,24 @@ def credits_of(
         rows = np.concatenate([missions, mission])
         sent_to = np.concatenate([recipient, alone])
         took_part = None if is_active is None else is_active[rows]
-        gained = gain(timestamp, position_m[rows], sent_to, channel, now[rows], rows, took_part)
+        gained = gain(
+            timestamp,
+            position_m[rows],
+            sent_to,
+            channel,
+            now[rows],
+            mission=rows,
+            is_active=took_part,
+        )
         credit[mission, sender] = gained[mission] - gained[num_missions:]
         return credit
 
     def replayed(recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B"]:
         # A user's own channel meets B missions at a time, as in flight, and draws the same numbers.
         again = snapshot_channel(channel)
-        return gain(timestamp, position_m, recipient, again, now, missions, is_active)
+        return gain(
+            timestamp, position_m, recipient, again, now, mission=missions, is_active=is_active
+        )
 
     together = replayed(recipient)
     turn = np.cumsum(sends, axis=1) * sends  # 1 for the first sender of a mission, and so on

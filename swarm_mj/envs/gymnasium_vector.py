@@ -1,11 +1,11 @@
 """Gymnasium's vector interface: B missions in as few swarms as can be.
 
-Missions that begin together are one group, played as one swarm. A mission that begins alone, by
-`reset_mask`, leaves its group for a new one; its row in the old group flies on, silent and unseen.
+Missions that begin together are one batch, played as one swarm. A mission that begins alone, by
+`reset_mask`, leaves its batch for a new one; its row in the old batch flies on, silent and unseen.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 from gymnasium.utils import EzPickle, seeding
@@ -18,14 +18,6 @@ from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, seed_or
 from swarm_mj.envs.options import check_count, check_reset, make_team_batch, team_spaces
 from swarm_mj.mission import Mission
 from swarm_mj.system.fields import did_you_mean
-
-
-class _Group(NamedTuple):
-    """Missions that began together, and the environments that they still are."""
-
-    batch: MissionBatch
-    rows: Int[np.ndarray, "E"]  # of the batch's missions
-    envs: Int[np.ndarray, "E"]  # the environment of each row
 
 
 class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
@@ -55,11 +47,13 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         self._screen = Screen(render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
         self._mission, self._options = mission, options
-        self._groups: list[_Group] = []
+        batch = make_team_batch(mission, num_envs, **options)
+        # Of each environment: the batch that flies it, and its row there.
+        self._batches = np.full(num_envs, batch, dtype=object)
+        self._rows = np.arange(num_envs)
         self._is_over = np.zeros(num_envs, dtype=np.bool_)
-        self._rngs: dict[int, np.random.Generator] = {}  # that draw seeds, by environment
-        spaces = team_spaces(make_team_batch(mission, 1, **options))
-        self.single_observation_space, self.single_action_space = spaces
+        self._rngs = [seeding.np_random()[0] for _ in range(num_envs)]  # that draw later seeds
+        self.single_observation_space, self.single_action_space = team_spaces(batch)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._seen = cast(
@@ -112,40 +106,37 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         """
         actions = np.asarray(actions)
         self._check_step(actions)
-        reward, infos, final = np.zeros(self.num_envs), {}, {}
-        late = np.flatnonzero(self._is_over)  # in the mode NEXT_STEP; they begin in this step
-        for group in self._groups:
-            batch, rows, envs = group
-            if not self._is_over[envs[0]]:
-                recipient = batch.flown.views.silence.astype(actions.dtype)
-                recipient[rows] = actions[envs]
-                reward[envs] = batch.step(recipient)[rows, 0]
-                self._is_over[envs] = batch.is_over
-                is_final = batch.is_over and self._mode == AutoresetMode.SAME_STEP
-                self._note(final if is_final else infos, group)
-        is_over = self._is_over.copy()
-        is_over[late] = False
-        if final:
+        reward = np.zeros(self.num_envs)
+        infos: Info = {}
+        final_infos: Info = {}  # of missions that end in this step, and begin anew in it
+        was_over = self._is_over.copy()  # in the mode NEXT_STEP; they begin in this step
+        is_same_step = self._mode == AutoresetMode.SAME_STEP
+        for batch in dict.fromkeys(self._batches[~was_over]):
+            envs = np.flatnonzero(self._batches == batch)
+            rows = self._rows[envs]
+            recipient = batch.flown.views.silence.astype(actions.dtype)
+            recipient[rows] = actions[envs]
+            reward[envs] = batch.step(recipient)[rows, 0]
+            self._is_over[envs] = batch.is_over
+            self._note(final_infos if batch.is_over and is_same_step else infos, batch)
+        ends = self._is_over & ~was_over
+        if final_infos:
             last_seen = np.full(self.num_envs, None, dtype=object)
-            for env in np.flatnonzero(is_over):
+            for env in np.flatnonzero(ends):
                 last_seen[env] = {name: each[env].copy() for name, each in self._seen.items()}
-            infos |= {"final_obs": last_seen, "_final_obs": is_over.copy()}
-            infos |= {"final_info": final, "_final_info": is_over.copy()}
-        begun = np.flatnonzero(is_over) if final else late
+            infos |= {"final_obs": last_seen, "_final_obs": ends.copy()}
+            infos |= {"final_info": final_infos, "_final_info": ends.copy()}
+        begun = np.flatnonzero(ends if is_same_step else was_over)
         if begun.size:
             self._begin(begun, [None] * begun.size, infos)
-        return self._copied(), reward, np.zeros_like(is_over), is_over, infos
+        return self._copied(), reward, np.zeros_like(ends), ends, infos
 
     def render(self) -> tuple[UInt8[np.ndarray, "H W 3"], ...] | None:
         """Draw all missions, in the mode "rgb_array"; raises OSError without OpenGL."""
         if self.render_mode is None:
             return None
-        places = {
-            env: (batch, row)
-            for batch, rows, envs in self._groups
-            for row, env in zip(rows.tolist(), envs.tolist(), strict=True)
-        }
-        pictures = (self._screen.picture(*places[env]) for env in range(self.num_envs))
+        flown = zip(self._batches, self._rows.tolist(), strict=True)
+        pictures = (self._screen.picture(batch, row) for batch, row in flown)
         return tuple(each for each in pictures if each is not None)
 
     def close_extras(self, **_: Any) -> None:
@@ -165,29 +156,30 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
             )
 
     def _begin(self, envs: Int[np.ndarray, "E"], seeds: Sequence[int | None], infos: Info) -> None:
-        """Begin these environments' missions in a group of their own; note their infos."""
-        begun, batch = [], self._spare_batch(envs)
+        """Begin these environments' missions in a batch of their own; note their infos."""
+        begun = []
         for env, seed in zip(envs.tolist(), seeds, strict=True):
-            if seed is not None or env not in self._rngs:
+            if seed is not None:
                 self._rngs[env], _ = seeding.np_random(seed)
             begun.append(seed_or_next(seed, self._rngs[env]))
+        batch = self._spare_batch(envs)
         batch.restart(begun)
-        left = [(group, ~np.isin(group.envs, envs)) for group in self._groups]
-        stay = [_Group(g.batch, g.rows[stays], g.envs[stays]) for g, stays in left if stays.any()]
-        self._groups = [*stay, _Group(batch, np.arange(len(envs)), envs)]
+        self._batches[envs], self._rows[envs] = batch, np.arange(envs.size)
         self._is_over[envs] = False
-        self._note(infos, self._groups[-1])
+        self._note(infos, batch)
 
     def _spare_batch(self, envs: Int[np.ndarray, "E"]) -> MissionBatch:
         """Return a batch of the right size that no other environment needs; reuse saves a swarm."""
-        for group in self._groups:
-            if group.batch.num_missions == len(envs) and np.isin(group.envs, envs).all():
-                return group.batch
-        return make_team_batch(self._mission, len(envs), **self._options)
+        needed = set(np.delete(self._batches, envs))
+        for batch in self._batches[envs]:
+            if batch.num_missions == envs.size and batch not in needed:
+                return batch
+        return make_team_batch(self._mission, envs.size, **self._options)
 
-    def _note(self, infos: Info, group: _Group) -> None:
-        """Keep a group's view, and write its infos next to masks of whose they are."""
-        batch, rows, envs = group
+    def _note(self, infos: Info, batch: MissionBatch) -> None:
+        """Keep what a batch shows, and write its infos next to masks of whose they are."""
+        envs = np.flatnonzero(self._batches == batch)
+        rows = self._rows[envs]
         for name, each in batch.observation.items():
             self._seen[name][envs] = each[rows]
         for name, each in batch.infos().items():

@@ -1,20 +1,18 @@
 """Options and spaces that all environments share: what users ask for, and what they get."""
 
 import copy
-import re
 from collections.abc import Collection
 from dataclasses import replace
 from numbers import Integral
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector.utils import batch_space
 
 from swarm_mj.control.motion import Controller, Costed, controller_of
-from swarm_mj.envs import NAMESPACE, environment_id
 from swarm_mj.envs.mission_batch import REWARDS, MissionBatch
-from swarm_mj.mission import MISSION_DISTANCE_M, PRESETS, Mission, Task
+from swarm_mj.mission import MISSION_DISTANCE_M, Mission, make_mission
 from swarm_mj.mission.components import Components
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies.gnn.feature_sets import is_own_set, load_features
@@ -22,7 +20,6 @@ from swarm_mj.policies.gnn.graphs import REFERENCE_WINDOWS
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.radio.free_space import Channel
-from swarm_mj.system.fields import did_you_mean
 
 
 def make_batch(
@@ -67,27 +64,21 @@ def make_batch(
     # Copies: a component may draw or remember, and another environment may be given the same one.
     components = copy.deepcopy(components.made(mission))
     _check_reward(reward, mission, components.controller)
-    check_features_named(features)
-    if is_own_set(features):
-        load_features(features)
-    seen = {"features": features, "with_parents": with_parents}
-    return MissionBatch(mission, num_missions, reward=reward, components=components, **seen)
+    _load_named(features)
+    return MissionBatch(
+        mission,
+        num_missions,
+        features=features,
+        reward=reward,
+        with_parents=with_parents,
+        components=components,
+    )
 
 
 def check_count(what: str, number: object) -> None:
     """Raise ValueError unless a number of missions, or of environments, is positive."""
     if not isinstance(number, Integral) or number < 1:
         raise ValueError(f"{what} must be 1 or more, not {number!r}")
-
-
-def check_features_named(features: object) -> None:
-    """Raise TypeError unless the features are a name, which stored policies keep."""
-    if not isinstance(features, str):
-        is_class = isinstance(features, type)
-        name = f"{features.__module__}:{features.__qualname__}" if is_class else "module:Name"
-        raise TypeError(
-            f'features must be named, as stored policies keep the name; write features="{name}"'
-        )
 
 
 def check_reset(options: Collection[str], known: Collection[str] = ()) -> None:
@@ -121,28 +112,24 @@ def _mission_of(mission: Mission | str, preset: str | None, fields: dict[str, An
                 f"the preset {mission.preset}; leave it out"
             )
         return replace(mission, **fields)
-    _check_task(mission, fields)
-    preset = "paper" if preset is None else preset
-    task = replace(Mission(), preset=preset, task=mission).task  # refuses what is unknown
-    return PRESETS[preset](task, **fields)
-
-
-def _check_task(mission: str, fields: dict[str, Any]) -> None:
-    """Refuse unknown tasks, of which some look like an environment's name, and second tasks."""
-    tasks = get_args(Task)
-    if mission not in tasks:
-        plain = str(mission).removeprefix(f"{NAMESPACE}/").partition("-v")[0]
-        typed = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", plain).lower()
-        raise ValueError(
-            f"task must be one of {', '.join(tasks)}, not {mission!r:.80}"
-            f"{did_you_mean(typed, tasks)}"
-        )
     if "task" in fields:
-        task = fields["task"]
         raise TypeError(
-            f"the environment's name or first argument settles the task, here {mission!r:.80}; use "
-            f"{environment_id(str(task)):.80} or {task!r:.80} there, and leave task= out"
+            f"the environment's name or first argument settles the task, here {mission!r:.80}; "
+            "leave task= out"
         )
+    return make_mission(task=mission, preset=preset or Mission().preset, **fields)
+
+
+def _load_named(features: object) -> None:
+    """Load a user's own features; raise TypeError for no name, as stored policies keep the name."""
+    if not isinstance(features, str):
+        is_class = isinstance(features, type)
+        name = f"{features.__module__}:{features.__qualname__}" if is_class else "module:Name"
+        raise TypeError(
+            f'features must be named, as stored policies keep the name; write features="{name}"'
+        )
+    if is_own_set(features):
+        load_features(features)
 
 
 def _check_reward(reward: str, mission: Mission, controller: Controller | None) -> None:

@@ -84,11 +84,6 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
             if agent not in self._robot:
                 names = f"{self.possible_agents[0]} to {self.possible_agents[-1]}"
                 raise ValueError(f"agents are {names}, not {agent!r:.80}; leave it out")
-            if action is None:
-                raise ValueError(
-                    f"the action of {agent} must be a robot's number from 0 to "
-                    f"{len(self._robot) - 1}, its own for silence, not None"
-                )
             if agent in self.agents:
                 chosen[self._robot[agent]] = np.squeeze(action)  # some wrap it
         if not self.agents:

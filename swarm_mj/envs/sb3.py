@@ -52,9 +52,13 @@ def make_vec_env(
         raise ValueError(f"agent must be one of {', '.join(AGENTS)}, not {agent!r}")
     for name in {"n_envs", "num_envs"} & options.keys():
         raise TypeError(f"make_vec_env has no {name!r}; did you mean num_missions?")
-    is_robot = agent == "robot"
-    batch = (make_batch if is_robot else make_team_batch)(mission, num_missions, **options)
-    env = SwarmVecEnv([batch], agent, *(robot_spaces if is_robot else team_spaces)(batch))
+    if agent == "robot":
+        batch = make_batch(mission, num_missions, **options)
+        observation_space, action_space = robot_spaces(batch)
+    else:
+        batch = make_team_batch(mission, num_missions, **options)
+        observation_space, action_space = team_spaces(batch)
+    env = SwarmVecEnv([batch], agent, observation_space, action_space)
     env.seed(seed)
     return env
 

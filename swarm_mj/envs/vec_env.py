@@ -41,14 +41,11 @@ class SwarmVecEnv(VecEnv):
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Let the next reset begin the missions of seeds from this one on; return each one's."""
-        owners = [batch for batch in self.batches for _ in range(batch.num_missions)]
-        self._given = [None if seed is None else seed + b for b in range(len(owners))]
+        missions = [batch for batch in self.batches for _ in range(batch.num_missions)]
+        self._given = [None if seed is None else seed + b for b in range(len(missions))]
         self._rngs = [seeding.np_random(each)[0] for each in self._given]
-        return [
-            given
-            for given, batch in zip(self._given, owners, strict=True)
-            for _ in range(self._per_mission(batch))
-        ]
+        per_mission = [self._per_mission(batch) for batch in missions]
+        return np.repeat(np.array(self._given, dtype=object), per_mission).tolist()
 
     def reset(self) -> Observation:
         """Begin the missions of the seeds given, and else others; their seeds are in infos."""
@@ -133,11 +130,10 @@ class SwarmVecEnv(VecEnv):
     def _infos(self) -> list[dict[str, Any]]:
         infos: list[dict[str, Any]] = []
         for batch in self.batches:
-            names, values = zip(*batch.infos().items(), strict=True)
-            for row in zip(*(each.tolist() for each in values), strict=True):
-                infos += (
-                    dict(zip(names, row, strict=True)) for _ in range(self._per_mission(batch))
-                )
+            shown = {name: values.tolist() for name, values in batch.infos().items()}
+            for b in range(batch.num_missions):
+                info = {name: values[b] for name, values in shown.items()}
+                infos += [info.copy() for _ in range(self._per_mission(batch))]
         return infos
 
     def _observe(self) -> Observation:

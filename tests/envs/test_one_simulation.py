@@ -89,7 +89,7 @@ class Singles:
 
 
 class Vector:
-    """Missions of one environment, which begin together or each in a group of its own."""
+    """Missions of one environment, which begin together or each in a batch of its own."""
 
     def __init__(self, mission, face):
         self.env = begun(SwarmVectorEnv(2, mission), SEEDS[0])
@@ -101,7 +101,8 @@ class Vector:
         return self.env.step(recipient)[1]
 
     def swarms(self):
-        return [(group.batch.swarm, row) for group in self.env._groups for row in group.rows]
+        flown = zip(self.env._batches, self.env._rows, strict=True)
+        return [(batch.swarm, row) for batch, row in flown]
 
 
 class Sb3:

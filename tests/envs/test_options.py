@@ -12,7 +12,7 @@ from gymnasium import spaces
 from swarm_mj.envs import environment_id, register_environments
 from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
-from swarm_mj.envs.options import check_features_named, make_batch, robot_spaces, team_spaces
+from swarm_mj.envs.options import _load_named, make_batch, robot_spaces, team_spaces
 from swarm_mj.mission import Task
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.policies.gnn.graphs import PaperFeatures
@@ -22,15 +22,15 @@ SMALL = {"num_robots": 3, "num_windows": 5}
 
 RESET = {"options": {"mask": 1}}
 REFUSED = {
-    "did you mean random-walk": lambda: make_batch("swarm_mj/RandomWalk-v0"),
+    "one of .*, random-walk, .*'swarm_mj/RandomWalk-v0'": lambda: make_batch(
+        "swarm_mj/RandomWalk-v0"
+    ),
     "one of .*; did you mean random-walk": lambda: make_batch("random_walk"),
-    "here 'flocking'; use swarm_mj/RandomWalk-v0 or 'random-walk'": lambda: gymnasium.make(
-        "swarm_mj/Flocking-v0", task="random-walk"
+    "here 'flocking'; leave task= out": lambda: gymnasium.make(
+        "swarm_mj/Flocking-v0", task="stationary"
     ),
     r"give it to reset\(seed=...\)": lambda: gymnasium.make("swarm_mj/Flocking-v0", seed=1),
-    r'features="swarm_mj\.policies\.gnn\.graphs:PaperFeatures"': lambda: check_features_named(
-        PaperFeatures
-    ),
+    r'features="swarm_mj\.policies\.gnn\.graphs:PaperFeatures"': lambda: _load_named(PaperFeatures),
     "no option 'mask'; it has none": lambda: SwarmEnv(**SMALL).reset(**RESET),
     "no option 'mask'; it has reset_mask": lambda: SwarmVectorEnv(2, **SMALL).reset(**RESET),
     "num_envs must be 1 or more, not 0": lambda: SwarmVectorEnv(0, **SMALL),

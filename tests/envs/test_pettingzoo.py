@@ -58,7 +58,7 @@ def test_each_agent_sees_and_is_paid_its_own():
     ("actions", "message"),
     [
         ({"robot_6": 1}, "agents are robot_0 to robot_5, not 'robot_6'"),
-        ({"robot_0": 1, "robot_3": None}, "robot_3 must be a robot's number from 0 to 5"),
+        ({"robot_0": 1, "robot_3": None}, "must be integers from 0 to 5, not object"),
         ({"robot_0": 0, "robot_2": 1.0}, "must be integers from 0 to 5, not float"),
         ({"robot_0": 0, "robot_2": np.float32(1.7)}, "must be integers from 0 to 5, not float"),
     ],
