@@ -1,7 +1,6 @@
 """Charts of flights and evaluations: one mission over time, and policies below each other."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -10,13 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from swarm_mj.control.motion import Flocking
-from swarm_mj.evaluation.figures.style import FAINT, escape_mathtext, look_of, styled
+from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, escape_mathtext, look_of, styled
 from swarm_mj.evaluation.results import Result
 from swarm_mj.mission.components import components_in
 
 Course = Float[np.ndarray, "T"]
 
-WIDTH_IN, PANEL_IN, ROW_IN, HEAD_IN = 7.5, 2.1, 0.32, 1.1
+PANEL_IN, ROW_IN, HEAD_IN = 2.1, 0.32, 1.1
 TITLE_PT = 10.0
 MIN_SHARE = 1e-6  # of the largest velocity variance that is drawn
 LABELS = {"aoi": "age of information\n[windows]", "velocity_variance": "velocity variance\n[m²/s²]"}
@@ -38,13 +37,14 @@ def draw_flight(
         own_cost = None
     number = 2 if own_cost or np.any(columns["velocity_variance"]) else 1
     with styled():
-        figure, axes = _axes(title, number, 1, HEAD_IN + number * PANEL_IN, sharex=True)
+        figure, axes = _axes(title, rows=number, height_in=HEAD_IN + number * PANEL_IN)
         for each in axes:
             each.margins(x=0.01)
         _draw_age(axes[0], columns, colour)
         if own_cost:
             axes[1].plot(columns["window"], columns["task_cost"], color=colour)
-            axes[1].set_ylabel("{}\n[{}]".format(*own_cost))
+            name, unit = own_cost
+            axes[1].set_ylabel(f"{name}\n[{unit}]")
             axes[1].set_ylim(bottom=0.0)
         elif number == 2:
             variance = columns["velocity_variance"]
@@ -64,8 +64,8 @@ def draw_evaluation(results: Sequence[Result]) -> Figure:
     about = f"{first.task}, {first.num_robots} robots, {first.episodes} missions from seed "
     title = f"{about}{first.seed}{components_in(vars(first)).title}"
     with styled():
-        size_in = HEAD_IN + ROW_IN * len(shown)
-        figure, axes = _axes(title, 1, len(costs), size_in, sharey=True)
+        height_in = HEAD_IN + ROW_IN * len(shown)
+        figure, axes = _axes(title, columns=len(costs), height_in=height_in)
         for each, cost in zip(axes, costs, strict=True):
             for place, result in enumerate(shown):
                 _draw_mean(each, place, result, cost)
@@ -96,10 +96,18 @@ def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:
 
 
 def _axes(
-    title: str, rows: int, columns: int, height_in: float, **how: Any
+    title: str, *, rows: int = 1, columns: int = 1, height_in: float
 ) -> tuple[Figure, list[Axes]]:
-    how |= {"squeeze": False, "layout": "constrained", "figsize": (WIDTH_IN, height_in)}
-    figure, axes = plt.subplots(rows, columns, **how)
+    """Return a titled figure of panels, those of a column over one x, those of a row over one y."""
+    figure, axes = plt.subplots(
+        rows,
+        columns,
+        sharex="col",
+        sharey="row",
+        squeeze=False,
+        layout="constrained",
+        figsize=(WIDTH_IN, height_in),
+    )
     figure.suptitle(escape_mathtext(title), x=0.01, ha="left", fontsize=TITLE_PT)
     return figure, list(axes.flat)
 

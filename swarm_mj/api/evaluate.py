@@ -184,8 +184,12 @@ def evaluate(
 def study_needs(study: Study, num_jobs: int) -> Needs:
     """Return the memory and disk of a study: a batch in each process, and the results of all."""
     batches = study.batches
-    sizes = ((each.mission.num_robots, len(each.seeds), each.policy) for each in batches)
-    largest = max(needs.missions_memory(*n, is_learned=is_learned(name)) for *n, name in sizes)
+    largest = max(
+        needs.missions_memory(
+            batch.mission.num_robots, len(batch.seeds), is_learned=is_learned(batch.policy)
+        )
+        for batch in batches
+    )
     torch = needs.OF_TORCH if any(map(is_learned, study.policies)) else 0.0
     ages = sum(2 * batch.mission.num_windows + 1 for batch in batches)  # counts
     missions = study.episodes * len(study.pairs)

@@ -1,21 +1,17 @@
 """The numbers of one flight: for the terminal and for `--json`."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
-
-import numpy as np
-from jaxtyping import Float
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
 from swarm_mj.mission.presets import where_flown
 from swarm_mj.mission.specification import NOTHING
 from swarm_mj.policies.policy import CentralisedPolicy, Policy
-from swarm_mj.protocol.costs import PACKETS
 from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
-from swarm_mj.simulation.rollout import Summary, WindowRecord
+from swarm_mj.simulation.rollout import Summary
 
 AGREED = 0.01  # of the first window's velocity variance: a flock with less has agreed
 CENTRE = "a centre that is told where all are"
@@ -47,10 +43,12 @@ def flight_title(mission: Mission, policy: str, seed: int) -> str:
     team = f"{mission.num_robots} robots" + (" that collide" if mission.collide else "")
     if mission.failure_fraction:
         team += f", {mission.failure_fraction:.0%} of them off half-way"
-    known = [f"known {mission.prior_knowledge}"] if mission.prior_knowledge != NOTHING else []
-    rate = [] if mission.bit_rate is None else [bits_per_second(mission.bit_rate)]
-    flown = (mission.task, policy, team, f"seed {seed}")
-    return ", ".join((*flown, *where_flown(mission), *known, *rate))
+    parts = [mission.task, policy, team, f"seed {seed}", *where_flown(mission)]
+    if mission.prior_knowledge != NOTHING:
+        parts.append(f"known {mission.prior_knowledge}")
+    if mission.bit_rate is not None:
+        parts.append(bits_per_second(mission.bit_rate))
+    return ", ".join(parts)
 
 
 def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> dict[str, str]:
@@ -73,26 +71,6 @@ def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> 
     if mission.num_failures:
         rows["robots switched off half-way"] = f"{mission.num_failures}; not counted from then on"
     return rows
-
-
-def window_columns(
-    windows: Sequence[WindowRecord], window_s: float, aoi_worst: Float[np.ndarray, "T"] | None
-) -> dict[str, Float[np.ndarray, "T"]]:
-    """Return a flight window by window, column by column; `aoi_worst` is None without a record."""
-    costs, window = [each.costs for each in windows], np.arange(1.0, len(windows) + 1.0)
-    task_costs = [each.task_cost for each in costs if each.task_cost is not None]
-    columns: dict[str, list[Any]] = {
-        "aoi": [each.age_windows for each in costs],
-        "velocity_variance": [each.velocity_variance_m2ps2 for each in costs],
-        **({"task_cost": [each.value for each in task_costs]} if task_costs else {}),
-        "hops": [each.hops for each in windows],
-        "is_complete": [each.is_complete for each in costs],
-        **{f"packets_{name}": [getattr(each.packets, name) for each in costs] for name in PACKETS},
-    }
-    flown = {name: np.concatenate(each).astype(np.float64) for name, each in columns.items()}
-    worst = {} if aoi_worst is None else {"aoi_worst": aoi_worst}
-    seconds = np.round(window * window_s, 9)
-    return {"window": window, "seconds": seconds, "aoi": flown.pop("aoi"), **worst, **flown}
 
 
 def _number(name: str, value: Any) -> Any:  # noqa: ANN401 - of a summary's field

@@ -33,7 +33,7 @@ from swarm_mj.system.fields import check_kind, check_names
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import Needs, check_fits, free_memory, in_gb, memory_errors
 from swarm_mj.system.packages import commit, version
-from swarm_mj.system.terminal import WorkBar, quiet_bar
+from swarm_mj.system.terminal import WorkBar, quiet_bar, quiet_console
 
 WINDOWS_BETWEEN_LOOKS = 50  # at the free memory
 COMPILING_WINDOWS = 10  # in which three robots use all that a flight does, schedules included
@@ -102,9 +102,9 @@ def fly(
     swarm = Swarm(mission, [seed], **components.given)
     swarm.start(chosen)
     recorder = Recorder(swarm, ego=observer) if record else None
-    with quiet_bar("Compiling", COMPILING_WINDOWS, "windows") as compiling:
+    with quiet_console().status("Compiling, once for all flights ..."):
         like = "tdma" if isinstance(policy, Policy) else name  # an object flies only once
-        compile_ahead(mission, like, compiling.advance, **how)
+        compile_ahead(mission, like, **how)
     bar = quiet_bar("Flying", mission.num_windows, "windows")
     flown = fly_swarm(swarm, recorder, bar, way_on="")
     if flown.code != DONE:
@@ -159,11 +159,8 @@ def fly_swarm(
     if memory did not suffice for one window, and ValueError as `rollout` does.
     """
     flown: list[WindowRecord] = []
+    code, ending = FAILED, "Out of memory"  # unless it ends otherwise, below
     start_s = time.perf_counter()
-
-    def ended(code: int, ending: str = "") -> Flown:
-        return Flown(flown, code, ending, time.perf_counter() - start_s)
-
     with suppress(MemoryError), memory_errors(), deferred_interrupt() as is_interrupted, bar:
         for window in rollout(swarm):
             if recorder:
@@ -172,22 +169,24 @@ def fly_swarm(
             bar.text = f"age {float(window.costs.age_windows[0]):.1f}"
             bar.advance()
             if is_interrupted():
-                return ended(INTERRUPTED, "Interrupted")
+                code, ending = INTERRUPTED, "Interrupted"
+                break
             is_time = way_on is not None and len(flown) % WINDOWS_BETWEEN_LOOKS == 0
             if recorder and is_time and (short := _shortage(swarm.mission, len(flown), recorder)):
-                return ended(FAILED, f"Memory ran short ({short}{way_on})")
-        return ended(DONE)
+                ending = f"Memory ran short ({short}{way_on})"
+                break
+        else:
+            code, ending = DONE, ""
     if not flown:
         raise MemoryError
-    return ended(FAILED, "Out of memory")
+    wall_s = time.perf_counter() - start_s
+    return Flown(windows=flown, code=code, ending=ending, wall_s=wall_s)
 
 
-def compile_ahead(
-    mission: Mission, policy_name: str, on_window: Callable[[], object] = lambda: None, **how: Any
-) -> None:
+def compile_ahead(mission: Mission, policy_name: str, **how: Any) -> None:
     """Fly a small mission of this kind, beyond half-way, so that compiling is not timed.
 
-    Name and `how` are arguments of `make_policy`; `on_window` is called after each window.
+    Name and `how` are arguments of `make_policy`.
     """
     # A stored policy may be for teams of one size, and a file's arena does not shrink.
     is_bound = registry.is_stored(policy_name) or mission.arena not in ARENAS
@@ -195,8 +194,8 @@ def compile_ahead(
     smallest = replace(mission, num_robots=robots, range_ratio=10.0, num_windows=COMPILING_WINDOWS)
     if registry.is_own_policy(policy_name):  # which may be made for one mission only
         policy_name, how = "tdma", {}
-    for _ in rollout(Swarm(smallest, [0]), registry.make_policy(policy_name, smallest, **how)):
-        on_window()
+    policy = registry.make_policy(policy_name, smallest, **how)
+    summarise(rollout(Swarm(smallest, [0]), policy))
 
 
 def run_of(

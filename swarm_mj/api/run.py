@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +12,10 @@ import numpy as np
 from jaxtyping import Float
 from rich.table import Table
 
-from swarm_mj.api.flight_table import flight_rows, flight_title, window_columns
+from swarm_mj.api.flight_table import flight_rows, flight_title
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import components_in
+from swarm_mj.protocol.costs import PACKETS
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.view import DEFAULTS, default_seconds, fitted
 from swarm_mj.simulation.rollout import WindowRecord
@@ -33,6 +35,14 @@ ELSEWHERE = (
     "run.show() plays a video in a notebook. Here, run.save('flight.mp4') writes the video, and "
     "run.save('flight.rrd') a replay that `swarm-mj replay flight.rrd` opens."
 )
+PLACES = {  # of a window's numbers in its record, by their columns
+    "aoi": "costs.age_windows",
+    "velocity_variance": "costs.velocity_variance_m2ps2",
+    "task_cost": "costs.task_cost.value",
+    "hops": "hops",
+    "is_complete": "costs.is_complete",
+    **{f"packets_{name}": f"costs.packets.{name}" for name in PACKETS},
+}
 ENDINGS = ".rrd|.mp4|.gif|.json|.csv"  # of files that hold a run
 
 
@@ -112,8 +122,15 @@ class Run:
 
     def columns(self) -> dict[str, Float[np.ndarray, "T"]]:
         """Return the flight window by window, column by column: all that `to_dataframe` has."""
-        worst = None if self.log is None else self.log.age_max
-        return window_columns(self.windows, self.mission.window_s, worst)
+        window = np.arange(1.0, len(self.windows) + 1.0)
+        clock = {"window": window, "seconds": np.round(window * self.mission.window_s, 9)}
+        flown = {
+            name: np.concatenate([attrgetter(place)(each) for each in self.windows]).astype(float)
+            for name, place in PLACES.items()
+            if name != "task_cost" or self.task_cost is not None
+        }
+        worst = {} if self.log is None else {"aoi_worst": self.log.age_max}
+        return {**clock, "aoi": flown.pop("aoi"), **worst, **flown}
 
     def to_dataframe(self) -> "DataFrame":
         """Return one row per window, at its end; what is not defined for the policy is nan.
@@ -165,8 +182,13 @@ class Run:
         """
         from swarm_mj.replay.footage import footage_of
 
-        flown = (self.config["policy"], self.config["seed"], components_in(self.config))
-        return footage_of(self._recorded(), self.mission, *flown)
+        return footage_of(
+            self._recorded(),
+            self.mission,
+            policy=self.config["policy"],
+            seed=self.config["seed"],
+            own=components_in(self.config),
+        )
 
     def report(self, replay: Path | None = None) -> dict[str, Any]:
         """Return config and summary, as `swarm-mj fly --json` writes them."""
@@ -196,9 +218,10 @@ class Run:
             case ".json":
                 write_json(path, self.report())
             case ".csv":
-                table = {name: map(_cell, x.tolist()) for name, x in self.columns().items()}
-                rows = zip(*table.values(), strict=True)
-                write_csv(path, list(table), (dict(zip(table, row, strict=True)) for row in rows))
+                columns = self.columns()
+                rows = np.column_stack(list(columns.values())).tolist()
+                cells = (dict(zip(columns, map(_cell, row), strict=True)) for row in rows)
+                write_csv(path, list(columns), cells)
             case ending:
                 write_bytes(path, self._film(ending))
         return path

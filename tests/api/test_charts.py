@@ -26,6 +26,8 @@ def test_a_flight_is_drawn_window_by_window():
     assert list(worst.get_ydata()) == list(run.log.age_max)
     assert list(variance.lines[0].get_xdata()) == list(range(1, 21))
     assert variance.get_yscale() == "log"
+    assert age.get_shared_x_axes().joined(age, variance)
+    assert tuple(age.figure.get_size_inches()) == pytest.approx((7.5, 1.1 + 2 * 2.1))
 
 
 def test_a_team_at_rest_has_no_velocities_and_a_notebook_shows_its_chart_once(monkeypatch):

@@ -38,14 +38,9 @@ def test_the_table_has_a_row_per_window(run):
     assert table.velocity_variance.iloc[-1] == run.summary.velocity_variance_last
     assert table.packets_sent.sum() == run.summary.packets_sent == 40
     assert table.packets_delivered.isna().all()  # broadcasts have no addressee
+    assert list(table.aoi_worst) == [matrix.max() for matrix in run.log.age]
     first = int(np.argmax(table.is_complete)) + 1
     assert first == run.summary.complete_window
-
-
-def test_the_worst_age_is_that_of_the_recorded_matrices(run, unrecorded):
-    assert list(run.to_dataframe().aoi_worst) == [matrix.max() for matrix in run.log.age]
-    assert unrecorded.log is None
-    assert "aoi_worst" not in unrecorded.to_dataframe()
 
 
 def test_a_replay_is_saved_whole(run, tmp_path):
@@ -78,6 +73,8 @@ def test_other_endings_and_what_was_not_recorded_are_refused(run, unrecorded, tm
         run.save(tmp_path / "a.mp3")
     with pytest.raises(ValueError, match="fly with record=True"):
         unrecorded.save(tmp_path / "a.rrd")
+    assert unrecorded.log is None
+    assert "aoi_worst" not in unrecorded.to_dataframe()
     assert list(tmp_path.iterdir()) == []
 
 
