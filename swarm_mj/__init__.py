@@ -48,7 +48,7 @@ as well), `cli` (the command line).
 
 from importlib import import_module
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from swarm_mj.api.evaluate import Evaluation, evaluate
@@ -103,7 +103,7 @@ _HOMES = {
 }
 
 
-def __getattr__(name: str) -> Any:  # noqa: ANN401 - any of the names
+def __getattr__(name: str) -> object:
     """Return a name of `__all__`, or the version, when it is first asked for."""
     if name == "__version__":
         return import_module("swarm_mj.system.packages").version()

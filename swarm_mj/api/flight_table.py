@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
 from swarm_mj.mission.presets import where_flown
@@ -25,7 +27,7 @@ FATES = {  # rows of the table: a count among the numbers, and its share of the 
 
 def flight_numbers(mission: Mission, policy: Policy, summary: Summary) -> dict[str, Any]:
     """Return the summary of the one mission flown, and its packets; None is what is undefined."""
-    numbers = {name: _number(name, value) for name, value in asdict(summary).items()}
+    numbers: dict[str, Any] = {name: _number(name, x) for name, x in asdict(summary).items()}
     first, last = numbers["velocity_variance_first"], numbers["velocity_variance_last"]
     packet_bytes = policy.packet(mission).num_bytes
     flown_s = numbers["num_windows"] * mission.window_s
@@ -73,7 +75,7 @@ def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> 
     return rows
 
 
-def _number(name: str, value: Any) -> Any:  # noqa: ANN401 - of a summary's field
+def _number(name: str, value: str | int | np.ndarray | None) -> str | int | float | None:
     """Return a field for the one mission: counts whole, None where it is not defined."""
     if value is None or isinstance(value, str | int):
         return value

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn
 
 from swarm_mj.cli.options import Parser, parse_options
 from swarm_mj.mission.components import one_line_each
@@ -21,8 +21,6 @@ from swarm_mj.system.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import did_you_mean
 from swarm_mj.system.interrupt import interruptible
 from swarm_mj.system.streams import lasting_streams
-
-T = TypeVar("T")
 
 NAME = "swarm-mj"
 WRONG_NAMES = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
@@ -90,7 +88,9 @@ def end_process() -> NoReturn:
     sys.exit(code)
 
 
-def script(kind: type[T], run: Callable[[T], int], arguments: Sequence[str] | None = None) -> int:
+def script(
+    kind: type[Any], run: Callable[[Any], int], arguments: Sequence[str] | None = None
+) -> int:
     """Run a separate program, such as those of `tools/`, as `main` does a command.
 
     `kind` is the dataclass of its options; the docstring of that module says what it does.

@@ -4,14 +4,11 @@ import json
 import os
 import platform
 import sys
-import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from itertools import groupby
 from pathlib import Path
-from subprocess import TimeoutExpired
 from textwrap import shorten
 from typing import Any, ClassVar, Literal, NamedTuple
 
@@ -24,16 +21,13 @@ from swarm_mj.system.exit_codes import DONE, FAILED
 from swarm_mj.system.fields import setting
 from swarm_mj.system.needs import free_memory, free_room, in_gb
 from swarm_mj.system.packages import CORE, commit, version
-from swarm_mj.system.processes import PYTHON, running
+from swarm_mj.system.processes import attempt
 from swarm_mj.system.terminal import num_cores, plain_console
 from swarm_mj.system.writing import check_writable
 
 State = Literal["ok", "absent", "broken"]  # absent: flying does without; broken: nothing flies
 MARKS = {"ok": "ok", "absent": "-", "broken": "BROKEN"}
 PACKAGE = "swarm_mj"
-LITTLE_MEMORY = 2 * 10**9  # a flight with its replay takes half a gigabyte, a training two
-LITTLE_DISK = 10**9
-LONGEST_S = 120.0  # of a trial; the first flight of an installation compiles for half a minute
 MAX_LETTERS = 400  # of what a trial complains, cut between words
 RENDERING = {  # by MuJoCo's back ends, and how to get each
     "egl": "needs a graphics driver with EGL; or use osmesa",
@@ -41,21 +35,16 @@ RENDERING = {  # by MuJoCo's back ends, and how to get each
     "glfw": "needs a display; else use egl or osmesa",
 }
 
+# Programs that end with 0 if a thing works.
 RENDER = """
 import mujoco
 with mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 32, 32) as renderer:
     renderer.render()
-print("works")
-"""
-TORCH = """
-import torch
-print(f"threads: {torch.get_num_threads()}, CUDA devices: {torch.cuda.device_count()}")
 """
 FLIGHT = """
 from swarm_mj.cli import main
-assert main("fly --task stationary --policy tdma --robots 3 --windows 5 --range-ratio 10 "
-            "--no-record".split()) == 0
-print("yes")
+raise SystemExit(main("fly --task stationary --policy tdma --robots 3 --windows 5 --range-ratio 10 "
+                      "--no-record".split()))
 """
 
 
@@ -67,18 +56,6 @@ class Finding(NamedTuple):
     state: State
     found: str
     mend: str = ""  # what to do, if it is not ok
-
-
-# Programs that end with 0 if a thing works, and last print what to say of it, by what is found if
-# they fail. One whose name is VARIABLE=VALUE runs with that.
-TRIALS = {
-    Finding("flying", "three robots fly", "broken", "", "see what `swarm-mj fly` says"): FLIGHT,
-    **{
-        Finding("rendering without a display", f"MUJOCO_GL={name}", "absent", "", mend): RENDER
-        for name, mend in RENDERING.items()
-    },
-    Finding("speed", "torch", "absent", "", "learned policies and training need it"): TORCH,
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,49 +114,32 @@ def _packages(name: str, asked: Sequence[Requirement], mend: str) -> Finding:
 
 
 def tried() -> Iterator[Finding]:
-    """Run the trials side by side.
+    """Fly, and render by each back end, to find what works."""
+    group, name, mend = "flying", "three robots fly", "see what `swarm-mj fly` says"
+    yield _of_trial(Finding(group, name, "broken", "", mend), FLIGHT)
+    for name, mend in RENDERING.items():
+        group, variable = "rendering without a display", f"MUJOCO_GL={name}"
+        # What else is set for PyOpenGL would bind all of them to one back end.
+        variables = {"MUJOCO_GL": name, "PYOPENGL_PLATFORM": name}
+        yield _of_trial(Finding(group, variable, "absent", "", mend), RENDER, variables)
 
-    Each has its own process: it may crash, and MuJoCo settles on a back end for good.
-    """
-    with ExitStack() as stack:
-        under_way = []
-        for failed, program in TRIALS.items():
-            said = stack.enter_context(tempfile.TemporaryFile("w+"))
-            variable, _, value = failed.name.partition("=")
-            environment = os.environ | ({variable: value} if value else {})
-            environment.pop("PYOPENGL_PLATFORM", None)  # it may bind all to one back end
-            process = running([*PYTHON, "-c", program], environment=environment, output=said)
-            under_way.append((failed, stack.enter_context(process), said))
-        for failed, process, said in under_way:
-            code, found = None, f"not within {LONGEST_S:g} s"
-            with suppress(TimeoutExpired):
-                code = process.wait(LONGEST_S)
-                said.seek(0)
-                last = (said.read().strip().splitlines() or ["it said nothing"])[-1]
-                found = shorten(last, MAX_LETTERS, placeholder=" ...")
-            works = {"state": "ok", "mend": ""} if code == 0 else {}
-            yield failed._replace(found=found, **works)
+
+def _of_trial(failed: Finding, program: str, variables: Mapping[str, str] | None = None) -> Finding:
+    """Return what a program shows by its end: that a thing works, or as it is found if not."""
+    works, said = attempt(program, variables)
+    if works:
+        return failed._replace(state="ok", found="works", mend="")
+    return failed._replace(found=shorten(said, MAX_LETTERS, placeholder=" ..."))
 
 
 def machine() -> Iterator[Finding]:
-    """Find cores, memory, disk, a place for compiled code and a display."""
+    """Find cores, memory, disk, and a place for compiled code."""
     threads = os.environ.get("OMP_NUM_THREADS")
     set_to = f", OMP_NUM_THREADS={threads}" if threads else ""
-    yield Finding("speed", "cores", "ok", f"{num_cores()} may be used{set_to}")
+    yield Finding("machine", "cores", "ok", f"{num_cores()} may be used{set_to}")
+    yield Finding("machine", "memory free", "ok", in_gb(free_memory()))
+    yield Finding("machine", "disk free here", "ok", in_gb(free_room(Path.cwd())))
     yield _compiled_code()
-    for name, free, little, mend in (
-        ("memory free", free_memory(), LITTLE_MEMORY, "end other programs"),
-        ("disk free here", free_room(Path.cwd()), LITTLE_DISK, "name another folder"),
-    ):
-        less = "" if free >= little else f", less than {in_gb(little)}"
-        yield Finding("room", name, "absent" if less else "ok", f"{in_gb(free)}{less}", mend)
-    names = [name for name in ("DISPLAY", "WAYLAND_DISPLAY") if os.environ.get(name)]
-    found = ", ".join(f"{name}={os.environ[name]}" for name in names)
-    if found or not sys.platform.startswith("linux"):
-        yield Finding("rerun's viewer", "display", "ok", found or sys.platform)
-    else:
-        mend = "`swarm-mj replay --web FILE` needs none"
-        yield Finding("rerun's viewer", "display", "absent", "none", mend)
 
 
 def _compiled_code() -> Finding:
@@ -189,11 +149,11 @@ def _compiled_code() -> Finding:
     try:
         if folder is not None:
             check_writable(Path(folder) / "kernels")
-            return Finding("speed", "compiled code", "ok", f"kept in {folder}")
+            return Finding("machine", "compiled code", "ok", f"kept in {folder}")
     except OSError as error:
         problem = f"{folder} cannot be written ({error})"
     mend = "set NUMBA_CACHE_DIR to a folder that you can write"
-    return Finding("speed", "compiled code", "absent", problem, mend)
+    return Finding("machine", "compiled code", "absent", problem, mend)
 
 
 def _print(found: list[Finding], *, works: bool) -> None:

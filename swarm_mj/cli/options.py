@@ -12,7 +12,7 @@ from dataclasses import MISSING, Field, field, fields
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NoReturn, TypeVar, get_origin
+from typing import Any, NoReturn, get_origin
 
 from swarm_mj.system.exit_codes import BAD_INPUT
 from swarm_mj.system.fields import (
@@ -25,8 +25,6 @@ from swarm_mj.system.fields import (
     range_of,
     setting,
 )
-
-T = TypeVar("T")
 
 MANY = 10**9  # from here on, the end of a range is only there to catch slips
 METAVARS: dict[Any, str] = {int: "N", float: "X", str: "NAME", Path: "FILE"}
@@ -84,7 +82,7 @@ def nested_option(spec: Field[Any], place: str, **about: Any) -> Field[Any]:
     return option
 
 
-def parse_options(kind: type[T], arguments: Sequence[str], prog: str, summary: str) -> T:
+def parse_options(kind: type[Any], arguments: Sequence[str], prog: str, summary: str) -> object:
     """Return the command line as an instance of its dataclass, `kind`.
 
     Its `EPILOG`, if it has one, ends the help; a field `typed` takes the arguments themselves.
@@ -97,7 +95,7 @@ def parse_options(kind: type[T], arguments: Sequence[str], prog: str, summary: s
     parsed = vars(_parser_of(kind, prog, summary).known(arguments))
     given: dict[str, Any] = {"typed": tuple(arguments)}
     given |= {name: tuple(x) if isinstance(x, list) else x for name, x in parsed.items()}
-    specs = fields(kind)  # pyright: ignore[reportArgumentType]
+    specs = fields(kind)
     values = {spec.name: given[spec.name] for spec in specs if spec.name in given}
     built = (spec for spec in specs if "build" in spec.metadata)
     options = kind(**values, **{spec.name: spec.metadata["build"](given) for spec in built})

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from datetime import timedelta
 
 from rich.console import Console
 
@@ -24,7 +23,7 @@ class Watch(WorkBar):
         self, console: Console, run: TrainingRun, is_interrupted: Callable[[], bool]
     ) -> None:
         """Prepare the bar; `is_interrupted` says whether Ctrl-C was pressed."""
-        super().__init__("Training", 1.0, console=console, shows_time_left=False)
+        super().__init__("Training", 1.0, console=console)
         self._console, self._run, self._is_interrupted = console, run, is_interrupted
         self.start: Progress | None = None  # of this session, once there was anything to do
         self._num_rows = 0
@@ -39,7 +38,7 @@ class Watch(WorkBar):
             self._num_rows = len(progress.curve)
             self._console.print(_row(self._run, progress))
         self.what = status.what
-        self.text = _text(status, self.start, limits)
+        self.text = _text(status, self.start)
         self.move_to(share_done(progress, limits))
         if self._is_interrupted() and not self.has_stopped:
             self.has_stopped = True
@@ -57,15 +56,6 @@ def share_done(progress: Progress, limits: Limits) -> float:
     """Return the share of a run that is done, by the limit that it is nearest to."""
     pairs = ((progress.decisions, limits.decisions), (progress.minutes, limits.minutes))
     return min(1.0, max((done / limit for done, limit in pairs if limit), default=0.0))
-
-
-def minutes_left(progress: Progress, start: Progress, limits: Limits) -> float | None:
-    """Return the minutes until the first limit, at the speed since `start`; None if unknown."""
-    left = [limits.minutes - progress.minutes] if limits.minutes else []
-    made, minutes = progress.decisions - start.decisions, progress.minutes - start.minutes
-    if limits.decisions and made:
-        left.append(minutes / made * (limits.decisions - progress.decisions))
-    return max(0.0, min(left)) if left else None
 
 
 def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
@@ -138,7 +128,7 @@ def _row(run: TrainingRun, progress: Progress) -> str:
     return f"{when}   held-out age {age}{note:13}{others}"
 
 
-def _text(status: Status, start: Progress, limits: Limits) -> str:
+def _text(status: Status, start: Progress) -> str:
     progress = status.progress
     parts = [f"{progress.decisions:,} decisions"]
     if status.evaluated is not None:
@@ -150,8 +140,6 @@ def _text(status: Status, start: Progress, limits: Limits) -> str:
     made, minutes = progress.decisions - start.decisions, progress.minutes - start.minutes
     if made and minutes:
         parts.append(f"{made / minutes / 60.0:.0f}/s")
-    if (left := minutes_left(progress, start, limits)) is not None:
-        parts.append(f"{timedelta(seconds=round(60.0 * left))} left")
     return ", ".join(parts)
 
 

@@ -17,11 +17,12 @@ from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.envs.options import make_batch, make_team_batch, robot_spaces, team_spaces
 from swarm_mj.envs.vec_env import AGENTS, SwarmVecEnv
 from swarm_mj.mission import Mission
-from swarm_mj.policies.policy_config import MlpConfig, MlpShape
+from swarm_mj.policies.policy_config import Activation, MlpConfig, MlpShape
 from swarm_mj.policies.stored import save_weights
 from swarm_mj.system.packages import commit, version
 
-ACTIVATIONS = {"tanh": nn.Tanh, "relu": nn.ReLU}  # of networks that can be stored as policies
+# Of networks that can be stored as policies.
+ACTIVATIONS: dict[Activation, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
 
 
 def make_vec_env(
@@ -148,10 +149,10 @@ def _actor(model: BaseAlgorithm) -> list[nn.Module]:
     return [*policy.mlp_extractor.policy_net, policy.action_net]
 
 
-def _activation_of(layers: list[nn.Module]) -> Any:  # noqa: ANN401 - one of the names
+def _activation_of(layers: list[nn.Module]) -> Activation:
     """Return the activation between layers; raises ValueError if none is known of them all."""
     between = {type(each) for each in layers} - {nn.Linear}
-    names = {kind: name for name, kind in ACTIVATIONS.items()}
+    names: dict[type[nn.Module], Activation] = {each: name for name, each in ACTIVATIONS.items()}
     if len(between) > 1 or not between <= set(names):
         raise ValueError(
             f"a policy's activation must be one of {', '.join(ACTIVATIONS)}, not "

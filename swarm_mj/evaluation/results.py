@@ -154,15 +154,16 @@ def _result(place: str, row: dict[str, str]) -> Result:
     present = {FORMER_NAMES.get(name, name): cell for name, cell in row.items()}
     given = (spec for spec in fields(Result) if spec.name in present)
     try:
-        return Result(**{spec.name: _value(spec, present[spec.name]) for spec in given})
+        values: dict[str, Any] = {spec.name: _value(spec, present[spec.name]) for spec in given}
+        return Result(**values)
     except ValueError as error:
         raise ValueError(f"{place}: {error}") from error
 
 
-def _value(spec: Field[Any], text: str) -> Any:  # noqa: ANN401 - any field's value
+def _value(spec: Field[Any], text: str) -> str | float | int | None:
     if text == "" and NoneType in get_args(spec.type):
         return None
-    kind = kind_of(spec)
+    kind: Any = kind_of(spec)
     is_signed = "difference" in spec.name
     low = 1.0 if kind is str else -MAX_NUMBER if is_signed else MIN_COST
     high = {str: MAX_CHARACTERS, int: MAX_COUNT, float: MAX_NUMBER}[kind]

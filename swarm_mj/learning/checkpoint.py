@@ -109,8 +109,9 @@ def load(path: Path, training: Training, model: PPO) -> tuple[Progress, Networks
     Raises ValueError if the file is damaged, foreign, of another version or of other settings,
     OSError if it cannot be read.
     """
-    state = read_torch(path, _max_bytes(model))
-    version = state.get("version") if isinstance(state, dict) else None
+    saved = read_torch(path, _max_bytes(model))
+    state = saved if isinstance(saved, dict) else {}
+    version = state.get("version")
     if version != CHECKPOINT_VERSION:
         raise ValueError(
             f"{path} is no checkpoint of swarm-mj train, or has version {version!r:.40}, and this "
@@ -192,7 +193,7 @@ def _check(state: Mapping[str, Any], counters: _Counters, model: PPO, networks: 
         raise ValueError("its optimiser's step count is negative")
 
 
-def _check_like(given: Any, like: Mapping[Any, Any] | Tensor, name: str) -> None:  # noqa: ANN401
+def _check_like(given: object, like: Mapping[Any, Any] | Tensor, name: str) -> None:
     """Raise ValueError unless all is plain, finite tensors of the same names, shapes and kinds."""
     if isinstance(like, Mapping):
         if not isinstance(given, Mapping) or given.keys() != like.keys():
@@ -200,8 +201,11 @@ def _check_like(given: Any, like: Mapping[Any, Any] | Tensor, name: str) -> None
         for key, each in like.items():
             _check_like(given[key], each, str(key))
         return
-    is_plain = type(given) is Tensor and given.layout == torch.strided
-    if not is_plain or (given.shape, given.dtype) != (like.shape, like.dtype):
+    if (
+        type(given) is not Tensor  # a class of its own might run code
+        or given.layout != torch.strided
+        or (given.shape, given.dtype) != (like.shape, like.dtype)
+    ):
         raise ValueError(f"{name} must be {list(like.shape)} of {like.dtype}")
     if not torch.isfinite(given).all():
         raise ValueError(f"{name} has numbers that are not finite")
@@ -215,7 +219,7 @@ def _max_bytes(model: PPO) -> int:
     return 2 * (weights + np.dtype(np.int16).itemsize * decisions) + SPARE_BYTES
 
 
-def read_torch(path: Path, max_bytes: int) -> Any:  # noqa: ANN401 - whatever was saved
+def read_torch(path: Path, max_bytes: int) -> object:
     """Return what a file of torch holds, without running code from it.
 
     Raises ValueError if it is missing, too large, damaged or foreign, or a link out of its folder,

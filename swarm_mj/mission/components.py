@@ -106,7 +106,7 @@ def is_ours(component: object) -> bool:
     return home.partition(".")[0] == PACKAGE
 
 
-def load(kind: str, name: str) -> Any:  # noqa: ANN401 - whatever has that name
+def load(kind: str, name: str) -> object:
     """Return what a user's `module:Name` names; the current folder is searched first.
 
     `kind` says for messages what it is to be, such as "channel". Raises ValueError if the name has
@@ -129,7 +129,7 @@ def load(kind: str, name: str) -> Any:  # noqa: ANN401 - whatever has that name
     return found
 
 
-def make(kind: str, name: str, mission: Mission) -> Any:  # noqa: ANN401 - any kind of component
+def make(kind: str, name: str, mission: Mission) -> object:
     """Return a user's own component for a mission.
 
     What `name` names is called with the mission, or with nothing if it needs no argument. A

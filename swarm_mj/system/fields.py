@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from functools import partial
 from numbers import Integral, Real
 from types import NoneType
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, ClassVar, Literal, Protocol, get_args, get_origin, runtime_checkable
 
 # What an annotation admits, NumPy's numbers included, and how a message calls it.
 KINDS: dict[Any, tuple[type, str]] = {
@@ -30,6 +30,13 @@ FORMER_NAMES = {
     "arm": "credit_assignment",
 }
 FieldOf = Any  # what a field's maker returns: type checkers take it for the attribute's value
+
+
+@runtime_checkable
+class Settings(Protocol):
+    """Any dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
 
 
 def setting(default: object = MISSING, help: str = "", **metadata: Any) -> FieldOf:
@@ -51,7 +58,7 @@ def same_as(owner: type[Any], name: str) -> FieldOf:
     return field(default=spec.default, metadata=spec.metadata)
 
 
-def check(settings: Any) -> None:  # noqa: ANN401 - any dataclass
+def check(settings: Settings) -> None:
     """Raise ValueError unless every field's value is of its kind and in its range or choices.
 
     The message names the field, what is allowed, and the value.
@@ -64,7 +71,7 @@ def check(settings: Any) -> None:  # noqa: ANN401 - any dataclass
             check_value(spec, each)
 
 
-def kind_of(spec: Field[Any]) -> Any:  # noqa: ANN401 - a type
+def kind_of(spec: Field[Any]) -> object:
     """Return the type of a single value: `int` of `int`, `int | None` and `tuple[int, ...]`."""
     if get_origin(spec.type) is Literal:
         return str
@@ -117,7 +124,7 @@ def check_kind(
         raise TypeError(f"{rule}, not {_shown(value)}")
 
 
-def name_of(part: Any) -> str:  # noqa: ANN401 - any function or object
+def name_of(part: object) -> str:
     """Return the name of a function or a class, or of an object's class, for messages."""
     while isinstance(part, partial):
         part = part.func
@@ -146,7 +153,7 @@ def _shown(value: object) -> str:
     return f"{value!r:.80}"
 
 
-def check_value(spec: Field[Any], value: Any, called: str = "") -> None:  # noqa: ANN401 - any field's value
+def check_value(spec: Field[Any], value: object, called: str = "") -> None:
     """Check one value of a field, which may be `called` otherwise where it was given."""
     allowed = spec.metadata
     label = called or allowed.get("label", spec.name)
@@ -157,17 +164,20 @@ def check_value(spec: Field[Any], value: Any, called: str = "") -> None:  # noqa
     is_allowed = isinstance(value, kind) and (is_number or kind in (bool, object))
     limits = ""
     if "low" in allowed:
-        is_allowed = is_allowed and allowed["low"] <= value <= allowed["high"]
+        is_within = isinstance(value, Real) and allowed["low"] <= value <= allowed["high"]
+        is_allowed = is_allowed and is_within
         limits = f" from {range_of(spec)}"
     if not is_allowed:
         shown = repr(value) if isinstance(value, str) else value
         raise ValueError(f"{label} must be {described}{limits}, not {shown}")
 
 
-def _check_choice(label: str, value: Any, choices: Sequence[str], *, is_joined: bool) -> None:  # noqa: ANN401 - any field's value
+def _check_choice(label: str, value: object, choices: Sequence[str], *, is_joined: bool) -> None:
     """Pass if a value is one of the choices, or several of them joined by commas."""
-    several = is_joined and isinstance(value, str)
-    for each in map(str.strip, value.split(",")) if several else [value]:
+    typed = [value]
+    if is_joined and isinstance(value, str):
+        typed = [each.strip() for each in value.split(",")]
+    for each in typed:
         if each not in choices:
             joined = ", or several joined by commas" if is_joined else ""
             rule = f"{label} must be one of {', '.join(choices)}{joined}"

@@ -4,12 +4,14 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import IO, Any
 
 # A Python that runs nothing out of the folder one stands in, where a numpy.py may lie.
 PYTHON = (sys.executable, "-P")
+LONGEST_S = 120.0  # of a trial; the first flight of an installation compiles for half a minute
 # Reads until its pipe is closed: the kernel does so when the one who writes has ended.
 GUARD = """
 import os, signal, sys
@@ -73,3 +75,23 @@ def running(
         finally:
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
+
+
+def attempt(program: str, variables: Mapping[str, str] | None = None) -> tuple[bool, str]:
+    """Run a Python program; return whether it ends well, and the last line that it said.
+
+    It has a process of its own, with these environment variables: it may crash or hang, and what
+    it loads may settle on a back end for good.
+    """
+    command, environment = [*PYTHON, "-c", program], os.environ | (variables or {})
+    with (
+        tempfile.TemporaryFile("w+") as said,
+        running(command, environment=environment, output=said) as process,
+    ):
+        try:
+            works = process.wait(LONGEST_S) == 0
+        except subprocess.TimeoutExpired:
+            return False, f"not within {LONGEST_S:g} s"
+        said.seek(0)
+        lines = said.read().strip().splitlines()
+    return works, lines[-1] if lines else "it said nothing"

@@ -131,7 +131,7 @@ def _made(kind: type[Any], value: object) -> object:
     return kind(value)
 
 
-def _with_all_keys(value: Any, kind: object, at: str = "$") -> Any:  # noqa: ANN401 - any plain value
+def _with_all_keys(value: object, kind: object, at: str = "$") -> object:
     """Return a dataclass's plain values by the present names of its fields, nested ones included.
 
     msgspec itself would fill in what lacks and drop what is unknown: a damaged or newer file would

@@ -6,7 +6,9 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, TypeVar
+
+Stream = TypeVar("Stream")
 
 GONE = (errno.EPIPE, errno.EIO)  # a pipe's reader has closed it; the terminal is closed
 
@@ -23,7 +25,7 @@ def lasting_streams() -> Iterator[Callable[[], OSError | None]]:
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115 - for good
+            setattr(sys, name, io.TextIOWrapper(io.FileIO(os.devnull, mode), encoding="utf-8"))
     before = sys.stdout, sys.stderr
     failures: list[OSError] = []
     lasting = [_lasting(stream, failures) for stream in before]
@@ -41,7 +43,7 @@ def lasting_streams() -> Iterator[Callable[[], OSError | None]]:
         failure()
 
 
-def _lasting(stream: Any, failures: list[OSError]) -> Any:  # noqa: ANN401 - of any kind
+def _lasting(stream: Stream, failures: list[OSError]) -> Stream | io.TextIOWrapper:
     """Return a stream to the same file, or the stream itself if it leads elsewhere, too."""
     if not isinstance(stream, io.TextIOWrapper):  # a notebook's has its server's file number
         return stream

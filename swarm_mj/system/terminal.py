@@ -13,6 +13,7 @@ from rich.table import Table
 
 BAR_WIDTH = 20
 AFTER_S = 2.0  # shorter work from Python shows no bar
+SPEED_OVER_S = 600.0  # several rollouts of a training, and evaluations between them
 
 
 def plain_console(*, is_error: bool = False) -> Console:
@@ -79,13 +80,12 @@ class WorkBar:
         *,
         completed: float | int = 0,
         console: Console | None = None,
-        shows_time_left: bool = True,
         after_s: float = 0.0,
     ) -> None:
         """Prepare the bar, on standard error unless there is another console.
 
-        Without a unit, it shows no numbers; the time left is by the speed so far. Work that is done
-        in less than `after_s` shows no bar [s].
+        Without a unit, it shows no numbers; the time left is by the speed of late. Work that is
+        done in less than `after_s` shows no bar [s].
         """
         self.what, self.text = what, ""
         console = console or Console(stderr=True, highlight=False)
@@ -95,8 +95,9 @@ class WorkBar:
             BarColumn(BAR_WIDTH),
             *([TextColumn(count, markup=False)] if unit else []),
             TextColumn("{task.fields[bar].text}", markup=False),
-            *([TimeRemainingColumn()] if shows_time_left else []),
+            TimeRemainingColumn(),
             console=console,
+            speed_estimate_period=SPEED_OVER_S,
             transient=True,
             disable=not console.is_terminal,
         )

@@ -10,7 +10,6 @@ from rich.console import Console
 from swarm_mj.cli.train_report import (
     Watch,
     has_stopped_early,
-    minutes_left,
     report,
     share_done,
     verdicts,
@@ -145,22 +144,22 @@ def test_the_share_done_is_by_the_nearest_limit():
         assert share_done(at(1_000, 2.0), limits) == pytest.approx(share)
 
 
-def test_the_time_left_is_by_this_sessions_speed():
-    """A session that began at 1000 decisions makes 500 a minute, whatever those before made."""
-    start, now = at(1_000, 60.0), at(2_000, 62.0)
-    assert minutes_left(now, start, Limits(decisions=3_500)) == pytest.approx(3.0)
-    assert minutes_left(now, start, Limits(minutes=64.0)) == pytest.approx(2.0)
-    assert minutes_left(now, start, Limits(decisions=3_500, minutes=64.0)) == pytest.approx(2.0)
-    assert minutes_left(start, start, Limits(decisions=3_500)) is None
-    assert minutes_left(now, start, Limits(decisions=1_500)) == 0.0
-
-
 def heard_by(is_interrupted, statuses, terminal=False):
-    """What is drawn for these, and whether each asked to go on."""
-    file = io.StringIO()
-    console = Console(file=file, force_terminal=terminal, width=120, soft_wrap=True)
+    """What is drawn for these, each at its minute, and whether each asked to go on."""
+    file, now_s = io.StringIO(), [0.0]
+    console = Console(
+        file=file,
+        force_terminal=terminal,
+        color_system=None,
+        width=120,
+        soft_wrap=True,
+        get_time=lambda: now_s[0],
+    )
+    answers = []
     with Watch(console, SHORT, is_interrupted) as watch:
-        answers = [watch(each) for each in statuses]
+        for each in statuses:
+            now_s[0] = 60.0 * each.progress.minutes
+            answers.append(watch(each))
     return file.getvalue(), answers, watch
 
 
@@ -188,7 +187,7 @@ def test_the_bar_says_where_the_run_stands_and_what_is_evaluated():
     ]
     shown, _, _ = heard_by(lambda: False, statuses[:2], terminal=True)
     assert "Training" in shown
-    assert "2,000 decisions, age 28.0, held out 31.5, 17/s, 0:02:00 left" in shown
+    assert "2,000 decisions, age 28.0, held out 31.5, 17/s 0:02:00" in shown
     shown, _, _ = heard_by(lambda: False, statuses, terminal=True)
     assert "Choosing" in shown
     assert "missions 40%" in shown

@@ -6,7 +6,8 @@ import time
 
 import pytest
 
-from swarm_mj.system.processes import guard, running
+from swarm_mj.system import processes
+from swarm_mj.system.processes import attempt, guard, running
 
 # Starts a child of its own, says that it has, and waits for it.
 FAMILY = """
@@ -48,3 +49,26 @@ def test_what_is_guarded_outlasts_the_block():
                 process.wait(timeout=0.2)
         finally:
             process.kill()
+
+
+@pytest.mark.parametrize(
+    ("program", "outcome"),
+    [
+        ("print('hello'); print('fine')", (True, "fine")),
+        ("raise SystemExit('no driver')", (False, "no driver")),
+        ("import os; os.abort()", (False, "it said nothing")),
+        ("import time; time.sleep(60)", (False, "not within 0.3 s")),
+        ("import os; print(os.environ['SAID'])", (True, "by its variables")),
+    ],
+)
+def test_what_came_of_an_attempt(monkeypatch, program, outcome):
+    if "sleep" in program:
+        monkeypatch.setattr(processes, "LONGEST_S", 0.3)
+    assert attempt(program, {"SAID": "by its variables"}) == outcome
+
+
+def test_an_attempt_runs_nothing_of_the_folder_here(trapped):
+    works, said = attempt("import numpy; print(numpy.pi)")
+    assert works
+    assert said.startswith("3.14")
+    assert not trapped.exists()

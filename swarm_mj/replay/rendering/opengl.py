@@ -9,10 +9,9 @@ that are started later draw by the same.
 import importlib
 import os
 import sys
-import tempfile
 from typing import Any
 
-from swarm_mj.system.processes import PYTHON, running
+from swarm_mj.system.processes import attempt
 
 CHOICE = "MUJOCO_GL"  # the variable by which people choose, and MuJoCo's renderer is told
 PYOPENGL = "PYOPENGL_PLATFORM"  # PyOpenGL's own, which MuJoCo and dm_control set
@@ -94,10 +93,5 @@ def _first_that_works() -> str:
 
 
 def _works(name: str) -> bool:
-    command = [*PYTHON, "-c", TRIAL.format(name)]
-    environment = {**os.environ, CHOICE: name, PYOPENGL: name}
-    with (
-        tempfile.TemporaryFile("w+") as said,
-        running(command, environment=environment, output=said) as child,
-    ):
-        return child.wait() == 0
+    works, _ = attempt(TRIAL.format(name), {CHOICE: name, PYOPENGL: name})
+    return works
