@@ -60,7 +60,8 @@ def draw_flight(
 def draw_evaluation(results: Sequence[Result]) -> Figure:
     """Return a chart of policies, the lowest age first; of flocks, with velocity variances."""
     shown = sorted(results, key=lambda result: result.aoi_mean)
-    first, costs = shown[0], list(LABELS)[: 2 if shown[0].task == "flocking" else 1]
+    first = shown[0]
+    costs = ["aoi", "velocity_variance"] if first.task == "flocking" else ["aoi"]
     about = f"{first.task}, {first.num_robots} robots, {first.episodes} missions from seed "
     title = f"{about}{first.seed}{components_in(vars(first)).title}"
     with styled():
@@ -99,15 +100,8 @@ def _axes(
     title: str, *, rows: int = 1, columns: int = 1, height_in: float
 ) -> tuple[Figure, list[Axes]]:
     """Return a titled figure of panels, those of a column over one x, those of a row over one y."""
-    figure, axes = plt.subplots(
-        rows,
-        columns,
-        sharex="col",
-        sharey="row",
-        squeeze=False,
-        layout="constrained",
-        figsize=(WIDTH_IN, height_in),
-    )
+    figure = plt.figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+    axes = figure.subplots(rows, columns, sharex="col", sharey="row", squeeze=False)
     figure.suptitle(escape_mathtext(title), x=0.01, ha="left", fontsize=TITLE_PT)
     return figure, list(axes.flat)
 

@@ -103,8 +103,7 @@ def fly(
     swarm.start(chosen)
     recorder = Recorder(swarm, ego=observer) if record else None
     with quiet_console().status("Compiling, once for all flights ..."):
-        like = "tdma" if isinstance(policy, Policy) else name  # an object flies only once
-        compile_ahead(mission, like, **how)
+        compile_ahead(mission, name, **how)
     bar = quiet_bar("Flying", mission.num_windows, "windows")
     flown = fly_swarm(swarm, recorder, bar, way_on="")
     if flown.code != DONE:
@@ -192,7 +191,8 @@ def compile_ahead(mission: Mission, policy_name: str, **how: Any) -> None:
     is_bound = registry.is_stored(policy_name) or mission.arena not in ARENAS
     robots = mission.num_robots if is_bound else 3
     smallest = replace(mission, num_robots=robots, range_ratio=10.0, num_windows=COMPILING_WINDOWS)
-    if registry.is_own_policy(policy_name):  # which may be made for one mission only
+    # A user's own policy may be made for one mission only, or be an object, which flies only once.
+    if not (policy_name in registry.POLICIES or registry.is_stored(policy_name)):
         policy_name, how = "tdma", {}
     policy = registry.make_policy(policy_name, smallest, **how)
     summarise(rollout(Swarm(smallest, [0]), policy))

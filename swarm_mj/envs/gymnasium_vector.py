@@ -162,19 +162,14 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
             if seed is not None:
                 self._rngs[env], _ = seeding.np_random(seed)
             begun.append(seed_or_next(seed, self._rngs[env]))
-        batch = self._spare_batch(envs)
-        batch.restart(begun)
+        batch = cast("MissionBatch", self._batches[envs[0]])
+        flies = np.flatnonzero(self._batches == batch)
+        if batch.num_missions != envs.size or not np.array_equal(flies, envs):
+            batch = make_team_batch(self._mission, envs.size, **self._options)
+        batch.restart(begun)  # in the swarm that flew exactly these, if there is one
         self._batches[envs], self._rows[envs] = batch, np.arange(envs.size)
         self._is_over[envs] = False
         self._note(infos, batch)
-
-    def _spare_batch(self, envs: Int[np.ndarray, "E"]) -> MissionBatch:
-        """Return a batch of the right size that no other environment needs; reuse saves a swarm."""
-        needed = set(np.delete(self._batches, envs))
-        for batch in self._batches[envs]:
-            if batch.num_missions == envs.size and batch not in needed:
-                return batch
-        return make_team_batch(self._mission, envs.size, **self._options)
 
     def _note(self, infos: Info, batch: MissionBatch) -> None:
         """Keep what a batch shows, and write its infos next to masks of whose they are."""

@@ -108,7 +108,7 @@ def test_compiling_is_not_timed(monkeypatch):
     monkeypatch.setattr(flight, "compile_ahead", compile_slowly)
     for policy in ("mst", Silent()):
         assert swarm_mj.fly(policy=policy, record=False, **SHORT).summary.wall_seconds == 0.0
-    assert flown == [("flocking", "mst", None), ("flocking", "tdma", None)]
+    assert flown == [("flocking", "mst", None), ("flocking", "Silent", None)]
 
 
 @pytest.mark.parametrize(
@@ -141,8 +141,9 @@ def test_memory_is_looked_at_before_the_work(monkeypatch):
 def test_a_small_mission_is_flown_ahead_also_for_a_policy_of_one_s_own(monkeypatch):
     flown = []
     monkeypatch.setattr(flight, "summarise", lambda windows: flown.append(len(list(windows))))
-    flight.compile_ahead(paper("stationary", num_windows=4), "nowhere:Mine", probability=0.2)
-    assert flown == [flight.COMPILING_WINDOWS]
+    for own in ("nowhere:Mine", "Silent"):
+        flight.compile_ahead(paper("stationary", num_windows=4), own, probability=0.2)
+    assert flown == [flight.COMPILING_WINDOWS] * 2
 
 
 def test_missions_take_at_least_their_buffers():

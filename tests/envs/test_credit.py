@@ -9,11 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm_mj.envs.credit import credits_of, gain, snapshot_channel
+from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.mission import PRESETS, paper, reference
+from swarm_mj.mission.components import Components
 from swarm_mj.protocol.window import window
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.simulation.swarm import Swarm
 
 
 def random_recipients(rng, shape, share):
@@ -45,22 +46,21 @@ def credits_by_replay(swarm, channel, buffers, recipient, now):
     return credit
 
 
-def assert_credits_are_those_of_a_replay(swarm, rng, num_windows, share):
+def assert_rewards_are_those_of_a_replay(mission, seeds, num_windows, share, channel=None):
     """In each window of random talk; returns all credits."""
-    credited, silence = [], np.arange(swarm.mission.num_robots)
+    own = Components(channel=channel)
+    batch = MissionBatch(mission, len(seeds), features="paper", reward="credit", components=own)
+    batch.restart(seeds)
+    credited, rng = [], np.random.default_rng(seeds[0])
     for _ in range(num_windows):
-        buffers, now = copy.deepcopy(swarm.buffers), swarm.now
-        channel = snapshot_channel(swarm.channel)
-        recipient = random_recipients(rng, swarm.states.position_m.shape[:2], share)
-        swarm.step_with_recipients(recipient)
-        states = swarm.states
-        given_ = (buffers.timestamp, states.position_m, recipient, channel, now)
-        found = credits_of(*given_, states.is_active)
-        expected = credits_by_replay(swarm, channel, buffers, recipient, now)
+        swarm, now = batch.flown, batch.flown.now
+        buffers, before = copy.deepcopy(swarm.buffers), snapshot_channel(swarm.channel)
+        recipient = random_recipients(rng, batch.shape, share)
+        found = batch.step(recipient) * mission.num_robots**2
+        expected = credits_by_replay(swarm, before, buffers, recipient, now)
         np.testing.assert_allclose(found, expected, atol=1e-9)
-        assert np.all(found[recipient == silence] == 0.0)
-        if states.is_active is not None:
-            assert np.all(found[~states.is_active] == 0.0)
+        assert np.all(found[recipient == np.arange(mission.num_robots)] == 0.0)
+        assert np.all(found[~batch.is_active] == 0.0)
         credited.append(found)
     return np.array(credited)
 
@@ -78,8 +78,8 @@ def test_credits_are_those_of_a_replay_without_each_robot(
     seed, preset, task, share, num_robots, num_windows
 ):
     """In any state that random talk leads to, under both presets' radios."""
-    swarm = Swarm(preset(task, num_robots=num_robots, range_ratio=0.5), [seed, seed + 1])
-    assert_credits_are_those_of_a_replay(swarm, np.random.default_rng(seed), num_windows, share)
+    mission = preset(task, num_robots=num_robots, range_ratio=0.5)
+    assert_rewards_are_those_of_a_replay(mission, [seed, seed + 1], num_windows, share)
 
 
 class Lossy:
@@ -109,8 +109,7 @@ FAILING = paper("stationary", num_robots=8, range_ratio=0.5, num_windows=16, fai
     ids=["fades and losses", "a channel that draws", "robots that fail"],
 )
 def test_a_window_replayed_for_credit_meets_the_same_world(mission, channel):
-    swarm = Swarm(mission, [1, 2, 3], channel=channel)
-    credit = assert_credits_are_those_of_a_replay(swarm, np.random.default_rng(4), 16, 0.35)
+    credit = assert_rewards_are_those_of_a_replay(mission, [4, 2, 3], 16, 0.35, channel)
     assert np.count_nonzero(credit) > 10
     assert np.any(credit < 0.0)  # some packet destroyed another
 

@@ -50,25 +50,6 @@ def test_task_cost_is_what_the_controller_says(controller):
     assert "task_cost" not in begun("stationary").infos()
 
 
-def test_credit_is_the_age_that_a_window_without_the_robot_would_have_left():
-    """Every robot's window is flown again by a team in which it alone is silent."""
-    batch = begun("random-walk", reward="credit", seeds=(3,))
-    past = []
-    for recipient in recipients(6, 1):
-        reward = batch.step(recipient)
-        ages = batch.infos()["age_windows"][0]
-        for i in range(5):
-            twin = Swarm(batch.mission, [3])
-            for each in past:
-                twin.step_with_recipients(each)
-            silent = recipient.copy()
-            silent[0, i] = i
-            assert reward[0, i] == pytest.approx(
-                twin.step_with_recipients(silent).age_windows[0] - ages
-            )
-        past.append(recipient)
-
-
 def test_what_is_seen_is_what_the_networks_see():
     sparse = {"num_robots": 8, "num_windows": 60, "range_ratio": 0.15}
     batch = begun("stationary", with_parents=True, seeds=(1, 2, 3), **sparse)
