@@ -1,4 +1,4 @@
-"""Draws the diagrams of `docs/concepts.md`.
+"""The diagrams of `docs/concepts.md`.
 
     python tools/diagrams.py --out docs/pictures
 
@@ -66,7 +66,7 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """Draws all diagrams; returns the exit code."""
+    """Draw all diagrams; return the exit code."""
     for name, draw in DIAGRAMS.items():
         path = options.out / f"{name}.svg"
         with plt.rc_context(STYLE):
@@ -147,7 +147,7 @@ def draw_loop() -> Figure:
 
 
 def draw_window() -> Figure:
-    """Return the two protocols, slot by slot."""
+    """Draw the two protocols, slot by slot."""
     figure, axes = _canvas(8.0, 3.5)
     for left, title in ((0.2, "Request and response"), (4.2, "Two broadcasts")):
         axes.text(left + 0.55, 3.25, title, weight="bold", va="center")
@@ -187,7 +187,7 @@ def _packet(axes: Axes, x: float, y: float, colour: str, text: str) -> None:
 
 
 def draw_sinr() -> Figure:
-    """Where a packet decodes: alone, and beside a second transmission."""
+    """Draw where a packet decodes: alone, and beside a second transmission."""
     mission = paper("stationary", num_robots=2)
     senders = np.array([[-150.0, 0.0], [150.0, 0.0]])
     east, north = np.linspace(-450.0, 450.0, 241), np.linspace(-270.0, 270.0, 145)
@@ -214,7 +214,7 @@ def draw_sinr() -> Figure:
 
 
 def draw_age() -> Figure:
-    """How r0's news of a neighbour and of a distant teammate ages, in a real flight."""
+    """Draw how r0's news of a neighbour and of a distant teammate ages, in a real flight."""
     age, hops = _ages()
     figure, axes = plt.subplots(figsize=(8.0, 3.0))
     windows = np.arange(60, 101)
@@ -248,7 +248,7 @@ def _ages() -> tuple[Float[np.ndarray, "W N"], Int[np.ndarray, "N"]]:
 
 
 def draw_buffer() -> Figure:
-    """Return a team of four, and what r0's buffer says about it."""
+    """Draw a team of four, and what r0's buffer says about it."""
     figure, axes = _canvas(8.0, 3.0)
     places = {"r0": (0.6, 1.0), "r1": (1.6, 1.9), "r2": (2.7, 1.3), "r3": (1.85, 0.5)}
     for start, end, colour in (("r2", "r1", ORANGE), ("r1", "r0", BLUE), ("r3", "r0", BLUE)):

@@ -91,7 +91,7 @@ def _put(files: Files, file: File) -> None:
 
 
 def place_of(path: str) -> str:
-    """Where a file of the repository is on the site."""
+    """Return where a file of the repository is on the site."""
     if path in PLACES:
         return PLACES[path]
     if path.startswith("docs/"):

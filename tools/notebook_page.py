@@ -48,7 +48,7 @@ def page_of(path: Path) -> str:
 
 
 def can_render() -> bool:
-    """Whether OpenGL works here."""
+    """Return whether OpenGL works here."""
     try:
         make_context(8, 8).free()
     except OSError:

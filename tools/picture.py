@@ -49,7 +49,7 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """Take the picture; returns the exit code."""
+    """Take the picture; return the exit code."""
     check_outputs(Output("picture", options.out, ".png"), must_be_new=not options.force)
     with owned(options.out):
         take_picture(options.replay, options.window, options.out, options.size, options.zoom)
@@ -92,7 +92,7 @@ def take_picture(replay: Path, window: int | None, out: Path, size: str, zoom: i
 
 
 def _without_title_bar(png: bytes, zoom: int) -> bytes:
-    """Crops the window's empty title bar off."""
+    """Crop the window's empty title bar off."""
     cropped = io.BytesIO()
     with Image.open(io.BytesIO(png)) as picture:
         top = round(TITLE_BAR_POINTS * (1.0 + ZOOM_STEP * zoom))

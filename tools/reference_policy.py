@@ -94,7 +94,7 @@ def store(path: Path, policy: Path) -> None:
 
 
 def costs_of(policy: Path, episodes: int, seed: int, num_jobs: int) -> list[float]:
-    """Each mission's mean age of information under the `reference` preset [windows]."""
+    """Return each mission's mean age of information under the `reference` preset [windows]."""
     study = Study(
         policies=(str(policy),), regimes=(reference("stationary"),), episodes=episodes, seed=seed
     )
@@ -118,7 +118,7 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """Flies the policy and compares; returns 1 if the costs are too far apart."""
+    """Fly the policy and compare; return 1 if the costs are too far apart."""
     tell_cores(options.jobs)
     with tempfile.TemporaryDirectory() as scratch:
         policy = options.out or Path(scratch) / "policy.safetensors"

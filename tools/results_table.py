@@ -27,7 +27,7 @@ COSTS = {
 
 
 def table(results: Sequence[Result], cost: str) -> str:
-    """One cost of one task and preset.
+    """Return the table of one cost of one task and preset.
 
     Args:
         results: Of one task and preset, and one fraction of robots switched off.
@@ -60,12 +60,12 @@ def table(results: Sequence[Result], cost: str) -> str:
 
 
 def _is_by_rate(results: Sequence[Result]) -> bool:
-    """Whether the bit rate is what was swept."""
+    """Return whether the bit rate was swept."""
     return len({result.bit_rate for result in results}) > 1
 
 
 def _place(x: float | None) -> float:
-    """Where a column stands; no limit comes last."""
+    """Return where a column stands; no limit comes last."""
     return math.inf if x is None else x
 
 
@@ -83,7 +83,7 @@ def _name(policy: str, results: Sequence[Result]) -> str:
 
 
 def _cell(result: Result, cost: str) -> str:
-    """Ours, and the published value in brackets if there is one."""
+    """Return our value, and the published one in brackets if there is one."""
     _, digits = COSTS[cost]
     ours = _plus_minus(result, cost, digits)
     published = _plus_minus(result, f"published_{cost}", digits)
@@ -110,7 +110,7 @@ def _kind(result: Result, *, is_by_rate: bool) -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """What is shown."""
+    """The files that are shown."""
 
     files: tuple[Path, ...] = setting(
         help="made by swarm-mj evaluate --csv", metavar="RESULTS.csv", is_positional=True
@@ -118,7 +118,7 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """Print the tables; returns the exit code."""
+    """Print the tables; return the exit code."""
     for path in options.files:
         results = read_results(path)
         kinds = [_kind(result, is_by_rate=_is_by_rate(results)) for result in results]
@@ -130,7 +130,7 @@ def run(options: Options) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the tool; returns its exit code."""
+    """Run the tool; return its exit code."""
     return script(Options, run, arguments)
 
 

@@ -1,4 +1,4 @@
-"""Tunes the probability of every policy that has one, in every regime of the paper's figures.
+"""Tuning: the probability of every policy that has one, in every regime of the paper's figures.
 
     python tools/tune.py
 
@@ -78,7 +78,7 @@ def regimes(preset: str, num_windows: int) -> Iterator[Mission]:
 
 
 def searches(policies: Sequence[str], num_windows: int) -> list[Search]:
-    """Every policy in every regime, policy by policy."""
+    """Return every policy in every regime, policy by policy."""
     return [
         Search(policy=policy, mission=mission, grid=grid_of(policy, preset))
         for policy in policies
@@ -88,7 +88,7 @@ def searches(policies: Sequence[str], num_windows: int) -> list[Search]:
 
 
 def ages(search: Search, probability: float, seeds: Sequence[int]) -> np.ndarray:
-    """Mean age of information of each mission [windows] (Eq. 10)."""
+    """Return the mean age of information of each mission [windows] (Eq. 10)."""
     swarm = Swarm(search.mission, seeds)
     policy = make_policy(search.policy, search.mission, probability)
     windows = range(search.mission.num_windows)
@@ -157,7 +157,7 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """Tunes and writes the table; returns the exit code."""
+    """Tune, and write the table; return the exit code."""
     console = plain_console(is_error=True)
     check_outputs(Output("table", options.out, ".csv"))
     with owned(options.out):
@@ -177,7 +177,7 @@ def _tune(options: Options, console: Console) -> int:
 
 
 def _tune_all(work: Sequence[Search], seeds: range, console: Console) -> list[Tuned]:
-    """Tunes with a progress bar, and says where a grid may have been too narrow."""
+    """Tune with a progress bar, and say where a grid may have been too narrow."""
     rows: list[Tuned] = []
     with WorkBar("Tuning", len(work), "regimes") as bar:
         for search in work:

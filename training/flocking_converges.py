@@ -52,7 +52,7 @@ def left_over(settings: Settings, policy_name: str) -> np.ndarray:
 
 
 def run(open_area: Settings) -> int:
-    """Run the experiment; returns its exit code."""
+    """Run the experiment; return its exit code."""
     walled = replace(open_area, mission=replace(open_area.mission, boundary="reflect"))
     table = Table(title=f"Velocity variance left, {open_area.num_missions} missions")
     for heading in ("boundary", "policy"):

@@ -54,7 +54,7 @@ class LearningFigure:
     )
 
     def __call__(self) -> int:
-        """Draws it."""
+        """Draw the figure; return the exit code."""
         paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
         check_outputs(*(Output("figure", path) for path in paths))
         figure = draw(read_curve(self.results / "rest-curve.csv"), self._levels())
@@ -110,7 +110,7 @@ def draw(curve: Mapping[str, np.ndarray], levels: Mapping[str, float]) -> Figure
 
 
 def _draw_level(axes: Axes, policy: str, level: float) -> None:
-    """Return a dotted line, named with its cost beside the axes."""
+    """Draw a dotted line, named with its cost beside the axes."""
     look = look_of(policy)
     axes.axhline(level, color=look.colour, linewidth=0.9, linestyle=(0, (1, 1.5)))
     axes.annotate(

@@ -32,7 +32,7 @@ ROOT = Path(__file__).resolve().parent.parent
 class Settings:
     """What is evaluated, and where it goes."""
 
-    presets: tuple[str, ...] = setting(("paper", "reference"), "whose", choices=tuple(PAPERS))
+    presets: tuple[str, ...] = setting(("paper", "reference"), "which", choices=tuple(PAPERS))
     figures: tuple[str, ...] = setting(
         ("fig4", "fig5", "fig6"), "which results", choices=tuple(RESULT_FIGURES)
     )
@@ -49,7 +49,7 @@ class Settings:
         shown="runs/paper_figures",
     )
     jobs: int = setting(os.cpu_count() or 1, "processes", low=1, high=256)
-    force: bool = setting(False, "make all anew")
+    force: bool = setting(False, "make everything again")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +75,7 @@ class Part:
 
 
 def evaluate(settings: Settings, jobs: int, *, force: bool) -> int:
-    """Make the results that are missing, or all by force; returns the exit code."""
+    """Make the results that are missing, or all by force; return the exit code."""
     parts = [
         Part(figure=RESULT_FIGURES[name], preset=preset)
         for preset in settings.presets
@@ -107,14 +107,14 @@ def _remove(settings: Settings, parts: Sequence[Part]) -> None:
 
 
 def _is_current(draft: Path) -> bool:
-    """Whether a draft is of this commit; one of another is removed."""
+    """Return whether a draft is of this commit; remove one of another."""
     if draft.exists() and {result.commit for result in read_results(draft)} != {commit()}:
         draft.unlink()
     return draft.exists()
 
 
 def run(settings: Settings) -> int:
-    """Run the experiment; returns its exit code."""
+    """Run the experiment; return its exit code."""
     return evaluate(settings, settings.jobs, force=settings.force)
 
 

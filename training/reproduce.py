@@ -1,11 +1,11 @@
-"""Trains and flies the paper's learned policies anew, figure by figure (V).
+"""The paper's learned policies, trained and flown again, figure by figure (V).
 
     python training/reproduce.py --scale quick
     make reproduce SCALE=quick    # the same; then `make figures` draws what it left
 
 What is trained and flown, and with which options, stands in `training/reproduce/`, one file a
 figure. `quick` has a hundredth of the authors' budget, `full` all of it.
-What `training/results/reproduce/SCALE` has of the same file is kept; `--force` makes all anew. An
+What `training/results/reproduce/SCALE` has of the same file is kept; `--force` makes it again. An
 interrupted run goes on where it broke off, as long as the commit is the same.
 """
 
@@ -53,7 +53,7 @@ class Settings:
     """How much is made, of what, and where everything goes."""
 
     scale: str = setting("quick", "how much is trained and flown", choices=SCALES)
-    figures: tuple[str, ...] = setting(FIGURES, "whose policies", choices=FIGURES)
+    figures: tuple[str, ...] = setting(FIGURES, "which figures", choices=FIGURES)
     experiments: Path = setting(
         ROOT / "training" / "reproduce",
         "what is trained and flown for each figure",
@@ -73,7 +73,7 @@ class Settings:
         shown="runs/reproduce",
     )
     jobs: int = setting(1, "processes that fly", low=1, high=256)
-    force: bool = setting(False, "make all anew")
+    force: bool = setting(False, "make everything again")
 
 
 class Failed(Exception):  # noqa: N818 - as KeyboardInterrupt
@@ -90,29 +90,29 @@ class Work:
 
     @property
     def scale(self) -> Scale:
-        """What its trainings and flights share."""
+        """The options that its trainings share, and its flights."""
         return getattr(self.experiment, self.settings.scale)
 
     @property
     def folder(self) -> Path:
-        """Where its runs and drafts are."""
+        """The folder of its runs and drafts."""
         return self.settings.runs / self.settings.scale / self.figure
 
     @property
     def digest(self) -> str:
-        """Of all that stands in its file and counts at this scale."""
+        """A digest of everything in its file that counts at this scale."""
         said = (asdict(self.scale), self.experiment.trainings, self.experiment.flights)
         return hashlib.sha256(json.dumps(said).encode()).hexdigest()[:12]
 
     @property
     def tables(self) -> list[Path]:
-        """What it hands over: what flights cost, the trainings, and their curves."""
+        """The files it leaves: what flights cost, the trainings, and their curves."""
         folder = self.settings.results / self.settings.scale
         return [folder / f"{self.figure}{end}.csv" for end in ("", "-trainings", "-curves")]
 
     @property
     def is_finished(self) -> bool:
-        """Whether the results are there, of the same experiment."""
+        """True if the results of this very experiment are there."""
         if not all(path.exists() for path in self.tables):
             return False
         _, rows = read_rows(self.tables[1], "table of trainings", MOST_BYTES)
@@ -120,7 +120,7 @@ class Work:
 
     @cached_property
     def trainings(self) -> dict[str, list[str]]:
-        """What `swarm-mj` is called with to train each, but to go on."""
+        """The arguments of `swarm-mj` that begin each training."""
         return {
             name: ["train", *typed(self.scale.train, own), "--out", str(self.folder / name)]
             for name, own in self.experiment.trainings.items()
@@ -128,7 +128,7 @@ class Work:
 
     @cached_property
     def flights(self) -> list[tuple[Path, list[str], dict[str, list[str]]]]:
-        """Each draft, what `swarm-mj` is called with to make it, and each training's curves."""
+        """Each draft, the arguments of `swarm-mj` that make it, and each training's curves."""
         return [
             (draft, self._evaluate(missions, curves, draft), curves)
             for number, (missions, curves) in enumerate(self.experiment.flights.items())
@@ -173,7 +173,7 @@ class Work:
         return read_json(read_file(self.folder / BEGUN, "beginning", MOST_BYTES), dict)
 
     def do(self) -> None:
-        """Trains and flies what is not there yet, and hands over the tables; raises Failed."""
+        """Train and fly what is missing, then write the tables; raise Failed if a command does."""
         writing.write_json(self.folder / BEGUN, self._now())
         for number, (name, command) in enumerate(self.trainings.items(), start=1):
             _say(f"{self.figure}: training {number} of {len(self.trainings)}, {name}")
@@ -184,7 +184,7 @@ class Work:
         self._hand_over()
 
     def _train(self, name: str, command: list[str]) -> None:
-        """Trains one, or goes on; one that came to its end is left alone."""
+        """Train one, or resume it; leave one alone that came to its end."""
         run, ended = self.folder / name, self.folder / f"{name}.trained"
         if not ended.exists():
             _run([*command, "--resume"] if (run / SETTINGS).exists() else command)
@@ -235,7 +235,7 @@ class Work:
 
 
 def run(settings: Settings) -> int:
-    """Run the experiments; returns the exit code."""
+    """Run the experiments; return the exit code."""
     works = [read_work(name, settings) for name in settings.figures]
     left = [work for work in works if settings.force or not work.is_finished]
     for work in left:

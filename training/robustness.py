@@ -4,7 +4,7 @@
 
 Teams of 10 to 200, ranges and speeds that the training did not have, robots that are switched off
 half-way, the authors' preset, and contact physics. One file a question under
-training/results/robustness; what is there is kept, `--force` makes all anew.
+training/results/robustness; what is there is kept, `--force` makes everything again.
 """
 
 import os
@@ -45,11 +45,11 @@ class Settings:
         RESULTS, "where the files go", metavar="DIR", shown="training/results/robustness"
     )
     jobs: int = setting(os.cpu_count() or 1, "processes", low=1, high=256)
-    force: bool = setting(False, "make all anew")
+    force: bool = setting(False, "make everything again")
 
 
 def answer(settings: Settings) -> int:
-    """Flies what is missing, or all by force; returns the exit code."""
+    """Fly what is missing, or all by force; return the exit code."""
     paths = {name: settings.results / f"{name}.csv" for name in QUESTIONS}
     check_outputs(*(Output("results", path) for path in paths.values()))
     for name, path in paths.items():

@@ -1,4 +1,4 @@
-"""Trains the candidates for the shipped policy `gnn` and compares them.
+"""The candidates for the shipped policy `gnn`, trained and compared.
 
     python training/shipped_gnn.py
 
@@ -58,7 +58,7 @@ class ShippedGnn:
     jobs: int = setting(2, "processes of the comparison", low=1, high=256)
 
     def __call__(self) -> int:
-        """Trains, then compares; returns the exit code."""
+        """Train, then compare; return the exit code."""
         curves = [self._curve(name) for name in CANDIDATES]
         compared = [self._compared(name) for name in REGIMES]
         check_outputs(*(Output("results", path) for path in (*curves, *compared)))
@@ -71,7 +71,7 @@ class ShippedGnn:
         return 0
 
     def _train(self, name: str, missions: str) -> str:
-        """Trains a candidate or goes on training it; returns where its policy is."""
+        """Train a candidate, or resume its training; return where its policy is."""
         folder = self.runs / name
         resume = ["--resume"] if (folder / "settings.json").exists() else []
         options = f"{missions} {TRAINING} --minutes {self.minutes:g}".split()
@@ -80,7 +80,7 @@ class ShippedGnn:
         return str(folder / POLICY)
 
     def _compare(self, name: str, policies: Sequence[str], missions: str) -> None:
-        """Flies the candidates and the schedules of TDMA on the same missions."""
+        """Fly the candidates and the schedules of TDMA on the same missions."""
         how = f"--seed {FIRST_SEED} --episodes {self.episodes} --jobs {self.jobs} {missions}"
         command = ["evaluate", "--policy", *policies, "spatial-tdma", "tdma"]
         _run([*command, *how.split(), "--csv", str(self._compared(name)), "--force"])

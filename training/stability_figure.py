@@ -55,7 +55,7 @@ class StabilityFigure:
     )
 
     def __call__(self) -> int:
-        """Draws it."""
+        """Draw the figure; return the exit code."""
         paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
         check_outputs(*(Output("figure", path) for path in paths))
         curves = read_curves(self.results / "fig6-curves.csv")
@@ -96,7 +96,7 @@ def read_curves(path: Path) -> Curves:
 
 
 def read_origin(path: Path) -> str:
-    """Who was trained, and by which commit, from a table of trainings.
+    """Return the team size and the commit of a table of trainings, in words.
 
     Raises:
         ValueError: It cannot be read, or has several commits or team sizes where one is needed.
@@ -114,7 +114,7 @@ def read_origin(path: Path) -> str:
 
 
 def draw(curves: Curves, origin: str) -> Figure:
-    """Both costs over the decisions: seeds pale, their mean, a band from lowest to highest."""
+    """Draw both costs over the decisions: seeds pale, their mean, a band from lowest to highest."""
     with styled():
         drawing = Figure(figsize=(WIDTH_IN, HEIGHT_IN))
         drawing.subplots_adjust(left=0.075, right=0.97, top=0.76, bottom=0.24, wspace=0.18)
@@ -145,7 +145,7 @@ def draw(curves: Curves, origin: str) -> Figure:
 def _draw_kind(
     axes: Axes, kind: str, cost: str, its: Sequence[Mapping[str, Float[np.ndarray, "E"]]]
 ) -> None:
-    """One kind of training in one pair of axes."""
+    """Draw one kind of training in one pair of axes."""
     (label, colour), x = KINDS[kind], its[0]["decisions"]
     costs = np.array([each[cost] for each in its])
     for each in costs:
