@@ -63,7 +63,7 @@ def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
     training, best, choice = run.training, progress.best, progress.choice
     if best is None:
         return {}
-    first, cost = progress.curve[0], training.cost
+    first, cost = progress.curve[0], training.reward
     if choice is None:  # of the best evaluation, the age is shown whatever the cost
         cost, missions = "aoi", f"{training.held_out} of each team size, which chose the policy"
         when = "untrained" if best is first else f"after {best['decisions']:,.0f} decisions"
@@ -104,7 +104,7 @@ def verdicts(run: TrainingRun, progress: Progress) -> Iterator[str]:
     for name, cost in choice.others.items():
         if cost.behind > 0.0:
             difference = Cost(mean=cost.behind, sem=cost.behind_sem)
-            other, behind = NAMES.get(name, name), _amount(difference, run.training.cost)
+            other, behind = NAMES.get(name, name), _amount(difference, run.training.reward)
             is_clear = cost.behind_sem is not None and cost.behind > CLEAR * cost.behind_sem
             lost, level = f"loses to {other} by", f"is no better than {other}, which is ahead by"
             yield f"The policy kept {lost if is_clear else level} {behind} on the same missions."

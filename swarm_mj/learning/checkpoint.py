@@ -11,7 +11,7 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import torch
@@ -22,65 +22,50 @@ from torch import Tensor
 
 from swarm_mj.learning.graph_vec_env import env_of
 from swarm_mj.learning.ppo import GnnActorCritic
-from swarm_mj.learning.selection import NUM_BEST, Amount, Count, Progress, candidates
+from swarm_mj.learning.selection import NUM_BEST, Progress, candidates
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.system.reading import read_file, read_json, read_plain
 from swarm_mj.system.writing import write_bytes
 
-CHECKPOINT_VERSION = 4
+CHECKPOINT_VERSION = 5
 SPARE_BYTES = 100_000_000  # the curve's, and what else does not depend on the settings
+MOMENTS = ("mean", "var", "count")  # of `VecNormalize`'s returns
 IN_A_ROW = (  # of the learning curve
     *("decisions", "minutes", "aoi", "aoi_steady", "velocity_variance", "objective"),
     *("packets_per_window", "delivery_ratio"),
 )
 
 Networks = dict[int, AggregationGnn]  # of policies that may be kept, by their decisions
-Word = Annotated[int, Meta(ge=0, lt=2**32)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Counters:
+class _Plain:
     """The part of a checkpoint that is neither tensors nor a library's own state."""
 
-    num_timesteps: Count
-    num_updates: Count
+    progress: Progress  # how often PPO has learned follows from its decisions
     seeds: list[list[int]]  # of the missions under way, by batch; replaying checks their range
     last_windows: list[int]  # when they end, by batch
-    # Of `VecNormalize`: the mean, variance and count of its returns.
-    reward_moments: tuple[Annotated[float, Meta(ge=-1e30, le=1e30)], Amount, Amount] | None
-    numpy_rng: tuple[
-        Literal["MT19937"],
-        Annotated[list[Word], Meta(min_length=624, max_length=624)],
-        Annotated[int, Meta(ge=0, le=624)],  # NumPy reads the word there unchecked
-        Annotated[int, Meta(ge=0, le=1)],
-        float,
-    ]
-    progress: Progress
+    # NumPy checks all of it but the place in the key, and reads the word there unchecked.
+    numpy_rng: tuple[str, list[int], Annotated[int, Meta(ge=0, le=624)], int, float]
 
 
 def save(
     path: Path, training: Training, model: PPO, progress: Progress, networks: Networks
 ) -> None:
     """Write a checkpoint, between rollouts; raises OSError if the file cannot be written."""
-    name, keys, *rest = np.random.get_state()  # noqa: NPY002 - PPO shuffles minibatches with it
-    env, batches = model.get_env(), env_of(model).batches
-    is_normalised = isinstance(env, VecNormalize)
-    moments = [env.ret_rms.mean, env.ret_rms.var, env.ret_rms.count] if is_normalised else None
-    is_cuda = model.device.type == "cuda"
+    name, key, *place = np.random.get_state()  # noqa: NPY002 - PPO shuffles minibatches with it
+    batches, is_cuda = env_of(model).batches, model.device.type == "cuda"
     state = _tensors(model, networks) | {
         "version": CHECKPOINT_VERSION,
         "training": json.dumps(asdict(training)),
-        "num_timesteps": model.num_timesteps,
-        "num_updates": model._n_updates,
-        "episode_starts": torch.tensor(model._last_episode_starts),
+        "progress": asdict(progress),
         "seeds": [batch.seeds for batch in batches],
         "last_windows": [batch.last_window for batch in batches],
-        "reward_moments": moments and [float(each) for each in moments],
-        "cuda_rng": torch.cuda.get_rng_state(model.device) if is_cuda else None,
-        "numpy_rng": [name, np.asarray(keys).tolist(), *rest],
+        "episode_starts": torch.tensor(model._last_episode_starts),
         "seeds_rng": env_of(model).rng.bit_generator.state,
-        "progress": asdict(progress),
+        "numpy_rng": [name, np.asarray(key).tolist(), *place],
+        "cuda_rng": torch.cuda.get_rng_state(model.device) if is_cuda else None,
     }
     content = io.BytesIO()
     torch.save(state, content)
@@ -88,8 +73,13 @@ def save(
 
 
 def _tensors(model: PPO, networks: Networks) -> dict[str, Any]:
-    """Return a run's tensors by their names in checkpoints, but for what a first rollout makes."""
+    """Return a run's tensors by their names in checkpoints."""
     env = model.get_env()
+    normaliser = {}  # of rewards
+    if isinstance(env, VecNormalize):
+        moments = {name: getattr(env.ret_rms, name) for name in MOMENTS}
+        normaliser = {name: torch.tensor(x, dtype=torch.float64) for name, x in moments.items()}
+        normaliser["returns"] = torch.tensor(env.returns)
     return {
         "weights": model.policy.state_dict(),
         "adam": model.policy.optimizer.state_dict()["state"],  # its settings are the training's
@@ -97,7 +87,7 @@ def _tensors(model: PPO, networks: Networks) -> dict[str, Any]:
             n: torch.tensor(np.array(batch.recipients, np.int16).reshape(-1, *batch.shape))
             for n, batch in enumerate(env_of(model).batches)
         },
-        "returns": torch.tensor(env.returns if isinstance(env, VecNormalize) else []),
+        "normaliser": normaliser,
         "torch_rng": torch.get_rng_state(),
         "candidates": {at: network.state_dict() for at, network in networks.items()},
     }
@@ -139,58 +129,58 @@ def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
     Raises ValueError if the state is of other shapes, kinds or ranges, and any Exception if a part
     is missing, or of quite another kind.
     """
-    counters = read_plain({spec.name: state[spec.name] for spec in fields(_Counters)}, _Counters)
-    progress = counters.progress
+    plain = read_plain({spec.name: state[spec.name] for spec in fields(_Plain)}, _Plain)
+    progress, env = plain.progress, env_of(model)
+    num_rollouts, rest = divmod(progress.decisions, env.num_teams * model.n_steps)
+    if rest:
+        raise ValueError(f"its {progress.decisions} decisions are no whole rollouts")
     kept = [int(row["decisions"]) for row in candidates(progress.curve)]
     networks = {at: acting_network(model) for at in kept}
-    _check(state, counters, model, networks)
+    _check(state, plain, model, networks)
     for at, network in networks.items():
         network.load_state_dict(state["candidates"][at])
-    policy, env = model.policy, model.get_env()
+    policy, rewards = model.policy, model.get_env()
     policy.load_state_dict(state["weights"])
     policy.optimizer.load_state_dict(policy.optimizer.state_dict() | {"state": state["adam"]})
-    model.num_timesteps, model._n_updates = counters.num_timesteps, counters.num_updates
-    recipients = [state["recipients"][n].numpy() for n in range(len(counters.seeds))]
-    model._last_obs = env_of(model).replay(counters.seeds, counters.last_windows, recipients)
+    model.num_timesteps = num_rollouts * model.n_steps * env.num_envs
+    model._n_updates = num_rollouts * model.n_epochs
+    recipients = [state["recipients"][n].numpy() for n in range(len(env.batches))]
+    model._last_obs = env.replay(plain.seeds, plain.last_windows, recipients)
     model._last_episode_starts = state["episode_starts"].numpy()
-    if isinstance(env, VecNormalize) and counters.reward_moments is not None:
-        for name, value in zip(("mean", "var", "count"), counters.reward_moments, strict=True):
-            setattr(env.ret_rms, name, value)
-        env.returns = state["returns"].numpy()
+    if isinstance(rewards, VecNormalize):
+        for name in MOMENTS:
+            setattr(rewards.ret_rms, name, state["normaliser"][name].item())
+        rewards.returns = state["normaliser"]["returns"].numpy()
     # Last, as making networks and replaying missions may draw.
     torch.set_rng_state(state["torch_rng"])
     if state["cuda_rng"] is not None and model.device.type == "cuda":
         torch.cuda.set_rng_state(state["cuda_rng"], model.device)
     np.random.set_state(tuple(state["numpy_rng"]))  # noqa: NPY002 - as in `save`
-    env_of(model).rng.bit_generator.state = state["seeds_rng"]
+    env.rng.bit_generator.state = state["seeds_rng"]
     return progress, networks
 
 
-def _check(state: Mapping[str, Any], counters: _Counters, model: PPO, networks: Networks) -> None:
+def _check(state: Mapping[str, Any], plain: _Plain, model: PPO, networks: Networks) -> None:
     """Raise ValueError unless a state is as one of this model's would be, in range and finite."""
-    progress, env = counters.progress, env_of(model)
-    if not all(math.isfinite(row[name]) for row in progress.curve for name in IN_A_ROW):
+    if not all(math.isfinite(row[name]) for row in plain.progress.curve for name in IN_A_ROW):
         raise ValueError("its curve has numbers that are not finite")
-    if counters.num_timesteps * env.num_teams != progress.decisions * env.num_envs:
-        raise ValueError("its steps are not those of its decisions")
-    if (counters.reward_moments is not None) != isinstance(model.get_env(), VecNormalize):
-        raise ValueError("it normalises rewards, or does not, unlike the run")
     # As a fresh model's, but for what optimiser steps and windows of missions have added.
     like = _tensors(model, networks)
     like["episode_starts"] = torch.zeros(model.n_envs, dtype=torch.bool)
-    if state["adam"]:
+    if plain.progress.decisions:
         like["adam"] = {
             n: {"step": torch.zeros(()), "exp_avg": weight, "exp_avg_sq": weight}
             for n, weight in enumerate(model.policy.parameters())
         }
-    for n, (batch, last) in enumerate(zip(env.batches, counters.last_windows, strict=True)):
+    for n, (batch, last) in enumerate(zip(env_of(model).batches, plain.last_windows, strict=True)):
         num_flown, num_windows = len(state["recipients"][n]), batch.mission.num_windows
         if not num_flown < last <= num_windows:
             raise ValueError(f"its missions end at window {last}, not within {num_windows}")
         like["recipients"][n] = torch.zeros((num_flown, *batch.shape), dtype=torch.int16)
     _check_like({name: state[name] for name in like}, like, "it")
-    if any(moments["step"] < 0 for moments in state["adam"].values()):
-        raise ValueError("its optimiser's step count is negative")
+    steps = [moments["step"] for moments in state["adam"].values()]
+    if any(each < 0 for each in (*steps, state["normaliser"].get("var", 0.0))):
+        raise ValueError("its optimiser's step count, or its rewards' variance, is negative")
 
 
 def _check_like(given: object, like: Mapping[Any, Any] | Tensor, name: str) -> None:

@@ -6,8 +6,8 @@ the flight.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from swarm_mj.envs.mission_batch import COSTS
 from swarm_mj.evaluation.summary import standard_error
 from swarm_mj.learning import selection
 from swarm_mj.learning.selection import COMPARED, JUDGED, NEAR, OTHER_FLIGHTS, Choice, Cost, Row
@@ -34,7 +35,32 @@ Flown = list[list[WindowCosts]]  # by team size, window by window
 Samples = list[Float[np.ndarray, "*window B"]]  # by team size
 MakePolicy = Callable[[Mission], Policy]
 OnWindow = Callable[[float], None]
-FIELDS = {"aoi": "age_windows", "velocity_variance": "velocity_variance_m2ps2"}  # of costs
+
+
+@dataclass(kw_only=True)
+class Flights:
+    """Flights one after the other, which report the share of all of them after every window."""
+
+    training: Training
+    on_window: OnWindow
+    total: int = 1  # flights, at most
+    num_done: int = 0
+
+    def fly(self, policy_of: MakePolicy, first_seed: int, num_missions: int) -> Flown:
+        """Fly as many missions of each team size, from a seed on; return their costs."""
+        flown: Flown = []
+        sizes, components = self.training.robots, self.training.components
+        for n, num_robots in enumerate(sizes):
+            mission = replace(self.training.mission, num_robots=num_robots)
+            seeds = range(first_seed, first_seed + num_missions)
+            swarm, policy = Swarm(mission, seeds, **components.given), policy_of(mission)
+            flown.append([])
+            for window in range(1, mission.num_windows + 1):
+                flown[-1].append(swarm.step(policy))
+                share = (n + window / mission.num_windows) / len(sizes)
+                self.on_window((self.num_done + share) / self.total)
+        self.num_done += 1
+        return flown
 
 
 def held_out_policy(training: Training, network: AggregationGnn, mission: Mission) -> GnnPolicy:
@@ -52,18 +78,19 @@ def evaluate(
     unless there is one only, `aoi_steady` that of the missions' second half. `velocity_variance` is
     Eq. 17 [m²/s²]. The best policy has the least `objective`, by the reward's cost.
     """
+    flights = Flights(training=training, on_window=on_window)
     flies = partial(held_out_policy, training, network)
-    return _means(training, fly(training, flies, HELD_OUT_SEED, training.held_out, on_window))
+    return _means(training, flights.fly(flies, HELD_OUT_SEED, training.held_out))
 
 
 def reference_columns(training: Training, curve: Sequence[Row], on_window: OnWindow) -> Row:
     """Return the costs of `REFERENCES`, flown once a run, by the curve's columns."""
     if curve:
         return {name: x for name, x in curve[0].items() if name in selection.REFERENCE_COLUMNS}
-    columns, sizes = {}, selection.reference_missions(training)
-    shares = _shares_of(on_window, len(sizes))
-    for name, size in sizes.items():
-        flown = fly(training, partial(make_policy, name), HELD_OUT_SEED, size, next(shares))
+    columns, flown_by = {}, selection.reference_missions(training)
+    flights = Flights(training=training, on_window=on_window, total=len(flown_by))
+    for name, num_missions in flown_by.items():
+        flown = flights.fly(partial(make_policy, name), HELD_OUT_SEED, num_missions)
         for cost in JUDGED:
             columns[selection.column(cost, name)] = _mean(_per_mission(flown, cost))
     return columns
@@ -77,27 +104,24 @@ def choose(
 ) -> tuple[Choice, Row]:
     """Choose among the finalists of a whole run on fresh missions; return its cost on others."""
     rows, run_decisions = selection.finalists(curve), int(curve[-1]["decisions"])
-    num_flights = len(rows) + OTHER_FLIGHTS  # at most
-    size = selection.num_missions(training, run_decisions, num_flights)
-    shares = _shares_of(on_window, num_flights)
+    flights = Flights(training=training, on_window=on_window, total=len(rows) + OTHER_FLIGHTS)
+    size = selection.num_missions(training, run_decisions, flights.total)
 
     def flies(row: Row) -> MakePolicy:
         return partial(held_out_policy, training, networks[int(row["decisions"])])
 
-    def flown(policy_of: MakePolicy, first_seed: int = TEST_SEED) -> Flown:
-        return fly(training, policy_of, first_seed, size, next(shares))
-
     def objective(row: Row) -> float:
-        return _means(training, flown(flies(row), CHOICE_SEED))["objective"]
+        return _means(training, flights.fly(flies(row), CHOICE_SEED, size))["objective"]
 
     kept = min(rows, key=objective) if len(rows) > 1 else rows[0]
-    costs = flown(flies(kept))
-    own = _per_mission(costs, training.cost)
+    costs = flights.fly(flies(kept), TEST_SEED, size)
+    own = _per_mission(costs, training.reward)
     compared: dict[str, MakePolicy] = {name: partial(make_policy, name) for name in COMPARED}
     if kept is not curve[0]:
         compared["first"] = flies(curve[0])
     others = {
-        name: _per_mission(flown(policy_of), training.cost) for name, policy_of in compared.items()
+        name: _per_mission(flights.fly(policy_of, TEST_SEED, size), training.reward)
+        for name, policy_of in compared.items()
     }
     choice = Choice(
         decisions=int(kept["decisions"]),
@@ -147,31 +171,9 @@ def record_replay(
     write_replay(recorder.log(), mission, about, folder / f"decisions-{decisions:09d}.rrd")
 
 
-def fly(
-    training: Training, policy_of: MakePolicy, first_seed: int, size: int, on_window: OnWindow
-) -> Flown:
-    """Fly `size` missions of each team size, from a seed on; return their costs."""
-    sizes: Flown = []
-    for num_robots in training.robots:
-        mission = replace(training.mission, num_robots=num_robots)
-        swarm = Swarm(mission, range(first_seed, first_seed + size), **training.components.given)
-        policy = policy_of(mission)
-        sizes.append([])
-        for window in range(1, mission.num_windows + 1):
-            sizes[-1].append(swarm.step(policy))
-            on_window((len(sizes) - 1 + window / mission.num_windows) / len(training.robots))
-    return sizes
-
-
-def _shares_of(on_window: OnWindow, total: int) -> Iterator[OnWindow]:
-    """Yield a listener for each flight in turn, which reports the share of all of them."""
-    for n in range(total):
-        yield lambda share, n=n: on_window((n + share) / total)
-
-
 def _means(training: Training, costs: Flown) -> Row:
     age, variance = (_samples(costs, cost) for cost in JUDGED)
-    is_aged = training.cost == "aoi"
+    is_aged = training.reward == "aoi"
     # Ages grow with the team; divided by its size, no size outweighs the others.
     objective = [a / n for a, n in zip(age, training.robots, strict=True)] if is_aged else variance
     packets = [window.packets for windows in costs for window in windows]
@@ -189,7 +191,7 @@ def _means(training: Training, costs: Flown) -> Row:
 
 
 def _samples(costs: Flown, cost: str) -> Samples:
-    return [np.array([getattr(each, FIELDS[cost]) for each in windows]) for windows in costs]
+    return [np.array([getattr(each, COSTS[cost]) for each in windows]) for windows in costs]
 
 
 def _per_mission(costs: Flown, cost: str) -> Samples:

@@ -24,7 +24,7 @@ REFERENCES = {
     ORACLE: "knows where all robots are and what they know",
 }
 COMPARED = ("tdma", "spatial-tdma")  # at the end, too: the oracle takes longer than the network
-JUDGED = ("aoi", "velocity_variance")  # costs that a run can lower
+JUDGED = ("aoi", "velocity-variance")  # costs that a run can lower, as rewards call them
 ORACLE_MISSIONS = 4  # of each team size: a window takes it 12 ms at 40 robots, 36 ms at 80 ...
 ORACLE_ROBOTS = 100  # ... and 472 ms at 200: larger teams it does not fly
 NUM_BEST = 3  # evaluations whose policies are flown again
@@ -102,9 +102,7 @@ class Progress:
 
     decisions: Count = 0  # of teams, in all sessions
     minutes: Amount = 0.0  # in all sessions, evaluations included
-    next_evaluation: Count = 0  # team decisions
     next_replay: Count = 0  # team decisions
-    best_objective: Annotated[float, Meta(ge=0.0)] = math.inf
     curve: list[Row] = field(default_factory=list)  # one row an evaluation
     since_evaluation: Accumulator = field(default_factory=Accumulator)
     optimiser: Row = field(default_factory=dict)  # what PPO last logged of itself
@@ -120,6 +118,11 @@ class Progress:
     def best(self) -> Row | None:
         """The best evaluation."""
         return min(self.curve, key=lambda row: row["objective"], default=None)
+
+    def is_due(self, every: int) -> bool:
+        """Return whether another interval of as many decisions began since the last evaluation."""
+        last = self.curve[-1]["decisions"] if self.curve else -1
+        return self.decisions // every > last // every
 
     def has_stalled(self, patience: int | None) -> bool:
         """Return whether the last `patience` evaluations brought no gain; never with None or 0."""
@@ -150,7 +153,7 @@ Listener = Callable[[Status], bool]
 
 def column(cost: str, name: str) -> str:
     """Return the learning curve's column for a cost of a policy of `REFERENCES`."""
-    return f"{cost}_{name.replace('-', '_')}"
+    return f"{cost}_{name}".replace("-", "_")
 
 
 REFERENCE_COLUMNS = [column(cost, name) for cost in JUDGED for name in REFERENCES]

@@ -145,11 +145,6 @@ class Training:
         return " ".join(f"--{kind} {name:.200}" for kind, name in self.own.items())
 
     @property
-    def cost(self) -> Literal["aoi", "velocity_variance"]:
-        """The cost that the run lowers, by its name in learning curves."""
-        return "aoi" if self.reward == "aoi" else "velocity_variance"
-
-    @property
     def sums_nodes(self) -> bool:
         """True if a team's value sums all nodes of all graphs, as in the authors' code."""
         return self.mission.preset == "reference"

@@ -82,10 +82,11 @@ class TrainingSession(BaseCallback):
         if self.progress.curve:
             self.progress.write_curve(folder / CURVE)  # the file may be ahead of the checkpoint
         if init is not None:
+            network, config = init
             assert isinstance(self.ppo.policy, GnnActorCritic)
-            self.ppo.policy.take_acting_network(init[0])
+            self.ppo.policy.take_acting_network(network)
             if not own.exists():
-                save_policy(own, *init)
+                save_policy(own, network, config)
         self.ppo.set_logger(configure(str(folder / run_folder.TENSORBOARD), ["tensorboard"]))
         self._counted_s, self._saved_s = time.monotonic(), -math.inf  # counted: in the progress
 
@@ -158,7 +159,7 @@ class TrainingSession(BaseCallback):
         means = {name: float(logged[name]) for name in OPTIMISER if name in logged}
         progress.optimiser = means or progress.optimiser  # of PPO's last passes over a rollout
         is_new = not progress.curve or progress.curve[-1]["decisions"] < decisions
-        is_due = is_new and (is_last or decisions >= progress.next_evaluation)
+        is_due = is_new and (is_last or progress.is_due(self._training.evaluate_every))
         if is_due:
             if not progress.curve:
                 self._save()  # from the first evaluation on, a run without one has lost it
@@ -174,13 +175,14 @@ class TrainingSession(BaseCallback):
 
     def _save(self) -> None:
         self._count_time()
-        kept = self._training, self.ppo, self.progress, self._networks
-        checkpoint.save(self._folder / CHECKPOINT, *kept)
+        checkpoint.save(
+            self._folder / CHECKPOINT, self._training, self.ppo, self.progress, self._networks
+        )
         self._saved_s = time.monotonic()
 
     def _evaluate(self) -> None:
         """Fly the held-out missions, log, and keep the policy if it is the best."""
-        progress, training, every = self.progress, self._training, self._training.evaluate_every
+        progress, training = self.progress, self._training
         decisions, network = progress.decisions, checkpoint.acting_network(self.ppo)
         try:
             flies_others = partial(self._report, "Flying others")
@@ -194,7 +196,6 @@ class TrainingSession(BaseCallback):
         self._count_time()
         progress.evaluation_minutes = progress.minutes - begun
         progress.since_evaluation = Accumulator()
-        progress.next_evaluation = decisions - decisions % every + every
         row = {"decisions": float(decisions), "minutes": progress.minutes, **costs, **others}
         progress.curve.append(row | means | progress.optimiser)
         for name, value in progress.curve[-1].items():
@@ -205,8 +206,8 @@ class TrainingSession(BaseCallback):
         kept = {int(row["decisions"]) for row in selection.candidates(progress.curve)}
         for dropped in self._networks.keys() - kept:
             del self._networks[dropped]
-        if costs["objective"] < progress.best_objective:
-            progress.best_objective, progress.choice = costs["objective"], None
+        if progress.best is progress.curve[-1]:
+            progress.choice = None
             self._keep(decisions, costs, None)
         self._report()
 
@@ -215,9 +216,9 @@ class TrainingSession(BaseCallback):
         progress = self.progress
         if not (self._goes_on and progress.curve) or progress.has_chosen:
             return
-        flown = self._training, progress.curve, self._networks
+        report = partial(self._report, "Choosing")
         try:
-            choice, costs = held_out.choose(*flown, partial(self._report, "Choosing"))
+            choice, costs = held_out.choose(self._training, progress.curve, self._networks, report)
         except Stopped:
             return
         self._keep(choice.decisions, costs, choice)

@@ -9,9 +9,9 @@ from small_runs import small_training
 from tiny_policies import tiny_network
 
 from swarm_mj.learning.held_out import (
+    Flights,
     choose,
     evaluate,
-    fly,
     held_out_policy,
     notes_of,
     reference_columns,
@@ -161,13 +161,14 @@ def test_the_card_says_on_which_missions_it_was_chosen(num_finalists, how):
 
 def test_the_oracle_flies_few_of_the_held_out_missions_and_no_large_teams(monkeypatch):
     """They are the first 4 of 6; of teams of 101 there are none."""
-    flown = []
+    flown, fly = [], Flights.fly
 
-    def noted(training, policy_of, first_seed, size, on_window):
+    def noted(flights, policy_of, first_seed, size):
         flown.append((policy_of.args[0], first_seed, size))
-        return fly(replace(training, robots=(4,)), policy_of, first_seed, size, on_window)
+        flights.training = replace(training, robots=(4,))
+        return fly(flights, policy_of, first_seed, size)
 
-    monkeypatch.setattr("swarm_mj.learning.held_out.fly", noted)
+    monkeypatch.setattr(Flights, "fly", noted)
     training = replace(TRAINING, held_out=6)
     columns = reference_columns(training, [], lambda _share: None)
     six = [("tdma", HELD_OUT_SEED, 6), ("spatial-tdma", HELD_OUT_SEED, 6)]

@@ -72,18 +72,31 @@ class ExtendedFeatures(FeatureExtractor):
     def graphs(self, views: LocalViews) -> Graphs:
         """Return what every robot's network sees now; must see every window."""
         remember(self._memory, views)
-        buffers, mission, num_robots = views.buffers, self._mission, views.num_robots
+        buffers, range_m, num_robots = views.buffers, self._mission.range_m, views.num_robots
         node = np.empty(buffers.timestamp.shape, dtype=NODE)
         may_address = np.empty(node.shape, dtype=np.bool_)
         is_known = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
-        now = views.now.astype(np.int64)
-        observed = (buffers.last_attempt, buffers.is_known, buffers.position_m, views.now)
-        _write_ages_and_news(self._memory, *observed, mission.range_m, node, may_address)
-        beliefs, range_m = (buffers.position_m, is_known), mission.range_m
-        _write_beliefs(*beliefs, now, range_m, node)
-        threshold = from_db(mission.sinr_threshold_db)
-        write_joined(*beliefs, now, range_m, threshold, node["has_joined"])
-        rows = (len(now) * num_robots, num_robots)
+        window = views.now.astype(np.int64)
+        _write_ages_and_news(
+            memory=self._memory,
+            last_attempt=buffers.last_attempt,
+            is_observed=buffers.is_known,
+            believed_m=buffers.position_m,
+            now=views.now,
+            range_m=range_m,
+            node=node,
+            may_address=may_address,
+        )
+        _write_beliefs(buffers.position_m, is_known, window, range_m, node)
+        write_joined(
+            believed_m=buffers.position_m,
+            is_known=is_known,
+            turn=window,
+            range_m=range_m,
+            threshold=from_db(self._mission.sinr_threshold_db),
+            has_joined=node["has_joined"],
+        )
+        rows = (len(window) * num_robots, num_robots)
         return Graphs(
             node=node.view(np.float32).reshape(*rows, len(FEATURES)),
             parent=buffers.parent.reshape(rows),
@@ -169,7 +182,7 @@ def _rises(own: Timestamps, neighbour: Timestamps, said: Timestamps) -> tuple[fl
 def _write_beliefs(
     believed_m: Places,
     is_known: Flags,
-    now: Int[np.ndarray, "B"],
+    window: Int[np.ndarray, "B"],
     range_m: float,
     node: Nodes,
 ) -> None:
@@ -196,10 +209,10 @@ def _write_beliefs(
                     dx, dy = x_m[j] - x_m[k], y_m[j] - y_m[k]
                     count += known[j] * (dx * dx + dy * dy <= range_m * range_m)
                 its[k].neighbours = count * known[k] / CROWD
-            at = (x_m, y_m, is_known[b, i], now[b], is_close)
-            write_turns(*at, 1.5 * range_m, its["has_turn_1_5"])
-            write_turns(*at, 2.0 * range_m, its["has_turn_2"])
-            write_turns(*at, 3.0 * range_m, its["has_turn_3"])
+            whom = is_known[b, i]
+            write_turns(x_m, y_m, whom, window[b], 1.5 * range_m, its["has_turn_1_5"], is_close)
+            write_turns(x_m, y_m, whom, window[b], 2.0 * range_m, its["has_turn_2"], is_close)
+            write_turns(x_m, y_m, whom, window[b], 3.0 * range_m, its["has_turn_3"], is_close)
 
 
 @compiled()
@@ -208,9 +221,9 @@ def write_turns(
     y_m: Column,
     is_known: Bool[np.ndarray, "N"],
     window: int,
-    is_close: Column,
     radius_m: float,
     has_turn: Float32[np.ndarray, "N"],
+    is_close: Column,
 ) -> None:
     """Write 1 for the robots that have a turn by one robot's beliefs, 0 for the others.
 

@@ -31,9 +31,20 @@ class Memory(NamedTuple):
 
 def empty_memory(num_missions: int, num_robots: int) -> Memory:
     """Return the memory of robots that never heard or said anything."""
-    pairs = (num_missions, num_robots, num_robots)
-    shapes = (pairs, pairs, pairs[:2], (*pairs, num_robots), pairs, pairs)
-    return Memory(*(np.full(shape, NEVER, dtype=np.float32) for shape in shapes))
+    robots = (num_missions, num_robots)
+    pairs = (*robots, num_robots)
+    return Memory(
+        heard=_never(pairs),
+        addressed_by=_never(pairs),
+        sent=_never(robots),
+        neighbour=_never((*pairs, num_robots)),
+        said=_never(pairs),
+        timestamp=_never(pairs),
+    )
+
+
+def _never(shape: tuple[int, ...]) -> Float32[np.ndarray, "..."]:
+    return np.full(shape, NEVER, dtype=np.float32)
 
 
 def remember(memory: Memory, views: LocalViews) -> None:

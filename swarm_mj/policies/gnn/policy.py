@@ -39,17 +39,21 @@ class GnnPolicy(LearnedPolicy):
     def logits(self, graphs: Graphs) -> Float[np.ndarray, "R N"]:
         """Return each robot's logits over recipients, from its own graph."""
         num_rows, num_robots = graphs.may_address.shape
+        node = torch.from_numpy(graphs.node)
         parent = torch.from_numpy(graphs.parent.astype(np.int64))  # a copy: buffers are read-only
-        given = (graphs.node, graphs.may_address, graphs.has_turn)
-        node, may_address, has_turn = map(torch.from_numpy, given)
-        owner = torch.arange(num_rows) % num_robots
+        may_address = torch.from_numpy(graphs.may_address)
         device, num_threads = next(self._network.parameters()).device, torch.get_num_threads()
         torch.set_num_threads(1)  # small batches are slower on several
         try:
             with torch.inference_mode():
-                output = self._network(*(x.to(device) for x in (node, parent, may_address))).cpu()
-                rules = owner, may_address, self._silence_logit, has_turn
-                return recipient_logits(output, *rules).numpy()
+                output = self._network(node.to(device), parent.to(device), may_address.to(device))
+                return recipient_logits(
+                    output.cpu(),
+                    owner=torch.arange(num_rows) % num_robots,
+                    may_address=may_address,
+                    silence_logit=self._silence_logit,
+                    has_turn=torch.from_numpy(graphs.has_turn),
+                ).numpy()
         finally:
             torch.set_num_threads(num_threads)  # the setting is the process's
 

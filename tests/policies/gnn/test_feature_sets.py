@@ -1,14 +1,11 @@
-"""The table of feature sets: their names, their sizes, the mission that normalises them."""
+"""The table of feature sets: their names and their sizes."""
 
-import numpy as np
 import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, make_extractor, num_features
 from swarm_mj.policies.gnn.graphs import PaperFeatures, ReferenceFeatures
-from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.protocol.window import LocalViews
 
 
 @pytest.mark.parametrize(
@@ -21,15 +18,8 @@ from swarm_mj.protocol.window import LocalViews
     ],
 )
 def test_a_set_is_found_by_its_name_and_has_so_many_features(features, kind, count):
-    extractor = make_extractor(features, paper())
-    assert type(extractor) is kind
+    assert type(make_extractor(features, paper())) is kind
     assert num_features(features) == count
-    swarm_of_two = LocalViews(buffers=empty_buffers(1, 2), now=np.zeros(1), phases=())
-    extractor.start(1, 2)
-    graphs = extractor.graphs(swarm_of_two)
-    assert graphs.node.shape == (2, 2, count)
-    assert np.all(np.isfinite(graphs.node))
-    assert np.all(np.diagonal(graphs.may_address))
 
 
 @pytest.mark.parametrize("refuse", [lambda name: make_extractor(name, paper()), num_features])
