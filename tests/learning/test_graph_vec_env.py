@@ -112,33 +112,30 @@ def test_a_robots_reward_is_its_credit_per_pair():
     assert np.any(reward != 0.0)
 
 
-def test_eq10_a_teams_reward_is_the_age_over_the_missions_duration():
-    env, rng = env_of("team", (3, 5)), np.random.default_rng(2)
-    env.reset()
-    for window in (1, 2):
-        _, reward, _, _ = env.step(drawn(env, rng))
-        ages = []
-        for batch in env.batches:
-            for timestamp in batch.swarm.buffers.timestamp:
-                each = [window - t for row in timestamp for t in row]
-                ages.append(sum(each) / len(each))
-        np.testing.assert_allclose(reward, [-age / WINDOWS for age in ages], rtol=1e-6)
+def mean_age(swarm, b):
+    """Of all pairs of a mission, now (Eq. 10)."""
+    return np.mean(swarm.now[b] - swarm.buffers.timestamp[b])
 
 
-def test_eq17_the_other_reward_is_the_velocity_variance():
-    env = env_of("team", task="flocking", reward="velocity-variance")
-    rng = np.random.default_rng(2)
+def velocity_variance(swarm, b):
+    """Of a mission's robots, now (Eq. 17)."""
+    return np.var(swarm.states.velocity_mps[b], axis=0).sum()
+
+
+@pytest.mark.parametrize(
+    ("reward", "cost", "scale"),
+    [("aoi", mean_age, WINDOWS), ("velocity-variance", velocity_variance, 1)],
+)
+def test_a_teams_reward_is_its_age_over_the_missions_duration_or_its_velocity_variance(
+    reward, cost, scale
+):
+    env, rng = env_of("team", (3, 5), task="flocking", reward=reward), np.random.default_rng(2)
     env.reset()
     for _ in range(2):
-        _, reward, _, _ = env.step(drawn(env, rng))
-        by_hand = []
-        for batch in env.batches:
-            for velocity in batch.swarm.states.velocity_mps:
-                mean = [sum(v[axis] for v in velocity) / len(velocity) for axis in range(2)]
-                squares = [(v[0] - mean[0]) ** 2 + (v[1] - mean[1]) ** 2 for v in velocity]
-                by_hand.append(-sum(squares) / len(velocity))
-        np.testing.assert_allclose(reward, by_hand, rtol=1e-5)
-        assert np.all(reward < 0.0)
+        _, found, _, _ = env.step(drawn(env, rng))
+        by_hand = [-cost(batch.swarm, b) / scale for batch in env.batches for b in range(2)]
+        np.testing.assert_allclose(found, by_hand, rtol=1e-5)
+        assert np.all(found < 0.0)
 
 
 def test_robots_that_do_not_exist_see_nothing_and_may_only_be_silent():
