@@ -79,10 +79,10 @@ def stand(_buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N 2"]:
 
 
 class RandomWalk:
-    """u ~ N(0, A_max / 3), a standard deviation per axis, clipped to plus or minus A_max (IV-A)."""
+    """u ~ N(0, A_max / 3), a standard deviation per axis (IV-A), which the physics clips."""
 
     def __init__(self, mission: Mission) -> None:
-        self._limit_mps2 = mission.max_acceleration_mps2
+        self._deviation_mps2 = mission.max_acceleration_mps2 / 3.0
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Give every robot its own stream of numbers; arguments as in `Started.start`."""
@@ -90,23 +90,20 @@ class RandomWalk:
 
     def __call__(self, _buffers: Buffers, _states: RobotStates) -> Float[np.ndarray, "B N 2"]:
         """Return the next accelerations [m/s²]."""
-        acceleration = self._stream.next() * (self._limit_mps2 / 3.0)
-        return np.clip(acceleration, -self._limit_mps2, self._limit_mps2)
+        return self._stream.next() * self._deviation_mps2
 
 
 class Flocking:
-    """Velocity consensus by `flocking`, clipped to plus or minus A_max (IV-A)."""
+    """Velocity consensus by `flocking` (IV-A)."""
 
     cost_name, cost_unit = "velocity variance", "m²/s²"
 
     def __init__(self, mission: Mission) -> None:
-        self._limit_mps2 = mission.max_acceleration_mps2
         self._flocking_set: FlockingSet = mission.flocking_set
 
     def __call__(self, buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N 2"]:
         """Return the next accelerations [m/s²]."""
-        acceleration = flocking(buffers, states.velocity_mps, self._flocking_set)
-        return np.clip(acceleration, -self._limit_mps2, self._limit_mps2)
+        return flocking(buffers, states.velocity_mps, self._flocking_set)
 
     def cost(self, states: RobotStates, /) -> Float[np.ndarray, "B"]:
         """Return the velocity variance of the active robots [m²/s²]."""

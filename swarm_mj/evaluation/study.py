@@ -10,10 +10,10 @@ from swarm_mj.control.motion import Costed, controller_of
 from swarm_mj.evaluation.batch import Batch
 from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.mission import Mission
+from swarm_mj.mission.batched_rng import MAX_SEED
 from swarm_mj.mission.components import Components, digest
 from swarm_mj.policies.policy import Parameters, Policy
 from swarm_mj.policies.registry import check_used, flown_name, is_learned, is_own_policy, normalised
-from swarm_mj.simulation.swarm import MAX_SEED
 from swarm_mj.system.fields import check, setting
 from swarm_mj.system.packages import code_digest, commit, version
 

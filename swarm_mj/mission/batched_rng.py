@@ -1,16 +1,51 @@
-"""Random numbers drawn ahead: one stream per mission, so that batches do not change a mission."""
+"""Random numbers of missions: from a seed to a generator for each purpose, and draws ahead.
+
+Each mission has streams of its own, so that the missions beside it do not change it.
+"""
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, runtime_checkable
+from numbers import Integral
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
+MAX_SEED = 2**63 - 1  # the largest that a replay's properties keep
 BLOCK = 64  # draws made at once: enough to make the loop over missions cheap
 
 Draw = Callable[[np.random.Generator, tuple[int, ...]], np.ndarray]
 uniform: Draw = np.random.Generator.random  # on [0, 1)
 normal: Draw = np.random.Generator.standard_normal
+
+
+class Streams(NamedTuple):
+    """Each mission's generators, one for each purpose, so that policies meet equal missions.
+
+    A seed spawns them in this order, so new ones go at the end, or all missions would change.
+    """
+
+    placement: list[np.random.Generator]
+    motion: list[np.random.Generator]
+    policy: list[np.random.Generator]
+    failures: list[np.random.Generator]
+    channel: list[np.random.Generator]
+
+
+def streams_of(seeds: Sequence[int]) -> Streams:
+    """Return the streams of missions that begin from these seeds."""
+    spawned = [np.random.SeedSequence(seed).spawn(len(Streams._fields)) for seed in seeds]
+    purposes = zip(*spawned, strict=True)
+    return Streams(*([np.random.default_rng(child) for child in each] for each in purposes))
+
+
+def check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
+    """Raise ValueError unless there are seeds, as many as expected, and none is negative."""
+    if not hasattr(seeds, "__len__") or isinstance(seeds, str | bytes):
+        raise ValueError(f"seeds must be a list, one per mission, such as [1], not {seeds!r}")
+    is_whole = all(isinstance(seed, Integral) and 0 <= seed <= MAX_SEED for seed in seeds)
+    if not is_whole or len(seeds) != (expected or max(1, len(seeds))):
+        count = "one or more" if expected is None else str(expected)
+        raise ValueError(f"seeds must be {count} integers from 0 to {MAX_SEED}, not {list(seeds)}")
 
 
 @runtime_checkable

@@ -21,7 +21,7 @@ from types import ModuleType
 from typing import Any
 
 from swarm_mj.mission import Mission
-from swarm_mj.system.fields import check_callable, did_you_mean, setting
+from swarm_mj.system.fields import check_callable, did_you_mean, name_of, setting
 
 FORM = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 GROUP, SHOWN_AS = "your own parts, each by module:Name", "MODULE:NAME"
@@ -61,7 +61,8 @@ class Components:
     @property
     def names(self) -> dict[str, str]:
         """The names of those given; of an object, its function's or its class's."""
-        return {kind: _name(each) for kind, each in self.given.items()}
+        given = self.given.items()
+        return {kind: each if isinstance(each, str) else name_of(each) for kind, each in given}
 
     @property
     def title(self) -> str:
@@ -79,15 +80,13 @@ class Components:
                 f"channel {self.channel} takes the place of the mission's own, so "
                 f"{mission.beyond_free_space} would change nothing; leave out one of them"
             )
-        found = {kind: make(kind, name, mission) for kind, name in named.items()}
-        for kind, each in found.items():
-            if isinstance(each, type) or not callable(each):
-                shown = f"the class {each.__name__}" if isinstance(each, type) else f"{each!r:.80}"
-                raise ValueError(
-                    f"{kind} {named[kind]} must be a function of two arguments, or make an "
-                    f"object like one, not {shown}"
-                )
-        return replace(self, **found)
+        made = self
+        for kind, name in named.items():
+            try:
+                made = replace(made, **{kind: make(kind, name, mission)})
+            except TypeError as error:
+                raise ValueError(f"{kind} {name}: {error}") from error
+        return made
 
 
 def components_in(config: Mapping[str, Any]) -> Components:
@@ -242,8 +241,3 @@ def _unwrapped(found: object) -> object:
     while isinstance(found, partial):
         found = found.func
     return found
-
-
-def _name(component: object) -> str:
-    name = getattr(component, "__qualname__", type(component).__qualname__)
-    return component if isinstance(component, str) else name

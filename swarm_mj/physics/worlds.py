@@ -15,13 +15,10 @@ from jaxtyping import Bool, Float
 from mujoco import batch
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.geometry import overlaps_earlier
 from swarm_mj.physics.arenas import obstacles_of
 from swarm_mj.physics.scene import ROBOT_MASS_KG, Scene, compose, num_substeps, timestep_s
-from swarm_mj.physics.state import ROBOT_RADIUS_M, RobotStates
+from swarm_mj.physics.state import RobotStates
 from swarm_mj.system.compiled import compiled
-
-OPEN, MIRROR, CLIP = 0, 1, 2  # at the boundary
 
 
 class Physics:
@@ -54,23 +51,13 @@ class Physics:
         self._qvel = self._batch.bind("qvel").reshape(shape)
         self._ctrl = self._batch.bind("ctrl").reshape(shape)
         self._rests = scene is None  # no scene can push robots at rest
-        self._wall = OPEN
-        if mission.has_walls and mission.physics == "exact":
-            self._wall = MIRROR if mission.wall_hit == "mirror" else CLIP
         # True states, in arrays that later steps do not change.
         self.states = RobotStates(position_m=np.zeros(shape), velocity_mps=np.zeros(shape))
 
     def place(
         self, position_m: Float[np.ndarray, "B N 2"], velocity_mps: Float[np.ndarray, "B N 2"]
     ) -> None:
-        """Restart all worlds from p_0 [m] and v_0 [m/s].
-
-        Raises ValueError without one finite state per robot, or if robots that collide overlap.
-        """
-        self._check_vectors("position", position_m)
-        self._check_vectors("velocity", velocity_mps)
-        if self._mission.collide:
-            _check_apart(position_m)
+        """Restart all worlds from p_0 [m] and v_0 [m/s]; robots that collide must be apart."""
         self._batch.reset()
         self._qpos[...] = position_m
         self._qvel[...] = velocity_mps
@@ -86,32 +73,40 @@ class Physics:
 
         Raises ValueError unless there is one finite acceleration per robot.
         """
-        self._check_vectors("acceleration", acceleration_mps2)
+        self._check_accelerations(acceleration_mps2)
         if self._mission.physics == "exact":
             self._step_exact(acceleration_mps2)
         else:
             self._step_contact(acceleration_mps2)
         return self.states
 
-    def _check_vectors(self, what: str, given: np.ndarray) -> None:
-        """Raise ValueError unless there is one finite vector per robot."""
+    def _check_accelerations(self, given: np.ndarray) -> None:
+        """Raise ValueError unless the controller gave one finite vector per robot."""
         expected = self.states.position_m.shape
-        if np.shape(given) != expected:
+        if given.shape != expected:
             shape = f"{expected}, missions by robots by axes"
-            raise ValueError(f"{what} must have shape {shape}, not {np.shape(given)}")
+            raise ValueError(f"acceleration must have shape {shape}, not {given.shape}")
         if not np.all(is_finite := np.isfinite(given)):
             b, i, _ = np.argwhere(~is_finite)[0]
             raise ValueError(
-                f"{what} must be finite, not ({given[b, i, 0]:g}, {given[b, i, 1]:g}) "
+                f"acceleration must be finite, not ({given[b, i, 0]:g}, {given[b, i, 1]:g}) "
                 f"of robot {i} in mission {b}"
             )
 
     def _step_exact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
         self._batch.step()
-        mission, worlds = self._mission, (self._qpos, self._qvel, self._ctrl)
-        limits = mission.max_acceleration_mps2, mission.max_velocity_mps, mission.half_side_m
-        moved = _kick(*worlds, acceleration_mps2, mission.window_s, *limits, self._wall)
-        self.states = replace(self.states, position_m=moved[0], velocity_mps=moved[1])
+        position_m, velocity_mps = _kick(
+            self._qpos,
+            self._qvel,
+            self._ctrl,
+            acceleration_mps2,
+            dt_s=self._mission.window_s,
+            limit_mps2=self._mission.max_acceleration_mps2,
+            limit_mps=self._mission.max_velocity_mps,
+            wall_m=self._mission.half_side_m if self._mission.has_walls else np.inf,
+            clips=self._mission.wall_hit == "clip",
+        )
+        self.states = replace(self.states, position_m=position_m, velocity_mps=velocity_mps)
 
     def _step_contact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
         if self._rests and not np.any(self._qvel) and not np.any(acceleration_mps2):
@@ -133,20 +128,6 @@ class Physics:
         )
 
 
-def _check_apart(position_m: Float[np.ndarray, "B N 2"]) -> None:
-    """Raise ValueError if bodies overlap, because contacts would fling them apart."""
-    for b, team_m in enumerate(position_m):
-        overlaps = np.flatnonzero(overlaps_earlier(team_m, 2.0 * ROBOT_RADIUS_M))
-        if len(overlaps) > 0:
-            j = int(overlaps[0])
-            apart_m = np.linalg.norm(team_m[:j] - team_m[j], axis=1)
-            raise ValueError(
-                f"robots {int(np.argmin(apart_m))} and {j} of mission {b} start "
-                f"{np.min(apart_m):.2g} m apart, and collide below {2.0 * ROBOT_RADIUS_M:g} m; "
-                "place them farther apart"
-            )
-
-
 @compiled()
 def _kick(
     qpos: Float[np.ndarray, "B N 2"],
@@ -157,7 +138,7 @@ def _kick(
     limit_mps2: float,
     limit_mps: float,
     wall_m: float,
-    wall: int,
+    clips: bool,  # the robot onto the wall, in place of its mirror image behind it
 ) -> tuple[Float[np.ndarray, "B N 2"], Float[np.ndarray, "B N 2"]]:
     """Accelerate, clip and reflect; qpos has already moved by v dt. Return p and v as copies."""
     num_missions, num_robots = acceleration.shape[:2]
@@ -168,9 +149,9 @@ def _kick(
                 u = min(max(acceleration[b, i, axis], -limit_mps2), limit_mps2)
                 v = min(max(ctrl[b, i, axis] + u * dt_s, -limit_mps), limit_mps)
                 p = qpos[b, i, axis]
-                while wall != OPEN and abs(p) > wall_m:
+                while abs(p) > wall_m:
                     edge = wall_m if p > 0 else -wall_m
-                    p = edge if wall == CLIP else 2 * edge - p
+                    p = edge if clips else 2 * edge - p
                     v = -v
                     qpos[b, i, axis] = p
                     qvel[b, i, axis] = -qvel[b, i, axis]  # the wall's impulse

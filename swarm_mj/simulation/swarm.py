@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.control.motion import Controller, controller_of, costed, initial_velocity
 from swarm_mj.mission import Mission
-from swarm_mj.mission.batched_rng import Started
+from swarm_mj.mission.batched_rng import Started, check_seeds, streams_of
 from swarm_mj.mission.components import Components, is_ours
 from swarm_mj.mission.geometry import overlaps_earlier
 from swarm_mj.mission.placement import connected_positions, draw_survivors
@@ -31,7 +31,6 @@ from swarm_mj.radio.obstruction import blocked
 from swarm_mj.system.fields import check_kind
 
 MAX_THREADS = 1024
-MAX_SEED = 2**63 - 1  # the largest that a replay's properties keep
 
 
 class Swarm:
@@ -59,7 +58,7 @@ class Swarm:
         """
         check_kind("mission", mission, Mission, 'paper("flocking")')
         own = Components(channel=channel, controller=controller, scene=scene).made(mission)
-        _check_seeds(seeds)
+        check_seeds(seeds)
         if not isinstance(num_threads, Integral) or not 1 <= num_threads <= MAX_THREADS:
             limits = f"from 1 to {MAX_THREADS}"
             raise ValueError(f"num_threads must be a whole number {limits}, not {num_threads!r}")
@@ -79,18 +78,17 @@ class Swarm:
 
         Raises ValueError as the constructor does.
         """
-        _check_seeds(seeds, self._num_missions)
-        streams = zip(*(_streams(seed) for seed in seeds), strict=True)
-        placement, motion, self._policy_rngs, failures, channel = streams
-        mission = self.mission
+        check_seeds(seeds, self._num_missions)
+        self._rngs, mission = streams_of(seeds), self.mission
         # Before the robots are placed, as a channel is asked which teams it connects.
-        for component, rngs in ((self.controller, motion), (self.channel, channel)):
-            if isinstance(component, Started):
-                component.start(mission.num_robots, rngs)
-        position_m = [self._place(b, rng) for b, rng in enumerate(placement)]
-        velocity_mps = [initial_velocity(mission, rng) for rng in placement]
+        if isinstance(self.controller, Started):
+            self.controller.start(mission.num_robots, self._rngs.motion)
+        if isinstance(self.channel, Started):
+            self.channel.start(mission.num_robots, self._rngs.channel)
+        position_m = [self._place(b, rng) for b, rng in enumerate(self._rngs.placement)]
+        velocity_mps = [initial_velocity(mission, rng) for rng in self._rngs.placement]
         self._physics.place(np.stack(position_m), np.stack(velocity_mps))
-        self._survivors = draw_survivors(mission, failures)
+        self._survivors = draw_survivors(mission, self._rngs.failures)
         self.now = np.zeros(len(seeds))  # t [windows]
         room = fitting(packet_of(mission), mission, "T, M and P").num_entries
         self.buffers: Buffers = with_room(empty_buffers(len(seeds), mission.num_robots), room)
@@ -105,12 +103,17 @@ class Swarm:
     def _place(self, b: int, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
         """Draw where mission b's robots begin, connected under their channel where it can say."""
         mission, channel = self.mission, self.channel
-        team = mission.num_robots, mission.half_side_m, mission.range_m
         has_obstacles = len(self._physics.obstacles.kind) > 0
         is_asked = isinstance(channel, ComposedChannel)
-        connects = partial(channel.largest_part, mission=b) if is_asked else None
-        is_blocked = self._is_blocked if has_obstacles or mission.collide else None
-        return connected_positions(*team, rng, connects, is_blocked, keeps_largest=has_obstacles)
+        return connected_positions(
+            num_robots=mission.num_robots,
+            half_side_m=mission.half_side_m,
+            range_m=mission.range_m,
+            rng=rng,
+            largest_part_at=partial(channel.largest_part, mission=b) if is_asked else None,
+            is_blocked_at=self._is_blocked if has_obstacles or mission.collide else None,
+            keeps_largest=has_obstacles,
+        )
 
     def _is_blocked(self, position_m: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
         """Return which robots would touch an obstacle there, or another robot if they collide."""
@@ -150,7 +153,7 @@ class Swarm:
             policy.inform(self.belief)
         else:
             raise TypeError("a policy must be a DecentralisedPolicy or a CentralisedPolicy")
-        policy.start(self.mission.num_robots, self._policy_rngs)
+        policy.start(self.mission.num_robots, self._rngs.policy)
         self.buffers = with_room(self.buffers, room)
         self._policy = policy
 
@@ -200,8 +203,14 @@ class Swarm:
             self._physics.deactivate(survivors)
         self.phases = window(self.buffers, decide_after, self.move, self.channel, start)
         self.now = start + 1.0
-        flown, cost = (self.buffers, self.states, self.phases, self.now), self.task_cost()
-        return window_costs(*flown, is_broadcast=window.is_broadcast, task_cost=cost)
+        return window_costs(
+            self.buffers,
+            self.states,
+            self.phases,
+            self.now,
+            is_broadcast=window.is_broadcast,
+            task_cost=self.task_cost(),
+        )
 
     # Not within `_play`: tests, which check types, would wrap it anew in every window.
     def _decide_after(
@@ -229,21 +238,3 @@ class Swarm:
                 f"for each mission, not {np.array2string(value, threshold=8)}"
             )
         return TaskCost(name=controller.cost_name, unit=controller.cost_unit, value=value)
-
-
-def _check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
-    """Raise ValueError unless there are seeds, as many as expected, and none is negative."""
-    if not hasattr(seeds, "__len__") or isinstance(seeds, str | bytes):
-        raise ValueError(f"seeds must be a list, one per mission, such as [1], not {seeds!r}")
-    is_whole = all(isinstance(seed, Integral) and 0 <= seed <= MAX_SEED for seed in seeds)
-    if not is_whole or len(seeds) != (expected or max(1, len(seeds))):
-        count = "one or more" if expected is None else str(expected)
-        raise ValueError(f"seeds must be {count} integers from 0 to {MAX_SEED}, not {list(seeds)}")
-
-
-def _streams(seed: int) -> list[np.random.Generator]:
-    """Return a stream each for placement, motion, policy, failures and channel.
-
-    Apart, so that all policies meet equal missions. Add new ones at the end only.
-    """
-    return [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(5)]

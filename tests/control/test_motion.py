@@ -61,18 +61,10 @@ def walked(mission, num_missions, num_windows, seed=0):
     return np.stack([walk(buffers, bodies_of(np.zeros(shape))) for _ in range(num_windows)])
 
 
-def test_iv_a_random_walk_is_a_clipped_normal():
-    """u ~ N(0, A_max / 3): a standard deviation; beyond three (P = 0.27 %) it is clipped."""
-    limit = 20.0
+def test_iv_a_random_walk_is_normal():
+    """u ~ N(0, A_max / 3): a standard deviation."""
     u = walked(paper("random-walk", num_robots=50), 10, 200).ravel()
-    assert np.abs(u).max() == limit
-    is_clipped = np.abs(u) == limit
-    expected = 2 * stats.norm.sf(3.0)
-    assert abs(is_clipped.mean() - expected) < 5 * math.sqrt(expected / u.size)
-    within = stats.truncnorm(-3.0, 3.0, scale=limit / 3.0)
-    assert stats.kstest(u[~is_clipped], within.cdf).pvalue > 1e-3
-    # With the tails at the limit, 0.2 % of the deviation is lost: 6.65, not 6.67 m/s².
-    assert np.std(u) == pytest.approx(limit / 3.0, rel=0.01)
+    assert stats.kstest(u, stats.norm(scale=20.0 / 3.0).cdf).pvalue > 1e-3
 
 
 def test_iv_a_random_walk_draws_apart_for_every_robot_axis_and_window():
@@ -110,19 +102,6 @@ def test_eq16_reference_counts_who_moves(seed):
     buffers, velocity_mps = overheard_team(seed)
     expected = mean_difference(buffers, velocity_mps, lambda _, velocity: velocity != 0.0)
     np.testing.assert_allclose(flocking(buffers, velocity_mps, "moving"), expected, atol=1e-12)
-
-
-@pytest.mark.parametrize("preset", [paper, reference])
-def test_flocking_is_clipped(preset):
-    """A teammate 1 km/s faster wants half that, per second; the robot accelerates at A_max."""
-    mission = preset("flocking", num_robots=2)
-    limit = mission.max_acceleration_mps2
-    buffers = empty_buffers(1, 2)
-    buffers.timestamp[...] = 1.0
-    buffers.velocity_mps[0, :, 1] = [1000.0, -1000.0]
-    buffers.velocity_mps[0, :, 0] = 1e-9
-    u = started(mission, 1)(buffers, bodies_of(np.zeros((1, 2, 2))))
-    np.testing.assert_array_equal(u[0], [[limit, -limit]] * 2)
 
 
 @pytest.mark.parametrize(("preset", "counts_unheard"), [(paper, False), (reference, True)])

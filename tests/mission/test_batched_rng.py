@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarm_mj.mission.batched_rng import BLOCK, Stream, normal, uniform
+from swarm_mj.mission.batched_rng import BLOCK, Stream, normal, streams_of, uniform
 
 SEEDS = [3, 1, 4, 15]
 LENGTH = 2 * BLOCK + 5  # over two borders of the blocks drawn ahead
@@ -38,3 +38,15 @@ def test_the_laws_of_the_draws():
     assert (flat.mean(), flat.var()) == pytest.approx((0.5, 1 / 12), abs=0.01)
     assert (bell.mean(), bell.var()) == pytest.approx((0.0, 1.0), abs=0.03)
     assert (np.abs(bell) < 1.0).mean() == pytest.approx(0.683, abs=0.01)
+
+
+@pytest.mark.parametrize("seed", [0, 7, 2**62])
+def test_streams_that_were_added_later_changed_no_other(seed):
+    """A mission's first three streams are those of a seed that spawns no more than three."""
+    three = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3)]
+    streams = [rng for (rng,) in streams_of([seed])]
+    assert len(streams) == 5  # the last is the channel's
+    for stream, expected in zip(streams[:3], three, strict=True):
+        assert stream.random(4).tolist() == expected.random(4).tolist()
+    drawn = [rng.random() for rng in (*three, *streams[3:])]
+    assert len(set(drawn)) == len(drawn)

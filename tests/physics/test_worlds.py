@@ -33,11 +33,17 @@ def drawn(mission, num_windows, seed=0, num_missions=NUM_MISSIONS):
     return position_m, velocity_mps, wanted
 
 
+def placed(mission, position_m, velocity_mps, **options):
+    """Worlds that begin so."""
+    worlds = Physics(mission, len(position_m), **options)
+    worlds.place(position_m, velocity_mps)
+    return worlds
+
+
 def flown(mission, position_m, velocity_mps, wanted):
     """The states after each window."""
-    physics = Physics(mission, len(position_m))
-    physics.place(position_m, velocity_mps)
-    return [physics.step(u) for u in wanted]
+    worlds = placed(mission, position_m, velocity_mps)
+    return [worlds.step(u) for u in wanted]
 
 
 def eq15(mission, p, v, u, at_wall):
@@ -99,8 +105,7 @@ class NoSteps:
 def test_position_only_moves_because_mujoco_steps(physics):
     mission = crowded(physics)
     p, v, wanted = drawn(mission, 10)
-    worlds = Physics(mission, NUM_MISSIONS)
-    worlds.place(p, v)
+    worlds = placed(mission, p, v)
     worlds._batch = NoSteps()
     for u in wanted:
         np.testing.assert_array_equal(worlds.step(u).position_m, p)
@@ -113,8 +118,7 @@ def test_position_only_moves_because_mujoco_steps(physics):
 def test_acceleration_that_is_not_finite_changes_nothing(physics, value):
     mission = crowded(physics)
     p, v, wanted = drawn(mission, 6)
-    worlds = Physics(mission, NUM_MISSIONS)
-    worlds.place(p, v)
+    worlds = placed(mission, p, v)
     states = [worlds.step(u) for u in wanted[:3]]
     bad = wanted[3].copy()
     bad[2, 4, 1] = value
@@ -129,8 +133,7 @@ def test_acceleration_that_is_not_finite_changes_nothing(physics, value):
 def test_threads_change_nothing(physics):
     mission = crowded(physics)
     p, v, wanted = drawn(mission, 20)
-    worlds = Physics(mission, NUM_MISSIONS, num_threads=2)
-    worlds.place(p, v)
+    worlds = placed(mission, p, v, num_threads=2)
     assert_same_states([worlds.step(u) for u in wanted], flown(mission, p, v, wanted))
 
 
@@ -139,8 +142,7 @@ def test_place_starts_anew(physics):
     """The second flight of the same worlds is the first one again, bit by bit, from time 0."""
     mission = crowded(physics)
     p, v, wanted = drawn(mission, 60)
-    worlds = Physics(mission, NUM_MISSIONS)
-    worlds.place(p, v)
+    worlds = placed(mission, p, v)
     first = [worlds.step(u) for u in wanted]
     worlds.place(p, v)
     np.testing.assert_array_equal(worlds._batch.bind("time"), 0.0)
@@ -153,8 +155,7 @@ def test_place_starts_anew(physics):
 def test_bodies_are_not_changed_by_later_steps(physics):
     mission = crowded(physics)
     p, v, wanted = drawn(mission, 3)
-    worlds = Physics(mission, NUM_MISSIONS)
-    worlds.place(p, v)
+    worlds = placed(mission, p, v)
     states = [worlds.states] + [worlds.step(u) for u in wanted[:2]]
     kept = [(s.position_m.copy(), s.velocity_mps.copy()) for s in states]
     p[:], v[:] = 0.0, 0.0  # nor by their owner
@@ -227,8 +228,8 @@ def wall_across(spec, _mission):
 def test_what_a_scene_adds_stops_robots_in_contact_physics_only(physics, is_stopped):
     """A wall 10 m thick through the middle; robots of 0.5 m start 20 m west of it at 3 m/s."""
     mission = paper("random-walk", num_robots=2, physics=physics)
-    worlds = Physics(mission, 1, scene=wall_across)
-    worlds.place(np.array([[[-25.0, 0.0], [-25.0, 50.0]]]), np.array([[[3.0, 0.0]] * 2]))
+    start_m, start_mps = np.array([[[-25.0, 0.0], [-25.0, 50.0]]]), np.array([[[3.0, 0.0]] * 2])
+    worlds = placed(mission, start_m, start_mps, scene=wall_across)
     for _ in range(200):  # 60 m if nothing stops them
         states = worlds.step(np.array([[[20.0, 0.0]] * 2]))
     expected = -5.0 - 0.5 if is_stopped else 35.0
@@ -240,10 +241,9 @@ def test_robots_meet_what_a_scene_adds_but_no_other_robot():
     mission = paper("random-walk", num_robots=2, physics="contact")
     ends = []
     for scene in (None, wall_across):
-        worlds = Physics(mission, 1, scene=scene)
-        worlds.place(
-            np.array([[[100.0, 0.0], [106.0, 0.0]]]), np.array([[[3.0, 0.0], [-3.0, 0.0]]])
-        )
+        start_m = np.array([[[100.0, 0.0], [106.0, 0.0]]])
+        start_mps = np.array([[[3.0, 0.0], [-3.0, 0.0]]])
+        worlds = placed(mission, start_m, start_mps, scene=scene)
         for _ in range(20):
             states = worlds.step(np.zeros((1, 2, 2)))
         ends.append(states.position_m)
@@ -254,8 +254,8 @@ def test_robots_meet_what_a_scene_adds_but_no_other_robot():
 def collided(*states):
     """Velocities of robots that collide, from (x, y, vx, vy) each, after 2 s, and before."""
     now = np.array([states])
-    worlds = Physics(paper("random-walk", num_robots=len(states), collide=True), 1)
-    worlds.place(now[..., :2].copy(), now[..., 2:].copy())
+    mission = paper("random-walk", num_robots=len(states), collide=True)
+    worlds = placed(mission, now[..., :2].copy(), now[..., 2:].copy())
     for _ in range(20):
         after = worlds.step(np.zeros((1, len(states), 2)))
     return after.velocity_mps[0], now[0, :, 2:]
@@ -279,8 +279,7 @@ def test_a_crowd_that_collides_keeps_its_energy_and_nobody_is_in_another(velocit
     rng = np.random.default_rng(2)
     grid_m = np.stack(np.meshgrid(np.arange(5), np.arange(4)), axis=-1).reshape(1, -1, 2) * 8.0 - 15
     start_mps = rng.uniform(-0.5, 0.5, grid_m.shape) * mission.max_velocity_mps
-    worlds = Physics(mission, 1)
-    worlds.place(grid_m, start_mps)
+    worlds = placed(mission, grid_m, start_mps)
     num_changes, last = 0, start_mps
     for _ in range(200):
         states = worlds.step(np.zeros_like(grid_m))
@@ -292,16 +291,6 @@ def test_a_crowd_that_collides_keeps_its_energy_and_nobody_is_in_another(velocit
     assert num_changes > 20  # other than at the boundary, which only turns signs
     fastest = np.abs(last).max() >= mission.max_velocity_mps * (1 - 1e-9)
     assert fastest or np.sum(last**2) == pytest.approx(np.sum(start_mps**2), rel=1e-3)
-
-
-def test_robots_that_collide_may_not_start_in_each_other():
-    worlds = Physics(paper("random-walk", num_robots=3, collide=True), 2)
-    position_m = np.array([[[0.0, 0.0], [5.0, 0.0], [9.0, 0.0]]] * 2)
-    worlds.place(position_m, np.zeros_like(position_m))
-    position_m[1, 2] = [5.0, 0.75]
-    said = r"robots 1 and 2 of mission 1 start 0.75 m apart, and collide below 1 m; place them"
-    with pytest.raises(ValueError, match=said):
-        worlds.place(position_m, np.zeros_like(position_m))
 
 
 def hall(half_m):
@@ -355,8 +344,7 @@ def test_a_team_at_rest_is_not_stepped_and_is_where_steps_would_leave_it(arena):
     pushed[0, 3, 0] = 1.0
     ends = []
     for scene in (None, lambda _spec, _mission: None):  # a scene's worlds are always stepped
-        worlds = Physics(mission, 1, scene=scene)
-        worlds.place(position_m, still)
+        worlds = placed(mission, position_m, still, scene=scene)
         worlds._batch = CountsSteps(worlds._batch)
         num_steps = []
         for push in (still, still, pushed, still):

@@ -7,7 +7,7 @@ from swarm_mj.mission import paper, reference
 from swarm_mj.mission.placement import draw_survivors
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.simulation.rollout import rollout
-from swarm_mj.simulation.swarm import Swarm, _streams
+from swarm_mj.simulation.swarm import Swarm
 
 NUM_WINDOWS, HALF = 21, 10  # of an odd number of windows the first half is the shorter one
 SEEDS = [1, 2, 3]
@@ -69,18 +69,6 @@ def test_any_robot_may_be_it_and_the_stream_says_who():
 @pytest.mark.parametrize(("num_windows", "first"), [(500, 250), (21, 10), (2, 1), (1, 0)])
 def test_when(num_windows, first):
     assert paper(num_windows=num_windows).failure_window == first
-
-
-@pytest.mark.parametrize("seed", [0, 7, 2**62])
-def test_placement_motion_and_policy_draw_as_if_nobody_ever_failed(seed):
-    """A mission's first three streams are those of a seed that spawns no more than three."""
-    three = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3)]
-    streams = _streams(seed)
-    assert len(streams) == 5  # the last is the channel's
-    for stream, expected in zip(streams[:3], three, strict=True):
-        assert stream.random(4).tolist() == expected.random(4).tolist()
-    drawn = [rng.random() for rng in (*three, *streams[3:])]
-    assert len(set(drawn)) == len(drawn)
 
 
 @pytest.mark.parametrize(("preset", "name"), KINDS)

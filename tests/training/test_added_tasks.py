@@ -34,7 +34,7 @@ def news_of(*entries, num_robots):
 
 @pytest.mark.parametrize("name", ["Formation", "Coverage"])
 def test_it_flies_by_name(name):
-    """As the commands in the example's own docstring do."""
+    """As the command in the example's own docstring does."""
     run = swarm_mj.fly(
         "random-walk",
         policy="tdma",

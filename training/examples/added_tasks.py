@@ -1,8 +1,6 @@
 """Two controllers that act on stale positions, formation and coverage: parts of a user's own.
 
-    cd training/examples
-    swarm-mj fly --controller added_tasks:Coverage --task random-walk
-    swarm-mj fly --controller added_tasks:Formation --task random-walk --velocity-ratio 0.6
+    swarm-mj fly --controller training.examples.added_tasks:Coverage --task random-walk
 
 `--task` says how they begin: with velocities in `random-walk`, at rest in `stationary`. But there
 `planner` takes them for robots that stay where they are, so moving teams are random walks.
