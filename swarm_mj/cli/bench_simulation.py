@@ -175,9 +175,16 @@ def _planning(mission: Mission) -> Callable[[], object]:
     def plan() -> object:
         """Plan the next epoch of one robot's snapshot."""
         snapshots = take_snapshots(buffers, 0, now, mission.window_s, num_windows / 2.0, seen)
-        is_free = np.ones(2 * num_windows, dtype=bool)
-        timestamp = buffers.timestamp[0]
-        return epoch_plan(belief, settings, snapshots, 0, timestamp, now, is_free).outcome()
+        planned = epoch_plan(
+            snapshots,
+            0,
+            belief,
+            settings,
+            timestamp=buffers.timestamp[0],
+            now=now,
+            is_free=np.ones(2 * num_windows, dtype=bool),
+        )
+        return planned.outcome()
 
     return plan
 

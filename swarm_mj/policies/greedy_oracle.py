@@ -10,18 +10,29 @@ order: `i` sends, `j` receives. Times are in slots, float32, which keeps them ex
 windows.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
+from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.policy import CentralisedPolicy
 from swarm_mj.protocol.timestamps import merge_expected, observe_own, rise
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW, LocalViews
-from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.links import Links, air_of, listen
-from swarm_mj.radio.mission_radio import TrueLinks
+from swarm_mj.radio.mission_radio import TrueLinks, radio_of
 from swarm_mj.radio.reception import NOBODY
 from swarm_mj.system.compiled import compiled
+
+
+class _Requests(NamedTuple):
+    """What is expected of a window's first slot, in which one more robot sends."""
+
+    heard: Int[np.ndarray, "N"]  # whom each robot may decode; itself: nobody
+    probability: Float[np.ndarray, "N"]  # that it does
+    after: Float32[np.ndarray, "N N"]  # T when responses are sent [slots]
+    gain: float  # the rise of T so far, summed [slots]
 
 
 class GreedyOracle(CentralisedPolicy):
@@ -33,9 +44,9 @@ class GreedyOracle(CentralisedPolicy):
 
     uses = "all buffers, all true positions and the true channel except its fades, at every moment"
 
-    def __init__(self, radio: FreeSpaceRadio) -> None:
-        """Prepare the policy for a radio, which is true unless the policy is informed otherwise."""
-        self._truth = TrueLinks(radio=radio)
+    def __init__(self, mission: Mission) -> None:
+        """Prepare the policy for the mission's radio, in free space unless informed otherwise."""
+        self._truth = TrueLinks(radio=radio_of(mission))
 
     def inform(self, truth: TrueLinks) -> None:
         """Plan with the true channel from now on."""
@@ -121,7 +132,8 @@ def window_gains(
                 gain += probability[j] * gains[heard[j], j]
             merge_expected(sent, heard, probability, after)
             observe_own(after, now + SLOTS_PER_WINDOW)
-            _add_responses(links, i, recipient, is_free, heard, probability, after, gain, value[i])
+            requests = _Requests(heard, probability, after, gain)
+            _add_responses(links, i, recipient, is_free, requests, value[i])
     return value
 
 
@@ -131,14 +143,12 @@ def _add_responses(
     i: int,
     recipient: Int[np.ndarray, "N"],
     is_free: Bool[np.ndarray, "N"],
-    heard: Int[np.ndarray, "N"],
-    probability: Float[np.ndarray, "N"],
-    after: Float32[np.ndarray, "N N"],
-    gain: float,
+    requests: _Requests,
     value: Float[np.ndarray, "N"],
 ) -> None:
     """Fill `value[r]`: the gain of the first slot and of the responses if r is i's recipient."""
     num_robots = recipient.shape[0]
+    heard, probability, after, gain = requests
     answers = np.zeros(num_robots, dtype=np.bool_)  # who may decode a packet addressed to it
     for j in range(num_robots):
         answers[j] = heard[j] != j and recipient[heard[j]] == j

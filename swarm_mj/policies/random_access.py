@@ -72,9 +72,9 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
         return self._drawn(views) if self._names_addressee else super().recipients(views)
 
     def _drawn(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        drawn = self._stream.next()
-        anyone = (drawn[:, 1] * views.num_robots).astype(np.int64)
-        return np.where(drawn[:, 0] < self._probability, anyone, views.silence)
+        chance, choice = np.moveaxis(self._stream.next(), 1, 0)
+        anyone = (choice * views.num_robots).astype(np.int64)
+        return np.where(chance < self._probability, anyone, views.silence)
 
 
 class Aloha(RandomTransmission, BroadcastPolicy):

@@ -16,7 +16,6 @@ from swarm_mj.policies.greedy_oracle import GreedyOracle
 from swarm_mj.policies.planner.link_tables import link_fields
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner
-from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.policies.policy_config import SUFFIX
 from swarm_mj.policies.random_access import Aloha, InnovationGossip, RandomFlooding
@@ -24,8 +23,6 @@ from swarm_mj.policies.sotdma.policy import SelfOrganisedTdma
 from swarm_mj.policies.tdma import SpatialTdma, Tdma
 from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.protocol.packets import fits, packet_of
-from swarm_mj.radio.free_space import from_db
-from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.system.fields import check_kind, did_you_mean
 from swarm_mj.system.packages import asset, need
 
@@ -33,26 +30,10 @@ WITHOUT_PAYLOAD = "planner --payload none"  # packets carry T, M and P alone
 PAYLOADS = ("snapshots", "none")
 
 
-def _spatial_tdma(mission: Mission) -> SpatialTdma:
-    return SpatialTdma(range_m=mission.range_m, threshold=from_db(mission.sinr_threshold_db))
-
-
-def _sotdma(mission: Mission) -> SelfOrganisedTdma:
-    is_whole = fits(packet_of(mission), mission)
-    # By the authors' rule a robot may decode while it transmits, which changes its T in that slot.
-    reads_packets = is_whole and mission.half_duplex == "strict"
-    return SelfOrganisedTdma(radio_of(mission), _spatial_tdma(mission), reads_packets=reads_packets)
-
-
-def _resting_planner(mission: Mission, *, learns: bool = False) -> RestingPlanner:
-    return RestingPlanner(mission, PlannerSettings(), _spatial_tdma(mission), learns=learns)
-
-
 def _planner(mission: Mission) -> Planner | RestingPlanner:
     if mission.task != "stationary":
         return Planner(mission)
-    learns = fits(packet_of(mission, link_fields(mission)), mission)
-    return _resting_planner(mission, learns=learns)
+    return RestingPlanner(mission, learns=fits(packet_of(mission, link_fields(mission)), mission))
 
 
 # What makes each policy, given the mission and, for these four, a transmission probability.
@@ -70,11 +51,11 @@ RULES: dict[str, Callable[..., Policy]] = {
     "aloha": lambda mission, probability: Aloha(probability, range_m=mission.range_m),
     "gossip": lambda _, probability: InnovationGossip(probability),
     "tdma": lambda _: Tdma(),
-    "spatial-tdma": _spatial_tdma,
-    "sotdma": _sotdma,
+    "spatial-tdma": SpatialTdma,
+    "sotdma": SelfOrganisedTdma,
     "planner": _planner,
-    WITHOUT_PAYLOAD: _resting_planner,
-    "greedy-oracle": lambda mission: GreedyOracle(radio_of(mission)),
+    WITHOUT_PAYLOAD: RestingPlanner,
+    "greedy-oracle": GreedyOracle,
 }
 SHIPPED = "gnn"  # in assets/policies/
 POLICIES = (*RULES, SHIPPED)

@@ -8,8 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.protocol.window import SLOT_WINDOWS, LocalViews
+from swarm_mj.radio.free_space import from_db
 from swarm_mj.radio.mission_radio import Belief
 from swarm_mj.radio.power_law import PowerLaw, no_powers
 from swarm_mj.radio.spatial_reuse import keep_joined
@@ -36,7 +38,7 @@ class Tdma(BroadcastPolicy):
         return views.silence == owner[:, None]
 
 
-class SpatialTdma(BroadcastPolicy):
+class SpatialTdma(Tdma):
     """TDMA in which robots far enough from the owner of the turn broadcast at the same time.
 
     Who joins the owner of the turn is the rule of `radio.spatial_reuse`: each robot predicts from
@@ -47,19 +49,19 @@ class SpatialTdma(BroadcastPolicy):
 
     uses = "as tdma, and the positions in its buffer: robots far enough apart share a slot"
 
-    def __init__(self, *, range_m: float, threshold: float) -> None:
-        """Take the distance at which a lone transmission just decodes, and its SINR, linear [1]."""
-        self._range_m, self._threshold = range_m, threshold
-        self._law: PowerLaw | None = None
+    def __init__(self, mission: Mission) -> None:
+        """Prepare the policy for the mission's radio, in free space unless informed otherwise."""
+        self._range_m, self._threshold = mission.range_m, from_db(mission.sinr_threshold_db)
+        self._law: PowerLaw | None = None  # of mean powers [noise]
 
     def inform(self, belief: Belief) -> None:
-        """Take the powers that robots believe in; they are in units of the noise."""
+        """Take the powers that robots believe in."""
         law, noise_mw = belief.law, belief.radio.noise_mw
         self._law = None if law is None else law._replace(at_1_m=law.at_1_m / noise_mw)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Draw every mission's order; arguments as in `Policy.start`."""
-        self._order = draw_order(num_robots, rngs)
+        """Draw every mission's order, and forget powers; arguments as in `Policy.start`."""
+        super().start(num_robots, rngs)
         self._powers = None if self._law is None else no_powers(self._law, len(rngs))
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:

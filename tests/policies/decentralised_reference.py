@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.planner.broadcast_scheduler import schedule
-from swarm_mj.policies.planner.plan import heuristic_weights, lookahead_of
+from swarm_mj.policies.planner.broadcast_scheduler import schedule_slot
+from swarm_mj.policies.planner.plan import problem_of
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import BroadcastPolicy
@@ -171,14 +171,10 @@ class Mind:
         for k in np.flatnonzero(~held.is_fresh):
             known[k] = np.minimum(known[k], held.seen[k])
             known[:, k] = np.minimum(known[:, k], held.seen[k])
-        lookahead = lookahead_of(len(known), is_certain=rests, settings=self.settings)
-        is_free = [
-            not (self.calls(h) or self.seeks(h)) for h in range(2 * begun, 2 * self.begins)
-        ] + [True] * lookahead.depth
+        problem = problem_of(links, self.settings, is_certain=rests)
+        is_free = [not (self.calls(h) or self.seeks(h)) for h in range(2 * begun, 2 * self.begins)]
         halves = (2 * known).astype(np.float32)
-        transmits = np.zeros((2 * length, len(known)), dtype=bool)
-        weights = heuristic_weights(links, self.settings)
-        schedule(halves, 2.0 * begun, links, weights, lookahead, np.array(is_free), transmits)
+        transmits = scheduled(halves, 2.0 * begun, problem, is_free)
         self.schedule, self.after = transmits[:, self.me].tolist(), halves.astype(float) / 2
 
     def calls(self, slot):
@@ -227,6 +223,16 @@ def is_near(row, k, place_m, reach_m):
     return seen[k] > 0.0 and np.hypot(*(position_m[k] - place_m)) < reach_m
 
 
+def scheduled(timestamp, now, problem, is_free):
+    """Who transmits in each slot; T is brought to the end of the last, all after which are free."""
+    free = np.array([*is_free, *[True] * problem.depth])
+    slots = [
+        schedule_slot(timestamp, now + p + 1.0, problem, free[p : p + problem.depth])
+        for p in range(len(is_free))
+    ]
+    return np.array(slots)
+
+
 PLANNED = {}  # by exactly what plans follow from, which spares working them out for every robot
 
 
@@ -234,14 +240,9 @@ def planned(links, settings, num_slots):
     """Who transmits in each slot, in one go, in a team that knows nothing at first."""
     key = (*(np.asarray(of).tobytes() for of in links), num_slots)
     if key not in PLANNED:
-        num_robots = len(links.received_mw)
-        transmits = np.zeros((num_slots, num_robots), dtype=bool)
-        nothing = np.zeros((num_robots, num_robots), dtype=np.float32)
-        weights = heuristic_weights(links, settings)
-        lookahead = lookahead_of(num_robots, is_certain=not links.is_doubtful, settings=settings)
-        free = np.ones(num_slots + lookahead.depth, dtype=bool)
-        schedule(nothing, 0.0, links, weights, lookahead, free, transmits)
-        PLANNED[key] = transmits
+        problem = problem_of(links, settings, is_certain=not links.is_doubtful)
+        nothing = np.zeros(links.received_mw.shape, dtype=np.float32)
+        PLANNED[key] = scheduled(nothing, 0.0, problem, [True] * num_slots)
     return PLANNED[key]
 
 

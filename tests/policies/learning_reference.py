@@ -35,8 +35,7 @@ SHORT = PlannerSettings(
 
 def learner(mission, settings=SHORT):
     """The planner that learns, by other numbers."""
-    turns = make_policy("spatial-tdma", mission)
-    return RestingPlanner(mission, settings, turns, learns=True)
+    return RestingPlanner(mission, settings, learns=True)
 
 
 def rounded(field, values):

@@ -37,7 +37,7 @@ def decided(policy, team):
 def test_missions_side_by_side_are_decided_apart():
     mission = paper("stationary", num_robots=9)
     teams = [flooded_team(mission, seed) for seed in range(5)]
-    policy = GreedyOracle(radio_of(mission))
+    policy = GreedyOracle(mission)
     together = policy.recipients(*told(teams))
     for recipient, team in zip(together, teams, strict=True):
         np.testing.assert_array_equal(recipient, decided(policy, team)[0])

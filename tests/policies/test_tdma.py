@@ -1,18 +1,22 @@
 """One broadcast after the other, or several far apart: the orders, the rule by hand, the law."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 from scipy.spatial.distance import pdist, squareform
-from spatial_rule import agreed_senders, radio
+from spatial_rule import agreed_senders
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tdma import SpatialTdma, Tdma
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.window import SLOT_WINDOWS, LocalViews
+from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.swarm import Swarm
 
 NUM_ROBOTS = 6
@@ -90,8 +94,8 @@ def senders(policy, views):
 
 
 def in_order(threshold=1.0):
-    """The policy of four robots, in the order of their identities."""
-    policy = SpatialTdma(range_m=250.0, threshold=threshold)
+    """The policy of four robots with a range of 250 m, in the order of their identities."""
+    policy = SpatialTdma(replace(MISSION, sinr_threshold_db=10.0 * math.log10(threshold)))
     policy.start(4, [np.random.default_rng(0)])
     policy._order = np.arange(4)[None]
     return policy
@@ -132,10 +136,10 @@ def test_who_joins_by_hand(x_m, threshold, half, expected):
 @given(
     seed=st.integers(0, 2**32 - 1),
     num_robots=st.integers(2, 25),
-    threshold=st.sampled_from([0.3, 1.25, 4.0]),
+    threshold_db=st.sampled_from([-5.0, 1.0, 6.0]),
 )
 def test_eq3_robots_that_know_all_decide_by_the_rule_and_the_others_wait(
-    seed, num_robots, threshold
+    seed, num_robots, threshold_db
 ):
     """The radio judges; half of the robots do not know one of the others."""
     rng = np.random.default_rng(seed)
@@ -143,11 +147,12 @@ def test_eq3_robots_that_know_all_decide_by_the_rule_and_the_others_wait(
     is_known = np.ones((num_robots, num_robots))
     ignorant = rng.permutation(num_robots)[: num_robots // 2]
     is_known[ignorant, (ignorant + rng.integers(1, num_robots)) % num_robots] = 0
-    policy = SpatialTdma(range_m=250.0, threshold=threshold)
+    mission = replace(MISSION, sinr_threshold_db=threshold_db)
+    policy = SpatialTdma(mission)
     policy.start(num_robots, [rng])
     (order,) = policy._order
     half = int(rng.integers(0, 100))
-    agreed = agreed_senders(order, half, position_m, radio(250.0, threshold))
+    agreed = agreed_senders(order, half, position_m, radio_of(mission))
     expected = (agreed - set(ignorant.tolist())) | {order[half % num_robots]}
     assert senders(policy, views_of(position_m, is_known, half)) == expected
 

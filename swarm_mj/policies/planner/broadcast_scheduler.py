@@ -27,83 +27,58 @@ from swarm_mj.radio.links import (
     chance_of_strongest,
     incoming_with,
     listen,
-    lone_probabilities,
 )
 from swarm_mj.radio.reception import NOBODY, Air, silent_air
 from swarm_mj.system.compiled import compiled
 
 
-class Weights(NamedTuple):
-    """The value of news to a receiver (row) about a subject (column)."""
+class Problem(NamedTuple):
+    """All that schedules over the same links follow from, but T, t and the slots that are free."""
 
-    squared_rise: Float32[np.ndarray, "N N"]  # times the square of what T rises by
+    links: Links
+    lone: Float[np.ndarray, "N N"]  # probability that j decodes i when nobody else transmits
+    weight: Float32[np.ndarray, "N N"]  # of a squared rise of T, by receiver j and subject k
     min_share: float  # of a slot's value that must remain when a transmitter is added
-
-
-class Lookahead(NamedTuple):
-    """How far a schedule looks ahead."""
-
     width: int  # first transmitters that are tried; 1: none but the best
     depth: int  # how long each is followed, the slot in question included [slots]
 
 
-class _Task(NamedTuple):
-    """The inputs of a schedule."""
-
-    links: Links
-    weights: Weights
-    lone: Float[np.ndarray, "N N"]  # probability that j decodes i when nobody else transmits
-
-
 @compiled()
-def schedule(
+def schedule_slot(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
-    links: Links,
-    weights: Weights,
-    lookahead: Lookahead,
-    is_free: Bool[np.ndarray, "P"],
-    transmits: Bool[np.ndarray, "P N"],
-) -> None:
-    """Fill `transmits`, slot by slot, and bring `timestamp` from `now` to the end of the last.
+    problem: Problem,
+    is_free: Bool[np.ndarray, "depth"],
+) -> Bool[np.ndarray, "N"]:
+    """Return who transmits in the slot that ends now, and bring `timestamp` to its end.
 
-    In slots that are not free nobody transmits. Looking ahead may reach beyond those to be filled.
+    Slots that are not free, this one or one of those looked ahead to, are silent.
     """
-    task = _Task(links, weights, lone_probabilities(links))
-    after = np.empty_like(timestamp)
-    for p in range(transmits.shape[0]):
-        now += 1.0
-        observe_own(timestamp, now)
-        if is_free[p]:
-            first = NOBODY
-            if lookahead.width > 1:
-                ahead = is_free[p : p + lookahead.depth]
-                first = _best_first(timestamp, now, task, lookahead.width, ahead)
-            _choose(timestamp, task, first, transmits[p], after)
-            for i in range(timestamp.shape[0]):
-                for k in range(timestamp.shape[0]):
-                    timestamp[i, k] = after[i, k]
-        else:
-            transmits[p, :] = False
+    observe_own(timestamp, now)
+    if not is_free[0]:
+        return np.zeros(timestamp.shape[0], dtype=np.bool_)
+    first = NOBODY
+    if problem.width > 1:
+        first = _best_first(timestamp, now, problem, is_free)
+    return _choose(timestamp, problem, first)
 
 
 @compiled()
 def _best_first(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
-    task: _Task,
-    width: int,
-    is_free: Bool[np.ndarray, "P"],
+    problem: Problem,
+    is_free: Bool[np.ndarray, "depth"],
 ) -> int:
     """Return the first transmitter of a slot by whose branch most is known, or `NOBODY`."""
     num_robots = timestamp.shape[0]
-    gain, _ = _gains(timestamp, task)
+    gain, _ = _gains(timestamp, problem)
     air, nobody = silent_air(num_robots), np.zeros(num_robots, dtype=np.bool_)
     alone = np.empty(num_robots)
     for i in range(num_robots):
-        alone[i] = _value(task.links, gain, air, nobody, i)
+        alone[i] = _value(problem.links, gain, air, nobody, i)
     best, most_known = NOBODY, -np.inf
-    for _ in range(width):
+    for _ in range(problem.width):
         first, first_value = NOBODY, 0.0
         for i in range(num_robots):
             if alone[i] > first_value:
@@ -111,7 +86,7 @@ def _best_first(
         if first == NOBODY:
             return best
         alone[first] = 0.0
-        known = _follow(timestamp, now, task, first, is_free)
+        known = _follow(timestamp, now, problem, first, is_free)
         if known > most_known:
             best, most_known = first, known
     return best
@@ -121,44 +96,38 @@ def _best_first(
 def _follow(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
-    task: _Task,
+    problem: Problem,
     first: int,
-    is_free: Bool[np.ndarray, "P"],
+    is_free: Bool[np.ndarray, "depth"],
 ) -> float:
     """Return the sum of all timestamps after each of the slots that begin with this transmitter."""
-    before, after = timestamp.copy(), np.empty_like(timestamp)
-    transmits = np.zeros(timestamp.shape[0], dtype=np.bool_)
+    timestamp = timestamp.copy()
     known = 0.0
     for p in range(is_free.shape[0]):
         if p > 0:
             now += 1.0
-            observe_own(before, now)
+            observe_own(timestamp, now)
         if is_free[p]:
-            _choose(before, task, first if p == 0 else NOBODY, transmits, after)
-            before, after = after, before
+            _choose(timestamp, problem, first if p == 0 else NOBODY)
         total = np.float32(0.0)
-        for i in range(before.shape[0]):
-            for k in range(before.shape[0]):
-                total += before[i, k]
+        for i in range(timestamp.shape[0]):
+            for k in range(timestamp.shape[0]):
+                total += timestamp[i, k]
         known += float(total)
     return known
 
 
 @compiled()
 def _choose(
-    timestamp: Float32[np.ndarray, "N N"],
-    task: _Task,
-    first: int,
-    transmits: Bool[np.ndarray, "N"],
-    after: Float32[np.ndarray, "N N"],
-) -> None:
-    """Fill in a slot's transmitters, a given first one before all others, and T as it follows."""
-    num_robots, links = timestamp.shape[0], task.links
-    gain, has_news = _gains(timestamp, task)
+    timestamp: Float32[np.ndarray, "N N"], problem: Problem, first: int
+) -> Bool[np.ndarray, "N"]:
+    """Return a slot's transmitters, a given first one among them, and bring T to its end."""
+    num_robots, links = timestamp.shape[0], problem.links
+    gain, has_news = _gains(timestamp, problem)
     air = silent_air(num_robots)
     heard, probability = np.empty(num_robots, dtype=np.int64), np.empty(num_robots)
+    transmits = np.zeros(num_robots, dtype=np.bool_)
     listens = np.ones(num_robots, dtype=np.bool_)
-    transmits[:] = False
     best, value = first, 0.0
     if first != NOBODY:
         value = _value(links, gain, air, transmits, first)
@@ -166,7 +135,7 @@ def _choose(
         if best != NOBODY:
             transmits[best], listens[best] = True, False
             broadcast(links, air, best)
-        best, best_value = NOBODY, value * task.weights.min_share
+        best, best_value = NOBODY, value * problem.min_share
         for i in range(num_robots):
             if listens[i] and has_news[i]:
                 with_i = _value(links, gain, air, transmits, i)
@@ -177,7 +146,9 @@ def _choose(
         value = best_value
     # The sum of powers anew, since its rounding depends on the order of the transmitters.
     listen(links, air_of(links, transmits), NOBODY, listens, heard, probability)
-    merge_expected(timestamp, heard, probability, after)
+    # In place: a robot that transmits decodes nothing, so its row is as it was sent.
+    merge_expected(timestamp, heard, probability, timestamp)
+    return transmits
 
 
 @compiled()
@@ -201,7 +172,7 @@ def _value(
 
 @compiled()
 def _gains(
-    timestamp: Float32[np.ndarray, "N N"], task: _Task
+    timestamp: Float32[np.ndarray, "N N"], problem: Problem
 ) -> tuple[Float[np.ndarray, "N N"], Bool[np.ndarray, "N"]]:
     """Return the value of j decoding i, where it can, and which robots have news for anyone."""
     num_robots = timestamp.shape[0]
@@ -209,9 +180,8 @@ def _gains(
     has_news = np.zeros(num_robots, dtype=np.bool_)
     for i in range(num_robots):
         for j in range(num_robots):
-            if task.lone[i, j] > 0.0:
-                weight = task.weights.squared_rise[j]
-                gain[i, j] = _gain(timestamp[i], timestamp[j], weight)
+            if problem.lone[i, j] > 0.0:
+                gain[i, j] = _gain(timestamp[i], timestamp[j], problem.weight[j])
                 if gain[i, j] > 0.0:
                     has_news[i] = True
     return gain, has_news

@@ -4,12 +4,16 @@ Both need only what is common before the mission: identities, the team's size an
 the clock. What a robot hears meanwhile can only keep it silent.
 """
 
+from typing import Literal
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
+
+Phase = Literal["discovery", "search", "plan"]
 
 
 class Discovery:
@@ -39,14 +43,14 @@ class Discovery:
         windows = min(settings.search_rounds * num_robots, settings.latest_search_windows)
         self._search_slot = SLOTS_PER_WINDOW * windows
 
-    def is_discovered(self, slot: int, is_known: Bool[np.ndarray, "N"]) -> bool:
-        """Return whether a slot is the discovery's, by a snapshot that knows these robots."""
-        return slot < self._search_slot and not np.all(is_known)
-
-    def is_sought(self, slot: int, is_fresh: Bool[np.ndarray, "N"]) -> bool:
-        """Return whether a slot is the search's, by a snapshot in which these are fresh."""
+    def phase(
+        self, slot: int, is_known: Bool[np.ndarray, "N"], is_fresh: Bool[np.ndarray, "N"]
+    ) -> Phase:
+        """Return whose a slot is, by a snapshot that knows some robots, of which some are fresh."""
+        if slot < self._search_slot:
+            return "plan" if np.all(is_known) else "discovery"
         is_turn = (slot // SLOTS_PER_WINDOW) % self._settings.search_every_windows == 0
-        return is_turn and slot >= self._search_slot and not np.all(is_fresh)
+        return "search" if is_turn and not np.all(is_fresh) else "plan"
 
     def transmits(self, slot: int, buffers: Buffers, b: int) -> Bool[np.ndarray, "N"]:
         """Return whose turn it is, except robots that know one nearby that comes before them."""

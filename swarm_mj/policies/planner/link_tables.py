@@ -10,7 +10,6 @@ that the sender plans by, and the best of the next.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -26,7 +25,7 @@ from swarm_mj.policies.planner.link_evidence import (
     Evidence,
 )
 from swarm_mj.policies.planner.settings import PlannerSettings
-from swarm_mj.policies.planner.snapshots import NUM_SENT
+from swarm_mj.policies.planner.snapshots import NUM_SENT, Proposals
 from swarm_mj.protocol.packets import PacketField, bits_for, identity, times
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.links import Curves, Links, decode_curves, doubtful, probability_at
@@ -57,10 +56,10 @@ class LinkTable:
         return not (fades or np.any(self.mean_db) or np.any(self.std_db))
 
 
-class Tables(NamedTuple):
-    """The tables of all robots at one time."""
+@dataclass(frozen=True, kw_only=True)
+class Tables(Proposals):
+    """The tables of all robots at one time; the best is that of the youngest knowledge."""
 
-    rank: Int[np.ndarray, "N"]  # the best table has rank 0: its owner's knowledge is youngest
     table: Callable[[int], LinkTable]  # of one robot, fitted when asked for
 
 
@@ -69,7 +68,12 @@ def tables_of(
 ) -> Tables:
     """Return what follows if [j, i] is the last slot of which j knows what i observed."""
     rank = np.argsort(np.argsort(-np.sum(known_until, axis=1), kind="stable"))
-    return Tables(rank, cache(lambda owner: fit(*evidence.counts(known_until[owner]), settings)))
+
+    def table(owner: int) -> LinkTable:
+        decoded, missed = evidence.counts(known_until[owner])
+        return fit(decoded, missed, settings)
+
+    return Tables(rank=rank, held=np.arange(len(rank)), table=cache(table))
 
 
 def fit(decoded: Counts, missed: Counts, settings: PlannerSettings) -> LinkTable:
@@ -81,9 +85,11 @@ def fit(decoded: Counts, missed: Counts, settings: PlannerSettings) -> LinkTable
     log_decoded, log_missed = _log_probabilities()
     prior = _priors()
     one, other = np.triu_indices(num_robots, 1)
-    pair = [(counts + counts.transpose(1, 0, 2))[one, other] for counts in (decoded, missed)]
-    log_likelihood = np.einsum("lk,kfx->lfx", pair[0], log_decoded)
-    log_likelihood += np.einsum("lk,kfx->lfx", pair[1], log_missed)
+    # A link is the same in both directions, and so is what was observed of it.
+    link_decoded = (decoded + decoded.transpose(1, 0, 2))[one, other]
+    link_missed = (missed + missed.transpose(1, 0, 2))[one, other]
+    log_likelihood = np.einsum("lk,kfx->lfx", link_decoded, log_decoded)
+    log_likelihood += np.einsum("lk,kfx->lfx", link_missed, log_missed)
     most = log_likelihood.max(axis=2, keepdims=True)
     likelihood = np.exp(log_likelihood - most)
     evidence = np.einsum("lfx,px->lfp", likelihood, prior) + np.finfo(np.float64).tiny
@@ -93,9 +99,8 @@ def fit(decoded: Counts, missed: Counts, settings: PlannerSettings) -> LinkTable
     mean_db = weight @ EXCESS_DB
     std_db = np.sqrt(np.maximum(weight @ EXCESS_DB**2 - mean_db**2, 0.0))
     table = np.zeros((2, num_robots, num_robots))
-    table[:, one, other] = table[:, other, one] = STEP_DB * np.rint(
-        np.stack([mean_db, std_db]) / STEP_DB
-    )
+    rounded_db = STEP_DB * np.rint(np.stack([mean_db, std_db]) / STEP_DB)
+    table[:, one, other] = table[:, other, one] = rounded_db
     return LinkTable(law=law, mean_db=table[0], std_db=table[1])
 
 

@@ -4,27 +4,25 @@ News has heuristic weights, by hand, from the graph of links that a scheduler be
 row `i` sends or is passed through, column `j` or `k` is reached or is the subject.
 """
 
-import math
-
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.policies.planner.broadcast_scheduler import Lookahead, Weights, schedule
+from swarm_mj.policies.planner.broadcast_scheduler import Problem, schedule_slot
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import Snapshots
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 from swarm_mj.radio.links import Links, lone_probabilities
 from swarm_mj.radio.mission_radio import Belief
-from swarm_mj.system.compiled import compiled
 
-CHUNK_SLOTS = 10  # planned at a time, whatever is asked for; any number gives the same plan
+ALL_FREE = np.ones(0, dtype=bool)  # slots beyond those that are named are free
 
 
 class Plan:
     """The transmitters of each slot, numbered from 0, between robots that stand still.
 
-    Without more arguments, the plan is endless and begins with a team that knows nothing.
+    Without more arguments, it begins with a team that knows nothing. It has no end: slots are
+    planned as they are asked for.
     """
 
     def __init__(
@@ -35,63 +33,46 @@ class Plan:
         is_certain: bool | None = None,
         timestamp: Float[np.ndarray, "N N"] | None = None,
         now: float = 0.0,
-        is_free: Bool[np.ndarray, "P"] | None = None,
+        is_free: Bool[np.ndarray, "P"] = ALL_FREE,
     ) -> None:
-        """Prepare a plan that begins with T and t [windows], and ends with the slots, free or not.
+        """Prepare a plan that begins with T and t [windows], and in which some slots are not free.
 
         It looks as far ahead as on certain links if that is said, or else if its links are.
         """
-        num_robots = len(links.received_mw)
         is_certain = not links.is_doubtful if is_certain is None else is_certain
-        timestamp = np.full((num_robots, num_robots), NEVER) if timestamp is None else timestamp
-        self._links, self._weights = links, heuristic_weights(links, settings)
-        self._lookahead = lookahead_of(num_robots, is_certain=is_certain, settings=settings)
+        timestamp = np.full_like(links.received_mw, NEVER) if timestamp is None else timestamp
+        self._problem = problem_of(links, settings, is_certain=is_certain)
         self._timestamp = (SLOTS_PER_WINDOW * timestamp).astype(np.float32)  # [slots]
         self._now = SLOTS_PER_WINDOW * now
-        self._num_slots = math.inf if is_free is None else len(is_free)
-        self._is_free = np.ones(0, dtype=bool) if is_free is None else is_free
+        self._is_free = is_free
         self._transmits = []  # by slots
 
     def transmits(self, slot: int) -> Bool[np.ndarray, "N"]:
-        """Return who transmits in a slot, or raise IndexError if the plan ends before."""
-        if slot >= self._num_slots:
-            raise IndexError(f"the plan has {self._num_slots} slots")
-        while slot >= len(self._transmits):
-            self._extend()
+        """Return who transmits in a slot."""
+        self._plan(slot + 1)
         return self._transmits[slot]
 
     def outcome(self) -> Float[np.ndarray, "N N"]:
-        """Return T after the last slot of a plan that ends, as expected [windows]."""
-        assert math.isfinite(self._num_slots)
-        while len(self._transmits) < self._num_slots:
-            self._extend()
+        """Return T after the last slot of which it was said whether it is free [windows]."""
+        self._plan(len(self._is_free))
+        assert len(self._transmits) == len(self._is_free)
         return self._timestamp.astype(np.float64) / SLOTS_PER_WINDOW
 
-    def _extend(self) -> None:
-        begin, num_robots = len(self._transmits), len(self._timestamp)
-        num_slots = int(min(CHUNK_SLOTS, self._num_slots - begin))
-        # Looking ahead reaches beyond these slots, and beyond the plan's end, where all are free.
-        is_free = np.ones(num_slots + self._lookahead.depth, dtype=bool)
-        known = self._is_free[begin : begin + len(is_free)]
-        is_free[: len(known)] = known
-        transmits, now = np.empty((num_slots, num_robots), dtype=bool), self._now + begin
-        network = self._links, self._weights, self._lookahead
-        schedule(self._timestamp, now, *network, is_free, transmits)
-        self._transmits.extend(transmits)
-
-
-def lookahead_of(num_robots: int, *, is_certain: bool, settings: PlannerSettings) -> Lookahead:
-    """Return how far a team of this size looks ahead, on certain or on merely believed links."""
-    if num_robots > settings.max_lookahead_robots:
-        return Lookahead(1, 1)
-    return Lookahead(*(settings.rest_lookahead if is_certain else settings.moving_lookahead))
+    def _plan(self, num_slots: int) -> None:
+        for slot in range(len(self._transmits), num_slots):
+            named = self._is_free[slot : slot + self._problem.depth]
+            is_free = np.ones(self._problem.depth, dtype=bool)
+            is_free[: len(named)] = named
+            now = self._now + slot + 1.0
+            self._transmits.append(schedule_slot(self._timestamp, now, self._problem, is_free))
 
 
 def epoch_plan(
-    belief: Belief,
-    settings: PlannerSettings,
     snapshots: Snapshots,
     owner: int,
+    belief: Belief,
+    settings: PlannerSettings,
+    *,
     timestamp: Float[np.ndarray, "N N"],
     now: float,
     is_free: Bool[np.ndarray, "P"],
@@ -115,29 +96,46 @@ def epoch_plan(
     )
 
 
-def heuristic_weights(links: Links, settings: PlannerSettings) -> Weights:
-    """Return the weights of squared rises of T: more at receivers that many robots lie behind.
+def problem_of(links: Links, settings: PlannerSettings, *, is_certain: bool) -> Problem:
+    """Return what schedules over these links follow from, with heuristic weights of news.
 
-    Squares prefer the stalest entries to many small refreshments. A receiver that passes news on to
-    many others should get it early. The denser the links, the smaller the share of a slot's value
-    that must remain when another robot transmits, and so the more robots transmit at once. Where
-    links or positions are doubtful or a robot has no link, plans should not rely on every packet.
+    Squared rises of T prefer the stalest entries to many small refreshments. They weigh more at
+    receivers that many robots lie behind, for a receiver that passes news on to many others should
+    get it early. On certain links looking further ahead pays.
     """
-    probability = lone_probabilities(links)
-    is_linked = probability >= settings.min_probability
-    has_link = np.any(is_linked, axis=1)
-    hops = expected_hops(np.where(is_linked, probability, 0.0))
+    lone, num_robots = lone_probabilities(links), len(links.received_mw)
+    hops = expected_hops(np.where(lone >= settings.min_probability, lone, 0.0))
     behind = np.maximum(num_downstream(hops, settings.slack_hops), 1.0)
     weight = behind**settings.downstream_exponent
-    weight *= np.clip(hops, 1.0, len(weight)) ** settings.hops_exponent
+    weight *= np.clip(hops, 1.0, num_robots) ** settings.hops_exponent
+    width, depth = settings.rest_lookahead if is_certain else settings.moving_lookahead
+    if num_robots > settings.max_lookahead_robots:
+        width, depth = 1, 1
+    return Problem(
+        links=links,
+        lone=lone,
+        weight=weight.astype(np.float32),
+        min_share=_min_share(links, lone, settings),
+        width=width,
+        depth=depth,
+    )
+
+
+def _min_share(links: Links, lone: Float[np.ndarray, "N N"], settings: PlannerSettings) -> float:
+    """Return the share of a slot's value that must remain when another robot transmits.
+
+    The denser the links, the smaller it is, and so the more robots transmit at once. Where links or
+    positions are doubtful or a robot has no link, plans should not rely on every packet.
+    """
+    has_link = np.any(lone >= settings.min_probability, axis=1)
+    total, num_linked = float(np.sum(lone)), int(np.sum(has_link))
     share = settings.share_unlinked
-    total, num_linked = float(np.sum(probability)), int(np.sum(has_link))
     if not links.is_doubtful:
         share += settings.share_per_link * total / max(1, num_linked * (num_linked - 1))
-    doubt = np.sum(probability / links.distance_over_std) / max(total, settings.min_probability)
+    doubt = np.sum(lone / links.distance_over_std) / max(total, settings.min_probability)
     share += settings.share_per_std * float(doubt)
     share += 0.0 if np.all(has_link) else settings.share_isolated
-    return Weights(weight.astype(np.float32), min(share, settings.max_share))
+    return min(share, settings.max_share)
 
 
 def expected_hops(probability: Float[np.ndarray, "N N"]) -> Float[np.ndarray, "N N"]:
@@ -150,16 +148,11 @@ def expected_hops(probability: Float[np.ndarray, "N N"]) -> Float[np.ndarray, "N
     return hops
 
 
-@compiled()
 def num_downstream(hops: Float[np.ndarray, "N N"], slack: float) -> Float[np.ndarray, "N N"]:
     """Return how many robots lie behind i for news of k, i itself among them; 0 out of reach."""
-    num_robots = hops.shape[0]
-    behind = np.zeros((num_robots, num_robots))
-    for i in range(num_robots):
-        for k in range(num_robots):
-            if hops[k, i] < np.inf:
-                for j in range(num_robots):
-                    if hops[k, j] < np.inf:
-                        detour = hops[k, i] + hops[i, j] - hops[k, j]
-                        behind[i, k] += 1.0 if detour < slack else 0.0
+    behind = np.empty_like(hops)
+    with np.errstate(invalid="ignore"):  # where j is out of reach: inf - inf is below no slack
+        for k in range(len(hops)):
+            detour = hops[k, :, None] + hops - hops[k]  # [i, j]: of k's news to j through i
+            behind[:, k] = np.sum(detour < slack, axis=1)
     return behind

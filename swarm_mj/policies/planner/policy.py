@@ -21,16 +21,15 @@ whenever a robot was not heard from for long, some windows are left to the searc
 
 import math
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.planner.discovery import Discovery
 from swarm_mj.policies.planner.plan import Plan, epoch_plan
 from swarm_mj.policies.planner.settings import PlannerSettings
-from swarm_mj.policies.planner.snapshots import Snapshots, better, snapshot_fields, take_snapshots
+from swarm_mj.policies.planner.snapshots import Snapshots, snapshot_fields, take_snapshots
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.protocol.buffers import NEVER, Buffers
 from swarm_mj.protocol.packets import (
@@ -112,17 +111,15 @@ class _Team:
         num_reaches = mission.side_m**2 / (math.pi * mission.range_m**2)
         self._discovery = Discovery(num_robots, num_reaches, mission.range_m, settings, rng)
         self._belief, self._settings, self._window_s = belief, settings, mission.window_s
-        everyone = self._everyone = np.arange(num_robots)
+        self._everyone = np.arange(num_robots)
         self._first: float | None = None  # when the first decision was asked for [windows]
         self._epoch = -1
         self._begin = self._end = 0  # of the epoch, after the first decision [windows]
         self._num_skipped = 0  # epochs without a discovery begin with the second
         self._current: Snapshots | None = None  # taken for this epoch
         self._upcoming: Snapshots | None = None  # taken for the next one
-        self._holds = everyone  # the owner of the current snapshot that i flies by
-        self._will_hold = everyone  # the owner of the best upcoming snapshot that i has
         self._plans: dict[int, Plan] = {}  # of this epoch, by the owner of the snapshot
-        self._planned_by = everyone  # the owner of i's plan when it took its upcoming snapshot
+        self._planned_by = self._everyone  # the owner of i's plan when it took its upcoming one
         self._before: list[Plan | None] = []  # what i followed in the last epoch
 
     def transmits(self, views: LocalViews, b: int) -> Bool[np.ndarray, "N"]:
@@ -131,32 +128,36 @@ class _Team:
         self._first = now if self._first is None else self._first
         slot = round((now - self._first) / SLOT_WINDOWS)
         heard = views.phases[-1].heard[b] if views.phases else self._everyone
-        held = self._holds
+        held = self._held()
         # Packets of the last slot carry snapshots of the epoch that may end now, so they are
         # adopted before the next one begins.
-        if self._current is not None:
-            self._holds = better(self._current.rank, self._holds, heard)
-        if self._upcoming is not None:
-            self._will_hold = better(self._upcoming.rank, self._will_hold, heard)
+        for snapshots in (self._current, self._upcoming):
+            if snapshots is not None:
+                snapshots.adopt(heard)
         if slot >= SLOTS_PER_WINDOW * self._end:
             self._begin_epoch(views.buffers, b, now)
-        if self._current is None:
+        if (current := self._current) is None:
             return self._discovery.transmits(slot, views.buffers, b)
         transmits = np.zeros(len(self._everyone), dtype=bool)
-        was_fresh = self._current.is_fresh[held]
-        for owner in np.unique(self._holds).tolist():
+        was_fresh = current.is_fresh[held]
+        for owner in np.unique(current.held).tolist():
             # Made even where nobody follows it yet, since the next epoch's plan continues it.
-            plan = self._plan(self._current, owner)
-            is_known, is_fresh = self._current.is_known[owner], self._current.is_fresh[owner]
-            if self._discovery.is_discovered(slot, is_known):
+            plan = self._plan(current, owner)
+            is_fresh = current.is_fresh[owner]
+            phase = self._discovery.phase(slot, current.is_known[owner], is_fresh)
+            if phase == "discovery":
                 chosen = self._discovery.transmits(slot, views.buffers, b)
-            elif self._discovery.is_sought(slot, is_fresh):
+            elif phase == "search":
                 chosen = self._discovery.seeks(slot, is_fresh, was_fresh, heard, views.buffers, b)
             else:
                 chosen = plan.transmits(slot - SLOTS_PER_WINDOW * self._begin)
-            follows = self._holds == owner
+            follows = current.held == owner
             transmits[follows] = chosen[follows]
         return transmits
+
+    def _held(self) -> Int[np.ndarray, "N"]:
+        """Return whose snapshot each robot flies by, itself if it has none yet."""
+        return self._everyone if self._current is None else self._current.held.copy()
 
     def _begin_epoch(self, buffers: Buffers, b: int, now: float) -> None:
         """Fly by the snapshots taken for this epoch, and take those for the next."""
@@ -168,38 +169,39 @@ class _Team:
         epoch, num_robots = self._epoch + self._num_skipped, len(self._everyone)
         length = epoch_windows(epoch, num_robots, self._settings)
         self._begin, self._end = self._end, self._end + length
-        take = partial(take_snapshots, buffers, b, now, self._window_s, settings=self._settings)
-        if is_common:
-            self._upcoming = take(windows_ahead=length / 2.0)
-            self._will_hold = np.zeros_like(self._everyone)  # all snapshots are the same
-        self._current, self._holds = self._upcoming, self._will_hold
+
+        def take(windows_ahead: float) -> Snapshots:
+            taken = take_snapshots(buffers, b, now, self._window_s, windows_ahead, self._settings)
+            if is_common:
+                taken.held[:] = 0  # all are the same
+            return taken
+
+        self._current = take(length / 2.0) if is_common else self._upcoming
         if epoch > 0:
             next_length = epoch_windows(epoch + 1, num_robots, self._settings)
-            self._upcoming = take(windows_ahead=length + next_length / 2.0)
-            self._will_hold = self._holds if is_common else self._everyone
-            self._planned_by = self._holds
+            self._upcoming = take(length + next_length / 2.0)
+            self._planned_by = self._held()
 
     def _plan(self, current: Snapshots, owner: int) -> Plan:
         """Return the plan that follows from someone's snapshot."""
         if owner not in self._plans:
-            before, is_fresh = self._before[owner], current.is_fresh[owner]
+            is_known, is_fresh = current.is_known[owner], current.is_fresh[owner]
+            before = self._before[owner]
             # At rest nothing else would correct two robots that expect different timestamps.
             is_at_rest = not np.any(current.position_std_m[owner])
             if is_at_rest and self._epoch % self._settings.forget_every == 0:
                 before = None
-            is_left = [
-                not self._discovery.is_discovered(slot, current.is_known[owner])
-                and not self._discovery.is_sought(slot, is_fresh)
-                for slot in range(SLOTS_PER_WINDOW * self._begin, SLOTS_PER_WINDOW * self._end)
-            ]
+            slots = range(SLOTS_PER_WINDOW * self._begin, SLOTS_PER_WINDOW * self._end)
+            phases = [self._discovery.phase(slot, is_known, is_fresh) for slot in slots]
+            nothing = np.full(current.is_known.shape, NEVER)
             self._plans[owner] = epoch_plan(
-                self._belief,
-                self._settings,
                 current,
                 owner,
-                np.full(is_fresh.shape * 2, NEVER) if before is None else before.outcome(),
-                self._begin + (self._first or 0.0),
-                np.array(is_left),
+                self._belief,
+                self._settings,
+                timestamp=nothing if before is None else before.outcome(),
+                now=self._begin + (self._first or 0.0),
+                is_free=np.array(phases) == "plan",
             )
         return self._plans[owner]
 

@@ -29,7 +29,7 @@ from swarm_mj.policies.planner.link_tables import Tables, corrected, link_fields
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
-from swarm_mj.policies.planner.snapshots import better, snapshot_fields
+from swarm_mj.policies.planner.snapshots import snapshot_fields
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.tdma import SpatialTdma
 from swarm_mj.protocol.packets import PacketField, fits, packet_of
@@ -49,15 +49,16 @@ class RestingPlanner(BroadcastPolicy):
     """
 
     def __init__(
-        self, mission: Mission, settings: PlannerSettings, turns: SpatialTdma, *, learns: bool
+        self, mission: Mission, settings: PlannerSettings | None = None, *, learns: bool = False
     ) -> None:
         """Prepare the policy, whose packets carry what robots observed of links, if it learns.
 
-        Robots that cannot plan follow the turns. If it learns, those that hear of motion follow the
+        Robots that cannot plan take turns. If it learns, those that hear of motion follow the
         planner of moving teams, unless only links fit into packets, as in some large teams.
         """
         self._belief = Belief(radio=radio_of(mission))
-        self._settings, self._turns, self._learns = settings, turns, learns
+        self._settings, self._learns = settings or PlannerSettings(), learns
+        self._turns = SpatialTdma(mission)
         is_ready = learns and fits(packet_of(mission, snapshot_fields(mission)), mission)
         self._moving = Planner(mission) if is_ready else None
         self.uses = (
@@ -137,8 +138,6 @@ class _Team:
         self._current: Tables | None = None
         self._current_begin = 0  # the slot since when robots fly by these tables
         self._next: Tables | None = None
-        self._holds = self._everyone  # the owner of the best of the current tables that i has
-        self._will_hold = self._everyone  # the same of the next ones
 
     def transmits(
         self, views: LocalViews, b: int, in_turn: Bool[np.ndarray, "N"]
@@ -185,19 +184,16 @@ class _Team:
         kinds = np.full(len(self._everyone), NOTHING)
         for follows, flight, planned in self._followed:
             listens = follows & ~self._transmitted & knows_all
-            believed = flight.expected_mw, flight.prior
-            kinds = np.maximum(kinds, observe(listens, heard, planned, *believed))
+            noted = observe(listens, heard, planned, flight.expected_mw, flight.prior)
+            kinds = np.maximum(kinds, noted)
         self._evidence.add(kinds)
-        if self._current is not None:
-            self._holds = better(self._current.rank, self._holds, heard)
-        if self._next is not None:
-            self._will_hold = better(self._next.rank, self._will_hold, heard)
+        for tables in (self._current, self._next):
+            if tables is not None:
+                tables.adopt(heard)
         if self._are_flown(slot + round(self._settings.spread_rounds * self._round)):
             self._next = tables_of(self._evidence, known_until, self._settings)
-            self._will_hold = self._everyone
         if self._are_flown(slot) and self._next is not None:
-            self._current, self._holds = self._next, self._will_hold
-            self._current_begin = slot
+            self._current, self._current_begin = self._next, slot
             self._flights = {key: of for key, of in self._flights.items() if key[1] is None}
 
     def _are_flown(self, slot: int) -> bool:
@@ -209,7 +205,7 @@ class _Team:
         """Return the owner of the table that i flies by; None if it changes nothing."""
         if self._current is None:
             return None
-        owner = int(self._holds[i])
+        owner = int(self._current.held[i])
         return None if self._current.table(owner).changes_nothing else owner
 
     def _flight(self, position_m: Float[np.ndarray, "N 2"], owner: int | None) -> _Flight:

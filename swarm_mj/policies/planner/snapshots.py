@@ -19,18 +19,30 @@ NUM_SENT = 2  # snapshots or tables in a packet: the current one, and the best o
 
 
 @dataclass(frozen=True, kw_only=True)
-class Snapshots:
-    """Each robot i's belief about every robot k when the epoch began: one snapshot a robot.
+class Proposals:
+    """What every robot made at one moment for all to use, and whose each of them holds by now.
 
-    A snapshot never changes. Packets carry it whole, so the identity of its owner stands for it.
+    What a robot made never changes. Packets carry it whole, so its maker's identity stands for it.
     """
+
+    rank: Int[np.ndarray, "N"]  # of what i made; the best has rank 0
+    held: Int[np.ndarray, "N"]  # whose i holds: the best that it made or decoded
+
+    def adopt(self, heard: Int[np.ndarray, "N"]) -> None:
+        """Let robots take over what the senders they decoded hold, where that is better."""
+        theirs = self.held[heard]
+        self.held[:] = np.where(self.rank[theirs] < self.rank[self.held], theirs, self.held)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Snapshots(Proposals):
+    """Each robot i's belief about every robot k when the epoch began: one snapshot a robot."""
 
     is_known: Bool[np.ndarray, "N N"]  # whether i had ever heard of k
     is_fresh: Bool[np.ndarray, "N N"]  # whether that was not too long ago
     position_m: Float[np.ndarray, "N N 2"]  # of k in the middle of the epoch [m]
     position_std_m: Float[np.ndarray, "N N"]  # its standard deviation, per axis [m]
     timestamp: Float[np.ndarray, "N N"]  # when k observed itself so [windows]
-    rank: Int[np.ndarray, "N"]  # the best snapshot has rank 0
 
 
 def take_snapshots(
@@ -69,18 +81,8 @@ def take_snapshots(
         position_std_m=position_std_m,
         timestamp=timestamp.copy(),
         rank=np.argsort(np.lexsort((np.sum(age * is_fresh, axis=1) / num_fresh, -num_fresh))),
+        held=np.arange(num_robots),
     )
-
-
-def better(
-    rank: Int[np.ndarray, "N"], owner: Int[np.ndarray, "N"], heard: Int[np.ndarray, "N"]
-) -> Int[np.ndarray, "N"]:
-    """Return the owner of the better of two objects, that i has and that it heard, by their rank.
-
-    Every robot makes such an object, adopts a better one that it decodes, and passes it on.
-    """
-    theirs = owner[heard]
-    return np.where(rank[theirs] < rank[owner], theirs, owner)
 
 
 def snapshot_fields(mission: Mission) -> tuple[PacketField, ...]:

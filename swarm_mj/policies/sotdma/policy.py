@@ -18,6 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.sotdma import slot_table
@@ -25,9 +26,9 @@ from swarm_mj.policies.sotdma.frame import Rule, chosen, first_slots, frame_slot
 from swarm_mj.policies.sotdma.slot_table import NO_PLACE, SlotTable, place_of
 from swarm_mj.policies.tdma import SpatialTdma, draw_order, slot_of
 from swarm_mj.protocol.buffers import Buffers
+from swarm_mj.protocol.packets import fits, packet_of
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW, LocalViews
-from swarm_mj.radio.free_space import FreeSpaceRadio
-from swarm_mj.radio.mission_radio import Belief
+from swarm_mj.radio.mission_radio import Belief, radio_of
 from swarm_mj.radio.power_law import powers_between, write_powers
 
 
@@ -43,15 +44,13 @@ class SelfOrganisedTdma(BroadcastPolicy):
         "information freshest"
     )
 
-    def __init__(
-        self, radio: FreeSpaceRadio, turns: SpatialTdma, *, reads_packets: bool = True
-    ) -> None:
-        """Prepare the policy, whose robots follow turns at first.
-
-        They read packets that hold all of T and P as before the slot, and so say who was heard.
-        """
-        self._turns, self._reads_packets = turns, reads_packets
-        self._belief = Belief(radio=radio)
+    def __init__(self, mission: Mission) -> None:
+        """Prepare the policy for the mission's radio, in free space unless informed otherwise."""
+        self._turns, self._belief = SpatialTdma(mission), Belief(radio=radio_of(mission))
+        # Packets say whom their senders heard only if they hold all of T and P as before the slot.
+        # By the authors' rule a robot may decode while it transmits, which changes its T in it.
+        is_whole = fits(packet_of(mission), mission)
+        self._reads_packets = is_whole and mission.half_duplex == "strict"
 
     def inform(self, belief: Belief) -> None:
         """Take the powers that robots believe in."""
@@ -74,8 +73,9 @@ class SelfOrganisedTdma(BroadcastPolicy):
         draw = self._uniform.next()
         for b, team in enumerate(self._teams):
             read = heard[b] if self._reads_packets else views.silence[b]
-            in_turn, now = transmits[b], int(slot[b])
-            transmits[b] = team.transmits(now, in_turn, views.buffers, b, read, draw[b])
+            transmits[b] = team.transmits(
+                int(slot[b]), transmits[b], views.buffers, b, heard=read, draw=draw[b]
+            )
         return transmits
 
 
@@ -120,10 +120,16 @@ class SotdmaTeam:
         slot_table.read_packets(table, heard, known, buffers.parent[b], slot - 1)
         slot_table.read_slots(table, known, rule)
         for i in self._choosers(slot):
-            is_marked, lately = slot_table.marks(table, i, slot, rule), self._chose_lately(slot)
-            power = self._powers(buffers.position_m[b, i], is_known[i])
-            believed = table.slots[i], table.announced[i], is_known[i]
-            table.slots[i, i] = chosen(i, *believed, is_marked, lately, power, rule)
+            table.slots[i, i] = chosen(
+                i,
+                table.slots[i],
+                table.announced[i],
+                is_known[i],
+                slot_table.marks(table, i, slot, rule),
+                self._chose_lately(slot),
+                self._powers(buffers.position_m[b, i], is_known[i]),
+                rule,
+            )
         place = place_of(slot, rule)
         if place == NO_PLACE:
             is_near = is_known & self._is_in_range(buffers.position_m[b])
@@ -153,8 +159,9 @@ class SotdmaTeam:
         if slot < self._rule.num_slots:  # nobody has heard how the first slots do
             return []
         period = self._rule.frames_per_choice * self._rule.num_slots
-        ends = [-(-(slot % period + n) * len(self._order) // period) for n in (0, 1)]
-        return self._order[slice(*ends)].tolist()
+        # Everyone's turn comes as evenly as whole slots allow.
+        first, after = (-(-(slot % period + n) * len(self._order) // period) for n in (0, 1))
+        return self._order[first:after].tolist()
 
     def _chose_lately(self, slot: int) -> Int[np.ndarray, "predicted 2"]:
         """Return who chose in which slot, the earliest first."""

@@ -118,17 +118,17 @@ def test_whose_turn_it_is_by_hand():
     everyone, some = fresh(), fresh(2)
     for slot in range(2 * LATE):
         is_early, is_fifth = slot < LATE, slot % 10 in (0, 1)
-        assert turns.is_discovered(slot, some) == is_early
-        assert turns.is_sought(slot, some) == (not is_early and is_fifth)
-        assert not turns.is_discovered(slot, everyone)
-        assert not turns.is_sought(slot, everyone)
+        late = "search" if is_fifth else "plan"
+        assert turns.phase(slot, some, some) == ("discovery" if is_early else late)
+        assert turns.phase(slot, everyone, some) == ("plan" if is_early else late)
+        assert turns.phase(slot, everyone, everyone) == "plan"
 
 
 @pytest.mark.parametrize(("num_robots", "windows"), [(2, 10), (40, 200), (100, 200)])
 def test_large_teams_do_not_wait_for_5_rounds(num_robots, windows):
     turns, nobody = discovery_of(num_robots, 1.0), np.zeros(num_robots, dtype=bool)
-    assert turns.is_discovered(2 * windows - 1, nobody)
-    assert not turns.is_discovered(2 * windows, nobody)
+    assert turns.phase(2 * windows - 1, nobody, nobody) == "discovery"
+    assert turns.phase(2 * windows, nobody, nobody) == "search"
 
 
 def sought(slot, lost, heard=None, places_m=None, knows=None, was_missing=None, seed=0):

@@ -13,14 +13,12 @@ from hypothesis import strategies as st
 from standing_teams import flooded_team
 
 from swarm_mj.mission import paper
-from swarm_mj.policies.planner import plan
 from swarm_mj.policies.planner.plan import (
     Plan,
     epoch_plan,
     expected_hops,
-    heuristic_weights,
-    lookahead_of,
     num_downstream,
+    problem_of,
 )
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import take_snapshots
@@ -60,8 +58,15 @@ def team_of(num_robots, seed):
 
 
 def plan_of(team, snapshots, owner=0, is_free=None):
-    free, belief = np.ones(24, dtype=bool) if is_free is None else is_free, Belief(radio=team.radio)
-    return epoch_plan(belief, SETTINGS, snapshots, owner, team.timestamp, team.now, free)
+    return epoch_plan(
+        snapshots,
+        owner,
+        Belief(radio=team.radio),
+        SETTINGS,
+        timestamp=team.timestamp,
+        now=team.now,
+        is_free=np.ones(24, dtype=bool) if is_free is None else is_free,
+    )
 
 
 def all_transmitters(planned, num_slots=24):
@@ -83,24 +88,6 @@ def test_a_plan_depends_on_one_snapshot_and_nothing_else(seed, num_robots):
     np.testing.assert_array_equal(planned.outcome(), again.outcome())
 
 
-@few
-@given(seed=seeds, chunk=st.integers(1, 30))
-def test_a_plan_worked_out_bit_by_bit_is_the_plan_worked_out_at_once(seed, chunk):
-    """Looking ahead does not end where the slots asked for do."""
-    team = team_of(8, seed)
-    snapshots, is_free = snapshots_of(team, seed), np.random.default_rng(seed).random(24) < 0.8
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plan, "CHUNK_SLOTS", chunk)
-        lazily = plan_of(team, snapshots, is_free=is_free)
-        transmits = all_transmitters(lazily)
-    at_once = plan_of(team, snapshots, is_free=is_free)
-    outcome = at_once.outcome()
-    np.testing.assert_array_equal(transmits, all_transmitters(at_once))
-    np.testing.assert_array_equal(lazily.outcome(), outcome)
-    with pytest.raises(IndexError):
-        lazily.transmits(24)
-
-
 @given(seed=seeds, num_robots=st.integers(2, 8))
 def test_what_was_expected_of_the_lost_is_corrected(seed, num_robots):
     """Of who is not fresh nothing newer is known to anybody than the snapshot has of it, and to it
@@ -108,26 +95,27 @@ def test_what_was_expected_of_the_lost_is_corrected(seed, num_robots):
     team, owner = team_of(num_robots, seed), seed % num_robots
     snapshots = snapshots_of(team, seed)
     expected = np.random.default_rng(seed).integers(0, 40, (num_robots, num_robots)) / 2
-    planned = epoch_plan(
-        Belief(radio=team.radio), SETTINGS, snapshots, owner, expected, NOW, np.ones(0, dtype=bool)
-    )
+    told = replace(team, timestamp=expected, now=NOW)
+    outcome = plan_of(told, snapshots, owner, np.ones(0, dtype=bool)).outcome()
     heard, is_fresh = snapshots.timestamp[owner], snapshots.is_fresh[owner]
     for i in range(num_robots):
         for k in range(num_robots):
             bounds = [heard[robot] for robot in {i, k} if not is_fresh[robot]]
-            assert planned.outcome()[i, k] == min([expected[i, k], *bounds])
+            assert outcome[i, k] == min([expected[i, k], *bounds])
 
 
 @pytest.mark.parametrize(
-    ("num_robots", "at_rest", "moving"), [(50, (6, 5), (4, 3)), (51, (1, 1), (1, 1))]
+    ("num_robots", "is_certain", "lookahead"),
+    [(5, True, (6, 5)), (5, False, (4, 3)), (6, True, (1, 1)), (6, False, (1, 1))],
 )
-def test_large_teams_look_less_far_ahead(num_robots, at_rest, moving):
+def test_large_teams_look_less_far_ahead(num_robots, is_certain, lookahead):
     """Whose plans would take long otherwise."""
     numbers = PlannerSettings(
-        rest_lookahead=(6, 5), moving_lookahead=(4, 3), max_lookahead_robots=50
+        rest_lookahead=(6, 5), moving_lookahead=(4, 3), max_lookahead_robots=5
     )
-    assert lookahead_of(num_robots, is_certain=True, settings=numbers) == at_rest
-    assert lookahead_of(num_robots, is_certain=False, settings=numbers) == moving
+    links = links_between(RADIO, np.zeros((num_robots, 2)))
+    problem = problem_of(links, numbers, is_certain=is_certain)
+    assert (problem.width, problem.depth) == lookahead
 
 
 def test_who_was_not_heard_of_for_three_rounds_is_planned_without():
@@ -145,7 +133,7 @@ def test_who_was_not_heard_of_for_three_rounds_is_planned_without():
 
 
 @pytest.mark.parametrize("is_doubtful", [False, True])
-def test_chunks_of_an_endless_plan_make_one_plan(is_doubtful):
+def test_a_plan_made_as_it_is_asked_for_is_the_plan_made_at_once(is_doubtful):
     """Slots may be asked for in any order."""
     team = team_of(8, 2)
     links = links_between(team.radio, team.position_m)
@@ -199,18 +187,18 @@ def graph_of(links):
     return hops, num_downstream(hops, WEIGHING.slack_hops), nx.from_numpy_array(lengths)
 
 
-def weights_of(links):
-    return heuristic_weights(links, WEIGHING)
+def weighed(links, settings=WEIGHING):
+    return problem_of(links, settings, is_certain=True)
 
 
 def test_a_row_of_three_by_hand():
     """Robot 0's news reach robot 2 through robot 1, two hops on; two of three pairs are linked."""
     row_m = np.array([[0.0, 0.0], [200.0, 0.0], [400.0, 0.0]])
-    weights = weights_of(links_between(RADIO, row_m))
-    assert weights.squared_rise[1, 0] == pytest.approx(2.0**0.6)
-    assert weights.squared_rise[2, 0] == pytest.approx(2.0**-0.3)
-    assert weights.squared_rise[0, 1] == pytest.approx(1.0)
-    assert weights.min_share == pytest.approx(0.95 - 0.3 * 2 / 3)
+    problem = weighed(links_between(RADIO, row_m))
+    assert problem.weight[1, 0] == pytest.approx(2.0**0.6)
+    assert problem.weight[2, 0] == pytest.approx(2.0**-0.3)
+    assert problem.weight[0, 1] == pytest.approx(1.0)
+    assert problem.min_share == pytest.approx(0.95 - 0.3 * 2 / 3)
 
 
 @given(seed=seeds, num_robots=st.integers(2, 6), is_certain=st.booleans())
@@ -255,8 +243,7 @@ def test_the_share_of_a_team_by_hand():
     apart = math.dist([30.0, 40.0], [50.0, 0.0])
     relative_std = (0.1 + 0.1 + math.sqrt(32.0) / apart) / 3
     share = 0.95 - 0.3 * 1.0 + 1.5 * relative_std + 0.1
-    settings = replace(WEIGHING, share_per_std=1.5)
-    assert heuristic_weights(links, settings).min_share == pytest.approx(share)
+    assert weighed(links, replace(WEIGHING, share_per_std=1.5)).min_share == pytest.approx(share)
 
 
 @pytest.mark.parametrize("num_robots", [1, 3])
@@ -264,6 +251,6 @@ def test_teams_without_links_have_finite_weights(num_robots):
     position_m = FAR_M * np.arange(2.0 * num_robots).reshape(num_robots, 2)
     links = links_between(RADIO, position_m, np.full(num_robots, 5.0))
     assert graph_of(links)[1].tolist() == np.eye(num_robots).tolist()
-    weights = weights_of(links)
-    assert np.all(np.isfinite(weights.squared_rise))
-    assert weights.min_share == 1.05
+    problem = weighed(links)
+    assert np.all(np.isfinite(problem.weight))
+    assert problem.min_share == 1.05

@@ -126,7 +126,7 @@ def test_epochs_by_hand():
 
 def held_by_all(flight):
     """The owner of the one snapshot that all robots fly by, if they hold the same."""
-    held = np.unique(flight.team._holds).tolist()
+    held = np.unique(flight.team._current.held).tolist()
     return held[0] if len(held) == 1 else None
 
 

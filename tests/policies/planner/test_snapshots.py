@@ -7,7 +7,12 @@ import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.planner.settings import PlannerSettings
-from swarm_mj.policies.planner.snapshots import Snapshots, better, snapshot_fields, take_snapshots
+from swarm_mj.policies.planner.snapshots import (
+    Proposals,
+    Snapshots,
+    snapshot_fields,
+    take_snapshots,
+)
 from swarm_mj.protocol.buffers import empty_buffers
 
 NOW = 20.0
@@ -148,9 +153,11 @@ def test_a_snapshot_does_not_change_with_the_buffer():
 
 def test_robots_adopt_the_better_of_what_they_have_and_decode():
     """Object 2 is best, then 0, 1, 3: robot 0 decodes robot 3, who holds 2, robot 1 decodes 0."""
-    rank, owner = np.array([1, 2, 0, 3]), np.array([0, 1, 3, 2])
-    assert better(rank, owner, np.array([3, 0, 2, 1])).tolist() == [2, 0, 3, 2]
-    assert better(rank, owner, np.arange(4)).tolist() == owner.tolist()
+    proposals = Proposals(rank=np.array([1, 2, 0, 3]), held=np.array([0, 1, 3, 2]))
+    proposals.adopt(np.arange(4))
+    assert proposals.held.tolist() == [0, 1, 3, 2]
+    proposals.adopt(np.array([3, 0, 2, 1]))
+    assert proposals.held.tolist() == [2, 0, 3, 2]
 
 
 def test_packets_hold_two_snapshots_by_hand():
