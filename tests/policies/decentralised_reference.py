@@ -94,6 +94,10 @@ class Mind:
         rounds = epochs.first_epoch_rounds if epoch == 0 else epochs.early_epoch_rounds
         return max(2, round(rounds * len(self.order)))
 
+    def packet(self):
+        """What it sends in this slot beside T, M and P."""
+        return copy.deepcopy((self.current, self.upcoming))
+
     def hear(self, sender, packet):
         """One slot: whom it decoded, if anybody, and what came beside T, M and P."""
         self.heard = sender
@@ -280,67 +284,59 @@ def rows(buffers, i):
 
 
 class Flight(BroadcastPolicy):
-    """A planner that flies one mission, and notes what it decides."""
+    """A policy that flies one mission; minds, if any, must decide the same throughout."""
 
-    def __init__(self, mission, seed, *, channel=None, settings=SETTINGS):
-        self.settings = settings
-        self.mission, self.seed = mission, seed
-        self.planner = Planner(mission, settings)
+    def __init__(self, policy, mission, seed, *, channel=None, minds=()):
+        self.policy, self.mission, self.minds = policy, mission, minds
         self.swarm = Swarm(mission, [seed], channel=channel)
-        self.transmitted = []  # [slot][robot]
 
     @property
     def team(self):
-        return self.planner._teams[0]
+        return self.policy._teams[0]
 
     def start(self, num_robots, rngs):
-        self.planner.start(num_robots, rngs)
+        self.policy.start(num_robots, rngs)
 
     def transmits(self, views):
-        transmits = self.planner.transmits(views)
-        self.transmitted.append(transmits[0])
-        return transmits
-
-    def fly(self, num_windows):
-        """Flies on, and returns who transmitted in each of these slots."""
-        for _ in range(num_windows):
-            self.swarm.step(self)
-        return np.array(self.transmitted[len(self.transmitted) - 2 * num_windows :])
-
-
-class Witnessed(Flight):
-    """A flight beside minds that share nothing, which must decide the same throughout."""
-
-    def __init__(self, mission, seed, **rest):
-        super().__init__(mission, seed, **rest)
-        order, rounds = common_orders(seed, mission)
-        groups = [group for groups in rounds for group in groups]
-        self.minds = [
-            Mind(me=i, mission=mission, settings=self.settings, order=order, groups=groups)
-            for i in range(mission.num_robots)
-        ]
-
-    def transmits(self, views):
-        transmits = super().transmits(views)
+        decided = self.policy.transmits(views)
         if views.phases:
             self.converse(views.phases[-1].heard[0].tolist())
         slot = round(2 * float(views.now[0]))
         for mind in self.minds:
-            expected = mind.transmits(rows(views.buffers, mind.me), slot)
-            assert transmits[0, mind.me] == expected, (slot, mind.me)
-        return transmits
+            assert decided[0, mind.me] == self.asked(mind, views, slot), (slot, mind.me)
+        return decided
+
+    def asked(self, mind, views, slot):
+        """What a mind decides on its own row."""
+        return mind.transmits(rows(views.buffers, mind.me), slot)
 
     def converse(self, heard):
         """One slot: all packets are written, then everyone reads the one it decoded."""
-        packets = {
-            i: copy.deepcopy((self.minds[i].current, self.minds[i].upcoming)) for i in set(heard)
-        }
-        for mind, sender in zip(self.minds, heard, strict=True):
-            if sender == mind.me:
-                mind.hear(None, None)
-            else:
-                mind.hear(sender, copy.deepcopy(packets[sender]))
+        packets = [mind.packet() for mind in self.minds]
+        for mind in self.minds:
+            sender = heard[mind.me]
+            mind.hear(*((None, None) if sender == mind.me else (sender, packets[sender])))
+
+    def fly(self, num_windows):
+        """Flies on, and returns who transmitted in each of these slots."""
+        return transmitters(self.swarm, self, num_windows)[:, 0]
 
     @property
     def num_taken(self):
         return sum(mind.took_over for mind in self.minds)
+
+
+def planner_flight(mission, seed, *, settings=SETTINGS, **rest):
+    """A flight of a planner of moving teams."""
+    return Flight(Planner(mission, settings), mission, seed, **rest)
+
+
+def witnessed(mission, seed, *, settings=SETTINGS, **rest):
+    """The same beside minds that share nothing but packets."""
+    order, rounds = common_orders(seed, mission)
+    groups = [group for groups in rounds for group in groups]
+    minds = [
+        Mind(me=i, mission=mission, settings=settings, order=order, groups=groups)
+        for i in range(mission.num_robots)
+    ]
+    return planner_flight(mission, seed, settings=settings, minds=minds, **rest)

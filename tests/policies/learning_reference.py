@@ -4,22 +4,21 @@ A mind is handed its own buffer row and what the packets hold that it decoded. I
 tables and plans alone.
 """
 
+import copy
 import math
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from decentralised_reference import planned, rows
+from decentralised_reference import Flight, planned, rows
 
 from swarm_mj.policies.planner.link_tables import LAWS, LinkTable, corrected, fit, link_fields
 from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.planner.settings import PlannerSettings
-from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.simulation.swarm import Swarm
 
 NUM_SLOTS = 120  # of a mission, at most
 
@@ -202,59 +201,35 @@ class LearningMind:
         self.notes = +self.notes
 
 
-class LearnedApart(BroadcastPolicy):
-    """A flight of the planner at rest, in which each robot is also asked apart.
-
-    Without a payload, nobody is told anything, and so none learns.
-    """
+class LearnedApart(Flight):
+    """A flight of the planner at rest beside minds; without a payload, none learns."""
 
     def __init__(self, mission, seed, *, channel=None, settings=SHORT, learns=True):
-        self.learns = learns
+        self.learns, self.turns = learns, make_policy("spatial-tdma", mission)
         plain = make_policy("planner --payload none", mission)
-        self.policy = learner(mission, settings) if learns else plain
-        self.turns = make_policy("spatial-tdma", mission)
-        self.swarm = Swarm(mission, [seed], channel=channel)
-        self.minds = [
+        policy = learner(mission, settings) if learns else plain
+        minds = [
             LearningMind(me=i, mission=mission, settings=settings)
             for i in range(mission.num_robots)
         ]
+        super().__init__(policy, mission, seed, channel=channel, minds=minds)
 
     def start(self, num_robots, rngs):
-        copies = [np.random.default_rng() for _ in rngs]
-        for one, other in zip(copies, rngs, strict=True):
-            one.bit_generator.state = other.bit_generator.state
-        self.turns.start(num_robots, copies)
-        self.policy.start(num_robots, rngs)
+        self.turns.start(num_robots, copy.deepcopy(rngs))
+        super().start(num_robots, rngs)
 
     def transmits(self, views):
-        decided, in_turn = self.policy.transmits(views), self.turns.transmits(views)
-        if views.phases and self.learns:
-            self.converse(views.phases[-1].heard[0].tolist())
-        slot = round(2 * float(views.now[0]))
-        for i, mind in enumerate(self.minds):
-            row = rows(views.buffers, i)
-            if self.learns:
-                self.holds_no_more_than_t_says(mind, row[0])
-            expected = mind.transmits(row, slot, bool(in_turn[0, i]))
-            assert decided[0, i] == expected, (slot, i)
-        return decided
+        self.in_turn = self.turns.transmits(views)[0]
+        return super().transmits(views)
+
+    def asked(self, mind, views, slot):
+        row = rows(views.buffers, mind.me)
+        if self.learns:  # what packets tell of a robot is as old as T
+            for i, t in enumerate(row[0].tolist()):
+                told = mind.told.get(i)
+                assert t == (0.0 if told is None else (told.slot + 1) / 2)
+        return mind.transmits(row, slot, bool(self.in_turn[mind.me]))
 
     def converse(self, heard):
-        """One slot: all packets are written, then everyone reads the one it decoded."""
-        packets = [mind.packet() for mind in self.minds]
-        for mind, sender in zip(self.minds, heard, strict=True):
-            if sender == mind.me:
-                mind.hear(None, None)
-            else:
-                mind.hear(sender, packets[sender])
-
-    @staticmethod
-    def holds_no_more_than_t_says(mind, seen):
-        """What packets tell of a robot is as old as T."""
-        for i, t in enumerate(seen.tolist()):
-            told = mind.told.get(i)
-            assert t == (0.0 if told is None else (told.slot + 1) / 2)
-
-    def fly(self, num_windows):
-        """Flies on; the mean age of each window."""
-        return [self.swarm.step(self).age_windows[0] for _ in range(num_windows)]
+        if self.learns:
+            super().converse(heard)

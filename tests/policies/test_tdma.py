@@ -157,16 +157,6 @@ def test_eq3_robots_that_know_all_decide_by_the_rule_and_the_others_wait(
     assert senders(policy, views_of(position_m, is_known, half)) == expected
 
 
-def test_robots_that_believe_otherwise_decide_otherwise():
-    """Robot 2 believes all others near: it keeps silent where the robots at 1000 m would speak."""
-    policy = in_order()
-    apart_m = np.array([[0.0, 0.0], [100.0, 0.0], [1000.0, 0.0], [1100.0, 0.0]])
-    views = views_of(apart_m, True)
-    assert senders(policy, views) == {0, 2}
-    views.buffers.position_m[0, 2] = [[150.0, 0.0], [50.0, 0.0], [0.0, 0.0], [100.0, 0.0]]
-    assert senders(policy, views) == {0}
-
-
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_team_at_rest_loses_nothing_and_gains_by_joining(seed):
     """From the start on all in range decode the owner; so nobody's knowledge is ever older than

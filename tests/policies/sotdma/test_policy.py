@@ -112,12 +112,6 @@ def test_eq10_news_is_younger_than_by_turns(task):
     assert age["sotdma"] < 0.95 * age["spatial-tdma"] < age["tdma"]
 
 
-def test_the_same_seed_is_the_same_flight_whatever_flies_beside():
-    beside, _ = flown(REST, [5, 6], 60)
-    alone, _ = flown(REST, [6], 60)
-    np.testing.assert_array_equal(beside[:, 1:], alone)
-
-
 def test_packets_that_hold_a_part_of_t_tell_nothing_of_who_was_heard():
     mission = paper("stationary", num_robots=12, range_ratio=0.2, bit_rate=10_000.0)
     for each, tells in ((mission, False), (REST, True)):
