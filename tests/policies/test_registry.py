@@ -138,15 +138,6 @@ def test_policies_by_name_and_what_flies_moving_teams_and_those_at_rest(name):
     assert (flown_name(name, REST), flown_name(name, MISSION)) == (name, moving)
 
 
-def test_the_planner_of_a_team_at_rest_learns_links_if_slots_hold_them():
-    rest = paper("stationary", num_robots=10)
-    policy = make_policy("planner", rest)
-    assert type(policy) is RestingPlanner
-    assert policy.payload == "links"
-    slow = paper("stationary", num_robots=10, bit_rate=100e3)
-    assert make_policy("planner", slow).payload == "none"
-
-
 @pytest.mark.parametrize(
     ("mission", "is_recomputed", "root_transmits"),
     [

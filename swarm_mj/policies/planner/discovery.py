@@ -13,7 +13,7 @@ from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 
-Phase = Literal["discovery", "search", "plan"]
+Purpose = Literal["discovery", "search", "plan"]
 
 
 class Discovery:
@@ -43,10 +43,10 @@ class Discovery:
         windows = min(settings.search_rounds * num_robots, settings.latest_search_windows)
         self._search_slot = SLOTS_PER_WINDOW * windows
 
-    def phase(
+    def purpose(
         self, slot: int, is_known: Bool[np.ndarray, "N"], is_fresh: Bool[np.ndarray, "N"]
-    ) -> Phase:
-        """Return whose a slot is, by a snapshot that knows some robots, of which some are fresh."""
+    ) -> Purpose:
+        """Return what a slot is for, by a snapshot: which robots it knows, and which are fresh."""
         if slot < self._search_slot:
             return "plan" if np.all(is_known) else "discovery"
         is_turn = (slot // SLOTS_PER_WINDOW) % self._settings.search_every_windows == 0

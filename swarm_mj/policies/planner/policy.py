@@ -144,10 +144,10 @@ class _Team:
             # Made even where nobody follows it yet, since the next epoch's plan continues it.
             plan = self._plan(current, owner)
             is_fresh = current.is_fresh[owner]
-            phase = self._discovery.phase(slot, current.is_known[owner], is_fresh)
-            if phase == "discovery":
+            purpose = self._discovery.purpose(slot, current.is_known[owner], is_fresh)
+            if purpose == "discovery":
                 chosen = self._discovery.transmits(slot, views.buffers, b)
-            elif phase == "search":
+            elif purpose == "search":
                 chosen = self._discovery.seeks(slot, is_fresh, was_fresh, heard, views.buffers, b)
             else:
                 chosen = plan.transmits(slot - SLOTS_PER_WINDOW * self._begin)
@@ -192,7 +192,7 @@ class _Team:
             if is_at_rest and self._epoch % self._settings.forget_every == 0:
                 before = None
             slots = range(SLOTS_PER_WINDOW * self._begin, SLOTS_PER_WINDOW * self._end)
-            phases = [self._discovery.phase(slot, is_known, is_fresh) for slot in slots]
+            purposes = [self._discovery.purpose(slot, is_known, is_fresh) for slot in slots]
             nothing = np.full(current.is_known.shape, NEVER)
             self._plans[owner] = epoch_plan(
                 current,
@@ -201,7 +201,7 @@ class _Team:
                 self._settings,
                 timestamp=nothing if before is None else before.outcome(),
                 now=self._begin + (self._first or 0.0),
-                is_free=np.array(phases) == "plan",
+                is_free=np.array(purposes) == "plan",
             )
         return self._plans[owner]
 
