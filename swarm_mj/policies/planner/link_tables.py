@@ -1,4 +1,8 @@
-"""Tables of links, fitted to what robots observed, and links corrected by them.
+"""Tables of links, fitted to packets that robots decoded or missed, and links corrected by them.
+
+A robot that knows the schedule knows who transmitted in the slot before, and so which packet it
+should have decoded. It notes the kind of that packet: its sender, its margin in bins, and whether
+it was decoded. Index order: `[j, i]`: robot j listens to robot i.
 
 A link's excess is how much stronger it is than was believed, in dB, the same in both directions.
 Every pair of a law of fades and a prior of the excess is a hypothesis. The most probable one is
@@ -12,33 +16,91 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.planner.link_evidence import (
-    BIN_CENTRES_DB,
-    BIN_DB,
-    MAX_KINDS,
-    MAX_TIMES,
-    NUM_BINS,
-    Counts,
-    Evidence,
-)
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import NUM_SENT, Proposals
 from swarm_mj.protocol.packets import PacketField, bits_for, identity, times
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.links import Curves, Links, decode_curves, doubtful, probability_at
 
+BIN_DB = 2.0
+LEAST_MARGIN_DB = -15.0  # of the lowest bin; packets that are expected to be weaker are not missed
+NUM_BINS = 24
+BIN_CENTRES_DB = LEAST_MARGIN_DB + BIN_DB * np.arange(NUM_BINS)
+
+NOTHING = -1  # in place of the kind of a packet
+MAX_KINDS = 64  # that one robot notes
+MAX_TIMES = 255  # that it notes one kind
+
 EXCESS_DB = np.arange(-30.0, 18.1, 3.0)  # the values that are distinguished
 ERASURES = (0.0, 0.15, 0.3, 0.45)
 LAWS = tuple((rician_k, loss) for rician_k in (NO_FADING, NO_LINE_OF_SIGHT) for loss in ERASURES)
-SPREADS_DB = (0.0, 3.0, 6.0, 9.0)  # of normal priors; the first says that beliefs are right
+SPREADS_DB = (3.0, 6.0, 9.0)  # of normal priors of a link's excess
 BLOCKED_SHARES = (0.3, 0.6)  # of priors in which links are as believed, or blocked
 BLOCKED_BELOW_DB = -20.0
 STEP_DB = 0.25  # to which tables are rounded
 SURPRISE = 0.005  # probability that a packet decodes, or not, against all laws: no single
 # packet may rule out a hypothesis, since no law here is exactly true
+
+Counts = Int[np.ndarray, "N N K"]  # packets of i that j decoded, or missed, by bins of margin
+
+
+def observe(
+    listens: Bool[np.ndarray, "N"],
+    heard: Int[np.ndarray, "N"],
+    transmitted: Bool[np.ndarray, "N"],
+    believed_mw: Float[np.ndarray, "N N"],
+    prior: Links,
+) -> Int[np.ndarray, "N"]:
+    """Return the kind of packet that each robot notes of a slot in which it followed one plan.
+
+    Only those listen here that know that all others follow plans, too; nobody else can say what was
+    in the air. The plan was made by believed powers of i at j, [i, j]. Margins are counted from the
+    links before anything was learned.
+    """
+    num_robots = len(heard)
+    everyone, is_other = np.arange(num_robots), ~np.eye(num_robots, dtype=bool)
+    arriving_mw = np.where(transmitted[:, None] & is_other, believed_mw, 0.0)
+    is_decoded = heard != everyone
+    i = np.where(is_decoded, heard, np.argmax(arriving_mw, axis=0))
+    # A sum of its own: the packet that j decoded need not be the strongest by this belief.
+    others_mw = np.sum(np.where(everyone[:, None] == i, 0.0, arriving_mw), axis=0)
+    margin = prior.received_mw[i, everyone] / (prior.noise_mw + others_mw) / prior.threshold
+    margin_db = 10.0 * np.log10(np.maximum(margin, np.finfo(np.float64).tiny))
+    place = np.floor((margin_db - LEAST_MARGIN_DB) / BIN_DB + 0.5).astype(np.int64)
+    is_missed = np.any(arriving_mw > 0.0, axis=0) & (place >= 0)
+    kind = (is_decoded * num_robots + i) * NUM_BINS + np.clip(place, 0, NUM_BINS - 1)
+    return np.where(listens & (is_decoded | is_missed), kind, NOTHING)
+
+
+class Evidence:
+    """All observations of a team, slot by slot."""
+
+    def __init__(self, num_robots: int) -> None:
+        self._slots: list[Int[np.ndarray, " N"]] = []  # the kind that j noted in each
+        self._times = np.zeros((num_robots, 2 * num_robots * NUM_BINS), dtype=np.int64)
+
+    def add(self, kinds: Int[np.ndarray, "N"]) -> None:
+        """Note the next slot; robots whose notes are full count on only the kinds they have."""
+        j = np.flatnonzero(kinds != NOTHING)
+        times = self._times[j, kinds[j]]
+        has_room = np.count_nonzero(self._times[j], axis=1) < MAX_KINDS
+        is_noted = np.where(times == 0, has_room, times < MAX_TIMES)
+        self._times[j, kinds[j]] += is_noted
+        self._slots.append(kinds.copy())
+        self._slots[-1][j[~is_noted]] = NOTHING
+
+    def counts(self, known_until: Int[np.ndarray, "N"]) -> tuple[Counts, Counts]:
+        """Return how many packets were decoded, and missed, until each robot's last slot."""
+        num_robots = len(known_until)
+        kinds = np.array(self._slots, dtype=np.int64).reshape(-1, num_robots)
+        slot, j = np.nonzero((kinds != NOTHING) & (np.arange(len(kinds))[:, None] <= known_until))
+        times = np.zeros_like(self._times)
+        np.add.at(times, (j, kinds[slot, j]), 1)
+        by_outcome = times.reshape(num_robots, 2, num_robots, NUM_BINS)
+        return by_outcome[:, 1], by_outcome[:, 0]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,10 +219,10 @@ def _decodes(margin_db: Float[np.ndarray, "K X"]) -> Float[np.ndarray, "K F X"]:
 
 @cache
 def _priors() -> Float[np.ndarray, "P X"]:
-    """Return distributions of a link's excess."""
+    """Return distributions of a link's excess; by the first, beliefs are right."""
     is_expected = (EXCESS_DB == 0.0).astype(np.float64)
     is_blocked = (EXCESS_DB < BLOCKED_BELOW_DB).astype(np.float64)
-    normal = [np.exp(-0.5 * (EXCESS_DB / spread_db) ** 2) for spread_db in SPREADS_DB[1:]]
+    normal = [np.exp(-0.5 * (EXCESS_DB / spread_db) ** 2) for spread_db in SPREADS_DB]
     num = is_blocked.sum()
     blocked = [(1.0 - x) * is_expected + x * is_blocked / num for x in BLOCKED_SHARES]
     priors = np.stack([is_expected, *normal, *blocked])

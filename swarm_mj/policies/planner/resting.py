@@ -6,9 +6,9 @@ nothing when the mission begins, so that it does not matter when a robot joins i
 robot takes its turns as in spatial TDMA. Without a payload they keep this plan.
 
 Under a channel that the robots do not know, some of its packets never arrive. With a payload,
-robots note what they decoded and what they missed (`link_evidence.py`), and packets carry these
+robots note what they decoded and what they missed (`link_tables.py`), and packets carry these
 counts of all robots, each as old as the rest of what they say of it. At common times every robot
-fits a table of links to what it then knows (`link_tables.py`). Packets carry the best table: that
+fits a table of links to what it then knows. Packets carry the best table: that
 of the robot whose knowledge is youngest. At the next common time each robot flies by a plan made
 from the best table that it holds, or goes on if the table says that links are as believed.
 
@@ -24,8 +24,15 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.planner.link_evidence import NOTHING, Evidence, observe
-from swarm_mj.policies.planner.link_tables import Tables, corrected, link_fields, tables_of
+from swarm_mj.policies.planner.link_tables import (
+    NOTHING,
+    Evidence,
+    Tables,
+    corrected,
+    link_fields,
+    observe,
+    tables_of,
+)
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.settings import PlannerSettings

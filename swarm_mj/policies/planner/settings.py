@@ -43,7 +43,7 @@ class PlannerSettings:
 
     # Plans: looking ahead takes a time that grows with N³, so large teams do not. Where nobody
     # moves, plans come true as they are, and looking further ahead pays.
-    rest_lookahead: tuple[int, int] = (6, 6)  # width and depth, as in `Lookahead`
+    rest_lookahead: tuple[int, int] = (6, 6)  # width and depth, as in `Problem`
     moving_lookahead: tuple[int, int] = (4, 4)
     max_lookahead_robots: int = 50  # largest team that looks ahead
     gone_rounds: float = 3.0  # a robot not heard from for longer is planned without [rounds]
