@@ -22,10 +22,11 @@ class Discovery:
     def __init__(
         self,
         num_robots: int,
-        num_reaches: float,
-        range_m: float,
         settings: PlannerSettings,
         rng: np.random.Generator,
+        *,
+        num_reaches: float,
+        range_m: float,
     ) -> None:
         """Draw the orders of a mission whose area is as large as this many circles of the range."""
         self._range_m, self._settings = range_m, settings
@@ -65,11 +66,12 @@ class Discovery:
     def seeks(
         self,
         slot: int,
+        buffers: Buffers,
+        b: int,
+        *,
         is_fresh: Bool[np.ndarray, "N"],
         was_fresh: Bool[np.ndarray, "N N"],
         heard: Int[np.ndarray, "N"],
-        buffers: Buffers,
-        b: int,
     ) -> Bool[np.ndarray, "N"]:
         """Return who transmits: one robot in a window's first slot, those that hear it in the next.
 

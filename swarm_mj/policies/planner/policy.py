@@ -109,7 +109,9 @@ class _Team:
         rng: np.random.Generator,
     ) -> None:
         num_reaches = mission.side_m**2 / (math.pi * mission.range_m**2)
-        self._discovery = Discovery(num_robots, num_reaches, mission.range_m, settings, rng)
+        self._discovery = Discovery(
+            num_robots, settings, rng, num_reaches=num_reaches, range_m=mission.range_m
+        )
         self._belief, self._settings, self._window_s = belief, settings, mission.window_s
         self._everyone = np.arange(num_robots)
         self._first: float | None = None  # when the first decision was asked for [windows]
@@ -148,7 +150,14 @@ class _Team:
             if purpose == "discovery":
                 chosen = self._discovery.transmits(slot, views.buffers, b)
             elif purpose == "search":
-                chosen = self._discovery.seeks(slot, is_fresh, was_fresh, heard, views.buffers, b)
+                chosen = self._discovery.seeks(
+                    slot,
+                    views.buffers,
+                    b,
+                    is_fresh=is_fresh,
+                    was_fresh=was_fresh,
+                    heard=heard,
+                )
             else:
                 chosen = plan.transmits(slot - SLOTS_PER_WINDOW * self._begin)
             follows = current.held == owner
@@ -171,7 +180,14 @@ class _Team:
         self._begin, self._end = self._end, self._end + length
 
         def take(windows_ahead: float) -> Snapshots:
-            taken = take_snapshots(buffers, b, now, self._window_s, windows_ahead, self._settings)
+            taken = take_snapshots(
+                buffers,
+                b,
+                self._settings,
+                now=now,
+                window_s=self._window_s,
+                windows_ahead=windows_ahead,
+            )
             if is_common:
                 taken.held[:] = 0  # all are the same
             return taken

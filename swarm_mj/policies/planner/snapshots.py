@@ -48,10 +48,11 @@ class Snapshots(Proposals):
 def take_snapshots(
     buffers: Buffers,
     b: int,
+    settings: PlannerSettings,
+    *,
     now: float,
     window_s: float,
     windows_ahead: float,
-    settings: PlannerSettings,
 ) -> Snapshots:
     """Return every robot's snapshot in mission b, row i from its own buffer alone.
 

@@ -27,7 +27,9 @@ SETTINGS = PlannerSettings(
 
 
 def discovery_of(num_robots, num_reaches, seed=0):
-    return Discovery(num_robots, num_reaches, RANGE_M, SETTINGS, np.random.default_rng(seed))
+    return Discovery(
+        num_robots, SETTINGS, np.random.default_rng(seed), num_reaches=num_reaches, range_m=RANGE_M
+    )
 
 
 def order_of(seed):
@@ -140,7 +142,7 @@ def sought(slot, lost, heard=None, places_m=None, knows=None, was_missing=None, 
     buffers = at_places(position_m, knows or {})
     was_fresh = np.tile(fresh(*(lost if was_missing is None else was_missing)), (NUM_ROBOTS, 1))
     transmits = discovery_of(NUM_ROBOTS, 1.0, seed).seeks(
-        slot, fresh(*lost), was_fresh, decoded, buffers, 0
+        slot, buffers, 0, is_fresh=fresh(*lost), was_fresh=was_fresh, heard=decoded
     )
     return np.flatnonzero(transmits).tolist()
 

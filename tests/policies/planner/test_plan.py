@@ -43,14 +43,14 @@ def snapshots_of(team, seed):
     buffers.timestamp[0] = timestamp
     buffers.position_m[0] = team.position_m + rng.normal(0.0, 20.0, (*shape, 2))
     buffers.velocity_mps[0] = rng.uniform(-3.0, 3.0, (*shape, 2))
-    return take_snapshots(buffers, 0, NOW, 0.1, 15.0, AGED)
+    return take_snapshots(buffers, 0, AGED, now=NOW, window_s=0.1, windows_ahead=15.0)
 
 
 def true_snapshots(team):
     """Everyone is known, fresh, at rest, and where it is believed to be."""
     buffers = empty_buffers(1, team.num_robots)
     buffers.timestamp[...], buffers.position_m[...] = 1.0, team.position_m
-    return take_snapshots(buffers, 0, 9.0, 0.1, 15.0, PlannerSettings())
+    return take_snapshots(buffers, 0, SETTINGS, now=9.0, window_s=0.1, windows_ahead=15.0)
 
 
 def team_of(num_robots, seed):

@@ -40,7 +40,7 @@ def buffers_of(position_m, velocity_mps, timestamp):
 def taken_from(position_m, velocity_mps, timestamp, windows_ahead, settings):
     """Snapshots at t = 20, in windows of 0.1 s."""
     buffers = buffers_of(position_m, velocity_mps, timestamp)
-    return take_snapshots(buffers, 0, NOW, 0.1, windows_ahead, settings)
+    return take_snapshots(buffers, 0, settings, now=NOW, window_s=0.1, windows_ahead=windows_ahead)
 
 
 def taken_by_hand(fresh_windows=20.0):
@@ -143,7 +143,9 @@ def test_a_snapshot_does_not_change_with_the_buffer():
     rng = np.random.default_rng(3)
     timestamp = np.where(np.eye(5) > 0, NOW, rng.integers(0, 40, (5, 5)) / 2)
     buffers = buffers_of(rng.random((5, 5, 2)), rng.random((5, 5, 2)), timestamp)
-    snapshots = take_snapshots(buffers, 0, NOW, 0.1, 15.0, believing(9.0))
+    snapshots = take_snapshots(
+        buffers, 0, believing(9.0), now=NOW, window_s=0.1, windows_ahead=15.0
+    )
     before = copy.deepcopy(snapshots)
     for array in vars(buffers).values():
         array[:] = 0
