@@ -27,7 +27,7 @@ from swarm_mj.system.compiled import compiled
 
 
 class _Requests(NamedTuple):
-    """What is expected of a window's first slot, in which one more robot sends."""
+    """The expected outcome of a window's first slot, in which one more robot sends."""
 
     heard: Int[np.ndarray, "N"]  # whom each robot may decode; itself: nobody
     probability: Float[np.ndarray, "N"]  # that it does

@@ -20,7 +20,7 @@ NUM_SENT = 2  # snapshots or tables in a packet: the current one, and the best o
 
 @dataclass(frozen=True, kw_only=True)
 class Proposals:
-    """What every robot made at one moment for all to use, and whose each of them holds by now.
+    """All robots' proposals of one moment, and whose each of them holds by now.
 
     What a robot made never changes. Packets carry it whole, so its maker's identity stands for it.
     """
