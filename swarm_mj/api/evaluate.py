@@ -10,7 +10,7 @@ from swarm_mj.api.fly import mission_of
 from swarm_mj.api.run import Metrics
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.flying import fly_study
-from swarm_mj.evaluation.results import COLUMNS, Result, write_csv
+from swarm_mj.evaluation.results import Result, write_csv
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study
 from swarm_mj.evaluation.summary import Evaluated, summarise, write_evaluated
 from swarm_mj.evaluation.table import results_text
@@ -73,9 +73,9 @@ class Evaluation:
         from pandas import DataFrame
 
         if not by_mission:
-            others = [name for name in COLUMNS if name not in (*FIRST, *LAST)]
-            columns = [*FIRST, *others, *LAST]
-            return DataFrame([asdict(each) for each in self._rows], columns=columns)
+            table = DataFrame(asdict(each) for each in self._rows)
+            others = table.columns.difference([*FIRST, *LAST], sort=False)
+            return table.reindex(columns=[*FIRST, *others, *LAST])
         rows = [
             {"policy": each.result.policy, "seed": each.result.seed + index, "aoi": aoi}
             | {"velocity_variance": each.velocity_variance[index]}

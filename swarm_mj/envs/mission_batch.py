@@ -96,7 +96,9 @@ class MissionBatch:
         channel = snapshot_channel(swarm.channel)
         self.fly(recipient)
         states = swarm.states
-        credit = credits_of(before, states.position_m, recipient, channel, start, states.is_active)
+        credit = credits_of(
+            before, states.position_m, recipient, channel, now=start, is_active=states.is_active
+        )
         return credit / self.mission.num_robots**2  # a mean over pairs: team sizes count alike
 
     def fly(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:

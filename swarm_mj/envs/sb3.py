@@ -109,30 +109,32 @@ def save_policy(model: BaseAlgorithm, path: Path | str) -> Path:
 def _trained_on(model: BaseAlgorithm) -> MissionBatch:
     """Return a model's missions; raises ValueError if no policy can be made of it."""
     env, kind = model.get_env(), type(model).__name__
-    inner: Any = env and env.unwrapped
-    normalised = env and unwrap_vec_wrapper(env, VecNormalize)
-    is_ours = isinstance(inner, SwarmVecEnv)
-    refused = {
-        "a policy is made of an actor that draws recipients, and {kind} has none; train PPO, A2C "
-        "or MaskablePPO": not hasattr(model.policy, "action_dist"),
-        "the model has no environment; load the model with it: {kind}.load(path, env=env)": (
-            env is None
-        ),
-        "a policy is made of a model that decides for one robot, and this one was trained on "
-        "another environment; train on swarm_mj.envs.sb3.make_vec_env": not is_ours,
-        'a policy decides for one robot, and agent="team" for all at once; train on '
-        'make_vec_env(..., agent="robot")': is_ours and inner.agent != "robot",
-        "a policy of this kind sees no parents; train without with_parents=True": (
-            is_ours and inner.batches[0].with_parents
-        ),
-        "a policy cannot be made of a model whose observations VecNormalize normalises, as it "
-        "would need their averages; they are normalised already, so train with VecNormalize(env, "
-        "norm_obs=False)": normalised is not None and normalised.norm_obs,
-    }
-    for reason, is_refused in refused.items():
-        if is_refused:
-            raise ValueError(reason.format(kind=kind))
-    return inner.batches[0]
+    if not hasattr(model.policy, "action_dist"):
+        raise ValueError(
+            f"a policy is made of an actor that draws recipients, and {kind} has none; train PPO, "
+            "A2C or MaskablePPO"
+        )
+    if env is None:
+        raise ValueError(
+            f"the model has no environment; load the model with it: {kind}.load(path, env=env)"
+        )
+    missions = env.unwrapped
+    if not isinstance(missions, SwarmVecEnv) or missions.agent != "robot":
+        raise ValueError(
+            "a policy is made of a model that decides for one robot, and this one was trained on "
+            'another environment; train on swarm_mj.envs.sb3.make_vec_env(..., agent="robot")'
+        )
+    batch = missions.batches[0]
+    if batch.with_parents:
+        raise ValueError("a policy of this kind sees no parents; train without with_parents=True")
+    normalised = unwrap_vec_wrapper(env, VecNormalize)
+    if normalised is not None and normalised.norm_obs:
+        raise ValueError(
+            "a policy cannot be made of a model whose observations VecNormalize normalises, as it "
+            "would need their averages; they are normalised already, so train with "
+            "VecNormalize(env, norm_obs=False)"
+        )
+    return batch
 
 
 def _actor(model: BaseAlgorithm) -> list[nn.Module]:

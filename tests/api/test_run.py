@@ -109,13 +109,8 @@ def test_a_flight_is_saved_as_a_video(tmp_path, suffix):
 @pytest.mark.usefixtures("opengl", "small")
 def test_a_notebook_plays_it(monkeypatch):
     shown = []
-    shell = SimpleNamespace(kernel=None)
-    display = SimpleNamespace(
-        Video=lambda **video: SimpleNamespace(**video), display=lambda video: shown.append(video)
-    )
-    ipython = SimpleNamespace(get_ipython=lambda: shell, display=display)
-    monkeypatch.setitem(sys.modules, "IPython", ipython)
-    monkeypatch.setitem(sys.modules, "IPython.display", display)
+    monkeypatch.setattr("IPython.get_ipython", lambda: SimpleNamespace(kernel=None))
+    monkeypatch.setattr("IPython.display.display", shown.append)
     swarm_mj.fly("stationary", policy="tdma", **TINY).show()
     (video,) = shown
     assert video.data[4:8] == b"ftyp"  # as every MP4 begins

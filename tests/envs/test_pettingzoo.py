@@ -82,15 +82,6 @@ def test_nothing_flies_on_when_nobody_is_left():
     assert env.batch.flown.now[0] == 12.0
 
 
-def chained(env):
-    env = supersuit.pettingzoo_env_to_vec_env_v1(env)
-    return supersuit.concat_vec_envs_v1(env, 2, base_class="stable_baselines3")
-
-
-def learn(policy, env):
-    return PPO(policy, env, n_steps=8, batch_size=48, n_epochs=1).learn(200).num_timesteps >= 200
-
-
 def test_supersuits_black_death_trains_where_robots_fail():
     env = supersuit.observation_lambda_v0(
         parallel_env(**FAILING),
@@ -99,7 +90,10 @@ def test_supersuits_black_death_trains_where_robots_fail():
     )
     env = supersuit.black_death_v3(env)
     assert isinstance(env.observation_space("robot_0"), spaces.Box)
-    assert learn("MlpPolicy", chained(env))
+    env = supersuit.pettingzoo_env_to_vec_env_v1(env)
+    env = supersuit.concat_vec_envs_v1(env, 2, base_class="stable_baselines3")
+    model = PPO("MlpPolicy", env, n_steps=8, batch_size=48, n_epochs=1)
+    assert model.learn(200).num_timesteps >= 200
 
 
 def test_without_pettingzoo_it_says_so():

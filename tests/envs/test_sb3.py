@@ -20,13 +20,6 @@ torch.set_num_threads(1)
 SMALL = {"num_robots": 4, "num_windows": 6, "range_ratio": 0.4}
 
 
-def actions(env, num_steps):
-    env.action_space.seed(3)
-    return [
-        np.array([env.action_space.sample() for _ in range(env.num_envs)]) for _ in range(num_steps)
-    ]
-
-
 def mean_age(model):
     """Of the first windows of missions that training does not see."""
     env = make_vec_env("stationary", 8, seed=0, num_robots=5, num_windows=100)
@@ -88,7 +81,7 @@ def test_a_stored_actor_decides_as_the_trained_one(tmp_path, algorithm, net_arch
     env = make_vec_env("stationary", 2, seed=7, **SMALL)
     env.reset()
     policy = make_policy(str(tmp_path / "policy"), env.batches[0].mission)
-    for action in actions(env, 5):
+    for action in np.random.default_rng(3).integers(0, 4, (5, env.num_envs)):
         seen, *_ = env.step(action)
         masks = {"action_masks": env.action_masks()} if algorithm is MaskablePPO else {}
         with torch.no_grad():
@@ -150,7 +143,7 @@ class Halved(CombinedExtractor):
     [
         (lambda: DQN("MultiInputPolicy", make_vec_env(**SMALL), buffer_size=9), "DQN has none"),
         (lambda: PPO("MultiInputPolicy", SwarmEnv(**SMALL)), "trained on another environment"),
-        (lambda: trained(PPO, make_vec_env(agent="team", **SMALL)), 'agent="team" for all at once'),
+        (lambda: trained(PPO, make_vec_env(agent="team", **SMALL)), "decides for one robot"),
         (lambda: trained(PPO, make_vec_env(with_parents=True, **SMALL)), "sees no parents"),
         (lambda: trained(PPO, VecNormalize(make_vec_env(**SMALL))), "norm_obs=False"),
         (
