@@ -29,7 +29,7 @@ class SwarmClass(PettingZooClass):
     def get_env_fun(
         self, num_envs: int, continuous_actions: bool, seed: int | None, device: str
     ) -> Callable[[], EnvBase]:
-        """As BenchMARL asks for it."""
+        """Return a function that makes an environment, as BenchMARL asks for it."""
         del num_envs, continuous_actions
         options = dict(self.config)
 
@@ -55,11 +55,11 @@ class SwarmClass(PettingZooClass):
         return True
 
     def has_state(self) -> bool:
-        """Nobody sees everything."""
+        """No agent sees the whole state."""
         return False
 
     def has_render(self, env: EnvBase) -> bool:  # noqa: ARG002
-        """Pictures are not asked for."""
+        """Nothing is rendered."""
         return False
 
     def max_steps(self, env: EnvBase) -> int:  # noqa: ARG002
@@ -73,7 +73,7 @@ class SwarmClass(PettingZooClass):
 
 
 class Ages(Callback):
-    """Prints what evaluations cost."""
+    """Print what evaluations cost."""
 
     def on_evaluation_end(self, rollouts: list[Any]) -> None:
         """Return the age of information of the missions flown [windows]."""
@@ -82,7 +82,7 @@ class Ages(Callback):
 
 
 def main() -> None:
-    """Trains for a few minutes; `credit` pays every robot for what its own packet changed."""
+    """Train for a few minutes; `credit` pays every robot for what its own packet changed."""
     config = {
         "mission": "stationary",
         "num_robots": 5,

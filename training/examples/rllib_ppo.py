@@ -30,7 +30,7 @@ def make_mission(reward: str) -> SwarmParallelEnv:
 
 
 class FlatEnv(ParallelPettingZooEnv):
-    """What robots know as one row, without masks: RLlib's own networks take that."""
+    """An environment that shows what robots know as one row, which RLlib's own networks take."""
 
     def __init__(self, _config: dict[str, Any]) -> None:
         """Make the missions that are trained on."""
@@ -39,12 +39,12 @@ class FlatEnv(ParallelPettingZooEnv):
         self.observation_space = spaces.Dict(seen)
 
     def reset(self, **options: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """As RLlib's."""
+        """Return what RLlib expects."""
         seen, infos = super().reset(**options)
         return flat(seen), infos
 
     def step(self, action_dict: dict[str, Any]) -> tuple[dict[str, np.ndarray], Any, Any, Any, Any]:
-        """As RLlib's."""
+        """Return what RLlib expects."""
         seen, *others = super().step(action_dict)
         return flat(seen), *others
 
@@ -55,7 +55,7 @@ def flat_space(mission: SwarmParallelEnv, agent: str) -> spaces.Space:
 
 
 def flat(seen: dict[str, Any]) -> dict[str, np.ndarray]:
-    """As `flat_space` has it."""
+    """Return what a robot knows as `flat_space` has it."""
     return {agent: each["observation"].ravel() for agent, each in seen.items()}
 
 
@@ -74,7 +74,7 @@ def mean_age(module: RLModule, num_missions: int = 5) -> float:
 
 
 def main() -> None:
-    """Trains for a minute or so."""
+    """Train for about a minute."""
     register_env("swarm", FlatEnv)
     config = (
         PPOConfig()

@@ -38,14 +38,14 @@ def make_env(reward: str) -> EnvBase:
 
 
 def perceptron(num_outputs: int) -> nn.Module:
-    """On what one robot knows; all robots have the same."""
+    """Return a network over what one robot knows; all robots share it."""
     return nn.Sequential(
         nn.Linear(NUM_ROBOTS * NUM_FEATURES, 64), nn.Tanh(), nn.Linear(64, num_outputs)
     )
 
 
 def make_actor(env: EnvBase) -> ProbabilisticActor:
-    """Whom a robot addresses, among those worth a thought."""
+    """Return the network that draws whom a robot addresses, among those that the mask allows."""
     network = TensorDictModule(perceptron(NUM_ROBOTS), in_keys=[SEEN], out_keys=[LOGITS])
     return ProbabilisticActor(
         network,
@@ -68,7 +68,7 @@ def mean_age(actor: ProbabilisticActor, num_missions: int = 5) -> float:
 
 
 def main() -> None:
-    """Trains for a minute or so."""
+    """Train for about a minute."""
     torch.manual_seed(0)
     env = make_env("credit")
     actor = make_actor(env)

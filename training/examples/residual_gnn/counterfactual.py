@@ -18,7 +18,7 @@ from swarm_mj.system.compiled import compiled
 
 
 class RecordedMissions(NamedTuple):
-    """How B recorded missions of S slots went."""
+    """B recorded missions of S slots."""
 
     observed: Int32[np.ndarray, "S+1 B N N"]  # T before each slot, and at the end [ticks]
     heard: Int[np.ndarray, "S B N"]  # whom each robot decoded; itself is nobody
@@ -33,7 +33,7 @@ def counterfactual_advantage(
     horizon: int,
     age_saved: Float[np.ndarray, "R"],
 ) -> None:
-    """Fill in how much age one slot that goes otherwise takes from the team.
+    """Fill in how much lower the team's age is if one slot goes otherwise.
 
     Args:
         recorded: Of the missions as they went.
@@ -74,7 +74,7 @@ def _step(
 ) -> None:
     """One slot: `other` holds the rows of robots that know otherwise than they did.
 
-    Whoever transmits decodes nothing, so a sender's row is what its packet holds.
+    A robot that transmits decodes nothing, so a sender's row is what its packet holds.
     """
     before, after, went = recorded.observed[s, b], recorded.observed[s + 1, b], recorded.heard[s, b]
     for j in range(heard.shape[0]):

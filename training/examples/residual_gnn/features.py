@@ -67,7 +67,7 @@ class Neighbour(IntEnum):
 
 
 class Seen(NamedTuple):
-    """What robots that decide see; the first `count` rows of neighbours hold something."""
+    """The inputs of robots that decide; the first `count` rows of neighbours are in use."""
 
     robots: Float32[np.ndarray, "R F"]
     neighbours: Float32[np.ndarray, "E G"]
@@ -75,7 +75,7 @@ class Seen(NamedTuple):
 
 
 def room_to_see(num_rows: int, num_robots: int) -> Seen:
-    """Room for so many robots that decide, in teams of this size."""
+    """Return room for a number of robots that decide, in teams of this size."""
     most = num_rows * (num_robots - 1)
     return Seen(
         robots=np.empty((num_rows, len(Own)), dtype=np.float32),
@@ -85,7 +85,7 @@ def room_to_see(num_rows: int, num_robots: int) -> Seen:
 
 
 class _Knowledge(NamedTuple):
-    """What one robot decides by, before a slot."""
+    """The knowledge by which one robot decides, before a slot."""
 
     identity: int
     now: int  # the slot's tick
@@ -247,7 +247,7 @@ def _see_oneself(
 
 @compiled()
 def _margin(ratio: float, threshold: float) -> float:
-    """Decades by which an SINR is above the threshold, within limits."""
+    """Return by how many decades an SINR is above the threshold, within limits."""
     return min(max(math.log10(max(ratio, 1e-12) / threshold), WORST), BEST)
 
 
@@ -273,7 +273,7 @@ def _news(
     held: Int32[np.ndarray, "N"],
     now: int,
 ) -> float:
-    """By how much a packet would make a listener's knowledge younger: mean over robots [slots]."""
+    """Return by how much a packet would lower a listener's ages, mean over robots [slots]."""
     total = 0
     for k in range(held.shape[0]):
         age = 0 if k == sender else now - sent[k]

@@ -1,8 +1,8 @@
-"""What every robot remembers of the others: what they know, and how well it inbound_ratio them.
+"""What every robot remembers of the others: what they know, and how well it receives them.
 
-Whoever decodes a packet knows all that its sender knew. What the sender learns from then on can be
-predicted from who is believed to transmit. Index order: `[b, i, j]` is what robot `i` of mission
-`b` believes of robot `j`. Times are ticks: a slot's tick is its number, counted from 1.
+A robot that decodes a packet knows all that its sender knew. What the sender learns afterwards can
+be predicted from who is believed to transmit. Index order: `[b, i, j]` is what robot `i` of
+mission `b` believes of robot `j`. Times are ticks: a slot's tick is its number, counted from 1.
 """
 
 from typing import NamedTuple
@@ -25,7 +25,7 @@ FIRST_SHARE = 0.8  # before there was one
 
 
 class Memory(NamedTuple):
-    """Of all robots of B missions."""
+    """The memories of all robots of B missions."""
 
     held: Int32[np.ndarray, "B N N N"]  # [b, i, j, k]: when k observed what j knows of k, or 0
     decoded: Int32[np.ndarray, "B N N"]  # when i last decoded a packet of j, or 0
@@ -37,7 +37,7 @@ class Memory(NamedTuple):
 
 
 def empty_memory(num_missions: int, num_robots: int) -> Memory:
-    """Of robots that have heard nothing."""
+    """Return the memories of robots that have heard nothing."""
     pairs = (num_missions, num_robots, num_robots)
     return Memory(
         held=np.zeros((*pairs, num_robots), dtype=np.int32),
@@ -63,7 +63,7 @@ def note_slot(
     law: PowerLaw,
     threshold: float,
 ) -> None:
-    """Take note of a slot that has passed.
+    """Update the memories with a slot that has passed.
 
     Args:
         memory: Written in place.
@@ -112,7 +112,7 @@ def note_slot(
 
 @compiled()
 def _count(share: Float32[np.ndarray, "N"], place: int, is_so: bool) -> None:
-    """Move a share towards what was so the last time."""
+    """Move a share towards the last outcome."""
     share[place] += RECENT * ((1.0 if is_so else 0.0) - share[place])
 
 
@@ -127,7 +127,7 @@ def _judge(share: Float32[np.ndarray, "N"], due: int, sender: int) -> None:
 def _read_packet(
     memory: Memory, b: int, i: int, sender: int, now: int, sent: Int32[np.ndarray, "N"]
 ) -> None:
-    """Take over what i decoded: all that the sender knows, and whether it knew of i's last one."""
+    """Take over what i decoded: all that the sender knows, and whether it had i's last packet."""
     last = memory.sent[b, i]
     if last > 0 and memory.decoded[b, i, sender] < last:
         _count(memory.outbound_ratio[b, i], sender, sent[i] >= last)
@@ -146,7 +146,7 @@ def _pass_on(
     threshold: float,
     predicted: PredictedReceptions,
 ) -> None:
-    """Neighbours that should have decoded a packet now know what its sender is believed to know.
+    """Let neighbours that should have decoded a packet know what its sender is believed to know.
 
     Of a sender that i did not decode itself, that is what i last believed: not that it has just
     observed itself.

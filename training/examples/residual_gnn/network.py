@@ -20,7 +20,7 @@ Array = Float[np.ndarray, "..."]
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """All that a network's decisions follow from, but what it sees."""
+    """The weights of a network, and all else that its decisions follow from but its inputs."""
 
     arrays: Mapping[str, Array]  # `LAYER.weight` and `LAYER.bias`, single precision
     prior_logit: float  # what the rule's own choice adds to the logit, or takes from it
@@ -28,7 +28,7 @@ class Weights:
 
     @property
     def width(self) -> int:
-        """Of the layers."""
+        """The width of the layers."""
         return len(self.arrays[f"{MESSAGE[0]}.bias"])
 
     def logits(self, seen: Seen) -> Float[np.ndarray, "R"]:

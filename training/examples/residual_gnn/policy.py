@@ -28,7 +28,7 @@ DIGITS = 12  # of a digest: enough to tell policies apart
 
 
 class Decision(NamedTuple):
-    """Of one slot, by the R robots that might do otherwise than the rule."""
+    """The decision on one slot of the R robots that might do otherwise than the rule."""
 
     rows: Int[np.ndarray, "R 2"]  # mission and identity of each
     seen: Seen
@@ -38,7 +38,7 @@ class Decision(NamedTuple):
 
 
 class ResidualPolicy(BroadcastPolicy):
-    """Draws whether to transmit from the network's probability, given what the plan says.
+    """A policy that draws whether to transmit by the network's probability, given the plan.
 
     Uses the robot's own buffer, T in packets that it decoded, its identity, the team's size, the
     order, the clock, common random numbers and the radio's range and threshold. Of what the mission
@@ -88,7 +88,7 @@ class ResidualPolicy(BroadcastPolicy):
         self._rule.inform(belief)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Draws each mission's order and forgets; arguments as in `Policy.start`."""
+        """Draw each mission's order and forget; arguments as in `Policy.start`."""
         self._rule.start(num_robots, rngs)
         self._own = Stream(rngs, uniform, (num_robots,))
         self._common = Stream(rngs, uniform, (num_robots,))
@@ -97,7 +97,7 @@ class ResidualPolicy(BroadcastPolicy):
         self._last: Decision | None = None
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
-        """Who transmits, by the network's word."""
+        """Return which robots transmit, by the network."""
         return self.decide(views).transmits
 
     def decide(self, views: LocalViews) -> Decision:
@@ -145,5 +145,5 @@ class ResidualPolicy(BroadcastPolicy):
 
 
 def ticks(timestamp: Float[np.ndarray, "..."]) -> Int32[np.ndarray, "..."]:
-    """Time [windows] in slots."""
+    """Return a time [windows] in slots."""
     return np.rint(SLOTS_PER_WINDOW * timestamp).astype(np.int32)

@@ -27,7 +27,7 @@ SCALE = 20.0  # of the loss, against which gradients are clipped
 
 @dataclass(frozen=True, kw_only=True)
 class PpoSettings:
-    """Of one improvement."""
+    """The settings of one improvement."""
 
     learning_rate: float = setting(7e-4, "of Adam", low=1e-9, high=1.0)
     epochs: int = setting(5, "passes over the decisions", low=1, high=100)
@@ -48,7 +48,7 @@ def improve(
     settings: PpoSettings,
     generator: torch.Generator,
 ) -> None:
-    """Take a few steps on what some missions taught, in units of each one's own spread.
+    """Take a few steps on the decisions of some missions, in units of each mission's spread.
 
     Args:
         network: Changed in place.
@@ -84,7 +84,7 @@ def surrogate(
     advantage: Float[Tensor, "R"],
     settings: PpoSettings,
 ) -> Float[Tensor, "R"]:
-    """PPO's clipped objective, in expectation over a robot's own action.
+    """Return PPO's clipped objective, in expectation over a robot's own action.
 
     Args:
         now: Logits of transmitting.

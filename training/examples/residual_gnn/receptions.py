@@ -1,4 +1,4 @@
-"""Whom everyone would decode in a slot, as one robot reckons from where it believes all to be."""
+"""Predictions of one robot: whom each robot decodes in a slot, from where it believes all are."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from swarm_mj.system.compiled import compiled
 
 
 class PredictedReceptions(NamedTuple):
-    """What a slot holds for every robot j, as robot i believes; powers in units of the noise."""
+    """The receptions of a slot at every robot j, as robot i predicts; powers in units of noise."""
 
     total: Float[np.ndarray, "N"]  # power of all packets at j
     strongest: Float[np.ndarray, "N"]  # of the strongest one
@@ -21,7 +21,7 @@ class PredictedReceptions(NamedTuple):
 
 @compiled()
 def empty_receptions(num_robots: int) -> PredictedReceptions:
-    """Room for the reckoning of one robot."""
+    """Return room for the predictions of one robot."""
     return PredictedReceptions(
         np.zeros(num_robots),
         np.zeros(num_robots),
@@ -37,7 +37,7 @@ def predict_receptions(
     law: PowerLaw,
     predicted: PredictedReceptions,
 ) -> None:
-    """Works out what all receive if these robots transmit; `predicted` is overwritten."""
+    """Predict what all receive if these robots transmit; `predicted` is overwritten."""
     total, strongest, sender, power = predicted
     total[:], strongest[:], sender[:] = 0.0, 0.0, NOBODY
     for o in range(transmits.shape[0]):
@@ -50,6 +50,6 @@ def predict_receptions(
 
 @compiled()
 def decoded_by(j: int, predicted: PredictedReceptions, more: float, threshold: float) -> int:
-    """Whom j decodes beside so much more interference, or `NOBODY`."""
+    """Return whom j decodes beside this additional interference, or `NOBODY`."""
     incoming = incoming_at(Air(predicted.total, predicted.strongest, predicted.sender), j)
     return decoded(incoming, NOBODY, 1.0, threshold, more=more)

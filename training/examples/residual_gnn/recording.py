@@ -14,7 +14,7 @@ from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW, LocalViews, channel_at
 from swarm_mj.simulation.swarm import Swarm
 
-LIKELY = 0.02  # whoever may do otherwise than the rule with more is always learned from
+LIKELY = 0.02  # above it, a decision that may go otherwise than the rule is always used
 
 
 class TrainingBatch(NamedTuple):
@@ -36,16 +36,16 @@ class _Part(NamedTuple):
 
 
 class Recorder(ResidualPolicy):
-    """Keeps all that it decides, and what everyone knew before."""
+    """A policy that keeps all its decisions, and what robots knew before each."""
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Forgets what it kept; arguments as in `Policy.start`."""
+        """Forget what was kept; arguments as in `Policy.start`."""
         super().start(num_robots, rngs)
         self.decisions: list[Decision] = []
         self.observed: list[np.ndarray] = []  # T before each slot [ticks]
 
     def decide(self, views: LocalViews) -> Decision:
-        """As it is decided; kept."""
+        """Return the decision, and keep it."""
         decision = super().decide(views)
         seen = decision.seen  # of a room for many more neighbours
         decision = decision._replace(seen=seen._replace(neighbours=seen.neighbours.copy()))
@@ -115,7 +115,7 @@ def collect_batch(
 def _learned_from(
     decision: Decision, rng: np.random.Generator, share: float
 ) -> tuple[Bool[np.ndarray, "R"], Float[np.ndarray, "C"]]:
-    """Which decisions are learned from, and how many each of those stands for."""
+    """Return which decisions are learned from, and how many each of those stands for."""
     rows = decision.rows[:, 0], decision.rows[:, 1]
     proposed, did = decision.proposal.transmits[rows], decision.transmits[rows]
     is_sure = proposed | did | (decision.logit > np.log(LIKELY / (1.0 - LIKELY)))

@@ -18,7 +18,7 @@ FARTHEST = 40  # later transmissions count as this far ahead [slots]
 
 
 class Proposal(NamedTuple):
-    """Of one slot: `[b, i, j]` is what robot i of mission b believes of j, or says of itself."""
+    """The rule's proposal for a slot: `[b, i, j]` is what robot i of mission b believes of j."""
 
     is_due: Bool[np.ndarray, "B N N"]  # whether j transmits in the slot
     due_in: Int16[np.ndarray, "B N N"]  # in how many slots it does so next
@@ -28,14 +28,14 @@ class Proposal(NamedTuple):
 
     @property
     def transmits(self) -> Bool[np.ndarray, "B N"]:
-        """Who should transmit, by the rule."""
+        """Return which robots should transmit, by the rule."""
         return np.diagonal(self.is_due, axis1=1, axis2=2)
 
 
 def turns(
     order: Int[np.ndarray, "B N"], slot: Int[np.ndarray, "B"]
 ) -> tuple[Bool[np.ndarray, "B N N"], Int16[np.ndarray, "B N N"]]:
-    """Whose turn it is in a common order, and when everyone's is next.
+    """Return whose turn it is in a common order, and when each robot's is next.
 
     Args:
         order: The robot at each place.
@@ -53,7 +53,7 @@ def turns(
 
 
 class RestingRule:
-    """Whoever has heard of everyone follows the plan that all such robots share; others take turns.
+    """A rule: robots that have heard of all others follow one common plan; others take turns.
 
     It is `planner --payload none` in a team at rest. Plans are kept for positions that come again.
     """
@@ -69,14 +69,14 @@ class RestingRule:
         self._plans: dict[bytes, Plan] = {}
 
     def inform(self, belief: Belief) -> None:
-        """Plans by this belief from now on."""
+        """Plan by this belief from now on."""
         are_plain = _is_free_space(belief) and _is_free_space(self._belief)
         if not (are_plain and belief.radio == self._belief.radio):
             self._plans = {}
         self._belief = belief
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Draws each mission's order of turns; arguments as in `Policy.start`."""
+        """Draw each mission's order of turns; arguments as in `Policy.start`."""
         self._order = draw_order(num_robots, rngs)
         if len(self._plans) > MOST_PLANS:
             self._plans = {}
@@ -101,7 +101,7 @@ class RestingRule:
 
 
 def _ahead(plan: Plan, slot: int) -> tuple[Bool[np.ndarray, "N"], Int16[np.ndarray, "N"]]:
-    """Who transmits by the plan, and in how many slots next."""
+    """Return which robots transmit by the plan, and in how many slots they next do."""
     ahead = np.stack([plan.transmits(slot + n) for n in range(1 + FARTHEST)])
     later = ahead[1:]
     due_in = np.where(np.any(later, axis=0), 1 + np.argmax(later, axis=0), len(ahead))
@@ -109,5 +109,5 @@ def _ahead(plan: Plan, slot: int) -> tuple[Bool[np.ndarray, "N"], Int16[np.ndarr
 
 
 def _is_free_space(belief: Belief) -> bool:
-    """Whether nothing is believed of the channel but its radio."""
+    """Return whether nothing is believed of the channel but its radio."""
     return belief.law is None and belief.reception is None and belief.shadowing_db == 0.0

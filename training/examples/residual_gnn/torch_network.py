@@ -11,7 +11,7 @@ from residual_gnn.network import OF_MESSAGES, Weights
 
 
 class ResidualNetwork(nn.Module):
-    """At first it says nothing, so that the rule decides."""
+    """A network that changes nothing at first, so that the rule decides."""
 
     def __init__(self, width: int, prior_logit: float) -> None:
         """Make a network.
@@ -45,12 +45,12 @@ class ResidualNetwork(nn.Module):
         return said + self.prior_logit * robots[:, 0]
 
     def weights(self, *, corrects_turns: bool) -> Weights:
-        """Its weights, to fly with."""
+        """Return its weights, to fly with."""
         arrays = {name: t.detach().numpy().copy() for name, t in self.state_dict().items()}
         return Weights(arrays, self.prior_logit, corrects_turns)
 
     def state_dict_copy(self) -> dict[str, Tensor]:
-        """Its weights as they are now."""
+        """Return a copy of its weights."""
         return {name: tensor.detach().clone() for name, tensor in self.state_dict().items()}
 
 

@@ -41,7 +41,7 @@ NUM_BEST = 3  # that are chosen among, with the untrained one
 
 @dataclass(frozen=True, kw_only=True)
 class ResidualTraining:
-    """What a training depends on: the same makes the same policy on the same machine."""
+    """The settings of a training: the same make the same policy on the same machine."""
 
     missions: dict[str, Mission]  # that are flown in turn, by their names
     width: int = setting(32, "of the network's layers", low=1, high=256)
@@ -89,7 +89,7 @@ class ResidualTraining:
 
 @dataclass(kw_only=True)
 class Progress:
-    """Where a run stands."""
+    """The progress of a run."""
 
     improvements: int = 0
     seconds: float = 0.0
@@ -101,7 +101,7 @@ class Run:
     """A training under way."""
 
     def __init__(self, training: ResidualTraining, folder: Path) -> None:
-        """Begins with an evaluation of the rule alone, or goes on from the folder's checkpoint.
+        """Begin with an evaluation of the rule alone, or resume the folder's checkpoint.
 
         Args:
             training: What is trained.
@@ -128,7 +128,7 @@ class Run:
             self.evaluate()
 
     def improve(self) -> dict[str, float]:
-        """Flies and learns once, and writes the checkpoint.
+        """Fly and learn once, and write the checkpoint.
 
         Returns:
             The mean age of each kind of mission [windows].
@@ -163,7 +163,7 @@ class Run:
         return ages
 
     def evaluate(self) -> dict[str, float]:
-        """Flies missions that training never sees; keeps the weights if they are among the best.
+        """Fly missions that training never sees; keep the weights if they are among the best.
 
         Returns:
             The mean age of each kind of mission [windows], and as `ratio` the mean of what they are
@@ -185,7 +185,7 @@ class Run:
         return row
 
     def choose(self) -> tuple[int, Weights, dict[int, float]]:
-        """Which of the best is the best on missions that judged nothing so far.
+        """Return which of the best is the best on missions that have judged none of them so far.
 
         Returns:
             After how many improvements it was made, its weights, and the ratio of each of the best;
@@ -227,7 +227,7 @@ class Run:
         return network.weights(corrects_turns=self.training.corrects_turns)
 
     def _ratio(self, ages: dict[str, float]) -> float:
-        """To what the rule costs alone, as the first evaluation said."""
+        """Return the ratio to the cost of the rule alone, from the first evaluation."""
         first = self.progress.curve[0] if self.progress.curve else ages
         return float(np.mean([ages[name] / first[name] for name in ages]))
 
@@ -271,7 +271,7 @@ class Run:
 
 
 def train(run: Run, minutes: float, said: Callable[[str], None]) -> None:
-    """Improves for so many minutes of training in all, and says how it goes.
+    """Improve until the run has trained for a number of minutes, and report the progress.
 
     Args:
         run: That begins or goes on; minutes that it has trained already count, evaluations do not.
