@@ -24,7 +24,7 @@ from swarm_mj.physics.scene import Scene
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
 from swarm_mj.radio.free_space import Channel
-from swarm_mj.replay.recorder import Recorder, replay_file, replay_memory
+from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK, Recorder
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system import needs
@@ -110,7 +110,7 @@ def fly(
         kept = f"{len(flown.windows)} of {mission.num_windows} windows; these are kept"
         warnings.warn(f"{flown.ending} after {kept}", stacklevel=2)
     run = run_of(swarm, flown, name=name, seed=seed, observer=observer, components=components)
-    return replace(run, log=recorder.log()) if recorder else run
+    return replace(run, log=recorder.log(run.config)) if recorder else run
 
 
 def mission_of(
@@ -143,9 +143,9 @@ def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:
     if not is_recorded:
         return Needs(memory=memory, addresses=addresses)
     return Needs(
-        memory=memory + replay_memory(mission, mission.num_windows),
+        memory=memory + IN_MEMORY.of(mission, mission.num_windows),
         addresses=addresses + needs.OF_RERUN,
-        file=replay_file(mission),
+        file=ON_DISK.of(mission, mission.num_windows),
     )
 
 
@@ -237,7 +237,7 @@ def _policy_of(
 
 def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | None:
     """Return a message if memory does not suffice to write the replay, at a second look either."""
-    needed = replay_memory(mission, num_windows) - recorder.num_bytes
+    needed = IN_MEMORY.of(mission, num_windows) - recorder.num_bytes
     if free_memory() >= needed:
         return None
     gc.collect()

@@ -180,15 +180,7 @@ class Run:
         Raises:
             ValueError: Nothing was recorded.
         """
-        from swarm_mj.replay.footage import footage_of
-
-        return footage_of(
-            self._recorded(),
-            self.mission,
-            policy=self.config["policy"],
-            seed=self.config["seed"],
-            own=components_in(self.config),
-        )
+        return self._recorded()
 
     def report(self, replay: Path | None = None) -> dict[str, Any]:
         """Return config and summary, as `swarm-mj fly --json` writes them."""
@@ -214,7 +206,7 @@ class Run:
                 from swarm_mj.replay.write import write_replay  # rerun is slow to import
 
                 config = {name: value for name, value in self.config.items() if value is not None}
-                write_replay(log, self.mission, config, path)
+                write_replay(log, config, path)
             case ".json":
                 write_json(path, self.report())
             case ".csv":

@@ -91,7 +91,7 @@ def run(options: FlyOptions) -> int:
         stack.callback(lambda: plain_console().print(run.table()))
         stack.enter_context(console.status("Writing ..."))
         if path and recorder:
-            stack.callback(lambda: replace(run, log=recorder.log()).save(path))
+            stack.callback(lambda: replace(run, log=recorder.log(run.config)).save(path))
         if options.json:
             write_json(options.json, run.report(path))
     for label, line in _next_commands(options, path):

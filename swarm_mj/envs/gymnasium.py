@@ -15,7 +15,7 @@ from jaxtyping import Bool, UInt8
 from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, seed_or_next
 from swarm_mj.envs.options import check_reset, make_team_batch, team_spaces
 from swarm_mj.mission import Mission
-from swarm_mj.replay.footage import footage_now
+from swarm_mj.replay.recorder import moment
 from swarm_mj.replay.rendering.scene import SceneRenderer, SceneViewer
 
 MODES = ("rgb_array", "human")
@@ -44,7 +44,7 @@ class Screen:
             return
         if self._viewer is None:
             self._viewer = SceneViewer(batch.mission, scene=batch.flown.scene)
-        self._viewer.show(footage_now(batch.flown))
+        self._viewer.show(moment(batch.flown))
         time.sleep(max(0.0, self._shown_s + batch.mission.window_s - time.monotonic()))
         self._shown_s = time.monotonic()
 
@@ -52,7 +52,7 @@ class Screen:
         """Draw a mission as it is now, in the mode "rgb_array"; raises OSError without OpenGL."""
         if self.mode != "rgb_array":
             return None
-        footage = footage_now(batch.flown, index)
+        footage = moment(batch.flown, index)
         if self._renderer is None:
             self._renderer = SceneRenderer(batch.mission, WIDTH, HEIGHT, scene=batch.flown.scene)
         return self._renderer.frame(footage)

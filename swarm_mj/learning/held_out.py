@@ -168,7 +168,7 @@ def record_replay(
     for window in rollout(swarm, held_out_policy(training, network, mission)):
         recorder.add(window)
     about = {"decisions": decisions, "seed": HELD_OUT_SEED, "training seed": training.seed}
-    write_replay(recorder.log(), mission, about, folder / f"decisions-{decisions:09d}.rrd")
+    write_replay(recorder.log(about), about, folder / f"decisions-{decisions:09d}.rrd")
 
 
 def _means(training: Training, costs: Flown) -> Row:

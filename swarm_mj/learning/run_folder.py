@@ -13,7 +13,7 @@ from pathlib import Path
 from swarm_mj.learning.selection import OTHER_FLIGHTS, num_missions
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.stored import POLICY
-from swarm_mj.replay.recorder import replay_file, replay_memory
+from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK
 from swarm_mj.system import needs
 from swarm_mj.system.fields import check, setting
 from swarm_mj.system.reading import read_document, read_file
@@ -152,10 +152,10 @@ def training_needs(training: Training, limits: Limits) -> needs.Needs:
     addresses = needs.ADDRESSES + needs.OF_TORCH
     if limits.replay_every is None:
         return needs.Needs(memory=memory, addresses=addresses, file=file)
-    replay = replay_file(first)
+    replay = ON_DISK.of(first, first.num_windows)
     num_replays = 1 + (limits.decisions or 0) // limits.replay_every
     return needs.Needs(
-        memory=memory + replay_memory(first, first.num_windows),
+        memory=memory + IN_MEMORY.of(first, first.num_windows),
         addresses=addresses + needs.OF_RERUN,
         file=file + num_replays * replay,
         largest_file=max(file, replay),

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 import pyarrow as pa
 import rerun as rr
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, Shaped
 
 from swarm_mj.mission.geometry import ROOT, spanning_tree
 from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay import palette
-from swarm_mj.replay.links import LinkMismatch, by_kind, is_other
+from swarm_mj.replay.links import by_kind, is_other
 from swarm_mj.replay.palette import Colour
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog
@@ -20,11 +20,36 @@ from swarm_mj.replay.rerun_log import RerunLog
 TREE_WIDTH, TREE_HEIGHT = 600.0, 400.0  # of the tree's view, in its own units
 RATE_WINDOWS = 10  # that packets are counted over
 
+# What a robot does with its radio in a window, and the colour of its lane meanwhile.
+SILENT = "silent"
+BROADCAST_STATES = {
+    SILENT: palette.BACKGROUND,
+    "hears": palette.RANGE,
+    "transmits": palette.BROADCAST,
+}
+ADDRESSED_STATES = {
+    SILENT: palette.BACKGROUND,
+    "overhears": palette.OVERHEARD,
+    "answers": palette.ANSWERED,
+    "is lost": palette.LOST,
+    "delivers": palette.DELIVERED,
+}
+# The fates that are counted, and the colours of their curves.
+COUNTED = {
+    "delivered": palette.DELIVERED,
+    "lost": palette.LOST,
+    "overheard": palette.OVERHEARD,
+    "answered": palette.ANSWERED,
+}
 
-def draw_tree(out: RerunLog, colours: UInt8[np.ndarray, "T N 3"]) -> None:
-    """Draw the ego robot's parent tree as a dendrogram, nodes in their robots' colours."""
+
+def draw_tree(out: RerunLog) -> None:
+    """Draw the ego robot's parent tree as a dendrogram, nodes in the colours of their ages."""
     log = out.log
-    place = dendrogram(log.parent, log.is_known, log.ego)
+    is_known, everywhere = ~np.isnan(log.known_age), np.ones_like(log.is_on)
+    # Robots that are off, too: what is known of them may still be passed on.
+    colours = palette.robot_colours(log.known_age, log.facts.full_scale, everywhere, log.ego)
+    place = dendrogram(log.parent, is_known, log.ego)
     max_hops = max(4.0, float(np.nanmax(place[..., 0])))
     place *= (TREE_WIDTH / max_hops, TREE_HEIGHT)
     across = np.arange(1, int(max_hops) + 1) * (TREE_WIDTH / int(max_hops))
@@ -72,12 +97,12 @@ def walk(
     return order, children
 
 
-def draw_age_matrix(out: RerunLog, full_scale: float) -> None:
+def draw_age_matrix(out: RerunLog) -> None:
     """Draw the ages of all pairs, in the order of a walk along the start's spanning tree.
 
     So neighbours stand together, and clusters show as blocks.
     """
-    log = out.log
+    log, full_scale = out.log, out.log.facts.full_scale
     parent = spanning_tree(log.position_m[:1])[0].tolist()
     order = walk(parent, range(len(parent)), ROOT)[0][1:]
     ages = np.minimum(log.age[:, order][:, :, order], full_scale).astype(np.float16)
@@ -93,43 +118,36 @@ def draw_age_matrix(out: RerunLog, full_scale: float) -> None:
 
 def draw_states(out: RerunLog) -> None:
     """Draw a lane per robot: what it did with the radio, logged when it changes."""
-    states, state = radio_states(out.log)
-    names = np.array(list(states))
-    colours = np.array(list(states.values()), dtype=np.uint8)
+    colours = BROADCAST_STATES if out.log.facts.is_broadcast else ADDRESSED_STATES
+    names, state = np.array(list(colours)), radio_states(out.log)
     # Silence is hidden: lanes would otherwise be full of it.
     configuration = rr.StateConfiguration(
-        values=names, labels=names, visible=names != "silent", colors=colours
+        values=names,
+        labels=names,
+        visible=names != SILENT,
+        colors=np.array(list(colours.values()), dtype=np.uint8),
     )
-    for i in range(state.shape[1]):
+    for i, lane in enumerate(state.T):
         path = f"state/r{i:03d}"
         out.fixed(path, configuration)
         # A lane keeps its state until the next change, so that one row per window is not needed.
-        changes = np.flatnonzero(np.diff(state[:, i], prepend=-1))
-        columns = rr.StateChange.columns(state=names[state[changes, i]])
-        out.timed(path, columns, out.log.window[changes])
+        changes = np.flatnonzero(np.append(True, lane[1:] != lane[:-1]))
+        out.timed(path, rr.StateChange.columns(state=lane[changes]), out.log.window[changes])
 
 
-def radio_states(log: Log) -> tuple[dict[str, Colour], Int[np.ndarray, "T N"]]:
-    """Return the radio's states with their colours, and each robot's as an index into them.
+def radio_states(log: Log) -> Shaped[np.ndarray, "T N"]:
+    """Return the state of each robot's radio, by its name.
 
     Sending goes before answering, answering before hearing.
     """
     robots = np.arange(log.recipient.shape[2])
-    is_first = log.is_transmitter
-    state = np.where(np.any(log.heard != robots, axis=1), 1, 0)
-    states = {"silent": palette.BACKGROUND}
-    if log.is_broadcast:
-        state[is_first] = 2
-        return states | {"hears": palette.RANGE, "transmits": palette.BROADCAST}, state
-    is_delivered = np.take_along_axis(log.heard, log.recipient, axis=2)[:, 0] == robots
-    state[log.recipient[:, 1] != robots] = 2
-    state[is_first] = np.where(is_delivered, 4, 3)[is_first]
-    return states | {
-        "overhears": palette.OVERHEARD,
-        "answers": palette.ANSWERED,
-        "is lost": palette.LOST,
-        "delivers": palette.DELIVERED,
-    }, state
+    sends, hears = log.is_transmitter, np.any(log.heard != robots, axis=1)
+    if log.facts.is_broadcast:
+        return np.select([sends, hears], ["transmits", "hears"], SILENT)
+    delivers = np.take_along_axis(log.heard, log.recipient, axis=2)[:, 0] == robots
+    answers = log.recipient[:, 1] != robots
+    order = {"delivers": sends & delivers, "is lost": sends, "answers": answers, "overhears": hears}
+    return np.select(list(order.values()), list(order), SILENT)
 
 
 class PlotCurve(NamedTuple):
@@ -158,7 +176,7 @@ def plots(log: Log) -> dict[str, list[PlotCurve]]:
         ]
     }
     counts, named = packet_counts(log), "delivered (green), lost (orange), answered (blue)"
-    if log.is_broadcast:
+    if log.facts.is_broadcast:
         named = "sent (grey), heard by anyone (blue)"
     found[f"Packets in {RATE_WINDOWS} windows: {named}"] = shown = []
     for name, (colour, count) in counts.items():
@@ -166,9 +184,9 @@ def plots(log: Log) -> dict[str, list[PlotCurve]]:
         recent = np.convolve(count, np.ones(RATE_WINDOWS))[: len(count)]
         is_hidden = name == "overheard"
         shown.append(PlotCurve(f"radio/{name}", name, colour, recent, is_hidden=is_hidden))
-    if log.mismatch is not None:
+    if log.is_compared:
         named = "believed, too weak (red); works, unbelieved (green); cut off (white)"
-        found[f"Share [%]: {named}"] = _mismatch_curves(log, log.mismatch)
+        found[f"Share [%]: {named}"] = _mismatch_curves(log)
     cost = log.task_cost
     if cost is None and log.has_motion:
         variance = log.velocity_variance_m2ps2
@@ -184,11 +202,11 @@ def packet_counts(log: Log) -> dict[str, tuple[Colour, Int[np.ndarray, "T"]]]:
 
     Broadcasts are sent, and heard if any robot decoded them.
     """
-    if not log.is_broadcast:
+    if not log.facts.is_broadcast:
         num, packets = len(log.window), log.packets
         return {
-            fate: (getattr(palette, fate.upper()), np.bincount(packets[fate].row, minlength=num))
-            for fate in ("delivered", "lost", "overheard", "answered")
+            fate: (colour, np.bincount(packets[fate].row, minlength=num))
+            for fate, colour in COUNTED.items()
         }
     row, phase, hearer = np.nonzero(is_other(log.heard))
     is_heard = np.zeros(log.heard.shape, dtype=bool)
@@ -197,28 +215,26 @@ def packet_counts(log: Log) -> dict[str, tuple[Colour, Int[np.ndarray, "T"]]]:
     return {"sent": (palette.SENT, sent), "heard": (palette.BROADCAST, heard)}
 
 
-def _mismatch_curves(log: Log, mismatch: LinkMismatch) -> list[PlotCurve]:
-    at, none = mismatch.window - log.window[0], np.zeros(len(log.window), dtype=int)
-    kinds = by_kind(mismatch.links).values()
-    num_works, num_weak = (np.bincount(its["row"], minlength=len(at)) for its in kinds)
-    numbers = log.num_believed, log.num_working
-    believed, working = ((none if num is None else num)[at] for num in numbers)
-    others, cut_off = np.sum(log.is_on[at], axis=1) - 1, np.sum(log.is_cut_off[at], axis=1)
+def _mismatch_curves(log: Log) -> list[PlotCurve]:
+    window = log.mismatch.window
+    at, links = window - log.window[0], by_kind(log.mismatch.links)
+    num = {kind: np.bincount(its["row"], minlength=len(at)) for kind, its in links.items()}
+    num_others, num_cut_off = np.sum(log.is_on[at], axis=1) - 1, np.sum(log.is_cut_off[at], axis=1)
     shares = {
-        "believed, too weak": (palette.TOO_WEAK, num_weak, believed),
-        "works, unbelieved": (palette.UNBELIEVED, num_works, working),
-        f"cut off from r{log.ego}": (palette.EGO, cut_off, others),
+        "believed, too weak": (palette.TOO_WEAK, num["too_weak"], log.num_believed),
+        "works, unbelieved": (palette.UNBELIEVED, num["unbelieved"], log.num_working),
+        f"cut off from r{log.ego}": (palette.EGO, num_cut_off, num_others),
     }
     curves = []
     for name, (colour, part, of) in shares.items():
         path, share = "world/" + name.replace(" ", "_"), 100.0 * part / np.maximum(1, of)
-        curves.append(PlotCurve(path, name, colour, share, window=mismatch.window))
+        curves.append(PlotCurve(path, name, colour, share, window=window))
     return curves
 
 
-def draw_plots(out: RerunLog, shown: dict[str, list[PlotCurve]]) -> None:
+def draw_plots(out: RerunLog) -> None:
     """Draw the curves of all plots."""
-    for curve in itertools.chain(*shown.values()):
+    for curve in itertools.chain(*plots(out.log).values()):
         path, style = f"plots/{curve.path}", {"colors": [curve.colour], "names": [curve.name]}
         if isinstance(curve.std, float):
             out.fixed(path, rr.SeriesLines(widths=[1.6], **style))

@@ -1,34 +1,29 @@
-"""The footage of a mission for pictures and videos, window by window, kept in replays."""
+"""The footage of a mission, window by window: what videos show, recorded or read from a replay."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Int16, UInt8
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import Components, components_in
+from swarm_mj.mission.components import components_in
 from swarm_mj.physics.scene import Scene
 from swarm_mj.replay import palette
 from swarm_mj.replay.links import (
-    NO_MISMATCH,
     PIECES,
     Lines,
     LinkMismatch,
     LinkRows,
-    PacketSegments,
+    PacketPaths,
     Positions,
     by_kind,
     divided,
     ends,
-    packet_segments,
     shades,
 )
-from swarm_mj.replay.recorder import Log, Recorder
-from swarm_mj.simulation.swarm import Swarm
 
 NEAR = 1.5  # times the area: robots that stay within it are shown around the area
-AS_RECORDED = ("window", "position_m", "velocity_mps", "is_on", "is_cut_off", "age_mean", "scene")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,8 +65,8 @@ class Facts:
     mission: Mission
     policy: str
     seed: int
-    observer: int
-    is_broadcast: bool
+    observer: int  # the ego robot
+    is_broadcast: bool  # packets have no addressee; otherwise the second phase answers the first
     full_scale: float  # the age from which robots are darkest [windows]
     channel: str | None = None  # the names of the user's own parts
     controller: str | None = None
@@ -85,43 +80,57 @@ class Facts:
 
 @dataclass(frozen=True, kw_only=True)
 class Footage:
-    """T windows of N robots."""
+    """T windows of N robots, each at its end; packets flew during it."""
 
     facts: Facts
     window: Int[np.ndarray, "T"]  # 1 is the mission's first
     position_m: Positions  # p
-    velocity_mps: Float[np.ndarray, "T N 2"]  # of any length: only its direction is shown
-    age: Float[np.ndarray, "T N"]  # of what the observer knows [windows]; nan: nothing
+    velocity_mps: Float[np.ndarray, "T N 2"]  # v; of a replay that was read, of any length
     is_on: Bool[np.ndarray, "T N"]  # whether a robot had not failed
-    segments: dict[str, PacketSegments]  # packets by their fate, in the order of drawing
+    known_age: Float[np.ndarray, "T N"]  # of what the ego robot knows [windows]; nan: nothing
+    is_cut_off: Bool[np.ndarray, "T N"]  # no packets reach the ego robot, over any number of hops
     age_mean: Float[np.ndarray, "T"]  # Eq. 10 [windows]
-    is_cut_off: Bool[np.ndarray, "T N"]  # whether it can exchange no packets with the observer
+    packets: dict[str, PacketPaths]  # by their fate, in the order of drawing
+    mismatch: LinkMismatch  # has no snapshots in free space
     ground: Ground  # that pictures show
-    mismatch: LinkMismatch = NO_MISMATCH
     scene: Scene | None = None  # what changed the arena; files have its name only
 
-    def colours(self, row: int) -> UInt8[np.ndarray, "N 3"]:
-        """Return the robots' colours in one window, counted from 0."""
-        scale, observer = self.facts.full_scale, self.facts.observer
-        return palette.robot_colours(self.age[row], scale, self.is_on[row], observer)
+    @property
+    def ego(self) -> int:
+        """The robot whose knowledge is shown."""
+        return self.facts.observer
 
-    def packets(self, row: int) -> Iterator[tuple[np.ndarray, np.ndarray, palette.Colour]]:
-        """Yield one window's starts [L 2] and ends [L 2] of packets [m], and their colour.
+    @property
+    def has_motion(self) -> bool:
+        """True if any robot moves."""
+        return bool(np.any(self.velocity_mps))
 
-        The fates are in the order of drawing, so that what matters more covers the rest.
-        """
-        for fate, drawn in self.segments.items():
-            its = slice(*np.searchsorted(drawn.row, [row, row + 1]))
-            yield drawn.start_m[its], drawn.end_m[its], palette.PACKETS[fate][0]
+    @property
+    def is_compared(self) -> bool:
+        """True if the channel was compared with the belief about it: beyond free space."""
+        return len(self.mismatch.window) > 0
+
+    @cached_property
+    def colours(self) -> UInt8[np.ndarray, "T N 3"]:
+        """The robots' colours."""
+        return palette.robot_colours(self.known_age, self.facts.full_scale, self.is_on, self.ego)
+
+    def packets_at(self, row: int) -> dict[str, PacketPaths]:
+        """Return one window's packets by their fate; what matters more is drawn over the rest."""
+        found = {}
+        for fate, packets in self.packets.items():
+            its = slice(*np.searchsorted(packets.row, [row, row + 1]))
+            found[fate] = PacketPaths(packets.row[its], packets.start_m[its], packets.end_m[its])
+        return found
 
     def links(self, row: int) -> LinkRows:
-        """Return the links that are shown in one window: of those too weak, the observer's only.
+        """Return the links that are shown in one window: of those too weak, the ego robot's only.
 
         In a city, all of them together would not show which robots each one joins.
         """
         links = self.mismatch.at(int(self.window[row]))
-        is_own = [links[end] == self.facts.observer for end in ("sender", "receiver")]
-        return links[np.any(is_own, axis=0) | ~links["is_too_weak"]]
+        is_own = (links["sender"] == self.ego) | (links["receiver"] == self.ego)
+        return links[is_own | ~links["is_too_weak"]]
 
     def mismatch_lines(self, row: int) -> tuple[Lines, UInt8[np.ndarray, "S 3"]]:
         """Return the lines of one window's links [m], and their colours."""
@@ -132,52 +141,8 @@ class Footage:
         return np.concatenate(lines_m), np.concatenate(colours)
 
     def shortfalls(self, row: int) -> tuple[Int16[np.ndarray, "K"], Int16[np.ndarray, "K"]]:
-        """Return the robots whose links with the observer are too weak, and the margins [dB]."""
-        links, own = self.links(row), self.facts.observer
+        """Return the robots whose links with the ego robot are too weak, and the margins [dB]."""
+        links = self.links(row)
         links = links[links["is_too_weak"]]
-        is_sender = links["sender"] == own
+        is_sender = links["sender"] == self.ego
         return np.where(is_sender, links["receiver"], links["sender"]), links["margin_db"]
-
-
-def footage_of(
-    log: Log, mission: Mission, policy: str, seed: int, own: Components = Components()
-) -> Footage:
-    """Return what a video shows of a recorded mission; `own` are the user's components."""
-    facts = Facts(
-        mission=mission,
-        policy=policy,
-        seed=seed,
-        observer=log.ego,
-        is_broadcast=log.is_broadcast,
-        full_scale=palette.nice_scale(log.age),
-        **own.names,
-    )
-    return Footage(
-        facts=facts,
-        age=log.known_age,
-        segments=packet_segments(log.packets, log.position_m),
-        ground=frame(log.position_m, mission.half_side_m, is_tight=not mission.has_walls),
-        mismatch=log.mismatch or NO_MISMATCH,
-        **{name: getattr(log, name) for name in AS_RECORDED},
-    )
-
-
-def footage_now(
-    swarm: Swarm, index: int = 0, *, observer: int = 0, full_scale: float | None = None
-) -> Footage:
-    """Return one of a swarm's missions as it is now, with the packets of the window just flown.
-
-    Robots are coloured by what the observer knows of them, darkest from an age of `full_scale`
-    windows on: the number of robots unless given, a round in which everyone has its turn. Raise
-    ValueError if there is no such mission or robot.
-    """
-    if not 0 <= index < len(swarm.now):
-        raise ValueError(f"index must be from 0 to {len(swarm.now) - 1}, not {index}")
-    mission, recorder = swarm.mission, Recorder(swarm, ego=observer, index=index)
-    recorder.add()
-    seen = footage_of(recorder.log(), mission, "", 0)
-    facts = replace(seen.facts, full_scale=full_scale or float(mission.num_robots))
-    # As wide wherever the team is: a live picture does not know where it will fly.
-    ground = frame(seen.position_m, mission.half_side_m)
-    ground = replace(ground, reach_m=max(mission.half_side_m, ground.reach_m))
-    return replace(seen, facts=facts, ground=ground)

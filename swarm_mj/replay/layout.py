@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.charts import TREE_HEIGHT, TREE_WIDTH, PlotCurve
+from swarm_mj.replay.charts import TREE_HEIGHT, TREE_WIDTH, PlotCurve, plots
 from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.links import PIECES, WHOLE, by_kind
 from swarm_mj.replay.recorder import Log
@@ -45,20 +45,20 @@ class Layout(rrb.Blueprint):
         del self._stream
 
 
-def layout(log: Log, frame: Ground, shown: dict[str, list[PlotCurve]]) -> Layout:
+def layout(log: Log, ground: Ground) -> Layout:
     """Return the blueprint: tabs of the mission, its scene, and the radio of every robot."""
-    reach, follows = MARGIN * frame.reach_m, ", follows the team" if frame.moves else ""
-    name, height = f"Map, squares of {square_m(frame):g} m{follows}", legend_height(log)
-    ground = _drawing("/", name, (-reach, reach), (-reach, reach), contents=["/arena/**"])
+    reach, follows = MARGIN * ground.reach_m, ", follows the team" if ground.moves else ""
+    name, height = f"Map, squares of {square_m(ground):g} m{follows}", legend_height(log)
+    map_view = _drawing("/", name, (-reach, reach), (-reach, reach), contents=["/arena/**"])
     samples = _drawing("/legend", "Legend", (0.0, WIDTH), (-3.5, height), titlebar=False)
     across, up = ((-0.05 * size, 1.05 * size) for size in (TREE_WIDTH, TREE_HEIGHT))
     tree = _drawing("/tree", f"Tree of r{log.ego}, in hops", across, up)
     mapping = rrb.TensorScalarMapping(colormap="Viridis", mag_filter="Nearest")
     ages = "Age of information, all pairs"
     matrix = rrb.TensorView(origin="/ages", name=ages, scalar_mapping=mapping, view_fit="Fill")
-    charts = [_plot(name, curves) for name, curves in shown.items()]
+    charts = [_plot(name, curves) for name, curves in plots(log).items()]
     mission = rrb.Horizontal(
-        rrb.Vertical(ground, samples, row_shares=[4, height / (ROW + LAST)]),
+        rrb.Vertical(map_view, samples, row_shares=[4, height / (ROW + LAST)]),
         rrb.Vertical(rrb.Horizontal(tree, matrix), *charts, row_shares=[4, *[3] * len(charts)]),
         column_shares=[11, 10],
         name="Mission",
@@ -71,7 +71,7 @@ def layout(log: Log, frame: Ground, shown: dict[str, list[PlotCurve]]) -> Layout
     )
     time = {"timeline": TIMELINE, "fps": WINDOWS_PER_SECOND, "loop_mode": "all"}
     return Layout(
-        rrb.Tabs(mission, _scene(frame.reach_m), radio, active_tab=0),
+        rrb.Tabs(mission, _scene(ground.reach_m), radio, active_tab=0),
         rrb.TimePanel(state="collapsed", **time),
         collapse_panels=True,
         auto_views=False,
@@ -118,8 +118,9 @@ def _plot(name: str, curves: list[PlotCurve]) -> rrb.TimeSeriesView:
     )
 
 
-def draw_legend(out: RerunLog, full_scale: float) -> None:
-    """Draw the ramp of ages, to `full_scale` [windows], and samples of what the map shows."""
+def draw_legend(out: RerunLog) -> None:
+    """Draw the ramp of ages, and samples of what the map shows."""
+    full_scale = out.log.facts.full_scale
     edges = LEFT + np.linspace(0.0, RAMP, NUM_SHADES + 1)
     strips = [[(a, 0.0), (b, 0.0)] for a, b in itertools.pairwise(edges)]
     colours = palette.age_colours(np.linspace(0.0, full_scale, NUM_SHADES), full_scale)
@@ -142,26 +143,26 @@ def legend_height(log: Log) -> float:
 
 
 def _row_height(log: Log) -> float:
-    return ROW if log.mismatch is None else ROW + LINE
+    return ROW + LINE if log.is_compared else ROW
 
 
 def _samples(log: Log) -> list[dict[str, str]]:
     """Return rows of texts with their layers: the radio, what else is shown, mismatched links."""
-    own, mismatch = f"r{log.ego}", log.mismatch
+    own = f"r{log.ego}"
     others = {"heading": "heading", f"{own}'s belief": "belief/ring"} if log.has_motion else {}
     others[f"{own}'s tree"] = "tree"
     # Beyond free space, the circle is what the range would be.
-    reach = {"radio range" if mismatch is None else "range in\nfree space": "radio/range"}
-    if log.is_broadcast:
+    reach = {"range in\nfree space" if log.is_compared else "radio range": "radio/range"}
+    if log.facts.is_broadcast:
         packets = {"transmits": "radio/transmitter", "is heard by": "radio/heard"}
         rows = [packets | reach, others]
     else:
         fates = ("delivered", "lost", "answered", "overheard")
         rows = [{fate: f"radio/{fate}" for fate in fates}, others | reach]
-    if mismatch is None:
+    if not log.is_compared:
         return rows
     texts = {"too_weak": "believed,\ntoo weak", "unbelieved": "works,\nunbelieved"}
-    found = {kind for kind, links in by_kind(mismatch.links).items() if len(links) > 0}
+    found = {kind for kind, links in by_kind(log.mismatch.links).items() if len(links) > 0}
     row = {text: f"world/{kind}" for kind, text in texts.items() if kind in found}
     if np.any(log.is_cut_off):
         row[f"cut off\nfrom {own}"] = "world/cut_off"

@@ -44,56 +44,47 @@ LinkRows: TypeAlias = Shaped[np.ndarray, "_"]  # an array of `LINK`
 Lines: TypeAlias = Float[np.ndarray, "_ 2 2"]  # from start to end [m]
 
 
-class PacketLinks(NamedTuple):
+class PacketPaths(NamedTuple):
     """L packets with the same fate, sorted by window."""
 
     row: Int[np.ndarray, "L"]  # the window, 0 to T - 1
-    sender: Int[np.ndarray, "L"]
-    receiver: Int[np.ndarray, "L"]
-
-    def chosen(self, which: Bool[np.ndarray, "L"]) -> "PacketLinks":
-        """Return some of the packets."""
-        return PacketLinks(*(column[which] for column in self))
-
-    def ends(self, position_m: Positions) -> tuple[Points, Points]:
-        """Return the positions of the senders and of the receivers [m]."""
-        return position_m[self.row, self.sender], position_m[self.row, self.receiver]
+    start_m: Points  # where the sender is
+    end_m: Points  # where the receiver is
 
 
-class PacketSegments(NamedTuple):
-    """L packets with the same fate as they are drawn, sorted by window."""
-
-    row: Int[np.ndarray, "L"]
-    start_m: Points
-    end_m: Points
-
-
-def fates(recipient: Phases, heard: Phases, *, is_broadcast: bool) -> dict[str, PacketLinks]:
-    """Sort the packets of T windows by their fate.
+def fates(
+    recipient: Phases, heard: Phases, position_m: Positions, *, is_broadcast: bool
+) -> dict[str, PacketPaths]:
+    """Sort the packets of T windows by their fate, in the order of drawing.
 
     Addressed packets are delivered, lost, overheard, answered or unanswered. `lost` and
     `unanswered` ones end at the robot they were meant for, which did not decode them; a packet that
-    k other robots overheard is k links. Broadcasts have no addressee: `heard` leads to each hearer.
-    The second phase answers the first. `recipient` is S^i in both phases, `heard` the sender that
-    each robot decoded; a robot's own number is none.
+    k other robots overheard is k packets here. Broadcasts have no addressee: `heard` leads to each
+    hearer. The second phase answers the first. `recipient` is S^i in both phases, `heard` the
+    sender that each robot decoded; a robot's own number is none.
     """
     # A robot decodes at most one packet in a phase, so `heard` has every reception once.
     row, phase, hearer = np.nonzero(is_other(heard))
     speaker = heard[row, phase, hearer]
-    received = PacketLinks(row, speaker, hearer)
+    received = np.stack([row, speaker, hearer])
     if is_broadcast:
-        return {"heard": received}
-    is_overheard = recipient[row, phase, speaker] != hearer
-    row, phase, sender = np.nonzero(is_other(recipient))
-    receiver = recipient[row, phase, sender]
-    is_decoded, is_request = heard[row, phase, receiver] == sender, phase == 0
-    sent = PacketLinks(row, sender, receiver)
+        found = {"heard": received}
+    else:
+        is_overheard = recipient[row, phase, speaker] != hearer
+        row, phase, sender = np.nonzero(is_other(recipient))
+        receiver = recipient[row, phase, sender]
+        is_decoded, is_request = heard[row, phase, receiver] == sender, phase == 0
+        sent = np.stack([row, sender, receiver])
+        found = {
+            "overheard": received[:, is_overheard],
+            "unanswered": sent[:, ~is_request & ~is_decoded],
+            "lost": sent[:, is_request & ~is_decoded],
+            "delivered": sent[:, is_request & is_decoded],
+            "answered": sent[:, ~is_request & is_decoded],
+        }
     return {
-        "delivered": sent.chosen(is_request & is_decoded),
-        "lost": sent.chosen(is_request & ~is_decoded),
-        "overheard": received.chosen(is_overheard),
-        "answered": sent.chosen(~is_request & is_decoded),
-        "unanswered": sent.chosen(~is_request & ~is_decoded),
+        fate: PacketPaths(row, position_m[row, sender], position_m[row, receiver])
+        for fate, (row, sender, receiver) in found.items()
     }
 
 
@@ -102,31 +93,22 @@ def is_other(robot: Phases) -> Bool[np.ndarray, "T 2 N"]:
     return robot != np.arange(robot.shape[2])
 
 
-def packet_segments(
-    packets: dict[str, PacketLinks], position_m: Positions
-) -> dict[str, PacketSegments]:
-    """Return where packets are drawn, in the order of drawing; lost ones stop on their way."""
-    segments = {}
-    for fate in (fate for fate in palette.PACKETS if fate in packets):
-        start_m, end_m = packets[fate].ends(position_m)
-        end_m = start_m + palette.PACKETS[fate][1] * (end_m - start_m)
-        segments[fate] = PacketSegments(packets[fate].row, start_m, end_m)
-    return segments
-
-
 def lifted(at_m: Float[np.ndarray, "*S 2"], height_m: float) -> Float[np.ndarray, "*S 3"]:
     """Return points at a height above the ground [m]."""
     width = [(0, 0)] * (at_m.ndim - 1) + [(0, 1)]
     return np.pad(at_m, width, constant_values=height_m)
 
 
-def arcs(start_m: Points, end_m: Points, base_m: float) -> Float[np.ndarray, "L P 3"]:
-    """Return points along parabolas that start and end at `base_m` above the ground [m]."""
-    share = np.linspace(0.0, 1.0, SEGMENTS + 1)
-    span_m = np.linalg.norm(end_m - start_m, axis=1)
+def arcs(packets: PacketPaths, base_m: float, share: float = 1.0) -> Float[np.ndarray, "L P 3"]:
+    """Return points along parabolas that start and end at `base_m` above the ground [m].
+
+    They cover this share of the way to the receiver: lost packets stop short of it.
+    """
+    along, way_m = np.linspace(0.0, 1.0, SEGMENTS + 1), share * (packets.end_m - packets.start_m)
+    span_m = np.linalg.norm(way_m, axis=1)
     # The longer the higher: packets that cross on the ground stay apart in the picture.
-    height_m = base_m + 4.0 * RISE * span_m[:, None] * share * (1.0 - share)
-    ground_m = start_m[:, None] + share[:, None] * (end_m - start_m)[:, None]
+    height_m = base_m + 4.0 * RISE * span_m[:, None] * along * (1.0 - along)
+    ground_m = packets.start_m[:, None] + along[:, None] * way_m[:, None]
     return np.concatenate([ground_m, height_m[..., None]], axis=2)
 
 

@@ -4,7 +4,7 @@ The ramp is viridis reversed (bright is fresh); the packets' colours are Okabe a
 apart for colour-blind eyes. Maps, scenes, plots and legends share them.
 """
 
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
@@ -49,16 +49,22 @@ def dim(colour: Colour, share: float) -> Colour:
     return (int(colour[0] * share), int(colour[1] * share), int(colour[2] * share))
 
 
-LOST_SHARE = 0.6  # a lost packet stops short of its receiver
-# Packets by their fate: colour in space, and the share of the way that is drawn. What is drawn
-# first may be covered by what follows.
-PACKETS: dict[str, tuple[Colour, float]] = {
-    "overheard": (dim(OVERHEARD, 0.6), 1.0),
-    "unanswered": (dim(ANSWERED, 0.6), LOST_SHARE),
-    "heard": (BROADCAST, 1.0),
-    "lost": (LOST, LOST_SHARE),
-    "delivered": (DELIVERED, 1.0),
-    "answered": (ANSWERED, 1.0),
+class PacketStyle(NamedTuple):
+    """How packets with the same fate are drawn in space."""
+
+    colour: Colour
+    share: float = 1.0  # of the way to the receiver: a lost packet stops short of it
+
+
+LOST_SHARE = 0.6
+# By fate. What is drawn first may be covered by what follows.
+PACKETS = {
+    "overheard": PacketStyle(dim(OVERHEARD, 0.6)),
+    "unanswered": PacketStyle(dim(ANSWERED, 0.6), LOST_SHARE),
+    "heard": PacketStyle(BROADCAST),
+    "lost": PacketStyle(LOST, LOST_SHARE),
+    "delivered": PacketStyle(DELIVERED),
+    "answered": PacketStyle(ANSWERED),
 }
 # Links on which channel and belief differ, by kind, in the same order.
 MISMATCH: dict[str, Colour] = {"unbelieved": UNBELIEVED, "too_weak": dim(TOO_WEAK, 0.7)}

@@ -16,7 +16,7 @@ from rerun.chunk import RrdReader
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Facts, Footage, frame
-from swarm_mj.replay.links import LINK, NO_MISMATCH, NUMBERS, SEGMENTS, LinkMismatch, PacketSegments
+from swarm_mj.replay.links import LINK, NO_MISMATCH, NUMBERS, SEGMENTS, LinkMismatch, PacketPaths
 from swarm_mj.replay.rerun_log import TIMELINE
 from swarm_mj.system.reading import open_file, read_json
 
@@ -94,11 +94,11 @@ def read_footage(path: Path) -> Footage:
             window=_windows(columns, "/scene/robots"),
             position_m=position_m,
             velocity_mps=headings[..., 3:5] - headings[..., :2],
-            age=age,
+            known_age=age,
             is_cut_off=cut_off.reshape(age.shape) > 0.0,
             mismatch=_mismatch(columns),
             is_on=_numbers(columns["/scene/robots is_on"]).reshape(age.shape) > 0.0,
-            segments=_segments(columns),
+            packets=_packets(columns),
             age_mean=_numbers(columns["/plots/age/mean Measurements:values"]),
             ground=frame(position_m, mission.half_side_m, is_tight=not mission.has_walls),
         )
@@ -124,13 +124,15 @@ def _columns(path: Path) -> Columns:
     }
 
 
-def _segments(columns: Columns) -> dict[str, PacketSegments]:
-    segments = {}
-    for fate in palette.PACKETS:
+def _packets(columns: Columns) -> dict[str, PacketPaths]:
+    found = {}
+    for fate, style in palette.PACKETS.items():
         if (strips := columns.get(f"/scene/packets/{fate} LineStrips3D:strips")) is not None:
-            points_m = _numbers(strips).reshape(-1, SEGMENTS + 1, 3)
-            segments[fate] = PacketSegments(_rows(strips), points_m[:, 0, :2], points_m[:, -1, :2])
-    return segments
+            points_m = _numbers(strips).reshape(-1, SEGMENTS + 1, 3)[..., :2]
+            # From the way that is drawn to the whole one.
+            start_m, way_m = points_m[:, 0], (points_m[:, -1] - points_m[:, 0]) / style.share
+            found[fate] = PacketPaths(_rows(strips), start_m, start_m + way_m)
+    return found
 
 
 def _mismatch(columns: Columns) -> LinkMismatch:

@@ -1,24 +1,28 @@
 """The record of a flight for its replay: one mission's windows as plain arrays."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from numbers import Integral
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
-from swarm_mj.physics.scene import Scene
+from swarm_mj.mission.components import components_in
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.costs import TaskCost
+from swarm_mj.replay.footage import Facts, Footage, frame
 from swarm_mj.replay.links import (
+    NO_MISMATCH,
     LinkMismatch,
-    PacketLinks,
+    RadioSnapshot,
     fates,
     is_other,
     radio_snapshot,
     stride_of,
 )
+from swarm_mj.replay.palette import nice_scale
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.needs import GB
@@ -26,81 +30,66 @@ from swarm_mj.system.needs import GB
 # Longer or larger flights keep the age matrix of every k-th window only.
 MAX_AGE_MATRIX_BYTES = 64e6
 AGE_BYTES = 4  # float32
-# Fits of measured peaks and files: of rerun itself, of each window, of each robot in it; and of the
-# age matrices, which are copied in memory and compressed in the file.
-RERUN_BYTES, WINDOW_BYTES, ROBOT_BYTES, MATRIX_COPIES = 0.1 * GB, 15e3, 1e3, 2.2
-BLUEPRINT_BYTES, WINDOW_FILE_BYTES, ROBOT_FILE_BYTES, MATRIX_SHARE = 0.5e6, 500.0, 150.0, 0.25
+
+
+class ReplaySize(NamedTuple):
+    """A fit of the bytes that replays take, in memory or on disk."""
+
+    base: float  # rerun itself, or the layout
+    window: float
+    robot: float  # in each window
+    matrix: float  # of each byte of the age matrices
+
+    def of(self, mission: Mission, num_windows: int) -> float:
+        """Return the size of the replay of so long a flight [bytes]."""
+        num_robots = mission.num_robots
+        matrices = min(MAX_AGE_MATRIX_BYTES, AGE_BYTES * num_windows * num_robots**2)
+        a_window = self.window + self.robot * num_robots
+        return self.base + a_window * num_windows + self.matrix * matrices
+
+
+# Of measured peaks, when a replay is written, and of files of teams that move; others' are smaller.
+# The age matrices are copied in memory and compressed in the file.
+IN_MEMORY = ReplaySize(base=0.1 * GB, window=15e3, robot=1e3, matrix=2.2)
+ON_DISK = ReplaySize(base=0.5e6, window=500.0, robot=150.0, matrix=0.25)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Log:
-    """T windows of one mission of N robots, each at its end; packets flew during it.
+class Log(Footage):
+    """Footage and all else that a replay shows of a flight, as it was recorded.
 
     Ages are those of the whole team; positions believed, and parents, are the ego robot's.
     """
 
-    ego: int
-    window: Int[np.ndarray, "T"]  # 1 is the mission's first window
-    position_m: Float[np.ndarray, "T N 2"]  # p [m]
-    velocity_mps: Float[np.ndarray, "T N 2"]  # v [m/s]
     recipient: Int[np.ndarray, "T 2 N"]  # S^i in both phases; itself: silent
-    is_on: Bool[np.ndarray, "T N"]  # whether a robot had not failed
     heard: Int[np.ndarray, "T 2 N"]  # the sender that robot j decoded in both phases; itself: none
-    is_broadcast: bool  # packets have no addressee; otherwise the second phase answers the first
-    is_known: Bool[np.ndarray, "T N"]  # whether the ego robot has heard of j
     believed_m: Float[np.ndarray, "T N 2"]  # M: where j was, as the ego robot knows it [m]
-    ego_age: Float[np.ndarray, "T N"]  # t - T^{ego,j} [windows]
     parent: Int[np.ndarray, "T N"]  # P^{ego,j}
+    ego_age: Float[np.ndarray, "T N"]  # t - T^{ego,j}, also of those never heard of [windows]
     age_window: Int[np.ndarray, "K"]  # the windows of the age matrix, every stride-th
     age: Float[np.ndarray, "K N N"]  # t - T^{i,j} [windows]
-    age_mean: Float[np.ndarray, "T"]  # Eq. 10 [windows]
     age_std: Float[np.ndarray, "T"]  # over all pairs of different robots that are on [windows]
     age_max: Float[np.ndarray, "T"]  # the worst pair's [windows]
     velocity_variance_m2ps2: Float[np.ndarray, "T"]  # Eq. 17
-    scene: Scene | None = None  # what changed the arena, if anything did
     task_cost: TaskCost | None = None  # one value a window; None if the controller has none
-    group: Int[np.ndarray, "T N"] | None = None  # the first robot of each one's connected group
-    num_believed: Int[np.ndarray, "T"] | None = None  # links that policies believe in
-    num_working: Int[np.ndarray, "T"] | None = None  # links whose packets decode but for fades
-    mismatch: LinkMismatch | None = None  # all four are None in free space
-
-    @cached_property
-    def packets(self) -> dict[str, PacketLinks]:
-        """All packets by their fate."""
-        return fates(self.recipient, self.heard, is_broadcast=self.is_broadcast)
+    num_believed: Int[np.ndarray, "C"]  # links that policies believe in, in each snapshot
+    num_working: Int[np.ndarray, "C"]  # links whose packets decode but for fades, likewise
 
     @property
     def is_transmitter(self) -> Bool[np.ndarray, "T N"]:
         """True if a robot sent a request, or a broadcast in either phase."""
-        return np.any(is_other(self.recipient)[:, : 2 if self.is_broadcast else 1], axis=1)
-
-    @property
-    def has_motion(self) -> bool:
-        """True if any robot moves."""
-        return bool(np.any(self.velocity_mps))
-
-    @property
-    def known_age(self) -> Float[np.ndarray, "T N"]:
-        """The ego robot's ages, nan of robots that it has not heard of [windows]."""
-        return np.where(self.is_known, self.ego_age, np.nan)
+        num_phases = 2 if self.facts.is_broadcast else 1
+        return np.any(is_other(self.recipient)[:, :num_phases], axis=1)
 
     @property
     def is_other_known(self) -> Bool[np.ndarray, "T N"]:
         """True if the ego robot has heard of j, which is not itself."""
-        return self.is_known & (np.arange(self.is_known.shape[1]) != self.ego)
+        return ~np.isnan(self.known_age) & (np.arange(self.known_age.shape[1]) != self.ego)
 
     @property
     def has_parent(self) -> Bool[np.ndarray, "T N"]:
         """True if the ego robot's entry of j came over the radio."""
         return self.is_other_known & (self.parent != NO_PARENT)
-
-    @property
-    def is_cut_off(self) -> Bool[np.ndarray, "T N"]:
-        """True if a robot cannot exchange packets with the ego robot, over any number of hops."""
-        if self.group is None:
-            return np.zeros(self.is_on.shape, dtype=bool)
-        is_apart = self.group != self.group[:, [self.ego]]
-        return is_apart & self.is_on & self.is_on[:, [self.ego]]
 
 
 class Recorder:
@@ -118,44 +107,42 @@ class Recorder:
         self._rows: list[dict[str, np.ndarray]] = []
         self._age: list[np.ndarray] = []
         self._task_costs: list[TaskCost] = []
-        self._links: list[np.ndarray] = []  # that differ, of each snapshot
-        self._radio: dict[str, object] = {}  # of the last snapshot, which stands until the next
+        self._snapshots: list[RadioSnapshot] = []  # none in free space
 
     def add(self, flown: WindowRecord | None = None) -> None:
         """Record the window that was just flown, if any, with its costs, if they are known."""
         swarm, index, own = self._swarm, self._index, self._ego
         buffers, states, phases = swarm.buffers, swarm.states, swarm.phases
         age = swarm.now[index] - buffers.timestamp[index]
-        costs, robots = None if flown is None else flown.costs, np.arange(len(age))
+        robots = np.arange(len(age))
         is_on = np.ones(len(age), bool) if states.is_active is None else states.is_active[index]
         others = age[is_on[:, None] & is_on & (robots[:, None] != robots)]
         if len(self._rows) % self._stride == 0:
             self._age.append(age.astype(np.float32))
         is_due = len(self._rows) % self._radio_stride == 0
-        if is_due and (seen := radio_snapshot(swarm, index)) is not None:
-            seen.links["row"] = len(self._links)
-            self._links.append(seen.links)
-            self._radio = {name: its for name, its in seen._asdict().items() if name != "links"}
-        if costs is not None and costs.task_cost is not None:
-            self._task_costs.append(costs.task_cost)
+        if is_due and (snapshot := radio_snapshot(swarm, index)) is not None:
+            self._snapshots.append(snapshot)
+        age_mean = velocity_variance = np.nan
+        if flown is not None:
+            age_mean = flown.costs.age_windows[index]
+            velocity_variance = flown.costs.velocity_variance_m2ps2[index]
+            if flown.costs.task_cost is not None:
+                self._task_costs.append(flown.costs.task_cost)
         silence = [robots, robots]  # of a mission that has not begun
-        no_cost = np.full(len(swarm.now), np.nan)
-        variance = no_cost if costs is None else costs.velocity_variance_m2ps2
         shown = {
             "position_m": states.position_m[index],
             "velocity_mps": states.velocity_mps[index],
             "recipient": [phase.recipient[index] for phase in phases] or silence,
             "heard": [phase.heard[index] for phase in phases] or silence,
             "is_on": is_on,
-            "is_known": buffers.is_known[index, own],
             "believed_m": buffers.position_m[index, own],
             "ego_age": age[own],
+            "known_age": np.where(buffers.is_known[index, own], age[own], np.nan),
             "parent": buffers.parent[index, own],
-            "age_mean": (no_cost if costs is None else costs.age_windows)[index],
+            "age_mean": age_mean,
             "age_std": np.std(others),
             "age_max": np.max(others),
-            "velocity_variance_m2ps2": variance[index],
-            **self._radio,
+            "velocity_variance_m2ps2": velocity_variance,
         }
         # Copies: the swarm writes its arrays in place, and a view would keep a whole matrix. The
         # row comes last: whatever an interrupt leaves unfinished, rows count the whole windows.
@@ -165,40 +152,87 @@ class Recorder:
     def num_bytes(self) -> int:
         """The memory taken so far; every window takes the same."""
         row = sum(value.nbytes for value in self._rows[0].values()) if self._rows else 0
-        return len(self._rows) * row + sum(each.nbytes for each in (*self._age, *self._links))
+        compared = (array for each in self._snapshots for array in (each.group, each.links))
+        return len(self._rows) * row + sum(each.nbytes for each in (*self._age, *compared))
 
-    def log(self) -> Log:
-        """Return everything recorded so far; raise ValueError if that is nothing."""
+    def log(self, config: Mapping[str, Any] | None = None) -> Log:
+        """Return everything recorded so far; raise ValueError if that is nothing.
+
+        `config` names the policy, the seed and the user's components, for titles.
+        """
         if not self._rows:
             raise ValueError("a replay needs at least 1 window flown, not 0")
         columns = {name: np.stack([row[name] for row in self._rows]) for name in self._rows[0]}
-        window = np.arange(1, len(self._rows) + 1)
-        age_window, seen = window[:: self._stride], window[:: self._radio_stride]
+        window, position_m = np.arange(1, len(self._rows) + 1), columns["position_m"]
+        age_window = window[:: self._stride]
         # An interrupt within `add` leaves one matrix, snapshot or cost too many.
-        costs, links = self._task_costs[: len(window)], self._links[: len(seen)]
+        age, costs = np.stack(self._age[: len(age_window)]), self._task_costs[: len(window)]
         value = np.array([cost.value[self._index] for cost in costs])
+        facts = self._facts(config or {}, age)
+        recipient, heard, mission = columns["recipient"], columns["heard"], facts.mission
         return Log(
-            ego=self._ego,
+            facts=facts,
             window=window,
-            is_broadcast=self._swarm.is_broadcast,
+            packets=fates(recipient, heard, position_m, is_broadcast=facts.is_broadcast),
+            ground=frame(position_m, mission.half_side_m, is_tight=not mission.has_walls),
             scene=self._swarm.scene,
             age_window=age_window,
-            age=np.stack(self._age[: len(age_window)]),
+            age=age,
             task_cost=replace(costs[0], value=value) if costs else None,
-            mismatch=LinkMismatch(seen, np.concatenate(links)) if links else None,
             **columns,
+            **self._compared(columns["is_on"]),
         )
 
+    def _facts(self, config: Mapping[str, Any], age: Float[np.ndarray, "K N N"]) -> Facts:
+        return Facts(
+            mission=self._swarm.mission,
+            policy=config.get("policy") or "",
+            seed=config.get("seed", 0),
+            observer=self._ego,
+            is_broadcast=self._swarm.is_broadcast,
+            full_scale=nice_scale(age),
+            **components_in(config).names,
+        )
 
-def replay_memory(mission: Mission, num_windows: int) -> float:
-    """Return the memory that recording takes at its peak, when the replay is written."""
-    matrices = min(MAX_AGE_MATRIX_BYTES, AGE_BYTES * num_windows * mission.num_robots**2)
-    a_window = WINDOW_BYTES + ROBOT_BYTES * mission.num_robots
-    return RERUN_BYTES + a_window * num_windows + MATRIX_COPIES * matrices
+    def _compared(self, is_on: Bool[np.ndarray, "T N"]) -> dict[str, Any]:
+        """Return the fields of a log that come from snapshots, each of which stands until the next.
+
+        In free space there are none.
+        """
+        window = np.arange(1, len(is_on) + 1)[:: self._radio_stride]
+        snapshots = self._snapshots[: len(window)]
+        is_cut_off, mismatch = np.zeros_like(is_on), NO_MISMATCH
+        if snapshots:
+            for row, snapshot in enumerate(snapshots):
+                snapshot.links["row"] = row
+            links = np.concatenate([snapshot.links for snapshot in snapshots])
+            mismatch = LinkMismatch(window, links)
+            group = np.stack([snapshot.group for snapshot in snapshots])
+            group = group[np.arange(len(is_on)) // self._radio_stride]
+            is_apart = group != group[:, [self._ego]]
+            is_cut_off = is_apart & is_on & is_on[:, [self._ego]]
+        return {
+            "is_cut_off": is_cut_off,
+            "mismatch": mismatch,
+            "num_believed": np.array([snapshot.num_believed for snapshot in snapshots], int),
+            "num_working": np.array([snapshot.num_working for snapshot in snapshots], int),
+        }
 
 
-def replay_file(mission: Mission) -> float:
-    """Return a replay's size, of teams that move; others' are smaller."""
-    matrices = min(MAX_AGE_MATRIX_BYTES, AGE_BYTES * mission.num_windows * mission.num_robots**2)
-    a_window = WINDOW_FILE_BYTES + ROBOT_FILE_BYTES * mission.num_robots
-    return BLUEPRINT_BYTES + a_window * mission.num_windows + MATRIX_SHARE * matrices
+def moment(swarm: Swarm, index: int = 0, *, observer: int = 0) -> Footage:
+    """Return one of a swarm's missions as it is now, with the packets of the window just flown.
+
+    Robots are coloured by what the observer knows of them. Raise ValueError if there is no such
+    mission or robot.
+    """
+    if not 0 <= index < len(swarm.now):
+        raise ValueError(f"index must be from 0 to {len(swarm.now) - 1}, not {index}")
+    recorder, mission = Recorder(swarm, ego=observer, index=index), swarm.mission
+    recorder.add()
+    seen = recorder.log()
+    # Darkest from a round on, in which everyone has its turn.
+    facts = replace(seen.facts, full_scale=float(mission.num_robots))
+    # As wide wherever the team is: a live picture does not know where it will fly.
+    ground = frame(seen.position_m, mission.half_side_m)
+    ground = replace(ground, reach_m=max(mission.half_side_m, ground.reach_m))
+    return replace(seen, facts=facts, ground=ground)

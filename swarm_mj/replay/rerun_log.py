@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Ground
-from swarm_mj.replay.links import NUMBERS, LinkMismatch, LinkRows, Points, shades
+from swarm_mj.replay.links import NUMBERS, LinkRows, Points, shades
 from swarm_mj.replay.palette import Colour, dim
 from swarm_mj.replay.recorder import Log
 
@@ -67,8 +67,8 @@ LAYERS = {
     "scene/world/unbelieved": EntityStyle(rr.LineStrips3D, None, 0.6),
     "scene/world/too_weak": EntityStyle(rr.LineStrips3D, None, 0.5),
     **{
-        f"scene/packets/{fate}": EntityStyle(rr.LineStrips3D, colour, 1.0)
-        for fate, (colour, _) in palette.PACKETS.items()
+        f"scene/packets/{fate}": EntityStyle(rr.LineStrips3D, style.colour, 1.0)
+        for fate, style in palette.PACKETS.items()
     },
 }
 
@@ -76,11 +76,8 @@ LAYERS = {
 class RerunLog:
     """Writes a log's entities; one that changes shows the row of the last window."""
 
-    def __init__(
-        self, recording: rr.RecordingStream, log: Log, frame: Ground, window_s: float
-    ) -> None:
-        self._recording, self._window_s = recording, window_s
-        self.log, self.frame = log, frame
+    def __init__(self, recording: rr.RecordingStream, log: Log, ground: Ground) -> None:
+        self._recording, self.log, self.ground = recording, log, ground
 
     def fixed(self, path: str, *archetypes: Any) -> None:
         """Write what never changes. It would hide the same component written in time."""
@@ -94,7 +91,7 @@ class RerunLog:
         # Two timelines: one to step by windows, one to play in seconds.
         times = [
             rr.TimeColumn(TIMELINE, sequence=at),
-            rr.TimeColumn("mission_time", duration=at * self._window_s),
+            rr.TimeColumn("mission_time", duration=at * self.log.facts.mission.window_s),
         ]
         self._recording.send_columns(path, indexes=times, columns=list(columns))
 
@@ -130,14 +127,15 @@ class RerunLog:
         self.layer(path, row, centers=centre, half_sizes=np.full(centre.shape, radius_m))
 
     def mismatch_lines(
-        self, path: str, links: LinkRows, lines_m: Float[np.ndarray, "L 2 A"], of: LinkMismatch
+        self, path: str, links: LinkRows, lines_m: Float[np.ndarray, "L 2 A"]
     ) -> None:
         """Write a line for each of these links; those who click on one read its numbers."""
         self.fixed_layer(path)
-        per_snapshot = np.bincount(links["row"], minlength=len(of.window))
+        window = self.log.mismatch.window
+        per_snapshot = np.bincount(links["row"], minlength=len(window))
         colours = shades(path.rsplit("/")[-1], links)
         columns = LAYERS[path].kind.columns(strips=lines_m, colors=colours)
         values: dict[str, Any] = {name: links[name] for name in NUMBERS}
         numbers = rr.AnyValues.columns(**values)
         parts = (part for each in (columns, numbers) for part in each.partition(per_snapshot))
-        self.timed(path, parts, of.window)
+        self.timed(path, parts, window)

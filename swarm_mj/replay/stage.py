@@ -40,15 +40,16 @@ GLASS = "transparentfillmajorwireframe"  # obstacles hide no robot
 FAR_M = 1e4  # half the side of a plane that has no end
 
 
-def draw_stage(out: RerunLog, mission: Mission) -> None:
+def draw_stage(out: RerunLog) -> None:
     """Draw the area, its walls and its obstacles, on the map and in 3-D."""
+    mission = out.log.facts.mission
     spec = compose(mission, scene=out.log.scene)
     if not mission.has_walls:
         # An open area's floor is as large as what is ever seen.
-        low, high = (end(out.frame.centre_m, axis=0) for end in (np.min, np.max))
+        low, high = (end(out.ground.centre_m, axis=0) for end in (np.min, np.max))
         for geom in (geom for geom in spec.geoms if geom.name == "floor"):
             geom.pos = [*(low + high) / 2.0, 0.0]
-            geom.size = [*(high - low) / 2.0 + 1.5 * out.frame.reach_m, 1.0]
+            geom.size = [*(high - low) / 2.0 + 1.5 * out.ground.reach_m, 1.0]
     model = spec.compile()
     _draw_ground(out, mission)
     for name, parts in static_geoms(model).items():
@@ -56,7 +57,7 @@ def draw_stage(out: RerunLog, mission: Mission) -> None:
             out.fixed(f"scene/area/{name}", part)
     # On the map, where they are in the way of the antennas.
     if outlines := footprints(obstacles_of(model), ROBOT_HEIGHT_M):
-        path, apart_m = "arena/world/filling", FILL_SHARE * out.frame.reach_m
+        path, apart_m = "arena/world/filling", FILL_SHARE * out.ground.reach_m
         lines = [line for outline in outlines for line in filling(outline, apart_m)]
         # The width is in metres, since rerun fills no areas.
         style: dict[str, Any] = LAYERS[path].style | {"radii": 0.55 * apart_m}
@@ -65,15 +66,15 @@ def draw_stage(out: RerunLog, mission: Mission) -> None:
 
 
 def _draw_ground(out: RerunLog, mission: Mission) -> None:
-    if out.frame.moves:
-        away = lifted(-out.frame.centre_m, 0.0)
+    if out.ground.moves:
+        away = lifted(-out.ground.centre_m, 0.0)
         out.timed("scene", rr.Transform3D.columns(translation=away))
         # rerun shows a timed transform whole or not at all, so the mirror is repeated.
         mirrors = np.tile(MIRROR, (len(away), 1, 1))
         out.timed("arena", rr.Transform3D.columns(translation=away @ MIRROR, mat3x3=mirrors))
     else:
         out.fixed("arena", rr.Transform3D(mat3x3=MIRROR))
-    strips, half = grid(out.frame), mission.half_side_m
+    strips, half = grid(out.ground), mission.half_side_m
     out.fixed_layer("arena/area/grid", strips=strips)
     out.fixed_layer("scene/grid", strips=lifted(np.array(strips), GRID_M))
     outline = [(-half, -half), (half, -half), (half, half), (-half, half), (-half, -half)]
@@ -81,17 +82,17 @@ def _draw_ground(out: RerunLog, mission: Mission) -> None:
     out.fixed_layer(f"arena/area/{name}", strips=[outline])
 
 
-def square_m(frame: Ground) -> float:
+def square_m(ground: Ground) -> float:
     """Return the side of the grid's squares: 100 m, or a power of ten more for a large ground."""
-    across_m = 2.0 * frame.reach_m + float(np.max(np.ptp(frame.centre_m, axis=0)))
+    across_m = 2.0 * ground.reach_m + float(np.max(np.ptp(ground.centre_m, axis=0)))
     return SQUARE_M * 10.0 ** max(0, int(np.ceil(np.log10(across_m / SQUARE_M / MAX_SQUARES))))
 
 
-def grid(frame: Ground) -> list[list[tuple[float, float]]]:
+def grid(ground: Ground) -> list[list[tuple[float, float]]]:
     """Return lines at whole squares, over all the ground that the map ever shows."""
-    square = square_m(frame)
-    x_low, y_low = np.floor((np.min(frame.centre_m, axis=0) - frame.reach_m) / square)
-    x_high, y_high = np.ceil((np.max(frame.centre_m, axis=0) + frame.reach_m) / square)
+    square = square_m(ground)
+    x_low, y_low = np.floor((np.min(ground.centre_m, axis=0) - ground.reach_m) / square)
+    x_high, y_high = np.ceil((np.max(ground.centre_m, axis=0) + ground.reach_m) / square)
     xs, ys = np.arange(x_low, x_high + 1) * square, np.arange(y_low, y_high + 1) * square
     return [[(x, ys[0]), (x, ys[-1])] for x in xs] + [[(xs[0], y), (xs[-1], y)] for y in ys]
 

@@ -29,6 +29,11 @@ TICKS_HZ = 100  # a GIF counts in hundredths of a second
 MIN_TICKS = 2  # viewers show what is shorter much longer
 MAX_MISSIONS = 2  # side by side
 
+# Fits of measured peaks and files. In memory: MuJoCo, OpenGL and the encoder; each pixel's buffers
+# in them; a pixel of each of a GIF's pictures. On disk: the file's frame, and each pixel drawn.
+DRAWING_BYTES, PIXEL_BYTES, KEPT_PIXEL_BYTES = 3.0 * LIBRARIES, 130.0, 1.5
+FILE_BYTES, FILE_PIXEL_BYTES = 0.1e6, 0.05
+
 
 def quiet_environment() -> dict[str, str]:
     """Return this environment, changed so that rerun's viewer reaches this machine only."""
@@ -123,7 +128,7 @@ def video_needs(width: int, height: int, num_pictures: int | float, suffix: str)
     pixels = width * height
     kept = num_pictures if suffix == GIF else 0.0
     return Needs(
-        memory=3.0 * LIBRARIES + (130.0 + 1.5 * kept) * pixels,
+        memory=DRAWING_BYTES + (PIXEL_BYTES + KEPT_PIXEL_BYTES * kept) * pixels,
         addresses=ADDRESSES + OF_RERUN,
-        file=0.1e6 + 0.05 * num_pictures * pixels,
+        file=FILE_BYTES + FILE_PIXEL_BYTES * num_pictures * pixels,
     )

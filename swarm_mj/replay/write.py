@@ -1,7 +1,7 @@
 """Writes a log as a rerun recording: what moves on the map and in 3-D, and all else around it."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -9,25 +9,12 @@ from typing import Any
 import numpy as np
 import rerun as rr
 import rerun_bindings as bindings
-from jaxtyping import UInt8
 
-from swarm_mj.mission import Mission
-from swarm_mj.mission.components import components_in
 from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 from swarm_mj.replay import charts, palette
-from swarm_mj.replay.footage import Footage, footage_of, frame
+from swarm_mj.replay.footage import frame
 from swarm_mj.replay.layout import draw_legend, layout
-from swarm_mj.replay.links import (
-    PIECES,
-    LinkMismatch,
-    PacketLinks,
-    arcs,
-    by_kind,
-    divided,
-    ends,
-    is_other,
-    lifted,
-)
+from swarm_mj.replay.links import PIECES, arcs, by_kind, divided, ends, is_other, lifted
 from swarm_mj.replay.read import FACTS, with_digest
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog
@@ -47,89 +34,86 @@ BODY_HEIGHT = 0.8  # of a body, by its radius
 HALO, HALO_M = 1.7, 2.0  # of a robot that is cut off, by the robot's radius; its height [m]
 
 
-def write_replay(log: Log, mission: Mission, config: Mapping[str, Any], path: Path) -> None:
+def write_replay(log: Log, config: Mapping[str, Any], path: Path) -> None:
     """Write or replace a replay, which appears under its name only when it is whole.
 
     `config` is kept in the file as recording properties: numbers, texts or booleans. Missing
     folders are made. Raise OSError if the file cannot be written.
     """
     # Rerun's own writer of files hides a full disk, or waits for space for good.
-    recorded = with_digest(_recorded(log, mission, config, path.stem))
+    recorded = with_digest(_recorded(log, config, path.stem))
     bindings.flush_and_cleanup_orphaned_recordings()  # its threads, which would stay
     write_bytes(path, recorded)
 
 
-def _recorded(log: Log, mission: Mission, config: Mapping[str, Any], name: str) -> bytes:
+def _recorded(log: Log, config: Mapping[str, Any], name: str) -> bytes:
     rr.set_strict_mode(True)  # bad data raises; otherwise a column is silently missing
-    policy, seed = config.get("policy") or "", config.get("seed", 0)
-    footage = footage_of(log, mission, policy, seed, components_in(config))
-    shown, plotted = frame(log.position_m, mission.half_side_m), charts.plots(log)
+    ground = frame(log.position_m, log.facts.mission.half_side_m)
     with rr.RecordingStream(APPLICATION, send_properties=False) as recording:
         stream = recording.binary_stream()
-        laid_out = layout(log, shown, plotted)
+        laid_out = layout(log, ground)
         recording.send_blueprint(laid_out, make_active=False)
         laid_out.close()
         recording.set_log_tick_enabled(False)
         recording.set_log_time_enabled(False)
         recording.send_recording_name(name)
         recording.send_property("mission", rr.AnyValues(drop_untyped_nones=True, **config))
-        recording.send_property(FACTS, rr.AnyValues(json=json.dumps(asdict(footage.facts))))
-        out = RerunLog(recording, log, shown, mission.window_s)
-        draw(out, footage)
-        charts.draw_plots(out, plotted)
-        said = dict(config)
-        if config.get("packet_bytes") is not None:
-            bits = BITS_PER_BYTE * config["packet_bytes"] * np.sum(is_other(log.recipient))
-            rate = bits / (len(log.window) * mission.window_s)
-            said["sent by the team"] = bits_per_second(rate)
-        about = "\n".join([f"# {name}", *(f"- **{key}**: {value}" for key, value in said.items())])
+        recording.send_property(FACTS, rr.AnyValues(json=json.dumps(asdict(log.facts))))
+        out = RerunLog(recording, log, ground)
+        draw(out)
+        about = "\n".join([f"# {name}", *_about(log, config)])
         out.fixed("about", rr.TextDocument(about, media_type="text/markdown"))
     return stream.read() or b""
 
 
-def draw(out: RerunLog, footage: Footage) -> None:
-    """Draw every layer of a replay but the plots."""
-    log, full_scale = out.log, footage.facts.full_scale
-    colours, known = (  # the tree also shows robots that are off
-        palette.robot_colours(log.known_age, full_scale, is_on, log.ego)
-        for is_on in (log.is_on, np.ones_like(log.is_on))
-    )
+def _about(log: Log, config: Mapping[str, Any]) -> Iterator[str]:
+    for key, value in config.items():
+        yield f"- **{key}**: {value}"
+    if config.get("packet_bytes") is not None:
+        bits = BITS_PER_BYTE * config["packet_bytes"] * np.sum(is_other(log.recipient))
+        rate = bits / (len(log.window) * log.facts.mission.window_s)
+        yield f"- **sent by the team**: {bits_per_second(rate)}"
+
+
+def draw(out: RerunLog) -> None:
+    """Draw every layer of a replay."""
     # First, for rerun takes the type of "loss_db" from its first use, and obstacles' is no integer.
-    draw_stage(out, footage.facts.mission)
-    draw_team(out, footage, colours)
-    draw_legend(out, full_scale)
-    charts.draw_tree(out, known)
-    charts.draw_age_matrix(out, full_scale)
+    draw_stage(out)
+    draw_team(out)
+    draw_legend(out)
+    charts.draw_tree(out)
+    charts.draw_age_matrix(out)
     charts.draw_states(out)
+    charts.draw_plots(out)
 
 
-def draw_team(out: RerunLog, footage: Footage, colours: UInt8[np.ndarray, "T N 3"]) -> None:
+def draw_team(out: RerunLog) -> None:
     """Draw everything that moves, the same on the map and in 3-D."""
-    log, radius_m = out.log, RADIUS_SHARE * out.frame.reach_m
+    log, radius_m = out.log, RADIUS_SHARE * out.ground.reach_m
     height_m = BODY_HEIGHT * radius_m
-    _draw_robots(out, colours)
-    _draw_bodies(out, colours, radius_m, height_m)
+    _draw_robots(out)
+    _draw_bodies(out, radius_m, height_m)
     if log.has_motion:
         _draw_motion(out, height_m)
     row, child = np.nonzero(log.has_parent)
     parent = log.parent[row, child]
     out.lines("arena/tree", log.position_m[row, parent], log.position_m[row, child], row)
-    _draw_radio(out, log.packets, footage.facts.mission.range_m)
-    for fate, drawn in footage.segments.items():
-        strips = arcs(drawn.start_m, drawn.end_m, height_m)
-        out.layer(f"scene/packets/{fate}", drawn.row, strips=strips)
-    if log.mismatch is not None:
-        _draw_mismatch(out, log.mismatch, radius_m, height_m)
+    _draw_radio(out)
+    for fate, packets in log.packets.items():
+        strips = arcs(packets, height_m, palette.PACKETS[fate].share)
+        out.layer(f"scene/packets/{fate}", packets.row, strips=strips)
+    if log.is_compared:
+        _draw_mismatch(out, radius_m, height_m)
 
 
-def _draw_robots(out: RerunLog, colours: UInt8[np.ndarray, "T N 3"]) -> None:
+def _draw_robots(out: RerunLog) -> None:
     log = out.log
     names = [f"r{i}" for i in range(log.parent.shape[1])]
     out.fixed("arena/robots", rr.Points2D.from_fields(labels=names, show_labels=False))
     where = log.position_m.reshape(-1, 2)
-    out.layer("arena/robots", positions=where, colors=colours.reshape(-1, 3))
+    out.layer("arena/robots", positions=where, colors=log.colours.reshape(-1, 3))
     row, where = np.arange(len(log.window)), log.position_m[:, log.ego]
-    radius_m = 2.0 * RING_SHARE * out.frame.reach_m
+    radius_m = 2.0 * RING_SHARE * out.ground.reach_m
     out.rings("arena/ego", where, radius_m, row)
     # The name is a point's label, for rerun misplaces an ellipse's.
     name = rr.Points2D.from_fields(labels=[f"r{log.ego}"], show_labels=True)
@@ -137,9 +121,7 @@ def _draw_robots(out: RerunLog, colours: UInt8[np.ndarray, "T N 3"]) -> None:
     out.layer("arena/ego/name", row, positions=where - (0.0, 3.0 * radius_m))
 
 
-def _draw_bodies(
-    out: RerunLog, colours: UInt8[np.ndarray, "T N 3"], radius_m: float, height_m: float
-) -> None:
+def _draw_bodies(out: RerunLog, radius_m: float, height_m: float) -> None:
     # Those who click on one, and videos, read what is known of it.
     log, path = out.log, "scene/robots"
     radii = np.full(log.is_on.shape[1], radius_m)
@@ -147,10 +129,10 @@ def _draw_bodies(
     lengths = np.full(len(radii), height_m)
     out.fixed(path, rr.Cylinders3D.from_fields(radii=radii, lengths=lengths, fill_mode="solid"))
     where = lifted(log.position_m.reshape(-1, 2), height_m / 2.0)
-    out.things(path, rr.Cylinders3D.columns(centers=where, colors=colours.reshape(-1, 3)))
+    out.things(path, rr.Cylinders3D.columns(centers=where, colors=log.colours.reshape(-1, 3)))
     age = log.known_age.astype(np.float32).ravel()
     out.things(path, rr.AnyValues.columns(age=age, is_on=log.is_on.ravel()))
-    if log.mismatch is not None:
+    if log.is_compared:
         out.things(path, rr.AnyValues.columns(is_cut_off=log.is_cut_off.ravel()))
 
 
@@ -158,7 +140,7 @@ def _draw_motion(out: RerunLog, height_m: float) -> None:
     log = out.log
     speed = np.linalg.norm(log.velocity_mps, axis=2, keepdims=True)
     # All of one length, for agreement is in directions.
-    way_m = HEADING_SHARE * out.frame.reach_m * log.velocity_mps / np.maximum(speed, 1e-9)
+    way_m = HEADING_SHARE * out.ground.reach_m * log.velocity_mps / np.maximum(speed, 1e-9)
     start, end = (at.reshape(-1, 2) for at in (log.position_m, log.position_m + way_m))
     out.lines("arena/heading", start, end)
     out.lines("scene/heading", lifted(start, height_m), lifted(end, height_m))
@@ -172,40 +154,41 @@ def _draw_motion(out: RerunLog, height_m: float) -> None:
     row, other = np.nonzero(log.is_other_known)
     believed = log.believed_m[row, other]
     out.lines("arena/belief/error", believed, log.position_m[row, other], row)
-    out.rings("arena/belief/ring", believed, RING_SHARE * out.frame.reach_m, row)
+    out.rings("arena/belief/ring", believed, RING_SHARE * out.ground.reach_m, row)
 
 
-def _draw_radio(out: RerunLog, packets: dict[str, PacketLinks], range_m: float) -> None:
+def _draw_radio(out: RerunLog) -> None:
     log = out.log
     row, sender = np.nonzero(log.is_transmitter)
     where = log.position_m[row, sender]
-    out.rings("arena/radio/range", where, range_m, row)
-    if log.is_broadcast:
+    out.rings("arena/radio/range", where, log.facts.mission.range_m, row)
+    if log.facts.is_broadcast:
         out.layer("arena/radio/transmitter", row, positions=where)
     else:
-        lost = packets["lost"]
-        out.lines("arena/radio/lost/rest", *lost.ends(log.position_m), lost.row)
-    aside_m = 0.8 * RING_SHARE * out.frame.reach_m  # an answer stands beside its request
+        lost = log.packets["lost"]
+        out.lines("arena/radio/lost/rest", lost.start_m, lost.end_m, lost.row)
+    aside_m = 0.8 * RING_SHARE * out.ground.reach_m  # an answer stands beside its request
     aside = {"delivered": 0.0, "lost": 0.0, "answered": aside_m, "unanswered": aside_m}
-    for fate, links in packets.items():
-        path, (start, end) = f"arena/radio/{fate}", links.ends(log.position_m)
+    for fate, (row, start_m, end_m) in log.packets.items():
+        path = f"arena/radio/{fate}"
         if fate not in aside:
-            out.lines(path, start, end, links.row)
+            out.lines(path, start_m, end_m, row)
             continue
-        way = end - start
+        way = end_m - start_m
         length = np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
-        origins = start + aside[fate] * (way[:, ::-1] * (-1.0, 1.0) / length)  # to the left
-        out.layer(path, links.row, origins=origins, vectors=palette.PACKETS[fate][1] * way)
+        origins = start_m + aside[fate] * (way[:, ::-1] * (-1.0, 1.0) / length)  # to the left
+        out.layer(path, row, origins=origins, vectors=palette.PACKETS[fate].share * way)
 
 
-def _draw_mismatch(out: RerunLog, mismatch: LinkMismatch, radius_m: float, height_m: float) -> None:
+def _draw_mismatch(out: RerunLog, radius_m: float, height_m: float) -> None:
     log = out.log
-    for kind, links in by_kind(mismatch.links).items():
-        whole_m = ends(links, log.position_m, mismatch.window[links["row"]] - log.window[0])
+    for kind, links in by_kind(log.mismatch.links).items():
+        at = log.mismatch.window[links["row"]] - log.window[0]
+        whole_m = ends(links, log.position_m, at)
         # In 3-D they are whole, whatever their kind: dashes would make the file larger.
-        out.mismatch_lines(f"scene/world/{kind}", links, lifted(whole_m, height_m), mismatch)
+        out.mismatch_lines(f"scene/world/{kind}", links, lifted(whole_m, height_m))
         each = np.repeat(links, len(PIECES[kind]))
-        out.mismatch_lines(f"arena/world/{kind}", each, divided(whole_m, PIECES[kind]), mismatch)
+        out.mismatch_lines(f"arena/world/{kind}", each, divided(whole_m, PIECES[kind]))
     row, robot = np.nonzero(log.is_cut_off)
     where_m, path = log.position_m[row, robot], "scene/world/cut_off"
     out.layer("arena/world/cut_off", row, positions=where_m)

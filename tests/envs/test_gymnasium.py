@@ -15,7 +15,7 @@ from swarm_mj.envs.gymnasium import HEIGHT, WIDTH, Screen, SwarmEnv
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
 from swarm_mj.envs.pettingzoo import parallel_env
 from swarm_mj.mission import paper
-from swarm_mj.replay.footage import footage_now
+from swarm_mj.replay.recorder import moment
 from swarm_mj.replay.rendering.scene import SceneRenderer
 from swarm_mj.simulation.swarm import Swarm
 
@@ -76,10 +76,10 @@ def pictures():
     """Of the missions of seeds 3 and 4 after each window, drawn without any environment."""
     swarm = Swarm(MISSION, [3, 4])
     with SceneRenderer(MISSION, WIDTH, HEIGHT) as renderer:
-        drawn = [[renderer.frame(footage_now(swarm, b)) for b in (0, 1)]]
+        drawn = [[renderer.frame(moment(swarm, b)) for b in (0, 1)]]
         for recipient in recipients(5):
             swarm.step_with_recipients(recipient)
-            drawn.append([renderer.frame(footage_now(swarm, b)) for b in (0, 1)])
+            drawn.append([renderer.frame(moment(swarm, b)) for b in (0, 1)])
     return drawn
 
 

@@ -44,13 +44,13 @@ def small_disk(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def flown():
-    """A small flight's log and its mission."""
+    """A small flight's log."""
     mission = paper("flocking", num_robots=12, num_windows=60)
     swarm = Swarm(mission, [1])
     recorder = Recorder(swarm)
     for window in rollout(swarm, make_policy("planner", mission)):
         recorder.add(window)
-    return recorder.log(), mission
+    return recorder.log()
 
 
 def said_in_one_line(capsys, path, reason):
@@ -63,9 +63,8 @@ def said_in_one_line(capsys, path, reason):
 @pytest.mark.fault("replays on full disks")
 def test_a_replay_on_a_full_disk_leaves_the_old_one(flown, small_disk, tries):
     """Faults 1 and 2: wherever the disk is full, at once or after some of the replay."""
-    log, mission = flown
     path, filler = small_disk / "a.rrd", small_disk / "filler"
-    write_replay(log, mission, {"seed": 1}, small_disk.parent / "whole.rrd")
+    write_replay(flown, {"seed": 1}, small_disk.parent / "whole.rrd")
     needed = (small_disk.parent / "whole.rrd").stat().st_size
     path.write_bytes(b"old")
     free = os.statvfs(small_disk).f_bavail * 4096
@@ -74,12 +73,12 @@ def test_a_replay_on_a_full_disk_leaves_the_old_one(flown, small_disk, tries):
         filler.write_bytes(bytes(max(0, free - kept)))
         start_s = time.monotonic()
         if kept > needed + 8192:
-            write_replay(log, mission, {"seed": 1}, path)
+            write_replay(flown, {"seed": 1}, path)
             check_replay(path)
             path.write_bytes(b"old")
         else:
             with pytest.raises(OSError, match=r"a\.rrd could not be written: No space left"):
-                write_replay(log, mission, {"seed": 1}, path)
+                write_replay(flown, {"seed": 1}, path)
         assert time.monotonic() - start_s < ENDS_S
         assert path.read_bytes() == b"old"
         assert names(small_disk) == ["a.rrd", "filler"]
@@ -147,7 +146,6 @@ def test_a_training_on_a_full_disk_ends_and_goes_on(here, capsys):
 @pytest.mark.fault("memory and threads of replays")
 def test_replays_leave_no_threads_and_no_memory(flown, tmp_path, tries):
     """Fault 10."""
-    log, mission = flown
 
     def used():
         lines = Path("/proc/self/status").read_text().splitlines()
@@ -157,11 +155,11 @@ def test_replays_leave_no_threads_and_no_memory(flown, tmp_path, tries):
     if not Path("/proc/self/status").exists():
         pytest.skip("this machine does not tell its threads")
     for _ in range(3):
-        write_replay(log, mission, {"seed": 1}, tmp_path / "a.rrd")
+        write_replay(flown, {"seed": 1}, tmp_path / "a.rrd")
     threads, mib = used()
     num_tries = tries(20)
     for _ in range(num_tries):
-        write_replay(log, mission, {"seed": 1}, tmp_path / "a.rrd")
+        write_replay(flown, {"seed": 1}, tmp_path / "a.rrd")
     more_threads, more_mib = np.subtract(used(), (threads, mib))
     assert more_threads <= 0
     assert more_mib < 20 + 0.2 * num_tries

@@ -26,7 +26,7 @@ from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import paper
 from swarm_mj.mission.components import Components
 from swarm_mj.policies.gnn.packet_memory import empty_memory
-from swarm_mj.replay.recorder import replay_file
+from swarm_mj.replay.recorder import ON_DISK
 
 LIMITS = Limits(decisions=5, minutes=0.5, replay_every=3)
 RUN = TrainingRun(
@@ -148,7 +148,7 @@ def test_replays_of_a_training_are_counted():
     training = usual_settings("robot", paper("random-walk"), (40,))
     none = training_needs(training, Limits(decisions=1000))
     ten = training_needs(training, Limits(decisions=1000, replay_every=100))
-    each = replay_file(training.mission)
+    each = ON_DISK.of(training.mission, training.mission.num_windows)
     assert ten.file - none.file == pytest.approx(11 * each)
     assert ten.memory > none.memory
     assert ten.addresses > none.addresses

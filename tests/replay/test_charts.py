@@ -10,12 +10,11 @@ from swarm_mj.replay.charts import dendrogram, plots, radio_states
 @pytest.mark.parametrize("flight", ["two_way", "flooded"])
 def test_states_follow_a_plain_reading_of_the_log(flight, request):
     log = request.getfixturevalue(flight).log
-    states, state = radio_states(log)
-    names = list(states)
-    assert len(names) == (3 if log.is_broadcast else 5)
+    states = radio_states(log)
+    assert len(np.unique(states)) == (3 if log.facts.is_broadcast else 5)
     for t, i in np.ndindex(len(log.window), 12):
         is_heard, (to, answered) = np.any(log.heard[t, :, i] != i), log.recipient[t, :, i]
-        if log.is_broadcast:
+        if log.facts.is_broadcast:
             expected = "hears" if is_heard else "silent"
             expected = "transmits" if to != i or answered != i else expected
         elif to != i:
@@ -23,7 +22,7 @@ def test_states_follow_a_plain_reading_of_the_log(flight, request):
         else:
             expected = "overhears" if is_heard else "silent"
             expected = "answers" if answered != i else expected
-        assert names[state[t, i]] == expected
+        assert states[t, i] == expected
 
 
 def test_lanes_show_all_states_but_silence(replay):
@@ -71,7 +70,8 @@ def test_a_small_tree_by_hand():
 
 def test_edges_lead_from_hop_to_hop_and_no_two_robots_share_a_place(replay, two_way):
     log = two_way.log
-    known = dendrogram(log.parent, log.is_known, log.ego)[-1][log.is_known[-1]]
+    is_known = ~np.isnan(log.known_age)
+    known = dendrogram(log.parent, is_known, log.ego)[-1][is_known[-1]]
     assert len(np.unique(known, axis=0)) == len(known)
     strips = rows(replay, "/tree/edges", "LineStrips2D:strips", 2, 2)
     assert len(strips) == np.sum(log.has_parent)
@@ -107,8 +107,7 @@ def test_the_plot_of_the_world_has_shares_of_links_and_robots(blocked, blocked_r
         num_extra = len(is_weak) - num_weak
         weak.append(100.0 * num_weak / num_near)
         works.append(100.0 * num_extra / (num_near - num_weak + num_extra))
-        team = log.group[window - 1].tolist()
-        cut_off.append(100.0 * sum(of != team[4] for of in team) / 13)
+        cut_off.append(100.0 * log.is_cut_off[window - 1].tolist().count(True) / 13)
     shares = {curve.name: curve.values for curve in list(plots(log).values())[2]}
     for name, values in expected.items():
         np.testing.assert_allclose(shares[name], values)

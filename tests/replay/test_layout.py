@@ -82,8 +82,8 @@ def test_legend_and_views_name_what_the_mission_has(name, request):
 
 def test_no_mismatch_is_named_where_packets_only_fade(blocked, tmp_path):
     none = NO_MISMATCH._replace(window=blocked.log.mismatch.window)
-    log = replace(blocked.log, mismatch=none, group=np.zeros_like(blocked.log.group))
-    write_replay(log, blocked.mission, {"seed": 5}, tmp_path / "a.rrd")
+    log = replace(blocked.log, mismatch=none, is_cut_off=np.zeros_like(blocked.log.is_cut_off))
+    write_replay(log, {"seed": 5}, tmp_path / "a.rrd")
     assert texts(tmp_path / "a.rrd") == BROADCAST | BEYOND
 
 

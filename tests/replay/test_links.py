@@ -16,10 +16,10 @@ from swarm_mj.replay.links import (
     RISE,
     SEGMENTS,
     LinkMismatch,
+    PacketPaths,
     arcs,
     by_kind,
     divided,
-    packet_segments,
     radio_snapshot,
     shades,
     stride_of,
@@ -27,49 +27,44 @@ from swarm_mj.replay.links import (
 from swarm_mj.simulation.swarm import Swarm
 
 
+def rows_of(packets):
+    """Window, start and end of each packet, as tuples."""
+    return [tuple(each) for each in np.column_stack(packets).tolist()]
+
+
 def test_a_broadcast_leads_to_each_robot_that_decoded_it(flooded):
     log = flooded.log
     expected = [
-        (t, log.heard[t, slot, hearer], hearer)
+        (t, *log.position_m[t, log.heard[t, slot, hearer]], *log.position_m[t, hearer])
         for t, slot, hearer in np.ndindex(len(log.window), 2, 12)
         if log.heard[t, slot, hearer] != hearer
     ]
-    assert list(zip(*log.packets["heard"], strict=True)) == expected
+    assert list(log.packets) == ["heard"]
+    assert rows_of(log.packets["heard"]) == expected
 
 
 def test_answers_heard_or_not_are_the_delivered_requests_turned_round(two_way):
-    links = two_way.log.packets
-    requests = set(zip(*links["delivered"], strict=True))
+    packets = two_way.log.packets
+    assert list(packets) == ["overheard", "unanswered", "lost", "delivered", "answered"]
     answers = {
-        (row, receiver, sender)
+        (row, *end, *start)
         for fate in ("answered", "unanswered")
-        for row, sender, receiver in zip(*links[fate], strict=True)
+        for row, *start, x, y in rows_of(packets[fate])
+        for end in [(x, y)]
     }
-    assert answers == requests
-
-
-def test_segments_are_in_the_order_of_drawing_and_lost_ones_stop_short(two_way, flooded):
-    log = two_way.log
-    segments = packet_segments(log.packets, log.position_m)
-    assert list(segments) == ["overheard", "unanswered", "lost", "delivered", "answered"]
-    for fate, (row, start_m, end_m) in segments.items():
-        share, links = 0.6 if fate in ("lost", "unanswered") else 1.0, log.packets[fate]
-        start, end = (log.position_m[row, robot] for robot in (links.sender, links.receiver))
-        np.testing.assert_array_equal(row, links.row)
-        np.testing.assert_allclose(start_m, start)
-        np.testing.assert_allclose(end_m, share * end + (1.0 - share) * start)
-    assert list(packet_segments(flooded.log.packets, flooded.log.position_m)) == ["heard"]
+    assert answers == set(rows_of(packets["delivered"]))
 
 
 def test_an_arc_starts_and_ends_at_its_ends_and_is_highest_in_the_middle():
     start, end = np.array([[0.0, 0.0], [10.0, 5.0]]), np.array([[100.0, 0.0], [10.0, -35.0]])
-    points = arcs(start, end, 2.0)
+    packets = PacketPaths(np.array([0, 0]), start, end)
+    points = arcs(packets, 2.0)
     assert points.shape == (2, SEGMENTS + 1, 3)
     np.testing.assert_allclose(points[:, 0], np.pad(start, ((0, 0), (0, 1)), constant_values=2.0))
     np.testing.assert_allclose(points[:, -1], np.pad(end, ((0, 0), (0, 1)), constant_values=2.0))
     np.testing.assert_allclose(points[:, SEGMENTS // 2, 2], 2.0 + RISE * np.array([100.0, 40.0]))
     np.testing.assert_allclose(points[0, :, 1], 0.0)
-    assert arcs(start[:0], end[:0], 0.0).shape == (0, SEGMENTS + 1, 3)
+    np.testing.assert_allclose(arcs(packets, 2.0, 0.6)[:, -1, :2], 0.4 * start + 0.6 * end)
 
 
 CITY = {"arena": "blocks", "shadowing_db": 6.0, "num_robots": 14, "high_power_fraction": 0.3}

@@ -49,7 +49,7 @@ def test_a_complaint_names_the_file_and_the_way_out(tmp_path, name, complaint):
 
 def test_a_replay_without_facts_is_refused_in_one_line(two_way, tmp_path, monkeypatch):
     monkeypatch.setattr("swarm_mj.replay.write.FACTS", "other")
-    write_replay(two_way.log, two_way.mission, {"seed": 5}, tmp_path / "old.rrd")
+    write_replay(two_way.log, {"seed": 5}, tmp_path / "old.rrd")
     with pytest.raises(ValueError, match=r"old\.rrd does not hold .*; record it again"):
         read_footage(tmp_path / "old.rrd")
 

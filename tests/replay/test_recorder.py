@@ -5,9 +5,9 @@ import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.replay import recorder
+from swarm_mj.replay import palette, recorder
 from swarm_mj.replay.links import radio_snapshot
-from swarm_mj.replay.recorder import Recorder
+from swarm_mj.replay.recorder import Recorder, moment
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
 
@@ -33,9 +33,10 @@ def test_ages_are_those_of_the_buffers():
     np.testing.assert_array_equal(log.age, age)
     np.testing.assert_array_equal(log.ego_age, age[:, 2])
     np.testing.assert_allclose(log.age_mean, age.mean(axis=(1, 2)), rtol=1e-12)
-    first = log.ego_age[0]  # robots never heard of are as old as the mission
-    assert set(first[~log.is_known[0]]) == {1.0}
-    assert first[2] == 0.0
+    is_known = ~np.isnan(log.known_age)
+    np.testing.assert_array_equal(log.known_age[is_known], log.ego_age[is_known])
+    assert set(log.ego_age[0, ~is_known[0]]) == {1.0}  # as old as the mission
+    assert log.known_age[0, 2] == 0.0
 
 
 def test_statistics_are_of_the_robots_that_are_on():
@@ -61,7 +62,7 @@ def test_a_log_is_the_swarm_s_state_field_by_field():
             "velocity_variance_m2ps2": states.velocity_mps[0].var(axis=0).sum(),
             "believed_m": buffers.position_m[0, 3].copy(),
             "parent": buffers.parent[0, 3].copy(),
-            "is_known": buffers.timestamp[0, 3] > 0,
+            "is_other_known": (buffers.timestamp[0, 3] > 0) & (np.arange(6) != 3),
             "heard": [phase.heard[0].copy() for phase in swarm.phases],
         }
 
@@ -78,15 +79,15 @@ def test_snapshots_are_taken_every_few_windows_and_groups_stand_until_the_next()
     record, seen = flown(radio_snapshot, policy=("tdma",), **city)
     log = record.log()
     np.testing.assert_array_equal(log.mismatch.window, [1, 6, 11])
-    np.testing.assert_array_equal(log.group, [seen[5 * (w // 5)].group for w in range(12)])
+    groups = [seen[5 * (w // 5)].group for w in range(12)]
     for window in (1, 6, 11):
         shown, expected = log.mismatch.at(window), seen[window - 1].links
         expected["row"] = window // 5
         np.testing.assert_array_equal(shown, expected)
-    is_apart = np.array([[of != team[2] for of in team] for team in log.group])
+    is_apart = np.array([[of != team[2] for of in team] for team in groups])
     np.testing.assert_array_equal(log.is_cut_off, is_apart)
     kept = [*record._age, *(value for row in record._rows for value in row.values())]
-    found = sum(seen[w].links.nbytes for w in (0, 5, 10))
+    found = sum(seen[w].links.nbytes + seen[w].group.nbytes for w in (0, 5, 10))
     assert record.num_bytes == sum(each.nbytes for each in kept) + found
 
 
@@ -94,7 +95,8 @@ def test_free_space_has_no_snapshots_and_rows_keep_no_more_than_themselves():
     """A row that is a view would hold its whole matrix in memory."""
     record, _ = flown(ages)
     log = record.log()
-    assert (log.mismatch, log.group, np.any(log.is_cut_off)) == (None, None, False)
+    assert not log.is_compared
+    assert not np.any(log.is_cut_off)
     assert all(kept.base is None for kept in record._rows[0].values())
 
 
@@ -133,3 +135,64 @@ def test_an_ego_robot_must_exist_and_nothing_flown_is_no_log():
             Recorder(swarm, ego=ego)
     with pytest.raises(ValueError, match="at least 1 window"):
         Recorder(swarm).log()
+
+
+@pytest.fixture
+def swarm():
+    return Swarm(paper("flocking", num_robots=8, num_windows=20, failure_fraction=0.25), [3, 4])
+
+
+def test_before_the_first_window_everyone_is_grey_but_the_white_observer(swarm):
+    seen = moment(swarm, 1, observer=2)
+    np.testing.assert_array_equal(seen.position_m[0], swarm.states.position_m[1])
+    np.testing.assert_array_equal(seen.velocity_mps[0], swarm.states.velocity_mps[1])
+    expected = np.tile(np.array(palette.UNKNOWN), (8, 1))
+    expected[2] = palette.EGO
+    np.testing.assert_array_equal(seen.colours[0], expected)
+    assert all(len(packets.row) == 0 for packets in seen.packets.values())
+
+
+def test_a_live_picture_has_the_packets_of_the_last_window_of_its_mission(swarm):
+    policy = make_policy("random-flooding", swarm.mission, 0.3)
+    for _ in range(4):
+        swarm.step(policy)
+    packets = moment(swarm, 1).packets_at(0)["heard"]
+    where = swarm.states.position_m[1]
+    expected = [
+        (*where[phase.heard[1, j]], *where[j])
+        for phase in swarm.phases
+        for j in range(8)
+        if phase.heard[1, j] != j
+    ]
+    assert len(expected) > 0
+    np.testing.assert_allclose(np.hstack(packets[1:]), expected)
+
+
+def test_a_live_picture_shows_links_that_surprise_and_who_is_cut_off():
+    mission = paper("random-walk", num_robots=10, arena="blocks", shadowing_db=6.0)
+    city = Swarm(mission, [3, 4])
+    for _ in range(60):
+        city.move()
+    seen, shown = radio_snapshot(city, 1), moment(city, 1, observer=2)
+    weak = seen.links[seen.links["is_too_weak"]]
+    num_own = np.sum((weak["sender"] == 2) | (weak["receiver"] == 2))
+    assert num_own > 0
+    assert len(shown.mismatch_lines(0)[0]) == 4 * num_own + len(seen.links) - len(weak)
+    np.testing.assert_array_equal(shown.is_cut_off[0], seen.group != seen.group[2])
+
+
+def test_robots_that_failed_are_dark(swarm):
+    policy = make_policy("tdma", swarm.mission)
+    for _ in range(12):
+        swarm.step(policy)
+    is_off = ~swarm.states.is_active[0]
+    assert np.sum(is_off) == 2
+    is_dark = np.all(moment(swarm).colours[0] == palette.SWITCHED_OFF, axis=1)
+    np.testing.assert_array_equal(is_dark, is_off)
+
+
+def test_what_is_not_there_is_refused(swarm):
+    with pytest.raises(ValueError, match="observer must be from 0 to 7, not 8"):
+        moment(swarm, observer=8)
+    with pytest.raises(ValueError, match="index must be from 0 to 1, not 2"):
+        moment(swarm, 2)

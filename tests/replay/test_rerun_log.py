@@ -15,8 +15,9 @@ OTHERS = {"scene/world/cut_off"}  # solids, whose width is in metres
 def test_every_layer_is_drawn_by_some_mission_and_nothing_else(
     replay, flood_replay, blocked_replay, two_way, tmp_path
 ):
-    unbounded = replace(two_way.mission, boundary="none")
-    write_replay(two_way.log, unbounded, {"seed": 5}, tmp_path / "free.rrd")
+    log, facts = two_way.log, two_way.log.facts
+    facts = replace(facts, mission=replace(facts.mission, boundary="none"))
+    write_replay(replace(log, facts=facts), {"seed": 5}, tmp_path / "free.rrd")
     paths = (replay, flood_replay, blocked_replay, tmp_path / "free.rrd")
     found = {entity for path in paths for entity in entities(path) if entity.startswith(DRAWN)}
     assert {entity.removeprefix("/") for entity in found} - OTHERS == set(LAYERS)

@@ -16,7 +16,7 @@ from swarm_mj.replay.write import write_replay
 
 
 def test_walls_and_floor_are_the_model_s_and_north_is_up(replay, two_way):
-    half = two_way.mission.half_side_m
+    half = two_way.log.facts.mission.half_side_m
     east = static(replay, "/scene/area/wall_east", "Boxes3D:half_sizes")
     np.testing.assert_allclose(east, [2.0, half + 4.0, 5.0], rtol=1e-6)
     floor = static(replay, "/scene/area/floor", "Boxes3D:half_sizes")
@@ -38,7 +38,7 @@ def test_the_city_s_blocks_are_on_the_map_and_say_their_loss(blocked, blocked_re
     strips = static(blocked_replay, "/arena/world/obstacle", "LineStrips2D:strips")
     outlines = np.array(strips.tolist()).reshape(9, 5, 2)
     np.testing.assert_allclose(np.ptp(outlines, axis=1), BLOCK_M, rtol=1e-5)
-    assert np.abs(outlines).max() < blocked.mission.half_side_m
+    assert np.abs(outlines).max() < blocked.log.facts.mission.half_side_m
     blocks = {path for path in entities(blocked_replay) if path.startswith("/scene/area/geom")}
     assert len(blocks) == 9
     assert {float(static(blocked_replay, path, "loss_db")[0]) for path in blocks} == {25.0}
@@ -48,7 +48,7 @@ def test_a_scene_of_one_s_own_is_drawn(two_way, tmp_path):
     def town(spec, _mission):
         spec.worldbody.add_geom(name="house", type=mjtGeom.mjGEOM_BOX, size=[5, 6, 10])
 
-    write_replay(replace(two_way.log, scene=town), two_way.mission, {"seed": 5}, tmp_path / "a.rrd")
+    write_replay(replace(two_way.log, scene=town), {"seed": 5}, tmp_path / "a.rrd")
     size = static(tmp_path / "a.rrd", "/scene/area/house", "Boxes3D:half_sizes")
     assert size.tolist() == [5, 6, 10]
 

@@ -60,7 +60,7 @@ def draw_title(
     time = f"{now * mission.window_s:.1f} s, window {now}"
     draw.text((right, below), time, palette.SENT, small, anchor="ra")
     if (num := int(np.sum(footage.is_cut_off[row]))) > 0:
-        text = f"{num} cut off from r{facts.observer}"
+        text = f"{num} cut off from r{footage.ego}"
         draw.text((right, below + size), text, palette.TOO_WEAK, small, anchor="ra")
 
 
@@ -92,12 +92,12 @@ def draw_legend(draw: ImageDraw, footages: Sequence[Footage], box: Box, size: in
 
 
 def _observers(footages: Sequence[Footage]) -> str:
-    return " and ".join(dict.fromkeys(f"r{each.facts.observer}" for each in footages))
+    return " and ".join(dict.fromkeys(f"r{each.ego}" for each in footages))
 
 
 def _samples(footages: Sequence[Footage], observers: str) -> dict[str, Colour]:
     samples = {"never heard of": palette.UNKNOWN}
-    if any(np.any(each.velocity_mps) for each in footages):
+    if any(each.has_motion for each in footages):
         samples["heading"] = palette.HEADING
     if any(each.facts.is_broadcast for each in footages):
         samples["packet heard"] = palette.BROADCAST

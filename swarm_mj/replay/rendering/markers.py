@@ -84,8 +84,9 @@ def draw_markers(scene: MjvScene, footage: Footage, row: int, camera: Camera) ->
     picture_m = max(camera.height, SMALLEST) * camera.pixel_m
     line_pixels = LINE * max(camera.height, SMALLEST)
     _draw_robots(scene, footage, row, picture_m, line_pixels)
-    for start_m, end_m, colour in footage.packets(row):
-        for points in arcs(start_m, end_m, ROBOT * picture_m):
+    for fate, packets in footage.packets_at(row).items():
+        colour, share = palette.PACKETS[fate]
+        for points in arcs(packets, ROBOT * picture_m, share):
             for start, end in itertools.pairwise(points):
                 _add_line(scene, start, end, colour, line_pixels)
     # Last, for of very dense teams there is no room for all; robots and packets go first.
@@ -99,11 +100,11 @@ def draw_markers(scene: MjvScene, footage: Footage, row: int, camera: Camera) ->
 def _draw_robots(
     scene: MjvScene, footage: Footage, row: int, picture_m: float, line_pixels: float
 ) -> None:
-    velocity_mps, colours = footage.velocity_mps[row], footage.colours(row)
+    velocity_mps, colours = footage.velocity_mps[row], footage.colours[row]
     speed = np.linalg.norm(velocity_mps, axis=1, keepdims=True)
     way_m = HEADING * picture_m * velocity_mps / np.maximum(speed, 1e-9)
     for i, (where, way) in enumerate(zip(footage.position_m[row], way_m, strict=True)):
-        radius_m = (OBSERVER if i == footage.facts.observer else ROBOT) * picture_m
+        radius_m = (OBSERVER if i == footage.ego else ROBOT) * picture_m
         height_m = ROBOT_HEIGHT * radius_m
         _add_disc(scene, np.append(where, height_m), radius_m, radius_m, colours[i])
         if footage.is_cut_off[row, i]:

@@ -113,7 +113,7 @@ def make_video(
 ) -> bytes:
     """Return the file of a video of one mission, or of two side by side.
 
-    Footages are from `footage_of` or `read_footage`; `on_picture` is called after each picture.
+    Footages are logs, or from `read_footage`; `on_picture` is called after each picture.
     Raise ValueError for more missions, another suffix, or more pictures per second than a GIF can
     show, and OSError if no OpenGL works here.
     """

@@ -10,7 +10,6 @@ import pytest
 from PIL import Image, ImageSequence
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.footage import footage_of
 from swarm_mj.replay.links import NO_MISMATCH
 from swarm_mj.replay.rendering.video import Movie, encode_gif, encode_mp4, make_video
 from swarm_mj.replay.view import VideoStyle
@@ -23,7 +22,7 @@ STYLE = VideoStyle(width=480, height=320, seconds=1.0, fps=6)
 @pytest.fixture(scope="module")
 def team(two_way):
     """30 windows of 12 robots."""
-    return footage_of(two_way.log, two_way.mission, "mst", 5)
+    return two_way.log
 
 
 @with_opengl
@@ -68,7 +67,7 @@ def test_a_mission_s_video_has_all_pictures(team, suffix):
 
 @with_opengl
 def test_links_that_surprise_and_their_shortfalls_are_seen(blocked):
-    city = footage_of(blocked.log, blocked.mission, "random-flooding", 5)
+    city = blocked.log
     row = max(range(30), key=lambda row: len(city.shortfalls(row)[1]))
     is_cut_off = np.zeros_like(city.is_cut_off)
     without = replace(city, mismatch=NO_MISMATCH, is_cut_off=is_cut_off)
