@@ -21,7 +21,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from torch import Tensor
 
 from swarm_mj.learning.graph_vec_env import env_of
-from swarm_mj.learning.ppo import GnnActorCritic
+from swarm_mj.learning.ppo import policy_of
 from swarm_mj.learning.selection import NUM_BEST, Progress, candidates
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.network import AggregationGnn
@@ -117,12 +117,6 @@ def load(path: Path, training: Training, model: PPO) -> tuple[Progress, Networks
         raise ValueError(f"{said}; begin a new run with another --out") from error
 
 
-def acting_network(model: PPO) -> AggregationGnn:
-    """Return a copy of the network that acts."""
-    assert isinstance(model.policy, GnnActorCritic)
-    return model.policy.acting_network()
-
-
 def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
     """Put a model and its missions back to a state; return the run's progress and candidates.
 
@@ -135,7 +129,7 @@ def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
     if rest:
         raise ValueError(f"its {progress.decisions} decisions are no whole rollouts")
     kept = [int(row["decisions"]) for row in candidates(progress.curve)]
-    networks = {at: acting_network(model) for at in kept}
+    networks = {at: policy_of(model).acting_network() for at in kept}
     _check(state, plain, model, networks)
     for at, network in networks.items():
         network.load_state_dict(state["candidates"][at])

@@ -60,6 +60,12 @@ def make_model(training: Training) -> PPO:
     return model
 
 
+def policy_of(model: PPO) -> "GnnActorCritic":
+    """Return a model's networks."""
+    assert isinstance(model.policy, GnnActorCritic)
+    return model.policy
+
+
 def _batch_size(training: Training, num_envs: int) -> int:
     """Return the rows of a minibatch, at least 2: of one row, advantages have no spread."""
     num_rows, num_minibatches = num_envs * training.ppo.num_steps, training.ppo.num_minibatches

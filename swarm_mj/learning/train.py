@@ -13,7 +13,7 @@ from stable_baselines3.common.logger import configure
 
 from swarm_mj.learning import checkpoint, held_out, run_folder, selection
 from swarm_mj.learning.graph_vec_env import env_of
-from swarm_mj.learning.ppo import GnnActorCritic, make_model
+from swarm_mj.learning.ppo import make_model, policy_of
 from swarm_mj.learning.run_folder import CHECKPOINT, CURVE, INIT, REPLAYS, SETTINGS, TrainingRun
 from swarm_mj.learning.selection import Accumulator, Choice, Listener, Progress, Row
 from swarm_mj.policies.policy_config import GnnConfig
@@ -66,9 +66,12 @@ class TrainingSession(BaseCallback):
         self._run, self._training = run, run.training
         self._folder, self._listener = folder, listener
         self.ppo = make_model(run.training)
-        self._env, self._aoi, self._goes_on = env_of(self.ppo), math.nan, True
+        self._env = env_of(self.ppo)
+        self._aoi = math.nan
+        self._goes_on = True
         self.progress, self._networks = Progress(), checkpoint.Networks()
-        kept, own, init = folder / CHECKPOINT, folder / INIT, None
+        kept, own = folder / CHECKPOINT, folder / INIT
+        init = None
         # Nothing is written before all that is read has been checked.
         if kept.exists():
             self.progress, self._networks = checkpoint.load(kept, run.training, self.ppo)
@@ -83,12 +86,12 @@ class TrainingSession(BaseCallback):
             self.progress.write_curve(folder / CURVE)  # the file may be ahead of the checkpoint
         if init is not None:
             network, config = init
-            assert isinstance(self.ppo.policy, GnnActorCritic)
-            self.ppo.policy.take_acting_network(network)
+            policy_of(self.ppo).take_acting_network(network)
             if not own.exists():
                 save_policy(own, network, config)
         self.ppo.set_logger(configure(str(folder / run_folder.TENSORBOARD), ["tensorboard"]))
-        self._counted_s, self._saved_s = time.monotonic(), -math.inf  # counted: in the progress
+        self._counted_s = time.monotonic()  # until when time is in the progress
+        self._saved_s = -math.inf
 
     def learn(self) -> None:
         """Alternate rollouts and passes over them until a limit or the listener ends it (III-C)."""
@@ -166,7 +169,7 @@ class TrainingSession(BaseCallback):
             self._evaluate()
         every = self._run.limits.replay_every
         if every and decisions >= progress.next_replay and self._goes_on:
-            network = checkpoint.acting_network(self.ppo)
+            network = policy_of(self.ppo).acting_network()
             held_out.record_replay(self._training, network, decisions, self._folder / REPLAYS)
             progress.next_replay = decisions - decisions % every + every
         is_old = time.monotonic() - self._saved_s >= self._run.limits.checkpoint_every_s
@@ -183,7 +186,7 @@ class TrainingSession(BaseCallback):
     def _evaluate(self) -> None:
         """Fly the held-out missions, log, and keep the policy if it is the best."""
         progress, training = self.progress, self._training
-        decisions, network = progress.decisions, checkpoint.acting_network(self.ppo)
+        decisions, network = progress.decisions, policy_of(self.ppo).acting_network()
         try:
             flies_others = partial(self._report, "Flying others")
             others = held_out.reference_columns(training, progress.curve, flies_others)

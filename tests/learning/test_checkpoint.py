@@ -11,8 +11,8 @@ import pytest
 import torch
 from small_runs import difference, run, small_training
 
-from swarm_mj.learning.checkpoint import IN_A_ROW, acting_network, load, restore, save
-from swarm_mj.learning.ppo import make_model
+from swarm_mj.learning.checkpoint import IN_A_ROW, load, restore, save
+from swarm_mj.learning.ppo import make_model, policy_of
 from swarm_mj.learning.run_folder import CHECKPOINT
 from swarm_mj.learning.selection import Accumulator, Progress
 
@@ -80,12 +80,12 @@ def test_progress_comes_back_to_the_last_bit(tmp_path):
     )
     model = make_model(TRAINING)
     model._last_episode_starts = np.ones(model.n_envs, dtype=bool)
-    save(tmp_path / "c.pt", TRAINING, model, progress, {0: acting_network(model)})
+    save(tmp_path / "c.pt", TRAINING, model, progress, {0: policy_of(model).acting_network()})
     again, networks = load(tmp_path / "c.pt", TRAINING, make_model(TRAINING))
     assert math.isnan(again.curve[1].pop("train/explained_variance"))
     progress.curve[1].pop("train/explained_variance")
     assert again == progress
-    assert not difference(networks[0].state_dict(), acting_network(model).state_dict())
+    assert not difference(networks[0].state_dict(), policy_of(model).acting_network().state_dict())
 
 
 def test_one_that_would_grow_when_it_is_read_is_refused(kept, tmp_path):

@@ -56,12 +56,9 @@ def test_what_is_no_settings_is_refused(tmp_path, text):
     [
         ((), {"format_version": 3}, "format_version is 3, and this swarm_mj reads 2"),
         (("training",), {"seed": "3"}, r"Expected `int`, got `str` - at `.*seed`"),
-        (("training",), {"missions": True}, r"Expected `int`, got `bool` - at `.*missions`"),
         (("training", "ppo"), {"clip": None}, r"Expected `float`, got `null` - at `.*clip`"),
-        (("training",), {"robots": ["4"]}, r"Expected `int`, got `str` - at `.*robots.*`"),
         (("training",), {"arm": "team"}, "an earlier version: .*`arm`"),
         (("training", "network"), {"latent": 0}, "latent must be a whole number from 1 to"),
-        (("limits",), {"wings": 2}, "wings"),
     ],
 )
 def test_settings_of_another_kind_are_refused(tmp_path, part, changes, complaint):

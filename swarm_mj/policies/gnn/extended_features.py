@@ -13,7 +13,6 @@ from jaxtyping import Bool, Float, Float32, Int, Shaped
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.gnn.packet_memory import Memory, empty_memory, log_age, logarithm, remember
-from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.free_space import from_db
 from swarm_mj.radio.spatial_reuse import believes_as_the_last, write_joined
@@ -137,17 +136,16 @@ def _write_ages_and_news(
     for b in range(num_missions):
         rank = (np.arange(num_robots) - int(now[b])) % num_robots / num_robots
         for i in range(num_robots):
-            own, said, news, unsaid_news = memory.timestamp[b, i], memory.said[b, i], 0.0, 0.0
+            own, said = memory.timestamp[b, i], memory.said[b, i]
+            news = unsaid_news = 0.0
             num_known = np.sum(is_observed[b, i]) + (not is_observed[b, i, i])
             known_share = num_known / num_robots
             for k in range(num_robots):
-                of_k, observed = node[b, i, k], memory.timestamp[b, i, k]
-                heard, addressed = memory.heard[b, i, k], memory.addressed_by[b, i, k]
-                attempt = last_attempt[b, i, k]
-                of_k.timestamp_age = log_age(now[b], observed, is_observed[b, i, k])
-                of_k.heard_age = log_age(now[b], heard, heard > NEVER)
-                of_k.attempt_age = log_age(now[b], attempt, attempt > NEVER)
-                of_k.addressed_age = log_age(now[b], addressed, addressed > NEVER)
+                of_k = node[b, i, k]
+                of_k.timestamp_age = log_age(now[b], own[k], is_observed[b, i, k])
+                of_k.heard_age = log_age(now[b], memory.heard[b, i, k])
+                of_k.attempt_age = log_age(now[b], last_attempt[b, i, k])
+                of_k.addressed_age = log_age(now[b], memory.addressed_by[b, i, k])
                 ranges = math.sqrt(squared_distance(believed_m[b, i], k, i)) / range_m
                 is_known = k == i or is_observed[b, i, k]
                 may_address[b, i, k] = not is_known or ranges <= ADDRESS_RANGES
@@ -163,9 +161,9 @@ def _write_ages_and_news(
                     unsaid_news += of_k.unsaid_news
                     of_k.news, of_k.unsaid_news = logarithm(of_k.news), logarithm(of_k.unsaid_news)
             # Of oneself at the end: a choice in the loop would double the time that it takes.
-            sent = memory.sent[b, i]
-            node[b, i, i].heard_age = log_age(now[b], sent, sent > NEVER)
-            node[b, i, i].news, node[b, i, i].unsaid_news = logarithm(news), logarithm(unsaid_news)
+            of_itself = node[b, i, i]
+            of_itself.heard_age = log_age(now[b], memory.sent[b, i])
+            of_itself.news, of_itself.unsaid_news = logarithm(news), logarithm(unsaid_news)
 
 
 @compiled(fastmath=True)

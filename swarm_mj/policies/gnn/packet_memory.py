@@ -90,10 +90,13 @@ LOG_AGES = np.array([math.log1p(n / 2) / math.log1p(LONG_WINDOWS) for n in range
 
 
 @compiled()
-def log_age(now: float, then: float, ever: bool) -> float:
-    """Return the age on this scale: 0 is now, 1 is long ago or never."""
+def log_age(now: float, then: float, is_granted: bool = False) -> float:
+    """Return the age on this scale: 0 is now, 1 is long ago.
+
+    What happened at `NEVER` did not happen, so its age is 1, unless it was granted at the start.
+    """
     age = now - then
-    if not ever or age >= LONG_WINDOWS:
+    if not (then > NEVER or is_granted) or age >= LONG_WINDOWS:
         return 1.0
     place = int(2.0 * age)
     return LOG_AGES[place] if place == 2.0 * age and place >= 0 else logarithm(age)

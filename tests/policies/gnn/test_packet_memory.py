@@ -80,7 +80,7 @@ def test_alg1_memory_is_what_was_sent_and_decoded(make, task):
 
 @pytest.mark.parametrize("age", [0.0, 0.5, 1.0, 17.5, 499.5, 0.3, 499.9, 500.0, 2_000.5])
 def test_ages_count_by_their_logarithm_whether_they_are_looked_up_or_not(age):
-    assert log_age(3_000.0, 3_000.0 - age, True) == pytest.approx(
-        min(1.0, math.log(1 + age) / math.log(501))
-    )
-    assert log_age(age, 0.0, False) == 1.0  # never
+    expected = pytest.approx(min(1.0, math.log(1 + age) / math.log(501)))
+    assert log_age(3_000.0, 3_000.0 - age) == expected
+    assert log_age(age, 0.0) == 1.0  # never
+    assert log_age(age, 0.0, True) == expected  # granted at the start
