@@ -175,12 +175,7 @@ def _planning(mission: Mission) -> Callable[[], object]:
     def plan() -> object:
         """Plan the next epoch of one robot's snapshot."""
         snapshots = take_snapshots(
-            buffers,
-            0,
-            seen,
-            now=now,
-            window_s=mission.window_s,
-            windows_ahead=num_windows / 2.0,
+            buffers, 0, seen, now=now, window_s=mission.window_s, windows_ahead=num_windows / 2.0
         )
         planned = epoch_plan(
             snapshots,

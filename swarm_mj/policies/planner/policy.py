@@ -151,12 +151,7 @@ class _Team:
                 chosen = self._discovery.transmits(slot, views.buffers, b)
             elif purpose == "search":
                 chosen = self._discovery.seeks(
-                    slot,
-                    views.buffers,
-                    b,
-                    is_fresh=is_fresh,
-                    was_fresh=was_fresh,
-                    heard=heard,
+                    slot, views.buffers, b, is_fresh=is_fresh, was_fresh=was_fresh, heard=heard
                 )
             else:
                 chosen = plan.transmits(slot - SLOTS_PER_WINDOW * self._begin)

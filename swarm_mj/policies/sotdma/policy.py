@@ -117,7 +117,7 @@ class SotdmaTeam:
         # A robot observes itself as it transmits, so T says in which slot it last did.
         ends = np.rint(SLOTS_PER_WINDOW * buffers.timestamp[b]).astype(np.int64)
         table, known = self.table, ends - 1 - self._first_slot
-        slot_table.read_packets(table, heard, known, buffers.parent[b], slot - 1)
+        slot_table.read_packets(table, heard, known, buffers.parent[b], slot - 1, rule)
         slot_table.read_slots(table, known, rule)
         for i in self._choosers(slot):
             table.slots[i, i] = chosen(
@@ -137,7 +137,7 @@ class SotdmaTeam:
             transmits = needs & (draw < rule.contention_probability)
         else:
             transmits = np.diagonal(table.slots) == place
-        table.sent[transmits], table.sent_place[transmits] = slot, place
+        table.sent[transmits] = slot
         return transmits
 
     def _first_slots(

@@ -29,7 +29,6 @@ class SlotTable(NamedTuple):
     decoded: Int32[np.ndarray, "N N"]  # when it last decoded a packet of each
     got_through: Int32[np.ndarray, "N N"]  # its own last packet that such a packet knew of
     sent: Int[np.ndarray, "N"]  # when it last transmitted itself
-    sent_place: Int[np.ndarray, "N"]  # and where in the frame
     outbound_delivery_ratio: Float[np.ndarray, "N"]  # recent share of its packets that arrived
     judged: Int32[np.ndarray, "N N"]  # the last of its packets of which it learned whether
     missed: Int8[np.ndarray, "N F N"]  # how many of a slot, in a row, a neighbour did not decode
@@ -45,7 +44,6 @@ def empty_table(slots: Int[np.ndarray, "N N"], num_slots: int) -> SlotTable:
         decoded=np.full(pairs, LONG_AGO, dtype=np.int32),
         got_through=np.full(pairs, LONG_AGO, dtype=np.int32),
         sent=np.full(num_robots, LONG_AGO),
-        sent_place=np.full(num_robots, NO_PLACE),
         outbound_delivery_ratio=np.ones(num_robots),
         judged=np.full(pairs, LONG_AGO, dtype=np.int32),
         missed=np.zeros((num_robots, num_slots, num_robots), dtype=np.int8),
@@ -80,6 +78,7 @@ def read_packets(
     known: Int[np.ndarray, "N N"],
     parent: Int[np.ndarray, "N N"],
     slot: int,
+    rule: Rule,
 ) -> None:
     """Note what the packets decoded in this slot, the last, say of the receiver's own.
 
@@ -90,7 +89,8 @@ def read_packets(
         if j == i:
             continue
         table.decoded[i, j], table.got_through[i, j] = slot, known[j, i]
-        sent, place = table.sent[i], table.sent_place[i]
+        sent = table.sent[i]
+        place = place_of(sent, rule)
         # A packet counts once per neighbour, however often that one repeats what it knows.
         is_due = 0 <= sent < slot and table.judged[i, j] < sent
         if place == NO_PLACE or not is_due:

@@ -51,44 +51,45 @@ def hear(table, slot, sender, known_until, passed_by):
     """Robot 0 decodes a packet that says what its sender knows of it: T, and P."""
     known, parent = np.full((3, 3), -1), np.full((3, 3), -1)
     known[sender, 0], parent[sender, 0] = known_until, passed_by
-    read_packets(table, np.array([sender, 1, 2]), known, parent, slot)
+    read_packets(table, np.array([sender, 1, 2]), known, parent, slot, RULE)
 
 
 def test_a_packet_tells_whether_its_sender_decoded_ones_own():
-    """Robot 0 transmitted in slot 14, place 0. Robot 1 decoded it; robot 2 knows of slot 10 only,
+    """Robot 0 transmitted in slot 14, place 2. Robot 1 decoded it; robot 2 knows of slot 10 only,
     and says so twice; then again, of what was sent in slot 18, it was told by robot 1."""
     table = memory()
-    table.sent[0], table.sent_place[0] = 14, 0
+    table.sent[0] = 14
     hear(table, 15, 1, 14, 1)
     hear(table, 16, 2, 10, 2)
     hear(table, 17, 2, 10, 2)
-    assert table.missed[0, 0].tolist() == [0, 0, 1]
-    assert table.missed_at[0].tolist() == [16, LONG_AGO, LONG_AGO]
+    assert table.missed[0, 2].tolist() == [0, 0, 1]
+    assert table.missed_at[0].tolist() == [LONG_AGO, LONG_AGO, 16]
     assert table.decoded[0].tolist() == [LONG_AGO, 15, 17]
     assert table.got_through[0].tolist() == [LONG_AGO, 14, 10]
     assert table.outbound_delivery_ratio[0] == pytest.approx(0.9)
     table.sent[0] = 18
     hear(table, 19, 2, 18, 1)
-    assert table.missed[0, 0].tolist() == [0, 0, 2]
+    assert table.missed[0, 2].tolist() == [0, 0, 2]
     table.sent[0] = 22
     hear(table, 23, 2, 22, 2)
-    assert table.missed[0, 0].tolist() == [0, 0, 0]
-    assert np.all(table.missed[0, 1:] == 0)
+    assert table.missed[0, 2].tolist() == [0, 0, 0]
+    assert np.all(table.missed[0, :2] == 0)
 
 
 def test_misses_are_counted_up_to_a_hundred():
     table = memory()
     for n in range(150):
-        table.sent[0], table.sent_place[0] = 10 + 4 * n, 0
+        table.sent[0] = 10 + 4 * n
         hear(table, 12 + 4 * n, 1, 5, 1)
-    assert table.missed[0, 0, 1] == 100
+    assert table.missed[0, 2, 1] == 100
 
 
-@pytest.mark.parametrize(("sent", "place"), [(-1, 0), (14, NO_PLACE), (15, 0)])
-def test_a_packet_says_nothing_of_what_was_sent_in_no_frame_or_just_now(sent, place):
+@pytest.mark.parametrize("sent", [-1, 11, 16])
+def test_a_packet_says_nothing_of_what_was_sent_in_no_frame_or_just_now(sent):
+    """Before the first frame; in slot 11, the fourth of its four; in this slot."""
     table = memory()
-    table.sent[0], table.sent_place[0] = sent, place
-    hear(table, 15, 1, 5, 1)
+    table.sent[0] = sent
+    hear(table, 16, 1, 5, 1)
     assert not np.any(table.missed)
     assert table.outbound_delivery_ratio[0] == 1.0
 
